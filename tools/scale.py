@@ -116,8 +116,8 @@ def do_stages(config: str, invent: str) -> None:
         begin = sum(os.times()[:4])  # of this process and of those that do a job's tasks
         if invent == "invent" and stage == "solve":
             note = checked_json.read(tasks)
-            for family in note["content"]["families"]:
-                write_invented(Path(note["content"]["folder"]) / f"{family['name']}.h5", family["scenes"])
+            for family in note["content"]["files"]:
+                write_invented(Path(note["content"]["folder"]) / f"{family['name']}.h5", family["tasks"])
             records.write(done, digest, note["products"])
         else:
             run_tasks.main(str(tasks), str(done), digest)

@@ -16,14 +16,13 @@ import netCDF4
 import numpy as np
 import xarray
 
-from springtune.registry import imported
 from springtune.safe_io.atomic import remove_unfinished
 from springtune.studies.kinds import load_study
-from springtune.studies.kinds.benchmark import stage as benchmark
-from springtune.studies.kinds.laying import stage as laying
-from springtune.studies.runs import checked_json, rerun, store
+from springtune.studies.kinds.benchmark import solve as benchmark
+from springtune.studies.kinds.laying import solve as laying
+from springtune.studies.runs import checked_json, driver, rerun, store
 from springtune.studies.runs.plan import plan
-from springtune.studies.runs.task_costs import Spent
+from springtune.studies.runs.task_costs import TaskCosts
 
 from campaigns import Campaign
 
@@ -46,10 +45,10 @@ def warm_up(scratch):
 
     What takes longest is not computed again after that: here it is about what becomes of files.
     """
-    for module, name in ((benchmark, "_case"), (laying, "_lay")):
-        setattr(module, name, _remembered(getattr(module, name)))
+    for module in (benchmark, laying):
+        module.solve = _remembered(module.solve)
     for job in plan(load_study(STUDY), scratch, 1).jobs.values():
-        imported(job.stage.module).run(job.content, Spent())
+        driver.run(job.stage.module, job.content, TaskCosts())
 
 
 def _remembered(function):

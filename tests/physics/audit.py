@@ -47,7 +47,7 @@ from springtune.problem.loads import LOADS
 from springtune.problem.materials import Material
 from springtune.scene.sheet import Loading, Sheet, solved
 from springtune.springs import DEFINITIONS, DefinitionError
-from springtune.studies.kinds.scenes.solve import solve as solve_scene
+from springtune.studies.kinds.scenes.solve import solved as solve_scene
 
 PROMISED = 1e-6
 """Largest error of the displacements of a solved scene, relative: `springtune.mechanics.newton.CORRECTION`."""

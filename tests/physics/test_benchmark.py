@@ -26,10 +26,10 @@ from springtune.reference.small_strain import solve_small_strain
 from springtune.springs.lattice import half_weight
 from springtune.studies.kinds.benchmark import measure as benchmark
 from springtune.studies.kinds.benchmark.approaches import APPROACHES
+from springtune.studies.kinds.benchmark.collect import BENCHMARK
 from springtune.studies.kinds.benchmark.measure import LoadedBeam
 from springtune.studies.kinds.benchmark.names import OTHER_APPROACHES, approach_names
 from springtune.studies.kinds.benchmark.tables import comparison
-from springtune.studies.kinds.benchmark.variables import BENCHMARK
 
 BEAM = Beam(0.1, 0.02, 1e-3, "100x20")
 SCENES = {

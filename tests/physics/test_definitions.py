@@ -17,9 +17,8 @@ from springtune.springs.base import not_negative
 from springtune.springs.fitting import least_squares
 from springtune.springs.identification import Misfit, patch_cases
 from springtune.springs.lattice import predicted_stiffness
-from springtune.studies.kinds.moduli import stage as moduli
-from springtune.studies.runs import store
-from springtune.studies.runs.task_costs import Spent
+from springtune.studies.runs import driver, store
+from springtune.studies.runs.task_costs import TaskCosts
 
 HEIGHT, SIZE = 20e-3, 2e-3
 RATIOS = (0.3, 1 / 3, 0.49)
@@ -515,8 +514,8 @@ def test_stage_measures_the_mesh_that_is_made(tmp_path, mesh_type):
     """Rows fitted to a box are no exact lattice: on 100 x 20 mm at 2 mm, E is off by +3.3 % and nu is .356."""
     box = {"length": 0.1, "height": HEIGHT}
     asked = [{"key": "one", "definition": "lattice", "poisson_ratio": 0.3}]
-    task = {"name": "one", "mesh": box | {"mesh_type": mesh_type, "mesh_size": SIZE}, "measurements": asked}
-    moduli.run({"folder": str(tmp_path), "patches": [task]}, Spent())
+    patch = {"name": "one", "mesh": box | {"mesh_type": mesh_type, "mesh_size": SIZE}, "tasks": asked}
+    driver.run("studies.kinds.moduli.solve", {"folder": str(tmp_path), "files": [patch]}, TaskCosts())
     found = store.read(tmp_path / "one.h5", ["one"])["one"]
     young, ratio, shear = errors("lattice", MESH_TYPES[mesh_type](**box, size=SIZE), 0.3)
     measured = found["young_modulus_error"], found["effective_poisson_ratio"], found["shear_modulus_error"]

@@ -21,7 +21,7 @@ from springtune.problem.status import Status
 from springtune.reference.small_strain import solve_small_strain
 from springtune.scene.sheet import Sheet
 from springtune.springs import DEFINITIONS, DefinitionError
-from springtune.studies.kinds.scenes.solve import solve
+from springtune.studies.kinds.scenes.solve import solved as solve_scene
 
 # Random beams may be thicker than they are high: thickness is a factor.
 pytestmark = pytest.mark.filterwarnings("ignore::springtune.problem.geometry.AssumptionWarning")
@@ -135,7 +135,7 @@ class TestWhatClosedFormsGotWrong:
             "kinematics": "linear",
             "reference": {},
         }  # fmt: skip
-        result = solve(Sheet(mesh, beam.thickness), scene)
+        result = solve_scene(Sheet(mesh, beam.thickness), scene)
         assert result["status"] == Status.SOLVED
         return result["displacement"] / solve_small_strain(beam, material, 3.0, kind=LOADS[load].kind).displacement - 1
 

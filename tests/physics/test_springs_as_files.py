@@ -16,7 +16,7 @@ from springtune.handover import paraview
 from springtune.handover.formats import ENDINGS
 from springtune.mechanics.energies import AngleEnergy, AreaEnergy
 from springtune.mechanics.integrators import EXPLICIT, IMPLICIT
-from springtune.studies.kinds.scenes.solve import solve
+from springtune.studies.kinds.scenes.solve import solved
 from springtune.studies.kinds.scenes.stored_scene import packed, unpacked
 
 STEEL = st.Material("210 GPa", 0.3, density="7850 kg/m^3", name="steel")
@@ -384,7 +384,7 @@ def test_fields_of_a_study_are_those_of_a_result(definition, mesh_type, kinemati
     scene = scene_of(definition, mesh_type, kinematics=kinematics)
     task = {"definition": definition, "material": asdict(STEEL), "kind": scene.kind.name, "follower": False}
     task |= {"force": scene.force, "kinematics": kinematics, "keep_fields": True}
-    stored = unpacked(packed(solve(scene.sheet, task)))
+    stored = unpacked(packed(solved(scene.sheet, task)))
     result = scene.solve()
     assert (stored["spring_stiffnesses"] == result.stiffness.astype("float32")).all()
     assert np.allclose(stored["spring_forces"], result.spring_forces, rtol=1e-6, atol=1e-6 * 20e3)

@@ -11,15 +11,13 @@ import meshio
 import netCDF4
 import numpy as np
 
-from springtune.registry import imported
-
 sys.path.append(str(Path(__file__).parents[1] / "unit"))  # for `campaigns`, where this is a program
 
 from springtune.mesh import MESH_TYPES
 from springtune.springs import DEFINITIONS
-from springtune.studies.runs import checked_json, records, rerun, run_tasks
+from springtune.studies.runs import checked_json, driver, records, rerun, run_tasks
 from springtune.studies.runs.dependencies import CODE_FILE, OURS
-from springtune.studies.runs.task_costs import Spent
+from springtune.studies.runs.task_costs import TaskCosts
 
 from campaigns import Campaign
 
@@ -71,11 +69,11 @@ class Run(Campaign):
 
     def do_stage(self, name):
         """A job of a stage, in this process, which compiles once what it needs."""
-        run_tasks.mended(lambda: self._compute(name), FOLDER)
+        run_tasks.with_repair(lambda: self._compute(name), FOLDER)
 
     def _compute(self, name):
-        note, spent = checked_json.read(self.plan.tasks(name)), Spent()
-        imported(note["module"]).run(note["content"], spent)
+        note, spent = checked_json.read(self.plan.tasks(name)), TaskCosts()
+        driver.run(note["module"], note["content"], spent)
         assert not spent.broken
         records.write(self.jobs[name].record, note["digest"], note["products"], **spent.summary())
 

@@ -101,15 +101,15 @@ class TestPage:
 
     def test_views_name_variables_that_studies_have(self):
         """A plot whose variable is misspelt would be left out silently."""
-        from springtune.studies.kinds.benchmark.variables import BENCHMARK
-        from springtune.studies.kinds.laying.variables import LAYING
-        from springtune.studies.kinds.moduli.variables import MODULI
-        from springtune.studies.kinds.refinement.variables import REFINEMENT
+        from springtune.studies.kinds.benchmark.collect import BENCHMARK
+        from springtune.studies.kinds.laying.collect import LAYING
+        from springtune.studies.kinds.moduli.collect import MODULI
+        from springtune.studies.kinds.refinement.collect import REFINEMENT
+        from springtune.studies.kinds.samples.collect import EFFECTS, SAMPLES, SOBOL
         from springtune.studies.kinds.samples.names import PARAMETERS
-        from springtune.studies.kinds.samples.variables import EFFECTS, SAMPLES, SOBOL
         from springtune.studies.kinds.scenes.variables import BLOCK, FIELDS, FINITE_STRAIN, ROOT, SENSITIVITY
         from springtune.studies.kinds.shapes.variables import SHAPE_FIELDS, SHAPES
-        from springtune.studies.kinds.stability.variables import STABILITY
+        from springtune.studies.kinds.stability.collect import STABILITY
         from springtune.studies.output.browse.page import views
 
         groups = (ROOT, SENSITIVITY, FINITE_STRAIN, BLOCK, FIELDS, MODULI, LAYING, STABILITY, BENCHMARK)

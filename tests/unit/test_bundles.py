@@ -12,7 +12,7 @@ from springtune.studies.kinds import load_study
 from springtune.studies.kinds.stability.names import EXPERIMENTS
 from springtune.studies.runs import bundles, checked_json, commands, records
 from springtune.studies.runs.plan import plan, usual_costs
-from springtune.studies.runs.task_costs import Spent
+from springtune.studies.runs.task_costs import TaskCosts
 
 USUAL = usual_costs()
 
@@ -162,7 +162,7 @@ def test_two_new_tasks_run_two_bundles_again():
 def test_costs_follow_what_the_machine_measures(tmp_path):
     path, done = tmp_path / "costs.json", tmp_path / "done_0.json"
     assert bundles.Costs(path, USUAL).of("reference") == USUAL["reference"][0]
-    spent = Spent()
+    spent = TaskCosts()
     for _ in range(10):
         spent.add("reference", 0, 3 * USUAL["reference"][0])
         spent.add("a kind of no cost", 0, 1.0)

@@ -19,7 +19,7 @@ VAGUE = {"asked", "whole", "race", "laid", "tasks", "work", "code", "files", "so
 
 
 OWN = {"MAX_EVALUATIONS", "MAX_HALVINGS", "MAX_ITERATIONS", "SMALLEST_STEP", "TOLERANCE"}
-OWN |= {"KIND", "OUTPUTS", "PAGE", "PLOTS", "STAGES", "VIEWS"}
+OWN |= {"KIND", "OUTPUTS", "PAGE", "PLOTS", "STAGE", "STAGES", "VIEWS"}
 """Constants that say the same of each solver or each study kind, and that each has its own value of."""
 
 
@@ -135,9 +135,8 @@ def test_tests_use_what_everybody_may_use(path):
 
 @pytest.mark.parametrize("stage", [one for kind in kinds() for one in kind.stages], ids=lambda one: one.name)
 def test_stages_say_what_is_lost_to_limits(stage):
-    """Those that attempt tasks; what has no tasks loses none."""
+    """The driver does for those that only solve; of those with a loop of their own what has no tasks loses none."""
     module = imported(stage.module)
-    assert callable(module.run)
-    text = Path(module.__file__).read_text()
-    attempts = "spent.attempt" in text or "stored_interpolant.make" in text
-    assert hasattr(module, "lose") == attempts == (stage.name != "calibrate")
+    own = hasattr(module, "run")
+    assert own or callable(module.solve)
+    assert hasattr(module, "gone") == (own and stage.name != "calibrate")

@@ -9,7 +9,6 @@ import signal
 import subprocess
 import sys
 import time
-from importlib import import_module
 from pathlib import Path
 
 import h5py
@@ -19,8 +18,9 @@ import xarray as xr
 
 import springtune as st
 from cf import complaints
+from springtune.registry import imported
 from springtune.safe_io import atomic
-from springtune.studies.config.kind import KINDS
+from springtune.studies.config.kind import modules
 from springtune.studies.kinds import load_study
 from springtune.studies.kinds.scenes.tables import tables
 from springtune.studies.kinds.scenes.variables import ROOT, SENSITIVITY
@@ -41,9 +41,9 @@ AXES = {
 }
 
 GROUPS = {
-    f"{kind}{group.name}": group
-    for kind in KINDS
-    for group in vars(import_module(f"springtune.studies.kinds.{kind}.variables")).values()
+    f"{name.split('.')[2]}{group.name}": group
+    for name in modules("variables", "collect")
+    for group in vars(imported(name)).values()
     if isinstance(group, Group)
 }
 

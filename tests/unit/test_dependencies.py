@@ -277,9 +277,9 @@ def test_what_writes_draws_or_reads_studies_is_in_no_key_of_a_result(stage):
         ("studies.kinds.scenes.solve", {"numpy", "scipy", "cvxopt", "pyamg"}),
         ("studies.kinds.scenes.sensitivity", {"numpy", "scipy", "cvxopt", "pyamg"}),
         ("studies.kinds.scenes.reference", {"numpy", "scipy", "cvxopt", "skfem"}),
-        ("studies.kinds.moduli.stage", {"numpy", "scipy", "cvxopt", "pyamg"}),
-        ("studies.kinds.stability.stage", {"numpy", "scipy", "cvxopt", "pyamg", "numba"}),
-        ("studies.kinds.benchmark.stage", {"numpy", "scipy", "cvxopt", "pyamg", "numba", "skfem"}),
+        ("studies.kinds.moduli.solve", {"numpy", "scipy", "cvxopt", "pyamg"}),
+        ("studies.kinds.stability.solve", {"numpy", "scipy", "cvxopt", "pyamg", "numba"}),
+        ("studies.kinds.benchmark.solve", {"numpy", "scipy", "cvxopt", "pyamg", "numba", "skfem"}),
     ],
 )
 def test_packages_are_those_that_are_imported(module, packages):
@@ -337,7 +337,7 @@ def _keys():
 
 SOLVING = {f"studies.kinds.{name}" for name in ("scenes.solve", "scenes.sensitivity")}
 SOLVING |= {
-    f"studies.kinds.{name}.stage" for name in ("moduli", "laying", "stability", "benchmark", "refinement", "samples")
+    f"studies.kinds.{name}.solve" for name in ("moduli", "laying", "stability", "benchmark", "refinement", "samples")
 }
 SOLVING |= {"patch", "annealed"}
 SOLVING |= {"studies.kinds.shapes.solve"}
@@ -362,8 +362,8 @@ VERSIONS = {
         "studies.kinds.shapes.solve",
     },
     "meshio": {"from a file"},
-    "numba": {"studies.kinds.stability.stage", "studies.kinds.benchmark.stage", "studies.kinds.shapes.solve"},
-    "scikit-fem": {"studies.kinds.scenes.reference", "studies.kinds.benchmark.stage", "studies.kinds.shapes.solve"},
+    "numba": {"studies.kinds.stability.solve", "studies.kinds.benchmark.solve", "studies.kinds.shapes.solve"},
+    "scikit-fem": {"studies.kinds.scenes.reference", "studies.kinds.benchmark.solve", "studies.kinds.shapes.solve"},
     "pyamg": SOLVING,
     "cvxopt": SOLVING | REFERENCE,
     "scipy": SOLVING | REFERENCE | {"studies.kinds.scenes.mesh", "studies.kinds.shapes.mesh", "from a file"},

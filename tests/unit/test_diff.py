@@ -9,7 +9,7 @@ from click.testing import CliRunner
 
 import springtune as st
 from springtune.cli import main
-from springtune.studies.kinds.benchmark.variables import BENCHMARK
+from springtune.studies.kinds.benchmark.collect import BENCHMARK
 from springtune.studies.kinds.scenes.variables import ROOT, SENSITIVITY
 from springtune.studies.output import dataset
 from springtune.studies.output.comparison import Tolerance, compare

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from springtune.studies.runs.task_costs import LOST, Spent
+from springtune.studies.runs.task_costs import LOST, TaskCosts
 from springtune.studies.runs.task_limits import Watch, guarded
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits are the kernel's, and another one's differ")
@@ -36,7 +36,7 @@ class Job:
     def __init__(self, folder, tasks, **limits):
         self.folder, self.tasks = folder, tasks
         self.watch = Watch({"seconds": 60.0, "memory": 4e9} | limits)
-        self.spent = Spent(self.watch)
+        self.spent = TaskCosts(self.watch)
 
     def run(self):
         for key, task in self.tasks.items():

@@ -6,16 +6,15 @@ import numpy as np
 import pytest
 
 from springtune.reference.interpolant import TOLERANCE
-from springtune.registry import imported
 from springtune.studies.config.kind import kinds
 from springtune.studies.kinds import load_study
 from springtune.studies.kinds.scenes import any_reference
 from springtune.studies.kinds.scenes.interpolated import box_of, expected_solves, interpolants
 from springtune.studies.kinds.scenes.plan import reference_of, solved_reference
 from springtune.studies.kinds.scenes.summary import summary
-from springtune.studies.runs import store
+from springtune.studies.runs import driver, store
 from springtune.studies.runs.plan import plan
-from springtune.studies.runs.task_costs import Spent
+from springtune.studies.runs.task_costs import TaskCosts
 
 MANY, FEW = 32, 20
 
@@ -58,8 +57,8 @@ def references(study):
 def run(study, folder, *stages):
     for job in plan(study, folder, 1).jobs.values():
         if job.stage.name in stages:
-            spent = Spent()
-            imported(job.stage.module).run(job.content, spent)
+            spent = TaskCosts()
+            driver.run(job.stage.module, job.content, spent)
             assert not spent.broken
             for path in job.products:
                 assert Path(path).exists()
@@ -151,5 +150,5 @@ def test_one_that_is_beyond_its_limits_is_a_hole(load, tmp_path):
     study = load(lengths(MANY))
     (job,) = [job for job in plan(study, tmp_path, 1).jobs.values() if job.stage.name == "reference"]
     (task,) = job.content["interpolants"]
-    imported(job.stage.module).lose(job.content, task["key"], "too slow", "at most 1 s")
+    driver.gone(job.stage.module, job.content, task["key"], "too slow", "at most 1 s")
     assert any_reference.read(tmp_path / "references", references(study)[0])["message"] == "too slow"

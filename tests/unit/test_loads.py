@@ -24,11 +24,8 @@ from springtune.reference.finite_strain import solve_neo_hooke
 from springtune.reference.small_strain import solve_small_strain
 from springtune.scene.sheet import Sheet
 from springtune.studies.kinds import load_study
-from springtune.studies.kinds.scenes import mesh as mesh_stage
-from springtune.studies.kinds.scenes import reference as reference_stage
-from springtune.studies.kinds.scenes import solve as solve_stage
-from springtune.studies.runs import plan, store
-from springtune.studies.runs.task_costs import Spent
+from springtune.studies.runs import driver, plan, store
+from springtune.studies.runs.task_costs import TaskCosts
 
 LIFT = LoadKind("lift", loaded=TOP, axis=1, held=((BOTTOM, BOTH),))
 BUILT_IN = LoadKind("built-in", loaded=TOP, axis=1, held=((LEFT, BOTH), (RIGHT, BOTH)), pressed=True)
@@ -108,11 +105,11 @@ grids:
 """)
     study = load_study(study)
     jobs = plan.plan(study, tmp_path, 1).jobs
-    for name, stage in (("mesh_0", mesh_stage), ("reference_0", reference_stage), ("solve_0", solve_stage)):
-        stage.run(jobs[name].content, Spent())
+    for name in ("mesh_0", "reference_0", "solve_0"):
+        driver.run(jobs[name].stage.module, jobs[name].content, TaskCosts())
     tasks = jobs["solve_0"].content
-    (family,) = tasks["families"]
-    (scene,) = family["scenes"]
+    (family,) = tasks["files"]
+    (scene,) = family["tasks"]
     assert scene["kind"] == "lift"
     (result,) = store.read(f"{tasks['folder']}/{family['name']}.h5", [scene["key"]]).values()
     assert result["displacement"] == pytest.approx(EXACT, rel=1e-6)

@@ -3,6 +3,8 @@
 import json
 import os
 import re
+import sys
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -10,9 +12,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from springtune.studies.runs import checked_json, records, run_tasks, store
+from springtune.studies.runs import checked_json, driver, records, run_tasks, store
 from springtune.studies.runs.damage import ASIDE, DamagedError
-from springtune.studies.runs.task_costs import Spent
+from springtune.studies.runs.task_costs import TaskCosts
 from springtune.studies.runs.task_limits import Watch
 
 JSON = st.recursive(
@@ -120,14 +122,17 @@ class TestStore:
         store.add(path, {"one": self.RESULT})
         assert store.stored(path) == {"one"}
 
-    def test_what_was_lost_to_limits_is_computed_again_when_they_change(self, tmp_path):
-        store.lose(tmp_path, "one", {"message": "not done within 1 s"}, "1 s")
+    def test_what_was_lost_to_limits_is_computed_again_when_they_change(self, tmp_path, monkeypatch):
+        store.add(tmp_path / "one.h5", {"one": {"message": "not done within 1 s", store.LIMITS: "1 s"}})
         path = tmp_path / "one.h5"
         assert store.stored(path, "1 s") == {"one"} == store.stored(path)
         assert store.stored(path, "2 s") == set()
         assert store.read_one(tmp_path, "one") == {"message": "not done within 1 s"}
-        assert [task["key"] for _, task in store.missing(tmp_path, [{"key": "one"}], "2 s")] == ["one"]
-        assert not list(store.missing(tmp_path, [{"key": "one"}], "1 s"))
+        monkeypatch.setitem(sys.modules, "springtune.tested_stage", SimpleNamespace(solve=lambda task: {"message": ""}))
+        content = {"folder": tmp_path, "files": [{"name": "one", "tasks": [{"key": "one"}]}]}
+        for limits, message in (("1 s", "not done within 1 s"), ("2 s", "")):
+            driver.run("tested_stage", content, Limited(limits))
+            assert store.read_one(tmp_path, "one") == {"message": message}
 
 
 class TestRecords:
@@ -180,14 +185,26 @@ class TestRecords:
         assert records.fault(record, "digest", [never])
 
 
+class Limited(TaskCosts):
+    """Tasks within limits of these words."""
+
+    def __init__(self, words):
+        super().__init__()
+        self.words = words
+
+    @property
+    def limits(self):
+        return self.words
+
+
 class TestRunTasks:
     """A job of the stage `reference`, whose result another job reads."""
 
     @pytest.fixture
     def study(self, tmp_path):
         folder = tmp_path / "results/mine"
-        content = {"folder": str(folder / "references"), "finite": []}
-        content["references"] = [{"key": "one", "problem": [5.0, 0.3, "axial"]}]
+        task = {"key": "one", "cost": ["reference", 0], "problem": [5.0, 0.3, "axial"]}
+        content = {"folder": str(folder / "references"), "files": [{"name": "one", "tasks": [task]}]}
         note = {"digest": "digest", "module": "studies.kinds.scenes.reference", "content": content}
         note |= {"limits": {"seconds": 60, "memory": 4e9}, "products": [str(folder / "references/one.h5")]}
         checked_json.write(folder / "tasks/reference_0.json", note)
@@ -214,7 +231,7 @@ class TestRunTasks:
             path.unlink()
         else:
             path.write_bytes(changed[how])
-        found = run_tasks.mended(lambda: store.read_one(study / "references", "one"), study)
+        found = run_tasks.with_repair(lambda: store.read_one(study / "references", "one"), study)
         assert {name: found[name] for name in ("displacement", "strain")} == {
             name: before[name] for name in ("displacement", "strain")
         }
@@ -228,12 +245,15 @@ class TestRunTasks:
         """One that is lost to the same limits stays lost, however its neighbours are mended."""
         tasks, done = study / "tasks/reference_0.json", study / "done/reference_0.json"
         note = checked_json.read(tasks)
-        note["content"]["references"].append({"key": "lost", "problem": [5.0, 0.3, "axial"]})
+        task = {"key": "lost", "cost": ["reference", 0], "problem": [5.0, 0.3, "axial"]}
+        note["content"]["files"].append({"name": "lost", "tasks": [task]})
         note["products"].append(str(study / "references/lost.h5"))
         checked_json.write(tasks, note)
-        store.lose(study / "references", "lost", {"message": "not done", "seconds": 0.0}, Watch(note["limits"]).words)
+        limits = Watch(note["limits"]).words
+        failed = {"message": "not done", "seconds": 0.0, store.LIMITS: limits}
+        store.add(study / "references/lost.h5", {"lost": failed})
         (study / "references/one.h5").unlink()
-        run_tasks.mended(lambda: store.read_one(study / "references", "one"), study)
+        run_tasks.with_repair(lambda: store.read_one(study / "references", "one"), study)
         assert store.read_one(study / "references", "lost")["message"] == "not done"
         assert checked_json.read(done)["work"]["reference"][0] == 1
 
@@ -248,11 +268,11 @@ class TestRunTasks:
 
     def test_what_no_job_makes_ends_the_reader(self, study):
         with pytest.raises(SystemExit, match="no job makes it"):
-            run_tasks.mended(lambda: store.read_one(study / "references", "other"), study)
+            run_tasks.with_repair(lambda: store.read_one(study / "references", "other"), study)
 
     def test_what_stays_damaged_ends_the_reader(self, study):
         with pytest.raises(SystemExit, match="did not help"):
-            run_tasks.mended(lambda: store.read(study / "references/one.h5", ["another"]), study)
+            run_tasks.with_repair(lambda: store.read(study / "references/one.h5", ["another"]), study)
 
 
 class TestAttempt:
@@ -260,7 +280,7 @@ class TestAttempt:
         def task():
             raise error
 
-        spent = Spent()
+        spent = TaskCosts()
         return spent.attempt("key", task, lambda why: {"message": why}), spent.broken
 
     @pytest.mark.parametrize(

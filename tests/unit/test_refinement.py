@@ -9,16 +9,15 @@ import xarray as xr
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from springtune.registry import imported
 from springtune.studies.config.messages import StudyError
 from springtune.studies.kinds import load_study
 from springtune.studies.kinds.refinement.batches import Rule, crossings, refine
 from springtune.studies.kinds.refinement.collect import groups
 from springtune.studies.kinds.refinement.tables import write
 from springtune.studies.output.comparison import compare
-from springtune.studies.runs import store
+from springtune.studies.runs import driver, store
 from springtune.studies.runs.plan import plan
-from springtune.studies.runs.task_costs import Spent
+from springtune.studies.runs.task_costs import TaskCosts
 
 STUDY = """\
 title: Where errors matter
@@ -69,8 +68,8 @@ def run(study, folder):
     before = sum(len(store.stored(path)) for path in (folder / "refinement").glob("*.h5"))
     for job in plan(study, folder, 1).jobs.values():
         if job.stage.name == "refinement":
-            spent = Spent()
-            imported(job.stage.module).run(job.content, spent)
+            spent = TaskCosts()
+            driver.run(job.stage.module, job.content, spent)
             assert not spent.broken
     return sum(len(store.stored(path)) for path in (folder / "refinement").glob("*.h5")) - before
 
@@ -210,9 +209,8 @@ def test_raising_most_is_new_cells_and_no_changed_ones(load, tmp_path):
 def test_a_value_beyond_its_limits_is_a_hole_and_the_others_are_not(load, tmp_path):
     study = load()
     (job,) = [job for job in plan(study, tmp_path, 1).jobs.values() if job.stage.name == "refinement"]
-    stage = imported(job.stage.module)
-    for task in job.content["refinements"]:
-        stage.lose(job.content, f"{task['key']}/0.875", "too slow", "")  # as there are none here
+    for task in job.content["files"]:
+        driver.gone(job.stage.module, job.content, f"{task['name']}/0.875", "too slow", "")  # as there are none here
     run(study, tmp_path)
     data = collected(study, tmp_path)
     lost = data.refined_stiffness_scale == 0.875

@@ -22,13 +22,13 @@ from springtune.springs import DEFINITIONS
 from springtune.studies.config.kind import kinds
 from springtune.studies.config.messages import StudyError
 from springtune.studies.kinds import load_study
-from springtune.studies.kinds.samples import designs, interpolate, stage
+from springtune.studies.kinds.samples import designs, interpolate, solve
 from springtune.studies.kinds.samples.figures import plot_effects, plot_sobol
 from springtune.studies.kinds.samples.indices import main_effect, sobol_indices
 from springtune.studies.kinds.samples.names import DESIGNS, MOST_SOLVED, blocks
 from springtune.studies.runs import store
 from springtune.studies.runs.orphans import orphans
-from springtune.studies.runs.task_costs import Spent
+from springtune.studies.runs.task_costs import TaskCosts
 
 from campaigns import Campaign
 
@@ -386,9 +386,9 @@ class TestRuns:
     def test_files_of_samples_that_nothing_asks_for_are_found(self, tmp_path):
         (tmp_path / "study.yaml").write_text(study_text())
         study = load_study(tmp_path / "study.yaml")
-        stage.lose({"folder": tmp_path / "samples"}, "old 0 mesh", "not done within 1 s", "")
+        solve.gone({"folder": tmp_path / "samples"}, "old 0 mesh", "not done within 1 s", "")
         asked = sampling().products(sampling().content(study, tmp_path, [(0, 8)]))
-        stage.lose({"folder": tmp_path / "samples"}, f"{asked[0].stem} 0 mesh", "not done within 1 s", "")
+        solve.gone({"folder": tmp_path / "samples"}, f"{asked[0].stem} 0 mesh", "not done within 1 s", "")
         assert orphans(study, tmp_path) == [tmp_path / "samples" / "old.h5"]
 
     def test_designs_without_rows_of_a_pair_have_effects_and_no_indices(self, here):
@@ -457,9 +457,9 @@ class TestFailures:
         (tmp_path / "study.yaml").write_text(study_text(("size: 16", "size: 8")))
         study = load_study(tmp_path / "study.yaml")
         content = sampling().content(study, tmp_path, [(0, 8)])
-        block = content["blocks"][0]["key"]
-        stage.lose(content, f"{block} 0 {content['meshed']}", "not done within 1 s", "limits A")
-        stage.run(content, Limited())
+        block = content["files"][0]["key"]
+        solve.gone(content, f"{block} 0 {content['meshed']}", "not done within 1 s", "limits A")
+        solve.run(content, Limited())
         path = tmp_path / "samples" / f"{block}.h5"
         keys = list(content["results"])
         found = store.read(path, keys, ("status", "displacement"))
@@ -469,7 +469,7 @@ class TestFailures:
             assert (found[key]["status"][1:2] == Status.SOLVED).all()
         assert set(keys) <= store.stored(path, "limits A")
         assert not set(keys) & store.stored(path, "limits B")
-        stage.run(content, Spent())
+        solve.run(content, TaskCosts())
         assert (store.read(path, keys, ("status",))[keys[0]]["status"] == Status.SOLVED).all()
 
     def test_what_was_lost_of_one_mesh_type_is_tried_of_another(self, tmp_path):
@@ -484,7 +484,7 @@ class TestFailures:
                 # As if each network had been lost; meshes are the same of both kinematics.
                 names.append({name for name in spent.names if name.split()[2] != content["meshed"]})
                 for name in names[-1]:
-                    stage.lose(content, name, "not done within 1 s", "")
+                    solve.gone(content, name, "not done within 1 s", "")
         assert not set.intersection(*names) and len(set.union(*names)) == sum(map(len, names))
 
     def test_what_is_solved_before_a_network_is_lost_is_not_solved_again(self, tmp_path):
@@ -514,7 +514,7 @@ class TestFailures:
             ("height: {from: 20 mm, to: 40 mm}", "height: 40 mm"),
             (RATIOS, "0"),
         )
-        spent = Spent()
+        spent = TaskCosts()
         _, results = networks(tmp_path, *how, spent=spent)
         assert not spent.broken
         status = results[0]["status"]
@@ -575,18 +575,18 @@ class TestReferences:
         interpolate.run(content, spent)
         assert len(spent.names) == 8
         before = store.read(path, store.stored(path))
-        interpolate.lose(content, spent.names[3], "not done within 1 s", "")
+        interpolate.gone(content, spent.names[3], "not done within 1 s", "")
         after = store.read(path, store.stored(path))
         assert [key for key in after if after[key] != before[key]] == [spent.names[3]]
 
 
-class Limited(Spent):
+class Limited(TaskCosts):
     """Tasks within limits of these words."""
 
     limits = "limits A"
 
 
-class Noting(Spent):
+class Noting(TaskCosts):
     """Notes the names of its tasks, and ends the process at one of them, as limits do."""
 
     def __init__(self, most=None):
@@ -607,7 +607,7 @@ def networks(folder, *replaced, spent=None, **options):
     study = load_study(folder / "study.yaml")
     sample = study.parts["samples"]
     content = sampling().content(study, folder, blocks(sample.design, sample.size))
-    stage.run(content, spent or Spent(), **options)
+    solve.run(content, spent or TaskCosts(), **options)
     fields = ("displacement", "status", "particles")
     found = [store.read(path, [*content["results"]], fields) for path in map(Path, sampling().products(content))]
     return content, [block[key] for block in found for key in content["results"]]
@@ -699,9 +699,9 @@ class TestRefusals:
             )
             study = load_study("study.yaml")
             content = sampling().content(study, here, [(0, 8)])
-            stage.run(content, Spent())
+            solve.run(content, TaskCosts())
             key = next(key for key, scene in content["results"].items() if scene["definition"] == "stiffening")
-            path = here / "samples" / f"{content['blocks'][0]['key']}.h5"
+            path = here / "samples" / f"{content['files'][0]['name']}.h5"
             found = store.read(path, [key], ("status",))[key]
             assert (found["status"] == Status.FAILED).all()
             assert "not in proportion" in found["messages"]["0"]

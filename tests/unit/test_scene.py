@@ -11,7 +11,7 @@ import springtune as st
 from springtune.problem.loads import LOADS
 from springtune.reference.similarity import unit_problem, unit_scales
 from springtune.scene.sheet import Sheet
-from springtune.studies.kinds.scenes.solve import solve
+from springtune.studies.kinds.scenes.solve import solved
 
 BEAM, STEEL = st.Beam("100 mm", "20 mm"), st.Material("210 GPa", 0.3, density="7850 kg/m^3", name="steel")
 
@@ -88,7 +88,7 @@ class TestSameAsThePipeline:
         kind, signed = found.kind, LOADS[load].sign * force
         task = {"material": asdict(STEEL), "kind": kind.name, "follower": False, "force": signed, "definition": "area",
                 "kinematics": kinematics, "reference": None}  # fmt: skip
-        stored = solve(Sheet(found.mesh, BEAM.thickness), task)
+        stored = solved(Sheet(found.mesh, BEAM.thickness), task)
         result = found.solve()
         assert (result.displacement, result.status) == (stored["displacement"], stored["status"])
         from springtune.reference.small_strain import solve_unit

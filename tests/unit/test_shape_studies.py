@@ -12,7 +12,6 @@ import yaml
 
 import springtune as st
 from springtune.mesh import write_mesh
-from springtune.registry import imported
 from springtune.studies.archive import verify
 from springtune.studies.config.kind import outputs
 from springtune.studies.kinds import collect, load_study
@@ -24,9 +23,9 @@ from springtune.studies.kinds.shapes.task_values import ONE_LOAD, geometry, load
 from springtune.studies.output import page
 from springtune.studies.output.dataset import STATUS
 from springtune.studies.output.export import export
-from springtune.studies.runs import store
+from springtune.studies.runs import driver, store
 from springtune.studies.runs.plan import plan, table_files
-from springtune.studies.runs.task_costs import Spent
+from springtune.studies.runs.task_costs import TaskCosts
 from springtune.studies.runs.workload import results_of
 
 REPOSITORY = Path(__file__).parents[2]
@@ -78,8 +77,8 @@ def refusal(loaded):
 def done(study, folder):
     """Tree of the dataset of a study, its groups and its folder; all stages run in this process."""
     for job in plan(study, folder, 1).jobs.values():
-        spent = Spent()
-        imported(job.stage.module).run(job.content, spent)
+        spent = TaskCosts()
+        driver.run(job.stage.module, job.content, spent)
         assert not spent.broken, spent.broken
     made, told = collect.run(study.path, folder, folder / "dataset.nc")
     with xr.open_datatree(made, engine="netcdf4") as tree:
@@ -450,7 +449,13 @@ def test_references_are_told_apart_whatever_they_are_called(loaded, tmp_path):
         "other": grid | {"shape": "a_b", "material": "c"},
     }
     jobs = plan(loaded(yaml.safe_dump(content)), tmp_path / "results", 1).jobs.values()
-    tasks = [task for job in jobs if job.stage.name == "shape_reference" for task in job.content["references"]]
+    tasks = [
+        task
+        for job in jobs
+        if job.stage.name == "shape_reference"
+        for file in job.content["files"]
+        for task in file["tasks"]
+    ]
     assert len({task["key"] for task in tasks}) == 2
 
 
@@ -467,14 +472,14 @@ def test_twins_are_counted_as_often_as_they_are_computed(loaded, tmp_path):
 
 
 def test_scenes_whose_mesh_was_beyond_limits_are_solved_once_these_are_raised(loaded, tmp_path):
-    class Limited(Spent):
+    class Limited(TaskCosts):
         limits = "1 s"
 
     study = loaded(COOK.replace("[16 mm, 8 mm]", "16 mm").replace("linear}", "linear, reference: false}"))
     jobs = {job.stage.name: job for job in plan(study, tmp_path / "results/study", 1).jobs.values()}
-    mesh, solve = (imported(jobs[name].stage.module) for name in ("shape_mesh", "shape_solve"))
-    mesh.lose(jobs["shape_mesh"].content, "cook_free_16mm", "not done", "1 s")
-    solve.run(jobs["shape_solve"].content, Limited())
+    mesh, solve = jobs["shape_mesh"], jobs["shape_solve"]
+    driver.gone(mesh.stage.module, mesh.content, "cook_free_16mm", "not done", "1 s")
+    driver.run(solve.stage.module, solve.content, Limited())
     (path,) = (tmp_path / "results/study/shape_solutions").iterdir()
     assert store.stored(path, "1 s") and not store.stored(path, "1 min")
     tree, told = done(study, tmp_path / "results/study")

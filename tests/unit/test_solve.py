@@ -7,7 +7,7 @@ from springtune.mesh import MESH_TYPES
 from springtune.problem.materials import Material
 from springtune.problem.status import Status
 from springtune.scene.sheet import Sheet
-from springtune.studies.kinds.scenes.solve import solve
+from springtune.studies.kinds.scenes.solve import solved
 
 STEEL = asdict(Material(210e9, 0.3, name="steel"))
 
@@ -23,7 +23,7 @@ def test_the_time_of_a_definition_is_taken_off_the_scene_that_spent_it_alone():
     results, deriving = [], []
     for kinematics in ("linear", "nonlinear", "linear"):
         before, begin = sheet.deriving, time.perf_counter()
-        results.append(solve(sheet, scene("adjoint", kinematics)))
+        results.append(solved(sheet, scene("adjoint", kinematics)))
         elapsed = time.perf_counter() - begin
         deriving.append(sheet.deriving - before)
         assert results[-1]["status"] == Status.SOLVED

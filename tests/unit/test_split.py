@@ -376,9 +376,9 @@ def test_damage_is_named_and_left_out(there):
 def test_other_software_is_named(there):
     for path in Path(PARTS[0]).glob("tasks/solve_*.json"):  # as another version would have asked for it
         text = checked_json.read(path)
-        text["content"]["families"] = [
-            family | {"scenes": [scene | {"key": scene["key"][::-1]} for scene in family["scenes"]]}
-            for family in text["content"]["families"]
+        text["content"]["files"] = [
+            family | {"tasks": [scene | {"key": scene["key"][::-1]} for scene in family["tasks"]]}
+            for family in text["content"]["files"]
         ]
         checked_json.write(path, text)
     assert "to its end, where it was computed" in run("merge", "config/many.yaml", *PARTS).output

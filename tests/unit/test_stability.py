@@ -11,13 +11,12 @@ from springtune.problem.materials import Material
 from springtune.studies.config.messages import StudyError
 from springtune.studies.kinds import load_study
 from springtune.studies.kinds.stability import experiments as stability
+from springtune.studies.kinds.stability.collect import STABILITY
 from springtune.studies.kinds.stability.names import AXES, EXPERIMENTS, ONCE
-from springtune.studies.kinds.stability.stage import run
-from springtune.studies.kinds.stability.variables import STABILITY
 from springtune.studies.output.dataset import DIMENSIONS
 from springtune.studies.runs import dependencies as code
-from springtune.studies.runs import store
-from springtune.studies.runs.task_costs import Spent
+from springtune.studies.runs import driver, store
+from springtune.studies.runs.task_costs import TaskCosts
 
 STUDY = """
 title: One experiment
@@ -98,8 +97,9 @@ def test_a_failing_experiment_is_stored_with_its_message(tmp_path):
     setup = {"beam": {"name": "", "length": 0.1, "height": 0.02, "thickness": 1e-3}, "force": 1.0,
              "material": {"name": "", "young_modulus": 1e6, "poisson_ratio": 0.3, "density": 1e3},
              "definition": "axis-exact", "mesh_type": "free", "mesh_sizes": [5e-3]}  # fmt: skip
-    tasks = {"folder": str(tmp_path), "experiments": [{"key": "one", "name": "contrast"} | setup]}
-    run(tasks, Spent())
+    tasks = [{"key": "one", "name": "contrast"} | setup]
+    content = {"folder": str(tmp_path), "files": [{"name": "one", "tasks": tasks}]}
+    driver.run("studies.kinds.stability.solve", content, TaskCosts())
     assert store.read(tmp_path / "one.h5", ["one"])["one"]["failure"]
 
 
@@ -108,8 +108,8 @@ def test_static_stages_know_no_dynamics():
     for stage in (
         "studies.kinds.scenes.solve",
         "studies.kinds.scenes.sensitivity",
-        "studies.kinds.moduli.stage",
-        "studies.kinds.laying.stage",
+        "studies.kinds.moduli.solve",
+        "studies.kinds.laying.solve",
     ):
         assert not any(file.endswith(("dynamics.py", "kernels.py")) for file in code.modules(stage))
-    assert any(file.endswith("dynamics.py") for file in code.modules("studies.kinds.stability.stage"))
+    assert any(file.endswith("dynamics.py") for file in code.modules("studies.kinds.stability.solve"))

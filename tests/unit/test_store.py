@@ -3,14 +3,16 @@
 import hashlib
 import subprocess
 import sys
+from types import ModuleType
 
 import h5py
 import numpy as np
 import pytest
 
 from springtune.studies.runs import dependencies as code
-from springtune.studies.runs import store
+from springtune.studies.runs import driver, store
 from springtune.studies.runs.hashing import hash_of
+from springtune.studies.runs.task_costs import TaskCosts
 
 
 def test_results_come_back_as_they_went(tmp_path):
@@ -104,13 +106,16 @@ def test_physics_imports_no_workflow_dataset_or_plots():
     assert not {"snakemake", "xarray", "matplotlib", "pandas", "pydantic", "pint"} & set(loaded)
 
 
-def test_tasks_are_missing_until_their_result_is_stored(tmp_path):
-    tasks = [{"key": "one"}, {"key": "two"}]
+def test_tasks_are_done_until_their_result_is_stored(tmp_path, monkeypatch):
+    done, module = [], ModuleType("springtune.tested_stage")
+    module.solve = lambda task: done.append(task["key"]) or {"displacement": 2.0}
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    content = {"folder": tmp_path, "files": [{"name": name, "tasks": [{"key": name}]} for name in ("one", "two")]}
     store.add(tmp_path / "one.h5", {"one": {"displacement": 1.0, "field": np.arange(2.0)}})
     (tmp_path / "two.h5").write_text("no results")
-    ((path, task),) = store.missing(tmp_path, tasks)
-    assert (path, task) == (tmp_path / "two.h5", tasks[1])
-    store.add(path, {"two": {"displacement": 2.0}})
-    assert not list(store.missing(tmp_path, tasks))
+    driver.run("tested_stage", content, TaskCosts())
+    assert done == ["two"] and store.read_one(tmp_path, "two") == {"displacement": 2.0}
+    driver.run("tested_stage", content, TaskCosts())
+    assert done == ["two"]
     assert store.read_one(tmp_path, "one") == {"displacement": 1.0}
     assert store.read_one(tmp_path, "one", ["field"])["field"].tolist() == [0.0, 1.0]

@@ -8,12 +8,12 @@ import xarray as xr
 
 from springtune.problem.compare import assured
 from springtune.studies.kinds.benchmark import tables as benchmark
-from springtune.studies.kinds.benchmark.variables import BENCHMARK
+from springtune.studies.kinds.benchmark.collect import BENCHMARK
 from springtune.studies.kinds.moduli import tables as definitions
-from springtune.studies.kinds.moduli.variables import MODULI
+from springtune.studies.kinds.moduli.collect import MODULI
 from springtune.studies.kinds.scenes.variables import ROOT
 from springtune.studies.kinds.stability import tables as stability
-from springtune.studies.kinds.stability.variables import STABILITY
+from springtune.studies.kinds.stability.collect import STABILITY
 from springtune.studies.output import page as tables_page
 from springtune.studies.output.tables import decimals, number
 

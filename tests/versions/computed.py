@@ -12,14 +12,13 @@ from pathlib import Path
 
 import h5py
 
-from springtune.registry import imported
 from springtune.studies.kinds import load_study
 from springtune.studies.kinds.scenes import stored_mesh
 from springtune.studies.kinds.scenes.solve import stored_key
 from springtune.studies.kinds.scenes.stored_scene import fields_key, unpacked
-from springtune.studies.runs import checked_json, store
+from springtune.studies.runs import checked_json, driver, store
 from springtune.studies.runs.plan import plan
-from springtune.studies.runs.task_costs import Spent
+from springtune.studies.runs.task_costs import TaskCosts
 
 PACKAGES = ("numpy", "scipy", "numba", "cvxopt", "netgen-mesher", "pyamg", "scikit-fem", "h5py", "meshio")
 
@@ -46,9 +45,9 @@ def computed(study, folder):
     """Results by stage, place and name: numbers, texts and arrays; and the meshes' points."""
     found = {}
     for job in plan(study, folder, 1).jobs.values():
-        imported(job.stage.module).run(job.content, Spent())
+        driver.run(job.stage.module, job.content, TaskCosts())
         if job.stage.name == "mesh":
-            for one in job.content["meshes"]:
+            for one in job.content["files"]:
                 found["mesh", one["name"], "points"] = stored_mesh.read(job.content["folder"], one["name"]).points
             continue
         calibration = checked_json.read(folder / "calibration.json")
@@ -74,7 +73,7 @@ def collected(study, output):
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch) / "results"
         for job in plan(load_study(study), folder, 1).jobs.values():
-            imported(job.stage.module).run(job.content, Spent())
+            driver.run(job.stage.module, job.content, TaskCosts())
         collect.run(study, folder, output)
 
 

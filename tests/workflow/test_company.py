@@ -7,11 +7,10 @@ import h5py
 import pytest
 import xarray as xr
 
-from springtune.registry import imported
 from springtune.studies.kinds import load_study
-from springtune.studies.runs import checked_json, store
+from springtune.studies.runs import checked_json, driver, store
 from springtune.studies.runs.plan import plan
-from springtune.studies.runs.task_costs import Spent
+from springtune.studies.runs.task_costs import TaskCosts
 
 STUDY = """
 title: Many scenes of few meshes
@@ -74,7 +73,7 @@ def stages(study, folder, cores=1):
 
 def compute(module, content):
     """Do a job."""
-    imported(module).run(content, Spent())
+    driver.run(module, content, TaskCosts())
 
 
 def keys(content):

@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Any
 import h5py
 import numpy as np
 
-from springtune.registry import imported
 from springtune.safe_io import atomic
 from springtune.safe_io.escapes import shown
 from springtune.safe_io.inputs import check_alone
@@ -30,12 +29,12 @@ from ..config.yaml_lines import read_yaml
 from ..kinds.division import part_of
 from ..kinds.scenes.plan import scene_key
 from ..output.reading import check_links
-from ..runs import checked_json, locks, records, rerun, store
+from ..runs import checked_json, driver, locks, records, rerun, store
 from ..runs.damage import DamagedError
 from ..runs.keys import installed
 from ..runs.plan import plan
 from ..runs.run_tasks import RECORDS, TASKS
-from ..runs.task_costs import Spent
+from ..runs.task_costs import TaskCosts
 from ..runs.task_limits import Watch
 
 if TYPE_CHECKING:
@@ -69,7 +68,7 @@ class _NotStoredError(Exception):
     """A task whose result is not stored."""
 
 
-class _OnlyStored(Spent):
+class _OnlyStored(TaskCosts):
     """Of jobs that are to find all their results stored: they compute nothing."""
 
     def __init__(self, limits: Mapping[str, float]) -> None:
@@ -81,7 +80,7 @@ class _OnlyStored(Spent):
         """Limits of a task in words."""
         return self.words
 
-    def attempt(self, key: str, function: Callable[[], Any], hole: Callable[[str], dict[str, Any]]) -> Any:
+    def attempt(self, key: str, function: Callable[[], Any], failed: Callable[[str], dict[str, Any]]) -> Any:
         """Refuse to compute."""
         raise _NotStoredError(key)
 
@@ -362,14 +361,14 @@ def adopt(study: "Study", folder: Path, cores: int) -> int:
             for path in filter(Path.exists, (record, took)):
                 path.touch()
             continue
-        spent = _OnlyStored(study.limits)
+        costs = _OnlyStored(study.limits)
         try:
-            imported(job.stage.module).run(job.content, spent)
+            driver.run(job.stage.module, job.content, costs)
         except (_NotStoredError, DamagedError):
             left += 1
             continue
         took.unlink(missing_ok=True)  # of another run than this
-        records.write(record, job.digest, job.products, **spent.summary())
+        records.write(record, job.digest, job.products, **costs.summary())
     return left
 
 

@@ -11,22 +11,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from springtune.problem.status import Status
-from springtune.registry import imported
 from springtune.safe_io import atomic
 
 from ..config.kind import kinds
 from ..config.model import SceneSpec
 from ..kinds import load_study
 from ..kinds.scenes.division import of_scenes
-from ..kinds.shapes.division import of_shape_scenes
+from ..kinds.shapes.plan import of_shape_scenes
 from ..output import reading
 from ..output.summary import SCENES
-from ..runs import checked_json, records, rerun, store
+from ..runs import checked_json, driver, records, rerun, store
 from ..runs.damage import ASIDE, DamagedError, rename
 from ..runs.keys import installed
 from ..runs.plan import BUNDLES_FILE, plan
 from ..runs.run_tasks import RECORDS, TASKS
-from ..runs.task_costs import Spent
+from ..runs.task_costs import TaskCosts
 from ..runs.task_limits import LIMITS_TOLD
 
 if TYPE_CHECKING:
@@ -196,10 +195,10 @@ def _part(study: "Study", chosen: "set[SceneSpec | ShapeScene]") -> "Study":
 def _made(study: "Study", folder: Path) -> "dict[str, xr.Dataset]":
     """Groups of the dataset of a study that have scenes, made in this process."""
     for job in plan(study, folder, 1).jobs.values():
-        spent = Spent()
-        imported(job.stage.module).run(job.content, spent)
-        if spent.broken:
-            raise spent.broken[0]
+        costs = TaskCosts()
+        driver.run(job.stage.module, job.content, costs)
+        if costs.broken:
+            raise costs.broken[0]
     found: dict[str, xr.Dataset] = {}
     for kind in kinds():
         if kind.name in ("scenes", "shapes") and study.parts[kind.name]:

@@ -17,8 +17,12 @@ if TYPE_CHECKING:
     from .model import Study
     from .sections import StudyConfig
 
-KINDS = ("scenes", "moduli", "laying", "stability", "benchmark", "samples", "refinement", "shapes")
-"""Packages of the study kinds, in the order of the dataset's groups."""
+_PACKAGES = Path(__file__).parents[1] / "kinds"
+
+_FIRST = ("scenes", "moduli", "laying", "stability", "benchmark", "samples", "refinement", "shapes")
+
+KINDS = _FIRST + tuple(sorted({path.parent.name for path in _PACKAGES.glob("*/kind.py")} - {*_FIRST}))
+"""Packages of the study kinds, in the order of the dataset's groups: these first, then any other."""
 
 
 FORMATS = ("png", "pdf")
@@ -86,8 +90,8 @@ class Output:
 class Stage:
     """A stage before the dataset: jobs that each work off a bundle of tasks.
 
-    Its module has functions ``run(content, spent)``, which computes what is not stored yet, and ``lose(content, key,
-    why, limits)``, which stores the hole of a task that went beyond its limits; `springtune.studies.runs.run_tasks`.
+    Its module says what one task is, see `springtune.studies.runs.driver`. Most stages follow from their tasks, see
+    `springtune.studies.runs.stages`.
 
     Attributes
     ----------
@@ -111,6 +115,10 @@ class Stage:
         Stages that it waits for: for the job of the same bundle, and for all jobs.
     alone : bool
         Whether a job has a single member and the machine to itself, since other jobs would be in its seconds.
+    folder : str
+        Folder of its files in the study's.
+    tasks : callable, optional
+        Of a study: its tasks, of a stage that follows from these.
     """
 
     name: str
@@ -123,14 +131,18 @@ class Stage:
     same: tuple[str, ...] = ()
     every: tuple[str, ...] = ()
     alone: bool = False
+    folder: str = ""
+    tasks: Callable[[Study], Iterable[Any]] | None = None
 
 
 @dataclass(frozen=True)
 class Kind:
     """A study kind.
 
-    Its package has a module ``kind`` with ``KIND``, which imports neither scipy, xarray nor matplotlib, and a module
-    ``collect`` with ``groups(study, folder)``: groups of the dataset by name.
+    Its package has a module ``kind`` with ``KIND``, which imports neither scipy, xarray nor matplotlib. ``variables``
+    say what its group of the dataset has, where each task has a cell of it; else a module ``collect`` has
+    ``groups(study, folder)``: groups of the dataset by name. A module ``outputs`` with ``OUTPUTS``, which imports no
+    pydantic, saves time where figures are drawn.
 
     Attributes
     ----------
@@ -150,16 +162,19 @@ class Kind:
         Of that part: labels of the dimensions of its groups.
     summary : callable, optional
         Of that part: rows of what `springtune scenes` prints, each a name, a number and a remark.
+    variables : dict of str to tuple
+        Variables of its group, see `springtune.studies.output.dataset.Group`.
     stages : tuple of Stage
     outputs : tuple of Output
     tables : callable, optional
         Of a study: stems of its tables on the page of all tables; ``tables(tree)`` in its module ``tables`` makes them.
     costs : dict of str to tuple
         Seconds of a task by its name in records, in any case and per unit, before any was measured.
-    division : str
-        Module of its package with ``pieces(study, costs, division)``, seconds of each piece that a part of a study may
-        have of it, by name, and ``take(study, names)``, the study with these pieces alone; see
-        `springtune.studies.kinds.division`. A kind without is in one part as a whole.
+    pieces : callable, optional
+        Of a study, `springtune.studies.runs.bundles.Costs` and a `springtune.studies.kinds.division.Division`: seconds
+        of each piece that a part of a study may have of it, by name. A kind without is in one part as a whole.
+    take : callable, optional
+        Of a study and names of pieces: the study with these alone.
     """
 
     name: str
@@ -171,11 +186,13 @@ class Kind:
     expand: Callable[[StudyConfig, Declared], Any] = lambda config, declared: ()
     axes: Callable[[Any], Mapping[str, Collection[str | float]]] = lambda part: {}
     summary: Callable[[Any], list[list[object]]] = lambda part: []
+    variables: dict[str, tuple[tuple[str, ...], str, str, Any]] = field(default_factory=dict)
     stages: tuple[Stage, ...] = ()
     outputs: tuple[Output, ...] = ()
     tables: Callable[[Study], list[str]] | None = None
     costs: dict[str, tuple[float, float]] = field(default_factory=dict)
-    division: str = ""
+    pieces: Callable[[Study, Any, Any], Mapping[tuple[str | int, ...], float]] | None = None
+    take: Callable[[Study, Collection[tuple[str | int, ...]]], Study] | None = None
 
     def module(self, name: str) -> ModuleType:
         """A module of its package."""
@@ -208,6 +225,13 @@ def distinct(name: str, labels: Iterable[str], cells: Iterable[Mapping[str, str]
     return {stem(name, one): one for one in chosen}
 
 
+def modules(*names: str) -> list[str]:
+    """Modules of these names that the packages of the study kinds have."""
+    return [
+        f"studies.kinds.{kind}.{name}" for kind in KINDS for name in names if (_PACKAGES / kind / f"{name}.py").exists()
+    ]
+
+
 @cache
 def kinds() -> tuple[Kind, ...]:
     """All study kinds.
@@ -228,5 +252,6 @@ def outputs() -> dict[str, Output]:
     dict of str to Output
         By name.
     """
-    modules = [imported(f"studies.kinds.{name}.outputs") for name in KINDS]
-    return {output.name: output for module in modules for output in module.OUTPUTS}
+    apart = {name.split(".")[2]: imported(f"{name}:OUTPUTS") for name in modules("outputs")}
+    found = (apart[name] if name in apart else imported(f"studies.kinds.{name}.kind:KIND").outputs for name in KINDS)
+    return {output.name: output for outputs in found for output in outputs}

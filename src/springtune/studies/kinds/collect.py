@@ -15,10 +15,12 @@ from ..output import dataset, summary
 from ..runs import bundles, provenance, records, rerun
 from ..runs.dependencies import CODE_FILE, OURS
 from ..runs.plan import COSTS_FILE, plan, usual_costs
-from ..runs.run_tasks import RECORDS, mended
+from ..runs.run_tasks import RECORDS, with_repair
+from ..runs.stages import results
 from . import load_study
 
 if TYPE_CHECKING:
+    from ..config.kind import Kind
     from ..config.model import Study
 
 
@@ -30,7 +32,7 @@ def run(config: str | Path, folder: str | Path, output: str | Path, untold: Coll
 def _collected(
     study: "Study", config: str | Path, folder: Path, output: Path, untold: Collection[str] = ()
 ) -> list[Path]:
-    groups = mended(lambda: gathered(study, folder), folder)
+    groups = with_repair(lambda: gathered(study, folder), folder)
     try:
         dataset.write(output, groups, provenance.attributes(study, config, untold))
     except OSError as error:  # the message says it all
@@ -52,12 +54,22 @@ def main(config: str, folder: str, output: str, record: str, digest: str, *untol
     records.write(record, digest, made, untold=list(untold))
 
 
+def _of_tasks(kind: "Kind", study: "Study", folder: Path) -> dict[str, xr.Dataset]:
+    """Group of a kind whose tasks have a cell each."""
+    group = dataset.Group(f"/{kind.name}", kind.variables)
+    found = dataset.Filler(group.empty(study.axes))
+    for stage in kind.stages:
+        for task, result in results(stage, study, folder):
+            found.put(result, **task.labels)
+    return {group.name: found.data}
+
+
 def gathered(study: "Study", folder: Path) -> dict[str, xr.Dataset]:
     """Groups of the dataset of a study, of what its stages stored."""
     groups: dict[str, xr.Dataset] = {}
     for kind in kinds():
         if study.parts[kind.name]:
-            groups |= kind.module("collect").groups(study, folder)
+            groups |= _of_tasks(kind, study, folder) if kind.variables else kind.module("collect").groups(study, folder)
     for made in () if study.part else outputs().values():
         if made.collect and made.name in study.outputs:
             groups |= imported(made.collect).groups(study, folder)

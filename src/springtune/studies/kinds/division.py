@@ -1,15 +1,14 @@
-"""Parts of a study for several sites: dealt out by what they are expected to cost, each scene to one of them.
+"""Parts of a study for several sites, dealt out by their expected cost: each scene is in one of them.
 
-A part is found from the whole study and its number alone, whatever the machine has measured: all sites agree on it.
-What depends on all scenes of a study, such as the range of its interpolants, is that of the whole study in each part:
-results have the same keys and the same bits as in one place.
+A part follows from the whole study and its number alone, so that all sites agree on it. Keys and numbers are those of
+the whole study.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from math import ceil
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..config.kind import kinds
 from ..config.messages import StudyError
@@ -18,6 +17,7 @@ from ..runs.bundles import Costs
 if TYPE_CHECKING:
     from ..config.kind import Kind
     from ..config.model import Study
+    from ..runs.stages import Task
 
 Name = tuple[str | int, ...]
 """Of a piece, within its kind of study."""
@@ -25,15 +25,7 @@ Name = tuple[str | int, ...]
 
 @dataclass(frozen=True)
 class Division:
-    """How a study is divided.
-
-    Attributes
-    ----------
-    by : str
-        What stays together, of `springtune.studies.config.sections.DEALT_BY`.
-    most : float
-        Seconds that a piece of several tasks should not exceed.
-    """
+    """How a study is divided: what stays together (``by``, see `DEALT_BY`), and the most seconds of a piece."""
 
     by: str
     most: float
@@ -45,6 +37,19 @@ class Division:
     def of_section(self, found: Mapping[Name, float]) -> dict[Name, float]:
         """Seconds of the pieces of a section of a study, all of which is one piece where grids stay together."""
         return {(): sum(found.values())} if self.by == "grid" else dict(found)
+
+
+def by_task(kind: str, tasks: "Callable[[Study], Iterable[Task]]", piece: Callable[[Any], Name]) -> dict[str, Any]:
+    """How a kind is divided whose part of a study is a tuple, and each of that a task."""
+
+    def pieces(study: "Study", costs: Costs, division: Division) -> dict[Name, float]:
+        return division.of_section({piece(task.of): task.seconds(costs) for task in tasks(study)})
+
+    def take(study: "Study", names: Collection[Name]) -> "Study":
+        chosen = tuple(one for one in study.parts[kind] if piece(one) in set(names))
+        return replace(study, parts=study.parts | {kind: chosen})
+
+    return {"pieces": pieces, "take": take}
 
 
 def dealt(study: "Study", count: int, by: str) -> list[tuple[float, dict[str, list[Name]]]]:
@@ -89,10 +94,7 @@ def taken(study: "Study", share: Mapping[str, list[Name]]) -> "Study":
         names = share.get(kind.name, [])
         if () in names:  # all of it
             continue
-        if kind.division:
-            study = kind.module(kind.division).take(study, names)
-        else:
-            study = replace(study, parts=study.parts | {kind.name: ()})
+        study = kind.take(study, names) if kind.take else replace(study, parts=study.parts | {kind.name: ()})
     return study
 
 
@@ -102,11 +104,7 @@ def _pieces(study: "Study", division: Division) -> dict[tuple[str, Name], float]
     found: dict[tuple[str, Name], float] = {}
     for kind in kinds():
         if study.parts[kind.name]:
-            own: Mapping[Name, float] = (
-                kind.module(kind.division).pieces(study, costs, division)
-                if kind.division
-                else {(): _seconds(kind, study, costs)}
-            )
+            own = kind.pieces(study, costs, division) if kind.pieces else {(): _seconds(kind, study, costs)}
             found |= {(kind.name, name): seconds for name, seconds in own.items()}
     return found
 

@@ -10,8 +10,13 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.font_manager import FontProperties, findfont, get_font
+from matplotlib.patches import Patch
 
+from . import style
 from .style import POINTS, SMALL, arrange
+
+End = tuple[float, float, str, str]
+"""Where a line ends, its name and its colour, for `name_lines`."""
 
 DARKER = 0.75
 """Share of the light of a line's colour that its name keeps, to be read on white."""
@@ -79,7 +84,7 @@ def spread(wanted: Sequence[float], sizes: Sequence[float], low: float, high: fl
     return found
 
 
-def name_lines(panel: Axes, ends: Iterable[tuple[float, float, str, str]], share: float = 0.6) -> None:
+def name_lines(panel: Axes, ends: Iterable[End], share: float = 0.6) -> None:
     """Names of lines to the right of their ends, no two on each other, within the panel, which is widened for them.
 
     Call it when the panel has its place and its limits.
@@ -129,6 +134,31 @@ def alike(curves: dict[str, np.ndarray], within: float) -> list[list[str]]:
         else:
             groups.append([name])
     return groups
+
+
+def line(panel: Axes, x: np.ndarray, y: np.ndarray, look: Mapping[str, Any], name: str, end: str = "") -> list[End]:
+    """Draw a line that has points: where it ends, with its name or another text, for `name_lines`."""
+    known = np.flatnonzero(np.isfinite(y))
+    if not len(known):
+        return []
+    panel.plot(x, y, label=name, **look)
+    return [(x[known[-1]], y[known[-1]], end or name, look["color"])]
+
+
+def lines(
+    panel: Axes, x: np.ndarray, curves: dict[str, np.ndarray], within: float, logarithmic: bool = False
+) -> list[End]:
+    """Draw a line a name, those that are `alike` as one: their ends for `name_lines`."""
+    shown = {name: np.log(np.abs(values)) for name, values in curves.items()} if logarithmic else curves
+    ends: list[End] = []
+    for number, names in enumerate(alike(shown, within)):
+        ends += line(panel, x, curves[names[0]], style.line(number), ", ".join(names))
+    return ends
+
+
+def swatches(colours: Mapping[str, str]) -> list[Patch]:
+    """Coloured boxes of a legend, by their texts."""
+    return [Patch(facecolor=colour, edgecolor="0.3", linewidth=0.4, label=text) for text, colour in colours.items()]
 
 
 TITLE_LINE = 0.13

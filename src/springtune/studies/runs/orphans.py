@@ -27,12 +27,8 @@ OUTPUT_FILES = {
 }
 """Folders of outputs, and how their files end."""
 
-STORED, STORES = (
-    ".h5",
-    {"references", "curves", "solutions", "moduli", "laying", "stability", "benchmark", "refinement", "samples"}
-    | {"shape_meshes", "shape_references", "shape_solutions"},
-)
-"""Ending of what stages store, see `springtune.studies.runs.store`, and the folders where they do."""
+STORED = ".h5"
+"""Ending of what stages store, see `springtune.studies.runs.store`."""
 
 
 def orphans(study: "Study", folder: Path) -> list[Path]:
@@ -50,6 +46,7 @@ def orphans(study: "Study", folder: Path) -> list[Path]:
 def _candidates(folder: Path) -> Iterator[Path]:
     """Files of the kinds that runs make, in a study's folder and those directly in it that are no links elsewhere."""
     names = tuple(f"{name}_" for name in (*(stage.name for stage in plan.stages()), rerun.PRESENT))
+    stores = {stage.folder for stage in plan.stages()}
     for path in _files(folder):
         if _is_left(path):
             yield path
@@ -61,7 +58,7 @@ def _candidates(folder: Path) -> Iterator[Path]:
         for path in _files(below):
             made = path.suffix in OUTPUT_FILES.get(below.name, ())
             made |= below.name in JOB_FILES and path.name.startswith(names)
-            made |= below.name in STORES and path.suffix == STORED
+            made |= below.name in stores and path.suffix == STORED
             made |= below.name == "meshes" and path.suffix in (".vtu", ".json")
             if made or _is_left(path):
                 yield path

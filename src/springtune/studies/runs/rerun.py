@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, is_dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..config.kind import FORMATS, KINDS, kinds, outputs
+from ..config.kind import FORMATS, kinds, modules, outputs
 from ..config.shown import keeps_fields
 from . import checked_json, records
 from .dependencies import CODE_FILE, OURS, PACKAGE
@@ -108,7 +108,7 @@ def _collect_digest(study: "Study", plan: Plan) -> str:
     """Digest of a study's dataset: of the study as it is expanded, and of the files that the dataset names."""
     collected = [made for made in outputs().values() if made.collect and made.name in study.outputs]
     code = [stage_key("studies.kinds.collect")]
-    code += [stage_key(f"studies.kinds.{name}.{part}") for name in KINDS for part in ("kind", "collect")]
+    code += [stage_key(name) for name in modules("kind", "collect")]
     code += [stage_key(made.collect) for made in collected]
     about = [
         study.name,
@@ -148,24 +148,24 @@ def _plain(part: Any) -> Any:
 
 
 def _present_digest(members: "Iterable[Output]", files: list[str]) -> str:
-    used = ["studies.output.present", *(f"studies.kinds.{name}.outputs" for name in KINDS)]
+    used = ["studies.output.present", *modules("outputs")]
     templates = []
     for one in members:
         used += filter(None, (one.module, one.write))
         if one.page:
-            used += ["studies.output.page", *(f"studies.kinds.{name}.kind" for name in KINDS)]
+            used += ["studies.output.page", *modules("kind")]
             used += [f"studies.kinds.{kind.name}.tables" for kind in kinds() if kind.tables]
             templates.append(records.checksum(PACKAGE / "studies/output/page.html"))
     return hash_of(files, [stage_key(name) for name in dict.fromkeys(used)], templates)
 
 
 def _browse_digest(study: "Study") -> str:
-    kinds_with_views = [name for name in KINDS if (PACKAGE / f"studies/kinds/{name}/views.py").exists()]
-    views = [f"studies.kinds.{name}.views" for name in kinds_with_views]
     assets = {
         path.name: records.checksum(path) for path in sorted((PACKAGE / "studies/output/browse/assets").iterdir())
     }
-    return hash_of(linked(study), [stage_key(name) for name in ("studies.output.browse.job", *views)], assets)
+    return hash_of(
+        linked(study), [stage_key(name) for name in ("studies.output.browse.job", *modules("views"))], assets
+    )
 
 
 def paper_job(source: Path, datasets: "Iterable[Path]", folder: Path) -> Job:

@@ -2,7 +2,7 @@
 
 What is to do is the note ``TASKS``; the module that it names does it, and ``DONE`` records what was done and made. A
 stored file that turns out to be damaged is set aside and made again, in the job that needs it. A task that goes beyond
-its limits is lost, and the others are done; a program that is broken ends the job when all other tasks are done.
+its limits fails, and the others are done; a program that is broken ends the job when all other tasks are done.
 """
 
 import os
@@ -17,10 +17,10 @@ from typing import Any, TypeVar
 from springtune.problem.geometry import AssumptionWarning
 from springtune.registry import imported
 
-from . import checked_json, records
+from . import checked_json, driver, records
 from .damage import DamagedError, set_aside
 from .hashing import hash_of
-from .task_costs import Spent
+from .task_costs import TaskCosts
 from .task_limits import Watch, guarded
 
 Made = TypeVar("Made")
@@ -46,8 +46,8 @@ def main(tasks: str, done: str, digest: str) -> None:
     Parameters
     ----------
     tasks : str
-        The note: ``digest``, ``limits``, ``module`` (of the package, with functions ``run(content, spent)`` and
-        ``lose(content, key, why, limits)``), ``content`` for these and ``products``, files that it makes.
+        The note: ``digest``, ``limits``, ``module`` of the package and ``content`` for it, see
+        `springtune.studies.runs.driver`, and ``products``, files that it makes.
     """
     note = checked_json.read(tasks)
     if note is None or note["digest"] != digest:
@@ -69,27 +69,27 @@ def source_state() -> str:
 
 def _run(note: dict[str, Any], done: str | Path, folder: Path) -> None:
     """Do the tasks of a note within their limits."""
-    module = imported(note["module"])
+    imported(note["module"])  # once for all children
     watch = Watch(note["limits"])
-    spent = Spent(watch)
+    costs = TaskCosts(watch)
     guarded(
-        lambda: mended(lambda: _do(note, done, spent), folder),
+        lambda: with_repair(lambda: _do(note, done, costs), folder),
         watch,
-        lambda key, why: module.lose(note["content"], key, why, watch.words),
+        lambda key, why: driver.gone(note["module"], note["content"], key, why, watch.words),
     )
 
 
-def _do(note: dict[str, Any], done: str | Path, spent: Spent) -> None:
-    imported(note["module"]).run(note["content"], spent)
-    if spent.broken:
-        for error in spent.broken[:TRACEBACKS]:
+def _do(note: dict[str, Any], done: str | Path, costs: TaskCosts) -> None:
+    driver.run(note["module"], note["content"], costs)
+    if costs.broken:
+        for error in costs.broken[:TRACEBACKS]:
             traceback.print_exception(error)
-        first = traceback.format_exception_only(spent.broken[0])[-1].strip()
-        raise SystemExit(f"{len(spent.broken)} of this job's tasks could not be done: {first}")
-    records.write(done, note["digest"], note["products"], **spent.summary())
+        first = traceback.format_exception_only(costs.broken[0])[-1].strip()
+        raise SystemExit(f"{len(costs.broken)} of this job's tasks could not be done: {first}")
+    records.write(done, note["digest"], note["products"], **costs.summary())
 
 
-def mended(function: Callable[[], Made], folder: Path) -> Made:
+def with_repair(function: Callable[[], Made], folder: Path) -> Made:
     """Call a function; stored files that it finds damaged are made again."""
     again: Counter[Path] = Counter()
     while True:

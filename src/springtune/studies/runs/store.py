@@ -11,7 +11,7 @@ read, before HDF5 sees it.
 import hashlib
 import json
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Self
 
@@ -29,7 +29,7 @@ MAGIC = b"springtune results, SHA-256 of what follows after 512 bytes: "
 """What a file begins with."""
 
 LIMITS = "limits"
-"""What a result notes that was lost to limits: these, in words; readers are not told."""
+"""Name under which the failed result of a task beyond its limits has these, in words; readers do not get it."""
 
 USER_BLOCK = 512
 """Length of the block before HDF5's own [bytes]."""
@@ -114,16 +114,6 @@ def read_one(folder: str | Path, key: str, fields: Sequence[str] = ()) -> dict[s
     return read(Path(folder) / f"{key}.h5", [key], fields)[key]
 
 
-def missing(
-    folder: str | Path, tasks: Iterable[Mapping[str, Any]], limits: str | None = None
-) -> Iterator[tuple[Path, Mapping[str, Any]]]:
-    """Tasks whose result, a file each, named by the task's key, is not stored yet."""
-    for task in tasks:
-        path = Path(folder) / f"{task['key']}.h5"
-        if task["key"] not in stored(path, limits):
-            yield path, task
-
-
 KEPT_BACK = 5.0
 """Seconds for which a `Keeper` has results in memory: writing them costs as much as computing small ones."""
 
@@ -148,11 +138,6 @@ class Keeper:
     def _write(self) -> None:
         add(self.path, self.results)
         self.results, self.since = {}, time.perf_counter()
-
-
-def lose(folder: str | Path, key: str, hole: Mapping[str, Any], limits: str) -> None:
-    """Store that a task, whose result has a file to itself, went beyond its limits."""
-    add(Path(folder) / f"{key}.h5", {key: {**hole, LIMITS: limits}})
 
 
 def add(path: str | Path, results: Mapping[str, Mapping[str, Any]]) -> None:

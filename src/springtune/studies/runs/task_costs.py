@@ -18,15 +18,15 @@ LOST = "beyond limits"
 """What tasks are counted as that went beyond their limits."""
 
 
-class Spent:
+class TaskCosts:
     """What the tasks of a job cost, for the record that says it is done.
 
     Examples
     --------
-    >>> spent = Spent()
-    >>> spent.add("linear", 231, 0.5)
-    >>> spent.add("linear", 19, 0.25)
-    >>> spent.summary()["work"]
+    >>> costs = TaskCosts()
+    >>> costs.add("linear", 231, 0.5)
+    >>> costs.add("linear", 19, 0.25)
+    >>> costs.summary()["work"]
     {'linear': [2, 250.0, 0.75]}
     """
 
@@ -38,11 +38,11 @@ class Spent:
 
     @property
     def limits(self) -> str:
-        """Limits of a task in words, which a result that is lost to them notes."""
+        """Limits of a task in words, which the failed result of one beyond them notes."""
         return self.watch.words if self.watch else ""
 
-    def attempt(self, key: str, function: Callable[[], Any], hole: Callable[[str], dict[str, Any]]) -> Any:
-        """Result of a task."""
+    def attempt(self, key: str, function: Callable[[], Any], failed: Callable[[str], dict[str, Any]]) -> Any:
+        """Result of a task, a failed one where it fails for reasons of its own; None where the program is broken."""
         from .failures import own_reason  # here: what counts alone needs no definitions
 
         try:
@@ -51,7 +51,7 @@ class Spent:
             with self.watch.over(key):
                 return function()
         except MemoryError:
-            return hole(f"not enough memory: {self.limits or 'the machine has no more'}") | {"limits": self.limits}
+            return failed(f"not enough memory: {self.limits or 'the machine has no more'}") | {"limits": self.limits}
         except Exception as error:
             from .damage import DamagedError
 
@@ -61,7 +61,7 @@ class Spent:
             if not why:
                 self.broken.append(error)
                 return None
-            return hole(why)
+            return failed(why)
 
     def add(self, kind: str, units: float, seconds: float, count: int = 1) -> None:
         """Count tasks."""

@@ -1,7 +1,7 @@
-"""Other ways to a beam's displacement, for the benchmark: those that the paper names, and plain finite elements.
+"""Other ways to a beam's displacement, for the benchmark: those of the paper, and plain finite elements.
 
-Each takes a scene and a mesh size and returns the displacement of the loaded side and the number of unknowns; it tells
-a clock which part of the work it is at. All are linear.
+Each takes a scene, a mesh size and a clock, and returns the displacement of the loaded side and the number of unknowns.
+All are linear.
 """
 
 from dataclasses import replace
@@ -186,10 +186,7 @@ def tensor_mass(scene, size, clock):
 
 
 def condensation(scene, size, clock):
-    """Responses of the loaded side, each computed once beforehand; any load is then a product (pre-computation).
-
-    The answers to unit loads are the part that is paid once (``factorizing``), the product is what a load costs.
-    """
+    """Responses of the loaded side to unit loads, computed once (``factorizing``); a load then costs a product."""
     with clock("meshing"):
         mesh = _mesh(scene, size)
     with clock("assembling"):

@@ -357,11 +357,7 @@ def plot_benchmark_curve(data, ax=None):
     style.arrange(figure, axes, **place)
     panel, count, ends = axes[0, 0], data.curve_count.values, []
     for number, name, label in ((1, "separate_seconds", "solve by solve"), (0, "curve_seconds", "one path")):
-        values, look = data[name].values, style.line(number)
-        there = np.flatnonzero(np.isfinite(values))
-        if len(there):
-            panel.plot(count, values, **look, label=label)
-            ends.append((count[there[-1]], values[there[-1]], label, look["color"]))
+        ends += labels.line(panel, count, data[name].values, style.line(number), label)
     panel.set(**style.LOGARITHMIC, xlabel="Stiffnesses on the curve", ylabel="Seconds",
               title="Seconds of a nonlinear sensitivity curve")  # fmt: skip
     if ends:

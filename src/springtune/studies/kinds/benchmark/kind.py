@@ -1,6 +1,6 @@
 """Run time against error: a study's section ``benchmark``."""
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Annotated
 
 from pydantic import Field
@@ -12,6 +12,7 @@ from springtune.problem.geometry import Beam
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import Material
 from springtune.problem.quantities import nearest
+from springtune.reference.program import program
 from springtune.springs import DEFINITIONS
 
 from ...config.checks import check_beam_material, check_density, check_known, check_particles, check_product
@@ -30,9 +31,10 @@ from ...config.fields import (
 )
 from ...config.kind import Kind
 from ...config.sections import Section
+from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key
+from ...runs.stages import Task, stage
 from .names import CURVE_COUNTS, OTHER_APPROACHES, THREAD_COUNTS, approach_names
 from .outputs import OUTPUTS
-from .plan import STAGES
 
 MOST_RUNS = 100_000
 """Most combinations of scenes, approaches and mesh sizes that a benchmark measures."""
@@ -85,17 +87,7 @@ class BenchmarkConfig(Section):
 
 @dataclass(frozen=True)
 class Case:
-    """A scene of the benchmark, see `springtune.studies.kinds.benchmark.measure`.
-
-    Attributes
-    ----------
-    force : float
-        Force on the loaded side, tension positive [N].
-    mesh_sizes : tuple of float
-        Lengths of an edge [m], ascending.
-    finest : tuple of float
-        The shortest edge of each approach [m].
-    """
+    """A scene of the benchmark; sizes are edges [m], ``finest`` has one for each approach, tension is positive [N]."""
 
     name: str
     beam: Beam
@@ -199,6 +191,28 @@ def _axes(cases):
     }
 
 
+def _tasks(study):
+    """Scenes; curves, steps and solvers are timed on the first one."""
+    for place, case in enumerate(study.parts["benchmark"]):
+        values = asdict(case) | {"beam": beam_key(case.beam), "material": material_key(case.material, density=True)}
+        del values["name"]
+        values |= {"second_beam": case.second_beam and beam_key(case.second_beam), "curves": place == 0}
+        yield Task(values, _code(case), of=case, costs=[("benchmark", 0)], name=case.name)
+
+
+def _code(case):
+    """Keys of what a scene is measured with."""
+    pairs = [approach.split("/") for approach in case.approaches if "/" in approach]
+    definitions, mesh_types = ({pair[place] for pair in pairs} for place in (0, 1))
+    # What the approaches do not name is solved and timed on these.
+    definitions, mesh_types = definitions | {"delingette", "lattice"}, mesh_types | {"structured"}
+    springs = [definition_key(name) for name in sorted(definitions)]
+    meshes = [mesh_type_key(name) for name in sorted(mesh_types)]
+    return springs, meshes, program() if any(name.startswith("calculix") for name in case.approaches) else ""
+
+
+STAGE = stage("benchmark", "studies.kinds.benchmark.solve", "Timing approaches", _tasks, alone=True)
+
 KIND = Kind(
     "benchmark",
     study_fields={
@@ -210,6 +224,6 @@ KIND = Kind(
     check=_check,
     expand=_expand,
     axes=_axes,
-    stages=STAGES,
+    stages=(STAGE,),
     outputs=OUTPUTS,
 )

@@ -1,7 +1,7 @@
 """Run time against error: definitions on all mesh types, and other approaches.
 
-Every case runs in a process of its own, forked warm, several times; the first run, which also imports and reads what
-the approach needs, is told apart. The machine's load and the largest memory are noted beside the seconds.
+Each case runs several times in a process of its own, forked warm. The first run imports and reads what the approach
+needs, and is kept apart.
 """
 
 import multiprocessing
@@ -108,17 +108,9 @@ class Alarm:
 
 
 def run(scene, approaches, sizes, finest, most_seconds, second_beam=None):
-    """All approaches on the sizes that are asked for, from coarse to fine.
+    """All approaches on their sizes [m], from coarse to fine, each down to its ``finest`` [m].
 
-    What an approach cannot do, or not within its seconds, is a hole with its status and message; so are the finer sizes
-    of what was not done within its seconds.
-
-    Parameters
-    ----------
-    sizes : sequence of float
-        Lengths of an edge [m], ascending.
-    finest : sequence of float
-        The shortest one that is asked of each approach [m].
+    An approach that fails or exceeds its seconds has a status and a message, and so have its finer sizes.
     """
     begin = time.perf_counter()
     reference = solve_small_strain(scene.beam, scene.material, scene.force, kind=scene.kind)
@@ -141,7 +133,7 @@ def run(scene, approaches, sizes, finest, most_seconds, second_beam=None):
                 continue
             if approach in beyond:
                 size, why = beyond[approach]
-                found = _hole(f"not run: at {1e3 * size:g} mm it was {why}")
+                found = _failed(f"not run: at {1e3 * size:g} mm it was {why}")
             else:
                 found = _case(scene, approach, sizes[j], meshes, most_seconds)
             if found.get("beyond"):
@@ -159,7 +151,7 @@ def _blank(shape):
     return np.zeros(shape, dtype=np.int8), np.full(shape, "", dtype=object)
 
 
-def _hole(message, status=Status.FAILED):
+def _failed(message, status=Status.FAILED):
     return {"status": status, "message": message}
 
 
@@ -193,7 +185,7 @@ def _second(scene, beam, approaches, sizes, solved, most_seconds):
 def _case(scene, approach, size, meshes, most_seconds, once=False):
     """Result of a case; the mesh of a definition is made before, and its time counted."""
     if approach.startswith("calculix") and not installed():
-        return _hole("CalculiX (ccx) is not on this machine; install it, or ask for other approaches")
+        return _failed("CalculiX (ccx) is not on this machine; install it, or ask for other approaches")
     mesh, meshing = None, 0.0
     if approach not in APPROACHES:
         mesh_type = approach.partition("/")[2]
@@ -224,8 +216,8 @@ def in_process(function, most_seconds, *arguments):
         if process.exitcode == -signal.SIGPROF:
             own = not left or left > most_seconds + BESIDE
             limits = _limit(most_seconds) if own else f"{_limit(most_seconds)}, or what is left of the study's `limits`"
-            return _hole(f"not done within {limits}") | {"beyond": True}
-        return _hole("ended: by the limits of the study, or for lack of memory") | {"beyond": True}
+            return _failed(f"not done within {limits}") | {"beyond": True}
+        return _failed("ended: by the limits of the study, or for lack of memory") | {"beyond": True}
     finally:
         process.join()
 
@@ -236,18 +228,18 @@ def _child(send, function, alarm, arguments):
         alarm.set()
         send.send(function(alarm, *arguments))
     except DefinitionError as error:
-        send.send(_hole(str(error)))
+        send.send(_failed(str(error)))
     except MemoryError:
-        send.send(_hole("not enough memory: the limits of the study, or the machine's") | {"beyond": True})
+        send.send(_failed("not enough memory: the limits of the study, or the machine's") | {"beyond": True})
     except Exception as error:  # the other cases shall still be measured
         others = resource.getrusage(resource.RUSAGE_CHILDREN)
         why = own_reason(error)
         if why and others.ru_utime + others.ru_stime >= alarm.most:
-            send.send(_hole(f"not done within {_limit(alarm.most)} ({why})") | {"beyond": True})
+            send.send(_failed(f"not done within {_limit(alarm.most)} ({why})") | {"beyond": True})
             return
         if not why:
             traceback.print_exc()
-        send.send(_hole(why, Status.NOT_CONVERGED) if why else error)
+        send.send(_failed(why, Status.NOT_CONVERGED) if why else error)
 
 
 def _repeat(alarm, scene, approach, size, mesh, meshing, once):
@@ -276,9 +268,9 @@ def _repeat(alarm, scene, approach, size, mesh, meshing, once):
 
 
 def rates(result, sizes):
-    """Order of the error in the mesh size, exponent of the seconds in the unknowns, and which cases nothing beats.
+    """Order of the error in the mesh size, exponent of the seconds in the unknowns, and the cases that nothing beats.
 
-    An error that changes its sign or does not fall with the mesh size has no order.
+    An error that changes its sign, or does not fall with the mesh size, has no order.
     """
     count = len(result["error"])
     rates, exponents = np.full(count, np.nan), np.full(count, np.nan)
@@ -296,13 +288,7 @@ def rates(result, sizes):
 
 
 def curves(scene, size, most_seconds):
-    """Seconds of sensitivity curves over the number of stiffnesses: as one path, and solve by solve.
-
-    Returns
-    -------
-    dict of str to ndarray, shape (n_counts,)
-        And what became of them.
-    """
+    """Seconds of sensitivity curves, shape (n_counts,): as one path, and solve by solve."""
     found = in_process(_curves, most_seconds, scene, size)
     if "status" in found:
         return {"curve_status": found["status"], "curve_message": np.array(found["message"], dtype=object)}
@@ -328,13 +314,7 @@ def _curves(alarm, scene, size):
 
 
 def solvers(scene, sizes, most_seconds):
-    """Seconds of the solvers of one linear system, from its matrix to its solution, the next matrix's with them.
-
-    Returns
-    -------
-    dict of str to ndarray, shape (n_solvers, n_sizes)
-        And what became of them.
-    """
+    """Seconds of linear solvers, shape (n_solvers, n_sizes): from a matrix to its solution, and for the next matrix."""
     shape = len(SOLVERS), len(sizes)
     arrays = {name: np.full(shape, np.nan) for name in ("solver_seconds", "solver_again_seconds")}
     status, message = _blank(shape)
@@ -342,7 +322,7 @@ def solvers(scene, sizes, most_seconds):
         mesh = MESH_TYPES["structured"](scene.beam.length, scene.beam.height, size)
         for i, name in enumerate(SOLVERS):
             if name == "Cholesky" and not factors.CHOLESKY:
-                found = _hole("CHOLMOD is not installed; install springtune[cholesky]")
+                found = _failed("CHOLMOD is not installed; install springtune[cholesky]")
             else:
                 found = in_process(_solver, most_seconds, scene, mesh, name)
             _note(found, arrays, status, message, (i, j))
@@ -364,10 +344,10 @@ def _solver(alarm, scene, mesh, name):
 
 
 def explicit(scene, sizes, most_seconds, updates=UPDATES):
-    """Explicit steps a second of nonlinear springs, and what they read and write, beside a plain copy of memory.
+    """Explicit steps a second of nonlinear springs, and the bytes that they move, beside a plain copy of memory.
 
-    A step reads each spring's ends, rest vector, length and stiffness, and of each particle four vectors, two of which
-    it writes: from a cache, where an earlier step has left it there.
+    A step reads each spring's ends, rest vector, length and stiffness, and four vectors of each particle, of which it
+    writes two.
     """
     shape = len(sizes), len(THREAD_COUNTS), len(PRECISIONS)
     arrays = {name: np.full(shape, np.nan) for name in ("explicit_steps", "spring_updates", "explicit_bandwidth")}

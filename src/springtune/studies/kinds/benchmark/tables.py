@@ -182,10 +182,9 @@ NOISE = 1.3
 
 
 def comparison(old: xr.Dataset, new: xr.Dataset) -> tuple[list[str], int]:
-    """Ratios of the seconds of two benchmarks, approach by approach.
+    """Ratios of the seconds of two benchmarks over their median, approach by approach.
 
-    A machine that is slower on the whole is no regression: ratios are over their median. Flagged is what lies outside
-    of `NOISE` and of three times the spread that the runs showed.
+    Flagged are ratios beyond `NOISE` and beyond three times the spread of the runs.
     """
     both = {name: [label for label in old[name].values if label in new[name].values]
             for name in ("scene", "approach", "mesh_size")}  # fmt: skip

@@ -1,6 +1,6 @@
 """Strips laid on a trapezoid: every combination of the values of a study's section ``laying``."""
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from itertools import product
 from typing import Annotated
 
@@ -14,8 +14,9 @@ from ...config.checks import check_beam_material, check_for_triangles, check_kno
 from ...config.fields import BeamName, DefinitionName, Length, MaterialName, OneOrMore, Stress, number, one_of
 from ...config.kind import Kind
 from ...config.sections import Section
+from ...runs.keys import definition_key, material_key, mesh_type_key
+from ...runs.stages import Task, stage
 from .outputs import OUTPUTS
-from .plan import STAGES
 
 LOADINGS = ("pressure", "gravity", "ends")
 """What lays a strip: a pressure on its upper face, its weight, or its ends, drawn down to the floor."""
@@ -70,17 +71,7 @@ class LayingConfig(Section):
 
 @dataclass(frozen=True)
 class LayingScene:
-    """A strip to lay on a trapezoid, see `springtune.studies.kinds.laying.lay`.
-
-    Attributes
-    ----------
-    mesh_size : float
-        Length of an edge [m].
-    pressure : float
-        Pressure on the strip, or its weight over its upper face [Pa].
-    friction : float
-        Coulomb's coefficient [1].
-    """
+    """A strip to lay on a trapezoid, its pressure or its weight over its upper face [Pa]; see `lay`."""
 
     strip: Strip
     trapezoid: Trapezoid
@@ -95,13 +86,7 @@ class LayingScene:
 
 @dataclass(frozen=True)
 class Laying:
-    """What a study lays.
-
-    Attributes
-    ----------
-    references : tuple of LayingScene
-        Strips of finite elements that the others are compared with, on several meshes a loading and friction.
-    """
+    """Strips of a study, and those of finite elements that they are compared with, on several meshes."""
 
     strips: tuple[LayingScene, ...]
     references: tuple[LayingScene, ...]
@@ -163,6 +148,17 @@ def _axes(laying):
     }
 
 
+def _tasks(study):
+    laying = study.parts["laying"]
+    for one in (*laying.strips, *laying.references) if laying else ():
+        values = asdict(one) | {"material": material_key(one.material), "support": material_key(one.support)}
+        # The trapezoid is of Delingette's springs.
+        also = mesh_type_key("structured"), definition_key(one.definition), definition_key("delingette")
+        yield Task(values, also, of=one, costs=[("laying", (1e-3 / one.mesh_size) ** 3)])
+
+
+STAGE = stage("laying", "studies.kinds.laying.solve", "Laying the strips", _tasks)
+
 KIND = Kind(
     "laying",
     study_fields={
@@ -174,7 +170,7 @@ KIND = Kind(
     check=_check,
     expand=_expand,
     axes=_axes,
-    stages=STAGES,
+    stages=(STAGE,),
     outputs=OUTPUTS,
     tables=lambda study: ["laying"] if study.parts["laying"] else [],
     costs={"laying": (0.0, 1.5)},

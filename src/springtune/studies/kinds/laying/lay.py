@@ -29,20 +29,9 @@ RIGID = 1e4
 
 @dataclass(frozen=True)
 class Laid:
-    """What became of a strip.
+    """A laid strip: ``penetration`` is over the mesh size, ``force_error`` over the load (NaN for drawn ends).
 
-    Attributes
-    ----------
-    elongation : float
-        Elongation of the strip's lower fibre [1].
-    penetration : float
-        Largest penetration over the mesh size [1].
-    force_error : float
-        Vertical contact force on the floor and rigid bodies less the load, over the load [1]; NaN for drawn ends.
-    load_share : float
-        Share of the load that was reached [1].
-    outline : ndarray of float, shape (n, 2)
-        Where the outline of the strip is, in order [m].
+    ``outline`` has shape (n, 2) [m].
     """
 
     area: float
@@ -59,19 +48,7 @@ class Laid:
 
 def lay(strip, trapezoid, material, support, definition, size, *, mesh_type="structured", loading="pressure",
         pressure=0.02e6, friction=0.0, rigid=RIGID):  # fmt: skip
-    """Lay a strip on a trapezoid.
-
-    Parameters
-    ----------
-    size : float
-        Mesh size [m].
-    pressure : float
-        Pressure on the upper face, or weight over it [Pa].
-    friction : float
-        Coulomb's coefficient [1].
-    rigid : float
-        Ratio of Young's moduli from which the trapezoid is rigid [1].
-    """
+    """Lay a strip on a trapezoid [m, Pa], which is rigid from a ratio ``rigid`` of Young's moduli on."""
     begin = time.perf_counter()
     body, mesh = _strip(strip, trapezoid, material, definition, size, mesh_type, loading, pressure)
     skipped = ["unknowns of the floor"]
@@ -134,10 +111,7 @@ def _strip(strip, trapezoid, material, definition, size, mesh_type, loading, pre
 
 
 def _support(strip, trapezoid, material, size):
-    """The trapezoid as a body: rows of linear triangles fitted between its sides, its small displacements alone.
-
-    Its sharp corners are no place for a negative area modulus, so it is `delingette` whatever the strip is.
-    """
+    """The trapezoid: rows of linear triangles of `delingette`, since its corners allow no negative area modulus."""
     mean = 0.5 * (trapezoid.lower_base + trapezoid.upper_base)
     made = MESH_TYPES["structured"](mean, trapezoid.height, size)
     y = made.points[:, 1]

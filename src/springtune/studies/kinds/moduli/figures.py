@@ -127,13 +127,7 @@ def _moduli(panel, here):
     values = np.concatenate([[low, high], *curves.values()])
     bottom, top = np.clip([np.nanmin(values) - 0.03, np.nanmax(values) + 0.03], -0.45, 0.75)
     panel.set_ylim(min(bottom, low - 0.03), max(top, high + 0.03))
-    ends = []
-    for number, names in enumerate(labels.alike(curves, 0.012)):
-        found, look = curves[names[0]], style.line(number)
-        panel.plot(wanted, found, label=", ".join(names), **look)
-        known = np.flatnonzero(np.isfinite(found))
-        if len(known):
-            ends.append((wanted[known[-1]], found[known[-1]], ", ".join(names), look["color"]))
+    ends = labels.lines(panel, wanted, curves, 0.012)
     room = panel.get_window_extent().width / panel.figure.dpi
     said = labels.wrapped(f"no moduli: {', '.join(lacking)}", room) if lacking and ends else ""
     return ends, said, "" if ends else f"No definition has moduli here: {_statuses(here.status.values)}."
@@ -230,8 +224,7 @@ def _field_errors(panel, error, status):
         if len(there) > 1:
             rate = np.polyfit(np.log(sizes[there]), np.log(values[there]), 1)[0]
             label += f" ({rate:.1f})".replace("-0.0", "0.0").replace("-", "−")
-        panel.plot(sizes, values, label=label, **look)
-        ends.append((sizes[there[-1]], values[there[-1]], label, look["color"]))
+        ends += labels.line(panel, sizes, values, look, label)
     said = [f"grey: {', '.join(others)}"] if others else []
     lacking = [str(name) for name, there, flag in zip(names, known, flags) if not there.any() and (flag > 0).any()]
     said += [f"no error: {', '.join(lacking)}"] if lacking else []

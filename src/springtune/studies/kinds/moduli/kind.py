@@ -1,6 +1,6 @@
 """Effective moduli of definitions: a flag of a grid, and the box on whose meshes they are measured."""
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from itertools import product
 
 from pydantic import Field
@@ -12,9 +12,12 @@ from springtune.springs import DEFINITIONS
 from ...config.checks import check_particles
 from ...config.fields import Flag, Length
 from ...config.kind import Kind
+from ...config.model import MeshSpec
 from ...config.sections import Section
+from ...runs.keys import definition_key, mesh_type_key
+from ...runs.stages import Task, stage
+from ..scenes.plan import mesh_key, mesh_parameters, mesh_source, particles
 from .outputs import OUTPUTS
-from .plan import STAGES
 
 
 class PatchConfig(Section):
@@ -29,15 +32,7 @@ class PatchConfig(Section):
 
 @dataclass(frozen=True)
 class Measurement:
-    """Effective moduli of a definition on a patch.
-
-    Attributes
-    ----------
-    mesh_size : float
-        Length of an edge [m].
-    poisson_ratio : float
-        Poisson's ratio that the definition is asked for [1].
-    """
+    """Effective moduli of a definition on a patch, for the Poisson's ratio that it is asked for."""
 
     definition: str
     mesh_type: str
@@ -47,13 +42,7 @@ class Measurement:
 
 @dataclass(frozen=True)
 class Measurements:
-    """What a study measures.
-
-    Attributes
-    ----------
-    patch : Beam
-        Box on whose meshes moduli are measured; its thickness does not matter.
-    """
+    """Measurements of a study, and the box on whose meshes they are made; its thickness does not matter."""
 
     patch: Beam
     measurements: tuple[Measurement, ...]
@@ -92,6 +81,30 @@ def _summary(moduli):
     return [["moduli", len(moduli.measurements), f"measured on {on}"]]
 
 
+def _tasks(study):
+    for one in study.parts["moduli"].measurements if study.parts["moduli"] else ():
+        mesh, name = _mesh_of(study, one), f"{one.mesh_type}_{1e3 * one.mesh_size:g}mm"
+        yield Task(
+            {"definition": one.definition, "poisson_ratio": one.poisson_ratio},
+            (mesh_parameters(mesh), mesh_type_key(one.mesh_type), definition_key(one.definition)),
+            labels=asdict(one),
+            costs=[("moduli", particles(mesh)), (one.definition, particles(mesh))],
+            name=name,
+            file=name,
+            shared={"mesh": mesh_source(mesh)},
+        )
+
+
+def _mesh_of(study, one):
+    """Mesh of a patch test: on the box, or of the meshes from files that of the shortest beam."""
+    if one.mesh_type in MESH_TYPES:
+        return MeshSpec(study.parts["moduli"].patch, one.mesh_type, one.mesh_size)
+    found = [mesh for label, mesh in study.mesh_files.items() if label[::2] == (one.mesh_type, one.mesh_size)]
+    return min(found, key=lambda mesh: (mesh.beam.length, mesh.beam.height, mesh_key(mesh)))
+
+
+STAGE = stage("moduli", "studies.kinds.moduli.solve", "Measuring effective moduli", _tasks)
+
 KIND = Kind(
     "moduli",
     study_fields={
@@ -115,7 +128,7 @@ KIND = Kind(
     expand=_expand,
     axes=_axes,
     summary=_summary,
-    stages=STAGES,
+    stages=(STAGE,),
     outputs=OUTPUTS,
     costs={"moduli": (5e-4, 2e-6)},
 )

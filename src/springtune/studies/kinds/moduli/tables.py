@@ -12,8 +12,7 @@ from springtune.safe_io.atomic import write_text
 from ...output.dataset import STATUS, most_requested
 from ...output.selection import unswept
 from ..scenes.variables import SCENE
-from .outputs import TABLES
-from .variables import PATCH
+from .outputs import PATCH, TABLES
 
 SCENE_VALUES = ("deformation_error", "field_error", "definition_seconds", "definition_evaluations", "spring_ratio")
 MODULI_VALUES = ("young_modulus_error", "effective_poisson_ratio", "shear_modulus_error", "spring_ratio")
@@ -120,10 +119,7 @@ def _range(errors, flags):
 
 
 def decision(tree: xr.DataTree) -> str:
-    """Markdown: what to use, what each definition attains on each mesh type, and over the paper's cells.
-
-    Every figure is a cell of the dataset, or the range, median or largest one of cells that the table names.
-    """
+    """Markdown: what to use, what each definition attains on each mesh type, and over the paper's cells."""
     root, moduli = unswept(tree.to_dataset()), tree["moduli"].to_dataset()
     advice = _advice(root)
     parts = ["### In short", "", *advice, ""] if advice else []

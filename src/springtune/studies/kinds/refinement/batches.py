@@ -1,8 +1,8 @@
-"""Which values a refinement takes: in batches, where the error changes its sign or crosses a tolerance.
+"""Values of a refinement: in batches, where the error changes its sign or crosses a tolerance.
 
-Values have places from 0 to 1 between the two ends. The first batch is evenly spaced; every further one halves all
-intervals in which the error crosses zero or the tolerance, of either sign, and which are wider than the resolution. So
-the places are the same whatever number of values a study allows, and a larger number goes on where a smaller one ended.
+Values have places from 0 to 1 between the two ends. The first batch is evenly spaced. Every further one halves the
+intervals in which the error crosses zero or the tolerance and which are wider than the resolution. So places do not
+depend on how many values a study allows.
 """
 
 from collections.abc import Callable, Sequence
@@ -55,17 +55,7 @@ class Rule:
 
 @dataclass(frozen=True)
 class Crossing:
-    """Where the error is zero, or the tolerance.
-
-    Attributes
-    ----------
-    level : float
-        The error that is crossed [1].
-    value : float
-        By a straight line between the two values that enclose it.
-    change : float
-        By how much the error changes between them, with its sign [1]: at a jump it stays as large as it is.
-    """
+    """Where the error is ``level`` [1], by a straight line between two values, and how much it changes between them."""
 
     level: float
     value: float

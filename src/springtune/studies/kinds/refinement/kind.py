@@ -1,6 +1,7 @@
 """Refinement: a study's section ``refine``, one task a refinement and definition."""
 
-from dataclasses import dataclass
+from collections import defaultdict
+from dataclasses import asdict, dataclass
 from typing import Annotated
 
 from pydantic import Field
@@ -29,10 +30,12 @@ from ...config.fields import (
 from ...config.kind import Kind
 from ...config.messages import refuse, show
 from ...config.sections import Section
+from ...runs.hashing import hash_of
+from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key, stage_key
+from ...runs.stages import Task, stage
 from .batches import Rule
 from .names import SPACINGS, VARIED
 from .outputs import OUTPUTS
-from .plan import STAGES
 
 MOST_REFINED = 10_001
 """Most values of a refinement."""
@@ -105,17 +108,7 @@ class RefinementConfig(Section):
 
 @dataclass(frozen=True)
 class Refinement:
-    """A refinement of one definition.
-
-    Attributes
-    ----------
-    force : float
-        With its sign [N]; that of the load where it is the parameter, and its size elsewhere.
-    mesh_size : float
-        Length of an edge [m]; zero where it is the parameter.
-    parameter : str
-        Key of `springtune.studies.kinds.refinement.names.VARIED`.
-    """
+    """A refinement of one definition; ``force`` [N] has its sign, ``mesh_size`` [m] is 0 where it is the parameter."""
 
     name: str
     beam: Beam
@@ -245,6 +238,52 @@ def _summary(refinements):
     return [["refined", first, f"values to begin with, at most {most}, where errors cross zero or a tolerance"]]
 
 
+SOLVE = "studies.kinds.refinement.solve"
+"""Module that solves refinements."""
+
+USUAL_PARTICLES = 1e3
+"""Particles of a mesh for costs, where they are not known."""
+
+
+def _parameters(one):
+    """What all values of a refinement have in common: refinements that differ in their ends alone share a file."""
+    load = LOADS[one.load]
+    return {
+        "beam": beam_key(one.beam),
+        "material": material_key(one.material),
+        "kind": load.kind.name,
+        "follower": load.follower and one.kinematics == "nonlinear",
+        "force": one.force,
+        "mesh_type": one.mesh_type,
+        "mesh_size": one.mesh_size,
+        "definition": one.definition,
+        "kinematics": one.kinematics,
+        "parameter": one.parameter,
+    }
+
+
+def file_key(one):
+    """Key of the file of a refinement: of all that its values depend on but these."""
+    return hash_of(_parameters(one), [stage_key(SOLVE), mesh_type_key(one.mesh_type), definition_key(one.definition)])
+
+
+def _tasks(study):
+    """Refinements, those together that share a file."""
+    families = defaultdict(list)
+    for one in study.parts["refinement"]:
+        families[file_key(one)].append(one)
+    for key, family in families.items():
+        values = _parameters(family[0]) | {"rules": [asdict(one.rule) for one in family]}
+        yield Task(values, costs=[_cost(one) for one in family], name=key, key=key)
+
+
+def _cost(one):
+    """Half of the values that a refinement may have, each on the mesh that is known."""
+    size = one.mesh_size or one.rule.first
+    particles = one.beam.length * one.beam.height / (0.866 * size**2) if size else USUAL_PARTICLES
+    return "refinement", particles, 0.5 * (one.rule.points + one.rule.most)
+
+
 KIND = Kind(
     "refinement",
     study_fields={
@@ -257,7 +296,7 @@ KIND = Kind(
     expand=_expand,
     axes=_axes,
     summary=_summary,
-    stages=STAGES,
+    stages=(stage("refinement", SOLVE, "Refining where errors matter", _tasks),),
     outputs=OUTPUTS,
     costs={"refinement": (3e-2, 1.2e-5)},
 )

@@ -7,15 +7,7 @@ from springtune.units import UnitError, parse
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter of a scene.
-
-    Attributes
-    ----------
-    kind : str
-        Of `springtune.units.QUANTITY_KINDS`; empty for numbers.
-    scales : tuple of (str, float)
-        Units of figures and their sizes in SI, the largest first; none for numbers.
-    """
+    """A parameter of a scene: ``kind`` is of `springtune.units.QUANTITY_KINDS`, ``scales`` are units and SI sizes."""
 
     meaning: str
     unit: str

@@ -104,15 +104,8 @@ def roles(design: str, names: list[str]) -> list[str]:
 def draw(
     design: str, seed: int, parameters: Mapping[str, Mapping[str, Any]], first: int, last: int
 ) -> dict[str, np.ndarray]:
-    """Parameters of the scenes of some base samples.
+    """Parameters of the scenes of some base samples, ``mesh_size`` among them, shape (n_rows,); see `roles`.
 
-    Returns
-    -------
-    dict of str to ndarray of float, shape (n_rows,)
-        By the parameter's name, ``mesh_size`` among them; rows of a base sample one after the other, see `roles`.
-
-    Notes
-    -----
     Rows A and B of a base sample are the halves of one point of twice the dimensions; AB_i is A with the parameter i of
     B (Saltelli et al., Comput. Phys. Commun. 181:259, 2010).
     """

@@ -21,15 +21,7 @@ NEGLIGIBLE = 1e-12
 
 @dataclass(frozen=True)
 class Indices:
-    r"""Sobol indices of one quantity.
-
-    Attributes
-    ----------
-    first, total : ndarray of float, shape (n_parameters,)
-        First- and total-order indices [1].
-    first_band, total_band : ndarray of float, shape (2, n_parameters)
-        Ends of their bootstrap bands.
-    """
+    """First- and total-order Sobol indices, shape (n_parameters,), and their bands, shape (2, n_parameters)."""
 
     first: np.ndarray
     total: np.ndarray

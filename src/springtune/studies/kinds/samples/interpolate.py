@@ -7,27 +7,27 @@ from pathlib import Path
 from typing import Any
 
 from ...runs import store
-from ...runs.task_costs import Spent
+from ...runs.task_costs import TaskCosts
 from ..scenes import stored_interpolant
 from .designs import draw
 
 
-def run(tasks: dict[str, Any], spent: Spent) -> None:
+def run(content: dict[str, Any], costs: TaskCosts) -> None:
     """Build the interpolants that are not there yet."""
     pairs = set()
-    if tasks["sample"]:
-        drawn = draw(**tasks["sample"])
+    if content["sample"]:
+        drawn = draw(**content["sample"])
         pairs = set(zip((drawn["length"] / drawn["height"]).tolist(), drawn["poisson_ratio"].tolist()))
-    for task in tasks["references"]:
+    for task in content["files"]:
         problems = {problem_key(task["key"], *pair): pair for pair in sorted(pairs)}
-        path = Path(tasks["folder"]) / f"{task['key']}.h5"
-        stored_interpolant.make(path, task | {"problems": problems}, spent)
+        path = Path(content["folder"]) / f"{task['key']}.h5"
+        stored_interpolant.make(path, task | {"problems": problems}, costs)
 
 
-def lose(tasks: dict[str, Any], key: str, why: str, limits: str) -> None:
-    """Store that a reference or an interpolant is beyond its limits; parameters as of other stages."""
-    path = Path(tasks["folder"]) / f"{key.partition(' ')[0]}.h5"
-    store.add(path, {key: stored_interpolant.hole(why) | {store.LIMITS: limits}})
+def gone(content: dict[str, Any], key: str, why: str, limits: str) -> None:
+    """Store the failed result of a reference or an interpolant beyond its limits."""
+    path = Path(content["folder"]) / f"{key.partition(' ')[0]}.h5"
+    store.add(path, {key: stored_interpolant.failed(why) | {store.LIMITS: limits}})
 
 
 def problem_key(reference: str, aspect_ratio: float, nu: float) -> str:

@@ -21,7 +21,7 @@ from ...config.sections import Section
 from .distributions import Distributed
 from .names import DESIGNS, DROP, FAILURES, PARAMETERS, SMALLEST_SIZE, SOBOL_INDICES, rows_each
 from .outputs import OUTPUTS
-from .plan import STAGES
+from .plan import STAGES, pieces, take
 
 Drawn = dict[str, Any]
 
@@ -120,15 +120,7 @@ class SamplesConfig(Section):
 
 @dataclass(frozen=True)
 class Sample:
-    """What a study samples.
-
-    Attributes
-    ----------
-    parameters : dict of str to dict
-        Distributions in the order of `PARAMETERS`, see `springtune.studies.kinds.samples.designs.quantile`.
-    blocks : tuple of tuple of int
-        First base sample, and that after the last, of each task that a part of a study asks for; none where it is all.
-    """
+    """What a study samples; ``blocks`` are the tasks of a part of a study, none where it has all."""
 
     design: str
     size: int
@@ -291,7 +283,8 @@ KIND = Kind(
     summary=_summary,
     stages=STAGES,
     outputs=OUTPUTS,
-    division="division",
+    pieces=pieces,
+    take=take,
     tables=lambda study: ["sobol"] if _has_indices(study) else [],
     costs={"sampled": (0.05, 6e-4)},
 )

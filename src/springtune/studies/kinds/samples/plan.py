@@ -1,13 +1,14 @@
 """Stages of samples: what their jobs are to do, and the keys of what they store."""
 
+from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 from springtune.problem.loads import LOADS
 
 from ...config.kind import Stage
 from ...runs.hashing import hash_of
 from ...runs.keys import definition_key, mesh_type_key, stage_key
+from ...runs.stages import products
 from ..scenes.interpolated import expected_solves
 from .names import MOST_SOLVED, blocks, rows_each
 
@@ -47,14 +48,11 @@ def block_key(sample, first, last):
 
 @cache
 def _solved_with(mesh_type, definition):
-    return hash_of(stage_key("studies.kinds.samples.stage"), mesh_type_key(mesh_type), definition_key(definition))
+    return hash_of(stage_key("studies.kinds.samples.solve"), mesh_type_key(mesh_type), definition_key(definition))
 
 
 def result_key(sample, load, definition):
-    """Key of the scenes of a load and definition, in the file of any base samples.
-
-    Of linear kinematics they are for 1 N, which loads of a kind share.
-    """
+    """Key of the scenes of a load and definition in the file of any base samples; linear ones are for 1 N."""
     linear = sample.kinematics == "linear"
     how = LOADS[load].kind.name if linear else [LOADS[load].kind.name, LOADS[load].sign, LOADS[load].follower]
     return hash_of(how, sample.mesh_type, sample.kinematics, _solved_with(sample.mesh_type, definition))
@@ -68,21 +66,21 @@ def _reference_members(study, costs):
     return {kind.name: (seconds, kind) for kind in load_kinds(sample)}
 
 
+def _reference(sample, kind):
+    key = reference_key(sample, kind)
+    return {"name": key, "key": key, "kind": kind.name, "box": reference_box(sample)}
+
+
 def _references(study, folder, kinds):
-    sample = study.parts["samples"]
-    box, drawn = reference_box(sample), None
+    sample, drawn = study.parts["samples"], None
     if sample.rows <= MOST_SOLVED:
         drawn = {"design": sample.design, "seed": sample.seed, "parameters": sample.parameters}
         drawn |= {"first": 0, "last": sample.size}
     return {
         "folder": str(folder / "samples"),
-        "references": [{"key": reference_key(sample, kind), "kind": kind.name, "box": box} for kind in kinds],
+        "files": [_reference(sample, kind) for kind in kinds],
         "sample": drawn,
     }
-
-
-def _reference_products(content):
-    return [Path(content["folder"]) / f"{one['key']}.h5" for one in content["references"]]
 
 
 def _members(study, costs):
@@ -123,14 +121,28 @@ def _content(study, folder, members):
         "parameters": sample.parameters,
         "mesh_type": sample.mesh_type,
         "kinematics": sample.kinematics,
-        "meshed": hash_of(stage_key("studies.kinds.samples.stage"), mesh_type_key(sample.mesh_type)),
+        "meshed": hash_of(stage_key("studies.kinds.samples.solve"), mesh_type_key(sample.mesh_type)),
         "results": results,
-        "blocks": [{"key": block_key(sample, *ends), "first": ends[0], "last": ends[1]} for ends in members],
+        "files": [_block(sample, *ends) for ends in members],
     }
 
 
-def _products(content):
-    return [Path(content["folder"]) / f"{block['key']}.h5" for block in content["blocks"]]
+def _block(sample, first, last):
+    key = block_key(sample, first, last)
+    return {"name": key, "key": key, "first": first, "last": last}
+
+
+def pieces(study, costs, division):
+    """Seconds of each piece of a sample: of a task's base samples, or of all."""
+    sample = study.parts["samples"]
+    return division.of_section({ends: seconds_of(sample, ends, costs) for ends in drawn_blocks(sample)})
+
+
+def take(study, names):
+    """The study with some of its pieces alone; what is estimated from all rows of a sample is left to the whole one."""
+    sample, wanted = study.parts["samples"], set(names)
+    blocks = tuple(ends for ends in drawn_blocks(sample) if ends in wanted)
+    return replace(study, parts=study.parts | {"samples": replace(sample, blocks=blocks) if blocks else ()})
 
 
 STAGES = (
@@ -139,15 +151,17 @@ STAGES = (
         "studies.kinds.samples.interpolate",
         "Interpolating the references of samples",
         _references,
-        _reference_products,
+        products,
         _reference_members,
+        folder="samples",
     ),
     Stage(
         "sample",
-        "studies.kinds.samples.stage",
+        "studies.kinds.samples.solve",
         "Solving the networks of samples",
         _content,
-        _products,
+        products,
         _members,
+        folder="samples",
     ),
 )

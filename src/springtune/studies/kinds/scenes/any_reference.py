@@ -1,7 +1,6 @@
-"""References as curves and the dataset want them, whether solved by themselves or interpolated.
+"""References for curves and the dataset, solved by themselves or interpolated.
 
-Scenes need whole fields, which interpolants have not: the stage `solve` reads `stored_reference` alone, and does not
-depend on finite elements.
+The stage `solve` reads `stored_reference` alone: it needs whole fields, and does not depend on finite elements.
 """
 
 from . import stored_interpolant, stored_reference

@@ -7,20 +7,20 @@ from springtune.springs.calibrated import calibrate
 from ...runs import checked_json, store
 
 
-def run(tasks, spent):
+def run(content, costs):
     """Calibrate from the stored curves."""
     results = {}
-    for group in tasks["groups"]:
+    for group in content["groups"]:
         try:
-            results[group["name"]] = {"stiffness": calibrate(_best(tasks, member) for member in group["members"])}
+            results[group["name"]] = {"stiffness": calibrate(_best(content, member) for member in group["members"])}
         except ValueError as error:
             results[group["name"]] = {"stiffness": None, "message": str(error)}
-    checked_json.write(tasks["file"], results)
+    checked_json.write(content["file"], results)
 
 
-def _best(tasks, member):
+def _best(content, member):
     """What a curve is called, its best stiffness [N/m], and why there is none."""
     name = member["curve"]
-    curve = store.read(Path(tasks["curves"]) / f"{member['mesh']}.h5", [name])[name]
+    curve = store.read(Path(content["curves"]) / f"{member['mesh']}.h5", [name])[name]
     called = f"{member['mesh']} in {member['load']} of {member['force']:g} N"
     return called, curve["best_stiffness"], curve["best_message"]

@@ -338,7 +338,9 @@ def _fields(study, folder, axes):
     scenes = [scene for scene in study.scenes if scene in whole]
     shown = {scene.mesh for scene in scenes}
     kept = [
-        mesh for mesh in study.meshes if mesh in shown and not stored_mesh.refusal(folder / "meshes", plan.stem(mesh))
+        mesh
+        for mesh in study.meshes
+        if mesh in shown and not stored_mesh.is_refused(folder / "meshes", plan.stem(mesh))
     ]
     meshes = {mesh: stored_mesh.read(folder / "meshes", plan.stem(mesh)) for mesh in kept}
     outlines = {one: _outline(study, folder, one) for one in dict.fromkeys(map(_reference_of, scenes))}

@@ -21,17 +21,7 @@ MOST_SHOWN = 60.0
 
 
 def sensitivity(tree):
-    """Figures of sensitivity curves: one for each beam, mesh type, material and load.
-
-    Parameters
-    ----------
-    tree : xarray.DataTree
-
-    Yields
-    ------
-    tuple
-        Stem, function that plots, and selection.
-    """
+    """Figures of sensitivity curves: stem, function that plots, and selection."""
     yield from _each("sensitivity", plot_sensitivity, group(tree, "sensitivity").status, SENSITIVITY_LABELS)
 
 
@@ -317,12 +307,7 @@ def compared(root, selection):
 
 
 def error_panels(ax, shown, draw, title, swept):
-    """Small multiples of deformation errors.
-
-    Returns
-    -------
-    ndarray of matplotlib.axes.Axes, shape (n_panels,)
-    """
+    """Small multiples of deformation errors, shape (n_panels,)."""
     columns = min(3, len(shown)) if len(shown) != 4 else 2
     figure, axes, flat, height = style.multiples(ax, len(shown), columns, 2.1, sharey=True)
     place = {"left": 0.55, "right": 0.06, "top": 0.48, "across": 0.12, "title": title}
@@ -382,14 +367,7 @@ def _errors(panel, here, looks, first):
 
 
 def error_line(panel, x, cell, name, look, asked=...):
-    """Draw the errors of a definition, hollow where their equilibrium is in doubt.
-
-    Parameters
-    ----------
-    x : ndarray, shape (n,)
-    cell : xarray.Dataset
-        With ``deformation_error`` and ``status``, shape (n,).
-    """
+    """Draw the errors of a definition, shape (n,), hollow where their equilibrium is in doubt."""
     error, flags = 100 * cell.deformation_error.values, cell.status.values
     known, ends, lost = np.isfinite(error), [], {}
     if known.any():
@@ -602,10 +580,7 @@ def _pressing(names):
 
 
 def block(tree):
-    """The figure of a pressed block: its last material and beam; its finest structured mesh, or of its first mesh type.
-
-    See `sensitivity`.
-    """
+    """The figure of a pressed block: its last material and beam; its finest structured mesh, or of its first type."""
     present = group(tree, "/").status != 0
     present = present.sel(load=[_pressing(labels_of(present, "load"))])
     types = labels_of(present, "mesh_type")
@@ -682,10 +657,7 @@ def plot_block(data, ax=None, *, beam=None, mesh_type=None, mesh_size=None, mate
 
 
 def _stiffness(panel, curves, root):
-    """Linear kinematics: the reference's own, so that only the law of stiffness is seen.
-
-    Returns ends of lines for their names, a note, and what to say where no curve is there.
-    """
+    """Draw linear kinematics, the reference's own: ends of lines, a note, and what to say without a curve."""
     panel.set(xlabel="Uniform stiffness [N/m]", ylabel="|Deformation error| [%]")
     panel.set_title("One stiffness for all loads? (small strain)", pad=13)
     if curves is None or "linear" not in curves.kinematics.values:
@@ -764,11 +736,7 @@ def _marks(panel, curves, root):
 
 
 def _profile(panel, block, root, load):
-    """The pressed face, like with like; returned as by `_stiffness`.
-
-    Networks with their full length law over the reference at finite strain, where there are both; else those of linear
-    kinematics over the one of small strain.
-    """
+    """Draw the pressed face, nonlinear over finite strain or linear over small strain; returned as by `_stiffness`."""
     x, pressed, ends, said, highest = block.face_position.values, block.sel(load=load), [], [], []
     panel.set(xlabel="Place on the loaded face over its length", ylabel="Displacement along the load [mm]")
     of_networks = pressed.face_profile.notnull().any(["definition", "face_position"])

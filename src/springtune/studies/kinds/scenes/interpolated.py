@@ -1,6 +1,6 @@
-"""Which references of a study come from interpolants: where it has more unit problems of a kind than they take.
+"""Which references of a study come from interpolants: where that takes fewer solves than the unit problems.
 
-An interpolant has no whole fields. References that need one are solved one by one, and so are the few of a small study.
+An interpolant has no whole fields; references that need one are solved one by one.
 """
 
 from math import ceil, floor, log, log10

@@ -1,6 +1,7 @@
 """Scenes of the grids: a study's own sections say what they are, see `springtune.studies.config.sections`."""
 
 from ...config.kind import Kind
+from .division import pieces, take
 from .outputs import OUTPUTS, stems
 from .plan import STAGES
 
@@ -11,7 +12,8 @@ KIND = Kind(
     stages=STAGES,
     outputs=OUTPUTS,
     tables=stems,
-    division="division",
+    pieces=pieces,
+    take=take,
     costs={
         "mesh": (4e-3, 2.5e-5),
         "linear": (5e-4, 1e-6),

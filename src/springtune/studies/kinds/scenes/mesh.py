@@ -2,40 +2,42 @@
 
 import hashlib
 import time
+from functools import partial
 from pathlib import Path
 
 from springtune.mesh import MESH_TYPES, quality, read_beam_mesh
 
+from ...runs.driver import REFUSED
 from . import stored_mesh
 
 
-def run(tasks, spent):
+def run(content, costs):
     """Make the meshes of a bundle that are not there yet."""
-    folder = tasks["folder"]
-    for task in tasks["meshes"]:
-        if stored_mesh.is_stored(folder, task["name"], task["key"], spent.limits):
+    folder = content["folder"]
+    for task in content["files"]:
+        if stored_mesh.is_stored(folder, task["name"], task["key"], costs.limits):
             continue
         begin = time.perf_counter()
-        mesh = spent.attempt(task["name"], lambda task=task: make(task), _hole)
+        mesh = costs.attempt(task["name"], partial(make, task), _failed)
         known = {"mesh_seconds": time.perf_counter() - begin}
         if mesh is None:
             continue
         if isinstance(mesh, dict):
             stored_mesh.refuse(folder, task["name"], task["key"], mesh)
-            spent.add(stored_mesh.REFUSED, 0, known["mesh_seconds"])
+            costs.add(REFUSED, 0, known["mesh_seconds"])
             continue
         known |= quality(mesh) | {"particles": len(mesh.points), "springs": len(mesh.edges)}
         stored_mesh.write(folder, task["name"], task["key"], mesh, known)
-        spent.add("mesh", len(mesh.points), time.perf_counter() - begin)
+        costs.add("mesh", len(mesh.points), time.perf_counter() - begin)
 
 
-def lose(tasks, name, why, limits):
+def gone(content, name, why, limits):
     """Store that a mesh is beyond its limits."""
-    key = next(task["key"] for task in tasks["meshes"] if task["name"] == name)
-    stored_mesh.refuse(tasks["folder"], name, key, _hole(why) | {"limits": limits})
+    key = next(task["key"] for task in content["files"] if task["name"] == name)
+    stored_mesh.refuse(content["folder"], name, key, _failed(why) | {"limits": limits})
 
 
-def _hole(why):
+def _failed(why):
     return {"message": f"mesh: {why}"}
 
 

@@ -14,6 +14,7 @@ from ...config.remembered import once_a_study
 from ...config.shown import shown
 from ...runs.hashing import hash_of
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key, stage_key
+from ...runs.stages import products
 from . import stored_mesh
 from .interpolated import expected_solves, interpolants
 from .stored_scene import calibrated_key
@@ -99,11 +100,7 @@ def interpolant_key(kind, box):
 
 @cache
 def solved_reference(beam, material, load):
-    """Reference that is solved by itself.
-
-    Its key is that of the unit problem, which beams and materials that differ by a scale share, and all loads of a
-    kind.
-    """
+    """Reference that is solved by itself, under the key of its unit problem, which scaled beams share."""
     length, displacement = unit_scales(beam, material, LOADS[load].kind)
     code = stage_key(
         "studies.kinds.scenes.reference", without=("reference.finite_strain", "studies.kinds.scenes.stored_interpolant")
@@ -254,12 +251,12 @@ def _mesh_members(study, costs):
 def _meshes(study, folder, members):
     return {
         "folder": str(folder / "meshes"),
-        "meshes": [{"name": stem(mesh), "key": mesh_key(mesh)} | mesh_source(mesh) for mesh, *_ in members],
+        "files": [{"name": stem(mesh), "key": mesh_key(mesh)} | mesh_source(mesh) for mesh, *_ in members],
     }
 
 
 def _mesh_products(content):
-    return [path for mesh in content["meshes"] for path in stored_mesh.files(content["folder"], mesh["name"])]
+    return [path for mesh in content["files"] for path in stored_mesh.files(content["folder"], mesh["name"])]
 
 
 def _reference_members(study, costs):
@@ -289,27 +286,28 @@ def _references(study, folder, groups):
     members = [one for group in groups for one in group]
     interpolated = [_interpolant(study, name) for name, kind in members if kind == INTERPOLANT]
     references = [member for member in members if member[1] != INTERPOLANT]
-    return {
-        "folder": str(folder / "references"),
-        "references": [
-            {"key": solved_reference(*problem)["key"], "problem": _unit_problem(*problem)}
-            for problem in ((one.beam, one.material, one.load) for one, kind in references if kind is None)
-        ],
-        "finite": [
-            {
-                "key": finite_key(one, kind),
-                "beam": beam_key(one.beam),
-                "material": material_key(one.material),
-                "force": one.force,
-                "load": LOADS[one.load].kind.name,
-                "law": kind.partition("-plane-")[0],
-                "plane": kind.partition("-plane-")[2],
-                "follower": LOADS[one.load].follower,
-            }
-            for one, kind in references
-            if kind is not None
-        ],
-    } | ({"interpolants": interpolated} if interpolated else {})
+    tasks = [
+        {"key": solved_reference(*problem)["key"], "cost": ["reference", 0], "problem": _unit_problem(*problem)}
+        for problem in ((one.beam, one.material, one.load) for one, kind in references if kind is None)
+    ]
+    tasks += [
+        {
+            "key": finite_key(one, kind),
+            "cost": ["finite", 0],
+            "beam": beam_key(one.beam),
+            "material": material_key(one.material),
+            "force": one.force,
+            "load": LOADS[one.load].kind.name,
+            "law": kind.partition("-plane-")[0],
+            "plane": kind.partition("-plane-")[2],
+            "follower": LOADS[one.load].follower,
+        }
+        for one, kind in references
+        if kind is not None
+    ]
+    files = [{"name": task["key"], "tasks": [task]} for task in tasks]
+    more = {"interpolants": interpolated} if interpolated else {}
+    return {"folder": str(folder / "references"), "files": files} | more
 
 
 def _interpolant(study, kind):
@@ -320,8 +318,8 @@ def _interpolant(study, kind):
 
 
 def _reference_products(content):
-    tasks = *content["references"], *content["finite"], *content.get("interpolants", ())
-    return [Path(content["folder"]) / f"{one['key']}.h5" for one in tasks]
+    interpolants = content.get("interpolants", ())
+    return products(content) + [Path(content["folder"]) / f"{one['key']}.h5" for one in interpolants]
 
 
 def _curve(study, curve):
@@ -337,34 +335,34 @@ def _curve(study, curve):
 
 def _sensitivity(study, folder, members):
     curves = by_mesh(study.curves)
-    families = [
-        {"name": stem(mesh), "curves": [_curve(study, curve) for curve in curves[mesh]]}
+    files = [
+        {"name": stem(mesh), "tasks": [_curve(study, curve) for curve in curves[mesh]]}
         for meshes in members
         for mesh in meshes
         if mesh in curves  # asking otherwise would add it for all who ask later
     ]
-    return families and {
+    return files and {
         "folder": str(folder / "curves"),
         "meshes": str(folder / "meshes"),
         "references": str(folder / "references"),
-        "families": families,
+        "files": files,
     }
 
 
 def _solve(study, folder, members):
     scenes = by_mesh(study.scenes)
-    families = [
-        {"name": stem(mesh), "thickness": mesh.beam.thickness, "scenes": _scenes(study, mesh)}
+    files = [
+        {"name": stem(mesh), "thickness": mesh.beam.thickness, "tasks": _scenes(study, mesh)}
         for meshes in members
         for mesh in meshes
         if mesh in scenes  # as above; a part of a study may have curves alone
     ]
-    return families and {
+    return files and {
         "calibration": str(calibration_path(folder)) if calibrated(study) else None,
         "folder": str(folder / "solutions"),
         "meshes": str(folder / "meshes"),
         "references": str(folder / "references"),
-        "families": families,
+        "files": files,
     }
 
 
@@ -388,11 +386,6 @@ def _scene(study, scene, common, key, kept):
         task["calibration"] = calibration_name(scene)
         task["thickness_ratio"] = _thickness_ratio(study, scene)
     return task
-
-
-def _family_products(content):
-    names = dict.fromkeys(family["name"] for family in content["families"])
-    return [Path(content["folder"]) / f"{name}.h5" for name in names]
 
 
 @once_a_study("scenes")
@@ -440,17 +433,19 @@ STAGES = (
         _references,
         _reference_products,
         _reference_members,
+        folder="references",
     ),
-    Stage("mesh", "studies.kinds.scenes.mesh", "Meshing", _meshes, _mesh_products, _mesh_members),
+    Stage("mesh", "studies.kinds.scenes.mesh", "Meshing", _meshes, _mesh_products, _mesh_members, folder="meshes"),
     Stage(
         "sensitivity",
         "studies.kinds.scenes.sensitivity",
         "Tracing the sensitivity curves",
         _sensitivity,
-        _family_products,
+        products,
         like="mesh",
         same=("mesh",),
         every=("reference",),
+        folder="curves",
     ),
     Stage(
         "calibrate",
@@ -466,9 +461,10 @@ STAGES = (
         "studies.kinds.scenes.solve",
         "Solving the networks",
         _solve,
-        _family_products,
+        products,
         like="mesh",
         same=("mesh",),
         every=("reference", "calibrate"),
+        folder="solutions",
     ),
 )

@@ -3,8 +3,8 @@
 Where a study has many unit problems, an interpolant answers for all of a kind of load.
 """
 
+import sys
 import time
-from functools import partial
 from pathlib import Path
 
 from springtune.problem.geometry import Beam
@@ -12,7 +12,7 @@ from springtune.problem.loads import LOAD_KINDS
 from springtune.problem.materials import Rubber, material_of
 from springtune.reference.small_strain import ReferenceNotConvergedError, solve_unit
 
-from ...runs import store
+from ...runs import driver, store
 from . import stored_interpolant
 
 NOT_TESTED = "has no uniaxial_test, and so no law of Yeoh's: its references are neo-Hookean"
@@ -20,32 +20,33 @@ OF_TESTED = "has a uniaxial_test, and so Yeoh's law: its reference is 'yeoh-plan
 """Why a material has no reference of the other law."""
 
 
-def run(tasks, spent):
+def run(content, costs):
     """Solve the references of a bundle that are not there yet."""
-    for kind, section, solve in (("reference", "references", _unit), ("finite", "finite", _finite)):
-        for path, task in store.missing(tasks["folder"], tasks[section], spent.limits):
-            begin = time.perf_counter()
-            result = spent.attempt(task["key"], partial(solve, task), _hole)
-            if result is None:
-                continue
-            result["seconds"] = time.perf_counter() - begin
-            store.add(path, {task["key"]: result})
-            spent.add(kind, 0, result["seconds"])
-    for task in tasks.get("interpolants", ()):
-        stored_interpolant.make(Path(tasks["folder"]) / f"{task['key']}.h5", task, spent)
+    driver.solve_files(sys.modules[__name__], content, costs)
+    for task in content.get("interpolants", ()):
+        stored_interpolant.make(Path(content["folder"]) / f"{task['key']}.h5", task, costs)
 
 
-def lose(tasks, key, why, limits):
-    """Store that a reference is beyond its limits."""
-    own = {task["key"] for task in (*tasks["references"], *tasks["finite"])}
-    interpolants = [task for task in tasks.get("interpolants", ()) if key in (task["key"], *task["problems"])]
+def gone(content, key, why, limits):
+    """Store the failed result of a reference beyond its limits."""
+    if driver.gone_of_files(sys.modules[__name__], content, key, why, limits):
+        return
     # What an interpolant cannot do goes into its own file.
-    for name in [key] if key in own else [task["key"] for task in interpolants]:
-        store.add(Path(tasks["folder"]) / f"{name}.h5", {key: _hole(why) | {store.LIMITS: limits}})
+    for task in content.get("interpolants", ()):
+        if key in (task["key"], *task["problems"]):
+            noted = failed(task, why) | {store.LIMITS: limits}
+            store.add(Path(content["folder"]) / f"{task['key']}.h5", {key: noted})
 
 
-def _hole(why):
+def failed(task, why):
+    """Result of a reference that fails."""
     return {"message": why, "seconds": 0.0}
+
+
+def solve(task):
+    """Result of a unit problem, or at finite strain."""
+    begin = time.perf_counter()
+    return (_finite(task) if "law" in task else _unit(task)) | {"seconds": time.perf_counter() - begin}
 
 
 def _unit(task):

@@ -2,8 +2,6 @@
 
 import time
 from dataclasses import replace
-from functools import partial
-from pathlib import Path
 
 import numpy as np
 
@@ -15,79 +13,46 @@ from springtune.reference.field import field_error, interpolate
 from springtune.scene.sheet import Sheet, definition_of
 from springtune.springs import DEFINITIONS, DefinitionError
 
-from ...runs import checked_json, store
-from . import stored_mesh
+from ...runs import checked_json
+from . import stored_mesh, stored_scene
 from . import stored_reference as references
-from .stored_scene import FIELD_ARRAYS, calibrated_key, fields_key, packed
+from .stored_scene import calibrated_key
+
+parts = stored_scene.parts
 
 
-def run(tasks, spent):
-    """Solve the scenes of a bundle that are not stored yet.
-
-    A scene that fails is stored with its status and message; it never stops the others.
-    """
-    calibration = checked_json.demand(tasks["calibration"]) if tasks["calibration"] else {}
-    for family in tasks["families"]:
-        path = Path(tasks["folder"]) / f"{family['name']}.h5"
-        present = store.stored(path, spent.limits)
-        scenes = {stored_key(scene, calibration): scene for scene in family["scenes"]}
-        kept = {name: fields_key(name) for name, scene in scenes.items() if scene.get("keep_fields")}
-        missing = {name: scene for name, scene in scenes.items() if not {name, kept.get(name, name)} <= present}
-        if not missing:
-            continue
-        refused = stored_mesh.refusal(tasks["meshes"], family["name"])
-        if refused:
-            holes = {name: _hole(**refused) for name in missing if name not in present}
-            store.add(path, holes | {kept[name]: {} for name in missing if name in kept})
-            spent.add(stored_mesh.REFUSED, 0, 0.0, len(missing))
-            continue
-        mesh = stored_mesh.read(tasks["meshes"], family["name"])
-        fields = References(tasks["references"], mesh)
-        sheet = Sheet(mesh, family["thickness"])
-        order = sorted(missing, key=lambda name: _turn(missing[name]))
-        with store.Keeper(path) as keeper:
-            for name in order:
-                scene, derived = missing[name], sheet.deriving
-                solved = partial(solve, sheet, scene, fields.field, calibration)
-                result = spent.attempt(name, solved, _hole)
-                if result is None:
-                    continue
-                if name in kept:
-                    keeper[kept[name]] = packed(result)
-                if name not in present:
-                    keeper[name] = {label: value for label, value in result.items() if label not in FIELD_ARRAYS}
-                work = "fields" if name in present else scene["kinematics"]
-                spent.add(work, len(mesh.points), result["seconds"])
-                spent.add(scene["definition"], len(mesh.points), sheet.deriving - derived)
+def tasks(family, content):
+    """Scenes of a mesh under the keys of their results, and what is calibrated for them."""
+    calibration = checked_json.demand(content["calibration"]) if content["calibration"] else {}
+    if not calibration:
+        return family["tasks"]
+    return [
+        scene | {"key": stored_key(scene, calibration), "calibrated": calibration.get(scene.get("calibration"))}
+        for scene in family["tasks"]
+    ]
 
 
-def lose(tasks, name, why, limits):
-    """Store that a scene is beyond its limits."""
-    calibration = checked_json.demand(tasks["calibration"]) if tasks["calibration"] else {}
-    for family in tasks["families"]:
-        kept = {stored_key(scene, calibration): scene.get("keep_fields") for scene in family["scenes"]}
-        if name in kept:
-            path = Path(tasks["folder"]) / f"{family['name']}.h5"
-            holes = {fields_key(name): {"limits": limits}} if kept[name] else {}
-            if name not in store.stored(path, limits):  # else its fields alone are beyond them
-                holes[name] = _hole(why, limits=limits)
-            store.add(path, holes)
+def prepare(family, content):
+    """Sheet of a mesh, and the fields of references on it."""
+    mesh = stored_mesh.prepared(content["meshes"], family["name"])
+    return Sheet(mesh, family["thickness"]), References(content["references"], mesh)
 
 
-def _hole(message, **limits):
-    return limits | {"status": Status.FAILED, "message": message, "seconds": 0.0}
+def failed(scene, why):
+    """Result of a scene that fails."""
+    return {"status": Status.FAILED, "message": why, "seconds": 0.0}
+
+
+def order(scene):
+    """Order in which scenes of one network follow each other."""
+    uniform = DEFINITIONS[scene["definition"]].uniform
+    return ("" if uniform else scene["definition"], scene["material"]["poisson_ratio"], LOAD_KINDS[scene["kind"]].held)
 
 
 def stored_key(scene, calibration):
     """Key of a scene's result; as `springtune.studies.kinds.scenes.plan.solved_key`, from the task."""
     group = scene.get("calibration")
     return calibrated_key(scene["key"], calibration[group]["stiffness"]) if group else scene["key"]
-
-
-def _turn(scene):
-    """Order in which scenes of one network follow each other."""
-    uniform = DEFINITIONS[scene["definition"]].uniform
-    return ("" if uniform else scene["definition"], scene["material"]["poisson_ratio"], LOAD_KINDS[scene["kind"]].held)
 
 
 class References:
@@ -108,34 +73,37 @@ class References:
         return None if field is None else reference["displacement"] * field
 
 
-def solve(sheet, scene, reference=None, calibration=None):
-    """Result of a scene, ready to be stored.
+def solve(scene, shared):
+    """Result of a scene, and the seconds of deriving its springs."""
+    sheet, references = shared
+    derived = sheet.deriving
+    result = solved(sheet, scene, references.field)
+    return result | {"deriving": sheet.deriving - derived}
 
-    Parameters
-    ----------
-    reference : callable, optional
-        Displacements of the scene's reference for 1 N at the particles [m]; None without.
 
-    Returns
-    -------
-    dict
-        ``status`` (a `springtune.problem.status.Status`), ``message``, ``displacement`` [m], ``stiffness`` [N/m],
-        ``field_error``, ``iterations``, ``residual``, ``negative_pivots``, ``seconds``, those of the definition:
-        ``definition_seconds``, ``definition_evaluations``, ``spring_ratio``, and ``displacements`` [m] of the
-        particles, ``spring_stiffnesses`` [N/m] and ``spring_forces`` [N] where they are kept.
+def cost(scene, shared, result, seconds):
+    """Seconds of a scene by the particles of its mesh, and those of its definition."""
+    particles = len(shared[0].mesh.points)
+    yield scene["kinematics"], particles, result["seconds"]
+    yield scene["definition"], particles, result.pop("deriving", 0.0)
+
+
+def solved(sheet, scene, reference=None):
+    """Result of a scene, ready to be stored: lengths [m], stiffnesses [N/m], forces [N].
+
+    ``reference`` returns the displacements of the scene's reference for 1 N at the particles [m], or None.
     """
     begin, derived = time.perf_counter(), sheet.deriving
     try:
-        result = _solved(sheet, scene, reference, calibration)
+        result = _solved(sheet, scene, reference)
     except DefinitionError as error:
         result = {"status": Status.FAILED, "message": f"{scene['definition']}: {error}"}
     return result | {"seconds": time.perf_counter() - begin - (sheet.deriving - derived)}
 
 
-def _solved(sheet, scene, reference, calibration):
-    stiffness = scene.get("stiffness")
-    if "calibration" in scene:
-        group = calibration[scene["calibration"]]
+def _solved(sheet, scene, reference):
+    stiffness, group = scene.get("stiffness"), scene.get("calibrated")
+    if group:
         if group["stiffness"] is None:
             return {"status": Status.FAILED, "message": group["message"]}
         stiffness = group["stiffness"] * scene["thickness_ratio"]

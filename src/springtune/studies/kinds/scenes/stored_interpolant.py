@@ -1,6 +1,6 @@
-"""Stored interpolants of references: how they are made, and read, for grids and for samples.
+"""Stored interpolants of references, of grids and of samples.
 
-The file of one that meets no tolerance has, beside the reason, unit problems that were asked of it, solved one by one.
+The file of one that meets no tolerance has the reason and, solved one by one, the unit problems that were asked of it.
 """
 
 import time
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from springtune.reference.interpolant import Interpolant
 
-    from ...runs.task_costs import Spent
+    from ...runs.task_costs import TaskCosts
 
     Found = tuple[Interpolant | None, dict[str, dict[str, Any]], float, str]
 
@@ -28,17 +28,17 @@ ANSWERS = ("displacement", "mean_displacement", "rotation", "strain", "error_est
 """What an interpolant answers for a unit problem."""
 
 
-def make(path: Path, task: "Mapping[str, Any]", spent: "Spent") -> None:
+def make(path: Path, task: "Mapping[str, Any]", costs: "TaskCosts") -> None:
     """Build an interpolant if it is not there yet; without one, solve the unit problems that are asked of it."""
-    if task["key"] not in store.stored(path, spent.limits):
+    if task["key"] not in store.stored(path, costs.limits):
         begin = time.perf_counter()
-        result = spent.attempt(task["key"], partial(_built, task), hole)
+        result = costs.attempt(task["key"], partial(_built, task), failed)
         if result is None:
             return
         result["seconds"], result["asked"] = time.perf_counter() - begin, len(task["problems"])
         store.add(path, {task["key"]: result})
-        spent.add("interpolant", result.get("solves", 0), result["seconds"])
-    known = store.stored(path, spent.limits)
+        costs.add("interpolant", result.get("solves", 0), result["seconds"])
+    known = store.stored(path, costs.limits)
     if "solves" in store.read(path, [task["key"]])[task["key"]]:
         return
     missing = [key for key in task["problems"] if key not in known]
@@ -47,15 +47,15 @@ def make(path: Path, task: "Mapping[str, Any]", spent: "Spent") -> None:
         for key in sorted(missing, key=lambda key: task["problems"][key]):
             begin = time.perf_counter()
             aspect_ratio, nu = task["problems"][key]
-            result = spent.attempt(key, partial(_solved, aspect_ratio, nu, task["kind"]), hole)
+            result = costs.attempt(key, partial(_solved, aspect_ratio, nu, task["kind"]), failed)
             if result is None:
                 continue
             keeper[key] = result | {"seconds": time.perf_counter() - begin}
-            spent.add("interpolant", 1, time.perf_counter() - begin, 0)
+            costs.add("interpolant", 1, time.perf_counter() - begin, 0)
 
 
-def hole(why: str) -> dict[str, Any]:
-    """Result of a reference that there is not."""
+def failed(why: str) -> dict[str, Any]:
+    """Result of a reference that fails."""
     return {"message": why, "seconds": 0.0}
 
 

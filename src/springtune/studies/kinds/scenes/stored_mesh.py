@@ -1,6 +1,6 @@
-"""Stored meshes: a VTU file each, and a note beside it with its key, its checksum and what is known of it.
+"""Stored meshes: a VTU file each, and a note with its key, its checksum and its quality.
 
-A mesh that cannot be made has no VTU file, and its note says why: it costs its own scenes and no others.
+A mesh that cannot be made has no VTU file, and its note says why.
 """
 
 from pathlib import Path
@@ -10,10 +10,8 @@ from springtune.mesh import Mesh, read_mesh, write_mesh
 
 from ...runs import checked_json
 from ...runs.damage import DamagedError, set_aside
+from ...runs.driver import RefusedError
 from ...runs.records import checksum
-
-REFUSED = "without mesh"
-"""What tasks are counted as that have no mesh."""
 
 
 def files(folder: str | Path, name: str) -> tuple[Path, Path]:
@@ -31,11 +29,11 @@ def write(folder: str | Path, name: str, key: str, mesh: Mesh, known: dict[str, 
     checked_json.write(notes, {"key": key, "checksum": checksum(path), **known})
 
 
-def refuse(folder: str | Path, name: str, key: str, hole: dict[str, str]) -> None:
-    """Store that a mesh cannot be made."""
+def refuse(folder: str | Path, name: str, key: str, why: dict[str, str]) -> None:
+    """Store that a mesh cannot be made: ``message``, and ``limits`` where it went beyond them."""
     path, notes = files(folder, name)
     path.unlink(missing_ok=True)
-    checked_json.write(notes, {"key": key, **hole})
+    checked_json.write(notes, {"key": key, **why})
 
 
 def is_stored(folder: str | Path, name: str, key: str, limits: str) -> bool:
@@ -61,10 +59,17 @@ def read_notes(folder: str | Path, name: str) -> dict[str, Any]:
     return notes
 
 
-def refusal(folder: str | Path, name: str) -> dict[str, str]:
-    """Why a mesh could not be made: ``message``, and ``limits`` where it went beyond them; empty where it was."""
+def is_refused(folder: str | Path, name: str) -> bool:
+    """Whether a mesh could not be made."""
+    return "message" in read_notes(folder, name)
+
+
+def prepared(folder: str | Path, name: str) -> Mesh:
+    """Mesh by its name, for tasks that need it."""
     notes = read_notes(folder, name)
-    return {label: notes[label] for label in ("message", "limits") if label in notes}
+    if "message" in notes:
+        raise RefusedError(notes["message"], "limits" in notes)
+    return read(folder, name)
 
 
 def read(folder: str | Path, name: str) -> Mesh:

@@ -6,19 +6,9 @@ SCALED = ("displacement", "mean_displacement", "displacements")
 
 
 def read(folder, reference, fields=()):
-    """Reference of a beam, material and kind of load.
+    """Reference for 1 N [m, rad, 1]; one that did not converge has ``message`` and ``seconds`` alone.
 
-    Parameters
-    ----------
-    reference : dict
-        ``key`` of the unit problem, ``length`` [m] and ``displacement`` [m/N], see
-        `springtune.reference.similarity.unit_scales`.
-
-    Returns
-    -------
-    dict
-        What the stage `reference` stored [m, rad, 1], for 1 N; of a reference that did not converge ``message`` and
-        ``seconds`` alone.
+    ``reference`` has the ``key`` of its unit problem and the scales ``length`` [m] and ``displacement`` [m/N].
     """
     return scaled(store.read_one(folder, reference["key"], fields), reference)
 

@@ -1,5 +1,7 @@
 """Stored scenes: numbers under one key, whole fields under another, so that either is there without the other."""
 
+from typing import Any
+
 import numpy as np
 
 from ...runs.hashing import hash_of
@@ -12,19 +14,19 @@ PACKED = "fields"
 
 
 def calibrated_key(key: str, stiffness: float | None) -> str:
-    """Key of a calibrated scene.
-
-    Parameters
-    ----------
-    stiffness : float or None
-        What was calibrated [N/m]; None where there is nothing.
-    """
+    """Key of a scene with a calibrated stiffness [N/m], or None."""
     return hash_of(key, stiffness)
 
 
 def fields_key(key: str) -> str:
     """Key of the fields of a scene."""
     return hash_of(key, "fields")
+
+
+def parts(task: dict[str, Any], result: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """What is stored of a result of a task, by key: numbers, and fields where these are kept."""
+    fields = {fields_key(task["key"]): packed(result)} if task.get("keep_fields") else {}
+    return fields | {task["key"]: {name: value for name, value in result.items() if name not in FIELD_ARRAYS}}
 
 
 def packed(result: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

@@ -15,19 +15,7 @@ from .plan import mesh_name
 
 @dataclass(frozen=True)
 class ShapeScene:
-    """A scene of a shape that a study asks for.
-
-    Attributes
-    ----------
-    shape : str
-        Its name.
-    mesh_type : str
-        Key of `springtune.studies.kinds.shapes.names.OUTLINED`, or ``"file"``.
-    mesh_size : float
-        Asked length of an edge [m]; 0 where the mesh is that of a file.
-    load : str
-        Name of a load of the shape.
-    """
+    """A scene of a shape; ``mesh_size`` is 0 and ``mesh_type`` ``"file"`` where the mesh is that of a file."""
 
     shape: str
     mesh_type: str
@@ -45,17 +33,7 @@ class ShapeScene:
 
 @dataclass(frozen=True)
 class Shapes:
-    """What a study asks of shapes.
-
-    Attributes
-    ----------
-    shapes : tuple of Shape
-        Those that have scenes.
-    parts : dict of str to dict of str to str
-        Name of the material of each part, by shape and part.
-    refined : dict of str to dict of str to float
-        Mesh size over that of the rest, by shape and group, point or part [1].
-    """
+    """What a study asks of shapes: those with scenes, the material of each part, and mesh sizes over the rest's."""
 
     declared: dict[str, Shape]
     shapes: tuple[Shape, ...]

@@ -10,7 +10,7 @@ from pydantic import Field
 from ...config.kind import Kind
 from ...config.sections import Later
 from .outputs import OUTPUTS, stems
-from .plan import STAGES
+from .plan import STAGES, pieces, take
 
 
 def _check(config, problems):
@@ -78,6 +78,7 @@ KIND = Kind(
     stages=STAGES,
     outputs=OUTPUTS,
     tables=stems,
-    division="division",
+    pieces=pieces,
+    take=take,
     costs={"shape_mesh": (2e-2, 2.5e-5), "shape_reference": (2.0, 0.0), "shape_scene": (5e-3, 2e-5)},
 )

@@ -18,15 +18,7 @@ STRESSES = ("xx", "yy", "xy")
 
 @dataclass(frozen=True)
 class QuantityKind:
-    """A kind of quantity of interest.
-
-    Attributes
-    ----------
-    places : tuple of str
-        What a study says it is of: ``at`` a point, ``of`` a group.
-    shown : tuple of tuple
-        Units that it is shown in and their sizes in SI units, the largest first.
-    """
+    """A kind of quantity of interest: ``places`` are ``at`` a point or ``of`` a group, ``shown`` units and SI sizes."""
 
     unit_kind: str
     places: tuple[str, ...] = ()

@@ -18,13 +18,7 @@ ERRORS, DEFORMED = "shapes_errors", "shapes_deformed"
 
 
 def figures(cases: "list[dict[str, str]]") -> "dict[str, dict[str, str]]":
-    """Figures by stem: of all quantities, and of each shape and load its errors, and its networks.
-
-    Parameters
-    ----------
-    cases : list of dict
-        Labels ``shape`` and ``load``.
-    """
+    """Figures by stem: of all quantities, and of each shape and load its errors and its networks."""
     found: dict[str, dict[str, str]] = {OVERVIEW: {}} if cases else {}
     for name in (ERRORS, DEFORMED):
         found |= {stem(name, one): one for one in cases}

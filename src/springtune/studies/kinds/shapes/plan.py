@@ -2,14 +2,23 @@
 
 import hashlib
 from collections import defaultdict
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ...config.kind import Stage
+from ...runs import driver
 from ...runs.hashing import hash_of
 from ...runs.keys import definition_key, material_key, mesh_type_key, stage_key
+from ...runs.stages import Task, products, stage
 from .names import OWN_FILE
 from .outputs import DRAWING
+
+if TYPE_CHECKING:
+    from collections.abc import Collection
+
+    from ...config.model import Study
 
 MOST_DRAWN = 1500
 """Particles, about, of the largest mesh that is drawn where a coarser one is there."""
@@ -67,7 +76,9 @@ def mesh_source(part, one):
 def mesh_key(part, one):
     """Key of a scene's mesh."""
     return hash_of(
-        _parameters(mesh_source(part, one)), stage_key("studies.kinds.shapes.mesh"), _reader(part.shape[one.shape])
+        _parameters(mesh_source(part, one)),
+        stage_key("studies.kinds.shapes.mesh", driver.DRIVER),
+        _reader(part.shape[one.shape]),
     )
 
 
@@ -89,7 +100,7 @@ def _case(part, shape, material, name):
 def reference_task(part, shape, material, name):
     """Task of a reference."""
     task = {"shape": _source(part.shape[shape])} | _case(part, shape, material, name)
-    code = stage_key("studies.kinds.shapes.reference"), _reader(part.shape[shape])
+    code = stage_key("studies.kinds.shapes.reference", driver.DRIVER), _reader(part.shape[shape])
     key = hash_of(task | {"shape": _parameters(task["shape"])}, code)
     return {"key": key} | task
 
@@ -110,11 +121,7 @@ def draws(study):
 
 
 def shown(part):
-    """Scenes whose networks are drawn.
-
-    Of each shape and load those of the finest mesh that is not too large to be drawn, of the first material and
-    kinematics.
-    """
+    """Scenes whose networks are drawn: of a shape and load the finest mesh that is not too large, one material."""
     cases = defaultdict(list)
     for one in part.scenes:
         cases[one.shape, one.load].append(one)
@@ -158,70 +165,98 @@ def _meshes(study, folder, members):
     part = study.parts["shapes"]
     return {
         "folder": str(folder / "shape_meshes"),
-        "meshes": [
-            {"name": mesh_name(one), "key": mesh_key(part, one), "source": mesh_source(part, one)}
+        "files": [
+            {"name": mesh_name(one), "tasks": [{"key": mesh_key(part, one), "source": mesh_source(part, one)}]}
             for one, *_ in members
         ],
     }
 
 
-def _mesh_products(content):
-    return [Path(content["folder"]) / f"{mesh['name']}.h5" for mesh in content["meshes"]]
-
-
-def _reference_members(study, costs):
+def _reference_tasks(study):
     part = study.parts["shapes"]
-    return {"/".join(one): (costs.of("shape_reference"), one) for one in (part.referred if part else ())}
-
-
-def _references(study, folder, members):
-    tasks = [reference_task(study.parts["shapes"], *one) for one in members]
-    return {
-        "folder": str(folder / "shape_references"),
-        "references": list({task["key"]: task for task in tasks}.values()),
-    }
-
-
-def _reference_products(content):
-    return [Path(content["folder"]) / f"{one['key']}.h5" for one in content["references"]]
+    for one in part.referred if part else ():
+        task = reference_task(part, *one)
+        yield Task(task, costs=[("shape_reference", 0)], name="/".join(one), key=task["key"])
 
 
 def _solve(study, folder, members):
     part = study.parts["shapes"]
     kept = shown(part) if draws(study) else ()
-    families = [
+    files = [
         {
             "name": mesh_name(scenes[0]),
             "mesh": mesh_key(part, scenes[0]),
             "shape": _parameters(_source(part.shape[scenes[0].shape])),
-            "scenes": list({task["key"]: task for task in (scene_task(part, one, kept) for one in scenes)}.values()),
+            "tasks": list({task["key"]: task for task in (scene_task(part, one, kept) for one in scenes)}.values()),
         }
         for scenes in members
     ]
-    return {"folder": str(folder / "shape_solutions"), "meshes": str(folder / "shape_meshes"), "families": families}
+    return {"folder": str(folder / "shape_solutions"), "meshes": str(folder / "shape_meshes"), "files": files}
 
 
-def _solve_products(content):
-    return [Path(content["folder"]) / f"{family['name']}.h5" for family in content["families"]]
+# -- parts of a study --------------------------------------------------------------------------------------------------
+
+
+def pieces(study, costs, division):
+    """Seconds of each piece: of a shape under a load, which says what of it is drawn, or of all grids."""
+    part = study.parts["shapes"]
+    found = defaultdict(float)
+    for one in part.scenes:
+        count = particles(part, one)
+        found[one.shape, one.load] += costs.of("shape_scene", count) + costs.of(one.definition, count)
+    for shape, _, load in part.referred:
+        found[shape, load] += costs.of("shape_reference")
+    return division.of_section(found)
+
+
+def take(study, names):
+    """The study with some of its pieces alone."""
+    wanted = set(names)
+    return of_shape_scenes(study, {one for one in study.parts["shapes"].scenes if (one.shape, one.load) in wanted})
+
+
+def of_shape_scenes(study: "Study", chosen: "Collection[object]") -> "Study":
+    """A study of a few scenes of shapes of another one, and of what these need."""
+    part = study.parts["shapes"]
+    scenes = tuple(scene for scene in part.scenes if scene in chosen) if part else ()
+    if not scenes:
+        return replace(study, parts=study.parts | {"shapes": ()})
+    cases = {(one.shape, one.material, one.load) for one in scenes}
+    names = {one.shape for one in scenes}
+    found = replace(
+        part,
+        shapes=tuple(shape for shape in part.shapes if shape.name in names),
+        scenes=scenes,
+        referred=tuple(case for case in part.referred if case in cases),
+    )
+    return replace(study, parts=study.parts | {"shapes": found})
 
 
 STAGES = (
-    Stage(
+    stage(
         "shape_reference",
         "studies.kinds.shapes.reference",
         "Solving the references of shapes",
-        _references,
-        _reference_products,
-        _reference_members,
+        _reference_tasks,
+        "shape_references",
     ),
-    Stage("shape_mesh", "studies.kinds.shapes.mesh", "Meshing shapes", _meshes, _mesh_products, _mesh_members),
+    Stage(
+        "shape_mesh",
+        "studies.kinds.shapes.mesh",
+        "Meshing shapes",
+        _meshes,
+        products,
+        _mesh_members,
+        folder="shape_meshes",
+    ),
     Stage(
         "shape_solve",
         "studies.kinds.shapes.solve",
         "Solving the networks of shapes",
         _solve,
-        _solve_products,
+        products,
         like="shape_mesh",
         same=("shape_mesh",),
+        folder="shape_solutions",
     ),
 )

@@ -1,13 +1,11 @@
 """Stage `shape_reference`: one finite-element solution each shape, material and load, on the shape itself."""
 
 import time
-from functools import partial
 
 import numpy as np
 
 from springtune.reference.shapes import solve_each
 
-from ...runs import store
 from .mesh import make
 from .task_values import ONE_LOAD, by_key, materials_of, quantity_key, shape_of
 
@@ -15,32 +13,15 @@ ALONG = 24
 """Points along a side of an outline that is drawn."""
 
 
-def run(tasks, spent):
-    """Solve the references of a bundle that are not there yet.
-
-    Parameters
-    ----------
-    tasks : dict
-        ``folder`` and ``references``, each with ``key``, ``shape`` (what `mesh.make` takes),
-        ``thickness``, ``load`` and ``materials``, see `task_values`.
-    """
-    for path, task in store.missing(tasks["folder"], tasks["references"], spent.limits):
-        begin = time.perf_counter()
-        result = spent.attempt(task["key"], partial(_solved, task), _hole)
-        if result is None:
-            continue
-        result["seconds"] = time.perf_counter() - begin
-        store.add(path, {task["key"]: result})
-        spent.add("shape_reference", 0, result["seconds"])
-
-
-def lose(tasks, key, why, limits):
-    """Store that a reference is beyond its limits."""
-    store.lose(tasks["folder"], key, _hole(why), limits)
-
-
-def _hole(why):
+def failed(task, why):
+    """Result of a reference that fails."""
     return {"message": why, "seconds": 0.0}
+
+
+def solve(task):
+    """Result of a reference: ``shape`` is as `mesh.make` takes it, load and materials as `task_values` has them."""
+    begin = time.perf_counter()
+    return _solved(task) | {"seconds": time.perf_counter() - begin}
 
 
 def _solved(task):
@@ -49,7 +30,7 @@ def _solved(task):
     case = shape.loads[ONE_LOAD]
     found, lacking = solve_each(shape, case, materials, grouped)
     if not found:
-        return _hole("; ".join(dict.fromkeys(lacking.values())))
+        return failed(task, "; ".join(dict.fromkeys(lacking.values())))
     values, estimates = {}, {}
     for one in found:
         values |= by_key(one.values, case)
@@ -82,12 +63,7 @@ def _rounds(shape, grouped):
 
 
 def rounds_of(edges):
-    """Closed rounds of points that edges join, each point of two of them.
-
-    Parameters
-    ----------
-    edges : ndarray of int, shape (n, 2)
-    """
+    """Closed rounds of points that edges, shape (n, 2), join; each point has two of them."""
     beside = {}
     for one, other in edges.tolist():
         beside.setdefault(one, []).append(other)

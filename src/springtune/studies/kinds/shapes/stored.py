@@ -13,7 +13,7 @@ from ...runs import store
 CORNERS = {3: "triangles", 4: "quads"}
 
 NO_LIMITS = "none"
-"""Limits that no result was lost to."""
+"""Limits that no task went beyond."""
 
 
 def packed(grouped: GroupedMesh) -> dict[str, Any]:
@@ -50,6 +50,6 @@ def read(folder: str | Path, name: str, key: str) -> GroupedMesh | str:
     )
 
 
-def is_lost(folder: str | Path, name: str, key: str) -> bool:
+def is_limited(folder: str | Path, name: str, key: str) -> bool:
     """Whether a mesh went beyond its limits, so that others may make it."""
     return key not in store.stored(Path(folder) / f"{name}.h5", NO_LIMITS)

@@ -44,13 +44,7 @@ def load(case: LoadCase) -> dict[str, Any]:
 
 
 def shape_of(described: dict[str, Any], thickness: float = 1.0, case: dict[str, Any] | None = None) -> Shape:
-    """Shape of what `geometry` gives.
-
-    Parameters
-    ----------
-    thickness : float, optional
-        [m]
-    """
+    """Shape of what `geometry` gives, of a thickness [m]."""
     holes = (Hole(_segments(hole["outline"]), hole["part"]) for hole in described["holes"])
     points = {name: _pair(point) for name, point in described["points"].items()}
     loads = {} if case is None else {ONE_LOAD: load_of(case)}

@@ -1,7 +1,7 @@
 """Stress tests of numerical stability: experiments whose results are the group ``/stability`` of a dataset.
 
-Each experiment takes a `Setup` and returns arrays by the names of `STABILITY` in `variables`,
-over the dimensions there that are not ``definition``; their values are `AXES` in `names`.
+Each takes a `Setup` and returns arrays by the names of `STABILITY` in `collect`, over the dimensions there that are not
+``definition``; their values are `AXES` in `names`.
 """
 
 from dataclasses import dataclass, replace
@@ -33,15 +33,7 @@ GROWTH_STEPS = 2000
 
 @dataclass(frozen=True)
 class Setup:
-    """What the experiments share.
-
-    Attributes
-    ----------
-    force : float
-        Traction [N].
-    mesh_sizes : tuple of float
-        Lengths of an edge [m], ascending.
-    """
+    """What experiments share: the traction [N] and ascending edge lengths [m]."""
 
     beam: Beam
     material: Material
@@ -326,9 +318,9 @@ def contrast(setup):
 
 
 def _refined(problem, s, displacements):
-    """Linear solution of springs by iterative refinement, residuals spring by spring in extended precision.
+    """Linear solution by iterative refinement, residuals spring by spring in extended precision.
 
-    The assembled matrix would not do: its entries are rounded, and where it is ill-conditioned it is another network's.
+    The assembled matrix would not do: its entries are rounded, and if ill-conditioned it is another network's.
     """
     network = problem.network
     normals = network.rest_vectors.astype(np.longdouble)

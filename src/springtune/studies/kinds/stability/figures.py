@@ -2,7 +2,6 @@
 
 import numpy as np
 from matplotlib.colors import ListedColormap
-from matplotlib.patches import Patch
 from matplotlib.ticker import NullLocator
 
 from springtune.safe_io.escapes import no_mathematics
@@ -47,15 +46,7 @@ def _curves(panel, x, curves, logarithmic=False):
     """Draw a line a name, those that are one to the eye as one: their ends, for names."""
     span = [np.log(np.abs(values)) if logarithmic else values for values in curves.values()]
     known = np.concatenate([values[np.isfinite(values)] for values in span]) if span else np.zeros(0)
-    within, ends, x = 0.004 * np.ptp(known) if len(known) else 0.0, [], np.asarray(x)
-    together = labels.alike(dict(zip(curves, span)), within)
-    for number, names in enumerate(together):
-        values, look = curves[names[0]], style.line(number)
-        there = np.flatnonzero(np.isfinite(values))
-        if len(there):
-            panel.plot(x, values, label=", ".join(names), **look)
-            ends.append((x[there[-1]], values[there[-1]], ", ".join(names), look["color"]))
-    return ends
+    return labels.lines(panel, np.asarray(x), curves, 0.004 * np.ptp(known) if len(known) else 0.0, logarithmic)
 
 
 @style.styled
@@ -184,8 +175,7 @@ def plot_stability_maps(data, ax=None):
     text = "Damping ratio of the highest mode, damping in proportion to mass"
     axes[0].set_ylabel("Step over 2/ωₘₐₓ")
     labels.settle(figure, grid, place | {"across": 0.04})
-    keys = [Patch(facecolor=colour, edgecolor="0.3", linewidth=0.4, label=name)
-            for colour, name in zip(MAP_COLOURS, ("stable", "decaying", "growing", "NaN"))]  # fmt: skip
+    keys = labels.swatches(dict(zip(("stable", "decaying", "growing", "NaN"), MAP_COLOURS)))
     keys.append(axes[0].plot([], [], color="black", label="predicted limit")[0])
     if figure is None:
         axes[0].set_xlabel(text)
@@ -231,16 +221,12 @@ def plot_stability_energy(data, ax=None):
     style.arrange(figure, axes, **place)
     panel, ends = axes[0, 0], []
     for number, name in enumerate(data.integrator.values):
-        values = data.energy.sel(integrator=name).values
-        known = np.flatnonzero(np.isfinite(values))
-        # Without damping one that lags is central-difference.
-        if name == "central-difference-lagged" or not len(known):
+        if name == "central-difference-lagged":  # without damping that is central-difference
             continue
+        values = data.energy.sel(integrator=name).values
         look = style.line(number) | {"marker": "", "linewidth": 0.8}
-        share = np.linspace(0, 1, len(values))
-        panel.plot(share, values, **look, label=name)
         drift = f"{float(data.energy_drift.sel(integrator=name)):+.1e}".replace("-", "−")
-        ends.append((share[known[-1]], values[known[-1]], f"{name}: drift {drift}", look["color"]))
+        ends += labels.line(panel, np.linspace(0, 1, len(values)), values, look, name, f"{name}: drift {drift}")
     panel.set(xlabel="Share of the run", ylabel="Energy over its start", xlim=(0, 1),
               title="A beam let go from its stretch, half of the limit, no damping")  # fmt: skip
     if not ends:
@@ -435,8 +421,7 @@ def plot_stability_strains(data, ax=None):
     kinds = {1: "solved", 4: "unstable: negative pivots; 0.5: limit point there; f: flutter; path: on the way",
              3: "none found: share reached"}  # fmt: skip
     kinds |= {flag: STATUS[flag].replace("_", " ") for flag in sorted(seen) if flag not in kinds}
-    keys = [Patch(facecolor=STATUS_COLOURS[flag], edgecolor="0.3", linewidth=0.4, label=text)
-            for flag, text in kinds.items() if flag in seen]  # fmt: skip
+    keys = labels.swatches({text: STATUS_COLOURS[flag] for flag, text in kinds.items() if flag in seen})
     if figure is None:
         axes[0].legend(handles=keys)
     elif keys:

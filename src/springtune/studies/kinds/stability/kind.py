@@ -1,6 +1,6 @@
 """Experiments on numerical stability: a study's section ``stability``."""
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Annotated
 
 from pydantic import Field
@@ -13,9 +13,11 @@ from ...config.checks import check_beam_material, check_density, check_for_trian
 from ...config.fields import BeamName, DefinitionName, Force, Length, MaterialName, MeshType, OneOrMore, one_of
 from ...config.kind import Kind
 from ...config.sections import Section
+from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key
+from ...runs.stages import Task, stage
+from ..division import by_task
 from .names import AXES, EXPERIMENTS, ONCE
 from .outputs import OUTPUTS
-from .plan import STAGES
 
 ExperimentName = Annotated[str, one_of("experiment", EXPERIMENTS)]
 
@@ -43,17 +45,7 @@ class StabilityConfig(Section):
 
 @dataclass(frozen=True)
 class Experiment:
-    """An experiment on numerical stability, see `springtune.studies.kinds.stability.experiments`.
-
-    Attributes
-    ----------
-    name : str
-        Key of `springtune.studies.kinds.stability.names.EXPERIMENTS`.
-    force : float
-        Traction [N].
-    mesh_sizes : tuple of float
-        Lengths of an edge [m], ascending.
-    """
+    """An experiment on numerical stability, under a traction [N], on ascending edge lengths [m]."""
 
     name: str
     beam: Beam
@@ -114,6 +106,15 @@ def _axes(experiments):
     return shared | AXES | {"experiment": tuple(dict.fromkeys(one.name for one in experiments))}
 
 
+def _tasks(study):
+    for one in study.parts["stability"]:
+        own = {"beam": beam_key(one.beam), "material": material_key(one.material, density=True)}
+        also = mesh_type_key(one.mesh_type), definition_key(one.definition)
+        yield Task(asdict(one) | own, also, of=one, costs=[(one.name, 0)])
+
+
+STAGE = stage("stability", "studies.kinds.stability.solve", "Experiments on stability", _tasks)
+
 KIND = Kind(
     "stability",
     study_fields={
@@ -125,9 +126,9 @@ KIND = Kind(
     check=_check,
     expand=_expand,
     axes=_axes,
-    stages=STAGES,
+    stages=(STAGE,),
     outputs=OUTPUTS,
-    division="division",
+    **by_task("stability", _tasks, lambda one: (one.name, one.definition)),
     costs={
         "limits": (10.0, 0.0),
         "maps": (8.0, 0.0),

@@ -1,38 +1,18 @@
 """Stage `benchmark`: run time against error."""
 
-import time
-from functools import partial
-
 import numpy as np
 
 from springtune.problem.geometry import Beam
 from springtune.problem.materials import material_of
 from springtune.problem.status import Status
 
-from ...runs import store
 from . import measure as benchmark
 
 CURVE_SIZE = 1e-3
 """Mesh size of the curves whose cost is measured, on the first scene's beam [m]."""
 
 
-def run(tasks, spent):
-    """Time the scenes that are not stored yet."""
-    for path, task in store.missing(tasks["folder"], tasks["cases"], spent.limits):
-        begin = time.perf_counter()
-        result = spent.attempt(task["key"], partial(_case, task), partial(_hole, task))
-        if result is not None:
-            store.add(path, {task["key"]: result})
-            spent.add("benchmark", 0, time.perf_counter() - begin)
-
-
-def lose(tasks, key, why, limits):
-    """Store that a scene is beyond its limits."""
-    task = next(one for one in tasks["cases"] if one["key"] == key)
-    store.lose(tasks["folder"], key, _hole(task, why), limits)
-
-
-def _hole(task, why):
+def failed(task, why):
     """Result of a scene of which nothing is measured."""
     shape = len(task["approaches"]), len(task["mesh_sizes"])
     return {
@@ -41,7 +21,8 @@ def _hole(task, why):
     }
 
 
-def _case(task):
+def solve(task):
+    """Errors and seconds of a scene."""
     scene = benchmark.LoadedBeam(Beam(**task["beam"]), material_of(task["material"]), task["load"], task["force"])
     second = Beam(**task["second_beam"]) if task["second_beam"] else None
     most, sizes = task["most_seconds"], task["mesh_sizes"]

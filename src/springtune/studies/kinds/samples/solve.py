@@ -1,8 +1,8 @@
 """Stage `sample`: the networks of sampled scenes.
 
-A scene's network is that of E t = 1 under a force over E t: with linear kinematics thickness, Young's modulus and force
-only scale an answer, and rows of a design that differ in these alone are solved once. Meshes of as many cells and rows
-follow each other, since networks on them share numbering, sparsity and symbolic factorization.
+A scene's network is that of E t = 1 under a force over E t: in linear kinematics thickness, modulus and force only
+scale an answer, and rows that differ in these alone are solved once. Meshes of as many cells and rows follow each
+other, since their networks share numbering, sparsity and symbolic factorization.
 """
 
 import time
@@ -24,7 +24,7 @@ from .designs import draw
 DRAWN = "drawn"
 """Name of the parameters among the results of a task."""
 
-LOST_NETWORK = "lost "
+GONE_NETWORK = "lost "
 """Beginning of the names of networks that went beyond the limits."""
 
 TOGETHER = {"linear": 32, "nonlinear": 4}
@@ -37,28 +37,28 @@ SCALES = 1e-7
 """Largest relative difference of an answer that was scaled from one that was not: they differ by rounding alone."""
 
 
-def run(tasks, spent, kept_back=store.KEPT_BACK):
+def run(content, costs, kept_back=store.KEPT_BACK):
     """Solve the scenes of a bundle that are not stored yet."""
     waiting = []
-    for block in tasks["blocks"]:
-        path = Path(tasks["folder"]) / f"{block['key']}.h5"
-        present = store.stored(path, spent.limits)
-        missing = {key: scene for key, scene in tasks["results"].items() if key not in present}
+    for block in content["files"]:
+        path = Path(content["folder"]) / f"{block['name']}.h5"
+        present = store.stored(path, costs.limits)
+        missing = {key: scene for key, scene in content["results"].items() if key not in present}
         if missing or DRAWN not in present:
-            lost = {name for name in present if name.startswith(LOST_NETWORK)}
+            lost = {name for name in present if name.startswith(GONE_NETWORK)}
             reasons = store.read(path, lost) if lost else {}
             reasons = {name: reasons[name]["message"] for name in lost}
-            waiting.append(_Block(tasks, block, path, missing, DRAWN not in present, reasons))
-            waiting[-1].take_up(spent.limits)
-    count = TOGETHER[tasks["kinematics"]]
+            waiting.append(_Block(content, block, path, missing, DRAWN not in present, reasons))
+            waiting[-1].take_up(costs.limits)
+    count = TOGETHER[content["kinematics"]]
     for begin in range(0, len(waiting), count):
-        _solve_together(tasks, waiting[begin : begin + count], spent, kept_back)
+        _solve_together(content, waiting[begin : begin + count], costs, kept_back)
 
 
-def lose(tasks, key, why, limits):
-    """Store that a network is beyond its limits: its block is solved again without it."""
+def gone(content, key, why, limits):
+    """Store that a network went beyond its limits: its block is solved again without it."""
     name = key.partition(" ")[0]
-    store.add(Path(tasks["folder"]) / f"{name}.h5", {f"{LOST_NETWORK}{key}": {"message": why, store.LIMITS: limits}})
+    store.add(Path(content["folder"]) / f"{name}.h5", {f"{GONE_NETWORK}{key}": {"message": why, store.LIMITS: limits}})
 
 
 class _Block:
@@ -132,16 +132,16 @@ class _Block:
         return found
 
 
-def _solve_together(tasks, blocks, spent, kept_back):
+def _solve_together(tasks, blocks, costs, kept_back):
     """Solve blocks: mesh after mesh, those of as many cells after each other."""
     meshes = [(box, block, rows) for block in blocks for box, rows in block.meshes().items()]
     meshes.sort(key=lambda one: [round(side / one[0][2]) for side in one[0][:2]])
     like, scaling, since = None, {}, time.perf_counter()
     for box, block, rows in meshes:
         begin = time.process_time()  # which a busy machine does not change: bundles are made by it
-        like = _solve_mesh(tasks, block, box, np.array(rows), like, scaling, spent) or like
+        like = _solve_mesh(tasks, block, box, np.array(rows), like, scaling, costs) or like
         block.seconds += time.process_time() - begin
-        if spent.broken:
+        if costs.broken:
             continue
         block.done[rows], block.kept, block.solved = True, False, block.solved + len(rows)
         if time.perf_counter() > since + kept_back:
@@ -149,19 +149,19 @@ def _solve_together(tasks, blocks, spent, kept_back):
                 one.keep_part()
             since = time.perf_counter()
     for block in blocks:
-        if not spent.broken:
+        if not costs.broken:
             block.keep_whole()
-            spent.add("sampled", block.solved * len(block.missing), block.seconds)
+            costs.add("sampled", block.solved * len(block.missing), block.seconds)
 
 
-def _solve_mesh(tasks, block, box, rows, like, scaling, spent):
+def _solve_mesh(tasks, block, box, rows, like, scaling, costs):
     """Solve the scenes of some rows of a block that share a mesh; the meshed sheet, if there is one."""
 
     def attempt(name, function):
         key = f"{block.key} {rows[0]} {name}"
-        if f"{LOST_NETWORK}{key}" in block.lost:
-            return _hole(block.lost[f"{LOST_NETWORK}{key}"], **{store.LIMITS: spent.limits})
-        return spent.attempt(key, function, _hole)
+        if f"{GONE_NETWORK}{key}" in block.lost:
+            return _failed(block.lost[f"{GONE_NETWORK}{key}"], **{store.LIMITS: costs.limits})
+        return costs.attempt(key, function, _failed)
 
     # One network at a time: what the one before has left, the next one's symbolic factor is.
     sheet = attempt(tasks["meshed"], lambda: Sheet(MESH_TYPES[tasks["mesh_type"]](*box), 1.0, networks=1, like=like))
@@ -182,7 +182,7 @@ def _solve_mesh(tasks, block, box, rows, like, scaling, spent):
             if isinstance(objection, str):
                 scaling[definition] = objection
         if scaling.get(definition):
-            block.keep(key, rows, 1.0, _hole(scaling[definition]))
+            block.keep(key, rows, 1.0, _failed(scaling[definition]))
             continue
         for ratio in np.unique(ratios):
             alike, name = ratios == ratio, f"{key} {float(ratio)!r}"
@@ -199,15 +199,12 @@ def _solve_mesh(tasks, block, box, rows, like, scaling, spent):
     return sheet
 
 
-def _hole(why, **limits):
+def _failed(why, **limits):
     return limits | {"displacement": np.nan, "status": Status.FAILED, "message": why}
 
 
 def _objection(sheet, scene, drawn, row):
-    """Why answers of a definition do not scale as samples make use of; empty where they do, on the mesh of a row.
-
-    None where there is no answer: that is said scene by scene.
-    """
+    """Why answers of a definition do not scale on the mesh of a row, or an empty string; None without an answer."""
     ratio, modulus, thickness = (float(drawn[name][row]) for name in ("poisson_ratio", "young_modulus", "thickness"))
     own, load = Sheet(sheet.mesh, thickness, like=sheet), 1.0 / (modulus * thickness)
     answers = [_solved(sheet, scene, ratio, load, "linear"), _solved(own, scene, ratio, 1.0, "linear", modulus=modulus)]
@@ -228,6 +225,6 @@ def _solved(sheet, scene, ratio, load, kinematics, follower=False, modulus=1.0):
     try:
         springs, _ = sheet.derive(scene["definition"], Material(modulus, float(ratio)))
     except DefinitionError as error:
-        return _hole(f"{scene['definition']}: {error}")
+        return _failed(f"{scene['definition']}: {error}")
     found = sheet.solve(kind, springs, load, kinematics, follower)
     return {"displacement": found.displacement, "status": found.status, "message": found.message}

@@ -1,40 +1,22 @@
 """Stage `stability`: experiments on numerical stability."""
 
 import time
-from functools import partial
 
 import numpy as np
 
 from springtune.problem.geometry import Beam
 from springtune.problem.materials import material_of
 
-from ...runs import store
 from . import experiments as stability
 
 
-def run(tasks, spent):
-    """Do the experiments that are not stored yet.
-
-    An experiment that fails is stored with its message; it never stops the others.
-    """
-    for path, task in store.missing(tasks["folder"], tasks["experiments"], spent.limits):
-        result = spent.attempt(task["key"], partial(_experiment, task), _hole)
-        if result is None:
-            continue
-        store.add(path, {task["key"]: result})
-        spent.add(task["name"], 0, result.get("seconds", 0.0))
-
-
-def lose(tasks, key, why, limits):
-    """Store that an experiment is beyond its limits."""
-    store.lose(tasks["folder"], key, _hole(why), limits)
-
-
-def _hole(why):
+def failed(task, why):
+    """Result of an experiment that fails."""
     return {"failure": why}
 
 
-def _experiment(task):
+def solve(task):
+    """Result of an experiment."""
     setup = stability.Setup(
         Beam(**task["beam"]), material_of(task["material"]), task["force"], task["definition"], task["mesh_type"],
         tuple(task["mesh_sizes"]),

@@ -1,7 +1,7 @@
 """Stage `refinement`: values of a parameter, added where the error changes its sign or crosses a tolerance.
 
-The loop is here, so that a plan stays a plan: which values there are depends on results. Each is stored under a key of
-its own; what is there is not solved again, so a run that was stopped goes on where it ended.
+The loop is here, since further values depend on results. Each value has a key of its own, so a run that was stopped
+goes on where it ended.
 """
 
 import time
@@ -30,27 +30,28 @@ SEPARATOR = "/"
 """Between the key of a file and that of a value, in the name of a task."""
 
 
-def run(tasks, spent):
+def run(content, costs):
     """Solve the values that refinements ask for and that are not stored yet."""
-    for task in tasks["refinements"]:
-        path = Path(tasks["folder"]) / f"{task['key']}.h5"
-        present = store.stored(path, spent.limits)
+    for file in content["files"]:
+        (task,) = file["tasks"]
+        path = Path(content["folder"]) / f"{file['name']}.h5"
+        present = store.stored(path, costs.limits)
         known = store.read(path, present) if present else {}
         solver = _Solver(task)
         with store.Keeper(path) as keeper:
             for rule in task["rules"]:
-                refine(Rule(**rule), partial(_errors, task, solver, known, keeper, spent))
+                refine(Rule(**rule), partial(_errors, task, solver, known, keeper, costs))
         if solver.seconds:
-            spent.add("refinement", solver.particles, solver.seconds)
+            costs.add("refinement", solver.particles, solver.seconds)
 
 
-def _errors(task, solver, known, keeper, spent, values):
+def _errors(task, solver, known, keeper, costs, values):
     """Errors of a batch of values: of those that are not known by solving them."""
     found = []
     for value in values:
         name = value_key(value)
         if name not in known:
-            result = spent.attempt(f"{task['key']}{SEPARATOR}{name}", partial(solver.solve, value), _hole)
+            result = costs.attempt(f"{task['key']}{SEPARATOR}{name}", partial(solver.solve, value), _failed)
             if result is None:  # the program is broken: the job ends with an error
                 found.append(np.nan)
                 continue
@@ -59,13 +60,13 @@ def _errors(task, solver, known, keeper, spent, values):
     return found
 
 
-def lose(tasks, key, why, limits):
-    """Store that a value is beyond its limits."""
+def gone(content, key, why, limits):
+    """Store the failed result of a value beyond its limits."""
     name, _, value = key.partition(SEPARATOR)
-    store.add(Path(tasks["folder"]) / f"{name}.h5", {value: _hole(why) | {store.LIMITS: limits}})
+    store.add(Path(content["folder"]) / f"{name}.h5", {value: _failed(why) | {store.LIMITS: limits}})
 
 
-def _hole(why):
+def _failed(why):
     return {"status": Status.FAILED, "message": why}
 
 
@@ -90,7 +91,7 @@ class _Solver:
         try:
             result = self._solved(beam, material, force, kind, given)
         except DefinitionError as error:
-            result = _hole(f"{task['definition']}: {error}")
+            result = _failed(f"{task['definition']}: {error}")
         result["seconds"] = time.perf_counter() - begin
         self.seconds += result["seconds"]
         return result

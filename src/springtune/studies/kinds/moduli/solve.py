@@ -1,0 +1,38 @@
+"""Stage `moduli`: effective moduli of definitions on patches, for E = 1 and t = 1."""
+
+from springtune.problem.materials import Material
+from springtune.problem.status import Status
+from springtune.scene.moduli import MeshModuli
+from springtune.springs import DefinitionError
+
+from ..scenes.mesh import make
+
+
+def prepare(patch, content):
+    """Moduli of the mesh of a patch, which definitions share."""
+    return MeshModuli(make(patch["mesh"]))
+
+
+def solve(task, moduli):
+    """Errors of E and G [1], effective Poisson's ratio, and what the definition cost; or why there are none."""
+    try:
+        found = moduli(Material(1.0, task["poisson_ratio"]), task["definition"])
+    except DefinitionError as error:
+        return {"status": Status.FAILED, "message": f"{task['definition']}: {error}"}
+    return {
+        "status": Status.SOLVED,
+        "message": "",
+        "young_modulus_error": found.young_modulus_error,
+        "effective_poisson_ratio": found.poisson_ratio,
+        "shear_modulus_error": found.shear_modulus_error,
+        "definition_seconds": found.seconds,
+        "definition_evaluations": found.springs.evaluations,
+        "spring_ratio": found.springs.spring_ratio,
+    }
+
+
+def cost(task, moduli, result, seconds):
+    """Seconds of the solves, and those of the definition."""
+    particles, of_definition = len(moduli.sheet.mesh.points), result.get("definition_seconds", 0.0)
+    yield "moduli", particles, seconds - of_definition
+    yield task["definition"], particles, of_definition

@@ -1,0 +1,114 @@
+"""Stages that follow from their tasks: bundles, contents of jobs, files and results."""
+
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import chain
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..config.kind import Stage
+from . import driver, store
+from .hashing import hash_of
+from .keys import stage_key
+
+if TYPE_CHECKING:
+    from ..config.model import Study
+    from .bundles import Costs
+
+
+@dataclass(frozen=True)
+class Task:
+    """A task of a stage.
+
+    Attributes
+    ----------
+    values : dict
+        What ``solve`` is given, without labels: a new label computes nothing again.
+    also : sequence
+        What its key depends on besides its values and the stage's code: keys of definitions and mesh types.
+    labels : dict
+        Cell of the dataset that its result is for.
+    of : object
+        What the study has that it is made from.
+    costs : sequence of tuple
+        Name, units and, unless it is 1, number of what it is expected to cost, see
+        `springtune.studies.config.kind.Kind`.
+    name : str
+        Tasks of one name are in one bundle; by default a hash of its values.
+    file : str
+        Stem of the file of its result; by default its key.
+    shared : dict
+        What all tasks of that file share.
+    key : str
+        Of its result; by default a hash of all that it depends on.
+    """
+
+    values: Mapping[str, Any]
+    also: Sequence[object] = ()
+    labels: Mapping[str, str | float] = field(default_factory=dict)
+    of: Any = None
+    costs: Sequence[tuple[str, float] | tuple[str, float, float]] = ()
+    name: str = ""
+    file: str = ""
+    shared: Mapping[str, Any] = field(default_factory=dict)
+    key: str = ""
+
+    def key_of(self, module: str) -> str:
+        """Key of its result, computed by a module."""
+        return self.key or hash_of(self.values, stage_key(module, driver.DRIVER), self.also)
+
+    def seconds(self, costs: "Costs") -> float:
+        """What it is expected to take."""
+        return sum(costs.of(name, units) * (count[0] if count else 1) for name, units, *count in self.costs)
+
+
+def stage(
+    name: str, module: str, message: str, tasks: "Callable[[Study], Iterable[Task]]", folder: str = "", **options: Any
+) -> Stage:
+    """Stage whose bundles and jobs follow from its tasks; it stores in the folder of its name, or in another one."""
+    folder = folder or name
+
+    def members(study: "Study", costs: "Costs") -> dict[str, tuple[float, list[Task]]]:
+        found: dict[str, tuple[float, list[Task]]] = {}
+        for task in tasks(study):
+            called = task.name or hash_of(task.values)
+            if task.name or called not in found:  # else it is one task with two labels
+                seconds, others = found.get(called, (0.0, []))
+                found[called] = seconds + task.seconds(costs), [*others, task]
+        return found
+
+    def content(study: "Study", results: Path, members: list[list[Task]]) -> dict[str, Any]:
+        files: dict[str, dict[str, Any]] = {}
+        for task in chain.from_iterable(members):
+            key = task.key_of(module)
+            file = files.setdefault(task.file or key, {"name": task.file or key, **task.shared, "tasks": {}})
+            cost = {"cost": list(task.costs[0][:2])} if task.costs else {}
+            file["tasks"][key] = {"key": key, **cost, **task.values}
+        return {
+            "folder": str(results / folder),
+            "files": [file | {"tasks": list(file["tasks"].values())} for file in files.values()],
+        }
+
+    return Stage(name, module, message, content, products, members, folder=folder, tasks=tasks, **options)
+
+
+def products(content: Mapping[str, Any]) -> list[Path]:
+    """Files that a job makes."""
+    names = dict.fromkeys(file["name"] for file in content["files"])  # beams of one extent share a file
+    return [Path(content["folder"]) / f"{name}.h5" for name in names]
+
+
+def results(
+    stage: Stage, study: "Study", folder: Path, fields: Iterable[str] = ()
+) -> Iterator[tuple[Task, dict[str, Any]]]:
+    """Tasks of a stage and their stored results, in the order of the tasks."""
+    assert stage.tasks
+    tasks, files = list(stage.tasks(study)), defaultdict(list)
+    keys = [task.key_of(stage.module) for task in tasks]
+    for task, key in zip(tasks, keys):
+        files[task.file or key].append(key)
+    fields = list(fields)
+    found = {name: store.read(folder / stage.folder / f"{name}.h5", held, fields) for name, held in files.items()}
+    for task, key in zip(tasks, keys):
+        yield task, dict(found[task.file or key][key])
