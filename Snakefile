@@ -12,10 +12,15 @@ include: "workflow/rules/internals.smk"
 if not NOTED:
 
     include: "workflow/rules/common.smk"
-
-    for kind in KINDS:
-
-        include: f"workflow/rules/{kind}.smk"
+    include: "workflow/rules/scenes.smk"
+    include: "workflow/rules/shapes.smk"
+    include: "workflow/rules/moduli.smk"
+    include: "workflow/rules/laying.smk"
+    include: "workflow/rules/stability.smk"
+    include: "workflow/rules/samples.smk"
+    include: "workflow/rules/refinement.smk"
+    include: "workflow/rules/benchmark.smk"
+    include: "workflow/rules/further.smk"
     include: "workflow/rules/collect.smk"
     include: "workflow/rules/outputs.smk"
     include: "workflow/rules/browse.smk"

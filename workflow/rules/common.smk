@@ -18,7 +18,7 @@ from springtune.studies.runs import commands
 from springtune.safe_io.atomic import remove_unfinished
 from springtune.studies.runs.dependencies import CODE_FILE, OURS
 from springtune.studies.kinds import load_study
-from springtune.studies.config.kind import FORMATS, KINDS
+from springtune.studies.config.kind import FORMATS
 from springtune.problem.geometry import AssumptionWarning
 from springtune.studies.config.messages import StudyError
 
