@@ -1,7 +1,6 @@
-"""Snakemake's logger plugin of springtune: progress of a study on a terminal, Snakemake's own lines everywhere else.
+"""Snakemake logger plugin: a study's progress on terminals, plain lines elsewhere.
 
-Snakemake imports every installed plugin whenever it starts, so what draws is imported by the first run that has
-something to do.
+Snakemake imports all plugins at each start, so drawing is imported only by a run with work to do.
 """
 
 import os
@@ -32,21 +31,19 @@ SEEN = {
 """Events that the display shows in its own way."""
 
 LOG = "Complete log"
-"""Beginning of the message that names Snakemake's log; read where something failed."""
+"""Start of the message that names Snakemake's log."""
 
 IDLE = ("Assuming unrestricted", "Building DAG", "Elapsed time", "Select jobs", "Using shell")
-"""Beginnings of messages that say nothing beside the display."""
+"""Starts of messages that the display leaves out."""
 
 NOTHING = "Nothing to be done"
-"""Beginning of the message of a run that finds everything made."""
 
 
 def _check_study(arguments: "Sequence[str]") -> None:
-    """End Snakemake with our message where a study is no study at all, as `springtune run` would.
+    """Stop Snakemake with our message if the config is no valid study.
 
-    Snakemake reads the file that ``--configfile`` names before the Snakefile, right after it has made its loggers: of
-    one that is missing it shows a traceback, of a tab no line, and aliases in aliases take all memory. What its own
-    parser would make of its arguments is not to be had here; that of a command in which this is not one is left to it.
+    Snakemake parses ``--configfile`` right after creating its loggers. A missing file would give a traceback, a tab no
+    line number, and nested aliases take all memory.
     """
     parser = ArgumentParser(add_help=False, allow_abbrev=False, exit_on_error=False)
     parser.add_argument("--configfile", "--configfiles", nargs="+", default=[])
@@ -72,14 +69,12 @@ def _check_study(arguments: "Sequence[str]") -> None:
 class LogHandler(LogHandlerBase):
     """Handler of Snakemake's records.
 
-    A terminal gets a display of the stages with tasks done, seconds gone by and left, and above it whatever fails. A
-    file, a pipe, continuous integration (``CI`` is set), a terminal that cannot move its cursor, and runs that ask for
-    more or for less (``--dry-run``, ``--printshellcmds``, ``--verbose``, ``--debug-dag``, ``--quiet``) get what
-    Snakemake prints without a plugin.
+    Terminals get a display. Files, pipes, continuous integration (``CI``), terminals without cursor control and runs
+    with ``--dry-run``, ``--printshellcmds``, ``--verbose``, ``--debug-dag`` or ``--quiet`` get Snakemake's own lines.
     """
 
     latest: "LogHandler | None" = None
-    """The handler of this run, for the Snakefile; None where Snakemake logs without this plugin."""
+    """This run's handler for the Snakefile; None without this plugin."""
 
     def __post_init__(self) -> None:
         Handler.__init__(self)  # the interface before 2.0 leaves it out
@@ -93,7 +88,7 @@ class LogHandler(LogHandlerBase):
 
     @property
     def writes_to_stream(self) -> bool:
-        """Whether it writes to the terminal: it stands in for Snakemake's own handler."""
+        """Whether it replaces Snakemake's stream handler."""
         return True
 
     @property
@@ -103,17 +98,17 @@ class LogHandler(LogHandlerBase):
 
     @property
     def has_filter(self) -> bool:
-        """Whether it filters records by itself: ``--quiet`` is Snakemake's to obey."""
+        """Whether it filters records; Snakemake handles ``--quiet``."""
         return False
 
     @property
     def has_formatter(self) -> bool:
-        """Whether it formats records by itself."""
+        """Whether it formats records."""
         return False
 
     @property
     def needs_rulegraph(self) -> bool:
-        """Whether it wants the graph of rules."""
+        """Whether it needs the rule graph."""
         return False
 
     def emit(self, record: LogRecord) -> None:
@@ -127,7 +122,7 @@ class LogHandler(LogHandlerBase):
             self._plain().emit(record)
 
     def close(self) -> None:
-        """Leave the terminal as it was."""
+        """Restore the terminal."""
         self._stop()
         super().close()
 
@@ -175,7 +170,7 @@ class LogHandler(LogHandlerBase):
             self.display.tell(self.format(record), style)
 
     def _is_told(self, record: LogRecord) -> bool:
-        """Whether the display does not show it in its own way."""
+        """Return whether Snakemake's own line is printed."""
         idle = IDLE if self.failed else (*IDLE, LOG)
         shown = getattr(record, "event", None) in SEEN or record.getMessage().startswith(idle)
         return record.levelno >= WARNING or not shown
@@ -191,7 +186,7 @@ class LogHandler(LogHandlerBase):
             self.display = None
 
     def _plain(self) -> Handler:
-        """Snakemake's own handler, which writes where it would without a plugin."""
+        """Snakemake's own handler."""
         if self.plain is None:
             from snakemake.logging import ColorizingTextHandler
 
