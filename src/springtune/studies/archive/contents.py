@@ -200,7 +200,7 @@ def gather(
 
 
 def _checkout(folder: Path) -> Path:
-    """Folder of the checkout in use's folder; refused if it could not run elsewhere."""
+    """Return this checkout's folder; refused if it could not run elsewhere."""
     checkout = Path.cwd()
     if folder.resolve().parent.parent != checkout:
         place = folder.parent.parent

@@ -52,7 +52,7 @@ def _draw(output: "Output", tree: xr.DataTree, folder: Path) -> Iterator[Path]:
     import matplotlib.pyplot as plt
     import numpy as np
 
-    from .canvas import png_and_pdf
+    from .style import png_and_pdf
 
     for stem, plot, selection in imported(output.plot)(tree):
         figure = np.ravel(plot(tree, **selection))[0].figure
