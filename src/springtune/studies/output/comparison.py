@@ -80,6 +80,7 @@ class Change:
 @dataclass(frozen=True)
 class VariableChanges:
     """Changes of one variable."""
+
     name: str
     compared: int
     changed: int
