@@ -40,7 +40,7 @@ def _number(value: object) -> object:
 
 
 def decimals(values: Iterable[float], digits: int = 4, most: int = 8) -> int | None:
-    """Decimals that show so many significant digits of a column without NaN.
+    """Decimals that show so many significant digits of a column; NaN is a missing number.
 
     The largest number has all of them, the smallest nonzero one at most one fewer.
     """
