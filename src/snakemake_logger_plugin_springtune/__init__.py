@@ -1,7 +1,6 @@
-"""Snakemake's logger plugin of springtune: progress of a study on a terminal, Snakemake's own lines everywhere else.
+"""Snakemake logger plugin: a study's progress on terminals, plain lines elsewhere.
 
-Snakemake imports every installed plugin whenever it starts, so what draws is imported by the first run that has
-something to do.
+Snakemake imports all plugins at each start, so drawing is imported only by a run with work to do.
 """
 
 import os
@@ -19,10 +18,8 @@ if TYPE_CHECKING:
 class LogHandler(LogHandlerBase):
     """Handler of Snakemake's records.
 
-    A terminal gets a display of the stages with tasks done, seconds gone by and left, and above it whatever fails. A
-    file, a pipe, continuous integration (``CI`` is set), a terminal that cannot move its cursor, and runs that ask for
-    more or for less (``--dry-run``, ``--printshellcmds``, ``--verbose``, ``--debug-dag``, ``--quiet``) get what
-    Snakemake prints without a plugin.
+    Terminals get a display. Files, pipes, continuous integration (``CI``), terminals without cursor control and runs
+    with ``--dry-run``, ``--printshellcmds``, ``--verbose``, ``--debug-dag`` or ``--quiet`` get Snakemake's own lines.
     """
 
     def __post_init__(self) -> None:
@@ -33,7 +30,7 @@ class LogHandler(LogHandlerBase):
 
     @property
     def writes_to_stream(self) -> bool:
-        """Whether it writes to the terminal: it stands in for Snakemake's own handler."""
+        """Whether it replaces Snakemake's stream handler."""
         return True
 
     @property
@@ -43,17 +40,17 @@ class LogHandler(LogHandlerBase):
 
     @property
     def has_filter(self) -> bool:
-        """Whether it filters records by itself: ``--quiet`` is Snakemake's to obey."""
+        """Whether it filters records; Snakemake handles ``--quiet``."""
         return False
 
     @property
     def has_formatter(self) -> bool:
-        """Whether it formats records by itself."""
+        """Whether it formats records."""
         return False
 
     @property
     def needs_rulegraph(self) -> bool:
-        """Whether it wants the graph of rules."""
+        """Whether it needs the rule graph."""
         return False
 
     def emit(self, record: LogRecord) -> None:
@@ -67,7 +64,7 @@ class LogHandler(LogHandlerBase):
             self._plain().emit(record)
 
     def close(self) -> None:
-        """Leave the terminal as it was."""
+        """Restore the terminal."""
         self._stop()
         super().close()
 
@@ -116,7 +113,7 @@ class LogHandler(LogHandlerBase):
             self.display = None
 
     def _plain(self) -> Handler:
-        """Snakemake's own handler, which writes where it would without a plugin."""
+        """Snakemake's own handler."""
         if self.plain is None:
             from snakemake.logging import ColorizingTextHandler
 

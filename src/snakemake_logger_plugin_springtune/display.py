@@ -1,4 +1,4 @@
-"""Stages of a study on a terminal: tasks done, seconds gone by, and about how many are left."""
+"""Terminal display of stages: finished tasks, elapsed and remaining time."""
 
 import time
 from collections.abc import Mapping
@@ -15,17 +15,17 @@ if TYPE_CHECKING:
     from springtune.studies.runs.workload import Load
 
 LOOKED_AT = 200
-"""So many files that jobs are still to make are looked for at a time."""
+"""Most expected files checked at a time."""
 
 PRIOR = 5.0
-"""Seconds of measured work that an expectation counts for: the first jobs do not turn it over."""
+"""Weight of the expectation [s], so that first jobs change it little."""
 
 OVERDUE = 0.2
-"""A job that runs longer than expected is expected to run on for this share of what it has run."""
+"""Share of its run time that an overdue job is expected to need still."""
 
 
 class Job:
-    """A job and how far it is."""
+    """A job and its progress."""
 
     def __init__(self, load: "Load") -> None:
         self.load = load
@@ -35,13 +35,13 @@ class Job:
         self.before = 0.0
 
     def start(self) -> None:
-        """It runs from now on."""
+        """Mark as running."""
         self.begun, self.before = time.monotonic(), time.time()
         # It may be run again after it failed.
         self.ended, self.failed, self.waiting = 0.0, False, list(self.load.products)
 
     def made(self) -> float:
-        """Share of its files that it has made since it began."""
+        """Share of its files made since it started."""
         if self.ended:
             return 0.0 if self.failed else 1.0
         if not self.begun or not self.load.products:
@@ -51,7 +51,7 @@ class Job:
         return 1 - len(self.waiting) / len(self.load.products)
 
     def left(self, pace: float) -> float:
-        """Seconds that it still needs, at so many for each expected one."""
+        """Remaining seconds at a pace of so many for each expected one."""
         if self.ended:
             return 0.0
         expected = pace * self.load.seconds
@@ -72,7 +72,7 @@ def _newer(path: Path, than: float) -> bool:
 
 
 class Display:
-    """The display of a run, from its beginning until `stop`."""
+    """Display of a run until `stop`."""
 
     def __init__(
         self,
@@ -96,32 +96,32 @@ class Display:
         self.live.start()
 
     def begin(self, number: int) -> None:
-        """A job begins."""
+        """Mark a job as started."""
         if number in self.jobs:
             self.jobs[number].start()
 
     def finish(self, number: int) -> None:
-        """A job is done."""
+        """Mark a job as done."""
         if number in self.jobs:
             self.jobs[number].ended = time.monotonic()
             self.jobs[number].failed = False
 
     def fail(self, number: int) -> None:
-        """A job failed."""
+        """Mark a job as failed."""
         if number in self.jobs:
             self.jobs[number].ended, self.jobs[number].failed = time.monotonic(), True
 
     def tell(self, text: str, style: str = "") -> None:
-        """Print something above the display."""
+        """Print above the display."""
         self.console.print(Text(text, style), soft_wrap=True)
 
     def stop(self) -> None:
-        """Leave the last picture on the terminal."""
+        """Stop and leave the last picture."""
         self.over = True
         self.live.stop()
 
     def left(self) -> float:
-        """Seconds that the run still needs, about: at the pace of the jobs that are done."""
+        """Estimate the run's remaining seconds from finished jobs."""
         now = time.monotonic()
         took = [
             (job.load.seconds, (job.ended or now) - job.begun, bool(job.ended))
@@ -136,7 +136,7 @@ class Display:
         return max([shared, *(seconds for seconds, _ in rest)])
 
     def picture(self) -> Table:
-        """A row for each stage, and one for the run."""
+        """Table with one row for each stage and one for the run."""
         table = Table.grid(padding=(0, 2))
         table.add_column(no_wrap=True)
         table.add_column()

@@ -50,13 +50,12 @@ from springtune.studies.kinds import load_study
 from springtune.studies.kinds.scenes.summary import summary
 from springtune.studies.output import reading
 from springtune.studies.output.browse.page import page
-from springtune.studies.output.canvas import png_and_pdf
 from springtune.studies.output.comparison import compare
 from springtune.studies.output.dataset import write
 from springtune.studies.output.export import export
 from springtune.studies.output.page import html as tables_page
 from springtune.studies.output.page import shown as shown_table
-from springtune.studies.output.style import styled
+from springtune.studies.output.style import png_and_pdf, styled
 from springtune.studies.runs import commands, rerun
 from springtune.studies.runs.plan import plan
 

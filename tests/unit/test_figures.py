@@ -52,7 +52,7 @@ from springtune.studies.kinds.stability.figures import (
     plot_stability_strains,
 )
 from springtune.studies.output import present, style
-from springtune.studies.output.canvas import png_and_pdf
+from springtune.studies.output.style import png_and_pdf
 from springtune.studies.runs.dependencies import modules
 
 from synthetic import BEAMS, DEFINITIONS, LOADS, SIZES, TYPES, dataset, moduli
@@ -399,7 +399,8 @@ def test_both_formats_show_the_same_and_are_the_same_again():
     assert one == two
     picture = Image.open(io.BytesIO(one["png"]))
     assert picture.size == (1200, 900) and picture.info["dpi"] == pytest.approx((300, 300), abs=0.1)
-    pixels = np.asarray(picture)
+    pixels = np.asarray(picture)[..., :3]
+    assert (np.asarray(picture)[..., 3:] == 255).all()
     red = (pixels == [255, 0, 0]).all(axis=2)
     # A diagonal, 20 points wide: from the lower left to the upper right, within the axes.
     rows, columns = np.nonzero(red)

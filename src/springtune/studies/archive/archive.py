@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from .contents import Contents, Packed
 
 PACKED_AT = (1980, 1, 1, 0, 0, 0)
-"""Time of every file in an archive, the earliest that a zip file knows: the same study is the same archive."""
+"""Time of every archived file, zip's earliest, so that the same study gives the same bytes."""
 
 
 def write(
@@ -40,7 +40,7 @@ def write(
     chosen: Mapping[str, bool] | None = None,
     tell: "Callable[[Contents], None] | None" = None,
 ) -> str:
-    """Write the archive of a study, which appears whole or not at all."""
+    """Write the archive of a study atomically."""
     try:
         atomic.check_folder(target)
     except ValueError as error:
@@ -60,7 +60,7 @@ def write(
 
 
 def check_limits(packed: "Mapping[str, Packed]") -> None:
-    """Refuse what `springtune verify` would not read."""
+    """Refuse archives that `springtune verify` would refuse."""
     texts = max(packed[name].size for name in (METADATA, SUMS))
     if len(packed) > MOST_FILES or texts > MOST_TEXT:
         raise ArchiveError(
@@ -70,7 +70,7 @@ def check_limits(packed: "Mapping[str, Packed]") -> None:
 
 
 def _zip(target: Path, packed: "Iterable[Packed]") -> None:
-    """Write a zip file that says nothing of when and where it was written."""
+    """Write a zip file without time and place of writing."""
     with (
         atomic.replacing(target, synced=True) as unfinished,
         zipfile.ZipFile(unfinished, "w", zipfile.ZIP_DEFLATED, compresslevel=6) as archive,

@@ -1,4 +1,4 @@
-"""What an archive of a study consists of: checked, found, and named; `springtune.studies.archive.archive` writes it."""
+"""Select and check the files of an archive; `springtune.studies.archive.archive` writes it."""
 
 import hashlib
 import json
@@ -30,10 +30,9 @@ if TYPE_CHECKING:
     from ..runs.rerun import Job
 
 METADATA, SUMS, README, DIFF = "ro-crate-metadata.json", "SHA256SUMS", "README.md", "code.diff"
-"""Files at the top of an archive."""
 
 CODE, INPUTS = "code", "inputs"
-"""Folders of an archive besides that of the results: of the checkout, and of files from outside of it."""
+"""Folders for files of the checkout, and of elsewhere."""
 
 CITATION = "CITATION.cff"
 OF_RESULTS = "results"
@@ -49,41 +48,34 @@ CHECKOUT_FILES = (
     "tools/setup.sh",
     *environment.LOCK_FILES,
 )
-"""Files of a checkout without which nobody could run an archive."""
+"""Required files of a checkout."""
 
 FOLDERS = {
     "src": (".css", ".html", ".js", ".py", ".pyi", ".typed"),
     "workflow": (".csl", "README.md", ".rst", ".smk", ".typ", ".yaml", ".yml"),
     "requirements": (".in", ".txt"),
 }
-"""Folders of a checkout that are packed, package, rules and lock files, and endings of files where there is no git."""
+"""Packed folders, and the endings used without git."""
 
 OF_PROFILES, LINK = "workflow/profiles", "profiles"
-"""Folder that is packed as committed, for a user's own edits never say what a study computes; and the link to it."""
+"""Folder packed as committed, since users edit profiles, and the link to it."""
 
 NOT_PACKED = ("__pycache__", ".egg-info", ".pyc", ".DS_Store")
-"""Endings of names of files and folders that are made of others."""
+"""Endings of generated files and folders."""
 
 MOST_FILES, MOST_TEXT = 100_000, 2**24
-"""Files of an archive, and bytes of its metadata or checksums; parsed these take thirty times as much memory."""
+"""Limits of files and metadata bytes; parsed metadata takes thirty times the memory."""
 
 MOST_TOLD = 5
-"""Most jobs that are told in a refusal."""
 
 
 class ArchiveError(ValueError):
-    """A study that cannot be archived as it is: what is missing, and what to do about it."""
+    """A study cannot be archived; the message names the reason and the remedy."""
 
 
 @dataclass(frozen=True)
 class Packed:
-    """A file of an archive.
-
-    Attributes
-    ----------
-    original : str
-        SHA-256 of the file that it was made from, where it is another one.
-    """
+    """A file of an archive; `original` is the SHA-256 of its source if that differs."""
 
     name: str
     source: Path | bytes
@@ -93,23 +85,13 @@ class Packed:
 
     @property
     def runs(self) -> bool:
-        """Whether it is to be executable."""
+        """Whether it is executable."""
         return isinstance(self.source, Path) and os.access(self.source, os.X_OK)
 
 
 @dataclass(frozen=True)
 class Code:
-    """The program of a checkout.
-
-    Attributes
-    ----------
-    diff : str
-        What of the package, the rules and the study differs from it.
-    new : tuple of str
-        Files that are packed and that git does not know.
-    left : tuple of str
-        Files of the same folders that are not packed.
-    """
+    """The program of a checkout: its `diff`, its packed untracked files (`new`), and unpacked ones (`left`)."""
 
     files: dict[str, Path]
     commit: str
@@ -120,24 +102,16 @@ class Code:
 
     @property
     def changed(self) -> bool:
-        """Whether it is not that of its commit."""
+        """Whether it differs from its commit."""
         return bool(self.diff or self.new)
 
 
 @dataclass(frozen=True)
 class Contents:
-    """What an archive of a study consists of, its metadata apart.
+    """Contents of an archive without metadata.
 
-    Attributes
-    ----------
-    inputs : tuple of str
-        Names of the files that it is made from besides.
-    machine : dict of str to str
-        On which all of it was computed; empty where that is not this one.
-    departures : dict of str to tuple of str
-        Versions that are locked, and others that the dataset was made with.
-    untold : list of str
-        Attributes of the dataset that are left out on request.
+    `departures` are installed versions other than the locked ones, `untold` attributes left out on request; `machine`
+    is empty if other machines took part.
     """
 
     study: "Study"
@@ -164,12 +138,12 @@ class Contents:
 
     @property
     def software(self) -> dict[str, str]:
-        """Versions that the dataset was made with."""
+        """Versions that made the dataset."""
         return dict(json.loads(self.attributes["software"]))
 
     @property
     def size(self) -> int:
-        """Of all files, uncompressed [B]."""
+        """Uncompressed size of all files [B]."""
         return sum(one.size for one in self.files.values())
 
 
@@ -181,7 +155,7 @@ def gather(
     untracked: bool = False,
     chosen: Mapping[str, bool] | None = None,
 ) -> Contents:
-    """What an archive of a study is to consist of."""
+    """Select and check the contents of an archive."""
     checkout = _checkout(folder)
     checked = verified(study, folder)
     if checked.faults or checked.stale:
@@ -226,7 +200,7 @@ def gather(
 
 
 def _checkout(folder: Path) -> Path:
-    """Folder of the checkout, which is this one; refused where it could not be run elsewhere."""
+    """Return this checkout's folder; refused if it could not run elsewhere."""
     checkout = Path.cwd()
     if folder.resolve().parent.parent != checkout:
         place = folder.parent.parent
@@ -247,7 +221,7 @@ def _checkout(folder: Path) -> Path:
 
 
 def _other_library(packed: Path) -> str:
-    """Name of a file that is another one in a folder than in the library that runs; empty where there is none."""
+    """First file that differs from the running library; empty if none does."""
     if packed.resolve() == PACKAGE.resolve():
         return ""
     names = {
@@ -277,11 +251,7 @@ def _unfinished(study: "Study", folder: Path, faults: Iterable[tuple[str, str]],
 
 
 def _code(study: "Study", checkout: Path, given: set[Path], untracked: bool) -> Code:
-    """The program: what git knows of it, or what files of a checkout are called where there is no git.
-
-    `given` are the files that the study is made from, which are packed anyway; `untracked` asks for all files of the
-    folders.
-    """
+    """The checkout's program, by git or, without git, by file endings; `given` inputs are packed anyway."""
     commit, texts = provenance.git_commit(checkout), {}
     known = _git(checkout, "ls-files", "-z", "--cached", "--", *FOLDERS, LINK) if commit else []
     if known:
@@ -319,12 +289,11 @@ def _code(study: "Study", checkout: Path, given: set[Path], untracked: bool) -> 
 
 
 def _git(checkout: Path, *arguments: str) -> list[str]:
-    """Names that git lists."""
     return [name for name in provenance.git(checkout, *arguments).split("\0") if name]
 
 
 def _followed(checkout: Path, names: Iterable[str]) -> Iterator[tuple[str, Path]]:
-    """Files by name; what a link to a folder of the checkout leads to under the link's name, as zip has no links."""
+    """Files by name; a link to a folder is followed, as zip has no links."""
     names = sorted(set(names))
     for name in names:
         path = checkout / name
@@ -338,7 +307,7 @@ def _followed(checkout: Path, names: Iterable[str]) -> Iterator[tuple[str, Path]
 
 
 def _is_usual(name: str) -> bool:
-    """Whether a file is packed where there is no git to ask: by its ending, and not hidden."""
+    """Return whether a visible file is packed by its ending if git is missing."""
     parts = PurePosixPath(name).parts
     return name.endswith(FOLDERS[parts[0]]) and not any(part.startswith(".") for part in parts)
 
@@ -351,7 +320,7 @@ def _is_made(name: str) -> bool:
 
 
 def archived_names(study: "Study", given: set[Path], checkout: Path) -> dict[Path, str]:
-    """Names in the archive of the files that a study is made from, which see each other as before."""
+    """Archive names of input files; their relative places stay."""
     config, files = study.path.resolve(), {file.resolve() for file in given}
     for path in files - {config}:
         if str(path) in study.text:
@@ -378,7 +347,7 @@ def archived_names(study: "Study", given: set[Path], checkout: Path) -> dict[Pat
 
 
 def _beside(path: Path, checkout: Path) -> str:
-    """Name of a file in a folder beside the checkout; empty for any other."""
+    """Name of a file in a folder beside the checkout; empty for others."""
     parts = Path(os.path.relpath(path, checkout)).parts
     kept = (
         parts[:1] == ("..",) and parts[1:2] != ("..",) and len(parts) > 2 and parts[1] not in (CODE, OF_RESULTS, INPUTS)
@@ -390,7 +359,7 @@ def _beside(path: Path, checkout: Path) -> str:
 
 
 def _made(folder: Path, jobs: "dict[str, Job]", made: "Plan", store: bool) -> Iterator[tuple[str, Path]]:
-    """Files of a study's results by their names from its folder on."""
+    """Product files by their names from the study's folder on."""
     from ..runs import checked_json
 
     for name, job in jobs.items():
@@ -406,7 +375,7 @@ def _made(folder: Path, jobs: "dict[str, Job]", made: "Plan", store: bool) -> It
 
 
 def stored_size(study: "Study", folder: Path) -> int:
-    """Bytes of what the stages of a study stored [B]."""
+    """Size of all stored results [B]."""
     made = plan(study, folder, 1)
     every = dict(_made(folder, rerun.jobs(study, made), made, True))
     few = dict(_made(folder, rerun.jobs(study, made), made, False))
@@ -414,9 +383,9 @@ def stored_size(study: "Study", folder: Path) -> int:
 
 
 def _without(dataset: Packed, names: Collection[str], scratch: Path) -> tuple[Packed, dict[str, str], str]:
-    """The dataset without what some attributes say, its other attributes, and the name of the machine.
+    """The dataset without some attributes, the others, and the machine's name.
 
-    The text of an attribute is overwritten in its place: all else stays as it was, to the byte.
+    Attributes are overwritten in place; all other bytes stay.
     """
     import h5py
     import numpy as np
@@ -448,12 +417,12 @@ def _without(dataset: Packed, names: Collection[str], scratch: Path) -> tuple[Pa
 
 
 def _elsewhere(folder: Path) -> bool:
-    """Whether other machines computed some of a study: nodes of a cluster, or sites whose results were added."""
+    """Return whether other machines computed part of a study."""
     return any((folder / note).is_file() for note in (COMMANDS_FILE, ELSEWHERE))
 
 
 def _departures(checkout: Path, attributes: dict[str, str]) -> dict[str, tuple[str, str]]:
-    """Versions that the dataset was made with and that are not the locked ones."""
+    """Versions of the dataset that differ from the locked ones."""
     locked: dict[str, str] = {}
     for lock in environment.LOCK_FILES:
         locked |= environment.locked(checkout / lock)
@@ -467,7 +436,7 @@ def _departures(checkout: Path, attributes: dict[str, str]) -> dict[str, tuple[s
 
 
 def _readme(found: Contents) -> str:
-    """What somebody reads who has unpacked the archive and knows nothing of it."""
+    """README of the archive."""
     study = f"../{found.config}" if not found.config.startswith(f"{CODE}/") else found.config.removeprefix(f"{CODE}/")
     commit = f"commit {found.code.commit}" if found.code.commit else "from no git checkout"
     version = found.attributes["springtune_version"]
@@ -507,6 +476,6 @@ def _of_file(name: str, path: Path) -> Packed:
 
 
 def of_text(name: str, text: str) -> Packed:
-    """A file of an archive that is a text."""
+    """Archive file with a given text."""
     content = text.encode(errors="surrogateescape")
     return Packed(name, content, hashlib.sha256(content).hexdigest(), len(content))

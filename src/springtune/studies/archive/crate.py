@@ -1,7 +1,7 @@
-"""The metadata of an archive: an RO-Crate 1.1 of the profile Provenance Run Crate, which is a Workflow RO-Crate, too.
+"""Metadata of an archive: RO-Crate 1.1, profile Provenance Run Crate.
 
-Its main entity is the Snakefile. Each rule is a step of it, carried out by the module that its jobs run; each job is an
-action with what it took. What is not known is left out: nobody is named who is not in CITATION.cff.
+The main entity is the Snakefile; each rule is a step, each job an action. Unknown values are left out, and only people
+in CITATION.cff are named.
 """
 
 import json
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from .contents import Contents
 
 TERMS = "https://w3id.org/ro/terms/workflow-run#"
-"""Where the terms are defined that RO-Crate 1.1 has not."""
+"""Namespace of terms that RO-Crate 1.1 lacks."""
 
 PROFILES = {
     "https://w3id.org/ro/wfrun/process/0.5": ("Process Run Crate", "0.5"),
@@ -29,11 +29,10 @@ PROFILES = {
     "https://w3id.org/ro/wfrun/provenance/0.5": ("Provenance Run Crate", "0.5"),
     "https://w3id.org/workflowhub/workflow-ro-crate/1.0": ("Workflow RO-Crate", "1.0"),
 }
-"""Profiles that an archive conforms to, with their names and versions."""
 
 WORKFLOW_PROFILE = "https://bioschemas.org/profiles/ComputationalWorkflow/1.0-RELEASE"
 PARAMETER_PROFILE = "https://bioschemas.org/profiles/FormalParameter/1.0-RELEASE"
-"""Profiles of the workflow, and of what it is given and makes."""
+"""Profiles of the workflow's parameters."""
 
 DONE = "http://schema.org/CompletedActionStatus"
 
@@ -57,13 +56,13 @@ MEDIA = {
     ".pvd": "application/xml",
     ".yaml": "application/yaml",
 }
-"""Types of files by their endings."""
+"""Media types by file ending."""
 
 TEXT, BYTES = "text/plain", "application/octet-stream"
-"""Types of other files: of the program, and of what a study names."""
+"""Media types of other files."""
 
 USED = {"s": ("wall time", "SEC"), "cpu_time": ("time of processors", "SEC"), "max_rss": ("most memory", "E63")}
-"""What is told of a job, of the columns of Snakemake's benchmarks: its name, and its unit's UN/CEFACT code."""
+"""Reported columns of Snakemake's benchmarks: name and UN/CEFACT unit code."""
 
 PAGES = {
     "cvxopt": "https://cvxopt.org", "h5netcdf": "https://h5netcdf.org", "h5py": "https://www.h5py.org",
@@ -73,15 +72,15 @@ PAGES = {
     "scikit-fem": "https://scikit-fem.readthedocs.io", "scipy": "https://scipy.org",
     "snakemake": "https://snakemake.readthedocs.io", "xarray": "https://xarray.dev",
 }  # fmt: skip
-"""Where software is described."""
+"""Web pages of software."""
 
 
 class CitationError(ValueError):
-    """CITATION.cff does not say what an archive states."""
+    """CITATION.cff lacks what an archive states."""
 
 
 def citation(path: Path) -> dict[str, Any]:
-    """What a citation file says of authors, licence and keywords."""
+    """Read authors, licence and keywords of a citation file."""
     import yaml
 
     try:
@@ -98,7 +97,7 @@ def citation(path: Path) -> dict[str, Any]:
 
 
 def _name(one: dict[str, Any]) -> str:
-    """Name of an author: a person's, or that of whoever else has a single one."""
+    """Name of a person or an organization."""
     parts = [one.get(key) for key in ("given-names", "name-particle", "family-names", "name-suffix")]
     return str(one.get("name") or " ".join(str(part) for part in parts if part))
 
@@ -113,13 +112,11 @@ def metadata(found: "Contents", cited: dict[str, Any]) -> str:
 
 
 def _single(value: Any) -> Any:
-    """A value in the place of a list of one, as compact JSON-LD has it."""
+    """Return the element of a list of one, as in compact JSON-LD."""
     return value[0] if isinstance(value, list) and len(value) == 1 else value
 
 
 class _Crate:
-    """The entities of an archive."""
-
     crate: "ROCrate"
 
     def __init__(self, found: "Contents", cited: dict[str, Any]) -> None:
@@ -138,7 +135,7 @@ class _Crate:
         self._run()
 
     def _add(self, name: str, kind: str, /, **properties: Any) -> "Entity":
-        """An entity that is no file; properties that are None are left out."""
+        """Add an entity other than a file; properties of None are left out."""
         from rocrate.model import ContextEntity
 
         given = {key: value for key, value in properties.items() if value is not None}
@@ -166,12 +163,12 @@ class _Crate:
         return self.crate.add_file(dest_path=name, properties=properties)
 
     def _page(self) -> dict[str, Any]:
-        """Where the program is, if CITATION.cff says so."""
+        """The program's web page, if CITATION.cff has one."""
         place = self.cited.get("repository-code") or self.cited.get("url")
         return {"url": str(place)} if place else {}
 
     def _described(self) -> dict[str, str]:
-        """What files are whose names do not say it."""
+        """Descriptions of files."""
         found = self.found
         told = {
             README: "what is in this archive, how to check it and to compute it again",
@@ -192,7 +189,7 @@ class _Crate:
         return told
 
     def _about(self) -> None:
-        """The whole: title, authors, licence, and what is in which folder."""
+        """Add the root entity."""
         root, found = self.crate.root_dataset, self.found
         commit = f"commit {found.code.commit}" if found.code.commit else "from no git checkout"
         commit += ", changed" if found.code.changed else ""
@@ -258,7 +255,7 @@ class _Crate:
     # -- the workflow and its run --------------------------------------------------------------------------------------
 
     def _rules(self) -> "list[tuple[str, tuple[str, str, list[str]]]]":
-        """What each rule does, the module that its jobs run, and its jobs, in the order of a run."""
+        """Description, module and jobs of each rule, in the order of a run."""
         found, made = self.found, []
         for stage in stages():
             own = [name for name, job in found.plan.jobs.items() if job.stage.name == stage.name]
@@ -275,7 +272,7 @@ class _Crate:
         return made
 
     def _workflow(self) -> None:
-        """The Snakefile: what it is given, and what it makes."""
+        """Add the Snakefile with its inputs and outputs."""
         workflow, found = self.files[f"{CODE}/Snakefile"], self.found
         root = self.crate.root_dataset
         workflow["conformsTo"] = {"@id": WORKFLOW_PROFILE}
@@ -297,7 +294,7 @@ class _Crate:
             workflow[key] = self.files[file]["exampleOfWork"] = parameter
 
     def _run(self) -> None:
-        """The run: the software, the machine, an action for each job."""
+        """Add the run: software, machine and one action for each job."""
         found, files, workflow = self.found, self.files, self.files[f"{CODE}/Snakefile"]
         software = {
             name: self._software(name, version) for name, version in sorted(found.software.items()) if version != "none"
@@ -354,7 +351,7 @@ class _Crate:
         return self._add(place, "SoftwareApplication", **about)
 
     def _job(self, name: str, tool: "Entity", message: str) -> "Entity":
-        """A job: when it was done, what it took, what it made."""
+        """Add the action of a job."""
         found, folder = self.found, self.found.plan.folder
         products = checked_json.demand(found.jobs[name].record)["products"]
         made = [f"{found.folder}/done/{name}.json"]
@@ -390,7 +387,7 @@ def _several(value: Any) -> list[str]:
 
 
 def _benchmark(path: Path) -> dict[str, str]:
-    """What Snakemake measured of a job, of what it could; nothing where it did not."""
+    """Snakemake's benchmark of a job, empty if missing."""
     try:
         head, row = (line.split("\t") for line in path.read_text().splitlines()[:2])
     except (OSError, ValueError):

@@ -1,15 +1,15 @@
-"""The software that a study is computed with: what lock files ask for, what is installed, and on which machine."""
+"""Locked and installed software, and the machine."""
 
 import os
 import platform
 from pathlib import Path
 
 LOCK_FILES = ("requirements/run.txt", "requirements/cholesky.txt")
-"""Lock files of what a study runs on, from the checkout on; the second is an extra that a machine may lack."""
+"""Lock files of studies; the second is an optional extra."""
 
 
 def minor(version: str) -> str:
-    """A version of Python without its last number: what wheels are built for.
+    """Python version without its last number, as wheels use it.
 
     Examples
     --------
@@ -20,7 +20,7 @@ def minor(version: str) -> str:
 
 
 def locked(path: Path) -> dict[str, str]:
-    """Versions that a lock file asks for on this machine."""
+    """Versions that a lock file requests on this machine."""
     from packaging.requirements import InvalidRequirement, Requirement
     from packaging.utils import canonicalize_name
 
@@ -39,7 +39,7 @@ def locked(path: Path) -> dict[str, str]:
 
 
 def departures(lock: Path) -> dict[str, tuple[str, str]]:
-    """What is installed here otherwise than a lock file asks for."""
+    """Installed versions that differ from a lock file."""
     from ..runs.keys import installed
 
     here = {name: (version, installed(name)) for name, version in locked(lock).items()}
@@ -47,7 +47,7 @@ def departures(lock: Path) -> dict[str, tuple[str, str]]:
 
 
 def machine() -> dict[str, str]:
-    """What numbers and times depend on besides the software; neither the machine's name nor its user's."""
+    """Properties of the machine that numbers and times depend on, without names."""
     found = {"architecture": platform.machine(), "system": platform.system(), "cores": str(os.cpu_count())}
     try:
         lines = Path("/proc/cpuinfo").read_text().splitlines()

@@ -1,8 +1,7 @@
-"""Results of a study's parts, computed at several sites, put together in the folder of the whole study.
+"""Merge the results of a study's parts from several sites.
 
-Results are known by their keys, which hold code, packages and parameters: a part fits where its jobs have stored all
-keys that the study asks for here. So a merge is the union of stored files, and whatever does not fit is told before
-anything is written.
+Keys of results hold code, packages and parameters, so a merge is the union of stored files. Everything is compared
+before anything is written.
 """
 
 import json
@@ -41,20 +40,18 @@ if TYPE_CHECKING:
     from ..config.model import Study
 
 HASH = re.compile("[0-9a-f]{24}")
-"""What `springtune.studies.runs.hashing.hash_of` gives."""
+"""Form of `springtune.studies.runs.hashing.hash_of`."""
 
 TIMES = "seconds"
-"""End of the names of what is another one in every run."""
+"""Ending of names of values that differ in every run."""
 
 NAMED = 3
-"""So many scenes or tasks are named of those with the same fault."""
 
 STORED, MESH_FILE, MESHES = ".h5", ".vtu", "meshes"
-"""Endings of files that stages make, and the folder of meshes and notes on them."""
 
 
 ELSEWHERE = f"{TASKS}/elsewhere.json"
-"""Note in a study's folder of the files that hold results of other machines."""
+"""Note of files with results of other machines."""
 
 
 class MergeError(Exception):
@@ -65,11 +62,11 @@ class MergeError(Exception):
 
 
 class _NotStoredError(Exception):
-    """A task whose result is not stored."""
+    """The result of a task is not stored."""
 
 
 class _OnlyStored(TaskCosts):
-    """Of jobs that are to find all their results stored: they compute nothing."""
+    """Costs of jobs that must find all results stored."""
 
     def __init__(self, limits: Mapping[str, float]) -> None:
         super().__init__()
@@ -94,21 +91,13 @@ class Site:
     attributes: dict[str, str]
 
     def place(self, product: str) -> Path:
-        """Name of a file in any folder of results, from the name that its job knows it by."""
+        """Path of a product in any results folder."""
         return Path(product).relative_to(Path("results", self.attributes["study"]))
 
 
 @dataclass(frozen=True)
 class Merged:
-    """What a merge did.
-
-    Attributes
-    ----------
-    files, written : int
-        Files that the parts have, and those of them that were written.
-    left : int
-        Jobs of the study that are still to run before its dataset.
-    """
+    """Outcome of a merge: `files` of the parts, `written` ones, and jobs `left` to run."""
 
     folder: Path
     files: int
@@ -118,10 +107,9 @@ class Merged:
 
 
 def merge_sites(study: "Study", folders: Sequence[Path], incomplete: bool = False) -> Merged:
-    """Put the results of a study's parts together in ``results/<study>``.
+    """Merge the parts' results into ``results/<study>``.
 
-    Nothing is written before all is compared, and no file is ever half written: a merge that was killed is called
-    again. What the folder holds already stays.
+    No file is ever half written, so an interrupted merge can be repeated. Existing results stay.
     """
     target = Path("results", study.name)
     locks.check_claim(target, study.path)
@@ -149,7 +137,7 @@ def merge_sites(study: "Study", folders: Sequence[Path], incomplete: bool = Fals
 
 
 def take_in(study: "Study", places: Mapping[Path, Sequence[Path]], target: Path) -> int:
-    """Add stored files to a study's results; nothing is written before all are compared."""
+    """Compare stored files, then add them to a study's results."""
     names = {scene_key(study, scene): study.name_of(scene) for scene in study.scenes}
     found = {place: _union(target / place, paths, names) for place, paths in sorted(places.items())}
     makes = {place: make for place, make in found.items() if make}
@@ -165,7 +153,7 @@ def take_in(study: "Study", places: Mapping[Path, Sequence[Path]], target: Path)
 
 
 def _site(study: "Study", folder: Path) -> Site:
-    """What a folder holds."""
+    """Read and check the folder of a part."""
     path = folder / rerun.DATASET
     if not folder.is_dir():
         raise MergeError(f"{folder}: there is no such folder; give the folders of results of all parts")
@@ -192,7 +180,7 @@ def _site(study: "Study", folder: Path) -> Site:
 
 
 def _text(attribute: Any) -> str:
-    """Text of an attribute, which HDF5 gives as bytes where it is ASCII."""
+    """Text of an attribute; HDF5 gives ASCII as bytes."""
     return attribute.decode() if isinstance(attribute, bytes) else str(attribute)
 
 
@@ -206,7 +194,7 @@ def _difference(one: str, other: str) -> str:
 
 
 def _absent(study: "Study", sites: Sequence[Site]) -> Iterator[str]:
-    """Parts whose results are not among those that are given, with their scenes."""
+    """Missing parts with their scenes."""
     parts = [site.study.part for site in sites if site.study.part]
     ways = {(part.of, part.by): site.folder for part, site in zip(parts, sites)}
     if len(ways) > 1:
@@ -219,13 +207,13 @@ def _absent(study: "Study", sites: Sequence[Site]) -> Iterator[str]:
 
 
 def _listed(names: Sequence[str], what: str) -> str:
-    """How many of something there are, and the first of them; nothing where there are none."""
+    """Count and first names of a list; empty for none."""
     more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
     return f"{len(names)} {what} ({', '.join(names[:NAMED])}{more})" if names else ""
 
 
 def _examined(site: Site) -> tuple[list[Path], list[str]]:
-    """Files that the jobs of a part have made and that are as they made them, and what is wrong besides."""
+    """Undamaged products of a part, and its faults."""
     found, damaged = dict[Path, None](), list[str]()
     done: set[str] = set()
     for path in sorted((site.folder / TASKS).glob("*_*.json")):
@@ -260,12 +248,12 @@ def _examined(site: Site) -> tuple[list[Path], list[str]]:
 
 
 def is_stored(place: Path) -> bool:
-    """Whether a job's file holds results by keys; others, such as calibrated stiffnesses, are made of these."""
+    """Return whether a file holds results by key; others are derived from these."""
     return place.suffix == STORED or place.parent.name == MESHES
 
 
 def _otherwise(site: Site) -> str:
-    """What differs between a site's installation and this one, with the remedy."""
+    """Difference of a site's installation from this one, with the remedy."""
     from ..runs.provenance import git_commit  # here: a merge that fits asks for nothing of it
 
     software = json.loads(site.attributes.get("software", "{}"))
@@ -284,7 +272,7 @@ def _otherwise(site: Site) -> str:
 
 
 def keys_of(content: Any) -> Iterator[str]:
-    """Keys of results, and of what they are made from, in what a job is to do."""
+    """Keys of results and their inputs in a task."""
     if isinstance(content, str):
         if HASH.fullmatch(content):
             yield content
@@ -298,7 +286,7 @@ def keys_of(content: Any) -> Iterator[str]:
 
 
 def _union(target: Path, paths: Sequence[Path], names: Mapping[str, str]) -> Callable[[], None] | None:
-    """What writes a file of the study from those of parts; None where nothing is to be written."""
+    """Return what writes the merged file, or None if it need not change."""
     if target.parent.name == MESHES:
         return _mesh(target, paths)
     before = store.contents(target) if store.stored(target) else {}
@@ -326,7 +314,7 @@ def _union(target: Path, paths: Sequence[Path], names: Mapping[str, str]) -> Cal
 
 
 def _mesh(target: Path, paths: Sequence[Path]) -> Callable[[], None] | None:
-    """As `_union`, of the file of a mesh, or of its notes: those of one part, since what it took is in them."""
+    """As `_union`, for a mesh or its notes, which come from one part."""
     if target.suffix == MESH_FILE and len({records.checksum(path) for path in paths}) > 1:
         told = " and ".join(map(str, paths))
         raise MergeError(
@@ -340,7 +328,7 @@ def _mesh(target: Path, paths: Sequence[Path]) -> Callable[[], None] | None:
 
 
 def _same(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
-    """Whether results are the same, bit by bit, but for what they took."""
+    """Return whether results agree bit by bit, run times apart."""
     names = {name for name in {**one, **other} if not name.endswith(TIMES)}
     return all(name in one and name in other and _as_text(one[name]) == _as_text(other[name]) for name in names)
 
@@ -350,7 +338,7 @@ def _as_text(value: Any) -> Any:
 
 
 def adopt(study: "Study", folder: Path, cores: int) -> int:
-    """Record the jobs of a study whose results are all stored as done; those that are keep their records."""
+    """Record jobs as done whose results are all stored; existing records stay."""
     planned = plan(study, folder, cores)
     planned.write()
     left = 0
@@ -373,7 +361,7 @@ def adopt(study: "Study", folder: Path, cores: int) -> int:
 
 
 def told(merged: Merged, parts: Iterable[Path]) -> str:
-    """What a merge did, in words."""
+    """Report of a merge."""
     lines = [f"{merged.folder}: {len([*parts])} parts, {merged.files} files, {merged.written} of them written"]
     if merged.missing:
         lines += ["still to be computed:", *(f"  {line}" for line in merged.missing)]

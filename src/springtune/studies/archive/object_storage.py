@@ -1,8 +1,4 @@
-"""Stored results of a stage in one file, for object storage.
-
-Storage has what is whole or nothing under a name, but asks a request for each: so a stage is one object. A pack names
-its files and their checksums, which are compared when it is unpacked; results are added to those that are there.
-"""
+"""Packs: the results of a stage as one object for object storage, with checksums."""
 
 import io
 import json
@@ -19,21 +15,20 @@ from ..runs import checked_json, records
 from .merge_parts import MergeError, adopt, is_stored, take_in
 
 CONTENTS = "contents.json"
-"""First file in a pack: checksums of the others by name."""
+"""First file in a pack: checksums by name."""
 
 ENDING = ".tar"
-"""Of the name of a pack."""
 
 UNPACKED = "fetched"
-"""Folder in a study's, in which packs are unpacked before they are added."""
+"""Folder in which packs are unpacked."""
 
 
 class PackError(Exception):
-    """A pack that is not what was packed."""
+    """A damaged pack."""
 
 
 def pack(folder: Path, done: Sequence[Path], output: Path) -> None:
-    """Pack what jobs have made; the same results make the same bytes."""
+    """Pack the products of jobs; the same results give the same bytes."""
     made: dict[str, list[object] | None] = {}
     for record in done:
         made |= checked_json.demand(record)["products"]
@@ -76,7 +71,7 @@ def _content(archive: tarfile.TarFile, member: tarfile.TarInfo) -> bytes:
 
 
 def fetch(config: str, packs: Sequence[Path]) -> str:
-    """Add what packs hold to a study's results, and record its jobs as done whose results are all there."""
+    """Add the results of packs to a study, and record finished jobs."""
     study = load_study(config)
     folder = Path("results", study.name)
     place = folder / UNPACKED
@@ -93,14 +88,14 @@ def fetch(config: str, packs: Sequence[Path]) -> str:
 
 
 def copy(output: Sequence[Path], files: Sequence[Path]) -> None:
-    """Copy files, each under a name of its own."""
+    """Copy files to new names."""
     for path, file in zip(output, files, strict=True):
         with atomic.replacing(path) as unfinished:
             shutil.copyfile(file, unfinished)
 
 
 def main(what: str, *arguments: str) -> None:
-    """Do what a rule asks for."""
+    """Run the command of a rule."""
     try:
         if what == "pack":
             folder, output, *done = map(Path, arguments)

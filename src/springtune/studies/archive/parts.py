@@ -1,4 +1,4 @@
-"""Files of the parts of a study, which several sites compute."""
+"""Write the files of a study's parts for several sites."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -19,13 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Written:
-    """A part of a study that was written.
-
-    Attributes
-    ----------
-    share : float
-        Of the expected seconds of the whole study [1].
-    """
+    """A written part, with its share of the study's expected time [1]."""
 
     path: Path
     study: "Study"
@@ -33,7 +27,7 @@ class Written:
 
 
 def write_parts(study: "Study", count: int, by: str, folder: Path) -> list[Written]:
-    """Write the files of the parts of a study; all of them, or none."""
+    """Write the files of all parts, or none."""
     if study.part:
         which = f"part {study.part.number} of {study.part.of}"
         raise StudyError(f"{study.path}: is {which} of a study already; split the whole one")
@@ -56,7 +50,7 @@ def write_parts(study: "Study", count: int, by: str, folder: Path) -> list[Writt
 
 
 def _named_files(study: "Study", folder: Path) -> dict[Path, bytes]:
-    """Files that a study names, by where parts in a folder look for them; none where they look at the same ones."""
+    """Copies that parts in a folder need of a study's named files."""
     beside = study.path.parent.resolve()
     if folder.resolve() == beside:
         return {}
@@ -69,7 +63,7 @@ def _named_files(study: "Study", folder: Path) -> dict[Path, bytes]:
 
 
 def told(written: Iterable[Written]) -> list[list[object]]:
-    """Rows of what each part has, with a head."""
+    """Table of the parts, with a head."""
     rows: list[list[object]] = [["part", "scenes", "curves", "of the cost", "besides"]]
     for one in written:
         besides = ", ".join(kind for kind, held in one.study.parts.items() if held and kind != "scenes")

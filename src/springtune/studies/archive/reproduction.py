@@ -1,4 +1,4 @@
-"""An archive of a study, checked, and computed again by what is in it; see `springtune.studies.archive.archive`."""
+"""Check an archive and compute its study again."""
 
 import hashlib
 import json
@@ -31,38 +31,26 @@ if TYPE_CHECKING:
     from ..output.comparison import Comparison
 
 MADE_BY = "https://w3id.org/ro/wfrun/provenance/0.5"
-"""Profile by which an archive is told from other zip files."""
+"""Profile that identifies an archive."""
 
 OF_MACHINE = "/benchmark"
-"""Group whose cases end by a machine's speed and programs: `most_seconds`, CalculiX, CHOLMOD."""
+"""Group whose cases depend on the machine: `most_seconds`, CalculiX, CHOLMOD."""
 
 UNZIPPED = 2**20
-"""Bytes that are read at once."""
 
 MOST_RATIO = 100
-"""So many times as large as packed an archive may be; those of studies are some times as large."""
+"""Limit of unpacked over packed size; studies stay far below."""
 
 LONGEST_MEMBER = 1000
-"""Characters of a file's name in an archive."""
 
 
 class ReproductionError(ValueError):
-    """An archive that could not be computed again: why, and what to do about it."""
+    """An archive cannot be reproduced; the message names the reason and the remedy."""
 
 
 @dataclass
 class Checked:
-    """What an archive is.
-
-    Attributes
-    ----------
-    title, study, config, dataset : str
-        Of the study: its title, its name, and the names of its file and of its dataset in the archive.
-    seconds : float
-        That all jobs took together [s].
-    machine : dict of str to str
-        That it was computed on, as far as it is told.
-    """
+    """A checked archive: names in it, the jobs' total `seconds` and the `machine` as far as stated."""
 
     path: Path
     sha256: str
@@ -78,7 +66,7 @@ class Checked:
 
 
 def check(path: Path) -> Checked:
-    """Compare all files of an archive with their checksums, and with what its metadata lists."""
+    """Compare an archive's files with checksums and metadata."""
     why = fault(path)
     if why:
         raise ReproductionError(f"{path}: cannot be read ({why}); give an archive")
@@ -95,11 +83,11 @@ def check(path: Path) -> Checked:
 UNREADABLE = (
     zipfile.BadZipFile, zlib.error, struct.error, OSError, EOFError, ValueError, RuntimeError, OverflowError
 )  # fmt: skip
-"""What zipfile raises where a zip file is damaged; RuntimeError where it is encrypted or of another version."""
+"""Errors of zipfile on damaged files; RuntimeError on encrypted ones."""
 
 
 class _Bounded(BufferedReader):
-    """A file of which zipfile cannot read more at once than the texts of an archive may have: it reads lists whole."""
+    """File with bounded reads: zipfile reads lists at once."""
 
     def read(self, size: int | None = -1, /) -> bytes:
         if size is not None and size > MOST_TEXT:
@@ -141,11 +129,10 @@ def _checked(found: Checked, archive: zipfile.ZipFile) -> Checked:
 
 
 SUM = re.compile("^([0-9a-f]{64})  (.+)$", re.MULTILINE)
-"""A line of `SUMS`."""
 
 
 def _check_sizes(path: Path, infos: list[zipfile.ZipInfo]) -> None:
-    """Refuse an archive that would take memory or time, by the sizes that it states; no more is unpacked of a file."""
+    """Refuse archives whose stated sizes exceed memory or time; unpacking stops at them."""
     if len(infos) > MOST_FILES:
         raise ReproductionError(f"{path}: has {len(infos)} files, and at most {MOST_FILES} are read; get it again")
     texts = [(info.filename, info.file_size) for info in infos if info.filename in (METADATA, SUMS)]
@@ -159,7 +146,7 @@ def _check_sizes(path: Path, infos: list[zipfile.ZipInfo]) -> None:
 
 
 def _unusual(info: zipfile.ZipInfo) -> str:
-    """What about a file is not as in any archive; empty where there is nothing."""
+    """Return what is unusual about a file, or an empty string."""
     name, place = info.filename.removesuffix("/"), PurePosixPath(info.filename)
     if place.is_absolute() or ".." in place.parts or "\\" in name:
         return "leads out of the archive"
@@ -173,7 +160,7 @@ def _unusual(info: zipfile.ZipInfo) -> str:
 
 
 def _digest(archive: zipfile.ZipFile, name: str) -> str | None:
-    """SHA-256 of a file; None where it cannot be unpacked."""
+    """SHA-256 of a file; None if it cannot be unpacked."""
     made, info, size = hashlib.sha256(), archive.getinfo(name), 0
     if _unusual(info):  # other methods unpack without a bound
         return None
@@ -188,7 +175,7 @@ def _digest(archive: zipfile.ZipFile, name: str) -> str | None:
 
 
 def _listed(found: Checked, text: bytes) -> dict[str, str]:
-    """Checksums in the metadata, by file; and what it tells of the study."""
+    """Checksums by file in the metadata; also sets facts of the study."""
     try:
         graph = {_text(one["@id"]): one for one in json.loads(text)["@graph"]}
         root, workflow = graph["./"], graph[f"{CODE}/Snakefile"]
@@ -217,7 +204,7 @@ def _listed(found: Checked, text: bytes) -> dict[str, str]:
 
 
 def _text(value: Any) -> str:
-    """A value that is to be a text; half of a character is none."""
+    """Return a valid text; unpaired surrogates are refused."""
     if not isinstance(value, str):
         raise TypeError(value)
     value.encode()
@@ -233,16 +220,10 @@ def _several(value: Any) -> list[Any]:
 
 @dataclass(frozen=True)
 class Reproduced:
-    """What came out when an archive was computed again.
+    """Outcome of a reproduction.
 
-    Attributes
-    ----------
-    exact, near : Comparison
-        What differs bit by bit, and beyond the usual tolerance; the archive is before.
-    others : dict of str to tuple of str
-        What the numbers depend on and what is another one: versions, processor. As it was, and as it is.
-    ended_otherwise : int
-        Cases of the benchmark that one of the machines did and the other did not; with any, its group is not compared.
+    `exact` and `near` list differences in bits and beyond the tolerance. `others` are changed versions and processor,
+    before and after. With any benchmark cases that `ended_otherwise`, that group is not compared.
     """
 
     exact: "Comparison"
@@ -252,19 +233,19 @@ class Reproduced:
 
     @property
     def same(self) -> bool:
-        """Whether it came out the same: all bits, or all within the tolerance where software or machine differ."""
+        """Whether results agree: to the bit, or within the tolerance if software or machine differ."""
         return not self.exact.different or (bool(self.others) and not self.near.different)
 
 
 def own_environment(lock: Path, python: str) -> dict[str, tuple[str, str]]:
-    """What of this program's environment is not what an archive asks for."""
+    """Installed versions that differ from the archive's."""
     found = environment.departures(lock)
     here, wanted = (environment.minor(version) for version in (sys.version.split()[0], python))
     return found | ({"python": (wanted, here)} if wanted != here else {})
 
 
 def reproduce(found: Checked, folder: Path, fresh: bool, say: Callable[[str], None]) -> Reproduced:
-    """Compute the study of an archive again by the program in it, and compare the datasets."""
+    """Compute an archived study again by its own program, and compare."""
     with zipfile.ZipFile(found.path) as archive:
         _unpack(archive, folder, without=str(PurePosixPath(found.dataset).parent) + "/", but=found.dataset)
     kept, code = folder / found.dataset, folder / CODE
@@ -287,11 +268,11 @@ def reproduce(found: Checked, folder: Path, fresh: bool, say: Callable[[str], No
 
 
 UNWANTED = ("PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV", "SNAKEMAKE_PROFILE", "SPRINGTUNE_SOLVER")
-"""Of the surroundings of this process, what is not to reach the one that computes."""
+"""Environment variables that must not reach the reproducing process."""
 
 
 def _unpack(archive: zipfile.ZipFile, folder: Path, without: str, but: str) -> None:
-    """Unpack files with their leave to run, results apart: these are computed."""
+    """Unpack files with their permissions, without results."""
     for info in archive.infolist():
         if info.is_dir() or (info.filename.startswith(without) and info.filename != but):
             continue
@@ -304,7 +285,7 @@ def _unpack(archive: zipfile.ZipFile, folder: Path, without: str, but: str) -> N
 
 
 def _python(code: Path, python: str, fresh: bool, say: Callable[[str], None]) -> Path:
-    """The Python to run a checkout by: this one where it is the same, else that of an environment of its own."""
+    """Python to run a checkout with: this one if it matches, else of a new environment."""
     others = own_environment(code / environment.LOCK_FILES[0], python)
     if not others and not fresh:
         say("environment: this one, whose packages are those of the archive's lock file")
@@ -327,7 +308,7 @@ def _python(code: Path, python: str, fresh: bool, say: Callable[[str], None]) ->
 
 
 def compared(kept: Path, made: Path, machine: dict[str, str]) -> Reproduced:
-    """Compare the dataset of an archive with one that was computed here."""
+    """Compare the archived dataset with a new one."""
     from ..output.comparison import Tolerance, compare
 
     with reading.open(kept) as before, reading.open(made) as after:

@@ -1,4 +1,4 @@
-"""Whether what lies in a study's folder is what was made, and whether a sample of it can be made again."""
+"""Verify a study's files by checksum, and recompute a sample."""
 
 import json
 import random
@@ -36,21 +36,19 @@ if TYPE_CHECKING:
     from ..output.dataset import Label
 
 OF_SHAPES = "/shapes"
-"""Group of the scenes of shapes."""
 
 COMPARED = {
     SCENES: ("displacement", "stiffness", "deformation_error", "field_error", "reference_displacement"),
     OF_SHAPES: ("value", "error", "reference_value"),
 }
-"""Numbers of a scene that are made again, by group; one of each quantity where a scene has many."""
+"""Recomputed numbers by group, one for each quantity."""
 
 SAME_SOFTWARE, OTHER_SOFTWARE = 1e-12, 1e-6
-"""Relative differences that are none: with the versions of the software that the dataset was made with, and with
-others, whose factors round differently; equilibria are solved to 1e-10 of the load."""
+"""Tolerances for the same software and for other versions; equilibria converge to 1e-10 of the load."""
 
 
 def _is_whole(path: Path) -> bool:
-    """Whether a file of results is what was written."""
+    """Return whether a file of results is undamaged."""
     try:
         store.contents(path)
     except DamagedError:
@@ -62,20 +60,12 @@ SEALS: dict[str, Callable[[Path], bool]] = {
     ".h5": _is_whole,
     ".json": lambda path: checked_json.read(path) is not None,
 }
-"""Whether a file is as it was written, by the checksum in it; by the file's ending."""
+"""Checks by file ending."""
 
 
 @dataclass(frozen=True)
 class Again:
-    """A scene that was made again.
-
-    Attributes
-    ----------
-    difference : float
-        Largest relative difference of its numbers [1].
-    limit : float
-        Largest one that is none [1].
-    """
+    """A recomputed scene with its largest relative `difference` and the `limit` for it [1]."""
 
     labels: str
     before: str
@@ -85,23 +75,13 @@ class Again:
 
     @property
     def agrees(self) -> bool:
-        """Whether it is what the dataset says."""
+        """Whether it agrees with the dataset."""
         return self.before == self.after and self.difference <= self.limit
 
 
 @dataclass(frozen=True)
 class Files:
-    """What the files of a study are.
-
-    Attributes
-    ----------
-    compared : int
-        Files that were compared with their checksums.
-    faults : tuple of tuple of str
-        Names of jobs, each with a file that is not as the job made it, or that it has not been done.
-    stale : tuple of str
-        Names of jobs that were done, and of which something else is asked for now: the study or the program changed.
-    """
+    """State of a study's files: `faults` pair job and file, `stale` jobs match no current request."""
 
     compared: int
     faults: tuple[tuple[str, str], ...]
@@ -135,7 +115,7 @@ def files(study: "Study", folder: Path) -> Files:
 
 
 def set_aside(found: Files) -> list[Path]:
-    """Give damaged files another name, so that the next run makes them again."""
+    """Rename damaged files, so that the next run makes them again."""
     whys = dict.fromkeys(why for _, why in found.faults if why.endswith(records.DAMAGED))
     paths = [Path(why.removesuffix(records.DAMAGED)) for why in whys]
     for path in paths:
@@ -144,12 +124,12 @@ def set_aside(found: Files) -> list[Path]:
 
 
 def left(folder: Path) -> list[Path]:
-    """Files that were set aside, and those that a process which was killed was writing."""
+    """Renamed files and unfinished temporary ones."""
     return sorted(path for path in folder.rglob("*") if path.name.endswith((ASIDE, atomic.UNFINISHED)))
 
 
 def again(folder: Path, beside: Path, number: int, seed: int) -> Iterator[Again]:
-    """Make scenes again that are drawn from a dataset, by its own config."""
+    """Recompute random scenes of a dataset by its own config."""
     with reading.open(folder) as tree, tempfile.TemporaryDirectory() as temporary:
         before = {name: tree[name].to_dataset().load() for name in COMPARED if name == SCENES or name in tree.groups}
         root = before[SCENES]
@@ -176,7 +156,7 @@ def again(folder: Path, beside: Path, number: int, seed: int) -> Iterator[Again]
 
 
 def _scenes(study: "Study") -> "dict[str, dict[SceneSpec | ShapeScene, dict[str, Label]]]":
-    """Scenes of a study with the cells that are theirs, by group of its dataset."""
+    """Scenes of a study with their cells, by group."""
     shapes = study.parts["shapes"]
     found: dict[str, dict[SceneSpec | ShapeScene, dict[str, Label]]] = {
         SCENES: {scene: study.labels(scene) for scene in study.scenes},
@@ -186,14 +166,14 @@ def _scenes(study: "Study") -> "dict[str, dict[SceneSpec | ShapeScene, dict[str,
 
 
 def _part(study: "Study", chosen: "set[SceneSpec | ShapeScene]") -> "Study":
-    """A study of a few scenes of another one, and of what these need."""
+    """Study of a few scenes and all that they need."""
     found = of_shape_scenes(of_scenes(replace(study, further_references=(), printed=()), chosen), chosen)
     kept = {name: found.parts[name] for name in ("scenes", "shapes")}
     return replace(found, parts=dict.fromkeys(study.parts, ()) | kept)
 
 
 def _made(study: "Study", folder: Path) -> "dict[str, xr.Dataset]":
-    """Groups of the dataset of a study that have scenes, made in this process."""
+    """Groups of a dataset, computed in this process."""
     for job in plan(study, folder, 1).jobs.values():
         costs = TaskCosts()
         driver.run(job.stage.module, job.content, costs)

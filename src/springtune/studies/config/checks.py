@@ -1,4 +1,4 @@
-"""Whether the values of a study go together."""
+"""Checks that the values of a study agree with each other."""
 
 import math
 import os
@@ -21,26 +21,23 @@ from .model import Grid, MeshSpec, Reference, SceneSpec
 from .sections import GRID_PARAMETERS, PLAUSIBLE, StatedStiffness, StudyConfig
 
 MOST_CELLS = 2_500_000
-"""Most cells of a dataset: combinations of labels of all its dimensions, whether or not a grid asks for them."""
+"""Limit of label combinations over all dimensions, requested or not."""
 
 MOST_CURVE_POINTS = 10_000_000
-"""Most points of all sensitivity curves in a dataset."""
 
 FEWER = "give shorter lists, or split the study into several"
-"""Remedy where a study asks for too much."""
 
 MORE_SCENES = f"or allow more by 'springtune run --max-scenes', or by {MOST_SCENES_VARIABLE} in the environment"
-"""Remedy where it is as large as it is meant to be."""
 
 
 def check_known(problems: Problems, path: Sequence[Key], what: str, name: str, names: Iterable[str]) -> None:
-    """A name that refers to what the study declares."""
+    """Check that the study declares a name."""
     if name not in names:
         problems.add(path, f"unknown {what} '{name}'; {nearest(name, names)}; or declare it under {what}s")
 
 
 def check_beam_material(problems: Problems, path: Sequence[Key], name: str, config: StudyConfig) -> None:
-    """A material of beams: one that the study declares, and isotropic."""
+    """Check that a beam material is declared and isotropic."""
     check_known(problems, path, "material", name, config.materials)
     given = config.materials[name] if name in config.materials else None
     if given and given.young_modulus is None and given.uniaxial_test is None:
@@ -52,7 +49,7 @@ def check_beam_material(problems: Problems, path: Sequence[Key], name: str, conf
 
 
 def check_names(config: StudyConfig, problems: Problems) -> None:
-    """Names that refer to what the study declares, and pairs of numbers."""
+    """Check the names that refer to declared sections, and the sensitivity range."""
     mesh_types = mesh_type_names(config)
     for name, rows in (config.mesh_files or {}).items():
         if name in MESH_TYPES:
@@ -95,7 +92,7 @@ def check_names(config: StudyConfig, problems: Problems) -> None:
 
 
 def most_scenes() -> int:
-    """Most scenes of a study."""
+    """Return the limit of scenes, which the environment may change."""
     text = os.environ.get(MOST_SCENES_VARIABLE) or str(MOST_SCENES)
     try:
         found = int(float(text))
@@ -109,7 +106,7 @@ def most_scenes() -> int:
 
 
 def check_counts(config: StudyConfig, content: dict[str, Any], problems: Problems) -> None:
-    """How many scenes grids have, before they are expanded, and whether what goes together has as many values."""
+    """Check the number of scenes and of zipped values before grids are expanded."""
     for name, grid in config.grids.items():
         check_groups(name, grid, content["grids"][name], problems)
     problems.stop()
@@ -134,7 +131,7 @@ def check_counts(config: StudyConfig, content: dict[str, Any], problems: Problem
 
 
 def _check_labels(config: StudyConfig, problems: Problems) -> None:
-    """How large the dataset becomes, as far as lists tell before they are expanded."""
+    """Estimate the size of the dataset before grids are expanded."""
     if not config.grids or any(grid.exclude for grid in config.grids.values()):
         return  # exclusions may leave labels out
     lists = {name: {value for grid in config.grids.values() for value in values_of(grid, name)} for name in LABELLED}
@@ -142,11 +139,10 @@ def _check_labels(config: StudyConfig, problems: Problems) -> None:
 
 
 LABELLED = tuple(name for name in GRID_PARAMETERS if name != "pressure")
-"""Parameters of grids that are dimensions, or may be."""
 
 
 def check_product(problems: Problems, section: object, path: Sequence[Key], labels: Iterable[str], most: int) -> None:
-    """How much a section asks for, before it is expanded: the product of its lists."""
+    """Check the product of a section's lists before it is expanded."""
     lists = {label: len(getattr(section, label)) for label in labels}
     count = math.prod(lists.values())
     if count > most:
@@ -157,7 +153,7 @@ def check_product(problems: Problems, section: object, path: Sequence[Key], labe
 def check_particles(
     problems: Problems, path: Sequence[Key], sizes: Iterable[float], length: float, height: float
 ) -> None:
-    """Mesh sizes against the box that they are for: no mesh of an absurd number of particles."""
+    """Refuse mesh sizes that give too many particles."""
     size = min(sizes)
     particles = length * height / (COEFFICIENT * size**2) if size**2 else math.inf
     if particles > MOST_MESHED:
@@ -166,7 +162,7 @@ def check_particles(
 
 
 def check_cells(config: StudyConfig, lists: dict[str, set[Any]], curves: bool, problems: Problems) -> None:
-    """How large the dataset becomes: each combination of labels has a cell, whichever grid has which label."""
+    """Check the size of the dataset, which has a cell for each combination of labels."""
     shown = " x ".join(f"{len(values)} {label}" for label, values in lists.items() if len(values) > 1)
     cells = math.prod(map(len, lists.values()))
     if cells > MOST_CELLS:
@@ -187,7 +183,7 @@ def check_cells(config: StudyConfig, lists: dict[str, set[Any]], curves: bool, p
 
 
 def check_numbers(lists: dict[str, set[Any]], problems: Problems) -> None:
-    """Numbers that are labels must differ by more than what they are found by."""
+    """Check that numeric labels differ by more than `SAME_VALUE`."""
     for name, values in lists.items():
         numbers = sorted(value for value in values if isinstance(value, float))
         for one, other in zip(numbers, numbers[1:]):
@@ -200,7 +196,7 @@ def _counted(count: int) -> str:
 
 
 def check_for_triangles(names: Iterable[str], path: Sequence[Key], problems: Problems) -> None:
-    """Definitions that derive a stiffness on triangles from mesh and material alone."""
+    """Check that definitions work on triangles without a reference or a stated stiffness."""
     able = [other for other, one in DEFINITIONS.items() if not one.needs and 3 in one.cells]
     for name in names:
         if name not in able:
@@ -209,18 +205,18 @@ def check_for_triangles(names: Iterable[str], path: Sequence[Key], problems: Pro
 
 
 def check_density(config: StudyConfig, name: str, path: Sequence[Key], problems: Problems) -> None:
-    """What moves has a density; materials that are not declared are another problem."""
+    """Check that a declared material has a density."""
     if name in config.materials and config.materials[name].density is None:
         problems.add(path, f"'{name}' has no density; add one to it under materials, such as density: 7850 kg/m^3")
 
 
 def mesh_type_names(config: StudyConfig) -> list[str]:
-    """Names of all mesh types, made ones first."""
+    """Names of all mesh types, generated ones first."""
     return [*MESH_TYPES, *(config.mesh_files or ())]
 
 
 def check_meshes(config: StudyConfig, content: dict[str, Any], grids: Iterable[Grid], problems: Problems) -> None:
-    """Mesh sizes against the beams they are for."""
+    """Check mesh sizes against the size of their beams."""
     for expanded in grids:
         name, grid = expanded.name, config.grids[expanded.name]
         made = {(scene.mesh.mesh_size, scene.mesh.beam.name) for scene in expanded.scenes if scene.mesh.file is None}
@@ -247,7 +243,7 @@ def _in_mm(length: float) -> str:
 
 
 def _check_kinds(grids: Iterable[Grid], problems: Problems) -> None:
-    """Definitions against the cells and loads of the grids that use them."""
+    """Check that definitions fit the cells and loads of their grids."""
     for grid in grids:
         found: dict[str, None] = {}
         for name, mesh_type, on in dict.fromkeys((one.definition, one.mesh.mesh_type, one.load) for one in grid.scenes):
@@ -264,11 +260,10 @@ def _check_kinds(grids: Iterable[Grid], problems: Problems) -> None:
 
 
 SEPARATE = "give them grids of their own"
-"""Remedy where two values of a grid do not go together."""
 
 
 def check_definitions(config: StudyConfig, content: dict[str, Any], grids: Sequence[Grid], problems: Problems) -> None:
-    """Parameters of the definitions against what the grids need of them."""
+    """Check that the study states what its definitions need."""
     _check_kinds(grids, problems)
     stated = {(row.mesh_type, row.material): row.value for row in stated_rows(config)}
     sheets: dict[tuple[str, str], dict[tuple[float, float], None]] = {}  # thickness and Young's modulus
@@ -310,14 +305,14 @@ def check_definitions(config: StudyConfig, content: dict[str, Any], grids: Seque
 
 
 def stated_rows(config: StudyConfig) -> list[StatedStiffness]:
-    """Rows of stated stiffnesses; none where the study states none."""
+    """Rows of stated stiffnesses; empty if the study states none."""
     return config.definitions.paper.stiffness if config.definitions.paper else []
 
 
 def check_files(
     meshes: Iterable[MeshSpec], scenes: Iterable[SceneSpec], references: Iterable[Reference], problems: Problems
 ) -> None:
-    """Different things must not share a name: names become files."""
+    """Check that different things do not share a file name."""
     parts = {(scene.mesh.beam.name, scene.mesh.mesh_type, scene.material.name) for scene in scenes}
     pairs = {(reference.beam.name, reference.material.name) for reference in references}
     flat = {

@@ -1,4 +1,4 @@
-"""Combinations of a grid's parameters: products, parameters that go together, and what is left out."""
+"""Combinations of a grid's parameters."""
 
 from collections.abc import Iterator, Mapping
 from itertools import chain, product
@@ -9,17 +9,16 @@ from .messages import Key, Problems
 from .sections import GRID_PARAMETERS, ExcludeConfig, GridConfig
 
 Factor = tuple[tuple[str, ...], list[tuple[Any, ...]]]
-"""Names of parameters that go together, and their values: those of one combination each."""
+"""Names of zipped parameters, and one tuple of values for each combination."""
 
 Combination = dict[str, Any]
-"""Value of each parameter of a grid by its name; parameters that it does not give are not there."""
 
 SAME_VALUE = 1e-9
-"""Difference of two numbers, relative, below which they are the same value."""
+"""Relative difference below which two numbers are the same value."""
 
 
 def values_of(grid: GridConfig, name: str) -> list[Any]:
-    """Values of a parameter of a grid; none where it does not give it, the forces of all beams of forces by beam."""
+    """Values of a grid's parameter; forces given by beam are joined."""
     values = getattr(grid, name)
     if isinstance(values, dict):
         return [force for forces in values.values() for force in forces]
@@ -27,14 +26,14 @@ def values_of(grid: GridConfig, name: str) -> list[Any]:
 
 
 def groups_of(grid: GridConfig) -> list[tuple[str, ...]]:
-    """Parameters of a grid in groups that go together, in the order of `GRID_PARAMETERS`."""
+    """Groups of zipped parameters in the order of `GRID_PARAMETERS`."""
     zipped = {name: tuple(group) for group in grid.zip for name in group}
     given = [name for name in GRID_PARAMETERS if getattr(grid, name) is not None]
     return list(dict.fromkeys(zipped.get(name, (name,)) for name in given))
 
 
 def check_groups(name: str, grid: GridConfig, content: Mapping[str, Any], problems: Problems) -> None:
-    """Whether parameters that go together have as many values, and others each value once."""
+    """Check that zipped lists have equal lengths and other lists no duplicates."""
     for group in groups_of(grid):
         if len(group) == 1:
             _check_repeats(name, group[0], grid, content, problems)
@@ -69,7 +68,7 @@ def _check_repeats(name: str, parameter: str, grid: GridConfig, content: Mapping
 
 
 def factors(grid: GridConfig) -> list[Factor]:
-    """What the combinations of a grid are the product of."""
+    """Factors whose product is all combinations of a grid."""
     found: list[Factor] = []
     for group in groups_of(grid):
         if group == ("force",) and grid.force and None not in grid.force:
@@ -88,13 +87,13 @@ def factors(grid: GridConfig) -> list[Factor]:
 
 
 def count(grid: GridConfig) -> tuple[int, dict[str, int]]:
-    """Number of combinations of a grid, those left out among them, and of what it is the product."""
+    """Count the combinations before exclusions, and the size of each factor."""
     lengths = {" and ".join(group): len(rows) for group, rows in factors(grid)}
     return prod(lengths.values()), lengths
 
 
 def combinations(name: str, grid: GridConfig, problems: Problems) -> Iterator[Combination]:
-    """Combinations of a grid."""
+    """Yield the combinations of a grid without excluded ones."""
     parts = factors(grid)
     names = [*chain.from_iterable(group for group, _ in parts)]
     left_out = [_given(one) for one in grid.exclude]
@@ -120,7 +119,7 @@ def _given(excluded: ExcludeConfig) -> dict[str, list[Any]]:
 
 
 def _among(value: Any, values: list[Any]) -> bool:
-    """Whether a value is one of some: numbers to `SAME_VALUE`, since ranges are rounded."""
+    """Return whether a value is listed; numbers match within `SAME_VALUE`."""
     if isinstance(value, float):
         return any(abs(value - one) <= SAME_VALUE * abs(one) for one in values)
     return value in values

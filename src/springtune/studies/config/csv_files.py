@@ -12,7 +12,7 @@ from .messages import Key, Problems, unseen
 def read_lines(
     path: Path, where: Sequence[Key], problems: Problems, own: Problems, remedy: str
 ) -> Iterator[tuple[int, list[str]]]:
-    """Lines of a CSV file; empty ones and those that begin with # are left out."""
+    """Yield the lines of a CSV file without empty ones and comments (#)."""
     try:
         text = read(path, LARGEST_CSV).decode("utf-8-sig")
     except ValueError as error:

@@ -1,4 +1,4 @@
-"""From the sections of a study to all that they ask for."""
+"""Expand the sections of a study into meshes, scenes and curves."""
 
 import os
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
@@ -35,7 +35,6 @@ from .printed import read_printed
 from .sections import StudyConfig
 
 Ranks = dict[str, dict[str, int]]
-"""Place of each label in the order of its dimension."""
 
 Item = TypeVar("Item", MeshSpec, SceneSpec, CurveSpec, Reference)
 
@@ -59,7 +58,7 @@ def files_of_meshes(config: StudyConfig, folder: Path, problems: Problems) -> Me
 
 
 def files_of_tests(config: StudyConfig, folder: Path, problems: Problems) -> tuple[Path, ...]:
-    """Files of tests that materials are fitted to or compared with, each read once to see what is wrong with it."""
+    """Check each file of material tests, and return their paths."""
     found: list[Path] = []
     for name, material in config.materials.items():
         own = [getattr(material, key) for key in ("uniaxial_test", "equibiaxial_test", "pure_shear_test")]
@@ -75,7 +74,7 @@ def files_of_tests(config: StudyConfig, folder: Path, problems: Problems) -> tup
 
 
 def file_fault(path: Path) -> str:
-    """Why a mesh file cannot be what is meant, and the remedy; empty where it may be. Its content is not looked at."""
+    """Return why a path cannot be a mesh file, or an empty string."""
     try:
         if path.is_file():
             if path.stat().st_size > LARGEST_FILE:
@@ -88,13 +87,7 @@ def file_fault(path: Path) -> str:
 
 @dataclass(frozen=True)
 class Declared:
-    """Bodies and materials that a study declares, by name.
-
-    Attributes
-    ----------
-    folder : Path
-        Folder that the names of the study's files are seen from.
-    """
+    """Bodies and materials that a study declares, by name; `folder` is where its file names start."""
 
     beams: dict[str, Beam]
     materials: dict[str, AnyMaterial]
@@ -102,7 +95,7 @@ class Declared:
 
 
 def declared(config: StudyConfig, folder: Path = Path()) -> Declared:
-    """What a study declares."""
+    """Bodies and materials that a study declares."""
     return Declared(
         {name: Beam(beam.length, beam.height, beam.thickness, name) for name, beam in config.beams.items()},
         {name: material.material(name, folder) for name, material in config.materials.items()},
@@ -111,7 +104,6 @@ def declared(config: StudyConfig, folder: Path = Path()) -> Declared:
 
 
 def _ranks(config: StudyConfig) -> Ranks:
-    """Place of each label in the order of its dimension."""
     names: dict[str, Iterable[str]] = {
         "beam": config.beams,
         "mesh_type": mesh_type_names(config),
@@ -124,7 +116,7 @@ def _ranks(config: StudyConfig) -> Ranks:
 
 
 def _order(ranks: Ranks) -> Callable[[MeshSpec | SceneSpec | CurveSpec | Reference], tuple[float, ...]]:
-    """Sort key of meshes, scenes, curves and references."""
+    """Return a sort key for meshes, scenes, curves and references."""
     beams, mesh_types, materials, loads = (ranks[name] for name in ("beam", "mesh_type", "material", "load"))
     definitions, kinematics = ranks["definition"], ranks["kinematics"]
 
@@ -150,7 +142,7 @@ def _order(ranks: Ranks) -> Callable[[MeshSpec | SceneSpec | CurveSpec | Referen
 
 
 def swept(config: StudyConfig) -> tuple[str, ...]:
-    """Parameters that are dimensions: those that a grid gives values of its own, and a force that has several."""
+    """Parameters that are dimensions: those listed in a grid, and a force with several values."""
     found = {name for grid in config.grids.values() for name in SWEPT if name != "force" and getattr(grid, name)}
     several = [values for grid in config.grids.values() for values in (grid.force or {}).values()]
     several += [grid.pressure for grid in config.grids.values() if grid.pressure]
@@ -160,7 +152,7 @@ def swept(config: StudyConfig) -> tuple[str, ...]:
 
 
 class _Bodies:
-    """Beams, materials and meshes of a study's combinations, each made once."""
+    """Create each beam, material and mesh of a study once."""
 
     def __init__(self, config: StudyConfig, mesh_files: MeshFiles, folder: Path) -> None:
         self._declared, self._files = declared(config, folder), mesh_files
@@ -169,7 +161,6 @@ class _Bodies:
         self._meshes: dict[tuple[Beam, str, float], MeshSpec | None] = {}
 
     def beam(self, one: Combination) -> Beam:
-        """Beam of a combination, its thickness the combination's where that has one."""
         name, thickness = key = one["beam"], one.get("thickness")
         if key not in self._beams:
             beam = self._declared.beams[name]
@@ -177,7 +168,6 @@ class _Bodies:
         return self._beams[key]
 
     def material(self, one: Combination) -> Material:
-        """Material of a combination, with the moduli that it has of its own."""
         key = one["material"], one.get("young_modulus"), one.get("poisson_ratio")
         if key not in self._materials:
             own = {name: one[name] for name in ("young_modulus", "poisson_ratio") if name in one}
@@ -187,7 +177,7 @@ class _Bodies:
         return self._materials[key]
 
     def mesh(self, beam: Beam, one: Combination) -> MeshSpec | None:
-        """Mesh of a combination; None where there is no file for it."""
+        """Mesh of a combination; None if its file is missing."""
         mesh_type, size = one["mesh_type"], one["mesh_size"]
         key = beam, mesh_type, size
         if key not in self._meshes:
@@ -199,12 +189,12 @@ class _Bodies:
 
 
 def _force(pressure: float, beam: Beam) -> float:
-    """Force of a pressure on the upper side [N], rounded as a label that other pressures and thicknesses may share."""
+    """Force of a pressure on the upper side [N], rounded so that equal forces share a label."""
     return float(f"{pressure * beam.length * beam.thickness:.{RANGE_DIGITS}g}")
 
 
 def expand(config: StudyConfig, mesh_files: MeshFiles, problems: Problems) -> tuple[Grid, ...]:
-    """Grids with their scenes and curves."""
+    """Expand grids into scenes and curves."""
     bodies, several = _Bodies(config, mesh_files, problems.folder), "force" in swept(config)
     forces: dict[tuple[Beam, Material, str], tuple[float, str]] = {}
     grids = []
@@ -299,7 +289,7 @@ def _calibrating(config: StudyConfig, scenes: Sequence[SceneSpec], problems: Pro
 def build(
     config: StudyConfig, grids: tuple[Grid, ...], kinds: Sequence[StudyKind], problems: Problems, about: dict[str, Any]
 ) -> Study:
-    """Study of a config and its grids, with the parts of all study kinds."""
+    """Build the study with the parts of all study kinds."""
     ranks = _ranks(config)
     order = _order(ranks)
 
@@ -361,7 +351,7 @@ def build(
 def _used(
     meshes: Iterable[MeshSpec], scenes: Sequence[SceneSpec], references: Sequence[Reference], names: Iterable[str]
 ) -> dict[str, set[Any]]:
-    """Labels of each dimension that scenes have."""
+    """Labels that scenes use, by dimension."""
     used: dict[str, set[Any]] = {
         "beam": {mesh.beam.name for mesh in meshes},
         "mesh_type": {mesh.mesh_type for mesh in meshes},
@@ -385,7 +375,7 @@ def _axes(
     names: Iterable[str],
     further: Iterable[Mapping[str, Collection[str | float]]],
 ) -> dict[str, tuple[str | float, ...]]:
-    """Labels of each dimension; groups of a dataset share those that its root has."""
+    """Labels of each dimension; groups share those of the root."""
     used, own = dict(used), {}
     # A study kind may have labels that no beam has, such as loads of its own.
     order: dict[str, dict[str | float, None]] = {name: dict.fromkeys(labels) for name, labels in ranks.items()}

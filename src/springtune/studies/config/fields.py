@@ -1,4 +1,4 @@
-"""Types of the values of a study: how their text is read, and words for what is expected."""
+"""Types of the values of a study: parsing, and the expected form in words."""
 
 import math
 import re
@@ -20,20 +20,17 @@ from .messages import refuse, show
 from .model import FURTHER_REFERENCES
 
 MOST_POINTS = 10_001
-"""Most points of a sensitivity curve."""
 
 LONGEST_TEXT = 1000
-"""Most characters of a value."""
 
 MOST_LISTED = 10_000
-"""Most values of a list."""
 
 FEW_NAMES = 5
-"""Names that a message lists, where a value is no name: a study may have hundreds of such values."""
+"""Most names that a message lists."""
 
 
 class Scalar:
-    """Annotation of a field."""
+    """Annotation of a scalar field."""
 
     def __init__(self, read: Callable[[str], Any], schema: dict[str, Any], words: str, short: str = "") -> None:
         self.read, self.schema, self.words, self.short = read, schema, words, short or words
@@ -116,7 +113,7 @@ def _read_memory(value: str) -> float:
 
 
 def one_of(what: str, names: Collection[str]) -> Scalar:
-    """Annotation of a name out of some."""
+    """Annotation of a name from a fixed list."""
 
     def read(value: str) -> str:
         if value not in names:
@@ -169,7 +166,7 @@ MaterialName = Annotated[str, Scalar(str, {"type": "string"}, "the name of a mat
 
 
 class OneOrMore:
-    """Annotation of a list: no duplicates, not empty; a single value stands for a list of one."""
+    """Annotation of a non-empty list without duplicates; a single value is a list of one."""
 
     def __init__(self, repeats: bool = False) -> None:
         self.repeats = repeats
@@ -199,17 +196,15 @@ class OneOrMore:
 
 
 SPACINGS = ("linear", "logarithmic")
-"""How the values of a range may be spaced."""
 
 RANGE_KEYS = ("from", "to", "points", "spacing")
-"""Keys of a range."""
 
 RANGE_DIGITS = 12
-"""Significant digits of the values inside of a range: 1.5 mm is to be found as 1.5e-3 m."""
+"""Significant digits of the inner values of a range, so that 1.5 mm is 1.5e-3 m."""
 
 
 def spaced(first: float, last: float, points: int, spacing: str) -> list[float]:
-    """Values of a range, both ends as they are.
+    """Values of a range, with both ends unchanged.
 
     Examples
     --------
@@ -225,7 +220,7 @@ def spaced(first: float, last: float, points: int, spacing: str) -> list[float]:
 
 
 class Values(OneOrMore):
-    """Annotation of numbers: a single one, a list, or a range, such as ``{from: 1 mm, to: 5 mm, points: 9}``."""
+    """Annotation of numbers: one, a list, or a range such as ``{from: 1 mm, to: 5 mm, points: 9}``."""
 
     def __init__(self, words: str) -> None:
         super().__init__(repeats=True)
@@ -279,7 +274,7 @@ Ratios = Annotated[list[Ratio], Values("a number above 0")]
 
 
 class PerBeam:
-    """Annotation of a mapping from beams to forces; forces alone, kept under None, stand for all beams."""
+    """Annotation of forces by beam; forces for all beams have the key None."""
 
     words = "a force such as '400 kN', a list, or a range; or these for each beam"
 
@@ -307,7 +302,7 @@ class PerBeam:
 
 
 class Named:
-    """Annotation of a mapping from names to sections: names that can be parts of file names, and at least one."""
+    """Annotation of a non-empty mapping whose names may become file names."""
 
     def __init__(self, what: str, for_files: bool = True) -> None:
         self.what, self.for_files = what, for_files
@@ -338,7 +333,7 @@ class Named:
 
 
 class Groups:
-    """Annotation of groups of names, each at least two of them and each name once; a single group may stand alone."""
+    """Annotation of groups of at least two names, each used once; one group may stand alone."""
 
     words = "a list of parameters such as [mesh_size, force], or several such lists"
 
@@ -370,7 +365,7 @@ class Groups:
 
 
 class Sections:
-    """Annotation of a list of sections; a single one stands for a list of one."""
+    """Annotation of a list of sections; a single one is a list of one."""
 
     words = "a section, or a list of sections; see below"
 

@@ -1,7 +1,4 @@
-"""Studies: what a config file asks for, validated, named, free of duplicates and in a canonical order.
-
-`load` reads a YAML file; `springtune.studies.config.sections` says what the file may hold, study kinds add to it.
-"""
+"""Load a study from YAML: validate it, expand it, remove duplicates and sort."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -51,7 +48,6 @@ def load(path: str | Path, kinds: Sequence[StudyKind], beside: Path | None = Non
 
 
 def _validate(model: type[StudyConfig], content: Any, problems: Problems) -> StudyConfig:
-    """Config of what a file holds."""
     if content is None:
         problems.add((), f"the file is empty; give the keys {', '.join(model.model_fields)}")
         problems.stop()

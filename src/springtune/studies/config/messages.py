@@ -1,4 +1,4 @@
-"""What is wrong with a file: messages that name file, line, key, value and remedy."""
+"""Messages on a file that name line, key, value and remedy."""
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -8,13 +8,12 @@ from pydantic_core import PydanticCustomError
 from springtune.safe_io.escapes import UNSEEN, shown
 
 Key = str | int
-"""A step of a path into a file: a key of a mapping, a number in a list."""
+"""Step of a path into a file: a key or a list index."""
 
 LONGEST_SHOWN = 60
-"""Most characters of a value that a message shows."""
 
 SHOWN_PROBLEMS = 5
-"""Problems that one message lists; it counts the others."""
+"""Problems that one message lists; the rest are counted."""
 
 
 class StudyError(ValueError):
@@ -43,7 +42,7 @@ class StudyError(ValueError):
 
 
 class Problems:
-    """Collects what is wrong with a file and raises it as one `StudyError`.
+    """Collect problems of a file and raise them as one `StudyError`.
 
     Examples
     --------
@@ -61,7 +60,7 @@ class Problems:
         self._found: list[tuple[int, str]] = []
 
     def add(self, path: Iterable[Key], message: str, line: int = 0) -> None:
-        """Note what is wrong."""
+        """Add a problem."""
         path = tuple(path)
         # What is missing has no line of its own; that of what should hold it helps.
         above = (path[:size] for size in range(len(path), 0, -1))
@@ -71,16 +70,16 @@ class Problems:
         self._found.append((line, f"{place}: {keys}: {message}" if keys else f"{place}: {message}"))
 
     def located(self, path: tuple[Key, ...], place: str) -> None:
-        """Tell where a value stands that comes from another file."""
+        """Set the place of a value that comes from another file."""
         self._places[path] = place
 
     @property
     def nothing(self) -> bool:
-        """Whether nothing was found."""
+        """Return whether no problem was added."""
         return not self._found
 
     def stop(self) -> None:
-        """Raise if anything was found."""
+        """Raise if a problem was added."""
         if not self._found:
             return
         messages = list(dict.fromkeys(message for _, message in sorted(self._found, key=lambda found: found[0])))
@@ -90,12 +89,12 @@ class Problems:
 
 
 def refuse(message: str, *path: Key) -> PydanticCustomError:
-    """Error of a validator."""
+    """Create the error of a validator."""
     return PydanticCustomError("study", "{message}", {"message": message, "path": path})
 
 
 def show(value: object) -> str:
-    """A value of the file, for a message.
+    """Format a value for a message.
 
     Examples
     --------
@@ -112,11 +111,11 @@ def show(value: object) -> str:
 
 
 def clipped(text: str) -> str:
-    """Text of which a message shows the beginning."""
+    """Shorten a text for a message."""
     return shown(text if len(text) <= LONGEST_SHOWN else f"{text[: LONGEST_SHOWN - 3]}...")
 
 
 def unseen(text: str) -> str:
-    """What is wrong with a text that is not one line of characters that can be seen, and the remedy; or nothing."""
+    """Return why a text is not one line of visible characters, or an empty string."""
     found = UNSEEN.search(text)
     return f"{show(text)} has '{shown(found[0])}'; write one line of characters that can be seen" if found else ""

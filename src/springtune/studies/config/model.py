@@ -1,4 +1,4 @@
-"""A study: its meshes, scenes and curves, free of duplicates and in a canonical order."""
+"""Expanded study: meshes, scenes and curves without duplicates, sorted."""
 
 from __future__ import annotations
 
@@ -18,28 +18,17 @@ if TYPE_CHECKING:
     from springtune.problem.shapes import Shape
 
 FINITE_STRAIN_REFERENCE = "neo-hooke-plane-stress"
-"""Reference of sheets at finite strain: networks of nonlinear kinematics are compared with it where a study has it."""
+"""Reference of sheets at finite strain for networks with nonlinear kinematics."""
 
 TESTED_REFERENCE = "yeoh-plane-stress"
-"""The same of materials that have a uniaxial test: by the law that is fitted to it."""
+"""The same for materials with a uniaxial test, using the fitted law."""
 
 FURTHER_REFERENCES = (FINITE_STRAIN_REFERENCE, "neo-hooke-plane-strain", TESTED_REFERENCE)
-"""Kinds of reference besides the small-strain one."""
 
 
 @dataclass(frozen=True)
 class MeshSpec:
-    """A mesh that a study asks for.
-
-    Attributes
-    ----------
-    mesh_type : str
-        Key of `springtune.mesh.MESH_TYPES`, or the name of meshes from files.
-    mesh_size : float
-        Asked length of an edge [m].
-    unit : float
-        Unit of the coordinates in the file [m].
-    """
+    """A mesh of a study, with `mesh_size` [m]; `unit` is that of the file's coordinates [m]."""
 
     beam: Beam
     mesh_type: str
@@ -62,20 +51,11 @@ class MeshSpec:
 
 
 MeshFiles = dict[tuple[str, str, float], MeshSpec]
-"""Meshes from files by (mesh type, beam's name, mesh size)."""
 
 
 @dataclass(frozen=True)
 class SceneSpec:
-    """A scene that a study asks for: one boundary-value problem on one mesh.
-
-    Attributes
-    ----------
-    force : float
-        Force on the loaded side, tension positive [N].
-    stiffness_scale : float
-        Factor on all stiffnesses of the definition [1].
-    """
+    """A boundary-value problem on one mesh, with tensile `force` [N] and a factor on all stiffnesses [1]."""
 
     mesh: MeshSpec
     material: Material
@@ -98,10 +78,7 @@ class SceneSpec:
 
 @dataclass(frozen=True)
 class CurveSpec:
-    """A sensitivity curve that a study asks for: attributes as a `SceneSpec`'s.
-
-    Its stiffness runs through `Study.stiffness_ratios`.
-    """
+    """A sensitivity curve; its stiffness runs through `Study.stiffness_ratios`."""
 
     mesh: MeshSpec
     material: Material
@@ -112,7 +89,7 @@ class CurveSpec:
 
 @dataclass(frozen=True)
 class Reference:
-    """A finite-element answer: attributes as a `SceneSpec`'s."""
+    """A finite-element reference solution."""
 
     beam: Beam
     material: Material
@@ -122,7 +99,7 @@ class Reference:
 
 @dataclass(frozen=True)
 class Grid:
-    """What one grid of a study asks for, whether or not other grids ask for it, too."""
+    """Scenes and curves of one grid, also those that other grids share."""
 
     name: str
     scenes: tuple[SceneSpec, ...]
@@ -131,23 +108,7 @@ class Grid:
 
 @dataclass(frozen=True)
 class PrintedCell:
-    """A cell of a printed table, as printed.
-
-    Attributes
-    ----------
-    mesh_size : float
-        Length of an edge [m].
-    force : float
-        Force, without sign [N].
-    stiffness : float
-        Stiffness of the springs [N/m].
-    reference_displacement, displacement : float
-        Displacement by finite elements and of the network, without sign [m].
-    deformation_error : float
-        Deformation error, without sign [1].
-    remark : str
-        Where the print contradicts itself; empty otherwise.
-    """
+    """A printed table cell in SI units; magnitudes only. `remark` names contradictions in the print."""
 
     table: int
     beam: str
@@ -165,13 +126,7 @@ class PrintedCell:
 
 @dataclass(frozen=True)
 class Part:
-    """Which part of a study a file asks for.
-
-    Attributes
-    ----------
-    by : str
-        What stays together, of `springtune.studies.config.sections.DEALT_BY`.
-    """
+    """A part of a study; `by` names what stays together (`sections.DEALT_BY`)."""
 
     number: int
     of: int
@@ -272,7 +227,7 @@ class Study:
         return found
 
     def labels(self, one: SceneSpec | CurveSpec | Reference) -> dict[str, str | float]:
-        """Cell of the dataset that is of a scene, a curve or a reference."""
+        """Labels of the dataset cell of a scene, curve or reference."""
         found: dict[str, str | float]
         if isinstance(one, Reference):
             beam = one.beam
@@ -303,7 +258,7 @@ class Study:
 
 
 def swept_value(one: SceneSpec | CurveSpec | Reference, beam: Beam, name: str) -> float:
-    """Value of a parameter that is a dimension."""
+    """Value of a swept parameter."""
     if name == "force":
         return abs(one.force)
     if name == "thickness":
@@ -312,27 +267,27 @@ def swept_value(one: SceneSpec | CurveSpec | Reference, beam: Beam, name: str) -
 
 
 class StudyOutput(Protocol):
-    """What a study needs to know of an output, see `springtune.studies.config.kind.Output`."""
+    """Interface of an output, see `springtune.studies.config.kind.Output`."""
 
     @property
     def name(self) -> str:
-        """As a study writes it."""
+        """Name in a study."""
 
     @property
     def meaning(self) -> str:
-        """What it is, for the manual."""
+        """Description for the manual."""
 
     @property
     def usual(self) -> bool:
-        """Whether it is made where a study does not say what."""
+        """Whether it is made by default."""
 
     @property
     def lack(self) -> Callable[[Study], str]:
-        """What a study would need for it and has not."""
+        """Return what a study lacks for it."""
 
 
 class StudyKind(Protocol):
-    """What a study needs to know of its kinds, see `springtune.studies.config.kind.Kind`."""
+    """Interface of a study kind, see `springtune.studies.config.kind.Kind`."""
 
     @property
     def name(self) -> str:
@@ -340,23 +295,23 @@ class StudyKind(Protocol):
 
     @property
     def study_fields(self) -> Mapping[str, tuple[Any, Any]]:
-        """Keys that it adds to a study."""
+        """Keys added to a study."""
 
     @property
     def grid_fields(self) -> Mapping[str, tuple[Any, Any]]:
-        """Keys that it adds to its grids."""
+        """Keys added to its grids."""
 
     @property
     def alone(self) -> Sequence[str]:
-        """Keys in the place of which a study may have neither beams nor grids."""
+        """Keys that replace beams and grids."""
 
     @property
     def check(self) -> Callable[[Any, Problems], None]:
-        """Adds what is wrong with a config's values."""
+        """Check the values of a config."""
 
     @property
     def expand(self) -> Callable[[Any, Any], Any]:
-        """Its part of a study."""
+        """Create its part of a study."""
 
     @property
     def axes(self) -> Callable[[Any], Mapping[str, Collection[str | float]]]:
@@ -364,4 +319,4 @@ class StudyKind(Protocol):
 
     @property
     def outputs(self) -> Sequence[StudyOutput]:
-        """What is made of it."""
+        """Outputs of the kind."""

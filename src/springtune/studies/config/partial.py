@@ -1,4 +1,4 @@
-"""Files of parts of a study: the whole study's text, and below it the section that says which part is asked for."""
+"""Files of parts: the whole study's text, then a section that names the part."""
 
 import hashlib
 from collections.abc import Iterator
@@ -13,19 +13,17 @@ from .yaml_lines import read_yaml
 PART_BELOW = (
     "\n# What stands above is the whole study; this file asks for a part of it. Written by `springtune split`.\n"
 )
-"""Comment between the whole study and the section ``part``."""
 
 LONGEST_NAME = 255
-"""Characters of the longest text that may name a file."""
 
 
 def is_part(text: str) -> bool:
-    """Whether a text asks for a part of a study."""
+    """Return whether a text requests a part of a study."""
     return PART_BELOW in text
 
 
 def whole_text(text: str) -> str:
-    """Text of the study that a file asks for a part of, or that it is."""
+    """Text of the whole study without the section ``part``."""
     return text.rpartition(PART_BELOW)[0] if is_part(text) else text
 
 
@@ -35,12 +33,12 @@ def digest_of(text: str) -> str:
 
 
 def part_text(text: str, part: Part) -> str:
-    """Text of a file that asks for a part of a study."""
+    """Text of a file that requests a part of a study."""
     return f"{text}{PART_BELOW}part: {{number: {part.number}, of: {part.of}, by: {part.by}, study: {part.study}}}\n"
 
 
 def declared_part(config: StudyConfig, text: str, problems: Problems) -> Part | None:
-    """Part of a study that a file asks for; None where it asks for all."""
+    """Part that a file requests; None for the whole study."""
     if config.part is None:
         return None
     part = Part(config.part.number, config.part.of, config.part.by, config.part.study)
@@ -55,7 +53,7 @@ def declared_part(config: StudyConfig, text: str, problems: Problems) -> Part | 
 
 
 def named_files(text: str, path: Path) -> list[Path]:
-    """Files that a study names, whichever key it is that names them."""
+    """Files that a study names under any key."""
     content, _ = read_yaml(text, str(path))
     found = {value for value in _texts(content) if value.strip() and len(value) < LONGEST_NAME}
     files = (path.parent / value for value in sorted(found))

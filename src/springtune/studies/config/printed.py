@@ -31,7 +31,7 @@ _PRINTED_COLUMNS = {
 
 
 def read_printed(path: Path, mesh_types: Sequence[str], problems: Problems) -> tuple[PrintedCell, ...]:
-    """Cells of a CSV file of printed values; lines that begin with # are comments."""
+    """Read printed cells from CSV; lines that start with # are comments."""
     file_problems = Problems(str(path))
     cells: dict[tuple[Any, ...], tuple[int, PrintedCell]] = {}
     header: list[str] | None = None

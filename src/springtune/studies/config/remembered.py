@@ -1,4 +1,4 @@
-"""What is asked of a study for each of its scenes, found once."""
+"""Cache of values computed once for a study."""
 
 from collections.abc import Callable
 from functools import wraps
@@ -8,13 +8,12 @@ if TYPE_CHECKING:
     from .model import Study
 
 MOST_STUDIES = 8
-"""Studies whose answers are kept: those that a paper reads are planned in one process."""
 
 Answer = TypeVar("Answer")
 
 
 def once_a_study(*names: str) -> "Callable[[Callable[[Study], Answer]], Callable[[Study], Answer]]":
-    """Decorator of a function of a study that is called once as long as some of its parts are the same objects."""
+    """Cache a function of a study while the named parts are the same objects."""
 
     def decorate(function: "Callable[[Study], Answer]") -> "Callable[[Study], Answer]":
         # Parts by their places in memory, and the parts themselves, so that no other objects come to be there.

@@ -1,4 +1,4 @@
-"""Combinations of a grid from a CSV file: a column a parameter, a row a combination."""
+"""Combinations of a grid from a CSV file: one column a parameter, one row a combination."""
 
 import re
 from pathlib import Path
@@ -12,11 +12,11 @@ from .messages import Problems, show
 from .sections import GRID_PARAMETERS
 
 HEAD = re.compile(r"\s*(?P<name>\w*)\s*(\[(?P<unit>[^\]]*)\])?\s*")
-"""Head of a column: a parameter, and in brackets the unit of its numbers."""
+"""Column head: a parameter and the unit of its numbers in brackets."""
 
 
 def with_rows(content: Any, folder: Path, problems: Problems) -> Any:
-    """Content of a study, each grid that names a file of rows with what the file holds."""
+    """Replace the file of rows in each grid by its content."""
     grids = content.get("grids") if isinstance(content, dict) else None
     if not isinstance(grids, dict):
         return content
@@ -43,7 +43,6 @@ def with_rows(content: Any, folder: Path, problems: Problems) -> Any:
 
 
 def _columns(grid: str, path: Path, problems: Problems) -> dict[str, list[tuple[str, int]]]:
-    """Texts of each column, and their lines."""
     columns: dict[str, list[tuple[str, int]]] = {}
     heads: list[tuple[str, str]] = []
     own = Problems(str(path))
@@ -68,7 +67,7 @@ def _columns(grid: str, path: Path, problems: Problems) -> dict[str, list[tuple[
 
 
 def _heads(row: list[str], line: int, problems: Problems) -> list[tuple[str, str]]:
-    """Parameter and unit of each column."""
+    """Read the parameter and the unit of each column."""
     found: list[tuple[str, str]] = []
     for cell in row:
         head = HEAD.fullmatch(cell)

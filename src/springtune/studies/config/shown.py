@@ -1,4 +1,4 @@
-"""Scenes that are shown where not all can be: those whose whole fields are kept."""
+"""Choice of scenes whose whole fields are stored."""
 
 from collections.abc import Collection, Iterable
 from typing import TYPE_CHECKING
@@ -11,19 +11,15 @@ if TYPE_CHECKING:
     from .model import SceneSpec, Study
 
 SHOWING = ("deformed", "paraview")
-"""Outputs that are made of whole fields."""
 
 
 def keeps_fields(study: "Study") -> bool:
-    """Whether a study's dataset has whole fields, its group `/fields`."""
+    """Return whether a study's dataset has whole fields, its group `/fields`."""
     return any(name in study.outputs for name in SHOWING)
 
 
 def shown(scenes: "Collection[SceneSpec]", swept: Iterable[str]) -> "frozenset[SceneSpec]":
-    """Scenes that are shown where not all can be.
-
-    Of each beam, mesh type, material and load those on the coarsest mesh; of what is swept one value of each.
-    """
+    """Scenes on the coarsest mesh, with one value of each swept parameter."""
     names, coarsest = tuple(swept), dict[tuple[str, ...], float]()
     for scene in scenes:
         body, size = _body(scene), scene.mesh.mesh_size

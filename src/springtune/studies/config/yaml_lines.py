@@ -1,4 +1,4 @@
-"""YAML with the line of every key, of a bounded size."""
+"""Read bounded YAML with the line of every key."""
 
 from pathlib import Path
 from typing import Any
@@ -10,24 +10,23 @@ from springtune.safe_io.inputs import BeyondSize, read
 from .messages import Key, Problems, StudyError, show, unseen
 
 LARGEST_STUDY = 500_000
-"""Bytes of the largest study that is read."""
 
 MOST_VALUES = 100_000
-"""Most values of a study, keys among them and each alias as what it stands for."""
+"""Limit of values and keys, with aliases expanded."""
 
 DEEPEST = 20
-"""Most levels of lists and mappings in each other."""
+"""Limit of nested lists and mappings."""
 
 _TAGS = frozenset(
     f"tag:yaml.org,2002:{name}" for name in ("bool", "float", "int", "map", "merge", "null", "seq", "str", "timestamp")
 )
-"""What a value may be; others, such as sets, would have to be asked for by name."""
+"""Allowed tags; others, such as sets, need an explicit tag."""
 
 _values = yaml.constructor.SafeConstructor()
 
 
 def read_study(path: str | Path) -> tuple[str, Any, dict[tuple[Key, ...], int]]:
-    """Text of a study, its content and the line of each path of keys: all that can be told without its models."""
+    """Return the text, the content and the line of each key of a study."""
     example = "give the path of a study such as config/paper.yaml"
     try:
         found = read(path, LARGEST_STUDY)
@@ -50,8 +49,7 @@ def read_study(path: str | Path) -> tuple[str, Any, dict[tuple[Key, ...], int]]:
 def read_yaml(text: str, file: str) -> tuple[Any, dict[tuple[Key, ...], int]]:
     r"""Content of a YAML text as dicts, lists and texts, and the line of each path of keys.
 
-    Scalars stay the texts they are, so that names such as ``1e3`` or ``no`` are no numbers or booleans, and messages
-    show what the file holds.
+    Scalars stay texts: names such as ``1e3`` or ``no`` are not numbers or booleans.
 
     Examples
     --------
@@ -84,7 +82,7 @@ _TOO_DEEP = "not a study: nested too deeply; see config/README.md for what it ma
 
 
 def _check_size(root: yaml.Node, file: str) -> None:
-    """Refuse what would grow beyond all bounds where each alias is what it stands for, without letting it grow."""
+    """Refuse content that grows too large when aliases are expanded, without expanding it."""
     sizes: dict[int, tuple[int, int]] = {}  # of each node: values and levels; none while it is counted
 
     def count(node: yaml.Node) -> tuple[int, int]:
@@ -114,7 +112,7 @@ def _check_size(root: yaml.Node, file: str) -> None:
 
 
 def _check_value(node: yaml.Node, file: str) -> None:
-    """Refuse values that YAML itself, and so Snakemake, would not take."""
+    """Refuse values that YAML, and so Snakemake, would not accept."""
     line = node.start_mark.line + 1
     if node.tag == "tag:yaml.org,2002:value":
         raise StudyError(f"{file}:{line}: not YAML: '=' means nothing by itself; put it in quotes")
@@ -132,7 +130,7 @@ def _check_value(node: yaml.Node, file: str) -> None:
 
 
 def _check_seen(text: str, path: tuple[Key, ...], node: yaml.Node, file: str) -> None:
-    """Refuse line breaks and control characters: texts are shown on terminals, and are parts of files."""
+    """Refuse line breaks and control characters in texts."""
     why = unseen(text)
     if why:
         problems = Problems(file)

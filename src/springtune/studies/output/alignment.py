@@ -9,20 +9,12 @@ import numpy as np
 import xarray as xr
 
 SAME_NUMBER = 1e-9
-"""Numbers that differ by less, of the larger one, are one label."""
+"""Relative difference below which two numbers are one label."""
 
 
 @dataclass(frozen=True)
 class Axis:
-    """A dimension with the labels of all datasets.
-
-    Attributes
-    ----------
-    labels : ndarray, shape (n,)
-        Numbers in order, texts as the first dataset has them and then what others add; places where there are none.
-    places : tuple of ndarray
-        For each dataset, where its own labels are among them.
-    """
+    """A dimension with the labels of all datasets; `places` are each dataset's own labels among them."""
 
     name: str
     labels: np.ndarray
@@ -31,7 +23,7 @@ class Axis:
     labelled: bool
 
     def common(self) -> tuple[np.ndarray, ...]:
-        """What all datasets have: its places among the labels, and then in each dataset."""
+        """Places of common labels: on the axis, then in each dataset."""
         kept = set(range(len(self.labels))).intersection(*(found.tolist() for found in self.places))
         among = np.array(sorted(kept), dtype=int)
         own = []
@@ -42,14 +34,14 @@ class Axis:
         return among, *own
 
     def alone(self, side: int) -> list[str | float]:
-        """Labels that only one of the datasets has."""
+        """Labels of only one of the datasets."""
         others = np.concatenate([places for number, places in enumerate(self.places) if number != side])
         found: list[str | float] = self.labels[np.setdiff1d(self.places[side], others)].tolist()
         return found
 
 
 def axis(name: str, datasets: Sequence[xr.Dataset]) -> Axis:
-    """One axis of a dimension of several datasets.
+    """Join a dimension of several datasets.
 
     Examples
     --------

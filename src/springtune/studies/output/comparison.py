@@ -1,4 +1,4 @@
-"""What changed from one dataset to another beyond a tolerance, cell by cell."""
+"""Compare two datasets cell by cell, with tolerances."""
 
 from __future__ import annotations
 
@@ -19,16 +19,15 @@ from .swept import with_swept
 from .text import NUMBER, without_numbers
 
 RELATIVE = 1e-6
-"""Tolerance where none is given, of the larger of two numbers."""
+"""Default relative tolerance."""
 
 MEASURED = (
     "seconds", "*_seconds", "seconds_*", "solver", "peak_memory", "machine_load", "pareto", "cost_exponent",
     "explicit_steps", "spring_updates", "*_bandwidth",
 )  # fmt: skip
-"""Names of variables that tell of a machine and what it was doing, not of what was computed."""
+"""Variables that depend on the machine."""
 
 TOLD_ATTRIBUTES = ("title", "study", "springtune_version", "git_commit")
-"""Attributes of the root that are told as they are; software, inputs and config are taken apart."""
 
 UNTOLD = {"created", "history", "host", "git_diff", "config", "config_sha256", "software", "inputs", "source"}
 UNTOLD |= {"Conventions", "references", "accepted", "tolerances"}
@@ -37,21 +36,17 @@ OF_CELLS = "tolerance"
 """Variable of relative tolerances by cell."""
 
 AT_ONCE = 2**26
-"""Bytes of an array that are compared at once."""
+"""Bytes of an array compared at once."""
 
 Labels = dict[str, str | float]
 
 
 @dataclass(frozen=True)
 class Tolerance:
-    """How far apart two numbers may be and still be the same: either is enough.
+    """Tolerances; either is enough.
 
-    Attributes
-    ----------
-    relative : float
-        Of the larger number; along a curve or over a field, of its largest.
-    absolute : float or None
-        In the unit of the numbers. None is 0, and ``relative`` for numbers without unit: errors and ratios.
+    `relative` refers to the larger number, or to the largest of a curve or field. `absolute` is in the numbers' unit;
+    None is 0, or `relative` for numbers without unit.
     """
 
     relative: float = RELATIVE
@@ -60,14 +55,9 @@ class Tolerance:
 
 @dataclass(frozen=True)
 class Change:
-    """A cell that changed; of a curve or a field its point that changed most.
+    """A changed cell, or the most changed point of a curve or field.
 
-    Attributes
-    ----------
-    before, after : float or str
-        NaN, or an empty text, where there is none.
-    excess : float
-        Difference over the tolerance; infinite where there is nothing to subtract.
+    Missing values are NaN or "". `excess` is the difference over the tolerance, infinite without one.
     """
 
     group: str
@@ -81,7 +71,7 @@ class Change:
 
     @property
     def difference(self) -> float:
-        """After less before; NaN of texts and flags."""
+        """After minus before; NaN for texts and flags."""
         if isinstance(self.before, str) or isinstance(self.after, str):
             return float("nan")
         return self.after - self.before
@@ -99,7 +89,7 @@ class VariableChanges:
 
 @dataclass(frozen=True)
 class Alone:
-    """Cells that one dataset has: how many, and the labels of the first."""
+    """Cells of only one dataset: their number, and the labels of the first."""
 
     count: int
     rows: list[Labels]
@@ -107,13 +97,7 @@ class Alone:
 
 @dataclass
 class GroupChanges:
-    """Changes of a group.
-
-    Attributes
-    ----------
-    cells : tuple of Alone
-        Cells that are asked for in one dataset alone.
-    """
+    """Changes of a group; `cells` counts those requested in one dataset only."""
 
     name: str
     axes: dict[str, Axis]
@@ -126,7 +110,7 @@ class GroupChanges:
 
     @property
     def labels(self) -> dict[str, tuple[list[str | float], list[str | float]]]:
-        """Labels that one dataset has alone, by dimension; of dimensions with labels that both have."""
+        """Labels of only one dataset by common dimension."""
         found = {
             name: (one.alone(0), one.alone(1))
             for name, one in self.axes.items()
@@ -136,7 +120,7 @@ class GroupChanges:
 
     @property
     def different(self) -> bool:
-        """Whether anything of the group differs."""
+        """Whether the group differs."""
         return bool(
             self.labels
             or any(alone.count for alone in self.cells)
@@ -148,13 +132,7 @@ class GroupChanges:
 
 @dataclass(frozen=True)
 class Comparison:
-    """What changed from a dataset to another.
-
-    Attributes
-    ----------
-    attributes : dict of str to tuple
-        Attributes that differ, before and after; they make no difference of results.
-    """
+    """Differences of two datasets; differing `attributes` do not count as different results."""
 
     groups: list[GroupChanges]
     alone: tuple[list[str], list[str]]
@@ -168,7 +146,7 @@ class Comparison:
 
     @property
     def changes(self) -> list[Change]:
-        """All rows of values, the largest first."""
+        """Changed values, largest first."""
         rows = [row for group in self.groups for one in group.values for row in one.rows]
         return sorted(rows, key=lambda row: -row.excess)
 
@@ -184,18 +162,12 @@ def compare(
     part: bool = False,
     block: int = AT_ONCE,
 ) -> Comparison:
-    """Compare two datasets by their labels.
+    """Compare two datasets by label.
 
-    Cells are matched by label, whatever the order, numbers within `alignment.SAME_NUMBER`. NaN is the same as NaN. A
-    cell that one of the studies does not ask for is told as such, and its values are not compared. Texts that differ in
-    numbers alone are compared by these. What `MEASURED` names is left out. A parameter that one study sweeps and the
-    other states once is a dimension of both.
-
-    Parameters
-    ----------
-    own : mapping of str to Tolerance, optional
-        Of variables that have one of their own, by `variable_name`; ``""`` is that of all others. A variable `OF_CELLS`
-        of a group of the first dataset is the relative tolerance of its cells, where it is not NaN.
+    Numeric labels match within `alignment.SAME_NUMBER`; NaN equals NaN. Values of cells that one study does not request
+    are not compared. Numbers inside texts are compared as numbers. `MEASURED` is left out. A parameter that only one
+    study sweeps becomes a dimension of both. `own` holds tolerances by `variable_name`, ``""`` for all others; a
+    variable `OF_CELLS` of the first dataset is the relative tolerance of its cells.
 
     Examples
     --------
@@ -237,7 +209,7 @@ def compare(
 
 
 def variable_name(group: str, variable: str) -> str:
-    """Name of a variable with its group's, which the root does not have.
+    """Name of a variable with its group; the root's name is left out.
 
     Examples
     --------
@@ -249,8 +221,6 @@ def variable_name(group: str, variable: str) -> str:
 
 @dataclass(frozen=True)
 class _How:
-    """What is compared, and how."""
-
     tolerance: Tolerance
     own: Mapping[str, Tolerance]
     ignored: Collection[str]
@@ -295,7 +265,7 @@ class _Group:
         return found
 
     def _comparable(self, name: str) -> str | None:
-        """Why a variable cannot be compared; None if it can."""
+        """Return why a variable cannot be compared, or None."""
         a, b = self._arrays(name)
         if set(a.dims) != set(b.dims):
             said = (f"({', '.join(map(str, one.dims))})" for one in (a, b))
@@ -308,7 +278,7 @@ class _Group:
         return None
 
     def _cells(self) -> tuple[tuple[Alone, Alone], int]:
-        """Cells that one side asks for alone, and the number of those that both ask for."""
+        """Cells requested by one side only, and the number requested by both."""
         asked = self.asked
         assert asked[0] is not None and asked[1] is not None
         names = [str(name) for name in asked[0].dims if name in self.cell_dimensions]
@@ -388,7 +358,7 @@ class _Group:
         return VariableChanges(name, compared, changed, rows[: self.how.most])
 
     def _further(self, names: Sequence[str], places: Sequence[np.ndarray]) -> np.ndarray:
-        """Relative tolerances of cells, of a shape that goes with a variable's; NaN where there are none."""
+        """Relative tolerances of cells, broadcastable to a variable; NaN if unset."""
         if OF_CELLS not in self.pair[0].data_vars or not set(self.pair[0][OF_CELLS].dims) <= set(names):
             return np.full([1] * len(names), np.nan)
         array = self.pair[0][OF_CELLS]
@@ -397,7 +367,7 @@ class _Group:
         return chosen[tuple(slice(None) if name in shared else np.newaxis for name in names)]
 
     def _asked_of(self, side: int, names: Sequence[str], places: Sequence[np.ndarray]) -> np.ndarray:
-        """Whether a study asks for each cell of a variable, of a shape that goes with it."""
+        """Requested cells of a variable, broadcastable to it."""
         mask = self.asked[side]
         shared = [name for name in names if mask is not None and name in mask.dims]
         if mask is None or not shared:
@@ -411,7 +381,7 @@ class _Group:
 
 
 class _Kind:
-    """How values of a variable are compared: numbers, flags or texts."""
+    """Comparison of numbers, flags or texts."""
 
     def __init__(self, a: xr.DataArray, b: xr.DataArray, tolerance: Tolerance) -> None:
         self.units = str(a.attrs.get("units", b.attrs.get("units", "1")))
@@ -420,7 +390,7 @@ class _Kind:
         self.text = a.dtype.kind in "OUS"
 
     def said(self, side: int, value: np.generic) -> float | str:
-        """A value, flags as words."""
+        """Value for a report, flags as words."""
         if self.words is not None:
             return self.words[side].get(int(value), "")
         return str(value) if self.text else float(value)
@@ -428,7 +398,7 @@ class _Kind:
     def excess(
         self, a: np.ndarray, b: np.ndarray, asked_a: np.ndarray, asked_b: np.ndarray, cells: int, further: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Difference over tolerance, shape of the values, and where there is anything to compare."""
+        """Difference over tolerance in the values' shape, and where it is defined."""
         if self.words is not None:
             return self._of_flags(a, b, asked_a, asked_b)
         missing = [one == "" for one in (a, b)] if self.text else [np.isnan(one) for one in (a, b)]
@@ -473,7 +443,7 @@ class _Kind:
         return np.where(there & (told[0] != told[1]), np.inf, 0.0), there
 
     def _of_texts(self, a: str, b: str) -> float:
-        """Texts that differ in numbers alone are as far apart as these."""
+        """Difference over tolerance of texts that differ only in numbers."""
         if without_numbers(a) != without_numbers(b):
             return float("inf")
         pairs = zip((float(one[0]) for one in NUMBER.finditer(a)), (float(one[0]) for one in NUMBER.finditer(b)))
@@ -486,7 +456,7 @@ class _Kind:
 
 
 def _asked(data: xr.Dataset, root: xr.Dataset) -> xr.DataArray | None:
-    """Whether the study asks for each cell of a group, by its status or that of the root; None where none says so."""
+    """Requested cells of a group by its or the root's status; None without one."""
     status = next((one["status"] for one in (data, root) if "status" in one.data_vars), None)
     if status is None:
         return None
@@ -496,10 +466,7 @@ def _asked(data: xr.Dataset, root: xr.Dataset) -> xr.DataArray | None:
 
 
 def cell_dimensions(pair: Sequence[xr.Dataset], roots: Sequence[xr.Dataset]) -> set[str]:
-    """Dimensions of cells; along others lie the points of a curve or a field.
-
-    A cell is what a message, or a status where there is none, tells of, and what has a text for a label.
-    """
+    """Dimensions of cells: those of messages, or else of a status, and those with text labels."""
     found: set[str] = set()
     for data, root in zip(pair, roots):
         judged = [data[name] for name in data.data_vars if str(name).endswith("message")]
@@ -512,7 +479,7 @@ def cell_dimensions(pair: Sequence[xr.Dataset], roots: Sequence[xr.Dataset]) -> 
 
 
 def _blocks(shape: Sequence[int], cells: int, itemsize: int, size: int) -> Iterator[tuple[int, slice]]:
-    """Axis and range of blocks that are compared at once."""
+    """Axis and range of each block compared at once."""
     if not cells:
         yield -1, slice(None)
         return
@@ -524,7 +491,7 @@ def _blocks(shape: Sequence[int], cells: int, itemsize: int, size: int) -> Itera
 
 
 def _values(array: xr.DataArray, names: Sequence[str], places: Sequence[np.ndarray]) -> np.ndarray:
-    """Values of chosen places, dimensions in the order of names; of a file, only what lies between them is read."""
+    """Values at chosen places, dimensions in the given order; from files only their range is read."""
     ranges, left = {}, []
     for name, own in zip(names, places):
         low, high = int(own.min()), int(own.max()) + 1
@@ -541,7 +508,7 @@ def _values(array: xr.DataArray, names: Sequence[str], places: Sequence[np.ndarr
 def _attributes(
     before: Mapping[Hashable, object], after: Mapping[Hashable, object]
 ) -> tuple[dict[str, tuple[str, str]], list[str]]:
-    """Attributes that differ, and the diff of the config."""
+    """Differing attributes, and the diff of the config."""
     found: dict[str, tuple[str, str]] = {}
     pairs: list[tuple[str, object, object]] = [
         (name, before.get(name, ""), after.get(name, "")) for name in TOLD_ATTRIBUTES

@@ -1,4 +1,4 @@
-"""The dataset of a study: dense labelled arrays, their units, and what is missing and why."""
+"""Dataset of a study: labelled arrays with units and the reasons of missing values."""
 
 import os
 import shutil
@@ -16,10 +16,10 @@ from springtune.problem.status import Status
 from springtune.safe_io.atomic import replacing
 
 STATUS = tuple(map(str, Status))
-"""Meanings of the flags of `status`; a flag's value is its place here."""
+"""Meanings of `status` flags in order of value."""
 
 Label = str | float
-"""Of a cell along a dimension: a text, or a number such as a mesh size [m]."""
+"""Label along a dimension: a text or a number in SI units."""
 
 DIMENSIONS: dict[str, str | tuple[str, str]] = {
     "beam": "beam, length x height in mm",
@@ -31,23 +31,15 @@ DIMENSIONS: dict[str, str | tuple[str, str]] = {
     "kinematics": "kinematics of the network",
     **SWEPT,
 }
-"""Dimensions that groups share: what they are, and their unit if they have one."""
+"""Shared dimensions: long name, and unit if any."""
 
 
 @dataclass(frozen=True)
 class Group:
-    """A group of a dataset: its variables over dimensions.
+    """A group of a dataset.
 
-    Attributes
-    ----------
-    variables : dict of str to tuple
-        By name: dimensions, units, long name, and what a cell without a value holds.
-    dimensions : dict of str to str or tuple
-        Of dimensions that other groups do not have: what they are, and their unit if they have one.
-    flags : dict of str to tuple
-        Meanings of flags by the last word of a variable's name, besides those of ``status``.
-    further : dict of str to dict
-        Attributes of variables besides units and long name, by name.
+    `variables` maps names to (dimensions, units, long name, fill value), `dimensions` those of this group alone to long
+    name and unit. `flags` holds meanings by the last word of a variable's name, `further` more attributes by variable.
     """
 
     name: str
@@ -57,7 +49,7 @@ class Group:
     further: dict[str, dict[str, object]] = field(default_factory=dict)
 
     def empty(self, axes: Mapping[str, Sequence[Label]], names: Collection[str] | None = None) -> xr.Dataset:
-        """Dataset whose cells hold nothing yet."""
+        """Create the dataset with empty cells."""
         chosen = {name: row for name, row in self.variables.items() if names is None or name in names}
         data, used = {}, set()
         for name, (dimensions, units, long_name, nothing) in chosen.items():
@@ -84,7 +76,7 @@ class Group:
         return xr.Dataset(data, coordinates)
 
     def over(self, further: Mapping[str, Sequence[str]], without: Collection[str] = ()) -> "Group":
-        """Group whose variables have further dimensions."""
+        """Copy with further dimensions."""
         variables = {}
         for name, (dimensions, units, long_name, nothing) in self.variables.items():
             shared = [one for one in dimensions if one in DIMENSIONS]
@@ -95,7 +87,7 @@ class Group:
 
 
 class Filler:
-    """Writes single cells of a dataset by label."""
+    """Writer of single cells by label."""
 
     def __init__(self, data: xr.Dataset) -> None:
         self.data = data
@@ -107,13 +99,13 @@ class Filler:
         self._texts: dict[object, object] = {}
 
     def put(self, values: Mapping[str, object], **labels: Label) -> None:
-        """Write values of variables by name into the cells of these labels."""
+        """Write variables by name into one cell."""
         for name, value in values.items():
             dimensions, array = self._arrays[name]
             array[tuple(self._places[name][labels[name]] for name in dimensions if name in labels)] = value
 
     def put_each(self, values: Sequence[Mapping[str, object]], labels: Sequence[Mapping[str, Label]]) -> None:
-        """Write values of many cells, as `put` does those of one, a variable at a time."""
+        """Write many cells, one variable at a time."""
         places = {
             dimension: np.array([known[one[dimension]] for one in labels])
             for dimension, known in self._places.items()
@@ -129,7 +121,7 @@ class Filler:
             array[place] = np.array(found, dtype=array.dtype)
 
     def put_rows(self, values: Mapping[str, Sequence[float] | np.ndarray], **labels: Label) -> None:
-        """Write rows, or tables, that may be shorter than the dimensions after those of the labels."""
+        """Write rows or tables that may be shorter than their dimensions."""
         for name, row in values.items():
             dimensions, array = self._arrays[name]
             place = tuple(self._places[dimension][labels[dimension]] for dimension in dimensions if dimension in labels)
@@ -137,14 +129,14 @@ class Filler:
 
 
 def most_requested(root: xr.Dataset, dimension: str) -> str:
-    """Label of a dimension that most scenes of a dataset's root are of."""
+    """Label of a dimension with the most requested scenes."""
     requested = root.status != 0
     counts = requested.sum([name for name in requested.dims if name != dimension])
     return str(counts[dimension].values[int(counts.values.argmax())])
 
 
 NO_NODE = np.int32(-1)
-"""Of UGRID's connectivities, where a mesh has fewer springs or cells than another one, or a cell fewer corners."""
+"""Fill value of UGRID connectivities."""
 
 UGRID: dict[str, dict[str, object]] = {
     "mesh": {
@@ -160,28 +152,28 @@ UGRID: dict[str, dict[str, object]] = {
     "spring_nodes": {"cf_role": "edge_node_connectivity", "start_index": np.int32(0)},
     "cell_nodes": {"cf_role": "face_node_connectivity", "start_index": np.int32(0)},
 }
-"""Attributes of unstructured meshes by the conventions UGRID-1.0, see `Group.further`."""
+"""Attributes of unstructured meshes by UGRID-1.0, see `Group.further`."""
 
 OF_PARTICLES: dict[str, object] = {"mesh": "mesh", "location": "node"}
 OF_SPRINGS: dict[str, object] = {"mesh": "mesh", "location": "edge"}
-"""Attributes of what such a mesh has of each particle, or of each spring."""
+"""Attributes of variables of particles or springs."""
 
 CHUNK = 2**18
-"""Bytes of a chunk of a compressed array [B], at most: what reading one cell of it reads."""
+"""Most bytes of a compressed chunk, which is read for each of its cells."""
 
 UNCOMPRESSED = 2**13
-"""Bytes up to which an array is stored as it is [B]: compression would save less than it costs to look up."""
+"""Most bytes of an uncompressed array; compressing less costs more than it saves."""
 
 
 MOSTLY = 0.75
-"""Share of the cells of a large array of texts from which on those without a text take no room."""
+"""Share of empty cells above which a large array of texts stores none of them."""
 
 TEXTS = 128
-"""Cells of a chunk of such an array: few, so that few have a text in some cells only."""
+"""Cells in a chunk of such an array."""
 
 
 def write(path: str | os.PathLike[str], groups: Mapping[str, xr.Dataset], attributes: Mapping[str, str]) -> None:
-    """Write a dataset; the file appears whole or not at all."""
+    """Write a dataset atomically."""
     tree = xr.DataTree.from_dict(groups)
     tree.attrs = dict(attributes)
     # What groups share with the root is written there alone.
@@ -209,7 +201,7 @@ def write(path: str | os.PathLike[str], groups: Mapping[str, xr.Dataset], attrib
 
 @contextmanager
 def _small_cache() -> Iterator[None]:
-    """Context in which netCDF's library keeps four chunks of each variable, not 64 MB: each is written once."""
+    """Limit netCDF's cache to four chunks a variable instead of 64 MB: each is written once."""
     import netCDF4
 
     before = netCDF4.get_chunk_cache()
@@ -221,7 +213,7 @@ def _small_cache() -> Iterator[None]:
 
 
 def _runs(data: xr.Dataset) -> list[list[Hashable]]:
-    """Variables of a group in order, by what writes them: those up to the first texts that are mostly holes, ..."""
+    """Split a group's variables into runs before and after sparse texts."""
     runs: list[list[Hashable]] = [[]]
     apart = False
     for name, array in data.data_vars.items():
@@ -233,14 +225,14 @@ def _runs(data: xr.Dataset) -> list[list[Hashable]]:
 
 
 def _mostly_holes(array: xr.DataArray) -> bool:
-    """Whether an array holds texts in few of many cells."""
+    """Return whether an array holds few texts in many cells."""
     if array.dtype != object or array.nbytes <= CHUNK or set(array.coords) - set(array.dims):
         return False
     return float(np.mean(array.values == "")) > MOSTLY
 
 
 def _append(path: str | os.PathLike[str], group: str, data: xr.Dataset, names: Sequence[Hashable]) -> None:
-    """Write further variables into a group of a file: texts that are mostly holes, or what stands between such."""
+    """Append variables to a group of a file."""
     if not _mostly_holes(data[names[0]]):
         between = xr.Dataset({name: data.variables[name] for name in names})
         encoding = {name: _encoding(data, name) for name in names}
@@ -264,7 +256,7 @@ def _append(path: str | os.PathLike[str], group: str, data: xr.Dataset, names: S
 
 
 def _block(shape: Sequence[int]) -> tuple[int, ...]:
-    """Shape of a chunk of texts: about as long in all dimensions, since grids differ in any of them."""
+    """Chunk shape of texts, about equal in all dimensions."""
     block = [1] * len(shape)
     while np.prod(block) < TEXTS and block != list(shape):
         _, number = min((block[n], -n) for n, length in enumerate(shape) if block[n] < length)
@@ -273,7 +265,7 @@ def _block(shape: Sequence[int]) -> tuple[int, ...]:
 
 
 def _encoding(data: xr.Dataset, name: Hashable) -> dict[str, object]:
-    """How a variable is stored."""
+    """Encoding of a variable."""
     array = data[name]
     # CF: coordinates have no holes, and so no value that stands for one.
     found: dict[str, object] = {"_FillValue": None} if name in data.coords else {}
@@ -285,7 +277,7 @@ def _encoding(data: xr.Dataset, name: Hashable) -> dict[str, object]:
 
 
 def _chunk(shape: Sequence[int], itemsize: int) -> tuple[int, ...]:
-    """Shape of a chunk: whole last dimensions, and of those before as much as there is room for."""
+    """Chunk shape: whole last dimensions, then as many of the others as fit."""
     chunk, room = [], CHUNK // itemsize
     for length in reversed(shape):
         chunk.append(max(1, min(length, room)))

@@ -14,19 +14,14 @@ if TYPE_CHECKING:
 
 
 LARGEST_SHOWN = 100.0
-"""Largest error of a curve that is shown [%]."""
+"""Largest error of a curve in a plot [%]."""
 
 
 @style.styled
 def draw_springs(ax: Axes | None, mesh: "Mesh", displacements: np.ndarray, forces: np.ndarray, title: str) -> Axes:
-    """Draw springs where they have come to, coloured by their force, and the outline at rest.
+    """Draw deformed springs coloured by force, and the outline at rest.
 
-    Parameters
-    ----------
-    displacements : ndarray of float, shape (n_points, 2)
-        [m]
-    forces : ndarray of float, shape (n_edges,)
-        [N]
+    `displacements` has shape (n_points, 2) [m], `forces` (n_edges,) [N].
     """
     _, ((panel,),) = style.panels(ax, figsize=(style.COLUMN, 2.2), layout="constrained")
     largest = float(np.abs(forces).max()) or 1.0
@@ -45,7 +40,7 @@ def draw_springs(ax: Axes | None, mesh: "Mesh", displacements: np.ndarray, force
 
 @style.styled
 def draw_curve(ax: Axes | None, curve: "Curve") -> Axes:
-    """Draw the deformation error over uniform stiffness, and where it is nothing."""
+    """Draw the deformation error over uniform stiffness, and its zero."""
     figure, axes = style.panels(ax, figsize=(style.COLUMN, 2.5))
     place: dict[str, Any] = {"left": 0.5, "right": 0.08, "bottom": 0.66, "top": 0.28}
     style.arrange(figure, axes, **place)

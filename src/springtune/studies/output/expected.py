@@ -1,4 +1,4 @@
-"""Values and curves that were accepted as right, with tolerances: in a file to be kept and reviewed."""
+"""Accepted values and curves with tolerances, in a file for review."""
 
 from __future__ import annotations
 
@@ -29,18 +29,18 @@ DEFAULTS = {
     "/": ("status", "displacement", "deformation_error", "stiffness"),
     "/sensitivity": ("deformation_error", "best_stiffness"),
 }
-"""Variables of a group that are accepted where none are named; of other groups with a status, what its cells have."""
+"""Variables accepted by default, by group."""
 
 MOST_NUMBERS = 20_000
-"""Most numbers of a file in YAML: more is no file to review, and is slow to read."""
+"""Most numbers of a YAML file."""
 
 ACCEPTED, TOLERANCES = "accepted", "tolerances"
-"""Attributes of expected values: the study, and tolerances as JSON."""
+"""Attributes: the study, and tolerances as JSON."""
 
 EXPECTED_ENDINGS = (".yaml", ".nc")
 
 FURTHER_DIGITS = 3
-"""Digits that a number in YAML has beyond its tolerance."""
+"""Digits in YAML beyond the tolerance."""
 
 EXAMPLE = "accept the results anew, or see docs/how-to/compare-studies.md"
 
@@ -51,7 +51,7 @@ EXAMPLE = "accept the results anew, or see docs/how-to/compare-studies.md"
 def accepted(
     tree: xr.DataTree, variables: Sequence[str] = (), tolerances: Mapping[str, Tolerance] | None = None
 ) -> xr.DataTree:
-    """Values of a dataset that are to be kept as right.
+    """Select accepted values of a dataset.
 
     Examples
     --------
@@ -80,7 +80,7 @@ def accepted(
 
 
 def _chosen(tree: xr.DataTree, variables: Sequence[str]) -> dict[str, list[str]]:
-    """Names of variables by path of their group; the root is there in any case."""
+    """Names of variables by group; the root is always included."""
     found: dict[str, list[str]] = {"/": []}
     if not variables:
         for node in tree.subtree:
@@ -114,7 +114,7 @@ def _chosen(tree: xr.DataTree, variables: Sequence[str]) -> dict[str, list[str]]
 
 
 def _is_kept(name: str, array: xr.DataArray, data: xr.Dataset) -> bool:
-    """Whether a variable of a further group is accepted without being named: the status, and numbers of its cells."""
+    """Return whether a variable of another group is kept by default: status, and numbers of its cells."""
     if name == "status":
         return True
     measured = any(fnmatchcase(name, one) for one in MEASURED)
@@ -122,7 +122,7 @@ def _is_kept(name: str, array: xr.DataArray, data: xr.Dataset) -> bool:
 
 
 def unsolved(tree: xr.DataTree) -> list[tuple[str, str, str, str]]:
-    """Cells of a dataset that are asked for and not solved."""
+    """Requested cells without a solution."""
     found = []
     for node in tree.subtree:
         data = node.to_dataset()
@@ -143,12 +143,12 @@ def unsolved(tree: xr.DataTree) -> list[tuple[str, str, str, str]]:
 
 
 def tolerances(tree: xr.DataTree) -> dict[str, Tolerance]:
-    """Tolerances of expected values by the name of a variable, see `accepted`."""
+    """Tolerances by variable name, see `accepted`."""
     return {name: Tolerance(**one) for name, one in json.loads(tree.attrs.get(TOLERANCES, "{}")).items()}
 
 
 def with_tolerances_of(tree: xr.DataTree, former: xr.DataTree) -> xr.DataTree:
-    """Expected values of this dataset, with the tolerances of the former ones."""
+    """Copy with the tolerances of former expected values."""
     held = {
         variable_name(node.path, str(name))
         for node in tree.subtree
@@ -171,14 +171,14 @@ def with_tolerances_of(tree: xr.DataTree, former: xr.DataTree) -> xr.DataTree:
 
 
 def with_tolerances(tree: xr.DataTree, given: Mapping[str, Tolerance]) -> xr.DataTree:
-    """Expected values with other tolerances, see `accepted`."""
+    """Copy with other tolerances, see `accepted`."""
     made = tree.copy()
     made.attrs = tree.attrs | {TOLERANCES: _tolerance_json(given)}
     return made
 
 
 def cells(tree: xr.DataTree) -> dict[str, int]:
-    """How many cells of each group have expected values, by its path."""
+    """Number of cells with expected values by group."""
     found = {}
     for node in tree.subtree:
         data = node.to_dataset()
@@ -192,7 +192,7 @@ def cells(tree: xr.DataTree) -> dict[str, int]:
 
 
 def _known(array: xr.DataArray) -> xr.DataArray:
-    """Where there is something to write."""
+    """Return where an array has values."""
     return array != 0 if array.dtype.kind in "iu" else array.notnull()
 
 
@@ -200,7 +200,7 @@ def _known(array: xr.DataArray) -> xr.DataArray:
 
 
 def is_expected(path: str | Path) -> bool:
-    """Whether a file in YAML holds expected values, and is no study."""
+    """Return whether a YAML file holds expected values instead of a study."""
     if fault(path):
         return False
     try:
@@ -225,7 +225,7 @@ def read(path: str | Path) -> xr.DataTree:
 
 
 def write(path: str | Path, tree: xr.DataTree) -> None:
-    """Write expected values; the file appears whole or not at all."""
+    """Write expected values atomically."""
     path = Path(path)
     if path.suffix == ".nc":
         groups = {node.path: node.to_dataset(inherit=False) for node in tree.subtree}
@@ -248,7 +248,7 @@ def write(path: str | Path, tree: xr.DataTree) -> None:
 
 
 def _lines(tree: xr.DataTree) -> Iterator[str]:
-    """Lines of a file in YAML."""
+    """Lines of the YAML file."""
     own = tolerances(tree)
     general = own.pop("", Tolerance())
     yield f"# What is accepted as right of the study {tree.attrs[ACCEPTED]}, in SI units but for labels."
@@ -315,7 +315,7 @@ def _group_lines(
 
 
 def _unit(data: xr.Dataset, name: str) -> str:
-    """What labels of a dimension are: names, or numbers of a unit."""
+    """Unit of a dimension's labels; empty for names."""
     if name in data.coords and data[name].dtype.kind in "OUS":
         return "name"
     units = str(data[name].attrs.get("units", "1")) if name in data.coords else "1"
@@ -341,7 +341,7 @@ def _tolerance_text(one: Tolerance) -> str:
 
 @dataclass(frozen=True)
 class _Table:
-    """Lines of a group: their labels by line, what these are, and what stands in them."""
+    """Lines of a group with labels, units and values."""
 
     path: str
     by: dict[str, str]
@@ -355,7 +355,7 @@ class _Table:
 
 
 class _Yaml:
-    """A file of expected values in YAML, read with a message for whatever is wrong with it."""
+    """YAML file of expected values; faults name their place."""
 
     def __init__(self, path: Path) -> None:
         from ..config.yaml_lines import read_yaml
@@ -368,14 +368,14 @@ class _Yaml:
         self.content, self.lines = read_yaml(text, str(path))
 
     def stop(self, message: str, *keys: str | int) -> ValueError:
-        """What to raise about a place of the file."""
+        """Create the error for a place in the file."""
         line = next((self.lines[keys[:size]] for size in range(len(keys), 0, -1) if keys[:size] in self.lines), 0)
         return ValueError(
             f"{self.path}:{line}: {'.'.join(map(str, keys))}: {message}" if line else f"{self.path}: {message}"
         )
 
     def tree(self) -> xr.DataTree:
-        """The values."""
+        """Read all values."""
         if not isinstance(self.content, dict) or ACCEPTED not in self.content:
             raise ValueError(f"{self.path}: holds no expected values; {EXAMPLE}")
         groups = [self._group(path) for path in self._mapping(self.content.get("groups"), "groups")]
@@ -426,7 +426,7 @@ class _Yaml:
         return found
 
     def _group(self, path: str) -> _Table:
-        """Labels of a group's lines."""
+        """Read the labels of a group's lines."""
         keys = ("groups", path)
         group = self._mapping(self.content["groups"][path], *keys)
         by = {name: str(unit) for name, unit in self._mapping(group.get("by", {}), *keys, "by").items()}
@@ -440,7 +440,7 @@ class _Yaml:
         return _Table(path, by, along, rows, values)
 
     def _filled(self, group: _Table, axes: Mapping[str, np.ndarray]) -> xr.Dataset:
-        """Values of a group's lines."""
+        """Read the values of a group's lines."""
         shape = [len(axes[name]) for name in group.by]
         further = [len(axes[name]) for name in group.along]
         places = {name: {label: at for at, label in enumerate(axes[name].tolist())} for name in group.axes()}
@@ -479,7 +479,7 @@ class _Yaml:
         return data
 
     def _labels(self, by: Mapping[str, str], text: str, *keys: str) -> dict[str, str | float]:
-        """Labels of a line."""
+        """Read the labels of a line."""
         words = [word.strip() for word in str(text).split(", ")] if by else []
         if len(words) != len(by):
             raise self.stop(f"{len(words)} labels; give {len(by)}: {', '.join(by)}", *keys, text)

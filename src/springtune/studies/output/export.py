@@ -1,4 +1,4 @@
-"""A dataset in other forms: a long table of one group, or the whole tree for a store of chunks."""
+"""Export a dataset: long tables, Zarr, netCDF meshes and ParaView files."""
 
 from __future__ import annotations
 
@@ -28,17 +28,12 @@ EXTRA = "install what is missing with `pip install springtune[export]`"
 
 
 class RequestError(ValueError):
-    """What is asked for is not in the dataset, or of no format: the request is wrong, not the dataset."""
+    """The request does not fit the dataset, or names an unknown format."""
 
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a long table.
-
-    Attributes
-    ----------
-    values : ndarray, shape (n_rows,)
-    """
+    """A column of a long table; `values` has shape (n_rows,)."""
 
     name: str
     units: str
@@ -47,7 +42,7 @@ class Column:
 
     @property
     def title(self) -> str:
-        """Name with its unit, where it has one."""
+        """Name with unit."""
         return self.name if self.units in ("", "1") else f"{self.name} [{self.units}]"
 
 
@@ -57,7 +52,7 @@ def table(
     variables: Sequence[str] = (),
     selection: Mapping[str, Sequence[str]] | None = None,
 ) -> list[Column]:
-    """Long table of a group: one row a cell that was asked for, one column a dimension or variable.
+    """Long table of a group: one row for each requested cell, one column for each dimension or variable.
 
     Examples
     --------
@@ -118,7 +113,7 @@ def _selected(data: xr.Dataset, selection: Mapping[str, Sequence[str]]) -> xr.Da
 
 
 def _place(name: str, coordinate: xr.DataArray, label: str) -> int:
-    """Place of a label along its dimension."""
+    """Index of a label."""
     known = coordinate.values
     if known.dtype.kind in "OU":
         found = np.flatnonzero(known.astype(str) == label)
@@ -133,7 +128,7 @@ def _place(name: str, coordinate: xr.DataArray, label: str) -> int:
 
 
 def _number(name: str, coordinate: xr.DataArray, label: str) -> float:
-    """Number of a label that may carry a unit."""
+    """Parse a numeric label that may have a unit."""
     try:
         return float(label)
     except ValueError:
@@ -146,7 +141,7 @@ def _number(name: str, coordinate: xr.DataArray, label: str) -> float:
 
 
 def _ordered(data: xr.Dataset, names: set[str]) -> list[str]:
-    """Dimensions in the order of the array that has most of them."""
+    """Dimensions in the order of the array with most of them."""
     arrays = sorted(data.data_vars.values(), key=lambda array: -len(names & set(array.dims)))
     found = dict.fromkeys(str(name) for array in arrays for name in array.dims if name in names)
     return list(found)
@@ -155,7 +150,7 @@ def _ordered(data: xr.Dataset, names: set[str]) -> list[str]:
 def _asked(
     data: xr.Dataset, status: xr.DataArray | None, chosen: Sequence[xr.DataArray], dimensions: Sequence[str]
 ) -> np.ndarray:
-    """Whether each cell has a row, shape of the dimensions."""
+    """Requested cells in the shape of the dimensions."""
     shape = [data.sizes[name] for name in dimensions]
 
     def spread(array: xr.DataArray) -> np.ndarray:
@@ -188,7 +183,7 @@ def _column(name: str, array: xr.DataArray, values: np.ndarray) -> Column:
 
 
 def write_csv(path: str | os.PathLike[str], columns: Sequence[Column]) -> None:
-    """Write a long table as CSV, units in the names of the columns, numbers with all their digits."""
+    """Write a long table as CSV, with units in the head and all digits."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow([column.title for column in columns])
@@ -199,7 +194,7 @@ def write_csv(path: str | os.PathLike[str], columns: Sequence[Column]) -> None:
 
 
 def write_parquet(path: str | os.PathLike[str], columns: Sequence[Column], attributes: Mapping[str, object]) -> None:
-    """Write a long table as Parquet, with units, long names and the dataset's attributes."""
+    """Write a long table as Parquet with units, long names and attributes."""
     try:
         import pyarrow as pa
         import pyarrow.parquet
@@ -217,7 +212,7 @@ def write_parquet(path: str | os.PathLike[str], columns: Sequence[Column], attri
 
 
 def write_zarr(path: str | os.PathLike[str], tree: xr.DataTree) -> None:
-    """Write a dataset as a Zarr store; the folder is replaced as a whole or not at all."""
+    """Write a Zarr store atomically."""
     try:
         import zarr  # noqa: F401
     except ImportError:
@@ -245,7 +240,6 @@ def write_zarr(path: str | os.PathLike[str], tree: xr.DataTree) -> None:
 
 
 EXPORTS = (".csv", ".parquet", ".zarr", ".nc", ".vtu", ".pvd")
-"""Endings of the names of files to export to."""
 
 
 def export(
@@ -256,14 +250,10 @@ def export(
     selection: Mapping[str, Sequence[str]] | None = None,
     force: bool = False,
 ) -> str:
-    """Write a dataset in the format that the ending of a file says.
+    """Write a dataset in the format of the file's ending, one of `EXPORTS`.
 
-    Parameters
-    ----------
-    path : str or Path
-        Ending in one of `EXPORTS`; ``.nc`` is one network of the group `fields` as an unstructured mesh, ``.vtu`` one
-        scene of it for ParaView, and ``.pvd`` a collection of all that are chosen; of shapes those of the group
-        `shape_fields`.
+    ``.nc`` holds one network of the group `fields`, ``.vtu`` one scene for ParaView and ``.pvd`` all selected scenes;
+    networks of shapes are in the group `shape_fields`.
     """
     path = Path(path)
     ending = path.suffix.lower()
@@ -327,7 +317,6 @@ def _mesh(
 
 
 def _paraview(tree: xr.DataTree, path: Path, selection: Mapping[str, Sequence[str]]) -> str:
-    """Write scenes of the group of fields as files for ParaView."""
     from springtune.handover.paraview import MOST_PIECES
 
     if "fields" not in tree.children:
@@ -355,7 +344,7 @@ def _paraview(tree: xr.DataTree, path: Path, selection: Mapping[str, Sequence[st
 def write_scenes(
     tree: xr.DataTree, path: Path, scenes: Sequence[Mapping[str, str | float]] | None = None
 ) -> list[Path]:
-    """Write scenes of the group of fields as a collection for ParaView."""
+    """Write scenes of the group of fields as a ParaView collection."""
     from springtune.handover.paraview import pieces_of, series
 
     files = _SceneFiles(tree)
@@ -366,19 +355,18 @@ def write_scenes(
 
 
 MESH = ("beam", "mesh_type", "mesh_size")
-"""Dimensions whose labels make a mesh."""
+"""Dimensions that identify a mesh."""
 
 NUMBERS = {
     "displacement": "displacement_of_the_load",
     "reference_displacement": "reference_displacement_of_the_load",
     "deformation_error": "deformation_error",
 }
-"""Numbers of a scene that go with its fields, and their names there; what is swept goes by its own, but for forces,
-which the springs have, too."""
+"""Scene variables written beside fields, and their names there."""
 
 
 def _scenes_of(fields: xr.Dataset) -> Iterator[dict[str, str | float]]:
-    """Labels of the scenes that have fields, in the order of a dataset."""
+    """Labels of scenes with fields, in dataset order."""
     order = (*MESH, "material", "load", "definition", "kinematics")
     solved = fields.displacement_x.isel(particle=0, drop=True).notnull()
     names = [*(name for name in order if name in solved.dims), *(name for name in solved.dims if name not in order)]
@@ -388,7 +376,7 @@ def _scenes_of(fields: xr.Dataset) -> Iterator[dict[str, str | float]]:
 
 
 class _SceneFiles:
-    """Writes scenes of the group of fields: particles and their displacements, springs as lines, cells."""
+    """Writer of scenes: particles with displacements, springs as lines, cells."""
 
     def __init__(self, tree: xr.DataTree) -> None:
         self.tree, root = tree, tree.to_dataset()
@@ -399,12 +387,12 @@ class _SceneFiles:
         self.mesh: dict[str, str | float] = {}  # the one of before: scenes of one follow each other
 
     def named(self, labels: Mapping[str, str | float], between: str = ", ") -> str:
-        """A scene of some labels in words."""
+        """Labels of a scene in words."""
         units = {name: str(self.tree["/fields"][name].attrs.get("units", "1")) for name in labels}
         return between.join(label_text(name, label, units[name]) for name, label in labels.items())
 
     def write(self, path: Path, labels: Mapping[str, str | float]) -> None:
-        """Write the scene of some labels."""
+        """Write a scene."""
         from springtune.handover.paraview import write_vtu
 
         mesh = {name: label for name, label in labels.items() if name in MESH}
@@ -443,14 +431,12 @@ class _SceneFiles:
 # -- networks of shapes ------------------------------------------------------------------------------------------------
 
 NETWORKS_OF_SHAPES = "shape_fields"
-"""Group of the networks of shapes."""
 
 CASE_LABELS = {"shape": "shape_name", "load": "load_name"}
-"""What may be selected of the cases of networks of shapes, besides definitions, by their variables."""
+"""Variables by which cases of shapes are selected."""
 
 
 def _shapes_for_paraview(tree: xr.DataTree, path: Path, selection: Mapping[str, Sequence[str]]) -> str:
-    """Write networks of shapes as files for ParaView."""
     from springtune.handover.paraview import MOST_PIECES, series
 
     fields = _group(tree, NETWORKS_OF_SHAPES).load()
@@ -477,7 +463,7 @@ def _shapes_for_paraview(tree: xr.DataTree, path: Path, selection: Mapping[str, 
 
 
 def _shape_scenes(fields: xr.Dataset, selection: Mapping[str, Sequence[str]]) -> list[dict[str, str]]:
-    """Labels of the networks of shapes that are there and selected, in the order of the dataset."""
+    """Labels of selected networks of shapes, in dataset order."""
     known = {name: fields[stored].values.astype(str).tolist() for name, stored in CASE_LABELS.items()}
     known["definition"] = fields["definition"].values.astype(str).tolist()
     for name, wanted in selection.items():
@@ -496,7 +482,7 @@ def _shape_scenes(fields: xr.Dataset, selection: Mapping[str, Sequence[str]]) ->
 
 
 def _write_shape(tree: xr.DataTree, fields: xr.Dataset, path: Path, labels: Mapping[str, str]) -> None:
-    """Write a network of a shape: particles and their displacements, springs as lines, cells."""
+    """Write a network of a shape: particles with displacements, springs as lines, cells."""
     from springtune.handover.paraview import write_vtu
 
     chosen = np.logical_and.reduce([fields[stored].values == labels[name] for name, stored in CASE_LABELS.items()])
@@ -531,7 +517,7 @@ def _write_shape(tree: xr.DataTree, fields: xr.Dataset, path: Path, labels: Mapp
 
 
 def selected(text: Sequence[str]) -> dict[str, list[str]]:
-    """Labels by dimension, of texts such as ``beam=200x40,load=traction``.
+    """Parse labels such as ``beam=200x40,load=traction`` by dimension.
 
     Examples
     --------

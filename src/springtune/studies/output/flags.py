@@ -1,4 +1,4 @@
-"""Flags, as the CF conventions have them, and what a cell without a value holds."""
+"""Flags by the CF conventions, and fill values."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -7,22 +7,21 @@ import numpy as np
 import xarray as xr
 
 NOT_REQUESTED = "not_requested"
-"""Flag of a cell that a study does not ask for."""
 
 
 def is_flagged(array: xr.DataArray) -> bool:
-    """Whether a variable holds flags."""
+    """Return whether a variable holds flags."""
     return "flag_meanings" in array.attrs and array.dtype.kind in "iuf"
 
 
 def flag_words(array: xr.DataArray) -> dict[int, str]:
-    """Meanings of flags by their values."""
+    """Meanings of flags by value."""
     values = np.atleast_1d(array.attrs.get("flag_values", [])).tolist()
     return dict(zip(map(int, values), str(array.attrs["flag_meanings"]).split()))
 
 
 def nothing(arrays: Sequence[xr.DataArray]) -> tuple[object, np.dtype[Any]]:
-    """What a cell without a value holds, and the type that holds it beside all values of some arrays."""
+    """Fill value for some arrays, and a type that holds it and all their values."""
     if arrays[0].dtype.kind in "OUS":
         return "", np.dtype(object)
     together = np.result_type(*(array.dtype for array in arrays))

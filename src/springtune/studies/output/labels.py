@@ -1,4 +1,4 @@
-"""Texts in figures: names at the ends of lines, notes below panels, and words where there is nothing to draw."""
+"""Place texts in figures: line names, notes and messages."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
@@ -19,7 +19,7 @@ End = tuple[float, float, str, str]
 """Where a line ends, its name and its colour, for `name_lines`."""
 
 DARKER = 0.75
-"""Share of the light of a line's colour that its name keeps, to be read on white."""
+"""Factor on a line's lightness for its name, to be readable on white."""
 
 LINE = 1.22 * SMALL / POINTS
 """Height of a line of small text [inch]."""
@@ -38,17 +38,16 @@ def width(text: str, size: float = SMALL) -> float:
 
 
 POWERS = {0: "", 3: "10³ ", 6: "10⁶ ", 9: "10⁹ "}
-"""How powers of ten are written before a unit."""
 
 
 def power_of_ten(largest: float) -> tuple[float, str]:
-    """What the values of an axis are divided by, and how that is written before their unit: 1e6 and ``"10⁶ "``."""
+    """Divisor of an axis and its text before the unit: 1e6 and ``"10⁶ "``."""
     power = max([power for power in POWERS if largest >= 10 * 10.0**power], default=0)
     return 10.0**power, POWERS[power]
 
 
 def wrapped(text: str, room: float, size: float = SMALL) -> str:
-    """A text in lines that are no wider than a room [inch], cut at spaces."""
+    """Wrap a text at spaces to a width [inch]."""
     lines = [""]
     for word in text.split(" "):
         longer = f"{lines[-1]} {word}".strip()
@@ -60,10 +59,9 @@ def wrapped(text: str, room: float, size: float = SMALL) -> str:
 
 
 def spread(wanted: Sequence[float], sizes: Sequence[float], low: float, high: float) -> np.ndarray:
-    """Places next to those wanted at which no two of some things overlap.
+    """Places without overlap nearest to the wanted ones.
 
-    The sum of the squared moves is the smallest there is for their order (pools of adjacent violators), before all are
-    moved between the ends.
+    Minimizes the sum of squared moves in the given order (pool adjacent violators), then moves all between the ends.
     """
     if not len(wanted):
         return np.zeros(0)
@@ -85,9 +83,9 @@ def spread(wanted: Sequence[float], sizes: Sequence[float], low: float, high: fl
 
 
 def name_lines(panel: Axes, ends: Iterable[End], share: float = 0.6) -> None:
-    """Names of lines to the right of their ends, no two on each other, within the panel, which is widened for them.
+    """Write line names to the right of their ends, without overlap, in the widened panel.
 
-    Call it when the panel has its place and its limits.
+    Call it once position and limits of the panel are set.
     """
     lines = [end for end in ends if np.isfinite(end[0]) and np.isfinite(end[1])]
     if not lines:
@@ -123,7 +121,7 @@ def name_lines(panel: Axes, ends: Iterable[End], share: float = 0.6) -> None:
 
 
 def alike(curves: dict[str, np.ndarray], within: float) -> list[list[str]]:
-    """Names of curves that are one line to the eye: lists, in order."""
+    """Groups of curves that look like one line, in order."""
     groups: list[list[str]] = []
     for name, values in curves.items():
         for group in groups:
@@ -166,10 +164,7 @@ TITLE_LINE = 0.13
 
 
 def room_left(panel: Axes) -> float:
-    """Width that a panel's axis on the left takes with the texts of its ticks and its label [inch].
-
-    Call it when the panel has its limits.
-    """
+    """Width of tick and axis labels on the left [inch]; call it once limits are set."""
     found = 0.04 + (0.16 if panel.get_ylabel() else 0.0)
     if not panel.yaxis.get_tick_params().get("labelleft", True):
         return found + 0.06
@@ -183,19 +178,14 @@ def room_left(panel: Axes) -> float:
 
 
 def settle(figure: Figure | SubFigure | None, axes: np.ndarray, place: Mapping[str, Any]) -> None:
-    """Place panels as `springtune.studies.output.style.arrange` does, with room for the texts on their left.
-
-    Parameters
-    ----------
-    axes : (nrows, ncols) ndarray of Axes
-    """
+    """Arrange panels with room for the texts on their left; `axes` has shape (nrows, ncols)."""
     left = max(room_left(panel) for panel in axes[:, 0])
     between = max((room_left(panel) for panel in axes[:, 1:].flat if panel.get_visible()), default=0.0)
     arrange(figure, axes, **{**place, "left": left, "across": place.get("across", 0.0) + between})
 
 
 def say(panel: Axes, text: str, bare: bool = True) -> None:
-    """Words in the middle of a panel that has nothing to show: what is missing, and why."""
+    """Write in the middle of an empty panel what is missing and why."""
     room = panel.get_window_extent().width / panel.figure.dpi
     panel.text(
         0.5, 0.5, wrapped(text, 0.9 * room, 8), transform=panel.transAxes, ha="center", va="center", fontsize=8,
@@ -207,12 +197,12 @@ def say(panel: Axes, text: str, bare: bool = True) -> None:
 
 
 def note(panel: Axes, text: str, below: float = 0.38) -> None:
-    """Small text below a panel's label, in lines as `wrapped` makes them; `below` is its distance [inch]."""
+    """Write small wrapped text `below` a panel's label [inch]."""
     if text:
         panel.annotate(text, (0, 0), xycoords="axes fraction", xytext=(0, -POINTS * below), va="top", ha="left",
                        textcoords="offset points", fontsize=SMALL, color="0.25")  # fmt: skip
 
 
 def lines_of(text: str) -> int:
-    """Number of lines of a text; none of an empty one."""
+    """Number of lines of a text; 0 for an empty one."""
     return 1 + text.count("\n") if text else 0

@@ -1,4 +1,4 @@
-"""The tree of a dataset's file, read when needed; xarray itself reads all texts as it opens a file."""
+"""Open a dataset lazily; xarray's public API reads all texts on opening."""
 
 from pathlib import Path
 from typing import Any
@@ -14,11 +14,11 @@ from springtune.safe_io.inputs import BeyondBound, bounded
 from .dataset import CHUNK
 
 LARGE_ARRAY = 2**20
-"""Bytes beyond which texts are not read as a file is opened."""
+"""Texts of arrays with more bytes are read on demand."""
 
 
 class _Texts(NetCDF4ArrayWrapper):
-    """Texts of a file: how long they are is not known before they are read, so memory is bounded then."""
+    """Texts of a file, read within bounded memory, since their length is unknown before."""
 
     __slots__ = ()
 
@@ -35,8 +35,6 @@ class _Texts(NetCDF4ArrayWrapper):
 
 
 class _Store(NetCDF4DataStore):
-    """A group of a file."""
-
     most: float
 
     def open_store_variable(self, name: str, var: Any) -> xr.Variable:
@@ -51,7 +49,7 @@ class _Store(NetCDF4DataStore):
 
 
 def opened(path: Path, most: float) -> xr.DataTree:
-    """The tree of a file."""
+    """Open the tree of a file."""
     root = _Store.open(str(path))  # type: ignore[no-untyped-call]
     root.most = most
     found = {}

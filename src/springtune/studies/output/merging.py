@@ -15,13 +15,12 @@ from .swept import with_swept
 from .text import cell_text, number_text
 
 SAME_VALUE = 1e-9
-"""Values that differ by less, of the larger one, are those of one scene."""
+"""Relative difference below which values of a scene agree."""
 
 FOUND_ANYHOW = (*MEASURED, "*message", "iterations", "residual", "definition_evaluations")
-"""Variables that tell how an answer was found: of a scene in several datasets, the first counts."""
+"""Variables on how a solution was found: the first dataset counts."""
 
 MOST_BYTES = 2e9
-"""Bytes of the largest array that is made."""
 
 JOINED = ("title", "study", "springtune_version", "git_commit")
 """Attributes whose different texts are joined."""
@@ -71,7 +70,7 @@ def merge(datasets: Sequence[xr.DataTree], relative: float = SAME_VALUE) -> xr.D
 
 
 class _Merger:
-    """What several datasets hold, on common axes."""
+    """Aligned contents of several datasets."""
 
     def __init__(self, trees: Sequence[xr.DataTree], relative: float) -> None:
         self.trees, self.relative = with_swept(trees), relative
@@ -103,7 +102,7 @@ class _Merger:
             self.places[path, name, number] = places
 
     def merged(self) -> xr.DataTree:
-        """All groups."""
+        """Merge all groups."""
         tree = xr.DataTree.from_dict({path: self._group(path, held) for path, held in self.held.items()})
         tree.attrs = self._attributes()
         return tree
@@ -197,7 +196,7 @@ class _Merger:
         values: tuple[object, object],
         array: xr.DataArray,
     ) -> None:
-        """Stop at a cell that has two values."""
+        """Raise for a cell with two values."""
         units = str(array.attrs.get("units", "1"))
         words = flag_words(array) if is_flagged(array) else {}
         two = " and ".join(
@@ -241,7 +240,7 @@ class _Merger:
         return found
 
     def _attributes(self) -> dict[str, str]:
-        """Attributes of the root: those that are the same, and what is told of all."""
+        """Attributes of the root: equal ones, and joined ones."""
         every = [{str(name): str(text) for name, text in tree.attrs.items()} for tree in self.trees]
         found = {name: text for name, text in every[0].items() if all(own.get(name) == text for own in every)}
         for name in JOINED:

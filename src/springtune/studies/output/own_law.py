@@ -1,4 +1,4 @@
-"""References at finite strain of each material's own law: of one with a uniaxial test Yeoh's, else neo-Hooke's."""
+"""Finite-strain references by each material's own law: Yeoh with a uniaxial test, else neo-Hooke."""
 
 from typing import TYPE_CHECKING
 
@@ -11,11 +11,11 @@ if TYPE_CHECKING:
 
 
 OWN_LAWS = (TESTED_REFERENCE, FINITE_STRAIN_REFERENCE)
-"""Labels of references in plane stress of a material's own law: which of them counts first."""
+"""Plane-stress references of own laws, by priority."""
 
 
 def of_own_law(finite: "xr.Dataset") -> "xr.Dataset | None":
-    """A group of references at finite strain, with those in plane stress of each material's own law."""
+    """Select plane-stress references of each material's own law."""
     neo_hooke, tested = (
         finite.sel(reference=kind, drop=True) if kind in finite.reference.values else None
         for kind in (FINITE_STRAIN_REFERENCE, TESTED_REFERENCE)
@@ -34,10 +34,7 @@ def of_own_law(finite: "xr.Dataset") -> "xr.Dataset | None":
 
 
 def own_law(cell: "xr.Dataset", name: str) -> str | None:
-    """Label of the reference in plane stress of one material's own law, by a variable of references; None without.
-
-    Where no such reference is there, though it was asked for, the label is that of one that was.
-    """
+    """Label of one material's plane-stress reference; an unsolved requested one counts last, None without any."""
     kinds = [kind for kind in OWN_LAWS if kind in cell.reference.values]
     there = [kind for kind in kinds if np.isfinite(cell[name].sel(reference=kind).values).any()]
     return next(iter(there or kinds[::-1]), None)

@@ -14,17 +14,16 @@ from ..config.kind import kinds
 from .tables import csv_text, decimals, number
 
 ANSWERED = ("solved", "unstable", "linear_only")
-"""Statuses of networks that have a displacement."""
+"""Statuses of networks with a displacement."""
 
 MOST_ROWS = 1000
-"""Rows of a table that the page shows; its CSV file has all of them, and a browser stays quick."""
+"""Most rows on the page; CSV files have all."""
 
 COLUMN_UNITS = {"mm2": "mm²", "mm": "mm", "percent": "%", "points": "points", "N": "N", "MPa": "MPa"}
-"""Units at the ends of the names of columns, as they are written."""
 
 
 def write(tree: xr.DataTree, folder: str | Path) -> list[str]:
-    """Write one CSV file a table and a page with all of them."""
+    """Write a CSV file for each table, and a page with all."""
     tables = [table for kind in kinds() if kind.tables for table in kind.module("tables").tables(tree)]
     written = {f"{table['stem']}.csv": csv_text(table["rows"]) for table in tables}
     scenes = [_scenes(table, list(map(str, tree.kinematics.values))) for table in tables if "title" not in table]
@@ -38,7 +37,7 @@ def write(tree: xr.DataTree, folder: str | Path) -> list[str]:
 def html(
     scenes: list[dict[str, Any]], further: list[dict[str, Any]], beams: list[str], attributes: Mapping[Any, Any]
 ) -> str:
-    """The page of the tables of scenes and of others, as `shown` gives them, with the dataset's attributes."""
+    """Page of tables prepared by `shown`, with the dataset's attributes."""
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("springtune.studies.output", ""),
         autoescape=True,
@@ -52,7 +51,7 @@ def html(
 
 
 def _beams(root: xr.Dataset) -> list[str]:
-    """What the beams of a study measure."""
+    """Dimensions of a study's beams."""
     found = []
     for name in root.beam.values if "beam_length" in root else []:
         one = root.sel(beam=name)
@@ -70,7 +69,7 @@ def _beams(root: xr.Dataset) -> list[str]:
 
 
 def _scenes(table: Mapping[str, Any], kinematics: list[str]) -> dict[str, Any]:
-    """A table of scenes as it is shown: texts of cells, a line a kinematics of a row."""
+    """Prepare a table of scenes: one line for each kinematics of a row."""
     rows, definitions = table["rows"], table["definitions"]
     there = [name for name in kinematics if any(f"{one}_{name}_status" in row for row in rows for one in definitions)]
     displacements = [row["reference_mm"] for row in rows]
@@ -101,17 +100,16 @@ def _scenes(table: Mapping[str, Any], kinematics: list[str]) -> dict[str, Any]:
 
 
 def _beyond(rows: list[Mapping[str, Any]]) -> str:
-    """Which rows are shown where not all are."""
+    """Note on rows that are left out."""
     return f"The first {MOST_ROWS} of {len(rows)} rows; the file has all of them: " if len(rows) > MOST_ROWS else ""
 
 
 def _short(values: list[float]) -> list[str]:
-    """Texts of values as a study says them."""
     return [f"{value:.6g}" for value in values]
 
 
 def _of_errors(values: list[float]) -> int:
-    """Decimals of errors in percent: three digits of their middle one."""
+    """Decimals of errors [%] for three digits of their median."""
     sizes = np.abs([value for value in values if np.isfinite(value) and value])
     return int(np.clip(decimals([float(np.median(sizes))], 3) or 0, 1, 4)) if len(sizes) else 2
 
@@ -123,7 +121,7 @@ def _lines(
     places: tuple[int | None, int],
     marks: set[str],
 ) -> Iterable[dict[str, Any]]:
-    """Lines of a row: one for each kinematics; the first begins with what is the same for all."""
+    """Lines of a row, one for each kinematics; the first has the common columns."""
     length, percent = places
     asked = [name for name in kinematics if any(f"{one}_{name}_status" in row for one in definitions)]
     objected = [name for name in asked if row[f"reference_applies_{name}"] == "no"]
@@ -166,12 +164,12 @@ def _lines(
 
 
 def _own_reference(kinematics: str) -> str:
-    """Column of the reference of networks of these kinematics, where they have one of their own: at finite strain."""
+    """Column of a kinematics' own reference at finite strain."""
     return f"reference_{kinematics}_mm"
 
 
 def _stiffnesses(rows: list[Mapping[str, Any]], definitions: list[str], kinematics: list[str]) -> Iterable[str]:
-    """Uniform stiffnesses of the networks of a table."""
+    """Uniform stiffnesses of a table's networks."""
     for definition in definitions:
         texts = {}
         for name in kinematics:
@@ -187,7 +185,7 @@ def _stiffnesses(rows: list[Mapping[str, Any]], definitions: list[str], kinemati
 
 
 def _objections(rows: list[Mapping[str, Any]], kinematics: list[str]) -> list[str]:
-    """What there is against references, once a beam."""
+    """Objections to references, once a beam."""
     found: dict[str, None] = {}
     for row in rows:
         against = [name for name in kinematics if row[f"reference_applies_{name}"] == "no"]
@@ -200,7 +198,7 @@ def _objections(rows: list[Mapping[str, Any]], kinematics: list[str]) -> list[st
 
 
 def shown(table: Mapping[str, Any]) -> dict[str, Any]:
-    """A table of any columns as it is shown: heads with units, and texts."""
+    """Prepare any table: heads with units, and texts."""
     rows = table["rows"]
     columns = list(dict.fromkeys(name for row in rows for name in row))
     texts, words = {}, []
@@ -226,7 +224,7 @@ def shown(table: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _head(name: str) -> str:
-    """A column's name with its unit in brackets."""
+    """Column name with its unit in brackets."""
     words = name.split("_")
     unit = COLUMN_UNITS.get(words[-1], "") if len(words) > 1 else ""
     return f"{' '.join(words[:-1])} [{unit}]" if unit else " ".join(words)

@@ -1,4 +1,4 @@
-"""What a study's outputs show of a dataset: figures in PNG and PDF files, and tables."""
+"""Make a study's outputs: figures in PNG and PDF files, and tables."""
 
 import gc
 import sys
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ..config.kind import Output
 
 MANY_PANELS = 16
-"""Panels of a figure beyond which what it leaves behind is given back before the next one is drawn."""
+"""Panels above which a figure's memory is freed before the next one."""
 
 
 def run(dataset: str | Path, folder: str | Path, *names: str) -> list[Path]:
@@ -52,7 +52,7 @@ def _draw(output: "Output", tree: xr.DataTree, folder: Path) -> Iterator[Path]:
     import matplotlib.pyplot as plt
     import numpy as np
 
-    from .canvas import png_and_pdf
+    from .style import png_and_pdf
 
     for stem, plot, selection in imported(output.plot)(tree):
         figure = np.ravel(plot(tree, **selection))[0].figure

@@ -1,4 +1,4 @@
-"""Opening the dataset of a study."""
+"""Open the dataset of a study safely."""
 
 import math
 import os
@@ -18,24 +18,22 @@ if TYPE_CHECKING:
     from .dataset import Label
 
 SPRING_NODES, CELL_NODES = "spring_nodes", "cell_nodes"
-"""Connectivities of `/fields`."""
 
 REMEDY = "give the dataset.nc of a study, or run the study again"
 
 MOST_HELD = 1e9
-"""Bytes that opening a dataset may take, and all that it says it holds, whatever the size of its file."""
+"""Limit of bytes that opening takes, and of stated content."""
 
 DEFLATED = 30.0
-"""How often its size a larger file may hold [1]; datasets of mostly holes are smaller than `MOST_HELD`."""
+"""Largest ratio of content to file size for files above `MOST_HELD`."""
 
 BARE_DIMENSION = b"This is a netCDF dimension but not a netCDF variable"
-"""What the name of an array begins with that is a dimension without labels, and never read."""
+"""Start of the name of a dimension without labels, which is never read."""
 
 OPENED_WITHIN = 4
-"""Seconds of the processor after which a file that is not open yet is taken to be damaged."""
+"""Processor seconds within which a file must open."""
 
 LONGEST_REASON = 200
-"""Most characters of an error that are shown."""
 
 
 def open(path: str | os.PathLike[str]) -> "xarray.DataTree":
@@ -92,7 +90,7 @@ def open(path: str | os.PathLike[str]) -> "xarray.DataTree":
 
 @contextmanager
 def lazily(path: str | os.PathLike[str]) -> "Iterator[xarray.DataTree]":
-    """Context of a dataset of which small arrays are in memory, and of large ones is read what is asked of them."""
+    """Context of a dataset with small arrays in memory and large ones read on demand."""
     from .lazy import LARGE_ARRAY
 
     with open(path) as tree:
@@ -104,10 +102,9 @@ def lazily(path: str | os.PathLike[str]) -> "Iterator[xarray.DataTree]":
 
 
 def check_opens(path: str | os.PathLike[str]) -> None:
-    """Refuse a file on which the library of netCDF ends a process or never comes to an end: a child opens it first.
+    """Open a file in a child process first, since netCDF may crash or hang on damaged files.
 
-    Commands can afford to know that; `open` cannot, in a process with threads and data of its user. Nothing is checked
-    where processes cannot be forked.
+    Only for commands: `open` may run in a process with threads. Without fork nothing is checked.
     """
     if not hasattr(os, "fork"):
         return
@@ -132,10 +129,9 @@ def check_opens(path: str | os.PathLike[str]) -> None:
 
 
 def check_links(path: Path) -> None:
-    """Refuse a file on which the library of netCDF would end this process, or never end, or look into other files.
+    """Refuse files on which netCDF would crash, hang or read other files, by looking with HDF5 alone.
 
-    So it does on some whose head is damaged, and where another program has changed the attributes by which arrays and
-    dimensions know each other. HDF5's own library says so in some milliseconds.
+    The attributes that link arrays and dimensions may be damaged or changed by another program.
     """
     import h5py
 
@@ -178,7 +174,7 @@ def check_links(path: Path) -> None:
 
 
 def _held(one: "h5py.h5d.DatasetID") -> int:
-    """Bytes of an array, or of a part of it that is read at once where that is more."""
+    """Bytes of an array, or of its largest chunk if that is more."""
     import h5py
 
     stored = one.get_create_plist()
@@ -187,13 +183,13 @@ def _held(one: "h5py.h5d.DatasetID") -> int:
 
 
 def most_of(path: Path) -> float:
-    """Bytes that the content of a file may take in memory."""
+    """Most bytes that a file may take in memory."""
     return max(MOST_HELD, DEFLATED * path.stat().st_size)
 
 
 @contextmanager
 def guarded(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Context in which a dataset that is not as springtune writes it is refused, whatever is tripped over.
+    """Context that turns any error on a damaged dataset into a refusal.
 
     Examples
     --------
@@ -218,7 +214,7 @@ def _said(error: Exception) -> str:
 
 
 def without_fields(data: "xarray.DataTree") -> str:
-    """Why a dataset has no networks of beams, and the remedy."""
+    """Return why a dataset has no networks of beams, and the remedy."""
     said = "the dataset has no group '/fields'"
     if data.variables:
         return f"{said}; add 'deformed' or 'paraview' to the outputs of the study, and run it"

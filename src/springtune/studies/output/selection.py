@@ -1,4 +1,4 @@
-"""What of a dataset a figure shows: its group, and the labels that it selects."""
+"""Select the group and labels that a figure shows."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def group(data: xr.DataTree | xr.Dataset, name: str, alone: bool = True) -> xr.Dataset:
-    """Dataset of a group: ``data`` itself unless it is a tree."""
+    """Dataset of a group; `data` itself if it is no tree."""
     if not isinstance(data, xr.DataTree):
         if not alone:
             raise ValueError(f"not only the group '/{name}' is plotted: give the whole dataset, an xarray.DataTree")
@@ -33,7 +33,7 @@ def group(data: xr.DataTree | xr.Dataset, name: str, alone: bool = True) -> xr.D
 
 
 def choose(present: xr.DataArray, **selection: Label | None) -> dict[str, Label | None]:
-    """Labels that a figure is of: those given, and those that leave no choice."""
+    """Labels of a figure: given ones, and those without alternative."""
     chosen = {name: label for name, label in selection.items() if name in present.dims}
     labels = {name: present[name].values.tolist() for name in chosen}
     there = present.values
@@ -58,9 +58,9 @@ def choose(present: xr.DataArray, **selection: Label | None) -> dict[str, Label 
 
 
 def last_swept(present: xr.DataArray, along: str = "") -> dict[str, xr.DataArray]:
-    """Of what a study sweeps, the last values that each beam, material and load has.
+    """Last swept values of each beam, material and load.
 
-    A figure that shows no sweep shows these: the largest force, under it the largest thickness, and so on.
+    Figures without a sweep show these: the largest force, then the largest thickness, and so on.
     """
     names = [str(name) for name in present.dims if name in SWEPT and name != along]
     if not names:
@@ -84,16 +84,16 @@ def last_swept(present: xr.DataArray, along: str = "") -> dict[str, xr.DataArray
 
 
 OF_FIELDS = "shown_"
-"""First letters of the variables of the group of fields that say of which values of what is swept the fields are."""
+"""Prefix of variables that hold the swept values of stored fields."""
 
 
 def unswept(root: xr.Dataset) -> xr.Dataset:
-    """Root of a dataset without what the study sweeps: each beam, material and load at its last values."""
+    """Root at the last swept values of each beam, material and load."""
     return at(root, last_swept(root.status != 0))
 
 
 def shown_swept(fields: xr.Dataset, root: xr.Dataset) -> dict[str, xr.DataArray]:
-    """Of what a study sweeps, the values that its whole fields are of."""
+    """Swept values of whole fields."""
     names = [name for name in SWEPT if name in root.dims and f"{OF_FIELDS}{name}" in fields]
     coordinates = [name for name in root.dims if name in SWEPT]
     # Nothing is kept of what has no value: any will do.
@@ -102,7 +102,7 @@ def shown_swept(fields: xr.Dataset, root: xr.Dataset) -> dict[str, xr.DataArray]
 
 
 def at(data: xr.Dataset, values: Mapping[str, xr.DataArray]) -> xr.Dataset:
-    """Dataset at values of what is swept, each beam, material and load at its own."""
+    """Select swept values by beam, material and load."""
     chosen = {name: value for name, value in values.items() if name in data.dims}
     if not chosen:
         return data
@@ -119,13 +119,13 @@ def at(data: xr.Dataset, values: Mapping[str, xr.DataArray]) -> xr.Dataset:
 
 
 def labels_of(present: xr.DataArray, name: str) -> list[Label]:
-    """Labels of a dimension that have any cell present: list, in the dataset's order."""
+    """Labels of a dimension with any cell present, in dataset order."""
     there = present.any([dimension for dimension in present.dims if dimension != name])
     return there[name].values[there.values].tolist()
 
 
 def cells(present: xr.DataArray, names: Collection[str]) -> list[dict[str, Label]]:
-    """Labels of every cell present over some dimensions: list of dicts, the last name fastest."""
+    """Labels of present cells over some dimensions, the last name fastest."""
     there = present.any([dimension for dimension in present.dims if dimension not in names]).transpose(*names)
     labels = [there[name].values.tolist() for name in names]
     return [{name: labels[axis][place[axis]] for axis, name in enumerate(names)} for place in np.argwhere(there.values)]
@@ -136,7 +136,7 @@ def _listed(labels: Iterable[object]) -> str:
 
 
 def labelled_beam(data: xr.Dataset, name: str) -> str:
-    """A beam's name with what it measures, see `springtune.problem.geometry.beam_label`."""
+    """Beam name with its dimensions, see `springtune.problem.geometry.beam_label`."""
     if "beam_length" not in data:
         return str(name)
     found = data[["beam_length", "beam_height"]]

@@ -1,7 +1,7 @@
-"""What became of a study, in a few lines at the end of its run: solved, not solved and why, worst errors, where it is.
+"""Summary of a run: solved cells, failures with reasons, worst errors, result paths.
 
-`text` is written beside the dataset by the stage `collect`; Snakemake's process reads that and adds what it knows of
-the run (`ending`, `broken`), without xarray.
+The stage `collect` writes `text` beside the dataset; Snakemake's process adds facts of the run (`ending`, `broken`)
+without xarray.
 """
 
 import os
@@ -28,31 +28,28 @@ if TYPE_CHECKING:
     from ..config.model import Study
 
 FILE = "summary.txt"
-"""File beside the dataset."""
 
 NAMED = 3
-"""So many cells are named of those that share a status; more if fewer than two would be left out."""
+"""Cells named for each status; more if fewer than two would remain."""
 
 WORST = 8
-"""So many definitions are told with their worst error."""
+"""Most definitions with a worst error."""
 
 HOLES = "Not everything is solved"
-"""Beginning of the last line, where that is so."""
 
 SCENES = "/"
-"""Group of the scenes."""
 
 
 FINITE = "/finite_strain"
-"""Group of references at finite strain, which networks of nonlinear kinematics are compared with."""
+"""Group of references for nonlinear kinematics."""
 
 
 REFERRED = {"status", "reference_displacement", "reference_applies", "reference_message"}
-"""What a group has whose scenes are compared with references of small strain."""
+"""Variables of groups that compare scenes with small-strain references."""
 
 
 def text(groups: "Mapping[str, xr.Dataset]", title: str) -> str:
-    """What became of a study's cells."""
+    """Summarize a study's cells."""
     states = [state for name, data in groups.items() for state in _states(name, data)]
     rows = [[what, str(sum(found.values())), _parts(found)] for what, found, _ in states if found]
     lines = [title, "", aligned(rows, left=2, right=(1,))]
@@ -73,11 +70,10 @@ def text(groups: "Mapping[str, xr.Dataset]", title: str) -> str:
 
 
 Cells = list[tuple[str, str]]
-"""Labels and message of each cell."""
 
 
 def _states(name: str, data: "xr.Dataset") -> Iterator[tuple[str, dict[Status, int], dict[Status, Cells]]]:
-    """What each status of a group is of, how many cells have which flag, and those that are not solved."""
+    """For each status variable: its subject, counts by flag, and unsolved cells."""
     for variable in data.data_vars.values():
         label = str(variable.name)
         message = label.removesuffix("status") + "message"
@@ -107,7 +103,7 @@ def _parts(found: Mapping[Status, int]) -> str:
 
 
 def _labels(data: "xr.Dataset", dims: Sequence[object], place: Iterable[int]) -> str:
-    """Labels of a cell, as a reader writes them."""
+    """Labels of a cell for readers."""
     return ", ".join(_label(data[dim], number) for dim, number in zip(dims, place))
 
 
@@ -116,7 +112,7 @@ def _label(axis: "xr.DataArray", number: int) -> str:
 
 
 def _named(cells: Cells) -> Iterator[str]:
-    """Some of the cells with their reasons, of each reason one at first, and how many there are besides."""
+    """Some cells, first one for each reason, and the number of others."""
     reasons: dict[str, Cells] = {}
     for cell in cells:
         reasons.setdefault(without_numbers(cell[1]), []).append(cell)
@@ -129,7 +125,7 @@ def _named(cells: Cells) -> Iterator[str]:
 
 
 def _at_finite_strain(root: "xr.Dataset", finite: "xr.Dataset | None") -> "xr.DataArray | None":
-    """Errors of networks of nonlinear kinematics against finite strain, NaN for others; None without a reference."""
+    """Errors of nonlinear networks against finite strain, NaN elsewhere; None without a reference."""
     finite = None if finite is None else of_own_law(finite)
     if finite is None:
         return None
@@ -137,7 +133,7 @@ def _at_finite_strain(root: "xr.Dataset", finite: "xr.Dataset | None") -> "xr.Da
 
 
 def _worst(root: "xr.Dataset", finite: "xr.Dataset | None" = None) -> Iterator[str]:
-    """The largest error of each definition among the scenes that are solved and whose reference applies."""
+    """Largest error of each definition over solved scenes with a valid reference."""
     counted, errors = (root.status == Status.SOLVED) & (root.reference_applies == 1), root.deformation_error
     at_finite_strain = _at_finite_strain(root, finite)
     if at_finite_strain is not None:  # never a nonlinear network against small strain
@@ -167,7 +163,7 @@ def _worst(root: "xr.Dataset", finite: "xr.Dataset | None" = None) -> Iterator[s
 
 
 def _unreferenced(root: "xr.Dataset", called: str) -> Iterator[str]:
-    """References that are missing or do not apply, each with the scenes that have no error of their own for it."""
+    """Missing or inapplicable references with their scenes."""
     requested, there = root.status != Status.NOT_REQUESTED, root.reference_displacement.notnull()
     for scenes, what in (
         (requested & ~there, "without a reference, and so without an error"),
@@ -186,7 +182,7 @@ def _unreferenced(root: "xr.Dataset", called: str) -> Iterator[str]:
 
 
 def ending(study: "Study", plan: Plan, since: float) -> str:
-    """What to say at the end of a run that finished."""
+    """Report at the end of a successful run."""
     new, took = _computed(study, plan, since), clock(time.time() - since)
     rows = [["new", new], ["took", took], ["results", _places(plan.folder)]]
     aside = [path for path in plan.folder.rglob(f"*{ASIDE}") if path.stat().st_ctime >= since]
@@ -196,7 +192,7 @@ def ending(study: "Study", plan: Plan, since: float) -> str:
 
 
 def broken(study: "Study", plan: Plan, since: float) -> str:
-    """What to say at the end of a run of which a job failed."""
+    """Report at the end of a failed run."""
     _, logs = _undone(plan, since)
     lines = [f"{study.name} is not complete: a job failed or was stopped."]
     for path in logs:
@@ -206,7 +202,7 @@ def broken(study: "Study", plan: Plan, since: float) -> str:
 
 
 def beside(study: "Study", plan: Plan, since: float) -> str:
-    """What to say of a study that was run besides, for the paper."""
+    """Report on a study that the paper needed."""
     undone, logs = _undone(plan, since)
     lines = [f"new in {study.name}: {_computed(study, plan, since)}"]
     lines += [f"  not complete: {', '.join(undone)}"] if undone else []
@@ -214,7 +210,7 @@ def beside(study: "Study", plan: Plan, since: float) -> str:
 
 
 def _last(log: Path) -> str:
-    """What a job said last: why it failed."""
+    """Last line of a job's log."""
     said = [line for line in log.read_text(errors="replace").splitlines() if line.strip()]
     if said:
         return said[-1].strip()
@@ -224,7 +220,7 @@ def _last(log: Path) -> str:
 
 
 def _undone(plan: Plan, since: float) -> tuple[list[str], list[Path]]:
-    """Bundles that are not done, and logs of jobs that this run began and that made nothing."""
+    """Unfinished bundles, and logs of jobs that failed in this run."""
     folder = plan.folder
     undone = [name for name in plan.jobs if not plan.record(name).exists()]
     missing = set(undone)
@@ -238,7 +234,7 @@ def _undone(plan: Plan, since: float) -> tuple[list[str], list[Path]]:
 
 
 def reminder(folder: Path) -> str:
-    """What to say of a study of which everything is made already."""
+    """Report if nothing was to do."""
     try:
         lines = (folder / FILE).read_text().splitlines()
     except OSError:
@@ -248,21 +244,18 @@ def reminder(folder: Path) -> str:
 
 
 def _time(path: Path) -> float:
-    """When a file was last changed; minus infinity where there is none."""
+    """Modification time; minus infinity if missing."""
     return path.stat().st_mtime if path.exists() else float("-inf")
 
 
 def _done(record: Path) -> float:
-    """When a job last made something; minus infinity where it did not.
-
-    A file that is made again for another job leaves the time of its own job's record as it was.
-    """
+    """Time of a job's last product, from its record; minus infinity if it made none."""
     made = (checked_json.read(record, products=dict) or {"products": {}})["products"].values()
     return max([_time(record), *(state[1] / 1e9 for state in made if state)])
 
 
 def _stored(study: "Study", plan: Plan) -> str:
-    """The text beside the dataset, if it is of what the stages made."""
+    """Stored summary, if it is up to date."""
     path = plan.folder / FILE
     if not path.exists():
         return f"{study.title}\n\nThere is no dataset yet.\n"
@@ -272,7 +265,7 @@ def _stored(study: "Study", plan: Plan) -> str:
 
 
 def _computed(study: "Study", plan: Plan, since: float) -> str:
-    """What a run computed, stage by stage, what it made again, and what was there before."""
+    """Counts of computed, repeated and reused results by stage."""
     new: dict[str, int] = {}
     asked: dict[str, int] = {}
     for name, job in plan.jobs.items():
@@ -293,7 +286,7 @@ def _computed(study: "Study", plan: Plan, since: float) -> str:
 
 
 def _places(folder: Path) -> str:
-    """Results that are there, those first that are looked at first."""
+    """Existing results, most useful first."""
     files = ("paper.pdf", "index.html", "dataset.nc", "tables/index.html")
     names = [name for name in files if (folder / name).exists()]
     names += [f"{name}/" for name in ("figures", "tables", "paraview", "meshes") if (folder / name).is_dir()]

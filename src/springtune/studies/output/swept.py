@@ -1,4 +1,4 @@
-"""Parameters that one study sweeps and another one states once: dimensions of both, so that scenes can be matched."""
+"""Turn parameters that only some studies sweep into dimensions of all."""
 
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
@@ -13,7 +13,7 @@ from .flags import nothing
 
 
 def with_swept(trees: Sequence[xr.DataTree]) -> list[xr.DataTree]:
-    """Datasets that have a dimension for each parameter that any of them sweeps."""
+    """Add a dimension for each parameter that any dataset sweeps."""
     made = [*trees]
     for name in SWEPT:
         sweeping = [tree for tree in trees if name in tree.dims]
@@ -35,7 +35,7 @@ def with_swept(trees: Sequence[xr.DataTree]) -> list[xr.DataTree]:
 
 
 def _stated(tree: xr.DataTree, name: str) -> xr.DataArray | None:
-    """What a study states for a parameter, over what it depends on; None where it does not say."""
+    """A study's value of a parameter over its dimensions; None if unstated."""
     if name in UNCHANGED:
         return xr.DataArray(UNCHANGED[name])
     found = tree.to_dataset().get(STATED[name])
@@ -49,7 +49,7 @@ def _swept(
     attributes: Mapping[Any, Any],
     over: Collection[tuple[str, str]],
 ) -> xr.DataTree:
-    """A dataset with one more dimension, which the variables `over`, of path and name, have."""
+    """Add a dimension to the variables `over`, pairs of path and name."""
     known = np.unique(stated.values[np.isfinite(stated.values)])
     if not len(known):
         return tree

@@ -1,4 +1,4 @@
-"""Rows of tables: cells of a dataset, CSV and Markdown."""
+"""Table rows as CSV and Markdown."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def cells_with_values(values: xr.DataArray, dimensions: Sequence[str]) -> Iterator[dict[str, Label]]:
-    """Labels of the cells that have a value."""
+    """Labels of cells with values."""
     stacked = values.transpose(*dimensions)
     labels = [stacked[name].values.tolist() for name in dimensions]
     for place in np.argwhere(np.isfinite(stacked.values)):
@@ -23,7 +23,7 @@ def cells_with_values(values: xr.DataArray, dimensions: Sequence[str]) -> Iterat
 
 
 def csv_text(rows: Sequence[Mapping[str, object]]) -> str:
-    """Rows as CSV; a number that is not there is an empty field."""
+    """Rows as CSV; missing numbers are empty."""
     text = io.StringIO()
     columns = list(dict.fromkeys(name for row in rows for name in row))
     writer = csv.DictWriter(text, columns, lineterminator="\n")
@@ -40,14 +40,9 @@ def _number(value: object) -> object:
 
 
 def decimals(values: Iterable[float], digits: int = 4, most: int = 8) -> int | None:
-    """Decimals with which the numbers of a column show so many significant digits.
+    """Decimals that show so many significant digits of a column; NaN is a missing number.
 
-    The largest number has as many, the smallest that is not zero at most one fewer. Points of a column stay in line.
-
-    Parameters
-    ----------
-    values : iterable of float
-        NaN where there is none.
+    The largest number has all of them, the smallest nonzero one at most one fewer.
     """
     sizes = np.abs(np.fromiter(values, dtype=float))
     sizes = sizes[np.isfinite(sizes) & (sizes > 0)]
@@ -59,7 +54,7 @@ def decimals(values: Iterable[float], digits: int = 4, most: int = 8) -> int | N
 
 
 def number(value: float, places: int | None, sign: bool = False) -> str:
-    """A number with decimals as `decimals` finds them; "–" where there is none."""
+    """Format a number by `decimals`; "–" if missing."""
     if not np.isfinite(value):
         return "–"
     text = f"{value:{'+' if sign else ''}{'.4g' if places is None else f'.{places}f'}}"
@@ -69,6 +64,6 @@ def number(value: float, places: int | None, sign: bool = False) -> str:
 
 
 def markdown_table(heads: list[str], rows: Iterable[list[str]]) -> list[str]:
-    """Lines of a table: texts in the first column, numbers flush right in the others."""
+    """Markdown lines: first column left, others right."""
     lines = [heads, ["---", *["---:"] * (len(heads) - 1)], *rows]
     return [f"| {' | '.join(line)} |" for line in lines]

@@ -9,12 +9,12 @@ from springtune.safe_io.escapes import shown
 
 
 def paragraphs(parts: Iterable[Iterable[str]]) -> str:
-    """Paragraphs of lines with an empty line between, each line one line on the terminal whatever values it has."""
+    """Join paragraphs of lines, escaping line breaks in values."""
     return "\n\n".join("\n".join(map(shown, lines)) for lines in parts)
 
 
 def aligned(rows: Iterable[Iterable[object]], left: int, right: Collection[int] = ()) -> str:
-    """Rows in columns, those in `right` flush right."""
+    """Align columns, those in `right` to the right."""
     texts = [[shown(cell) for cell in row] for row in rows]
     widths = [max(map(len, column)) for column in zip(*texts)]
     lines = []
@@ -27,7 +27,7 @@ def aligned(rows: Iterable[Iterable[object]], left: int, right: Collection[int] 
 
 
 def bytes_text(number: float) -> str:
-    """So many bytes, as people read them."""
+    """Bytes with a readable unit."""
     for unit in ("B", "kB", "MB"):
         if number < 1000:
             return f"{number:.3g} {unit}"
@@ -36,7 +36,7 @@ def bytes_text(number: float) -> str:
 
 
 def number_text(number: float, unit: str) -> str:
-    """A number with its unit, lengths in mm.
+    """Number with unit, lengths in mm.
 
     Examples
     --------
@@ -49,7 +49,7 @@ def number_text(number: float, unit: str) -> str:
 
 
 def label_text(dimension: str, label: object, unit: str = "1") -> str:
-    """A label of a dimension as people read it.
+    """Label of a dimension for readers.
 
     Examples
     --------
@@ -71,7 +71,7 @@ def label_text(dimension: str, label: object, unit: str = "1") -> str:
 
 
 def cell_text(labels: Mapping[str, object], units: Mapping[str, str]) -> str:
-    """Labels of a cell as people read them, by dimension as the units of numbers are."""
+    """Labels of a cell for readers; `units` are by dimension."""
     return ", ".join(label_text(name, label, units.get(name, "1")) for name, label in labels.items())
 
 
@@ -79,5 +79,5 @@ NUMBER = re.compile(r"[+-]?[0-9][0-9.]*(e[+-]?[0-9]+)?")
 
 
 def without_numbers(text: str) -> str:
-    """A message by which those are alike that differ in numbers alone."""
+    """Replace numbers, so that messages that differ only in them are equal."""
     return NUMBER.sub("#", text)

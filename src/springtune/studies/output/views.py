@@ -1,4 +1,4 @@
-"""What a page to browse shows of a group of the dataset, as a study kind declares it in its module ``views``."""
+"""Views of dataset groups on the browsing page; kinds declare them in ``views``."""
 
 from __future__ import annotations
 
@@ -12,22 +12,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Plot:
-    """One plot of a group: what stands along its axes. Dimensions that it does not name are for the reader to choose.
+    """A plot of a group; readers choose along unnamed dimensions.
 
-    Attributes
-    ----------
-    value : str
-        Variable that is plotted: up the axis of lines, by colour on a map.
-    by : str
-        Dimension with a line a label, or that of a map along y.
-    along : str
-        Dimension whose points a line joins, where `x` is a variable.
-    ascending : bool
-        Whether a line joins them in the order of `x`.
-    log : str
-        Logarithmic axes: ``"x"``, ``"y"`` or ``"xy"``. What is along a logarithmic axis is shown without its sign.
-    beside : tuple of tuple
-        Further lines, each the variable or dimension along x, the variable up the axis, and a name.
+    `value` is the plotted variable; `by` has one line a label, or is a map's y axis. A line joins the points `along` a
+    dimension if `x` is a variable, in the order of `x` if `ascending`. `log` names logarithmic axes ("x", "y", "xy"),
+    which show magnitudes. `beside` lists further lines as (x, variable, name).
     """
 
     title: str
@@ -45,14 +34,9 @@ class Plot:
 
 @dataclass(frozen=True)
 class View:
-    """View of a group.
+    """View of a group: its `plots`, the first shown first, and table `columns` for the root.
 
-    Attributes
-    ----------
-    plots : tuple of Plot
-        Plots to choose from, the first of them at the beginning; one whose variables are not there is left out.
-    columns : tuple of str
-        Variables in the columns of the table of cells, for the root.
+    Plots whose variables are missing are left out.
     """
 
     group: str

@@ -1,5 +1,5 @@
-"""A paper from datasets: its numbers, tables and figures by name, set with Typst."""
+"""Build a paper with Typst: numbers, tables and figures from datasets."""
 
 
 class PaperError(Exception):
-    """What is wrong with a paper's source or with the datasets that it reads."""
+    """A fault of a paper's source or datasets."""

@@ -1,4 +1,4 @@
-"""Build a paper: its numbers, tables and figures from datasets, then the PDF, with Typst."""
+"""Build a paper: numbers, tables, figures, then the PDF."""
 
 import os
 import sys
@@ -19,11 +19,7 @@ MAIN = "main.typ"
 
 
 def run(source: str | Path, folder: str | Path, output: str | Path, *paths: str | Path) -> None:
-    """Build a paper.
-
-    The same datasets and source give the same bytes: only fonts that Typst brings along are used, and no date is
-    written.
-    """
+    """Build a paper; the same inputs give the same bytes: Typst's own fonts, no date."""
     source, folder = Path(source), Path(folder)
     check_typst()
     _check_texts(source)
@@ -49,14 +45,14 @@ def run(source: str | Path, folder: str | Path, output: str | Path, *paths: str 
 
 
 def main(source: str, folder: str, output: str, record: str, digest: str, *paths: str) -> None:
-    """Build a paper and write the record of it."""
+    """Build a paper and write its record."""
     checksums = [records.checksum(path) for path in paths]
     run(source, folder, output, *paths)
     records.write(record, digest, [output], read=checksums)
 
 
 def typeset(source: Path, folder: Path) -> bytes:
-    """Set a paper whose numbers and figures are there."""
+    """Typeset a paper whose numbers and figures are made."""
     import typst
 
     source, folder = source.resolve(), folder.resolve()
@@ -72,7 +68,7 @@ def typeset(source: Path, folder: Path) -> bytes:
 
 
 def check_typst() -> None:
-    """Whether Typst is installed."""
+    """Raise if Typst is not installed."""
     if find_spec("typst") is None:
         raise PaperError('the paper is set with Typst, which is not installed: pip install "springtune[paper]"')
 
@@ -93,7 +89,7 @@ def _check_texts(source: Path) -> None:
 
 
 def _labels(datasets: Mapping[str, "Dataset"]) -> list[str]:
-    """Labels of all dimensions: what the text may call a beam or a definition."""
+    """Labels of all dimensions."""
     found = {str(label) for one in datasets.values() for name in ("beam", "definition", "mesh_type", "material")
              if name in one.tree.coords for label in one.tree.coords[name].values}  # fmt: skip
     return sorted(found)

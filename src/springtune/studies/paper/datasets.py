@@ -1,4 +1,4 @@
-"""The datasets that a paper reads, by the names of their studies."""
+"""Datasets of a paper by study name."""
 
 import hashlib
 import json
@@ -15,18 +15,11 @@ if TYPE_CHECKING:
     import xarray as xr
 
 HASH_SHOWN = 12
-"""Digits of a hash that are shown."""
 
 
 @dataclass(frozen=True)
 class Dataset:
-    """A dataset in memory, with where it came from.
-
-    Attributes
-    ----------
-    sha256 : str
-        Hash of the file's bytes: times and seconds in it count, too.
-    """
+    """A dataset in memory with its origin; `sha256` includes stored run times."""
 
     path: Path
     tree: "xr.DataTree"
@@ -38,7 +31,7 @@ class Dataset:
         return str(self.tree.attrs["study"])
 
     def origin(self) -> dict[str, object]:
-        """What a statement on reproducibility says of it."""
+        """Facts for a statement on reproducibility."""
         attributes = self.tree.attrs
         return {
             "study": self.study,

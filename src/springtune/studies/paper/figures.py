@@ -1,7 +1,6 @@
-"""Figures of a paper: what the library plots, put together at the paper's width.
+"""Figures of a paper, declared in ``figures.yaml``.
 
-``figures.yaml`` declares them: a size and panels, each a public function that plots, a study and a selection; or a
-script of ``examples/`` that draws one from formulas, without a dataset.
+A figure has panels, each a plot function with study and selection, or is drawn by a script of ``examples/``.
 """
 
 import io
@@ -24,13 +23,7 @@ if TYPE_CHECKING:
 
 
 class Panel(BaseModel):
-    """A part of a figure.
-
-    Attributes
-    ----------
-    plot : str
-        Public function of springtune that plots, such as ``plot_sensitivity``, or a sketch of `SKETCHES`.
-    """
+    """A panel; `plot` is a public plot function such as ``plot_sensitivity``, or of `SKETCHES`."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -42,12 +35,8 @@ class Panel(BaseModel):
 class Drawing(BaseModel):
     """Declaration of a figure.
 
-    Attributes
-    ----------
-    size : tuple of float, optional
-        Width and height [inch]; may be left out where one panel is plotted as it is by itself.
-    example : str
-        In place of panels: stem of a script whose ``main`` leaves one figure open.
+    `size` [inch] may be left out for one panel. `example` names a script whose ``main`` leaves one figure open, in
+    place of panels.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -103,7 +92,7 @@ def _pdf(drawing: Drawing, datasets: Mapping[str, Dataset], name: str, examples:
 
 
 def _drawn(script: Path, name: str) -> Any:
-    """The figure that an example leaves open."""
+    """Figure that an example leaves open."""
     import matplotlib.pyplot as plt
 
     if not script.is_file():
@@ -128,7 +117,7 @@ def _plot(plot: str, name: str) -> Callable[..., object]:
 
 
 def _origin(drawing: Drawing, datasets: Mapping[str, Dataset], name: str) -> str:
-    """Selections of the panels, a study's together, and the hash of each dataset; or the script."""
+    """Panel selections by study with hashes of datasets, or the script."""
     if drawing.example:
         return f"none, drawn by examples/{drawing.example}.py"
     told: dict[str, list[str]] = {}
@@ -154,7 +143,7 @@ def _label(key: str, value: object) -> str:
 
 
 def sketch_block(tree: Any, part: "SubFigure", *, beam: str) -> None:
-    """A block whose lower long side is held and whose upper one is pressed."""
+    """Draw a block, fixed below and pressed from above."""
     root = tree.to_dataset().sel(beam=beam)
     length, height = 1e3 * float(root.beam_length), 1e3 * float(root.beam_height)
     panel = part.subplots()
@@ -172,7 +161,7 @@ def sketch_block(tree: Any, part: "SubFigure", *, beam: str) -> None:
 
 
 def sketch_laying(tree: Any, part: "SubFigure") -> None:
-    """A strip above the trapezoid that it is to be laid on."""
+    """Draw a strip above the trapezoid that it is laid on."""
     laid, root = tree["laying"].to_dataset(), tree.to_dataset()
     x, y = 1e3 * laid.trapezoid_x.values, 1e3 * laid.trapezoid_y.values
     length, height = 1e3 * float(root.beam_length.max()), 1e3 * float(root.beam_height.max())
@@ -194,4 +183,3 @@ def sketch_laying(tree: Any, part: "SubFigure") -> None:
 
 
 SKETCHES: dict[str, Callable[..., object]] = {"sketch_block": sketch_block, "sketch_laying": sketch_laying}
-"""Drawings of set-ups, from the dimensions in a dataset."""

@@ -33,7 +33,7 @@ TEXT_UNITS = {
     "mN": ("N", 1e-3), "N": ("N", 1.0), "kN": ("N", 1e3), "N/m": ("N/m", 1.0), "N/mm": ("N/m", 1e3),
     "×10⁶ N/m": ("N/m", 1e6), "MPa": ("Pa", 1e6), "GPa": ("Pa", 1e9), "J": ("J", 1.0), "MB": ("byte", 1e6),
 }  # fmt: skip
-"""Units that a paper shows: the dataset's unit, and how many of that."""
+"""Text units: the dataset's unit and the factor."""
 
 Selection = Annotated[list[dict[str, Any]], BeforeValidator(lambda at: at if isinstance(at, list) else [at])]
 
@@ -44,34 +44,18 @@ REDUCTIONS: dict[str, Callable[[np.ndarray], float]] = {
     "largest": np.max,
     "count": len,
 }
-"""What makes one number of several cells; cells without a value are left out."""
+"""Reductions of several cells, without empty ones."""
 
 
 class Number(BaseModel):
     """Declaration of a number.
 
-    Attributes
-    ----------
-    study, variable : str
-        Study, and variable or coordinate with its group, such as ``sensitivity/best_stiffness``.
-    at : dict or list of dict
-        Labels by dimension, a list of them for several; of a list of dicts the cells together count.
-    over : str
-        Variable of the same group that it is divided by.
-    where : str
-        A variable of flags and what it must be, or must not: ``status=unstable``, ``status!=not_requested``.
-    reduce : str
-        Key of `REDUCTIONS`, where the labels leave several cells.
-    cells : int, optional
-        How many cells must have a value, where a reduction over fewer would mislead.
-    formula : str
-        In place of a variable: of other numbers, in SI units.
-    optional : bool
-        Whether the text has a branch for the case that it is not there.
-    marks : dict of str to str
-        Mark by the variable that sets it: a text that is not empty, or a status that is not ``solved``.
-    title, group : str
-        Of rows and columns of tables; ``{beam}`` stands for its label.
+    `variable` includes its group, as in ``sensitivity/best_stiffness``. `at` maps dimensions to labels; cells of a list
+    of such mappings count together. `over` names a divisor of the same group. `where` tests flags: ``status=unstable``,
+    ``status!=not_requested``. `reduce` is of `REDUCTIONS`, and `cells` the number of values that it needs. `formula`
+    computes from other numbers in SI units, in place of a variable. `optional` numbers may be missing. `marks` maps a
+    mark to a variable whose text or status sets it. `title` and `group` belong to tables; ``{beam}`` stands for its
+    label.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -96,7 +80,7 @@ class Number(BaseModel):
     group: str = ""
 
     def text(self, value: float) -> str:
-        """A value, formatted, without its unit."""
+        """Format a value without its unit."""
         value = value / TEXT_UNITS[self.unit][1]
         if self.figures is not None:
             text = _significant(value, self.figures)
@@ -109,7 +93,7 @@ class Number(BaseModel):
         return text.replace("-", "−")
 
     def source(self) -> str:
-        """Where it comes from, in words."""
+        """Describe the source."""
         if self.formula:
             return self.formula
         labels = "; ".join(", ".join(f"{name}={label}" for name, label in at.items()) for at in self.at)
@@ -117,7 +101,7 @@ class Number(BaseModel):
 
 
 class Printed(BaseModel):
-    """A number that another publication prints."""
+    """A number from another publication."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -127,13 +111,7 @@ class Printed(BaseModel):
 
 
 class Table(BaseModel):
-    """Declaration of a table: what all its cells share, rows and columns.
-
-    Attributes
-    ----------
-    rows, columns : list of dict
-        Declarations that are put on top of it, with ``title`` and ``group``.
-    """
+    """Declaration of a table; `rows` and `columns` override its common entries."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -151,7 +129,7 @@ def load(path: Path) -> dict[str, Any]:
 
 
 def numbers(declared: Mapping[str, Any], printed: Mapping[str, Any], datasets: Mapping[str, Dataset]) -> dict[str, Any]:
-    """All numbers of a paper."""
+    """Evaluate all numbers of a paper."""
     twice = sorted(set(declared) & set(printed))
     if twice:
         raise PaperError(f"{', '.join(twice)}: declared twice, in numbers.yaml and printed.yaml; rename one")
@@ -186,7 +164,7 @@ def _read(number: Number, found: Mapping[str, Any], datasets: Mapping[str, Datas
 
 
 def table(declared: Mapping[str, Any], datasets: Mapping[str, Dataset], name: str) -> dict[str, Any]:
-    """A table of a paper: titles and formatted cells."""
+    """Evaluate a table: titles and formatted cells."""
     made = checked(Table, declared, name)
     columns = [checked(Number, entry, name) for entry in made.columns]
     rows, studies = [], set()
@@ -203,7 +181,7 @@ def table(declared: Mapping[str, Any], datasets: Mapping[str, Dataset], name: st
 
 
 def checked(model: type[Any], entry: object, name: str) -> Any:
-    """A declaration, validated."""
+    """Validate a declaration."""
     try:
         return model.model_validate(entry)
     except ValidationError as error:
@@ -221,14 +199,14 @@ def _together(*parts: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _without(number: Number, datasets: Mapping[str, Dataset], name: str) -> Number:
-    """A cell's declaration without labels of dimensions that its variable does not have, but its dataset has."""
+    """Drop labels of dimensions that the variable lacks but its dataset has."""
     data, variable = _group(number, datasets, name)
     kept = [dimension for dimension in number.at[0] if dimension in data[variable].dims or dimension not in data.dims]
     return number.model_copy(update={"at": [{dimension: number.at[0][dimension] for dimension in kept}]})
 
 
 def _titled(text: str, number: Number) -> str:
-    """A title with labels put in: a mesh size in mm, others as they are."""
+    """Fill labels into a title, mesh sizes in mm."""
     for name, label in number.at[0].items():
         shown = f"{1e3 * label:g} mm" if name == "mesh_size" else f"{label}"
         text = text.replace(f"{{{name}}}", shown)
@@ -257,7 +235,7 @@ def _group(number: Number, datasets: Mapping[str, Dataset], name: str) -> tuple[
 
 
 def _units(number: Number, data: xr.Dataset, variable: str, name: str) -> str:
-    """Units of a variable: its own, or where its cells have several, those of the cells that are chosen."""
+    """Units of a variable, or of its chosen cells if they differ."""
     array = data[variable]
     if "units_variable" not in array.attrs:
         return str(array.attrs.get("units", ""))
@@ -324,7 +302,7 @@ def _value(number: Number, datasets: Mapping[str, Dataset], name: str) -> float:
 
 
 def _flag(where: str) -> tuple[str, bool, str]:
-    """Variable, whether it is to be equal, and to what."""
+    """Split a condition into variable, equality and value."""
     variable, _, wanted = where.partition("=")
     return variable.rstrip("!"), not variable.endswith("!"), wanted
 
@@ -344,7 +322,7 @@ def _marks(number: Number, datasets: Mapping[str, Dataset], name: str) -> str:
 
 
 def _lacking(number: Number, datasets: Mapping[str, Dataset], name: str) -> str:
-    """Message on a number that is not there: what was looked for, what the dataset says of it, and the remedy."""
+    """Message on a missing number: request, state in the dataset, remedy."""
     if number.formula:
         return f"{name}: the formula '{number.formula}' has no value"
     data, variable = _group(number, datasets, name)
@@ -371,7 +349,7 @@ _FUNCTIONS: dict[str, Callable[..., float]] = {"abs": abs, "max": max, "min": mi
 
 
 def _formula(text: str, found: Mapping[str, Any], name: str) -> float:
-    """Value of a formula: arithmetic of numbers that stand above it, NaN where one of them is not there."""
+    """Evaluate arithmetic of earlier numbers; NaN if one is missing."""
 
     def value(node: ast.AST) -> float:
         match node:
@@ -405,7 +383,7 @@ _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def _significant(value: float, figures: int) -> str:
-    """A number with significant digits, with a power of ten where it is far from one."""
+    """Format significant digits, with a power of ten far from one."""
     mantissa, _, power = f"{value:.{figures - 1}e}".partition("e")
     exponent = int(power)
     if -4 <= exponent < 5:

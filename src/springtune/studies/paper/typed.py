@@ -1,16 +1,14 @@
-r"""Numbers that were typed into a paper's text in place of being read from a dataset.
+r"""Find numbers typed into a paper's Typst text in place of dataset values.
 
-The text of a paper is Typst. Outside of formulas no digit may stand in it but in names (``2-D``, ``P1``, a label such
-as ``@tab-1``) and after *Table*, *Figure*, *Equation* or *section*, where another text is referred to. A formula may
-hold whole numbers of one digit: they belong to its structure, as in :math:`2 k / \sqrt 3`. Arguments of the functions
-of `FUNCTIONS` are names, not text.
+Digits are allowed in names (``2-D``, ``P1``, ``@tab-1``), after *Table*, *Figure*, *Equation* and *section*, and in
+arguments of `FUNCTIONS`. Formulas may hold one-digit integers, as :math:`2 k / \sqrt 3`.
 """
 
 import re
 from collections.abc import Iterator
 
 FUNCTIONS = ("beam", "drawing", "has", "n", "named", "range", "tabular", "v")
-"""Functions of the template whose arguments are names, or layout."""
+"""Template functions whose arguments are names or layout."""
 
 _BLANKED = (
     re.compile(r"/\*.*?\*/", re.DOTALL),
@@ -32,12 +30,12 @@ _NUMBER = re.compile(r"\d[\d.,]*(?:\s*%|\s*[a-zA-Zµ°]+\b)?")
 
 
 def _blank(found: re.Match[str]) -> str:
-    """As many lines, nothing on them."""
+    """Replace a match by empty lines."""
     return re.sub(r"[^\n]", " ", found.group())
 
 
 def typed_numbers(text: str) -> Iterator[tuple[int, str]]:
-    """Numbers that stand in a text.
+    """Yield typed numbers with their lines.
 
     Examples
     --------

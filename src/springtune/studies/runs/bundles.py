@@ -1,10 +1,8 @@
-"""Which tasks share a job: bundles of about equal cost, by what such tasks have cost on this machine.
+"""Share tasks out to jobs of about equal cost, by measured costs on this machine.
 
-One process a scene would be all start-up, so tasks are put together until start-up is a small share of a job. Jobs say
-what their tasks cost (`task_costs`), the stage `collect` adds that up over studies (`remember`), and the
-next bundles are made by it. A bundle once made keeps its tasks as long as the study asks for them: only what is new is
-shared out. On a cluster a job waits in a queue before it starts, and is to last for the minutes that its profile says;
-what it asks the cluster for is in `Needs`.
+Tasks are bundled until start-up is a small share of a job. A bundle keeps its tasks while the study requests them; only
+new tasks are shared out. On a cluster a job lasts for the minutes that its profile states, and `Needs` requests its
+time and memory.
 """
 
 from collections import defaultdict
@@ -17,38 +15,35 @@ from typing import Any
 from . import checked_json
 
 Usual = Mapping[str, tuple[float, float]]
-"""Seconds of a task by its name: in any case, and per unit."""
+"""Seconds of a task by name: fixed, and per unit."""
 
 START_UP = 0.25
-"""Seconds of imports of a job before any was measured."""
+"""Seconds of imports of a job before any is measured."""
 
 SPAWNED = 0.25
-"""Seconds of a job's start-up that it does not see: Snakemake's share, the shell's, and those of an interpreter."""
+"""Seconds of start-up that a job cannot measure: Snakemake, shell and interpreter."""
 
 START_SHARE = 0.05
-"""Share of a job that its start-up may take."""
+"""Share of a job's time that start-up may take."""
 
 QUEUED = 300.0
-"""Seconds that a job on a cluster may take besides its work: interpreters start twice, from a filesystem that others
-read from, too."""
+"""Seconds that a cluster job may take besides its work: interpreters start twice, on a shared filesystem."""
 
 TIME_MARGIN, MEMORY_MARGIN = 3.0, 1.5
-"""How much more a job asks a cluster for than it is expected to need: nodes may be slower, meshes finer than before."""
+"""Factors on expected needs: nodes may be slower, meshes finer."""
 
 MEMORY, LEAST_MEMORY = 2e9, 1e9
-"""Bytes that a job asks for before any was measured, and at least: a core of a cluster has as many, and asking for less
-gains nothing."""
+"""Bytes requested before any are measured, and at least: cores of clusters have that much."""
 
 FORGET = 0.5
-"""Share of the memory of before that jobs are still expected to need if they needed less: one small run does not make
-all that follow ask for too little."""
+"""Share of former memory kept if jobs needed less: one small run must not lower all requests."""
 
 REMEMBERED = 20
-"""A machine's costs follow the last jobs: those before count as at most so many times the work of the last run."""
+"""Weight limit of former jobs, in multiples of the last run's work."""
 
 
 class Costs:
-    """What tasks cost on this machine.
+    """Measured costs of tasks on this machine.
 
     Examples
     --------
@@ -72,13 +67,7 @@ class Costs:
 
 @dataclass(frozen=True)
 class Needs:
-    """What a job asks a cluster for.
-
-    Attributes
-    ----------
-    memory : float
-        Bytes that it is expected to need; 0 where nothing like it was measured.
-    """
+    """Resources that a job requests from a cluster; expected `memory` [byte] is 0 if unmeasured."""
 
     seconds: float
     memory: float = 0.0
@@ -95,7 +84,7 @@ class Needs:
         return ceil((QUEUED + TIME_MARGIN * self.seconds) / 60) * 2 ** (attempt - 1)
 
     def megabytes(self, attempt: int) -> int:
-        """Memory beyond which the cluster may end the job [MB].
+        """Memory limit of the job [MB].
 
         Examples
         --------
@@ -113,7 +102,7 @@ def _usual(usual: Usual, kind: str, count: float, units: float) -> float:
 
 
 def remember(path: Path, done: Iterable[Path], usual: Usual) -> None:
-    """Add what the jobs of a run did to what is known of the machine."""
+    """Add the costs of a run's jobs to those of the machine."""
     known = checked_json.read(path, kinds=dict)
     since = path.stat().st_mtime if known else 0.0
     known = known or {"kinds": {}}
@@ -137,7 +126,7 @@ def remember(path: Path, done: Iterable[Path], usual: Usual) -> None:
 
 
 def _memory(before: Mapping[str, float], found: Iterable[tuple[str, Any]]) -> dict[str, float]:
-    """Largest memory of a job by its stage: by those of a run that computed anything, and of before."""
+    """Largest job memory by stage, over this run and former ones."""
     now: dict[str, float] = {}
     for name, note in found:
         if note and note.get("work"):
@@ -149,7 +138,7 @@ def _memory(before: Mapping[str, float], found: Iterable[tuple[str, Any]]) -> di
 def share_out(
     costs: Mapping[str, float], cores: int, start_up: float, before: Mapping[str, list[str]], lasting: float = 0.0
 ) -> dict[str, list[str]]:
-    """Bundles of about equal cost.
+    """Share tasks out in bundles of about equal cost.
 
     Examples
     --------
@@ -182,7 +171,7 @@ def share_out(
 
 
 def beside(kept: Mapping[str, list[str]], shared: Mapping[str, list[str]]) -> dict[str, list[str]]:
-    """Bundles and others, which get labels that are free.
+    """Join kept bundles with new ones under free labels.
 
     Examples
     --------
@@ -195,7 +184,7 @@ def beside(kept: Mapping[str, list[str]], shared: Mapping[str, list[str]]) -> di
 
 
 def _number(seconds: float, size: float, start_up: float, cores: int, most: int) -> int:
-    """Number of bundles for so many seconds of work: as many on each core, if there are more than cores."""
+    """Number of bundles for some work: a multiple of the cores beyond one each."""
     count = round(seconds / size)
     if count > cores:
         count = cores * ceil(count / cores)

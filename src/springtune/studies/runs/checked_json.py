@@ -1,8 +1,4 @@
-"""Notes that jobs and runs leave for each other: JSON files with a checksum.
-
-Whoever reads one gets what was written, or nothing: a note that was cut short, changed or emptied is as good as none,
-and all of them can be made again.
-"""
+"""JSON notes between jobs, with a checksum; a damaged note reads as missing."""
 
 import hashlib
 import json
@@ -14,11 +10,10 @@ from springtune.safe_io import atomic
 from .damage import DamagedError
 
 PREFIX, BETWEEN, SUFFIX = b'{"seal": "', b'",\n"content": ', b"\n}\n"
-"""What stands around the checksum and the content."""
 
 
 def write(path: str | Path, content: Any) -> None:
-    """Write a note; it appears whole or not at all.
+    """Write a note atomically.
 
     Examples
     --------
@@ -33,7 +28,7 @@ def write(path: str | Path, content: Any) -> None:
 
 
 def read(path: str | Path, **parts: type) -> Any:
-    """Content of a note.
+    """Content of a note, or None if it is damaged.
 
     Examples
     --------
@@ -58,7 +53,7 @@ def read(path: str | Path, **parts: type) -> Any:
 
 
 def demand(path: str | Path) -> Any:
-    """Content of a note that a job has written."""
+    """Content of a note that must exist."""
     content = read(path)
     if content is None:
         raise DamagedError(path, "its checksum is not that of its content" if Path(path).exists() else "it is missing")

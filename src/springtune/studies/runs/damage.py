@@ -1,15 +1,14 @@
-"""Stored files that are not what was written."""
+"""Handling of damaged stored files."""
 
 import sys
 from contextlib import suppress
 from pathlib import Path
 
 ASIDE = ".damaged"
-"""Ending of the name of a file that is not what was written, after its own."""
 
 
 class DamagedError(Exception):
-    """A stored file is not what was written, or is not there."""
+    """A stored file is damaged or missing."""
 
     def __init__(self, path: str | Path, why: str, whole: bool = False) -> None:
         super().__init__(f"{path}: {why}")
@@ -17,7 +16,7 @@ class DamagedError(Exception):
 
 
 def rename(path: Path) -> Path:
-    """Give a damaged file the name under which it is kept."""
+    """Rename a damaged file so that it is kept."""
     aside = path.with_name(path.name + ASIDE)
     with suppress(FileNotFoundError):  # another job was quicker
         path.replace(aside)
@@ -25,10 +24,7 @@ def rename(path: Path) -> Path:
 
 
 def set_aside(error: DamagedError) -> None:
-    """Give a damaged file another name and say so; what it held is computed again.
-
-    One that is whole keeps its name: it gets what it lacks.
-    """
+    """Rename a damaged file and report it; a whole file keeps its name and gets what it lacks."""
     told = "computed again"
     if error.path.exists() and not error.whole:
         told = f"set aside as {rename(error.path).name}, and computed again"

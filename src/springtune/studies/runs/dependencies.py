@@ -1,13 +1,12 @@
-"""Which code and which packages a result is computed by, found in the source.
+"""Find the code and packages that a result depends on, in the source.
 
-Snakemake does not see edits of an imported package, and taking the whole package as input would solve everything
-again after an edit of a plot. So what a module computes depends on the modules that it imports, directly or not, and on
-the packages that these import. All imports count that can run, those inside of functions and of ``try`` included; what
-type checkers alone read does not. Of a package's ``__init__`` that only imports, the names asked for are followed, not
-all that it has.
+Snakemake does not see edits of imported packages, and the whole package as input would rerun everything. So a module's
+closure is all modules that it imports, directly or not, and their packages. All imports that can run count, also inside
+functions and ``try``; type-checking imports do not. Of an ``__init__`` that only imports, only the requested names are
+followed.
 
-What is imported by its name as a text is not seen. Definitions and mesh types are such: they count where they are
-chosen (`definition_closure`, `mesh_type_closure`); so do the modules of outputs, which the rules name.
+Imports by a name in a text are not seen. Definitions and mesh types are added where they are chosen
+(`definition_closure`, `mesh_type_closure`); the rules name the modules of outputs.
 """
 
 import hashlib
@@ -39,23 +38,17 @@ NOT_COUNTED = {
     ("mesh/formats.py", "meshio"): "as of the store; `mesh_file_closure` counts it where a study's own file is read",
     ("units.py", "pint"): "what a study says with units is in the parameters as numbers",
 }
-"""Packages that modules use and that no result depends on, and why."""
+"""Packages that do not influence results, and why."""
 
 CODE_FILE = "code.json"
-"""File beside the studies' folders: what was read of the package's source."""
+"""Cache of parsed source, beside the folders of studies."""
 
 DISTRIBUTIONS = {"PIL": "pillow", "netgen": "netgen-mesher", "skfem": "scikit-fem", "yaml": "pyyaml"}
-"""Distributions of packages whose names differ; of those that are not here it is looked up, in a third of a second."""
+"""Distributions with another name than their package; looking one up takes a third of a second."""
 
 
 class Closure(NamedTuple):
-    """All that a module runs on.
-
-    Attributes
-    ----------
-    packages : tuple of str
-        Names of packages from elsewhere, as they are imported.
-    """
+    """Files and packages that a module depends on; `packages` are import names."""
 
     files: tuple[Path, ...]
     packages: tuple[str, ...]
@@ -63,7 +56,7 @@ class Closure(NamedTuple):
 
 
 class Code:
-    """Files of code, each read once."""
+    """Files of code, each parsed once."""
 
     def __init__(self, package: Path = PACKAGE) -> None:
         self.package = package
@@ -74,17 +67,17 @@ class Code:
 
     @property
     def files(self) -> frozenset[Path]:
-        """Files that closures were made of so far."""
+        """Files of all closures so far."""
         return frozenset(self._sources)
 
     def recall(self, path: Path) -> None:
-        """Take what was read before of files with the same content, which costs as much as half a plan."""
+        """Reuse cached source with the same content; parsing takes half of planning."""
         note = checked_json.read(path, sources=dict)
         if note is not None and note.get("reader") == READER:
             self._known = note["sources"]
 
     def remember(self, path: Path) -> None:
-        """Write down what was read of files of the package, for `recall`."""
+        """Write the cache for `recall`."""
         read_now = {
             _mark(file.read_bytes()): [source.digest, sorted(source.imports), source.face]
             for file, source in self._sources.items()
@@ -94,7 +87,7 @@ class Code:
             checked_json.write(path, {"reader": READER, "sources": read_now})
 
     def closure(self, start: Path, without: frozenset[Path] = frozenset(), counted: str = "") -> Closure:
-        """A file and all that it imports, directly or not."""
+        """A file and all its direct and indirect imports."""
         known = start, without, counted
         if known not in self._closures:
             found: set[Path] = set()
@@ -114,13 +107,13 @@ class Code:
         return self._closures[known]
 
     def union(self, closures: Iterable[Closure]) -> Closure:
-        """Closures as one."""
+        """Union of closures."""
         found = list(closures)
         files = {file for one in found for file in one.files}
         return self._closed(files, {package for one in found for package in one.packages})
 
     def of_text(self, text: str) -> Closure:
-        """What a text runs on that is in no file."""
+        """Closure of a text that is in no file."""
         try:
             source = read(textwrap.dedent(text), self.package.name)
         except SyntaxError:
@@ -150,7 +143,7 @@ class Code:
         return path.is_relative_to(self.package)
 
     def _imported(self, path: Path, imports: Iterable[Import]) -> tuple[set[Path], set[tuple[str, str]]]:
-        """Files that a file imports, and packages, each with the file as `NOT_COUNTED` names it."""
+        """Imported files, and packages with the importing file as in `NOT_COUNTED`."""
         files: set[Path] = set()
         packages: set[tuple[str, str]] = set()
         where = path.relative_to(self.package).as_posix() if self._has(path) else str(path)
@@ -163,7 +156,7 @@ class Code:
         return files, packages
 
     def _followed(self, path: Path, one: Import, faces: frozenset[Path] = frozenset()) -> list[Path | str]:
-        """Files that an import of a file reads through some faces, or the name of a package from elsewhere."""
+        """Files that an import reads through ``__init__`` files, or the name of an external package."""
         _, module, name = one
         place = self._place(path, *one[:2])
         if place is None:
@@ -183,7 +176,7 @@ class Code:
         return [found for found in (file if face is None or not below else None, below) if found]
 
     def _place(self, path: Path, level: int, module: str) -> Path | None:
-        """Where a module is, without an ending; None of a package from elsewhere."""
+        """Path of a module without ending; None for an external package."""
         parts = module.split(".") if module else []
         if level:
             return path.parents[level - 1].joinpath(*parts)
@@ -206,14 +199,13 @@ def _mark(content: bytes) -> str:
 
 
 READER = _mark(Path(syntax.__file__).read_bytes())
-"""What reads source: what was read by another one is not taken."""
+"""Digest of the parser; caches of other parsers are ignored."""
 
 OURS = Code()
-"""The code of springtune."""
 
 
 def modules(*names: str) -> tuple[str, ...]:
-    """Files that modules run on: their own and all that they import.
+    """Files of modules and all their imports.
 
     Examples
     --------
@@ -224,22 +216,22 @@ def modules(*names: str) -> tuple[str, ...]:
 
 
 def stage_closure(*names: str, without: tuple[str, ...] = ()) -> Closure:
-    """What modules run on, without definitions and mesh types that they may choose."""
+    """Closure of modules without the definitions and mesh types that they may choose."""
     return OURS.union(OURS.closure(_module(name), frozenset(map(_module, without))) for name in names)
 
 
 def definition_closure(name: str, code: Code = OURS) -> Closure:
-    """What a definition runs on: of this package, and from beside its file or elsewhere."""
+    """Closure of a definition, which may be outside this package."""
     return _declared_closure(DEFINITIONS[name], code)
 
 
 def mesh_type_closure(name: str) -> Closure:
-    """What a mesh type runs on, as `definition_closure`."""
+    """Closure of a mesh type."""
     return _declared_closure(MESH_TYPES[name], OURS)
 
 
 def mesh_file_closure() -> Closure:
-    """What meshes from files are read by, meshio included."""
+    """Closure of reading mesh files, with meshio."""
     return OURS.closure(_module("mesh.formats"), counted="meshio")
 
 
@@ -258,7 +250,7 @@ def _declared_closure(one: Declared, code: Code) -> Closure:
 
 @cache
 def distribution(package: str) -> str:
-    """Distribution that has a package.
+    """Distribution that contains a package.
 
     Examples
     --------
@@ -282,7 +274,7 @@ def _module(name: str) -> Path:
 
 @cache
 def _own(package: str) -> Path | None:
-    """Place of a package that no distribution has, such as one of the user's on Python's path."""
+    """Path of a package without distribution, such as one on PYTHONPATH."""
     from importlib.metadata import PackageNotFoundError, version
 
     try:
@@ -297,7 +289,7 @@ def _own(package: str) -> Path | None:
 
 @cache
 def _lazy_names() -> dict[str, str]:
-    """Modules of the names that `springtune` imports when they are asked for."""
+    """Modules of the names that `springtune` imports lazily."""
     places: dict[str, str] = vars(sys.modules[PACKAGE.name])["_PLACES"]
     return places
 

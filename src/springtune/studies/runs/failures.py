@@ -1,14 +1,13 @@
-"""What fails for reasons of its own, and what a broken program is."""
+"""Tell failed tasks from broken programs."""
 
 from springtune.mesh import MeshError
 from springtune.springs import DefinitionError
 
 REFUSALS = (DefinitionError, MeshError)
-"""What refuses a definition or a mesh; the message says it all."""
 
 
 def own_reason(error: Exception) -> str:
-    """Why a task has no result although the program is sound: it is a hole, and the others go on.
+    """Return the reason of a failed task, or an empty string if the program is broken.
 
     Examples
     --------

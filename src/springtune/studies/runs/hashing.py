@@ -1,4 +1,4 @@
-"""Hashes of what a result depends on."""
+"""Hashes of the inputs of results."""
 
 import hashlib
 import json
@@ -8,7 +8,7 @@ _ENCODER = json.JSONEncoder(sort_keys=True, separators=(",", ":"))
 
 
 def hash_of(*parts: Any) -> str:
-    """Hash of what a result depends on.
+    """Hash values, independent of the order of keys.
 
     Examples
     --------

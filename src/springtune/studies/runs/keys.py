@@ -1,6 +1,6 @@
-"""Keys of results: hashes of all that they depend on, code and packages included.
+"""Keys of results: hashes of all inputs, code and packages.
 
-Of Python itself the minor version counts: the sum of floats is another from 3.12 on, and compiled packages differ.
+Python's minor version counts: sums of floats change with 3.12, and compiled packages differ.
 """
 
 import os
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @cache
 def installed(distribution: str) -> str:
-    """Version of a distribution; "none" where it is an extra that is not there, or not wanted."""
+    """Version of a distribution; "none" if it is not installed or not wanted."""
     from importlib.metadata import PackageNotFoundError, version  # here: it costs as much as the rest of a key
 
     unused = distribution == "cvxopt" and os.environ.get("SPRINGTUNE_SOLVER") == "superlu"
@@ -33,17 +33,17 @@ def installed(distribution: str) -> str:
 
 @cache
 def stage_key(*modules: str, without: tuple[str, ...] = ()) -> str:
-    """What results of modules depend on besides their parameters: their code, and versions of the packages it uses."""
+    """Key of modules' code and the versions of their packages."""
     return code_key(dependencies.stage_closure(*modules, without=without))
 
 
 def definition_key(name: str) -> str:
-    """What springs of a definition depend on besides their parameters."""
+    """Key of a definition's code."""
     return code_key(dependencies.definition_closure(name))
 
 
 def mesh_type_key(name: str) -> str:
-    """What meshes of a type depend on besides their parameters, and those from files besides their content."""
+    """Key of a mesh type's code; for mesh files of the reader's."""
     if name not in MESH_TYPES:
         return code_key(dependencies.mesh_file_closure())
     return code_key(dependencies.mesh_type_closure(name))
@@ -51,20 +51,20 @@ def mesh_type_key(name: str) -> str:
 
 @cache
 def code_key(code: dependencies.Closure) -> str:
-    """Key of code, and of the versions of the packages that it uses."""
+    """Key of code and the versions of its packages."""
     versions = (f"{name} {installed(name)}" for name in map(dependencies.distribution, code.packages))
     return hash_of(code.digest, [f"python {sys.version_info[0]}.{sys.version_info[1]}", *sorted(set(versions))])
 
 
 @cache
 def beam_key(beam: "Beam") -> dict[str, Any]:
-    """What of a beam results depend on: a new label is not a new beam."""
+    """Properties of a beam that results depend on; its label is not one."""
     return asdict(beam) | {"name": ""}
 
 
 @cache
 def material_key(material: "Material", density: bool = False) -> dict[str, Any]:
-    """What of a material results depend on: statics depend on no density."""
+    """Properties of a material that results depend on; statics ignore density."""
     known = asdict(material) | {"name": ""}
     known.pop("test_errors", None)
     if not density:

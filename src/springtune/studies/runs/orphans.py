@@ -1,4 +1,4 @@
-"""What lies in a study's folder and nothing asks for any more: outputs and results of values that it no longer has."""
+"""Files in a study's folder that its current values no longer need."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,24 +15,22 @@ if TYPE_CHECKING:
     from ..config.model import Study
 
 JOB_FILES = {"tasks": ".json", "done": ".json", "logs": ".log", "benchmarks": ".tsv"}
-"""Folders of files that each job has one of, and how these end."""
 
 COLLECTED, PIECE = ".pvd", ".vtu"
-"""How files end of which ParaView opens many at once, and those that they name, in a folder beside them."""
+"""Endings of ParaView collections, and of their files in a folder beside."""
 
 OUTPUT_FILES = {
     "figures": tuple(f".{ending}" for ending in FORMATS),
     "tables": (".csv", ".html", ".md"),
     "paraview": (COLLECTED,),
 }
-"""Folders of outputs, and how their files end."""
 
 STORED = ".h5"
 """Ending of what stages store, see `springtune.studies.runs.store`."""
 
 
 def orphans(study: "Study", folder: Path) -> list[Path]:
-    """Files of the kinds that runs make which the study's next run neither makes nor reads."""
+    """Files of earlier runs that the next run neither makes nor reads."""
     planned = plan.plan(study, folder, 1)
     jobs = rerun.jobs(study, planned)
     products = [Path(path) for job in jobs.values() for path in job.products]

@@ -1,4 +1,4 @@
-"""Where a dataset comes from: attributes of its root."""
+"""Attributes of a dataset's root that state its origin."""
 
 import hashlib
 import json
@@ -32,19 +32,19 @@ SOFTWARE = (
 )
 
 LOCK = Path("requirements/run.txt")
-"""Versions that a checkout installs, beside the study or above it."""
+"""Lock file, beside the study or above it."""
 
 COMPARED_WITH_COMMIT = ("src", "Snakefile", "workflow/paper", "workflow/report", "workflow/rules")
-"""Package and rules, from the checkout on. Profiles are not among them: they may hold what is one user's own."""
+"""Compared files of the checkout; profiles may be a user's own."""
 
 CHANGED = "+changes"
-"""What `git_commit` ends with where files of the checkout differed from the commit."""
+"""Ending of `git_commit` if files differ from the commit."""
 
 LONGEST = 40_000
-"""Characters of a difference from the commit that are kept."""
+"""Most characters of the stored difference."""
 
 PRINTED = {"paper_tables.csv": "the paper Mass-Spring Parameters Definition in 2D for Simulation"}
-"""Where printed values are from, by the name of their file."""
+"""Sources of printed values by file name."""
 
 
 def attributes(study: Study, config: str | Path, untold: Collection[str] = ()) -> dict[str, str]:
@@ -73,7 +73,7 @@ def attributes(study: Study, config: str | Path, untold: Collection[str] = ()) -
 
 
 def _references(study: Study) -> dict[str, str]:
-    """Where the printed values are from; nothing where the dataset has none."""
+    """Sources of the printed values that the study uses."""
     cells = {(one.mesh.beam.name, one.mesh.mesh_type, one.material.name, one.load) for one in study.scenes}
     if not study.printed_path or not any(
         (one.beam, one.mesh_type, one.material, one.load) in cells for one in study.printed
@@ -84,19 +84,19 @@ def _references(study: Study) -> dict[str, str]:
 
 
 def inputs(study: Study, folder: Path) -> dict[str, str]:
-    """SHA-256 of each file that a study is made from, the versions of its software included."""
+    """SHA-256 of each input file, lock file included."""
     root = _checkout(folder)
     files = input_files(study) | ({root / LOCK} if root else set())
     return {_name(file.resolve(), root or folder): checksum(file) for file in sorted(files)}
 
 
 def _checkout(folder: Path) -> Path | None:
-    """The checkout that holds a folder."""
+    """Checkout that contains a folder."""
     return next((above for above in (folder, *folder.parents) if (above / LOCK).is_file()), None)
 
 
 def input_files(study: Study) -> set[Path]:
-    """The study's file, and all that it names: meshes, rows of parameters, tests, printed values."""
+    """The study's file and all files that it names."""
     files = {study.path, *study.test_files, *study.row_files}
     files |= {mesh.file for mesh in study.mesh_files.values() if mesh.file}
     files |= {study.printed_path} if study.printed_path else set()
@@ -104,17 +104,17 @@ def input_files(study: Study) -> set[Path]:
 
 
 def _name(file: Path, root: Path) -> str:
-    """Name of a file without what is the machine's own."""
+    """File name without parts that depend on the machine."""
     return file.relative_to(root).as_posix() if file.is_relative_to(root) else f"{file.parent.name}/{file.name}"
 
 
 def git_commit(folder: Path) -> str:
-    """Commit of the checkout that holds a folder, with `CHANGED` where files differ from it; empty outside of git."""
+    """Commit of the checkout, with `CHANGED` if files differ; empty outside of git."""
     return git(folder, "describe", "--always", "--abbrev=40", f"--dirty={CHANGED}", "--exclude=*").strip()
 
 
 def git_diff(study: Study, folder: Path) -> str:
-    """What differs from the commit, see `difference`; of a long text the beginning, and its SHA-256."""
+    """Difference from the commit; a long one is clipped and ends in its SHA-256."""
     # Whatever files are written in.
     text = difference(study, folder).encode(errors="surrogateescape").decode(errors="replace").replace("\0", "")
     if len(text) <= LONGEST:
@@ -125,10 +125,7 @@ def git_diff(study: Study, folder: Path) -> str:
 
 
 def difference(study: Study, folder: Path, *options: str) -> str:
-    """What of the package, the rules and the study's own files differs from the commit, and nothing else.
-
-    Files that git does not know are not part of it.
-    """
+    """Difference of package, rules and the study's files from the commit, without untracked files."""
     top, root = Path(git(folder, "rev-parse", "--show-toplevel").removesuffix("\n")), _checkout(folder)
     files = {file.resolve() for file in input_files(study)} | (
         {root / name for name in COMPARED_WITH_COMMIT} if root else set()
@@ -139,7 +136,7 @@ def difference(study: Study, folder: Path, *options: str) -> str:
 
 
 def git(folder: Path, *arguments: str) -> str:
-    """What git says in a folder, empty where it fails or is not there; bytes that are no UTF-8 are escaped."""
+    """Output of a git command, empty if it fails; bytes other than UTF-8 are escaped."""
     try:
         answer = subprocess.run(["git", *arguments], cwd=folder, capture_output=True, check=True)
     except (OSError, subprocess.CalledProcessError):

@@ -1,7 +1,6 @@
-"""Records: what a job did, and size, time and checksum of all that it made.
+"""Records of jobs: what each did, and size, time and checksum of its products.
 
-A run plans by them, whatever else it finds: a job is done if its record says that it did what is asked for now, and if
-what it made is still what it was.
+A job is done if its record matches the current request and its products are unchanged.
 """
 
 import hashlib
@@ -12,7 +11,7 @@ from typing import Any
 from . import checked_json
 
 MISSING, DAMAGED = " is missing", " is damaged"
-"""How a fault ends that begins with a file which is not as it was made."""
+"""Endings of faults, after the file's name."""
 
 
 def checksum(path: str | Path) -> str:
@@ -22,7 +21,7 @@ def checksum(path: str | Path) -> str:
 
 
 def write(path: str | Path, digest: str, products: Iterable[str | Path], **more: Any) -> None:
-    """Write the record of a job that is done."""
+    """Write the record of a finished job."""
     made: dict[str, list[Any] | None] = {}
     for product in map(Path, products):
         made[str(product)] = None
@@ -33,12 +32,12 @@ def write(path: str | Path, digest: str, products: Iterable[str | Path], **more:
 
 
 def fault(path: str | Path, digest: str, products: Iterable[str | Path], wholly: bool = False) -> str:
-    """Why a job is to run."""
+    """Return why a job must run, or an empty string."""
     return next(faults(path, digest, products, wholly), "")
 
 
 def faults(path: str | Path, digest: str, products: Iterable[str | Path], wholly: bool = False) -> Iterator[str]:
-    """All reasons for which a job is to run."""
+    """All reasons why a job must run."""
     path = Path(path)
     if not path.exists():
         yield "not done yet"

@@ -1,11 +1,8 @@
-"""Results of scenes on disk: one HDF5 file a mesh and stage, results by a hash of all they depend on.
+"""Stored results: one HDF5 file a mesh and stage, results by the hash of their inputs.
 
-Scalars and texts of all results are one JSON text, since a group with attributes for each would cost more than solving
-it; arrays are datasets. A stage computes only the results that the file does not hold. What an earlier grid asked for
-stays, so going back to it computes nothing. Nothing but the dataset is meant for users.
-
-A file begins with a checksum of what follows, in a user block that HDF5 passes over. It is compared whenever a file is
-read, before HDF5 sees it.
+Scalars and texts are one JSON text, since groups with attributes cost more than solving; arrays are datasets. Former
+results stay, so that going back to them is free. A file starts with a checksum in a user block, which is compared
+before HDF5 reads the rest.
 """
 
 import hashlib
@@ -23,10 +20,9 @@ from springtune.safe_io import atomic
 from .damage import DamagedError, set_aside
 
 SCALARS = "scalars"
-"""Dataset of what is not an array."""
 
 MAGIC = b"springtune results, SHA-256 of what follows after 512 bytes: "
-"""What a file begins with."""
+"""Start of a file."""
 
 LIMITS = "limits"
 """Name under which the failed result of a task beyond its limits has these, in words; readers do not get it."""
@@ -35,7 +31,7 @@ USER_BLOCK = 512
 """Length of the block before HDF5's own [bytes]."""
 
 OLD = b"\x89HDF"
-"""What files began with before they had a checksum."""
+"""Start of files from before checksums."""
 
 
 def _checked(path: str | Path) -> None:
@@ -56,7 +52,7 @@ def _user_block(image: bytes) -> bytes:
 
 
 def stored(path: str | Path, limits: str | None = None) -> set[str]:
-    """Keys of the results in a file; a damaged one is set aside and holds none."""
+    """Keys of stored results; a damaged file is renamed and counts as empty."""
     if not Path(path).exists():
         return set()
     try:
@@ -71,7 +67,7 @@ def stored(path: str | Path, limits: str | None = None) -> set[str]:
 
 
 def _is_old(path: str | Path) -> bool:
-    """Whether a file was written when files had no checksum yet."""
+    """Return whether a file is from before checksums."""
     if not Path(path).is_file():
         return False
     with open(path, "rb") as file:
@@ -100,7 +96,7 @@ def read(path: str | Path, names: Iterable[str], fields: Sequence[str] = ()) -> 
 
 
 def contents(path: str | Path) -> dict[str, dict[str, Any]]:
-    """All results in a file, as `add` takes them: scalars, texts and all arrays."""
+    """All stored results, in the form that `add` takes."""
     _checked(path)
     with h5py.File(path) as file:
         found = _scalars(file)
@@ -110,16 +106,16 @@ def contents(path: str | Path) -> dict[str, dict[str, Any]]:
 
 
 def read_one(folder: str | Path, key: str, fields: Sequence[str] = ()) -> dict[str, Any]:
-    """Read a result that has a file to itself, named by its key."""
+    """Read a result with a file of its own, named by its key."""
     return read(Path(folder) / f"{key}.h5", [key], fields)[key]
 
 
 KEPT_BACK = 5.0
-"""Seconds for which a `Keeper` has results in memory: writing them costs as much as computing small ones."""
+"""Seconds between writes of a `Keeper`: writing costs as much as computing small results."""
 
 
 class Keeper:
-    """Context that adds results to a file now and then, and at its end: what is computed is not lost to what comes."""
+    """Context that stores results at intervals and at its end, so that a failure loses little."""
 
     def __init__(self, path: str | Path) -> None:
         self.path, self.results, self.since = path, dict[str, Mapping[str, Any]](), time.perf_counter()
@@ -141,7 +137,7 @@ class Keeper:
 
 
 def add(path: str | Path, results: Mapping[str, Mapping[str, Any]]) -> None:
-    """Add results to a file, which changes whole or not at all.
+    """Add results to a file atomically.
 
     Examples
     --------

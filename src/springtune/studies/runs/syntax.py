@@ -1,4 +1,4 @@
-"""Source as a syntax tree: what it does and what it imports, without what is written for readers alone."""
+"""Meaning and imports of source code, without comments and docstrings."""
 
 import ast
 import hashlib
@@ -7,20 +7,14 @@ from itertools import groupby
 from typing import NamedTuple
 
 Import = tuple[int, str, str]
-"""Level of a relative import, its module, and the name taken from it: none of a plain import, or an asterisk."""
+"""Level of a relative import, module, and imported name: empty for a plain import, or an asterisk."""
 
 
 class Source(NamedTuple):
-    """What is read of a text.
+    """Parsed source.
 
-    Attributes
-    ----------
-    digest : str
-        Of its syntax tree without comments, docstrings, formatting, and what type checkers alone read.
-    imports : frozenset of tuple
-        Each an `Import`; all that can run, those inside of functions and of ``try`` included.
-    face : dict of str to tuple, or None
-        Where the text does nothing but import names from modules: each name with its `Import`.
+    `digest` ignores comments, docstrings, formatting and type-checking code. `imports` are all that can run. `face`
+    maps names to imports if the source only imports names, else it is None.
     """
 
     digest: str
@@ -29,7 +23,7 @@ class Source(NamedTuple):
 
 
 def read(text: str | bytes, package: str = "") -> Source:
-    r"""Read a text.
+    r"""Parse source code.
 
     Examples
     --------
@@ -79,7 +73,7 @@ def _attributes(tree: ast.Module, package: str) -> set[Import]:
 
 
 def _says_nothing(node: ast.AST) -> bool:
-    """Whether a statement does nothing: a docstring or `pass`."""
+    """Return whether a statement is a docstring or `pass`."""
     if isinstance(node, ast.Expr):
         return isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
     return isinstance(node, ast.Pass)
@@ -95,9 +89,9 @@ def _is_text(node: ast.expr) -> bool:
 
 
 class _Reader:
-    """Reads a syntax tree: texts that stand for it, the same in all versions of Python, and its imports.
+    """Read a syntax tree as text that is the same in all versions of Python, and its imports.
 
-    A version may add fields to nodes, which are empty where its syntax is not used: what is empty is left out.
+    Newer versions add fields, which are empty for older syntax: empty fields are left out.
     """
 
     SKIPPED = ("ctx", "kind", "type_comment")  # follow from the rest, or are said for readers

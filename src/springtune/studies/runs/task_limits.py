@@ -1,7 +1,6 @@
-"""Limits of a task: a job is done by a child of its process, so that a task beyond them ends the child alone.
+"""Limits of tasks, kept by a child process that a task beyond them ends.
 
-Seconds are those of the processor, which the kernel counts and a busy machine does not change; memory is what a task
-may take on top of what there was. Where the system counts neither, there are no limits.
+Seconds are processor time; memory is counted on top of the child's start. Systems without such limits run without.
 """
 
 import ctypes
@@ -17,20 +16,19 @@ from contextlib import contextmanager
 from springtune.safe_io.inputs import virtual_memory
 
 PLACES = 4096
-"""Bytes of the name of a task."""
+"""Most bytes of the name of a task."""
 
 STOPPED = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
-"""Signals by which somebody ends a job; all others a task brings upon itself."""
+"""Signals from outside; a task causes all others itself."""
 
 LIMITS_TOLD = "(`limits` of the study)"
-"""How limits end in words."""
 
 PARENT_DEATH = 1
-"""Linux's number for the signal of a process whose parent is gone (prctl)."""
+"""Linux's prctl option: signal a process when its parent ends."""
 
 
 class Watch:
-    """Limits of the tasks of a job, and which task is under way."""
+    """Limits of a job's tasks, and the current task."""
 
     def __init__(self, limits: Mapping[str, float]) -> None:
         self.seconds, self.memory = limits["seconds"], limits["memory"]
@@ -57,7 +55,7 @@ class Watch:
             self._write("")
 
     def under_way(self) -> str:
-        """Key of the task that has begun and not ended; empty where there is none."""
+        """Key of the current task, or an empty string."""
         return self._name[:PLACES].rstrip(b"\0").decode()
 
     def _write(self, key: str) -> None:
@@ -65,13 +63,13 @@ class Watch:
 
 
 def go_with_parent() -> None:
-    """Let the kernel end this process when the one that forked it ends; where it can."""
+    """Let the kernel end this process with its parent, where it can."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(PARENT_DEATH, signal.SIGKILL)
 
 
 def guarded(function: Callable[[], None], watch: Watch, lose: Callable[[str, str], None]) -> None:
-    """Call a function in a child of this process, again after each task that ends the child."""
+    """Run a function in a child process, again after each task that ends the child."""
     while True:
         child = _begin(function)
         with _passed_on(child):
@@ -93,7 +91,7 @@ def guarded(function: Callable[[], None], watch: Watch, lose: Callable[[str, str
 
 
 def _begin(function: Callable[[], None]) -> int:
-    """Child that calls a function; it goes when this process goes."""
+    """Start a child that ends with this process."""
     parent = os.getpid()
     sys.stdout.flush()
     sys.stderr.flush()
@@ -120,7 +118,7 @@ def _begin(function: Callable[[], None]) -> int:
 
 @contextmanager
 def _passed_on(child: int) -> Iterator[None]:
-    """Context in which whoever stops this process stops its child."""
+    """Context that forwards termination signals to the child."""
 
     def stop(number: int, frame: object) -> None:
         os.kill(child, number)
