@@ -70,13 +70,12 @@ def stage(
     folder = folder or name
 
     def members(study: "Study", costs: "Costs") -> dict[str, tuple[float, list[Task]]]:
-        found: dict[str, tuple[float, list[Task]]] = {}
+        found: dict[str, list[Task]] = {}
         for task in tasks(study):
             called = task.name or hash_of(task.values)
             if task.name or called not in found:  # else it is one task with two labels
-                seconds, others = found.get(called, (0.0, []))
-                found[called] = seconds + task.seconds(costs), [*others, task]
-        return found
+                found.setdefault(called, []).append(task)
+        return {called: (sum(task.seconds(costs) for task in own), own) for called, own in found.items()}
 
     def content(study: "Study", results: Path, members: list[list[Task]]) -> dict[str, Any]:
         files: dict[str, dict[str, Any]] = {}

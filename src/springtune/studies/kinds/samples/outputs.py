@@ -6,6 +6,8 @@ from ...config.kind import Output, stem
 from .names import SOBOL_INDICES
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
     from ...config.model import Study
 
 
@@ -27,9 +29,6 @@ def _each_load(name: str) -> "Callable[[Study], Mapping[str, Mapping[str, object
 
     return figures
 
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
 
 OUTPUTS = (
     Output(
