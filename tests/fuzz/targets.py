@@ -33,9 +33,8 @@ from mutations import WORDS, spoil_bytes, spoil_counts, spoil_tree
 from snakemake.utils import format as rendered
 
 import springtune as st
-from springtune.cli.archived import verified
 from springtune.cli.diff import comparison_text
-from springtune.cli.info import info_text
+from springtune.cli.results import info_text, verified
 from springtune.handover.formats import ENDINGS
 from springtune.mechanics.moduli import axial_moduli
 from springtune.mesh import MESH_TYPES, MeshError, corner_angles, read_beam_mesh, signed_areas, write_mesh

@@ -332,7 +332,7 @@ CODE = {
     "style of figures": ("studies/output/style.py", "", "present_scenes", {}),
     "collect": ("studies/kinds/scenes/collect.py", "", AFTER, {}),
     "page to browse": ("studies/output/browse/page.py", "", "browse", {}),
-    "command line": ("cli/clean.py", "", "", {}),
+    "command line": ("cli/results.py", "", "", {}),
 }
 """File of the package, what is edited in it (nothing: a statement is added), and as of a `Row`."""
 

@@ -20,7 +20,7 @@ from counting import counted
 from springtune import prediction
 from springtune.cli import COMMANDS, main
 from springtune.cli.recommendation import prediction_json, prediction_text
-from springtune.cli.schema import BEGIN, END, MANUAL, SCHEMA, manual_text, schema_text
+from springtune.cli.study import BEGIN, END, MANUAL, SCHEMA, manual_text, schema_text
 from springtune.handover.formats import ENDINGS, FOR_SIMULATORS
 from springtune.mesh import MESH_TYPES, Mesh, braced, write_mesh
 from springtune.mesh.types import MeshType

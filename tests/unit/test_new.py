@@ -12,8 +12,8 @@ from click.testing import CliRunner
 
 import springtune as st
 from springtune.cli import main
-from springtune.cli.new import LOADS_BY_FORCE
 from springtune.cli.run import SLURM
+from springtune.cli.study import LOADS_BY_FORCE
 from springtune.mesh import MESH_TYPES
 from springtune.problem.loads import LOADS
 from springtune.studies.kinds import load_study

@@ -6,14 +6,41 @@ import sys
 import warnings
 from contextlib import redirect_stderr, redirect_stdout
 from itertools import groupby
+from pathlib import Path
 from typing import Any, NamedTuple, TextIO
 
 import click
+from click.shell_completion import CompletionItem
 
 from .. import __version__
 from ..registry import imported
 from ..safe_io.escapes import UNSEEN, shown
-from .examples import examples
+
+
+def examples(*lines: str) -> str:
+    r"""Epilog of a command that shows how it is called.
+
+    Examples
+    --------
+    >>> examples("springtune definitions")
+    '\x08\nExamples:\n  springtune definitions'
+    """
+    return "\n".join(["\b", "Examples:", *(f"  {line}" for line in lines)])
+
+
+def studies_here(context: click.Context, parameter: click.Parameter, begun: str) -> list[CompletionItem]:
+    """Studies in ``config/``, or files where something else is begun."""
+    found = [path.as_posix() for path in sorted(Path("config").glob("*.yaml"))]
+    chosen = [CompletionItem(path) for path in found if path.startswith(begun)]
+    return chosen or [CompletionItem(begun, type="file")]
+
+
+def mesh_types(context: click.Context, parameter: click.Parameter, begun: str) -> list[CompletionItem]:
+    """Mesh types, or files where something else is begun."""
+    from ..mesh import MESH_TYPES  # here: it is not needed but to complete them
+
+    chosen = [CompletionItem(name) for name in MESH_TYPES if name.startswith(begun)]
+    return chosen or [CompletionItem(begun, type="file")]
 
 
 class Row(NamedTuple):
@@ -28,25 +55,25 @@ class Row(NamedTuple):
 STUDIES, RESULTS, HOUSE = "Studies", "Results", "For those who work on springtune"
 
 COMMANDS = {
-    "new": Row(STUDIES, "new", "new", "Write a small study to begin with."),
+    "new": Row(STUDIES, "study", "new", "Write a small study to begin with."),
     "run": Row(STUDIES, "run", "run", "Run a study."),
-    "scenes": Row(STUDIES, "studies", "scenes", "Say what a study asks for, before anything runs."),
-    "split": Row(STUDIES, "split", "split", "Write the parts of a study for several sites."),
-    "definitions": Row(STUDIES, "studies", "definitions", "List the definitions of spring stiffness."),
+    "scenes": Row(STUDIES, "study", "scenes", "Say what a study asks for, before anything runs."),
+    "split": Row(STUDIES, "study", "split", "Write the parts of a study for several sites."),
+    "definitions": Row(STUDIES, "study", "definitions", "List the definitions of spring stiffness."),
     "predict": Row(STUDIES, "predict", "predict", "Recommend a definition for one mesh, or a mesh for one error."),
     "springs": Row(STUDIES, "springs", "springs", "Write the springs of one mesh for another program."),
-    "browse": Row(RESULTS, "browse", "browse", "Browse the results of a study."),
-    "info": Row(RESULTS, "info", "info", "Say what a dataset holds, and where it comes from."),
+    "browse": Row(RESULTS, "results", "browse", "Browse the results of a study."),
+    "info": Row(RESULTS, "results", "info", "Say what a dataset holds, and where it comes from."),
     "diff": Row(RESULTS, "diff", "diff", "Say what changed from one dataset to another, scene by scene."),
-    "accept": Row(RESULTS, "accept", "accept", "Keep values and curves as right, or say what departs from them."),
-    "export": Row(RESULTS, "export", "export", "Write a dataset as CSV, Parquet or Zarr."),
-    "merge": Row(RESULTS, "merge", "merge", "Put the results of a study's parts together."),
-    "verify": Row(RESULTS, "verify", "verify", "Compare results with their checksums, and compute some again."),
+    "accept": Row(RESULTS, "diff", "accept", "Keep values and curves as right, or say what departs from them."),
+    "export": Row(RESULTS, "results", "export", "Write a dataset as CSV, Parquet or Zarr."),
+    "merge": Row(RESULTS, "study", "merge", "Put the results of a study's parts together."),
+    "verify": Row(RESULTS, "results", "verify", "Compare results with their checksums, and compute some again."),
     "archive": Row(
-        RESULTS, "archive", "archive", "Pack a finished study into one file, to be cited and computed again."
+        RESULTS, "results", "archive", "Pack a finished study into one file, to be cited and computed again."
     ),
-    "clean": Row(RESULTS, "clean", "clean", "List what no study asks for any more, and remove it."),
-    "schema": Row(HOUSE, "schema", "schema", "Print the JSON schema of studies, or renew it and the manual."),
+    "clean": Row(RESULTS, "results", "clean", "List what no study asks for any more, and remove it."),
+    "schema": Row(HOUSE, "study", "schema", "Print the JSON schema of studies, or renew it and the manual."),
     "which": Row(HOUSE, "pages", "which", "Tables of docs/which-definition.md from a dataset."),
     "stability": Row(HOUSE, "pages", "stability", "Tables of docs/stability.md from a dataset."),
     "bench": Row(HOUSE, "pages", "bench", "Tables of docs/speed.md from a dataset, or ratios of two benchmarks."),

@@ -1,17 +1,28 @@
-"""What options say of a beam, its mesh and its material: shared by the commands that take no study."""
+"""What several commands share: beams, shapes, meshes and materials of options, folders of studies, limits."""
 
 import os
-from collections.abc import Callable, Iterator
+import re
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import reduce
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
+from click.core import ParameterSource
+
+from ..problem.parameters import MOST_SCENES, MOST_SCENES_VARIABLE
+from . import mesh_types
 
 if TYPE_CHECKING:
     from ..mesh import Mesh
+    from ..mesh.groups import GroupedMesh
     from ..problem.geometry import Beam
-    from ..problem.materials import Material
+    from ..problem.materials import AnyMaterial, Material
+    from ..problem.shapes import Shape
+    from ..studies.config.model import Study
+    from ..studies.kinds.shapes.expand import Shapes
 
 SAID_FROM = 1_000_000
 """Particles from which on it is said that a mesh is being made: it takes seconds."""
@@ -157,3 +168,312 @@ def asked_mesh(beam: "Beam", mesh_type: str, edge: float | None, unit: str) -> "
         return MESH_TYPES[mesh_type](beam.length, beam.height, edge)
     scale = asked_quantity("--unit", unit if unit[:1].isdigit() else f"1 {unit}", "length")
     return read_beam_mesh(mesh_type, beam.length, beam.height, scale)
+
+
+NAMED_SHAPE = "config/shapes.yaml:cook"
+"""How a shape is named, for messages."""
+
+MESH_SIZE = re.compile("^mesh size: [^ ]+ ")
+"""How messages of a mesh size begin."""
+
+OF_BEAMS = {
+    "beam": "give one of the two",
+    "thickness": "which has the one of its study; leave it out",
+    "mesh_type": "whose mesh is made at --size, or that of the file that the study names; leave it out",
+    "unit": "which has the one of its study; leave it out",
+    "young": "whose materials are those of its study; give one of them by --material",
+    "poisson": "whose materials are those of its study; give one of them by --material",
+    "loads": "whose loads are those of its study; give one of them by --load",
+    "force": "whose loads have their sizes; give --scale, such as 0.5, or leave it out",
+}
+"""Options that are of beams alone, by parameter, and what to do about them beside a shape."""
+
+
+def check_kind(shape: str | None, beam: str | None, of_shapes: tuple[str, ...]) -> None:
+    """Refuse a call that names neither a beam nor a shape, or gives options of the other one.
+
+    Parameters
+    ----------
+    of_shapes : tuple of str
+        Parameters that are of shapes alone.
+    """
+    context = click.get_current_context()
+    if shape is None and beam is None:
+        raise click.UsageError(f"Missing option '--beam' such as 200x40, or '--shape' such as {NAMED_SHAPE}.", context)
+    options = {one.name: one.opts[0] for one in context.command.params if isinstance(one, click.Option)}
+    given = {
+        name: option
+        for name, option in options.items()
+        if name and context.get_parameter_source(name) is ParameterSource.COMMANDLINE
+    }
+    if shape is not None:
+        for name, why in OF_BEAMS.items():
+            if name in given:
+                raise ValueError(f"{given[name]}: '{context.params[name]}' is beside --shape {shape}, {why}")
+        return
+    for name in of_shapes:
+        if name in given:
+            raise ValueError(
+                f"{given[name]}: '{context.params[name]}' is of shapes alone; give --shape, or leave it out"
+            )
+
+
+@dataclass(frozen=True)
+class AskedShape:
+    """A shape of a study, and what is asked of it.
+
+    Attributes
+    ----------
+    part : Shapes
+        What the study has of shapes.
+    shape : Shape
+    size : float or None
+        Length of an edge [m]; None where the mesh is that of a file.
+    """
+
+    part: "Shapes"
+    shape: "Shape"
+    load: str
+    materials: "Mapping[str, AnyMaterial]"
+    size: float | None
+
+    @property
+    def size_text(self) -> str:
+        """The size as the option takes it."""
+        return f"{1e3 * (self.size or 0.0):.12g} mm"
+
+    @property
+    def mesh_name(self) -> str:
+        """What the mesh is called."""
+        return Path(self.shape.file).name if self.size is None else f"free {self.size_text}"
+
+    def mesh(self) -> "GroupedMesh":
+        """The mesh, finer where the study says so."""
+        from ..mesh.group_files import read_shape  # here, since studies are read without scipy
+        from ..mesh.outlines import mesh_shape
+
+        if self.size is None:
+            return read_shape(self.shape.file, self.shape.unit)
+        refined = {where: share * self.size for where, share in self.part.refined[self.shape.name].items()}
+        try:
+            return mesh_shape(self.shape, self.size, refined=refined)
+        except ValueError as error:
+            said = MESH_SIZE.sub("", str(error))
+            between = " " if said != str(error) else ": "
+            raise ValueError(f"--size: '{self.size_text}'{between}{said}") from None
+
+
+def asked_shape(
+    text: str, load: str | None, material: str | None, density: str | None, size: str | None, *, sized: bool = True
+) -> AskedShape:
+    """Shape of a study of an option such as ``config/shapes.yaml:cook``.
+
+    Parameters
+    ----------
+    load, material, density, size : str or None
+        Of the options; a load or material may be left out where the study has but one for the shape.
+    sized : bool, optional
+        Whether a shape of an outline needs a size.
+    """
+    study, part, shape = _shape(text)
+    if load is None and len(shape.loads) > 1:
+        raise ValueError(f"--load: missing; shape '{shape.name}' has {', '.join(shape.loads)}; give one")
+    from ..problem.quantities import nearest
+
+    load = next(iter(shape.loads)) if load is None else load
+    if load not in shape.loads:
+        raise ValueError(f"--load: shape '{shape.name}' has no load '{load}'; {nearest(load, shape.loads)}")
+    materials = _materials(study, part, shape, material, density)
+    if shape.file:
+        if size is not None:
+            raise ValueError(f"--size: '{size}' is beside the mesh of {Path(shape.file).name}; leave --size out")
+        return AskedShape(part, shape, load, materials, None)
+    if size is None and sized:
+        raise ValueError("--size: missing; give the length of an edge such as '2 mm'")
+    edge = None if size is None else asked_quantity("--size", size, "length")
+    (left, low), (right, top) = shape.extent
+    most = min(right - left, top - low)
+    if edge is not None and edge > most:
+        raise ValueError(f"--size: '{size}' is larger than shape '{shape.name}'; give at most {1e3 * most:.4g} mm")
+    return AskedShape(part, shape, load, materials, edge)
+
+
+def _shape(text: str) -> "tuple[Study, Shapes, Shape]":
+    """Study, what it has of shapes, and the shape."""
+    from ..problem.quantities import nearest
+    from ..studies.kinds import load_study
+
+    path, colon, name = (text, "", "") if Path(text).is_file() else text.rpartition(":")
+    if not Path(path).is_file():
+        raise ValueError(f"--shape: '{text}': there is no study {path or text}; give one such as {NAMED_SHAPE}")
+    if Path(path).suffix not in (".yaml", ".yml"):
+        raise ValueError(
+            f"--shape: '{text}' is no study, which has the supports and loads; write one with 'file: "
+            f"{Path(path).name}' (springtune new mine --shape), and give such as mine.yaml:plate"
+        )
+    study = load_study(path)
+    part = study.parts["shapes"]
+    if not part:
+        raise ValueError(f"--shape: study {path} has no shapes; add 'shapes' and 'shape_grids', or give --beam")
+    if not name and (colon or len(part.declared) > 1):
+        raise ValueError(
+            f"--shape: '{text}' names no shape; give such as {path}:<name>; known: {', '.join(part.declared)}"
+        )
+    name = name or next(iter(part.declared))
+    if name not in part.declared:
+        raise ValueError(f"--shape: study {path} has no shape '{name}'; {nearest(name, part.declared)}")
+    return study, part, study.shape(name)
+
+
+def _materials(
+    study: "Study", part: "Shapes", shape: "Shape", name: str | None, density: str | None
+) -> "dict[str, AnyMaterial]":
+    """Materials by part, that of the main one by the option."""
+    if name is None:
+        used = {one.material for one in part.scenes if one.shape == shape.name} or set(study.materials)
+        if len(used) > 1:
+            known = ", ".join(one for one in study.materials if one in used)
+            raise ValueError(f"--material: missing; the study has {known} for shape '{shape.name}'; give one")
+        (name,) = used
+    try:
+        found = {"": study.material(name)} | {
+            one: study.material(other) for one, other in part.parts[shape.name].items()
+        }
+    except ValueError as error:
+        raise ValueError(f"--{error}") from None
+    if density is None:
+        return found
+    heavy = asked_quantity("--density", density, "density")
+    lacking = {one.name for one in found.values() if one.density is None}
+    if not lacking:
+        have = ", ".join(f"'{one}'" for one in dict.fromkeys(one.name for one in found.values()))
+        raise ValueError(
+            f"--density: '{density}' is beside material {have}, which has its own in the study; leave it out"
+        )
+    if len(lacking) > 1:
+        raise ValueError(
+            f"--density: '{density}' is of one material, and {', '.join(sorted(lacking))} have none; give them theirs "
+            "in the study"
+        )
+    return {one: replace(other, density=heavy) if other.density is None else other for one, other in found.items()}
+
+
+def known_materials(context: click.Context, parameter: click.Parameter, begun: str) -> list[str]:
+    """Materials whose names begin so, for a shell to complete."""
+    return [name for name in MATERIALS if name.startswith(begun)]
+
+
+AnyCommand = Callable[..., None]
+
+
+def sheet_options(mesh_help: str, mesh_type: str | None = None) -> Callable[[AnyCommand], AnyCommand]:
+    """Decorator that adds them to a command, with what its mesh may be, and is without the option."""
+    each = (
+        click.option("--beam", help="Length x height in mm, such as 200x40."),
+        click.option(
+            "--shape",
+            help=f"A study's shape, such as {NAMED_SHAPE}, in the place of a beam; the name may be left out where "
+            "there is one.",
+        ),
+        click.option("--thickness", default="1 mm", show_default=True, help="Thickness of the sheet."),
+        click.option(
+            "--mesh", "mesh_type", default=mesh_type, show_default=True, shell_complete=mesh_types, help=mesh_help
+        ),
+        click.option("--size", help="Length of an edge, such as '2 mm'; not for a mesh file."),
+        click.option("--unit", default="1 m", show_default=True, help="Unit of the coordinates in a mesh file."),
+        click.option(
+            "--material",
+            shell_complete=known_materials,
+            help=f"One of {', '.join(MATERIALS)}; or give --young and --poisson; of a shape one of its study.",
+        ),
+        click.option("--young", help="Young's modulus, such as '210 GPa'."),
+        click.option("--poisson", help="Poisson's ratio, from 0 to 0.5."),
+    )
+    return lambda command: reduce(lambda made, option: option(made), reversed(each), command)
+
+
+RESULTS_FOLDER, CONFIG_FOLDER = Path("results"), Path("config")
+
+DATASET = "dataset.nc"
+
+
+def studies(given: Path | None) -> "Iterator[tuple[Study, Path]]":
+    """Studies with the folders of their results."""
+    from ..studies.kinds import load_study
+    from ..studies.runs.locks import LockedError, check_claim, claimed
+
+    if given is not None and not given.is_dir():
+        study = load_study(given)
+        folder = RESULTS_FOLDER / study.name
+        if not folder.is_dir():
+            raise click.ClickException(f"{folder}: there is no such folder; run the study, or go to where it was run")
+        try:
+            check_claim(folder, given)
+        except LockedError as error:
+            raise click.ClickException(str(error)) from None
+        yield study, folder
+        return
+    if given is None and not RESULTS_FOLDER.is_dir():
+        raise click.ClickException(f"{RESULTS_FOLDER}: there is no such folder; go to where studies were run")
+    folders = [given] if given else sorted(path for path in RESULTS_FOLDER.iterdir() if path.is_dir())
+    for folder in folders:
+        config = claimed(folder) or folder.parent.parent / CONFIG_FOLDER / f"{folder.name}.yaml"
+        if config.is_file():
+            yield load_study(config), folder
+        elif given:
+            raise click.ClickException(f"{folder}: there is no {config}; give the study's YAML file instead")
+        else:
+            click.echo(f"{folder}: left alone, there is no {config}; give the study's YAML file, or remove it by hand")
+
+
+def idle(folder: Path) -> None:
+    """Refuse to remove anything under a run."""
+    from ..studies.runs.locks import LockedError, check_idle
+
+    try:
+        check_idle(folder)
+    except LockedError as error:
+        raise click.ClickException(f"{error}; nothing is removed") from None
+
+
+def dataset_path(given: str) -> Path:
+    """Dataset of what a command is given."""
+    from ..studies.runs.locks import check_claim
+
+    path = Path(given)
+    if path.suffix in (".yaml", ".yml"):
+        from ..studies.output.expected import is_expected
+
+        if is_expected(path):
+            return path
+        config, path = path, RESULTS_FOLDER / path.stem
+        check_claim(path, config)
+    for file in (path, path / DATASET, RESULTS_FOLDER / path / DATASET):
+        if file.is_file():
+            return file
+    known = sorted(file.parent.name for file in RESULTS_FOLDER.glob(f"*/{DATASET}"))
+    there = f"here are {', '.join(known)}" if known else "none is in results/ here"
+    raise ValueError(
+        f"{given}: there is no such dataset; run the study, or give a dataset.nc, results/<study> or a study's name; "
+        f"{there}"
+    )
+
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+
+def max_scenes(command: Command) -> Command:
+    """Option of a command that reads a study: argument ``most``, for `allow`."""
+    option: Callable[[Command], Command] = click.option(
+        "--max-scenes",
+        "most",
+        type=click.IntRange(min=1),
+        help=f"A study of more scenes is refused before anything is made of it; {MOST_SCENES} without.",
+    )
+    return option(command)
+
+
+def allow(most: int | None) -> None:
+    """Let this process and those that it starts read studies of so many scenes."""
+    if most is not None:
+        os.environ[MOST_SCENES_VARIABLE] = str(most)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ..safe_io.atomic import write_text
-from .examples import examples
+from . import examples
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .completion import studies_here
-from .examples import examples
-from .many import allow, max_scenes
+from . import examples, studies_here
+from .options import allow, max_scenes
 
 if TYPE_CHECKING:
     from ..studies.config.model import Study

@@ -9,26 +9,27 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from .examples import examples
+from . import examples
 from .options import (
     SPRING_FILES,
     Unmet,
     asked_beam,
     asked_material,
     asked_mesh,
+    asked_shape,
     asked_size,
+    check_kind,
     check_target,
     is_made,
     refusals,
+    sheet_options,
 )
-from .shape_options import asked_shape, check_kind
-from .sheet_options import sheet_options
 
 if TYPE_CHECKING:
     from ..handover.net import SpringNet
     from ..problem.geometry import Beam
     from ..problem.materials import Material
-    from .shape_options import AskedShape
+    from .options import AskedShape
 
 OPTIONS = re.compile(r"^(?=(load|force|scale|definition|stiffness|density|mujoco)\b)")
 """Beginnings of messages that name an argument, which is an option here."""

@@ -18,7 +18,7 @@ def _stretch(length: float, height: float, size: float) -> float:
 
 @mesh_type("free", order=20, row_height=ROW_HEIGHT, own_stretch=_stretch)
 def free(length: float, height: float, size: float) -> Mesh:
-    """Delaunay triangulation inside an outline of imposed edge size [m], by netgen's advancing front.
+    """Delaunay triangulation inside an outline of imposed edge size, by netgen's advancing front.
 
     The sides are divided into equal edges no longer than `size`; inside, netgen makes near-equilateral triangles.
     Deterministic.

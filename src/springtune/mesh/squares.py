@@ -8,7 +8,9 @@ from .types import mesh_type, nearest_counts
 
 @mesh_type("right", order=30)
 def right(length: float, height: float, size: float) -> Mesh:
-    r"""Squares of about `size` cut by parallel diagonals, stretched to fit the box; lengths in m.
+    r"""Squares cut by parallel diagonals.
+
+    Their edges have about `size` [m]; they are stretched to fit the box.
 
     ::
 

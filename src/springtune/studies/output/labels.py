@@ -61,7 +61,7 @@ def wrapped(text: str, room: float, size: float = SMALL) -> str:
 def spread(wanted: Sequence[float], sizes: Sequence[float], low: float, high: float) -> np.ndarray:
     """Places without overlap nearest to the wanted ones.
 
-    Minimizes the sum of squared moves in the given order (pool adjacent violators), then moves all between the ends.
+    Minimises the sum of squared moves in the given order (pool adjacent violators), then moves all between the ends.
     """
     if not len(wanted):
         return np.zeros(0)

@@ -74,7 +74,7 @@ LINES: tuple[dict[str, Any], ...] = (
 LOGARITHMIC = {"xscale": "log", "yscale": "log"}
 
 
-FORMATS: dict[str, dict[str, Any]] = {
+SAVED_AS: dict[str, dict[str, Any]] = {
     "png": {"pil_kwargs": {"compress_level": 1}},  # higher levels take twice the time for a tenth of the size
     "pdf": {"metadata": {"CreationDate": None}},
 }
@@ -229,7 +229,7 @@ def png_and_pdf(figure: Figure) -> dict[str, bytes]:
     """Save a figure in both formats without dates: the same figure gives the same bytes."""
     found = {}
     with matplotlib.rc_context(SETTINGS):
-        for ending, options in FORMATS.items():
+        for ending, options in SAVED_AS.items():
             content = io.BytesIO()
             figure.savefig(content, format=ending, **options)
             found[ending] = content.getvalue()

@@ -49,7 +49,7 @@ REFERRED = {"status", "reference_displacement", "reference_applies", "reference_
 
 
 def text(groups: "Mapping[str, xr.Dataset]", title: str) -> str:
-    """Summarize a study's cells."""
+    """Summarise a study's cells."""
     states = [state for name, data in groups.items() for state in _states(name, data)]
     rows = [[what, str(sum(found.values())), _parts(found)] for what, found, _ in states if found]
     lines = [title, "", aligned(rows, left=2, right=(1,))]

@@ -10,14 +10,16 @@ import json
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
-import h5py
 import numpy as np
 
 from springtune.safe_io import atomic
 
 from .damage import DamagedError, set_aside
+
+if TYPE_CHECKING:
+    import h5py
 
 SCALARS = "scalars"
 
@@ -61,6 +63,8 @@ def stored(path: str | Path, limits: str | None = None) -> set[str]:
         if not _is_old(path):
             set_aside(error)
         return set()
+    import h5py  # here: a plan reads no results
+
     with h5py.File(path) as file:
         scalars = _scalars(file)
     return {name for name, result in scalars.items() if limits is None or result.get(LIMITS, limits) == limits}
@@ -74,7 +78,7 @@ def _is_old(path: str | Path) -> bool:
         return file.read(len(OLD)) == OLD
 
 
-def _scalars(file: h5py.File) -> dict[str, dict[str, Any]]:
+def _scalars(file: "h5py.File") -> dict[str, dict[str, Any]]:
     scalars: dict[str, dict[str, Any]] = json.loads(file[SCALARS][()])
     return scalars
 
@@ -82,6 +86,8 @@ def _scalars(file: h5py.File) -> dict[str, dict[str, Any]]:
 def read(path: str | Path, names: Iterable[str], fields: Sequence[str] = ()) -> dict[str, dict[str, Any]]:
     """Read results."""
     _checked(path)
+    import h5py  # here: a plan reads no results
+
     with h5py.File(path) as file:
         scalars = _scalars(file)
         names = list(names)
@@ -98,6 +104,8 @@ def read(path: str | Path, names: Iterable[str], fields: Sequence[str] = ()) -> 
 def contents(path: str | Path) -> dict[str, dict[str, Any]]:
     """All stored results, in the form that `add` takes."""
     _checked(path)
+    import h5py  # here: a plan reads no results
+
     with h5py.File(path) as file:
         found = _scalars(file)
         for name, result in found.items():
@@ -152,6 +160,8 @@ def add(path: str | Path, results: Mapping[str, Mapping[str, Any]]) -> None:
         return
     scalars: dict[str, dict[str, Any]] = {}
     # In memory: what is on the disk is written at once, checksum and all.
+    import h5py  # here: a plan reads no results
+
     with h5py.File("results", "w", driver="core", backing_store=False) as file:
         if stored(path):
             with h5py.File(path) as before:

@@ -1,0 +1,347 @@
+"""Commands of studies before they run: write one, list what it asks for, split and merge it, its schema."""
+
+import inspect
+import json
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from ..registry import NAME, NAME_RULE
+from ..safe_io.atomic import write_text
+from ..studies.output.text import aligned
+from . import examples, studies_here
+from .options import CONFIG_FOLDER, WrongCall, allow, max_scenes
+from .run import checkout_here, checkout_of_run, how_to_get_one
+
+if TYPE_CHECKING:
+    from pydantic.fields import FieldInfo
+
+TEMPLATE = """\
+{schema}# `springtune scenes {path}` says what this study asks for, `springtune run {path}` does it.
+# Every quantity carries its unit. Names of beams, materials and grids are yours; {manual} explains every key.
+title: "{title}"
+beams:
+  100x20: {{length: 100 mm, height: 20 mm, thickness: 1 mm}}
+materials:
+  steel: {{young_modulus: 210 GPa, poisson_ratio: 0.3}}
+grids:  # all combinations of the values of a grid are its scenes; [5 mm, 2 mm] are two values
+  pulled:
+    beam: 100x20
+    mesh_type: structured  # or {mesh_types}
+    mesh_size: 5 mm
+    material: steel
+    load: traction  # or {loads}
+    force: 20 kN
+    definition: [lattice, patch]  # rules for the stiffness of springs: `springtune definitions` lists them
+outputs: [sensitivity, deformed, tables]
+"""
+
+SHAPE_TEMPLATE = """\
+{schema}# `springtune scenes {path}` says what this study asks for, `springtune run {path}` does it.
+# Every quantity carries its unit. Names of shapes, groups, loads, quantities, materials and grids are yours;
+# {manual} explains every key.
+title: "{title}"
+materials:
+  steel: {{young_modulus: 210 GPa, poisson_ratio: 0.3}}
+shapes:
+  plate:
+    thickness: 1 mm
+    outline:  # sides from corner to corner, counter-clockwise, each of a group; with a `centre` it is an arc
+      - {{from: [0, 0], group: lower}}
+      - {{from: [100 mm, 0], group: right}}
+      - {{from: [100 mm, 40 mm], group: upper}}
+      - {{from: [0, 40 mm], group: left}}
+    holes: [{{circle: {{centre: [50 mm, 20 mm], radius: 8 mm}}, group: hole}}]
+    # file: plate.msh  # a mesh file, with groups of its own, in the place of outline, holes, points and refined
+    points: {{top: [50 mm, 28 mm]}}  # particles of every mesh, to be held, loaded or asked for
+    refined: {{hole: 0.5}}  # edges there, over the mesh size
+    loads:
+      pull:
+        supports: {{left: fixed}}  # or displacements by group or point: {{x: 0 mm}} leaves y free
+        forces: {{right: [4 kN, 0]}}  # along x and y, spread over the group
+        # pressures: {{hole: 1 MPa}}  # towards the body; gravity: [0, -9.81 m/s^2] needs densities
+        quantities:  # what is asked; errors are theirs
+          stretch: {{displacement: x, of: right}}
+          peak: {{stress: xx, at: top}}
+shape_grids:  # all combinations of the values of a grid are its scenes; [8 mm, 4 mm] are two values
+  plate:
+    shape: plate
+    mesh_size: [8 mm, 4 mm]
+    material: steel
+    definition: [lattice, patch]  # rules for the stiffness of springs: `springtune definitions` lists them
+    kinematics: linear  # small strain; nonlinear: springs keep their length law
+outputs: [shapes, tables]
+"""
+
+LOADS_BY_FORCE = ("compression", "bending", "shear")
+"""Loads that a person is told of first; all take a force."""
+
+
+@click.command(
+    epilog=examples(
+        "springtune new my-study", "springtune new studies/my-study.yaml", "springtune new my-plate --shape"
+    )
+)
+@click.argument("study")
+@click.option("--shape", is_flag=True, help="A study of a shape, an outline with a hole, rather than of a beam.")
+def new(study: str, shape: bool) -> None:
+    """Write a small study with comments, to be changed into your own; it runs as it is.
+
+    STUDY is its name, or the path of its file. A name alone becomes config/<name>.yaml in a checkout, and <name>.yaml
+    elsewhere. What is there already is never overwritten.
+    """
+    from ..safe_io.atomic import write_text
+
+    path = _path(study)
+    if not NAME.fullmatch(path.stem):
+        raise WrongCall(f"'{path.stem}' cannot name a study; {NAME_RULE}")
+    if os.path.lexists(path):
+        raise click.ClickException(f"{path}: is there already; give another name, or change that file")
+    if not path.parent.is_dir():
+        raise click.ClickException(f"{path.parent}: there is no such folder; make it, or name another")
+    try:
+        write_text(path, template_text(path, SHAPE_TEMPLATE if shape else TEMPLATE))
+    except OSError as error:
+        raise click.ClickException(
+            f"{path}: cannot be written: {error.strerror or error}; name another place"
+        ) from None
+    if not path.resolve().is_relative_to(Path.cwd().resolve()):
+        click.echo(f"written outside of this folder: {path.resolve()}")
+    scenes = 4 if shape else 2
+    if checkout_of_run():
+        click.echo(f"{path}: {scenes} scenes; change it as you like, and run it:\n  springtune run {path}")
+    else:
+        click.echo(f"{path}: {scenes} scenes; change it as you like. To run it: {how_to_get_one(path)}")
+
+
+def _path(given: str) -> Path:
+    """Where a study is to be."""
+    path = Path(given)
+    if path.suffix not in (".yaml", ".yml"):
+        if not path.name:
+            return path
+        path = path.with_name(f"{path.name}.yaml")
+        path = CONFIG_FOLDER / path if given == path.stem and checkout_here() else path
+    return path
+
+
+def template_text(path: Path, template: str = TEMPLATE) -> str:
+    """Text of a study to begin with."""
+    from ..mesh import MESH_TYPES
+
+    schema = _beside(path, SCHEMA)
+    words = path.stem.replace("-", " ").replace("_", " ").strip() or path.stem
+    return template.format(
+        schema=f"# yaml-language-server: $schema={schema}\n" if schema else "",
+        manual="config/README.md",
+        path=path.as_posix(),
+        title=words[0].upper() + words[1:],
+        mesh_types=", ".join(name for name in MESH_TYPES if name.isalpha() and name != "structured"),
+        loads=", ".join(LOADS_BY_FORCE),
+    )
+
+
+def _beside(path: Path, name: str) -> str | None:
+    """A file of the checkout's config, as seen from a study; None where there is none."""
+    checkout = checkout_of_run()
+    file = checkout / CONFIG_FOLDER / name if checkout else None
+    if file is None or not file.is_file():
+        return None
+    return Path(os.path.relpath(file, path.parent)).as_posix()
+
+
+@click.command(
+    epilog=examples(
+        "springtune scenes config/paper.yaml",
+        "springtune scenes --max-scenes 2000000 config/large.yaml",
+    )
+)
+@max_scenes
+@click.argument("config", type=click.Path(path_type=Path), shell_complete=studies_here)
+def scenes(config: Path, most: int | None) -> None:
+    """Say what a study asks for, before anything runs.
+
+    Counts scenes, meshes, references and curves, and what grids share. A study with mistakes is refused with the line
+    of each.
+    """
+    allow(most)
+    from ..studies.config.kind import kinds
+    from ..studies.config.messages import StudyError
+    from ..studies.kinds import load_study  # here, so that --help does not wait for it
+    from ..studies.kinds.scenes.summary import summary
+
+    try:
+        study = load_study(config)
+    except StudyError as error:
+        click.echo(str(error), err=True)
+        raise SystemExit(1) from None
+    parts = [(kind, study.parts[kind.name]) for kind in kinds()]
+    click.echo(summary(study, [row for kind, part in parts if part for row in kind.summary(part)]))
+
+
+@click.command(
+    epilog=examples(
+        "springtune definitions | grep area",
+    )
+)
+def definitions() -> None:
+    """List the definitions of spring stiffness."""
+    from .. import DEFINITIONS
+    from ..studies.output.text import aligned
+
+    click.echo(aligned([[name, definition.summary] for name, definition in DEFINITIONS.items()], left=2))
+
+
+BY = ("mesh", "grid")
+"""What may stay together: as `springtune.studies.config.sections.DEALT_BY`, which help does not wait for."""
+
+MOST_PARTS = 1000
+"""As `springtune.studies.config.sections.MOST_PARTS`."""
+
+
+@click.command(
+    epilog=examples(
+        "springtune split config/paper.yaml --into 3",
+        "springtune split config/paper.yaml --into 2 --by grid --out parts",
+    )
+)
+@max_scenes
+@click.argument("config", type=click.Path(path_type=Path), shell_complete=studies_here)
+@click.option("--into", "count", type=click.IntRange(2, MOST_PARTS), required=True, help="Number of parts.")
+@click.option(
+    "--by",
+    type=click.Choice(BY),
+    default=BY[0],
+    show_default=True,
+    help="What stays together: the scenes of a mesh, but of one that alone is more than a part; or those of a grid.",
+)
+@click.option("--out", type=click.Path(path_type=Path), help="Folder of the parts; that of the study without.")
+def split(config: Path, count: int, by: str, out: Path | None, most: int | None) -> None:
+    """Write studies that together ask for the scenes of a study, each for its own.
+
+    CONFIG is the study. Each part, config/<study>-1-of-3.yaml and so on, holds the whole study and says which part of
+    it is asked for; it runs as any study does, at any site. `springtune merge` then puts their results together. Parts
+    are about equal in what they are expected to cost; a section such as `laying` is in one of them.
+    """
+    allow(most)
+    from ..studies.archive.parts import told, write_parts  # here, so that --help does not wait for it
+    from ..studies.config.messages import StudyError
+    from ..studies.kinds import load_study
+
+    try:
+        study = load_study(config)
+        written = write_parts(study, count, by, config.parent if out is None else out)
+    except StudyError as error:
+        raise click.ClickException(str(error)) from None
+    except OSError as error:
+        raise click.ClickException(f"{error.filename}: cannot be written: {error.strerror}") from None
+    click.echo(aligned(told(written), left=0, right=(1, 2, 3)))
+    results = " ".join(f"results/{one.study.name}" for one in written)
+    click.echo(f"\nspringtune run {written[0].path}   # and so on, each where it is to run; then, with all results in "
+               f"one place,\nspringtune merge {config} {results}")  # fmt: skip
+
+
+@click.command(
+    epilog=examples(
+        "springtune merge config/paper.yaml results/paper-1-of-2 results/paper-2-of-2",
+        "springtune merge config/paper.yaml results/paper-1-of-2 --incomplete",
+    )
+)
+@click.argument("config", type=click.Path(path_type=Path), shell_complete=studies_here)
+@click.argument("results", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option("--incomplete", is_flag=True, help="Merge what is there; the study then computes the rest.")
+def merge(config: Path, results: tuple[Path, ...], incomplete: bool) -> None:
+    """Put the results of a study's parts together in results/<study>, so that its run computes no scene again.
+
+    CONFIG is the whole study, RESULTS are the folders of its parts, which `springtune split` wrote, wherever they were
+    computed. All files are compared with their checksums, and parts must be of this very study, computed by the same
+    code, packages and Python; nothing is written before all fits. `st.merge` in Python joins datasets of different
+    studies.
+    """
+    from ..studies.archive.merge_parts import MergeError, merge_sites, told  # here, so that --help does not wait for it
+    from ..studies.config.messages import StudyError
+    from ..studies.kinds import load_study
+    from ..studies.runs.locks import LockedError
+
+    try:
+        merged = merge_sites(load_study(config), results, incomplete)
+    except (StudyError, MergeError, LockedError) as error:
+        raise click.ClickException(str(error)) from None
+    except OSError as error:
+        raise click.ClickException(f"{error.filename}: {error.strerror}; the same command goes on from here") from None
+    click.echo(told(merged, results))
+    click.echo(f"springtune run {config}   # collects the dataset" + (", and computes the rest" if merged.left else ""))
+
+
+SCHEMA = "study.schema.json"
+MANUAL = "README.md"
+BEGIN, END = "<!-- generated by `springtune schema --write`: begin -->\n", "<!-- generated: end -->\n"
+
+
+@click.command(
+    epilog=examples(
+        "springtune schema > study.schema.json",
+        "springtune schema --write",
+    )
+)
+@click.option(
+    "--write", is_flag=True, help=f"Write {SCHEMA} and the tables of {MANUAL} instead of printing the schema."
+)
+@click.option("--folder", default="config", show_default=True, type=click.Path(path_type=Path), help="Where to write.")
+def schema(write: bool, folder: Path) -> None:
+    """Print the JSON schema of studies, or renew it and the tables of their manual."""
+    if not write:
+        click.echo(schema_text(), nl=False)
+        return
+    try:
+        manual = manual_text((folder / MANUAL).read_text())
+    except ValueError as error:
+        raise click.ClickException(f"{folder / MANUAL}: {error}") from None
+    except OSError as error:
+        raise click.ClickException(
+            f"{folder / MANUAL}: {error.strerror or error}; go to a checkout, or name its config/ by --folder"
+        ) from None
+    for name, text in ((SCHEMA, schema_text()), (MANUAL, manual)):
+        write_text(folder / name, text)
+
+
+def schema_text() -> str:
+    """JSON schema of studies, as the file holds it."""
+    from ..studies.config.kind import kinds
+    from ..studies.config.sections import json_schema, study_model
+
+    return json.dumps(json_schema(study_model(kinds())), indent=2) + "\n"
+
+
+def manual_text(frame: str) -> str:
+    """Manual of studies: the hand-written text around the generated tables stays."""
+    before, begin, rest = frame.partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not begin or not end:
+        raise ValueError(f"the marks around the generated tables are missing; put {BEGIN.strip()} and {END.strip()}")
+    return before + begin + _key_tables() + end + after
+
+
+def _key_tables() -> str:
+    from ..studies.config.kind import kinds
+    from ..studies.config.sections import sections, study_model
+
+    parts: list[str] = []
+    for place, model in sections(study_model(kinds())).items():
+        paragraphs = [" ".join(paragraph.split()) for paragraph in (inspect.getdoc(model) or "").split("\n\n")]
+        parts += ["", f"### `{place}`" if place else "### The file", "", "\n\n".join(paragraphs), ""]
+        parts += ["| key | value | default | meaning |", "|---|---|---|---|"]
+        for name, field in model.model_fields.items():
+            parts.append(_key_row(field.alias or name, field))
+    return "\n".join(parts) + "\n\n"
+
+
+def _key_row(key: str, field: "FieldInfo") -> str:
+    from ..studies.config.sections import expected_value
+
+    default = "required" if field.is_required() else f"`{field.default}`" if isinstance(field.default, str) else "none"
+    if field.default_factory is not None:
+        default = "its keys' defaults"
+    return f"| `{key}` | {expected_value(field)} | {default} | {field.description} |"
