@@ -155,6 +155,14 @@ class Machine:
         command = [self.python, "-m", "snakemake", "--snakefile", REPOSITORY / "Snakefile", "--cores", "2"]
         command += ["--workflow-profile", REPOSITORY / "workflow/profiles/default", *arguments]
         command += ["--configfile", "config/tiny.yaml"]
+        return self._called(command, variables)
+
+    def springtune(self, *arguments, **variables):
+        """Exit code and output of `springtune run`."""
+        command = [self.python, "-m", "springtune", "run", "config/tiny.yaml", "--cores", "2", *arguments]
+        return self._called(command, {"SPRINGTUNE_WORKFLOW": str(REPOSITORY)} | variables)
+
+    def _called(self, command, variables):
         kept = {name: value for name, value in os.environ.items() if not name.lower().endswith("_proxy")}
         own = {"PYTHONPATH": str(REPOSITORY / "src"), "CI": "1"} | self.variables | variables
         done = subprocess.run(list(map(str, command)), cwd=self.folder, env=kept | own, capture_output=True, text=True)
