@@ -20,7 +20,7 @@ REPOSITORY = Path(__file__).parents[2]
 NAME = f"springtune-{springtune.__version__}"
 
 WITHIN = re.compile(
-    r"springtune/.*\.py|springtune/(__init__\.pyi|py\.typed|output/page\.html)"
+    r"springtune/.*\.py|springtune/(__init__\.pyi|py\.typed|studies/output/page\.html)"
     r"|springtune/studies/output/browse/assets/\w+\.(css|html|js)"
     r"|snakemake_logger_plugin_springtune/\w+\.py"
     rf"|{NAME}\.dist-info/(METADATA|WHEEL|RECORD|entry_points\.txt|licenses/LICENSE)"
