@@ -15,7 +15,7 @@ from springtune.problem.geometry import Strip, Trapezoid
 from springtune.problem.materials import Material
 from springtune.springs import DEFINITIONS
 from springtune.studies.kinds.laying.kind import REFERENCE_SIZES
-from springtune.studies.kinds.laying.lay import lay
+from springtune.studies.kinds.laying.solve import lay
 
 RUBBER, STEEL = Material(1e6, 0.49, name="rubber"), Material(210e9, 0.3, name="steel")
 STRIP, TRAPEZOID = Strip(0.1, 3e-3, 1e-3), Trapezoid(0.08, 0.05, 9e-3)

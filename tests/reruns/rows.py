@@ -310,7 +310,7 @@ CODE = {
     "stage of scenes": ("studies/kinds/scenes/solve.py", "", f"solve {AFTER}", SCENES),
     "stage of curves": ("studies/kinds/scenes/sensitivity.py", "", CURVES, {"curve": 16}),
     "stage of moduli": ("studies/kinds/moduli/solve.py", "", f"moduli {AFTER}", {"moduli": 2}),
-    "stage of laying": ("studies/kinds/laying/lay.py", "", f"laying {AFTER}", {"laying": 4}),
+    "stage of laying": ("studies/kinds/laying/solve.py", "", f"laying {AFTER}", {"laying": 4}),
     "stage of stability": ("studies/kinds/stability/experiments.py", "", f"stability {AFTER}", {"contrast": 1}),
     "calibration": ("studies/kinds/scenes/calibrate.py", "", f"calibrate solve {AFTER}", {}),
     "definition of one scene": (

@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 from springtune.studies.config.messages import StudyError
 from springtune.studies.kinds import load_study
 from springtune.studies.kinds.refinement.batches import Rule, crossings, refine
-from springtune.studies.kinds.refinement.collect import groups
-from springtune.studies.kinds.refinement.tables import write
+from springtune.studies.kinds.refinement.collect import groups, write
 from springtune.studies.output.comparison import compare
 from springtune.studies.runs import driver, store
 from springtune.studies.runs.plan import plan
@@ -210,7 +209,7 @@ def test_a_value_beyond_its_limits_is_a_hole_and_the_others_are_not(load, tmp_pa
     study = load()
     (job,) = [job for job in plan(study, tmp_path, 1).jobs.values() if job.stage.name == "refinement"]
     for task in job.content["files"]:
-        driver.gone(job.stage.module, job.content, f"{task['name']}/0.875", "too slow", "")  # as there are none here
+        driver.gone(job.stage.module, job.content, f"{task['name']} 0.875", "too slow", "")  # as there are none here
     run(study, tmp_path)
     data = collected(study, tmp_path)
     lost = data.refined_stiffness_scale == 0.875

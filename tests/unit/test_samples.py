@@ -23,11 +23,13 @@ from springtune.studies.config.kind import kinds
 from springtune.studies.config.messages import StudyError
 from springtune.studies.kinds import load_study
 from springtune.studies.kinds.samples import designs, interpolate, solve
+from springtune.studies.kinds.samples.designs import DESIGNS, blocks
 from springtune.studies.kinds.samples.figures import plot_effects, plot_sobol
 from springtune.studies.kinds.samples.indices import main_effect, sobol_indices
-from springtune.studies.kinds.samples.names import DESIGNS, MOST_SOLVED, blocks
+from springtune.studies.kinds.samples.plan import MOST_SOLVED
 from springtune.studies.runs import store
 from springtune.studies.runs.orphans import orphans
+from springtune.studies.runs.stages import products
 from springtune.studies.runs.task_costs import TaskCosts
 
 from campaigns import Campaign
@@ -387,7 +389,7 @@ class TestRuns:
         (tmp_path / "study.yaml").write_text(study_text())
         study = load_study(tmp_path / "study.yaml")
         solve.gone({"folder": tmp_path / "samples"}, "old 0 mesh", "not done within 1 s", "")
-        asked = sampling().products(sampling().content(study, tmp_path, [(0, 8)]))
+        asked = products(content_of("sample", study, tmp_path)[0])
         solve.gone({"folder": tmp_path / "samples"}, f"{asked[0].stem} 0 mesh", "not done within 1 s", "")
         assert orphans(study, tmp_path) == [tmp_path / "samples" / "old.h5"]
 
@@ -456,12 +458,12 @@ class TestFailures:
         """A task that was lost is a hole of its rows when the block is solved again, and is tried with other limits."""
         (tmp_path / "study.yaml").write_text(study_text(("size: 16", "size: 8")))
         study = load_study(tmp_path / "study.yaml")
-        content = sampling().content(study, tmp_path, [(0, 8)])
-        block = content["files"][0]["key"]
-        solve.gone(content, f"{block} 0 {content['meshed']}", "not done within 1 s", "limits A")
+        content, file = content_of("sample", study, tmp_path)
+        block = file["name"]
+        solve.gone(content, f"{block} 0 {file['meshed']}", "not done within 1 s", "limits A")
         solve.run(content, Limited())
         path = tmp_path / "samples" / f"{block}.h5"
-        keys = list(content["results"])
+        keys = list(file["results"])
         found = store.read(path, keys, ("status", "displacement"))
         for key in keys:
             assert found[key]["status"][0] == Status.FAILED
@@ -482,7 +484,7 @@ class TestFailures:
                 content, results = networks(tmp_path, how, spent=spent)
                 assert [found["messages"] for found in results] == [{}] * len(results)
                 # As if each network had been lost; meshes are the same of both kinematics.
-                names.append({name for name in spent.names if name.split()[2] != content["meshed"]})
+                names.append({name for name in spent.names if name.split()[2] != content["files"][0]["meshed"]})
                 for name in names[-1]:
                     solve.gone(content, name, "not done within 1 s", "")
         assert not set.intersection(*names) and len(set.union(*names)) == sum(map(len, names))
@@ -502,7 +504,7 @@ class TestFailures:
         for one, other in zip(whole, results, strict=True):
             for name in ("displacement", "status", "particles"):
                 assert one[name].tobytes() == other[name].tobytes()
-        asked = {path.name for path in sampling().products(content)}
+        asked = {path.name for path in products(content)}
         assert {path.name for path in (tmp_path / "samples").iterdir()} == asked
 
     def test_a_sample_that_is_singular_is_a_hole_and_the_others_are_solved(self, tmp_path):
@@ -532,9 +534,8 @@ class TestReferences:
         """Store what a build that is not certified stores; the task and the file."""
         (folder / "study.yaml").write_text(study_text(*replaced))
         study = load_study(folder / "study.yaml")
-        stage = next(one for kind in kinds() for one in kind.stages if one.name == "interpolate")
-        content = stage.content(study, folder / "samples_of", [LOADS["traction"].kind])
-        (path,) = stage.products(content)
+        content, _ = content_of("interpolate", study, folder / "samples_of")
+        (path,) = products(content)
         store.add(path, {path.stem: {"message": "no interpolant", "seconds": 0.0, "asked": 0}})
         return content, path
 
@@ -605,17 +606,18 @@ def networks(folder, *replaced, spent=None, **options):
     folder.mkdir(exist_ok=True)
     (folder / "study.yaml").write_text(study_text(*replaced))
     study = load_study(folder / "study.yaml")
-    sample = study.parts["samples"]
-    content = sampling().content(study, folder, blocks(sample.design, sample.size))
+    content, file = content_of("sample", study, folder)
     solve.run(content, spent or TaskCosts(), **options)
     fields = ("displacement", "status", "particles")
-    found = [store.read(path, [*content["results"]], fields) for path in map(Path, sampling().products(content))]
-    return content, [block[key] for block in found for key in content["results"]]
+    found = [store.read(path, [*file["results"]], fields) for path in products(content)]
+    return content, [block[key] for block in found for key in file["results"]]
 
 
-def sampling():
-    """Stage that solves samples."""
-    return next(one for kind in kinds() for one in kind.stages if one.name == "sample")
+def content_of(name, study, folder):
+    """Content of a job with all tasks of a stage of samples, and its first file."""
+    stage = next(one for kind in kinds() for one in kind.stages if one.name == name)
+    content = stage.content(study, folder, [[task] for task in stage.tasks(study)])
+    return content, content["files"][0]
 
 
 class TestRefusals:
@@ -698,10 +700,10 @@ class TestRefusals:
                 )  # fmt: skip
             )
             study = load_study("study.yaml")
-            content = sampling().content(study, here, [(0, 8)])
+            content, file = content_of("sample", study, here)
             solve.run(content, TaskCosts())
-            key = next(key for key, scene in content["results"].items() if scene["definition"] == "stiffening")
-            path = here / "samples" / f"{content['files'][0]['name']}.h5"
+            key = next(key for key, scene in file["results"].items() if scene["definition"] == "stiffening")
+            path = here / "samples" / f"{file['name']}.h5"
             found = store.read(path, [key], ("status",))[key]
             assert (found["status"] == Status.FAILED).all()
             assert "not in proportion" in found["messages"]["0"]

@@ -1,4 +1,4 @@
-"""Views of dataset groups on the browsing page; kinds declare them in ``views``."""
+"""Views of dataset groups on the browsing page; kinds declare them in ``outputs`` or ``views``."""
 
 from __future__ import annotations
 

@@ -164,7 +164,7 @@ def _browse_digest(study: "Study") -> str:
         path.name: records.checksum(path) for path in sorted((PACKAGE / "studies/output/browse/assets").iterdir())
     }
     return hash_of(
-        linked(study), [stage_key(name) for name in ("studies.output.browse.job", *modules("views"))], assets
+        linked(study), [stage_key(name) for name in ("studies.output.browse.job", *modules("outputs", "views"))], assets
     )
 
 

@@ -1,23 +1,144 @@
-"""Stage `laying`: strips laid on a trapezoid."""
+r"""Stage `laying`: a strip laid on a trapezoid that stands on a rigid floor, the paper's section 4.2.
 
-from dataclasses import asdict
+::
 
+        v v v v v v v v v v v v v v      pressure that follows the upper face, or weight, or ends drawn down
+       +----------------------------+
+       +------+--------------+------+    strip, free but for its middle, which stays on the axis
+             /                \
+            /    trapezoid     \
+    -------+--------------------+-------  floor
+
+The trapezoid is deformable. Where it is far stiffer than the strip it counts as rigid and has no unknowns, like the
+floor.
+"""
+
+import time
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from springtune.mechanics.contact import Body, Contact, ContactError, Obstacle
+from springtune.mechanics.follower import FollowerPressure
+from springtune.mesh import MESH_TYPES, Mesh
 from springtune.problem.geometry import Strip, Trapezoid
 from springtune.problem.materials import material_of
 from springtune.problem.status import Status
+from springtune.scene.sheet import Sheet
 from springtune.springs import DefinitionError
 
-from .lay import lay
+RIGID = 1e4
+"""Ratio of Young's moduli from which the trapezoid counts as rigid."""
+
+
+@dataclass(frozen=True)
+class Laid:
+    """A laid strip: ``penetration`` is over the mesh size, ``force_error`` over the load (NaN for drawn ends).
+
+    ``outline`` has shape (n, 2) [m].
+    """
+
+    area: float
+    elongation: float
+    penetration: float
+    force_error: float
+    load_share: float
+    message: str
+    iterations: int
+    seconds: float
+    skipped: str
+    outline: np.ndarray
 
 
 def solve(task):
-    """Result of a strip; one that does not lie has a status and a message."""
+    """Result of a strip; one that is not laid has a status and a message."""
+    made = {
+        "strip": Strip(**task["strip"]),
+        "trapezoid": Trapezoid(**task["trapezoid"]),
+        "material": material_of(task["material"]),
+        "support": material_of(task["support"]),
+        "size": task["mesh_size"],
+    }
     try:
-        found = lay(
-            Strip(**task["strip"]), Trapezoid(**task["trapezoid"]), material_of(task["material"]),
-            material_of(task["support"]), task["definition"], task["mesh_size"], loading=task["loading"],
-            pressure=task["pressure"], friction=task["friction"],
-        )  # fmt: skip
+        found = lay(**made, **{name: task[name] for name in ("definition", "loading", "pressure", "friction")})
     except DefinitionError as error:
         return {"status": Status.FAILED, "message": f"{task['definition']}: {error}"}
     return asdict(found) | {"status": Status.NOT_CONVERGED if found.message else Status.SOLVED}
+
+
+def lay(strip, trapezoid, material, support, definition, size, *, loading="pressure", pressure=0.02e6, friction=0.0,
+        rigid=RIGID):  # fmt: skip
+    """Lay a strip on a trapezoid [m, Pa], which is rigid from a ratio `rigid` of Young's moduli on."""
+    begin = time.perf_counter()
+    body, mesh = _strip(strip, trapezoid, material, definition, size, loading, pressure)
+    skipped = ["unknowns of the floor"]
+    if support.young_modulus >= rigid * material.young_modulus:
+        contact = Contact([body], [Obstacle(np.array(trapezoid.corners))], floor=True, size=size, friction=friction)
+        skipped.append("the trapezoid's deformation: it is rigid beside the strip")
+    else:
+        below = _support(strip, trapezoid, support, size)
+        contact = Contact([body, below], floor=True, size=size, friction=friction)
+    message = ""
+    try:
+        contact.solve(first=1e-3)
+    except ContactError as error:
+        message = str(error)
+    low = np.flatnonzero(mesh.points[:, 1] <= trapezoid.height * (1 + 1e-9))
+    fibre = body.points[low[np.argsort(mesh.points[low, 0])]]
+    lengths = np.linalg.norm(np.diff(fibre, axis=0), axis=1)
+    load = pressure * strip.length * strip.thickness
+    if loading == "pressure":  # as far as it still acts downwards
+        load = -float(contact.share * body.force * body.pressure.forces(body.displacements)[:, 1].sum())
+    outline = body.outline[:, 0]
+    around = [0]
+    while len(around) < len(outline):
+        around.append(int(body.neighbours[0][around[-1]]))
+    return Laid(
+        area=float(np.sum(0.5 * (fibre[1:, 1] + fibre[:-1, 1]) * np.diff(fibre[:, 0]))),
+        elongation=float(lengths.sum() / strip.length - 1),
+        penetration=contact.penetration / size,
+        force_error=float("nan") if loading == "ends" else float(contact.contact_force()[1] / abs(load) - 1),
+        load_share=contact.share,
+        message=message,
+        iterations=contact.iterations,
+        seconds=time.perf_counter() - begin,
+        skipped="; ".join(skipped),
+        outline=body.points[outline[around]],
+    )
+
+
+def _strip(strip, trapezoid, material, definition, size, loading, pressure):
+    made = MESH_TYPES["structured"](strip.length, strip.height, size)
+    mesh = Mesh(made.points + [-0.5 * strip.length, trapezoid.height], made.triangles, made.quads)
+    sheet = Sheet(mesh, strip.thickness)
+    springs, _ = sheet.derive(definition, material)
+    held = np.zeros(mesh.points.shape, dtype=bool)
+    # Without friction nothing else keeps the strip from sliding off to one side.
+    held[np.abs(mesh.points[:, 0]) <= 1e-9 * strip.length, 0] = True
+    arguments, total = {}, pressure * strip.length * strip.thickness
+    if loading == "pressure":
+        top = mesh.outline_edges(1, mesh.points[:, 1].max())
+        arguments = {"pressure": FollowerPressure.of_side(mesh, top, 0), "force": -total}
+    elif loading == "gravity":
+        weights = -total * mesh.particle_areas / mesh.area
+        arguments = {"forces": np.stack([np.zeros(len(weights)), weights], axis=1)}
+    else:
+        low = np.abs(mesh.points[:, 1] - trapezoid.height) <= 1e-9 * trapezoid.height
+        ends = low & (np.abs(np.abs(mesh.points[:, 0]) - 0.5 * strip.length) <= 1e-9 * strip.length)
+        held[ends, 1] = True
+        arguments = {"prescribed": np.where(ends[:, None], [0.0, -trapezoid.height], 0.0)}
+    return Body(sheet.network(held, springs), springs.reference, **arguments), mesh
+
+
+def _support(strip, trapezoid, material, size):
+    """The trapezoid: rows of linear triangles of `delingette`, since its corners allow no negative area modulus."""
+    mean = 0.5 * (trapezoid.lower_base + trapezoid.upper_base)
+    made = MESH_TYPES["structured"](mean, trapezoid.height, size)
+    y = made.points[:, 1]
+    width = trapezoid.lower_base + (trapezoid.upper_base - trapezoid.lower_base) * y / trapezoid.height
+    mesh = Mesh(np.stack([(made.points[:, 0] / mean - 0.5) * width, y], axis=1), made.triangles)
+    sheet = Sheet(mesh, strip.thickness)
+    springs, _ = sheet.derive("delingette", material)
+    held = np.zeros(mesh.points.shape, dtype=bool)
+    held[np.lexsort((np.abs(mesh.points[:, 0]), y))[0], 0] = True
+    return Body(sheet.network(held, springs), springs.reference, moves_little=True)

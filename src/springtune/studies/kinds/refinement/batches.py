@@ -13,16 +13,10 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Rule:
-    """Where a refinement looks, and how far it goes.
+    """Ends of a refinement, and how it adds values.
 
-    Attributes
-    ----------
-    logarithmic : bool
-        Whether values are spaced by their logarithms.
-    tolerance : float
-        Size of the error that matters [1].
-    resolution : float
-        Widest interval that is not halved any more, over that between the ends [1].
+    `points` is the size of the first batch, `most` the largest number of values. Intervals up to `resolution` [1], a
+    share of the distance of the ends, are not halved. `tolerance` is the size of the error that matters [1].
 
     Examples
     --------
@@ -49,13 +43,16 @@ class Rule:
 
     @property
     def levels(self) -> tuple[float, float, float]:
-        """Errors whose crossings are looked for [1]."""
+        """Errors whose crossings matter [1]."""
         return 0.0, self.tolerance, -self.tolerance
 
 
 @dataclass(frozen=True)
 class Crossing:
-    """Where the error is ``level`` [1], by a straight line between two values, and how much it changes between them."""
+    """Value at which the error is `level` [1], by a straight line between two values.
+
+    `width` is the distance of these values, `change` the change of the error between them.
+    """
 
     level: float
     value: float
@@ -63,18 +60,17 @@ class Crossing:
     change: float
 
 
-def value_key(value: float) -> str:
+def value_key(file: str, value: float) -> str:
     """Key of a value's result in the file of its refinement."""
-    return f"{value:.12g}"
+    return f"{file} {value:.12g}"
 
 
-def refine(rule: Rule, solve: Callable[[list[float]], Sequence[float]]) -> tuple[list[float], list[int], list[float]]:
-    """Values, batch after batch.
+def refine(
+    rule: Rule, solve: Callable[[list[float]], Sequence[float] | None]
+) -> tuple[list[float], list[int], list[float]]:
+    """Places of values, their batches and errors, batch after batch.
 
-    Parameters
-    ----------
-    solve : callable
-        Errors [1] at values, which are all of a batch; NaN where there is none.
+    `solve` returns the errors of a batch of values [1], NaN where there is none, or None to end here.
 
     Examples
     --------
@@ -87,13 +83,15 @@ def refine(rule: Rule, solve: Callable[[list[float]], Sequence[float]]) -> tuple
     wanted, batch = [step / (rule.points - 1) for step in range(rule.points)], 0
     while wanted:
         errors = solve([rule.value(place) for place in wanted])
+        if errors is None:
+            break
         known |= {place: (batch, float(error)) for place, error in zip(wanted, errors)}
         wanted, batch = _halved(rule, known)[: rule.most - len(known)], batch + 1
     return list(known), [batch for batch, _ in known.values()], [error for _, error in known.values()]
 
 
 def _halved(rule: Rule, known: dict[float, tuple[int, float]]) -> list[float]:
-    """Middles of the intervals to halve, of the widest first."""
+    """Middles of the intervals to halve, the widest first."""
     places, found = sorted(known), []
     for low, high in zip(places, places[1:]):
         ends = known[low][1], known[high][1]
@@ -103,16 +101,16 @@ def _halved(rule: Rule, known: dict[float, tuple[int, float]]) -> list[float]:
 
 
 SAME = 1e-9
-"""Error by which two are the same: of an exact definition rounding decides the sign [1]."""
+"""Largest difference of equal errors [1]: rounding decides the sign for an exact definition."""
 
 
 def _crosses(one: float, other: float, level: float) -> bool:
-    """Whether two errors are on different sides of a level; one that is not there is on none."""
+    """Whether two errors are on different sides of a level; a missing one is on no side."""
     return bool(np.isfinite([one, other]).all()) and (one >= level - SAME) != (other >= level - SAME)
 
 
 def crossings(rule: Rule, places: Sequence[float], errors: Sequence[float]) -> list[Crossing]:
-    """Where the error is zero, or the tolerance, by the last values.
+    """Values at which the error is zero or the tolerance.
 
     Examples
     --------

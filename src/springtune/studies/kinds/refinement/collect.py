@@ -1,14 +1,18 @@
-"""Refinements, gathered in the group ``/refinement``."""
+"""Refinements: the group ``/refinement``, and tables of its values and of where errors are zero or the tolerance."""
 
 from collections.abc import Collection
+from pathlib import Path
 
 import numpy as np
 
-from ...output.dataset import Filler, Group
+from springtune.safe_io.atomic import write_text
+
+from ...output.dataset import STATUS, Filler, Group
+from ...output.tables import csv_text
 from ...runs import store
 from .batches import crossings, refine, value_key
 from .kind import file_key
-from .names import SPACINGS, VARIED
+from .outputs import REFINEMENT_TABLES, SPACINGS, VARIED
 
 OF_ONE = ("refinement",)
 VALUE, CROSSING = (*OF_ONE, "definition", "point"), (*OF_ONE, "definition", "crossing")
@@ -59,23 +63,14 @@ def refinement_group(parameters: Collection[str]) -> Group:
 REFINEMENT = refinement_group(VARIED)
 """The group with all that a study may vary."""
 
-OF_A_VALUE = (
-    "status",
-    "message",
-    "displacement",
-    "reference_displacement",
-    "reference_error_estimate",
-    "reference_applies",
-    "deformation_error",
-    "particles",
-)
-"""What of a value's result goes into the dataset as it is."""
+RESULTS = ("displacement", "reference_displacement", "reference_error_estimate", "deformation_error", "particles")
+"""Numbers of a value's result that the dataset and the table have."""
 
 
 def groups(study, folder):
     """Groups of a dataset, see `springtune.studies.kinds.scenes.collect.groups`."""
     part = study.parts["refinement"]
-    found = [_read(one, folder / "refinement" / f"{file_key(one)}.h5") for one in part]
+    found = [_read(one, folder / "refinement") for one in part]
     lengths = {
         "point": max(len(places) for places, *_ in found),
         "crossing": max(1, *(len(where) for *_, where in found)),
@@ -88,18 +83,18 @@ def groups(study, folder):
     return {group.name: data.data.set_coords([name for name in COORDINATES if name in data.data])}
 
 
-def _read(one, path):
+def _read(one, folder):
     """Places, batches and results of a refinement's values, and its crossings: the loop again, on what is stored."""
-    results = {}
+    file, results = file_key(one), []
 
     def errors(values):
-        batch = {value: value_key(value) for value in values}
-        known = store.read(path, batch.values())
-        results.update({value: known[key] for value, key in batch.items()})
-        return [results[value].get("deformation_error", np.nan) for value in values]
+        keys = [value_key(file, value) for value in values]
+        known = store.read(folder / f"{file}.h5", keys)
+        results.extend(known[key] for key in keys)
+        return [known[key].get("deformation_error", np.nan) for key in keys]
 
-    places, batches, errors = refine(one.rule, errors)
-    return places, batches, results, crossings(one.rule, places, errors)
+    places, batches, found = refine(one.rule, errors)
+    return places, batches, results, crossings(one.rule, places, found)
 
 
 def _scene(one):
@@ -117,12 +112,58 @@ def _put(one, places, batches, results, where, data):
     about = {"parameter": one.parameter, "tolerance": one.rule.tolerance, "spacing": SPACINGS[one.rule.logarithmic]}
     data.put(about | {"scene": _scene(one)}, refinement=one.name)
     data.put({"value_count": len(places), "halved": max(batches)}, **labels)
-    for point, (place, batch) in enumerate(zip(places, batches)):
-        value = one.rule.value(place)
-        result = results[value]
-        values = {f"refined_{one.parameter}": value, "batch": batch}
-        data.put(values | {name: result[name] for name in OF_A_VALUE if name in result}, point=point, **labels)
+    for point, (place, batch, result) in enumerate(zip(places, batches, results)):
+        values = {f"refined_{one.parameter}": one.rule.value(place), "batch": batch}
+        known = ("status", "message", "reference_applies", *RESULTS)
+        data.put(values | {name: result[name] for name in known if name in result}, point=point, **labels)
     for number, crossing in enumerate(where):
         values = {"crossing_level": crossing.level, "crossing_change": crossing.change}
         values |= {f"crossing_{one.parameter}": crossing.value, f"crossing_{one.parameter}_width": crossing.width}
         data.put(values, crossing=number, **labels)
+
+
+CROSSING_COLUMNS = ("refinement", "definition", "parameter", "unit", "error", "value", "width", "change")
+"""Columns of the table of crossings."""
+
+
+def write(tree, folder):
+    """Write two CSV files."""
+    data = tree["refinement"].to_dataset()
+    for name, rows in zip(REFINEMENT_TABLES, (_values(data), _crossings(data))):
+        write_text(Path(folder) / name, csv_text(rows))
+    return list(REFINEMENT_TABLES)
+
+
+def _cells(data):
+    """Each refinement and definition that has values: its part of the dataset, and its labels for a row."""
+    for name in data.refinement.values.tolist():
+        for definition in data.definition.values.tolist():
+            cell = data.sel(refinement=name, definition=definition)
+            if cell.value_count:
+                parameter = str(cell.parameter.item())
+                # NaN, where there is no value, comes last.
+                cell = cell.isel(point=np.argsort(cell[f"refined_{parameter}"].values, kind="stable"))
+                labels = {"refinement": name, "definition": definition, "parameter": parameter}
+                yield cell, labels | {"unit": VARIED[parameter].unit}
+
+
+def _values(data):
+    rows = []
+    for cell, labels in _cells(data):
+        for point in range(int(cell.value_count)):
+            one = cell.isel(point=point)
+            row = labels | {"value": float(one[f"refined_{labels['parameter']}"]), "batch": int(one.batch)}
+            row |= {name: float(one[name]) for name in RESULTS}
+            rows.append(row | {"status": STATUS[int(one.status)], "message": str(one.message.item())})
+    return rows
+
+
+def _crossings(data):
+    rows = []
+    for cell, labels in _cells(data):
+        for number in np.flatnonzero(np.isfinite(cell.crossing_level.values)):
+            one, name = cell.isel(crossing=number), f"crossing_{labels['parameter']}"
+            row = {"error": float(one.crossing_level), "value": float(one[name]), "width": float(one[f"{name}_width"])}
+            rows.append(labels | row | {"change": float(one.crossing_change)})
+    # A file without rows has its columns.
+    return rows or [dict.fromkeys(CROSSING_COLUMNS, "")]

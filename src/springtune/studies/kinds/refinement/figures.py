@@ -6,7 +6,7 @@ from springtune.problem.status import Status
 
 from ...output import labels, style
 from ...output.selection import choose, group
-from .names import SPACINGS, VARIED
+from .outputs import SPACINGS, VARIED
 
 HOLLOW = "hollow: unstable, or beyond the linear reference"
 

@@ -34,8 +34,7 @@ from ...runs.hashing import hash_of
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key, stage_key
 from ...runs.stages import Task, stage
 from .batches import Rule
-from .names import SPACINGS, VARIED
-from .outputs import OUTPUTS
+from .outputs import OUTPUTS, SPACINGS, VARIED
 
 MOST_REFINED = 10_001
 """Most values of a refinement."""

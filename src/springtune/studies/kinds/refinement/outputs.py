@@ -1,11 +1,71 @@
-"""What is made of refinements."""
+"""Parameters that a refinement may vary, the figure and tables of refinements, and what the page to browse shows."""
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from springtune.units import UnitError, parse
+
 from ...config.kind import Output
+from ...output.views import Plot, View
 
 if TYPE_CHECKING:
     from ...config.model import Study
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter of a scene: ``kind`` is of `springtune.units.QUANTITY_KINDS`, ``scales`` are units and SI sizes."""
+
+    meaning: str
+    unit: str
+    kind: str = ""
+    scales: tuple[tuple[str, float], ...] = (("", 1.0),)
+    most: float = float("inf")
+    zero: bool = False
+
+    def scale(self, largest: float) -> tuple[str, float]:
+        """Unit in which values are shown, and its size in SI.
+
+        Examples
+        --------
+        >>> VARIED["force"].scale(20.0), VARIED["force"].scale(2e4)
+        (('N', 1.0), ('kN', 1000.0))
+        """
+        return next((one for one in self.scales if largest >= one[1]), self.scales[-1])
+
+    def read(self, text: str) -> float:
+        """Value of a text."""
+        if self.kind:
+            try:
+                value = parse(text, self.kind)
+            except UnitError as error:
+                raise ValueError(str(error)) from None
+        else:
+            try:
+                value = float(text)
+            except ValueError:
+                raise ValueError(f"'{text}' is not a number; give one such as 0.3") from None
+        if not (value >= 0 if self.zero else value > 0) or not value <= self.most or value == float("inf"):
+            most = f" to {self.most:g}" if self.most < float("inf") else ""
+            raise ValueError(f"'{text}' is out of range; give a value {'from' if self.zero else 'above'} 0{most}")
+        return value
+
+
+LENGTHS = (("mm", 1e-3),)
+"""Units of lengths."""
+
+VARIED = {
+    "mesh_size": Parameter("asked length of an edge", "m", "length", LENGTHS),
+    "force": Parameter("size of the force", "N", "force", (("kN", 1e3), ("N", 1.0))),
+    "thickness": Parameter("thickness of the sheet", "m", "length", LENGTHS),
+    "young_modulus": Parameter("Young's modulus", "Pa", "stress", (("GPa", 1e9), ("MPa", 1e6), ("kPa", 1e3))),
+    "poisson_ratio": Parameter("Poisson's ratio", "1", most=0.5, zero=True),
+    "stiffness_scale": Parameter("factor on the stiffness that the definition gives", "1"),
+}
+"""Parameters by name."""
+
+SPACINGS = ("linear", "logarithmic")
+"""How values are spaced."""
 
 REFINEMENT_TABLES = ("refinement.csv", "refinement_crossings.csv")
 """Tables of the values, and of where errors are zero or the tolerance."""
@@ -22,7 +82,20 @@ OUTPUTS = (
         figures=lambda study: {"refinement": {}},
         plot="studies.kinds.refinement.figures:refinement",
         tables=lambda study: REFINEMENT_TABLES,
-        write="studies.kinds.refinement.tables",
+        write="studies.kinds.refinement.collect",
         lack=_lack,
     ),
 )
+
+VIEWS = (
+    View(
+        "/refinement",
+        "Refinement",
+        "The deformation error over a parameter, with more values where it changes its sign or crosses the tolerance.",
+        tuple(
+            Plot(f"error over {known.meaning}", "deformation_error", f"refined_{name}", "definition", along="point",
+                 ascending=True)
+            for name, known in VARIED.items()
+        ),
+    ),
+)  # fmt: skip

@@ -1,12 +1,12 @@
 """Stage `refinement`: values of a parameter, added where the error changes its sign or crosses a tolerance.
 
-The loop is here, since further values depend on results. Each value has a key of its own, so a run that was stopped
-goes on where it ended.
+Further values depend on results, so that a job looks for its tasks again after each batch. Each value has a result of
+its own: a run that was stopped goes on where it ended.
 """
 
-import time
+import sys
 from dataclasses import replace
-from functools import lru_cache, partial
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -23,96 +23,71 @@ from springtune.scene.meshes import make_mesh
 from springtune.scene.sheet import Sheet
 from springtune.springs import DefinitionError
 
-from ...runs import store
+from ...runs import driver, store
 from .batches import Rule, refine, value_key
-
-SEPARATOR = "/"
-"""Between the key of a file and that of a value, in the name of a task."""
 
 
 def run(content, costs):
-    """Solve the values that refinements ask for and that are not stored yet."""
-    for file in content["files"]:
-        (task,) = file["tasks"]
-        path = Path(content["folder"]) / f"{file['name']}.h5"
-        present = store.stored(path, costs.limits)
-        known = store.read(path, present) if present else {}
-        solver = _Solver(task)
-        with store.Keeper(path) as keeper:
-            for rule in task["rules"]:
-                refine(Rule(**rule), partial(_errors, task, solver, known, keeper, costs))
-        if solver.seconds:
-            costs.add("refinement", solver.particles, solver.seconds)
+    """Solve the values that refinements ask for, batch after batch."""
+    before, asked = -1, 0
+    while asked > before and not costs.broken:
+        driver.solve_files(sys.modules[__name__], content, costs)
+        before, asked = asked, sum(len(tasks(file, content)) for file in content["files"])
 
 
-def _errors(task, solver, known, keeper, costs, values):
-    """Errors of a batch of values: of those that are not known by solving them."""
-    found = []
-    for value in values:
-        name = value_key(value)
-        if name not in known:
-            result = costs.attempt(f"{task['key']}{SEPARATOR}{name}", partial(solver.solve, value), _failed)
-            if result is None:  # the program is broken: the job ends with an error
-                found.append(np.nan)
-                continue
-            known[name] = keeper[name] = result
-        found.append(known[name].get("deformation_error", np.nan))
-    return found
+def tasks(file, content):
+    """Values that are asked for by the errors that are stored."""
+    path, (shared,) = Path(content["folder"]) / f"{file['name']}.h5", file["tasks"]
+    present, asked = store.stored(path), {}
+    known = store.read(path, present) if present else {}
+
+    def errors(values):
+        batch = {value_key(file["name"], value): value for value in values}
+        asked.update(batch)
+        return [known[key].get("deformation_error", np.nan) for key in batch] if batch.keys() <= present else None
+
+    for rule in shared["rules"]:
+        refine(Rule(**rule), errors)
+    return [shared | {"key": key, "value": value} for key, value in asked.items()]
 
 
-def gone(content, key, why, limits):
-    """Store the failed result of a value beyond its limits."""
-    name, _, value = key.partition(SEPARATOR)
-    store.add(Path(content["folder"]) / f"{name}.h5", {value: _failed(why) | {store.LIMITS: limits}})
-
-
-def _failed(why):
-    return {"status": Status.FAILED, "message": why}
-
-
-class _Solver:
-    """Scenes of a refinement, one a value."""
-
-    def __init__(self, task):
-        self.task, self.sheet, self.seconds, self.particles = task, None, 0.0, 0
-
-    def solve(self, value):
-        """Result of a scene."""
-        begin, task = time.perf_counter(), self.task
-        given = {"mesh_size": task["mesh_size"], "force": 1.0, "stiffness_scale": 1.0} | {task["parameter"]: value}
-        beam, material = (
-            replace(body, **{name: given[name] for name in names if name in given})
-            for body, names in (
-                (Beam(**task["beam"]), ("thickness",)),
-                (material_of(task["material"]), ("young_modulus", "poisson_ratio")),
-            )
+def solve(task):
+    """Result of the scene of a value."""
+    given = {"mesh_size": task["mesh_size"], "force": 1.0, "stiffness_scale": 1.0} | {task["parameter"]: task["value"]}
+    beam, material = (
+        replace(body, **{name: given[name] for name in names if name in given})
+        for body, names in (
+            (Beam(**task["beam"]), ("thickness",)),
+            (material_of(task["material"]), ("young_modulus", "poisson_ratio")),
         )
-        force, kind = task["force"] * given["force"], LOAD_KINDS[task["kind"]]
-        try:
-            result = self._solved(beam, material, force, kind, given)
-        except DefinitionError as error:
-            result = _failed(f"{task['definition']}: {error}")
-        result["seconds"] = time.perf_counter() - begin
-        self.seconds += result["seconds"]
-        return result
+    )
+    force, kind = task["force"] * given["force"], LOAD_KINDS[task["kind"]]
+    sheet = _sheet(beam, task["mesh_type"], given["mesh_size"])
+    try:
+        springs, _ = sheet.derive(task["definition"], material)
+    except DefinitionError as error:
+        return {"status": Status.FAILED, "message": f"{task['definition']}: {error}"}
+    springs = replace(springs, reference=given["stiffness_scale"] * springs.reference)
+    solution = sheet.solve(kind, springs, force, task["kinematics"], task["follower"])
+    found = {"status": solution.status, "message": solution.message, "particles": len(sheet.mesh.points)}
+    if np.isfinite(solution.displacement):
+        found["displacement"] = solution.displacement
+    return _compared(found, beam, material, force, kind, task["kinematics"])
 
-    def _solved(self, beam, material, force, kind, given):
-        task, size = self.task, given["mesh_size"]
-        if self.sheet is None or task["parameter"] in ("mesh_size", "thickness"):
-            mesh = make_mesh(beam, task["mesh_type"], size)
-            self.sheet = Sheet(mesh, beam.thickness)
-        self.particles += len(self.sheet.mesh.points)
-        springs, _ = self.sheet.derive(task["definition"], material)
-        springs = replace(springs, reference=given["stiffness_scale"] * springs.reference)
-        solution = self.sheet.solve(kind, springs, force, task["kinematics"], task["follower"])
-        result = {"status": solution.status, "message": solution.message, "particles": len(self.sheet.mesh.points)}
-        if np.isfinite(solution.displacement):
-            result["displacement"] = solution.displacement
-        return _compared(result, beam, material, force, kind, task["kinematics"])
+
+def cost(task, result, seconds):
+    """Particles of a value's network."""
+    yield "refinement", result.get("particles", 0), seconds
+
+
+@lru_cache(maxsize=1)
+def _sheet(beam, mesh_type, size):
+    """Sheet that all values share unless they vary the mesh size or the thickness."""
+    return Sheet(make_mesh(beam, mesh_type, size), beam.thickness)
 
 
 def _compared(result, beam, material, force, kind, kinematics):
-    """Result with its reference and the error."""
+    """Add the reference and the error to a result."""
     try:
         unit = _reference(*unit_problem(beam, material, kind))
     except ReferenceNotConvergedError as error:
@@ -122,13 +97,10 @@ def _compared(result, beam, material, force, kind, kinematics):
     result |= {"reference_displacement": displacement, "reference_error_estimate": unit.error_estimate}
     if "displacement" in result:
         result["deformation_error"] = float(deformation_error(result["displacement"], displacement))
-    result["reference_applies"] = True
-    if kinematics == "nonlinear":
-        size = abs(force) * scale / length
-        why = beyond_linear(size * unit.rotation, size * unit.strain)
-        result["reference_applies"] = not why
-        result["message"] = "; ".join(filter(None, (result["message"], why)))
-    return result
+    size = abs(force) * scale / length
+    why = beyond_linear(size * unit.rotation, size * unit.strain) if kinematics == "nonlinear" else ""
+    message = "; ".join(filter(None, (result["message"], why)))
+    return result | {"reference_applies": not why, "message": message}
 
 
 @lru_cache(maxsize=4)

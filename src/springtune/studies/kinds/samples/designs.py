@@ -1,15 +1,55 @@
-"""Designs: points of the unit cube, and the parameters of scenes that distributions make of them.
+"""Designs of samples: points of the unit cube, and the parameters of scenes that distributions make of them.
 
 All are extendable: the first half of a sample of twice the size is the sample, bit for bit.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
-from .names import FIRST_ROLES, SOBOL_INDICES, rows_each
+PARAMETERS = {
+    "length": ("length", "extent along x", "m"),
+    "height": ("length", "extent along y", "m"),
+    "thickness": ("length", "extent out of the plane", "m"),
+    "mesh_size": ("length", "asked length of an edge", "m"),
+    "relative_mesh_size": ("", "asked length of an edge over the height", "1"),
+    "young_modulus": ("stress", "Young's modulus", "Pa"),
+    "poisson_ratio": ("", "Poisson's ratio", "1"),
+    "force": ("force", "magnitude of the force", "N"),
+}
+"""Parameters of a sampled scene: kind of quantity, what it is, and its unit."""
+
+SOBOL_INDICES = "sobol-indices"
+"""The design whose rows differ in one parameter from each other, by which indices are estimated."""
+
+DESIGNS = (SOBOL_INDICES, "sobol", "latin-hypercube")
+"""How samples are drawn."""
+
+SMALLEST_SIZE = 8
+"""Smallest size of a sample."""
+
+BASE_ROWS = 64
+"""Most base samples of a task of `SOBOL_INDICES`; they have some hundred rows."""
+
+PLAIN_ROWS = 512
+"""Most base samples of a task of other designs; each is one row."""
+
+
+def blocks(design: str, size: int) -> list[tuple[int, int]]:
+    """First base sample of each task, and the one after its last. Those of a size begin with those of half the size.
+
+    Examples
+    --------
+    >>> blocks("sobol-indices", 16), blocks("sobol-indices", 32)
+    ([(0, 8), (8, 16)], [(0, 8), (8, 16), (16, 32)])
+    """
+    most = BASE_ROWS if design == SOBOL_INDICES else PLAIN_ROWS
+    ends = [0, SMALLEST_SIZE]
+    while ends[-1] < size:
+        ends.append(ends[-1] + min(ends[-1], most))
+    return list(zip(ends[:-1], ends[1:]))
 
 
 def points(design: str, size: int, dimensions: int, seed: int, first: int = 0, last: int | None = None) -> np.ndarray:
@@ -90,15 +130,15 @@ def varied(parameters: Mapping[str, Mapping[str, Any]]) -> list[str]:
     return [name for name, one in parameters.items() if one["distribution"] != "fixed"]
 
 
-def roles(design: str, names: list[str]) -> list[str]:
-    """What each row of a base sample is.
+def roles(design: str, names: Iterable[str]) -> list[str]:
+    """Name the rows of a base sample.
 
     Examples
     --------
     >>> roles("sobol-indices", ["length", "force"])
     ['A', 'B', 'AB_length', 'AB_force']
     """
-    return [*FIRST_ROLES, *(f"AB_{name}" for name in names)] if design == SOBOL_INDICES else [FIRST_ROLES[0]]
+    return ["A", "B", *(f"AB_{name}" for name in names)] if design == SOBOL_INDICES else ["A"]
 
 
 def draw(
@@ -113,11 +153,9 @@ def draw(
     count, pair = len(names), design == SOBOL_INDICES
     size = 1 << (last - 1).bit_length()  # a power of two
     shares = points(design, size, count * (2 if pair else 1), seed, first, last)
-    rows = rows_each(design, count)
-    table = np.repeat(shares[:, None, :count], rows, axis=1)
+    table = np.repeat(shares[:, None, :count], len(roles(design, names)), axis=1)
     if pair:
-        other = shares[:, count:]
-        table[:, 1] = other
+        table[:, 1] = other = shares[:, count:]
         for axis in range(count):
             table[:, 2 + axis, axis] = other[:, axis]
     table = table.reshape(-1, count)

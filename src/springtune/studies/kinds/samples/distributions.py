@@ -9,16 +9,24 @@ from springtune.problem.quantities import LEAST, nearest
 
 from ...config.fields import number, quantity
 from ...config.messages import refuse, show
-from .names import DISTRIBUTION_KEYS, PARAMETERS
+from .designs import PARAMETERS
+
+DISTRIBUTION_KEYS = {
+    "uniform": ("from", "to"),
+    "log-uniform": ("from", "to"),
+    "triangular": ("from", "mode", "to"),
+    "normal": ("mean", "deviation"),
+}
+"""Keys that each distribution needs."""
 
 DEVIATIONS = 4.0
-"""Standard deviations from the mean at which a normal distribution ends where it is not told."""
+"""Standard deviations from the mean at which a normal distribution ends by default."""
 
 MOST_DEVIATIONS = 8.0
-"""Standard deviations from the mean up to which a part of the range of a normal distribution has to come."""
+"""Largest distance of the range of a normal distribution from its mean, in standard deviations."""
 
 LEGAL = {"poisson_ratio": (0.0, 0.5), "relative_mesh_size": (LEAST, 1.0)}
-"""What a parameter may be, where that is not anything above zero."""
+"""Range of the parameters that are not just positive."""
 
 _NUMBERS = {
     "poisson_ratio": number("a number from 0 to 0.5, such as 0.3", 0, 0.5),
@@ -27,7 +35,7 @@ _NUMBERS = {
 
 
 class Distributed:
-    """Annotation of a parameter: a value, or a distribution that it is drawn from."""
+    """Annotation of a parameter: a value, or the distribution to draw it from."""
 
     def __init__(self, name: str, example: str) -> None:
         scalar = _NUMBERS.get(name) or quantity(PARAMETERS[name][0])
@@ -83,14 +91,17 @@ class Distributed:
             raise refuse(f"{show(value['from'])} has no logarithm; give a 'from' above zero, or a uniform one", "from")
         if name == "triangular" and not low <= read["mode"] <= high:
             raise refuse(f"{show(value['mode'])} is not between 'from' and 'to'; give a mode between them", "mode")
-        if name == "normal" and not low < read["mean"] + MOST_DEVIATIONS * read["deviation"]:
-            raise refuse(f"{show(value['mean'])} is far below 'from'; give ends near the mean", "mean")
-        if name == "normal" and not high > read["mean"] - MOST_DEVIATIONS * read["deviation"]:
-            raise refuse(f"{show(value['mean'])} is far above 'to'; give ends near the mean", "mean")
+        if name == "normal":
+            most = MOST_DEVIATIONS * read["deviation"]
+            where = (
+                "below 'from'" if read["mean"] + most <= low else "above 'to'" if read["mean"] - most >= high else ""
+            )
+            if where:
+                raise refuse(f"{show(value['mean'])} is far {where}; give ends near the mean", "mean")
         return {"distribution": name, "low": low, "high": high} | read
 
     def _number(self, key: str, value: object) -> float:
-        """A number of the parameter's own kind, or what is wrong with it under its key."""
+        """Read a number of the parameter's own kind; what is wrong with it goes under its key."""
         if not isinstance(value, str):
             raise refuse(f"{show(value)} instead of {self.scalar.words}; give {self.scalar.words}", key)
         try:
@@ -100,7 +111,7 @@ class Distributed:
             raise refuse(message["message"], key) from None
 
     def _ended(self, read: dict[str, float]) -> dict[str, float]:
-        """A normal distribution with its ends: those given, or some deviations from the mean within what is legal."""
+        """Add the ends of a normal distribution: by default some deviations from the mean, within its legal range."""
         if not read["deviation"] > 0:
             raise refuse("'0' is no deviation; give one above zero, or one value", "deviation")
         least, most = LEGAL.get(self.name, (0.0, float("inf")))

@@ -14,18 +14,17 @@ from .designs import draw
 
 def run(content: dict[str, Any], costs: TaskCosts) -> None:
     """Build the interpolants that are not there yet."""
-    pairs = set()
-    if content["sample"]:
-        drawn = draw(**content["sample"])
-        pairs = set(zip((drawn["length"] / drawn["height"]).tolist(), drawn["poisson_ratio"].tolist()))
-    for task in content["files"]:
+    for file in content["files"]:
+        (task,), pairs = file["tasks"], set()
+        if file["sample"]:
+            drawn = draw(**file["sample"])
+            pairs = set(zip((drawn["length"] / drawn["height"]).tolist(), drawn["poisson_ratio"].tolist()))
         problems = {problem_key(task["key"], *pair): pair for pair in sorted(pairs)}
-        path = Path(content["folder"]) / f"{task['key']}.h5"
-        stored_interpolant.make(path, task | {"problems": problems}, costs)
+        stored_interpolant.make(Path(content["folder"]) / f"{task['key']}.h5", task | {"problems": problems}, costs)
 
 
 def gone(content: dict[str, Any], key: str, why: str, limits: str) -> None:
-    """Store the failed result of a reference or an interpolant beyond its limits."""
+    """Store the failed result of a reference, or of an interpolant, beyond its limits."""
     path = Path(content["folder"]) / f"{key.partition(' ')[0]}.h5"
     store.add(path, {key: stored_interpolant.failed(why) | {store.LIMITS: limits}})
 

@@ -18,10 +18,15 @@ from ...config.fields import DefinitionName, Flag, Kinematics, Load, MeshType, O
 from ...config.kind import Kind
 from ...config.messages import refuse, show
 from ...config.sections import Section
+from .designs import DESIGNS, PARAMETERS, SMALLEST_SIZE, SOBOL_INDICES, roles, varied
 from .distributions import Distributed
-from .names import DESIGNS, DROP, FAILURES, PARAMETERS, SMALLEST_SIZE, SOBOL_INDICES, rows_each
 from .outputs import OUTPUTS
 from .plan import STAGES, pieces, take
+
+DROP = "drop"
+
+FAILURES = (DROP, "withhold")
+"""What becomes of indices where scenes have no value."""
 
 Drawn = dict[str, Any]
 
@@ -120,7 +125,7 @@ class SamplesConfig(Section):
 
 @dataclass(frozen=True)
 class Sample:
-    """What a study samples; ``blocks`` are the tasks of a part of a study, none where it has all."""
+    """What a study samples; `blocks` are the tasks of a part of a study, and empty for a whole study."""
 
     design: str
     size: int
@@ -137,12 +142,12 @@ class Sample:
     @property
     def varied(self) -> tuple[str, ...]:
         """Parameters that are not fixed."""
-        return tuple(name for name, one in self.parameters.items() if one["distribution"] != "fixed")
+        return tuple(varied(self.parameters))
 
     @property
     def rows(self) -> int:
         """Number of points whose scenes are solved."""
-        return self.size * rows_each(self.design, len(self.varied))
+        return self.size * len(roles(self.design, self.varied))
 
     @property
     def scenes(self) -> int:
@@ -154,7 +159,7 @@ def _check(config, problems):
     section = config.samples
     if not section:
         return
-    where, parameters = ("samples", "parameters"), _parameters(section)
+    where, sample = ("samples", "parameters"), _sample(section)
     if (section.parameters.mesh_size is None) == (section.parameters.relative_mesh_size is None):
         if section.parameters.mesh_size is not None:
             problems.add((*where, "relative_mesh_size"), "both this and 'mesh_size'; remove one")
@@ -162,8 +167,8 @@ def _check(config, problems):
             remedy = "give one such as {from: 2 mm, to: 5 mm}, or a 'relative_mesh_size'"
             problems.add(where, f"'mesh_size' is missing; {remedy}")
     else:
-        _check_sizes(section, problems)
-    if not any(one["distribution"] != "fixed" for one in parameters.values()):
+        _check_sizes(sample, problems)
+    if not sample.varied:
         problems.add(where, "nothing varies; give at least one parameter a range such as {from: 100 mm, to: 400 mm}")
     if section.mesh_type not in MESH_TYPES:
         problems.add(
@@ -172,7 +177,6 @@ def _check(config, problems):
         )
     else:
         _check_definitions(section, problems)
-    sample = _sample(section)
     most = most_scenes()
     if sample.scenes > most:
         each = f"{sample.rows // sample.size} rows x {len(sample.loads)} loads x {len(sample.definitions)} definitions"
@@ -201,26 +205,25 @@ def _check_definitions(section, problems):
                 )
 
 
-def _check_sizes(section, problems):
-    """Mesh sizes against the beams of the worst corners of the sample."""
-    found = _parameters(section)
-    relative = section.parameters.mesh_size is None
-    name = "relative_mesh_size" if relative else "mesh_size"
-    path = ("samples", "parameters", name)
-    size, length, height = found[name], found["length"], found["height"]
+def _check_sizes(sample, problems):
+    """Check mesh sizes against the smallest and the largest beam of a sample."""
+    name = "relative_mesh_size" if "relative_mesh_size" in sample.parameters else "mesh_size"
+    path, relative = ("samples", "parameters", name), name == "relative_mesh_size"
+    size, length, height = (sample.parameters[one] for one in (name, "length", "height"))
     if relative:
-        largest, smallest = size["high"] * height["high"], size["low"] * height["low"]
+        largest = size["high"] * height["high"]
         if largest > length["low"]:
             problems.add(path, f"{size['high']:g} of a height of {_mm(height['high'])} is {_mm(largest)}, larger than "
                          f"a length of {_mm(length['low'])}; give a smaller 'to', or longer beams")  # fmt: skip
     else:
-        largest, smallest, side = size["high"], size["low"], min(length["low"], height["low"])
+        largest, side = size["high"], min(length["low"], height["low"])
         if largest > side:
             problems.add(path, f"up to {_mm(largest)} is larger than the smallest side of a beam, {_mm(side)}; give at "
                          f"most {_mm(side)}, or a 'relative_mesh_size'")  # fmt: skip
-    if section.mesh_type in MESH_TYPES:
-        box = (length["high"], height["low"] if relative else height["high"])
-        particles = MESH_TYPES[section.mesh_type].particles(*box, smallest) if smallest**2 else float("inf")
+    if sample.mesh_type in MESH_TYPES:
+        box = length["high"], height["low" if relative else "high"]
+        smallest = size["low"] * (height["low"] if relative else 1.0)
+        particles = MESH_TYPES[sample.mesh_type].particles(*box, smallest) if smallest**2 else float("inf")
         if particles > MOST_MESHED:
             low, beam = f"{size['low']:g}" if relative else _mm(size["low"]), f"{_mm(box[0])} x {_mm(box[1])}"
             most = f"more than {MOST_MESHED:.0e}"
@@ -231,24 +234,15 @@ def _mm(length: float) -> str:
     return f"{1e3 * length:g} mm"
 
 
-def _parameters(section):
-    """Distributions of the parameters that are given, in the order of `PARAMETERS`."""
-    given = {name: getattr(section.parameters, name) for name in PARAMETERS}
-    return {name: one for name, one in given.items() if one is not None}
-
-
 def _sample(section):
+    given = {name: getattr(section.parameters, name) for name in PARAMETERS}
+    same = ("design", "size", "seed", "mesh_type", "kinematics", "failures")
     return Sample(
-        design=section.design,
-        size=section.size,
-        seed=section.seed,
-        mesh_type=section.mesh_type,
+        **{name: getattr(section, name) for name in same},
         loads=tuple(name for name in LOADS if name in section.load),
         definitions=tuple(name for name in DEFINITIONS if name in section.definition),
-        kinematics=section.kinematics,
         best_stiffness=section.best_stiffness and section.kinematics == "linear",
-        failures=section.failures,
-        parameters=_parameters(section),
+        parameters={name: one for name, one in given.items() if one is not None},
     )
 
 
@@ -269,6 +263,11 @@ def _summary(sample):
     return [["samples", sample.scenes, f"scenes, {' x '.join([each, *times])}, {design}: {', '.join(sample.varied)}"]]
 
 
+def _tables(study):
+    sample = study.parts["samples"]
+    return ["sobol"] if sample and sample.design == SOBOL_INDICES else []
+
+
 KIND = Kind(
     "samples",
     study_fields={
@@ -285,10 +284,6 @@ KIND = Kind(
     outputs=OUTPUTS,
     pieces=pieces,
     take=take,
-    tables=lambda study: ["sobol"] if _has_indices(study) else [],
+    tables=_tables,
     costs={"sampled": (0.05, 6e-4)},
 )
-
-
-def _has_indices(study):
-    return bool(study.parts["samples"]) and study.parts["samples"].design == SOBOL_INDICES

@@ -1,14 +1,21 @@
-"""What is made of samples."""
+"""Figures of samples, and what the page to browse shows of them."""
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 from ...config.kind import Output, stem
-from .names import SOBOL_INDICES
+from ...output.views import Plot, View
+from .designs import SOBOL_INDICES
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
     from ...config.model import Study
+
+QUANTITIES = {
+    "displacement": "displacement of the network",
+    "deformation_error": "deformation error",
+    "best_stiffness": "uniform stiffness without an error",
+}
+"""Quantities that have indices and main effects."""
 
 
 def _lack(study: "Study") -> str:
@@ -22,29 +29,55 @@ def _lack_indices(study: "Study") -> str:
     return _lack(study)
 
 
-def _each_load(name: str) -> "Callable[[Study], Mapping[str, Mapping[str, object]]]":
-    def figures(study: "Study") -> "Mapping[str, Mapping[str, object]]":
-        sample = study.parts["samples"]
-        return {stem(name, {"load": load}): {"load": load} for load in sample.loads} if sample else {}
-
-    return figures
+def _each_load(name: str, study: "Study") -> dict[str, dict[str, str]]:
+    sample = study.parts["samples"]
+    return {stem(name, {"load": load}): {"load": load} for load in sample.loads} if sample else {}
 
 
-OUTPUTS = (
+OUTPUTS = tuple(
     Output(
-        "sobol",
-        "the figure of Sobol indices of samples",
-        figures=_each_load("sobol"),
-        plot="studies.kinds.samples.figures:sobol",
+        name,
+        f"the figure of {shown} of samples",
+        figures=partial(_each_load, name),
+        plot=f"studies.kinds.samples.figures:{name}",
         job="samples",
-        lack=_lack_indices,
-    ),
-    Output(
-        "effects",
-        "the figure of main effects of samples",
-        figures=_each_load("effects"),
-        plot="studies.kinds.samples.figures:effects",
-        job="samples",
-        lack=_lack,
-    ),
+        lack=lack,
+    )
+    for name, shown, lack in (("sobol", "Sobol indices", _lack_indices), ("effects", "main effects", _lack))
 )
+
+OF_ERRORS = {"quantity": "deformation_error"}
+
+VIEWS = (
+    View(
+        "/samples",
+        "Samples",
+        "Scenes whose parameters are drawn from distributions: a point each.",
+        (
+            *(
+                Plot(f"error by {title}", "deformation_error", x, "definition", "points", along="sample")
+                for title, x in (
+                    ("mesh size", "sample_mesh_size"), ("height", "height"), ("Poisson's ratio", "poisson_ratio"),
+                )
+            ),
+            Plot("best stiffness by Young's modulus", "best_stiffness", "young_modulus", "", "points", along="sample",
+                 log="xy"),
+        ),
+    ),
+    View(
+        "/sobol",
+        "What matters",
+        "Sobol indices: shares of a quantity's variance by each parameter alone, and in all that it takes part in.",
+        (
+            Plot("total order", "total_order", "parameter", "definition", "points", selection=OF_ERRORS),
+            Plot("first order", "first_order", "parameter", "definition", "points", selection=OF_ERRORS),
+            Plot("total order by quantity", "total_order", "parameter", "quantity", "map"),
+        ),
+    ),
+    View(
+        "/effects",
+        "Main effects",
+        "Means of a quantity over one parameter, whatever the others are.",
+        (Plot("main effect", "main_effect", "parameter_value", "definition", along="bin", selection=OF_ERRORS),),
+    ),
+)  # fmt: skip

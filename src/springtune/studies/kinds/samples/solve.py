@@ -40,19 +40,14 @@ SCALES = 1e-7
 def run(content, costs, kept_back=store.KEPT_BACK):
     """Solve the scenes of a bundle that are not stored yet."""
     waiting = []
-    for block in content["files"]:
-        path = Path(content["folder"]) / f"{block['name']}.h5"
+    for file in content["files"]:
+        path = Path(content["folder"]) / f"{file['name']}.h5"
         present = store.stored(path, costs.limits)
-        missing = {key: scene for key, scene in content["results"].items() if key not in present}
-        if missing or DRAWN not in present:
-            lost = {name for name in present if name.startswith(GONE_NETWORK)}
-            reasons = store.read(path, lost) if lost else {}
-            reasons = {name: reasons[name]["message"] for name in lost}
-            waiting.append(_Block(content, block, path, missing, DRAWN not in present, reasons))
-            waiting[-1].take_up(costs.limits)
-    count = TOGETHER[content["kinematics"]]
+        if not {DRAWN, *file["results"]} <= present:
+            waiting.append(_Block(file, path, present, costs.limits))
+    count = TOGETHER[content["files"][0]["kinematics"]]
     for begin in range(0, len(waiting), count):
-        _solve_together(content, waiting[begin : begin + count], costs, kept_back)
+        _solve_together(waiting[begin : begin + count], costs, kept_back)
 
 
 def gone(content, key, why, limits):
@@ -64,41 +59,48 @@ def gone(content, key, why, limits):
 class _Block:
     """Rows of some base samples, and what is known of their scenes."""
 
-    def __init__(self, tasks, block, path, missing, new, lost):
-        self.key, self.path, self.missing, self.new, self.lost = block["key"], path, missing, new, lost
-        self.drawn = draw(tasks["design"], tasks["seed"], tasks["parameters"], block["first"], block["last"])
+    def __init__(self, file, path, present, limits):
+        (task,) = file["tasks"]
+        self.file, self.path, self.part = file, path, path.with_stem(f"{path.stem}{PART}")
+        self.missing = {key: scene for key, scene in file["results"].items() if key not in present}
+        self.is_new = DRAWN not in present
+        lost = {name for name in present if name.startswith(GONE_NETWORK)}
+        self.lost = {name: one["message"] for name, one in store.read(path, lost).items()} if lost else {}
+        self.drawn = draw(file["design"], file["seed"], file["parameters"], task["first"], task["last"])
         rows = len(self.drawn["length"])
-        self.particles = np.zeros(rows, dtype=np.int64)
-        self.displacement = {key: np.full(rows, np.nan) for key in missing}
-        self.status = {key: np.full(rows, Status.FAILED, dtype=np.int8) for key in missing}
-        self.messages = {key: {} for key in missing}
-        self.limited = dict.fromkeys(missing, "")
+        self.found = {
+            key: {
+                "displacement": np.full(rows, np.nan),
+                "status": np.full(rows, Status.FAILED, dtype=np.int8),
+                "particles": np.zeros(rows, dtype=np.int64),  # of the mesh type, which parameters do not say
+                "messages": {},
+                "limited": "",
+            }
+            for key in self.missing
+        }
         self.done = np.zeros(rows, dtype=bool)
-        self.part, self.kept, self.solved, self.seconds = path.with_stem(f"{path.stem}{PART}"), True, 0, 0.0
-
-    def take_up(self, limits):
-        """Go on where a process that ended before the block was done had got to, within the same limits."""
-        if not set(self.missing) <= store.stored(self.part, limits):
-            return
-        found = store.read(self.part, self.missing, ("displacement", "status", "particles", "done"))
-        for key, result in found.items():
-            self.displacement[key], self.status[key] = result["displacement"], result["status"]
-            self.messages[key], self.limited[key] = result["messages"], result["limited"]
-            self.particles = result["particles"]
-        self.done = np.all([result["done"] for result in found.values()], axis=0)
+        self.is_kept, self.solved, self.seconds = True, 0, 0.0
+        if set(self.missing) <= store.stored(self.part, limits):  # a process ended before the block was done
+            fields = ("displacement", "status", "particles", "done")
+            self.found = store.read(self.part, self.missing, fields)
+            self.done = np.all([one.pop("done") for one in self.found.values()], axis=0)
 
     def keep_part(self):
         """Store what is known of a block that is not done."""
-        if not self.kept:
-            results = {key: one for key, one in self.results().items() if key != DRAWN}
-            more = {key: {"done": self.done, "limited": self.limited[key]} for key in results}
-            store.add(self.part, {key: one | more[key] for key, one in results.items()})
-            self.kept = True
+        if not self.is_kept:
+            store.add(self.part, {key: one | {"done": self.done} for key, one in self.results().items()})
+            self.is_kept = True
 
     def keep_whole(self):
         """Store the results of a block."""
-        store.add(self.path, self.results())
+        store.add(self.path, self.results() | ({DRAWN: self.drawn} if self.is_new else {}))
         self.part.unlink(missing_ok=True)
+
+    def results(self):
+        """What to store of scenes."""
+        return {
+            key: one | ({store.LIMITS: one["limited"]} if one["limited"] else {}) for key, one in self.found.items()
+        }
 
     def meshes(self):
         """Rows of each distinct mesh that are not done, by its length, height and mesh size [m]."""
@@ -111,39 +113,26 @@ class _Block:
 
     def keep(self, key, rows, scale, result):
         """Note what became of the scenes of some rows, a result over a scale each."""
-        self.displacement[key][rows] = result["displacement"] * scale
-        self.status[key][rows] = result["status"]
+        found = self.found[key]
+        found["displacement"][rows] = result["displacement"] * scale
+        found["status"][rows] = result["status"]
         if result["message"]:
-            self.messages[key] |= dict.fromkeys(map(str, rows), result["message"])
-        self.limited[key] = self.limited[key] or result.get(store.LIMITS, "")
-
-    def results(self):
-        """What to store."""
-        found = {DRAWN: self.drawn} if self.new else {}
-        for key in self.missing:
-            found[key] = {
-                "displacement": self.displacement[key],
-                "status": self.status[key],
-                "messages": self.messages[key],
-                "particles": self.particles,  # of the mesh type, which parameters say nothing of
-            }
-            if self.limited[key]:
-                found[key][store.LIMITS] = self.limited[key]
-        return found
+            found["messages"] |= dict.fromkeys(map(str, rows), result["message"])
+        found["limited"] = found["limited"] or result.get(store.LIMITS, "")
 
 
-def _solve_together(tasks, blocks, costs, kept_back):
+def _solve_together(blocks, costs, kept_back):
     """Solve blocks: mesh after mesh, those of as many cells after each other."""
     meshes = [(box, block, rows) for block in blocks for box, rows in block.meshes().items()]
     meshes.sort(key=lambda one: [round(side / one[0][2]) for side in one[0][:2]])
     like, scaling, since = None, {}, time.perf_counter()
     for box, block, rows in meshes:
         begin = time.process_time()  # which a busy machine does not change: bundles are made by it
-        like = _solve_mesh(tasks, block, box, np.array(rows), like, scaling, costs) or like
+        like = _solve_mesh(block, box, np.array(rows), like, scaling, costs) or like
         block.seconds += time.process_time() - begin
         if costs.broken:
             continue
-        block.done[rows], block.kept, block.solved = True, False, block.solved + len(rows)
+        block.done[rows], block.is_kept, block.solved = True, False, block.solved + len(rows)
         if time.perf_counter() > since + kept_back:
             for one in blocks:
                 one.keep_part()
@@ -154,48 +143,47 @@ def _solve_together(tasks, blocks, costs, kept_back):
             costs.add("sampled", block.solved * len(block.missing), block.seconds)
 
 
-def _solve_mesh(tasks, block, box, rows, like, scaling, costs):
+def _solve_mesh(block, box, rows, like, scaling, costs):
     """Solve the scenes of some rows of a block that share a mesh; the meshed sheet, if there is one."""
 
     def attempt(name, function):
-        key = f"{block.key} {rows[0]} {name}"
+        key = f"{block.file['name']} {rows[0]} {name}"
         if f"{GONE_NETWORK}{key}" in block.lost:
             return _failed(block.lost[f"{GONE_NETWORK}{key}"], **{store.LIMITS: costs.limits})
         return costs.attempt(key, function, _failed)
 
-    # One network at a time: what the one before has left, the next one's symbolic factor is.
-    sheet = attempt(tasks["meshed"], lambda: Sheet(MESH_TYPES[tasks["mesh_type"]](*box), 1.0, networks=1, like=like))
+    # One network at a time: the next one takes over the symbolic factor.
+    mesh_type = MESH_TYPES[block.file["mesh_type"]]
+    sheet = attempt(block.file["meshed"], lambda: Sheet(mesh_type(*box), 1.0, networks=1, like=like))
     if not isinstance(sheet, Sheet):
         for key in block.missing if sheet else ():
             block.keep(key, rows, 1.0, sheet)
         return None
-    block.particles[rows] = len(sheet.mesh.points)
-    drawn, linear = block.drawn, tasks["kinematics"] == "linear"
-    ratios = drawn["poisson_ratio"][rows]
-    # What deforms a network of E t = 1 as the row's force does the row's.
+    for found in block.found.values():
+        found["particles"][rows] = len(sheet.mesh.points)
+    drawn, kinematics = block.drawn, block.file["kinematics"]
+    linear, ratios = kinematics == "linear", drawn["poisson_ratio"][rows]
+    # This force deforms a network of E t = 1 as the row's force deforms the row's.
     loads = drawn["force"][rows] / (drawn["young_modulus"][rows] * drawn["thickness"][rows])
     for key, scene in block.missing.items():
         definition = scene["definition"]
         if definition not in scaling:
             objection = attempt(f"{key} scales", partial(_objection, sheet, scene, drawn, rows[0]))
-            # A sample without an answer objects to nothing: the next one is asked.
+            # Without an answer the next mesh is tried.
             if isinstance(objection, str):
                 scaling[definition] = objection
         if scaling.get(definition):
             block.keep(key, rows, 1.0, _failed(scaling[definition]))
             continue
         for ratio in np.unique(ratios):
-            alike, name = ratios == ratio, f"{key} {float(ratio)!r}"
-            if linear:
-                found = attempt(name, partial(_solved, sheet, scene, ratio, 1.0, "linear"))
+            alike = ratios == ratio
+            for load in (1.0,) if linear else np.unique(loads[alike]):
+                here = alike if linear else alike & (loads == load)
+                how = scene.get("sign", 1.0) * load, kinematics, scene.get("follower", False)
+                name = f"{key} {float(ratio)!r} {float(load)!r}"
+                found = attempt(name, partial(_solved, sheet, scene, ratio, *how))
                 if found:
-                    block.keep(key, rows[alike], loads[alike], found)
-                continue
-            for load in np.unique(loads[alike]):
-                solved = partial(_solved, sheet, scene, ratio, scene["sign"] * load, "nonlinear", scene["follower"])
-                found = attempt(f"{name} {float(load)!r}", solved)
-                if found:
-                    block.keep(key, rows[alike & (loads == load)], 1.0, found)
+                    block.keep(key, rows[here], loads[here] if linear else 1.0, found)
     return sheet
 
 

@@ -18,7 +18,7 @@ from markupsafe import Markup
 from springtune.registry import imported
 from springtune.safe_io.inputs import bounded
 
-from ...config.kind import KINDS
+from ...config.kind import modules
 from ..reading import REMEDY, check_links, guarded, most_of
 from ..views import View
 from .payload import packed
@@ -33,10 +33,8 @@ LIBRARY = ("bokeh", "bokeh-api")
 def views() -> dict[str, View]:
     """Views that the study kinds declare."""
     found: dict[str, View] = {}
-    for name in KINDS:
-        module = f"studies.kinds.{name}.views"
-        if find_spec(f"springtune.{module}"):
-            found |= {view.group: view for view in imported(module).VIEWS}
+    for name in modules("outputs", "views"):
+        found |= {view.group: view for view in getattr(imported(name), "VIEWS", ())}
     return found
 
 
