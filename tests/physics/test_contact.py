@@ -154,10 +154,12 @@ def test_outline_has_the_body_on_its_left(mesh_type):
 def test_strip_lies_on_the_trapezoid(definition, size):
     laid = lay(STRIP, TRAPEZOID, RUBBER, STEEL, definition, size)
     assert laid.message == "" and laid.load_share == 1.0
-    assert laid.area == pytest.approx(585e-6, rel=0.01)  # what lies under it besides is the gap at either foot
-    assert laid.area > 585e-6
+    assert laid.area_under_strip == pytest.approx(
+        585e-6, rel=0.01
+    )  # what lies under it besides is the gap at either foot
+    assert laid.area_under_strip > 585e-6
     assert laid.penetration <= 1e-3
-    assert abs(laid.force_error) <= 1e-9
+    assert abs(laid.contact_force_error) <= 1e-9
     assert abs(laid.elongation) < 0.015
     # Symmetric, since strip, trapezoid and load are.
     assert laid.outline[:, 0].sum() == pytest.approx(0, abs=1e-6)
@@ -169,7 +171,7 @@ def test_friction_holds_the_strip_back():
     assert abs(rubbing.elongation) < abs(free.elongation)
     assert rubbing.penetration <= 1e-6
     # The residual that friction leaves, which lags a step behind.
-    assert abs(rubbing.force_error) <= 1e-5 and abs(free.force_error) <= 1e-9
+    assert abs(rubbing.contact_force_error) <= 1e-5 and abs(free.contact_force_error) <= 1e-9
 
 
 @pytest.mark.slow
@@ -202,7 +204,7 @@ def test_rigid_is_the_limit_of_stiff():
     rigid, stiff = (lay(STRIP, TRAPEZOID, RUBBER, STEEL, "delingette", 2e-3, rigid=ratio) for ratio in (1e4, 1e9))
     assert "rigid" in rigid.skipped and "rigid" not in stiff.skipped
     assert stiff.message == ""
-    assert stiff.area == pytest.approx(rigid.area, rel=1e-3)
+    assert stiff.area_under_strip == pytest.approx(rigid.area_under_strip, rel=1e-3)
 
 
 def test_a_strip_that_cannot_be_laid_keeps_its_last_good_step():

@@ -12,7 +12,15 @@ from ...runs.stages import results
 from .kind import STAGE
 
 LAID = ("definition", "mesh_size", "loading", "friction")
-LAID_REFERENCE = ("loading", "friction")
+OF_REFERENCE = ("loading", "friction")
+
+BAND = "twice its spread over three meshes of finite elements"
+
+
+def _outline(name, dimensions, whose):
+    """Variables of the points of an outline."""
+    return {f"{name}_{axis}": (dimensions, "m", f"{whose} along {axis}", np.nan) for axis in "xy"}
+
 
 LAYING = Group(
     "/laying",
@@ -28,42 +36,24 @@ LAYING = Group(
         "status": (LAID, "1", "what became of the scene", 0),
         "message": (LAID, "1", "why the strip is not laid", ""),
         "skipped": (LAID, "1", "what the scene did not need", ""),
-        "strip_x": ((*LAID, "outline_point"), "m", "outline of the laid strip along x", np.nan),
-        "strip_y": ((*LAID, "outline_point"), "m", "outline of the laid strip along y", np.nan),
-        "reference_area": (LAID_REFERENCE, "m2", "area between the strip and the floor, finite elements", np.nan),
+        **_outline("strip", (*LAID, "outline_point"), "outline of the laid strip"),
+        "reference_area": (OF_REFERENCE, "m2", "area between the strip and the floor, finite elements", np.nan),
         "reference_area_error_estimate": (
-            LAID_REFERENCE,
-            "m2",
-            "band of the area between strip and floor, twice its spread over three meshes of finite elements",
-            np.nan,
+            OF_REFERENCE, "m2", f"band of the area between strip and floor, {BAND}", np.nan,
         ),
-        "reference_elongation": (LAID_REFERENCE, "1", "elongation of the lower fibre, finite elements", np.nan),
+        "reference_elongation": (OF_REFERENCE, "1", "elongation of the lower fibre, finite elements", np.nan),
         "reference_elongation_error_estimate": (
-            LAID_REFERENCE,
-            "1",
-            "band of the elongation of the lower fibre, twice its spread over three meshes of finite elements",
-            np.nan,
+            OF_REFERENCE, "1", f"band of the elongation of the lower fibre, {BAND}", np.nan,
         ),
-        "reference_x": (
-            (*LAID_REFERENCE, "outline_point"),
-            "m",
-            "outline of the strip of finite elements along x",
-            np.nan,
-        ),
-        "reference_y": (
-            (*LAID_REFERENCE, "outline_point"),
-            "m",
-            "outline of the strip of finite elements along y",
-            np.nan,
-        ),
-        "trapezoid_x": (("corner",), "m", "corners of the trapezoid along x", np.nan),
-        "trapezoid_y": (("corner",), "m", "corners of the trapezoid along y", np.nan),
+        **_outline("reference", (*OF_REFERENCE, "outline_point"), "outline of the strip of finite elements"),
+        **_outline("trapezoid", ("corner",), "corners of the trapezoid"),
     },
-    dimensions={
-        "loading": "what lays the strip",
-        "friction": "Coulomb's coefficient of friction",
-    },
-)
+    dimensions={"loading": "what lays the strip", "friction": "Coulomb's coefficient of friction"},
+)  # fmt: skip
+
+OF_ALL = ("status", "message", "load_share", "iterations", "laying_seconds", "skipped", "penetration")
+OF_SOLVED = ("area_under_strip", "elongation", "contact_force_error")
+"""Results that the dataset takes as they are."""
 
 
 def groups(study, folder):
@@ -78,47 +68,31 @@ def groups(study, folder):
     meshes = defaultdict(list)
     for one in part.references:
         meshes[one.loading, one.friction].append(found[one])
-    for (loading, friction), solved in meshes.items():
-        _reference(solved, {"loading": loading, "friction": friction}, laid)
-    corners = np.array(part.strips[0].trapezoid.corners)
-    laid.put({"trapezoid_x": corners[:, 0], "trapezoid_y": corners[:, 1]})
+    for labels, solved in meshes.items():
+        _reference(solved, dict(zip(OF_REFERENCE, labels)), laid)
+    laid.put(dict(zip(("trapezoid_x", "trapezoid_y"), np.transpose(part.strips[0].trapezoid.corners))))
     return {LAYING.name: laid.data}
 
 
 def _strip(one, result, laid):
     """Put the result of a strip of springs."""
-    labels = {"definition": one.definition, "mesh_size": one.mesh_size}
-    labels |= {"loading": one.loading, "friction": one.friction}
-    values = {"status": result["status"], "message": result["message"]}
-    if "area" in result:
-        values |= {
-            "load_share": result["load_share"],
-            "iterations": result["iterations"],
-            "laying_seconds": result["seconds"],
-            "skipped": result["skipped"],
-            "penetration": result["penetration"],
-        }
-    if result["status"] == Status.SOLVED:
-        values |= {
-            "area_under_strip": result["area"],
-            "area_error": result["area"] / one.trapezoid.area - 1,
-            "elongation": result["elongation"],
-            "contact_force_error": result["force_error"],
-        }
+    labels, solved = {name: getattr(one, name) for name in LAID}, result["status"] == Status.SOLVED
+    values = {name: result[name] for name in OF_ALL + OF_SOLVED * solved if name in result}
+    if solved:
+        values["area_error"] = result["area_under_strip"] / one.trapezoid.area - 1
     laid.put(values, **labels)
     if "outline" in result:
-        laid.put_rows({"strip_x": result["outline"][:, 0], "strip_y": result["outline"][:, 1]}, **labels)
+        laid.put_rows(dict(zip(("strip_x", "strip_y"), result["outline"].T)), **labels)
 
 
 def _reference(meshes, labels, laid):
-    """Put the result of finite elements on several meshes: that of the first, with a band of all."""
+    """Put the result of finite elements on the first of several meshes, with a band of all."""
     result = meshes[0]
     if result["status"] != Status.SOLVED:
         return
     values = {}
-    for name in ("area", "elongation"):
-        values[f"reference_{name}"] = result[name]
-        others = [mesh[name] if mesh["status"] == Status.SOLVED else np.nan for mesh in meshes]
-        values[f"reference_{name}_error_estimate"] = band(others)
+    for variable, name in (("reference_area", "area_under_strip"), ("reference_elongation", "elongation")):
+        all_values = [mesh[name] if mesh["status"] == Status.SOLVED else np.nan for mesh in meshes]
+        values |= {variable: result[name], f"{variable}_error_estimate": band(all_values)}
     laid.put(values, **labels)
-    laid.put_rows({"reference_x": result["outline"][:, 0], "reference_y": result["outline"][:, 1]}, **labels)
+    laid.put_rows(dict(zip(("reference_x", "reference_y"), result["outline"].T)), **labels)

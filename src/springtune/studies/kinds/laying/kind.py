@@ -19,10 +19,10 @@ from ...runs.stages import Task, stage
 from .outputs import OUTPUTS
 
 LOADINGS = ("pressure", "gravity", "ends")
-"""What lays a strip: a pressure on its upper face, its weight, or its ends, drawn down to the floor."""
+"""What lays a strip: a pressure on its upper face, its weight, or its ends, which are drawn down to the floor."""
 
 REFERENCE_SIZES = (1.0, 1.25, 1.6)
-"""Mesh sizes on which a laid strip's reference is solved, over the one that is given; the first is the answer."""
+"""Mesh sizes of a reference over the given one; the first gives the answer, all of them its band."""
 
 MOST_STRIPS = 10_000
 """Most strips that a study lays; each takes seconds."""
@@ -71,17 +71,17 @@ class LayingConfig(Section):
 
 @dataclass(frozen=True)
 class LayingScene:
-    """A strip to lay on a trapezoid, its pressure or its weight over its upper face [Pa]; see `lay`."""
+    """A strip to lay on a trapezoid; `pressure` is its pressure, or its weight over its upper face [Pa]."""
 
+    definition: str
+    mesh_size: float
+    loading: str
+    friction: float
     strip: Strip
     trapezoid: Trapezoid
     material: Material
     support: Material
-    definition: str
-    mesh_size: float
-    loading: str
     pressure: float
-    friction: float
 
 
 @dataclass(frozen=True)
@@ -122,20 +122,14 @@ def _expand(config, declared):
         "support": declared.materials[section.support],
         "pressure": section.pressure,
     }
-    labels = list(product(section.loading, section.friction))
-    strips = [
-        LayingScene(**parts, definition=definition, mesh_size=size, loading=loading, friction=friction)
-        for definition in DEFINITIONS
-        if definition in section.definition
-        for size in sorted(section.mesh_size)
-        for loading, friction in labels
-    ]
-    references = [
-        LayingScene(**parts, definition="delingette", mesh_size=size, loading=loading, friction=friction)
-        for loading, friction in labels
-        for size in (ratio * section.reference_size for ratio in REFERENCE_SIZES)
-    ]
-    return Laying(tuple(strips), tuple(references))
+    ways = list(product(section.loading, section.friction))
+    names = [name for name in DEFINITIONS if name in section.definition]
+    strips = product(names, sorted(section.mesh_size), ways)
+    references = product(ways, [ratio * section.reference_size for ratio in REFERENCE_SIZES])
+    return Laying(
+        tuple(LayingScene(name, size, *way, **parts) for name, size, way in strips),
+        tuple(LayingScene("delingette", size, *way, **parts) for way, size in references),
+    )
 
 
 def _axes(laying):

@@ -33,19 +33,20 @@ RIGID = 1e4
 
 @dataclass(frozen=True)
 class Laid:
-    """A laid strip: ``penetration`` is over the mesh size, ``force_error`` over the load (NaN for drawn ends).
+    """A laid strip; names are those of the dataset.
 
-    ``outline`` has shape (n, 2) [m].
+    `penetration` is over the mesh size, `contact_force_error` over the load (NaN for drawn ends). `outline` has shape
+    (n, 2) [m].
     """
 
-    area: float
+    area_under_strip: float
     elongation: float
     penetration: float
-    force_error: float
+    contact_force_error: float
     load_share: float
     message: str
     iterations: int
-    seconds: float
+    laying_seconds: float
     skipped: str
     outline: np.ndarray
 
@@ -87,21 +88,21 @@ def lay(strip, trapezoid, material, support, definition, size, *, loading="press
     fibre = body.points[low[np.argsort(mesh.points[low, 0])]]
     lengths = np.linalg.norm(np.diff(fibre, axis=0), axis=1)
     load = pressure * strip.length * strip.thickness
-    if loading == "pressure":  # as far as it still acts downwards
+    if loading == "pressure":  # its part that still acts downwards
         load = -float(contact.share * body.force * body.pressure.forces(body.displacements)[:, 1].sum())
     outline = body.outline[:, 0]
     around = [0]
     while len(around) < len(outline):
         around.append(int(body.neighbours[0][around[-1]]))
     return Laid(
-        area=float(np.sum(0.5 * (fibre[1:, 1] + fibre[:-1, 1]) * np.diff(fibre[:, 0]))),
+        area_under_strip=float(np.sum(0.5 * (fibre[1:, 1] + fibre[:-1, 1]) * np.diff(fibre[:, 0]))),
         elongation=float(lengths.sum() / strip.length - 1),
         penetration=contact.penetration / size,
-        force_error=float("nan") if loading == "ends" else float(contact.contact_force()[1] / abs(load) - 1),
+        contact_force_error=float("nan") if loading == "ends" else float(contact.contact_force()[1] / abs(load) - 1),
         load_share=contact.share,
         message=message,
         iterations=contact.iterations,
-        seconds=time.perf_counter() - begin,
+        laying_seconds=time.perf_counter() - begin,
         skipped="; ".join(skipped),
         outline=body.points[outline[around]],
     )
@@ -113,7 +114,7 @@ def _strip(strip, trapezoid, material, definition, size, loading, pressure):
     sheet = Sheet(mesh, strip.thickness)
     springs, _ = sheet.derive(definition, material)
     held = np.zeros(mesh.points.shape, dtype=bool)
-    # Without friction nothing else keeps the strip from sliding off to one side.
+    # Without friction the strip would slide off to one side.
     held[np.abs(mesh.points[:, 0]) <= 1e-9 * strip.length, 0] = True
     arguments, total = {}, pressure * strip.length * strip.thickness
     if loading == "pressure":
@@ -131,7 +132,7 @@ def _strip(strip, trapezoid, material, definition, size, loading, pressure):
 
 
 def _support(strip, trapezoid, material, size):
-    """The trapezoid: rows of linear triangles of `delingette`, since its corners allow no negative area modulus."""
+    """The trapezoid, of linear triangles (`delingette`): a negative area modulus fails at its corners."""
     mean = 0.5 * (trapezoid.lower_base + trapezoid.upper_base)
     made = MESH_TYPES["structured"](mean, trapezoid.height, size)
     y = made.points[:, 1]

@@ -44,18 +44,33 @@ def _main(root, names, selection):
     return chosen
 
 
-def _arrange(figure, axes, title, ax=None, height=0.0, notes=()):
-    """Place panels of `style.multiples`, with room for notes below each; a figure of our own grows by that."""
-    under = labels.LINE * max(map(labels.lines_of, notes), default=0)
-    if ax is None and notes:
+def _by_mesh_type(ax, present, title, draw):
+    """A panel a mesh type; `draw` returns ends of lines for their names, a note, and what to say without lines."""
+    types = labels_of(present, "mesh_type")
+    columns = min(2, max(1, len(types)))
+    figure, axes, flat, height = style.multiples(ax, len(types), columns, 1.95)
+    title = labels.wrapped(title, (style.PAGE if columns > 1 else style.COLUMN) - 0.1, 8.5)
+    place = {"left": 0.5, "right": 0.06, "bottom": 0.4, "top": 0.36 + 0.14 * labels.lines_of(title), "across": 0.5,
+             "down": 0.68, "title": title}  # fmt: skip
+    style.arrange(figure, axes, **place)
+    drawn = [draw(panel, name) for panel, name in zip(flat, types)]
+    for panel, name in zip(flat, types):
+        panel.set_title(name)
+    under = labels.LINE * max((labels.lines_of(said) for _, said, _ in drawn), default=0)
+    if ax is None and drawn:  # a figure of our own grows by its notes
         figure.set_size_inches(style.size(figure)[0], height + len(axes) * under)
-    title = labels.wrapped(title, (style.PAGE if axes.shape[1] > 1 else style.COLUMN) - 0.1, 8.5)
-    place = {"left": 0.5, "right": 0.06, "bottom": 0.4 + under, "top": 0.36 + 0.14 * labels.lines_of(title),
-             "across": 0.5, "down": 0.68 + under, "title": title}  # fmt: skip
-    if notes:
-        labels.settle(figure, axes, place | {"across": 0.1})
-    else:
-        style.arrange(figure, axes, **place)
+    labels.settle(figure, axes, place | {"bottom": 0.4 + under, "across": 0.1, "down": 0.68 + under})
+    for panel, (ends, said, why) in zip(flat, drawn):
+        labels.name_lines(panel, ends)
+        labels.note(panel, said)
+        if why:
+            labels.say(panel, why)
+    return flat
+
+
+def _room(panel):
+    """Width of a panel [inch]."""
+    return panel.get_window_extent().width / panel.figure.dpi
 
 
 def _statuses(flags):
@@ -95,24 +110,13 @@ def plot_moduli(data, ax=None):
     ('asked for', 'effective')
     """
     moduli = group(data, "moduli")
-    types = labels_of(moduli.status != 0, "mesh_type")
-    figure, axes, flat, height = style.multiples(ax, len(types), min(2, max(1, len(types))), 1.95)
     title = "Effective Poisson's ratio against the one asked for; grey: as asked"
-    _arrange(figure, axes, title)
-    drawn = [_moduli(panel, moduli.sel(mesh_type=mesh_type)) for panel, mesh_type in zip(flat, types)]
-    for panel, mesh_type in zip(flat, types):
-        panel.set(title=mesh_type, xlabel="asked for", ylabel="effective")
-    _arrange(figure, axes, title, ax, height, [said for _, said, _ in drawn])
-    for panel, (ends, said, why) in zip(flat, drawn):
-        labels.name_lines(panel, ends)
-        labels.note(panel, said)
-        if why:
-            labels.say(panel, why)
-    return flat
+    return _by_mesh_type(ax, moduli.status != 0, title, lambda panel, name: _moduli(panel, moduli.sel(mesh_type=name)))
 
 
 def _moduli(panel, here):
-    """Draw one mesh type: ends of lines for their names, a note, and what to say where there is no line."""
+    """Draw the moduli of one mesh type, see `_by_mesh_type`."""
+    panel.set(xlabel="asked for", ylabel="effective")
     curves, lacking, wanted = {}, [], here.poisson_ratio.values
     for definition in here.definition.values:
         one = here.sel(definition=definition)
@@ -128,8 +132,7 @@ def _moduli(panel, here):
     bottom, top = np.clip([np.nanmin(values) - 0.03, np.nanmax(values) + 0.03], -0.45, 0.75)
     panel.set_ylim(min(bottom, low - 0.03), max(top, high + 0.03))
     ends = labels.lines(panel, wanted, curves, 0.012)
-    room = panel.get_window_extent().width / panel.figure.dpi
-    said = labels.wrapped(f"no moduli: {', '.join(lacking)}", room) if lacking and ends else ""
+    said = labels.wrapped(f"no moduli: {', '.join(lacking)}", _room(panel)) if lacking and ends else ""
     return ends, said, "" if ends else f"No definition has moduli here: {_statuses(here.status.values)}."
 
 
@@ -170,32 +173,24 @@ def plot_definitions_size(data, ax=None, *, beam=None, material=None, load=None,
     root = unswept(group(data, "/"))
     chosen = choose(root.status != 0, beam=beam, material=material, load=load, kinematics=kinematics)
     root = root.sel(chosen)
-    error = root.field_error
-    types = labels_of(root.status != 0, "mesh_type")
-    figure, axes, flat, height = style.multiples(ax, len(types), min(2, max(1, len(types))), 1.95)
     title = f"{labelled_beam(root, chosen['beam'])}, {chosen['material']}, {chosen['load']}"
     rates = ", fitted rate in brackets" if len(labels_of(root.status != 0, "mesh_size")) > 1 else ""
     title = f"{title}: error of the displacement field in L2{rates}"
-    _arrange(figure, axes, title)
-    drawn = [_field_errors(panel, error.sel(mesh_type=name), root.status.sel(mesh_type=name))
-             for panel, name in zip(flat, types)]  # fmt: skip
-    values = 100 * np.maximum(error.values[np.isfinite(error.values)], FLOOR)
-    for panel, mesh_type in zip(flat, types):
-        panel.set(title=mesh_type, xlabel="Mesh size [mm]", ylabel="Error [%]")
-        if len(values):
-            panel.set_ylim(0.7 * values.min(), 1.4 * values.max())
+    values = root.field_error.values
+    values = 100 * np.maximum(values[np.isfinite(values)], FLOOR)
+    limits = (0.7 * values.min(), 1.4 * values.max()) if len(values) else None
+
+    def draw(panel, name):
+        drawn = _field_errors(panel, root.field_error.sel(mesh_type=name), root.status.sel(mesh_type=name))
+        panel.set(xlabel="Mesh size [mm]", ylabel="Error [%]", ylim=limits)
         style.plain(panel, "y")
-    _arrange(figure, axes, title, ax, height, [said for _, said, _ in drawn])
-    for panel, (ends, said, why) in zip(flat, drawn):
-        labels.name_lines(panel, ends)
-        labels.note(panel, said)
-        if why:
-            labels.say(panel, why)
-    return flat
+        return drawn
+
+    return _by_mesh_type(ax, root.status != 0, title, draw)
 
 
 def _field_errors(panel, error, status):
-    """Draw one mesh type, see `_moduli`: the best definitions and the baseline with names, the others in grey."""
+    """Draw the errors of one mesh type, see `_by_mesh_type`: the best definitions and the baseline have names."""
     asked = np.flatnonzero((status != 0).any("definition").values)
     error, status = error.isel(mesh_size=asked), status.isel(mesh_size=asked)
     every = error.transpose("definition", "mesh_size").values
@@ -232,8 +227,7 @@ def _field_errors(panel, error, status):
         without = sizes[~there & (flag > 0)]
         if there.any() and len(without):
             said.append(f"no error: {name} at {', '.join(f'{size:g}' for size in without)} mm")
-    room = panel.get_window_extent().width / panel.figure.dpi
-    return ends, "\n".join(labels.wrapped(text, room) for text in said), ""
+    return ends, "\n".join(labels.wrapped(text, _room(panel)) for text in said), ""
 
 
 @style.styled
