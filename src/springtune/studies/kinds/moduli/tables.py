@@ -68,22 +68,20 @@ COARSENESS = (0.05, 0.1, np.inf)
 """Mesh size over the height of the beam [1] up to which errors are summed up together."""
 
 
-def _advice(root):
+def _advice(root, materials):
     """What to use, with the range of its errors over all beams and mesh sizes, by mesh size over height."""
-    kinematics = most_requested(root, "kinematics")
-    materials = _materials(root, most_requested(root, "beam"))
     loads = [load for load in TABLE_LOADS if load in root["load"].values]
-    here = root[["deformation_error", "status"]].sel(kinematics=kinematics)
     ratios = root.mesh_size.values / root.beam_height.values[:, None]
     heads = [f"{load}, ν = {nu:g}" for load in loads for nu in materials]
     rows, seen = [], np.zeros((len(COARSENESS), *ratios.shape), dtype=bool)
     for situation, name, mesh_type in ADVICE:
-        if name not in here.definition.values or mesh_type not in here.mesh_type.values:
+        if name not in root.definition.values or mesh_type not in root.mesh_type.values:
             continue
-        cells = here.sel(definition=name, mesh_type=mesh_type, load=loads, material=list(materials.values()))
+        cells = root[["deformation_error", "status"]].sel(
+            definition=name, mesh_type=mesh_type, load=loads, material=list(materials.values())
+        )
         cells = cells.transpose("load", "material", "beam", "mesh_size")
-        shape = (len(heads), *ratios.shape)
-        errors, flags = (cells[part].values.reshape(shape) for part in ("deformation_error", "status"))
+        errors, flags = (cells[part].values.reshape(-1, *ratios.shape) for part in ("deformation_error", "status"))
         low = 0.0
         for number, high in enumerate(COARSENESS):
             within = (ratios > low * (1 + 1e-9)) & (ratios <= high * (1 + 1e-9)) & (flags != 0).any(axis=0)
@@ -104,7 +102,7 @@ def _advice(root):
         for group in seen if group.any()
     )  # fmt: skip
     said = "Each line is the range over all meshes of the study up to its a/H and beyond that of the line before"
-    return [*lines, "", f"{said}: {meshes}."]
+    return ["### In short", "", *lines, "", f"{said}: {meshes}.", ""]
 
 
 def _range(errors, flags):
@@ -121,98 +119,85 @@ def _range(errors, flags):
 def decision(tree: xr.DataTree) -> str:
     """Markdown: what to use, what each definition attains on each mesh type, and over the paper's cells."""
     root, moduli = unswept(tree.to_dataset()), tree["moduli"].to_dataset()
-    advice = _advice(root)
-    parts = ["### In short", "", *advice, ""] if advice else []
+    beam = most_requested(root, "beam")
+    materials = _materials(root, beam)
+    root = root.sel(kinematics=most_requested(root, "kinematics"))
+    parts = _advice(root, materials)
     for mesh_type in TABLE_MESH_TYPES:
-        lines = _attained(root, moduli, mesh_type) if mesh_type in root.mesh_type.values else []
-        if lines:
-            parts += [f"### Mesh type `{mesh_type}`", "", *lines, ""]
-    cells = _paper_cells(root)
-    parts += ["### The paper's cells", "", *cells, ""] if cells else []
-    return "\n".join(parts + _beyond(root))
+        if mesh_type in root.mesh_type.values and mesh_type in moduli.mesh_type.values:
+            parts += _attained(root, moduli, mesh_type, beam, materials)
+    return "\n".join(parts + _paper_cells(root) + _beyond(root))
 
 
 def _beyond(root):
     """Scenes of these tables whose reference does not apply; nothing without any."""
-    here = root.sel(kinematics=most_requested(root, "kinematics"))
-    if "reference_applies" not in here:
+    if "reference_applies" not in root:
         return []
     place = ("material", "load")
-    beyond = (here.reference_applies == 0) & (here.status == 1)
+    beyond = (root.reference_applies == 0) & (root.status == 1)
     beyond = beyond.any([name for name in beyond.dims if name not in place]).transpose(*place)
     if not beyond.any():
         return []
-    named = "; ".join(f"{here.material.values[i]}, {here['load'].values[j]}" for i, j in np.argwhere(beyond.values))
+    named = "; ".join(f"{root.material.values[i]}, {root['load'].values[j]}" for i, j in np.argwhere(beyond.values))
     return [f"Beyond small strain, where errors hold more than the network's own: {named}.", ""]
 
 
 def _materials(root, beam):
     """Name by Poisson's ratio: the material nearest to 0.3 and the one with the largest, of those with most scenes."""
-    requested = (
-        (root.status.sel(beam=beam) != 0).any(["mesh_type", "mesh_size", "definition", "kinematics"]).sum("load").values
-    )
-    ratios = root.material_poisson_ratio.values
-    found = np.flatnonzero(requested == requested.max())
-    chosen = sorted(
-        {found[np.argmin(np.abs(ratios[found] - 0.3))], found[np.argmax(ratios[found])]}, key=lambda i: ratios[i]
-    )
-    return {float(ratios[i]): str(root.material.values[i]) for i in chosen}
+    requested = (root.status.sel(beam=beam) != 0).any(["mesh_type", "mesh_size", "definition", "kinematics"])
+    counts, ratios = requested.sum("load").values, root.material_poisson_ratio.values
+    found = np.flatnonzero(counts == counts.max())
+    chosen = {found[np.argmin(np.abs(ratios[found] - 0.3))], found[np.argmax(ratios[found])]}
+    return {float(ratios[i]): str(root.material.values[i]) for i in sorted(chosen, key=lambda i: ratios[i])}
 
 
-def _attained(root, moduli, mesh_type):
+def _attained(root, moduli, mesh_type, beam, materials):
     """Moduli and deformation errors of one and the same mesh size, the finest, of the beam that most scenes are of."""
-    beam = most_requested(root, "beam")
-    materials = _materials(root, beam)
     loads = [load for load in TABLE_LOADS if load in root["load"].values]
     fine, height = min(root.mesh_size.values), float(root.beam_height.sel(beam=beam))
-    here = root.sel(mesh_type=mesh_type, beam=beam, kinematics=most_requested(root, "kinematics"))
+    here, moduli_here = root.sel(mesh_type=mesh_type, beam=beam), moduli.sel(mesh_type=mesh_type)
     ratios = [ratio for ratio in materials if ratio in moduli.poisson_ratio.values]
     heads = [f"E at {nu:g}" for nu in ratios] + [f"ν at {nu:g}" for nu in ratios]
     heads += [f"{load}, {nu:g}" for load in loads for nu in materials]
     rows = []
-    for name in root.definition.values:
-        if name not in moduli.definition.values or mesh_type not in moduli.mesh_type.values:
-            continue
-        patch, scenes = moduli.sel(definition=name, mesh_type=mesh_type), here.sel(definition=name)
+    for name in (name for name in root.definition.values if name in moduli.definition.values):
+        patch, scenes = moduli_here.sel(definition=name), here.sel(definition=name)
         both = (patch.status == 1).any("poisson_ratio") & (scenes.status == 1).any(["material", "load"])
         if not both.any():
             continue
         size = float(both.mesh_size[both.values].min())
         patch, scene = patch.sel(mesh_size=size), scenes.sel(mesh_size=size)
+        errors = scene.deformation_error.sel(load=loads, material=list(materials.values()))
         cells = [_signed(patch.young_modulus_error.sel(poisson_ratio=nu)) for nu in ratios]
         cells += [_plain(patch.effective_poisson_ratio.sel(poisson_ratio=nu), 3) for nu in ratios]
-        cells += [
-            _signed(scene.deformation_error.sel(load=load, material=material))
-            for load in loads
-            for material in materials.values()
-        ]
+        cells += [_signed(error) for error in errors.transpose("load", "material").values.flat]
         seconds = float(scene.definition_seconds.max())
         cells.append(f"{1e3 * seconds:.0f} ms" if seconds >= 5e-4 else "< 1 ms")
         mark = "" if size == fine else f" ({1e3 * size:g} mm)"
         rows.append(f"| `{name}`{mark} | {' | '.join(cells)} |")
     if not rows:
         return []
-    box = [1e3 * moduli.attrs[f"patch_{part}"] for part in ("length", "height")]
-    same = np.allclose(box, [1e3 * float(root[f"beam_{part}"].sel(beam=beam)) for part in ("length", "height")])
-    extent = f"{box[0]:g} x {box[1]:g} mm"
+    sides = [moduli.attrs[f"patch_{part}"] for part in ("length", "height")]
+    same = np.allclose(sides, [float(root[f"beam_{part}"].sel(beam=beam)) for part in ("length", "height")], atol=0)
+    extent = " x ".join(f"{1e3 * side:g}" for side in sides) + " mm"
     of = f"beam of {extent}" if same else f"beam {beam}; moduli are of the meshes of a {extent} sheet"
     note = f"All at {1e3 * fine:g} mm (a/H = {fine / height:.3g}), but where a row says otherwise; {of}."
     head = [f"| definition | {' | '.join(heads)} | cost |", "|---|" + "---:|" * (len(heads) + 1)]
-    return [note, "", *head, *rows]
+    return [f"### Mesh type `{mesh_type}`", "", note, "", *head, *rows, ""]
 
 
 def _paper_cells(root):
     """Median and largest error over beams, mesh sizes and the paper's three loads and materials."""
     pairs = (("steel", "traction"), ("steel", "compression"), ("rubber", "traction"))
-    if not {"steel", "rubber"} <= set(root.material.values) or not {"traction", "compression"} <= set(
-        root["load"].values
-    ):
+    known = {*root.material.values, *root["load"].values}
+    if not {name for pair in pairs for name in pair} <= known:
         return []
-    errors = [
-        root.deformation_error.sel(material=material, load=load, kinematics=most_requested(root, "kinematics"))
-        for material, load in pairs
+    errors = [root.deformation_error.sel(material=material, load=load) for material, load in pairs]
+    lines = [
+        "### The paper's cells",
+        "",
+        "| definition | mesh type | steel, median | largest | rubber, median | largest |",
     ]
-    lines = ["| definition | mesh type | steel, median | largest | rubber, median | largest |"]
     lines.append("|---|---|---:|---:|---:|---:|")
     for name in root.definition.values:
         for mesh_type in root.mesh_type.values:
@@ -223,7 +208,7 @@ def _paper_cells(root):
                     values = 100 * np.abs(values[np.isfinite(values)])
                     texts += [f"{np.median(values):.2f} %", f"{values.max():.2f} %"]
                 lines.append(f"| `{name}` | {mesh_type} | {' | '.join(texts)} |")
-    return lines
+    return [*lines, ""]
 
 
 def _signed(value):
