@@ -54,13 +54,10 @@ def plot_refinement(data, ax=None, *, refinement=None):
         choose(data.status != 0, refinement=refinement)
         data = data.sel(refinement=[refinement])
     names = data.refinement.values.tolist()
-    figure, axes, flat, height = style.multiples(ax, len(names), min(2, len(names)), 2.6)
+    figure, axes, flat, _ = style.multiples(ax, len(names), min(2, len(names)), 2.6)
     place = {"left": 0.6, "right": 0.1, "bottom": 0.58, "top": 0.55, "across": 0.14, "down": 1.15}
     style.arrange(figure, axes, **place)
     ends = [_panel(panel, data.sel(refinement=name)) for panel, name in zip(flat, names)]
-    for panel in flat:
-        if panel.get_xscale() == "log":
-            style.plain(panel, "x")
     labels.settle(figure, axes, place)
     for panel, name, (found, said) in zip(flat, names, ends):
         room = panel.get_window_extent().width / panel.figure.dpi
@@ -81,38 +78,34 @@ def _entitle(panel, name, scene):
 
 
 def _panel(panel, data):
-    """Draw one refinement; ends of its lines with their names and colours, and what there is to say below it."""
+    """Draw one refinement; ends of its lines with their names and colours, and a note."""
     parameter = str(data.parameter.item())
-    known = VARIED[parameter]
-    tolerance = 100 * float(data.tolerance)
+    known, tolerance = VARIED[parameter], 100 * float(data.tolerance)
     panel.axhspan(-tolerance, tolerance, color="0.92", zorder=0)
     panel.axhline(0, color="0.45", linewidth=0.8)
-    values = data[f"refined_{parameter}"].values
-    logarithmic = str(data.spacing.item()) == SPACINGS[1]
-    there = values[np.isfinite(values)]
-    # Of decades, the unit is that of those in the middle: ticks at both ends are short then.
-    middle = np.sqrt(there.min() * there.max()) if logarithmic and there.size else there.max(initial=0.0)
+    values, logarithmic = data[f"refined_{parameter}"].values, str(data.spacing.item()) == SPACINGS[1]
+    values = values[np.isfinite(values)]
+    # On a logarithmic axis the unit is that of the middle: ticks at both ends are short then.
+    middle = np.sqrt(values.min() * values.max()) if logarithmic and values.size else values.max(initial=0.0)
     name, size = known.scale(middle)
     unit = f" [{name}]" if name else ""
     panel.set(xlabel=f"{known.meaning[0].upper()}{known.meaning[1:]}{unit}", ylabel="Deformation error [%]")
     if logarithmic:
         panel.set_xscale("log")
-    ends, number, hollow = [], 0, False
-    for definition in data.definition.values.tolist():
+    ends, hollow = [], False
+    data = data.isel(definition=np.flatnonzero(data.value_count))
+    for number, definition in enumerate(data.definition.values.tolist()):
         cell = data.sel(definition=definition)
-        if not cell.value_count:
-            continue
         cell = cell.isel(point=np.argsort(cell[f"refined_{parameter}"].values, kind="stable"))
         x, y = cell[f"refined_{parameter}"].values / size, 100 * cell.deformation_error.values
         there, look = np.isfinite(x) & np.isfinite(y), style.line(number)
-        number += 1
-        if not there.any():
-            continue
-        panel.plot(x[there], y[there], markersize=2.2, linewidth=0.9, label=definition, **look)
+        small = look | {"markersize": 2.2, "linewidth": 0.9}
+        ends += labels.line(panel, x[there], y[there], small, definition)
         doubted = there & ((cell.status.values != Status.SOLVED) | (cell.reference_applies.values == 0))
         hollow |= bool(doubted.any())
-        panel.plot(x[doubted], y[doubted], markersize=2.2, markerfacecolor="white", **{**look, "linestyle": ""})
-        ends.append((x[there][-1], y[there][-1], definition, look["color"]))
+        panel.plot(x[doubted], y[doubted], **small | {"markerfacecolor": "white", "linestyle": ""})
         zeros = cell[f"crossing_{parameter}"].values[cell.crossing_level.values == 0] / size
         panel.plot(zeros, np.zeros(len(zeros)), "|", color=look["color"], markersize=9)
+    if logarithmic:
+        style.plain(panel, "x")
     return ends, HOLLOW if hollow else ""

@@ -40,7 +40,7 @@ MOST_REFINED = 10_001
 """Most values of a refinement."""
 
 MADE = ("mesh_size", "force")
-"""Parameters that a refinement states where it does not vary them; beam and material have the others."""
+"""Parameters that a refinement states unless it varies them; beam and material have the others."""
 
 
 def _read_share(value: str) -> float:
@@ -145,15 +145,15 @@ def _check(config, problems):
         if section.most < section.points:
             problems.add((*path, "most"), f"{section.most} is below 'points', {section.points}; give at least as many")
         ends = _ends(section, path, problems)
-        if section.beam in config.beams and (ends or section.parameter != "mesh_size"):
-            sizes = {"mesh_size": section.mesh_size}
-            if section.parameter == "mesh_size":
-                sizes = dict(zip(("from", "to"), ends))
+        sizes = {"mesh_size": section.mesh_size} if section.mesh_size else {}
+        if section.parameter == "mesh_size":
+            sizes = dict(zip(("from", "to"), ends))
+        if section.beam in config.beams:
             _check_sizes(section, sizes, config.beams[section.beam], path, problems)
 
 
 def _ends(section, path, problems):
-    """Both ends of a refinement in SI units; nothing where they are wrong, which is noted."""
+    """Both ends of a refinement in SI units; none if they are wrong, which is noted."""
     known, found = VARIED[section.parameter], []
     for key, text in (("from", section.start), ("to", section.stop)):
         try:
@@ -161,20 +161,18 @@ def _ends(section, path, problems):
         except ValueError as error:
             problems.add((*path, key), str(error))
     if len(found) < 2:
-        return None
+        return []
     if not found[0] < found[1]:
         problems.add((*path, "from"), f"'{section.start}' is not below 'to', '{section.stop}'; give a smaller 'from'")
-        return None
-    if section.spacing == "logarithmic" and not found[0]:
+    elif section.spacing == SPACINGS[1] and not found[0]:
         problems.add((*path, "from"), "0 has no logarithm; give a larger one, or spacing: linear")
-        return None
-    return found
+    else:
+        return found
+    return []
 
 
 def _check_sizes(section, sizes, beam, path, problems):
     for key, size in sizes.items():
-        if size is None:
-            continue
         refusal = MESH_TYPES[section.mesh_type].refusal(beam.length, beam.height, size, f"beam '{section.beam}'")
         if refusal:
             problems.add((*path, key), f"{1e3 * size:g} mm {refusal}")
@@ -200,23 +198,15 @@ def _expand(config, declared):
     found = []
     for name, section in (config.refine or {}).items():
         known = VARIED[section.parameter]
-        start, stop = known.read(section.start), known.read(section.stop)
-        rule = Rule(
-            start,
-            stop,
-            section.points,
-            section.spacing == "logarithmic",
-            section.tolerance,
-            section.resolution,
-            section.most,
-        )
+        ends = known.read(section.start), known.read(section.stop)
+        how = section.points, section.spacing == SPACINGS[1], section.tolerance, section.resolution, section.most
         beam, material = declared.beams[section.beam], declared.materials[section.material]
         if section.parameter == "thickness":
-            warn_of_thickness(max(start, stop), (beam.length, beam.height), f"refine.{name}")
+            warn_of_thickness(max(ends), (beam.length, beam.height), f"refine.{name}")
         force = LOADS[section.load].sign * (1.0 if section.force is None else section.force)
         body = beam, material, section.load, force, section.mesh_type, section.mesh_size or 0.0
         found += [
-            Refinement(name, *body, definition, section.kinematics, section.parameter, rule)
+            Refinement(name, *body, definition, section.kinematics, section.parameter, Rule(*ends, *how))
             for definition in DEFINITIONS
             if definition in section.definition
         ]
@@ -241,33 +231,28 @@ SOLVE = "studies.kinds.refinement.solve"
 """Module that solves refinements."""
 
 USUAL_PARTICLES = 1e3
-"""Particles of a mesh for costs, where they are not known."""
+"""Particles of a mesh of unknown size, for costs."""
 
 
 def _parameters(one):
     """What all values of a refinement have in common: refinements that differ in their ends alone share a file."""
     load = LOADS[one.load]
-    return {
+    same = ("force", "mesh_type", "mesh_size", "definition", "kinematics", "parameter")
+    return {name: getattr(one, name) for name in same} | {
         "beam": beam_key(one.beam),
         "material": material_key(one.material),
         "kind": load.kind.name,
         "follower": load.follower and one.kinematics == "nonlinear",
-        "force": one.force,
-        "mesh_type": one.mesh_type,
-        "mesh_size": one.mesh_size,
-        "definition": one.definition,
-        "kinematics": one.kinematics,
-        "parameter": one.parameter,
     }
 
 
 def file_key(one):
-    """Key of the file of a refinement: of all that its values depend on but these."""
+    """Key of the file of a refinement: of all that its results depend on besides their values."""
     return hash_of(_parameters(one), [stage_key(SOLVE), mesh_type_key(one.mesh_type), definition_key(one.definition)])
 
 
 def _tasks(study):
-    """Refinements, those together that share a file."""
+    """A task for all refinements that share a file."""
     families = defaultdict(list)
     for one in study.parts["refinement"]:
         families[file_key(one)].append(one)
@@ -277,7 +262,7 @@ def _tasks(study):
 
 
 def _cost(one):
-    """Half of the values that a refinement may have, each on the mesh that is known."""
+    """Expected cost: half of the values that a refinement may add, on its largest known mesh."""
     size = one.mesh_size or one.rule.first
     particles = one.beam.length * one.beam.height / (0.866 * size**2) if size else USUAL_PARTICLES
     return "refinement", particles, 0.5 * (one.rule.points + one.rule.most)

@@ -1,9 +1,11 @@
 """Figures of samples: which parameter matters, and how."""
 
+from functools import partial
+
 import numpy as np
 
 from ...output import labels, style
-from ...output.selection import choose, group
+from ...output.selection import choose, group, labels_of
 
 PARAMETER_AXES = {
     "length": ("length", 1e3, "mm"),
@@ -52,21 +54,27 @@ def _axis(text, unit):
     return f"{text} [{unit}]" if unit else text
 
 
-def _of(tree, load):
-    """Words on a sample, for a title."""
-    attributes = tree.attrs
-    words = [load.capitalize(), f"{attributes['mesh_type']} meshes", f"{attributes['kinematics']} kinematics"]
-    return ", ".join(words)
+def _titled(samples, load, what, columns):
+    """Title of a figure of so many columns of panels, wrapped."""
+    words = f"{load.capitalize()}, {samples.attrs['mesh_type']} meshes, {samples.attrs['kinematics']} kinematics"
+    return labels.wrapped(f"{words}: {what}", (style.PAGE if columns > 1 else style.COLUMN) - 0.1, 8.5)
+
+
+def _note_below(figure, text, above):
+    """Write a note at a height above the lower end of a figure [inch]."""
+    if figure is not None:
+        width, height = style.size(figure)
+        text = labels.wrapped(text, width - 0.2)
+        figure.text(0.1 / width, above / height, text, fontsize=style.SMALL, color="0.25")
 
 
 def _panels_of_indices(data, load):
-    """Quantity and definition of each panel; what is of no definition has one."""
+    """Quantity and definition of each panel; the best stiffness has one panel for all definitions."""
     asked = data.base_samples.sel(load=load) + data.base_samples_without.sel(load=load) > 0
     found = []
     for quantity in ("deformation_error", "displacement", "best_stiffness"):
         if quantity in data["quantity"].values:
-            here = asked.sel(quantity=quantity)
-            names = here["definition"].values[here.values].tolist()
+            names = labels_of(asked.sel(quantity=[quantity]), "definition")
             found += [(quantity, name) for name in (names[:1] if quantity == "best_stiffness" else names)]
     return found
 
@@ -108,36 +116,28 @@ def plot_sobol(data, ax=None, *, load=None):
     shown = _panels_of_indices(found, load)
     names = found.parameter.values.tolist()
     words = [PARAMETER_AXES[name][0] for name in names]
-    columns = min(COLUMNS, max(1, len([one for one in shown if one[0] == shown[0][0]])))
-    inside = 0.21 * len(names)
-    figure, axes, flat, height = style.multiples(ax, len(shown), columns, inside + 0.52)
-    rows, size = axes.shape[0], samples.attrs["size"]
-    note = _note(found.sel(load=load), size)
+    columns = min(COLUMNS, max(1, sum(quantity == shown[0][0] for quantity, _ in shown)))
+    figure, axes, flat, height = style.multiples(ax, len(shown), columns, 0.21 * len(names) + 0.52)
+    note, title = _note(found.sel(load=load), samples.attrs["size"]), _titled(samples, load, "Sobol indices", columns)
     room = style.PAGE if columns > 1 else style.COLUMN
-    lines = labels.lines_of(labels.wrapped(note, room - 0.2))
-    title = labels.wrapped(f"{_of(samples, load)}: Sobol indices", room - 0.1, 8.5)
+    under, over = (0.14 * labels.lines_of(text) for text in (labels.wrapped(note, room - 0.2), title))
     if figure is not None and ax is None:
-        figure.set_size_inches(style.size(figure)[0], height + 0.11 + 0.14 * (lines + labels.lines_of(title)))
-    style.arrange(figure, axes, left=0.15 + max(map(labels.width, words)), right=0.15, bottom=0.42 + 0.14 * lines,
-                  top=0.35 + 0.14 * labels.lines_of(title), across=0.18, down=0.42 if rows > 1 else 0.0,
-                  title=title)  # fmt: skip
-    order = found["definition"].values.tolist()
-    limits = _limits(found, shown, load)
+        figure.set_size_inches(style.size(figure)[0], height + 0.11 + under + over)
+    style.arrange(figure, axes, left=0.15 + max(map(labels.width, words)), right=0.15, bottom=0.42 + under,
+                  top=0.35 + over, across=0.18, down=0.42 if axes.shape[0] > 1 else 0.0, title=title)  # fmt: skip
+    order, limits = found["definition"].values.tolist(), _limits(found, shown, load)
     for number, (panel, (quantity, definition)) in enumerate(zip(flat, shown)):
         one = found.sel(quantity=quantity, load=load, definition=definition)
-        colour = "0.35" if quantity == "best_stiffness" else style.line(order.index(definition))["color"]
-        panel.set_title(QUANTITY_AXES[quantity][0] + ("" if quantity == "best_stiffness" else f", {definition}"))
-        _bars(panel, one, colour)
+        best = quantity == "best_stiffness"
+        panel.set_title(QUANTITY_AXES[quantity][0] + ("" if best else f", {definition}"))
+        _bars(panel, one, "0.35" if best else style.line(order.index(definition))["color"])
         panel.set_xlim(limits)
         panel.set_yticks(range(len(names)), words if number % columns == 0 else [""] * len(names))
         if not np.isfinite(one.first_order.values).any():
-            why = _why(found, one)
-            labels.say(panel, why, bare=False)
+            labels.say(panel, _why(found, one), bare=False)
     for panel in flat[-columns:]:
         panel.set_xlabel("share of the variance")
-    if figure is not None:
-        width, tall = style.size(figure)
-        figure.text(0.1 / width, 0.06 / tall, labels.wrapped(note, width - 0.2), fontsize=style.SMALL, color="0.25")
+    _note_below(figure, note, 0.06)
     return flat
 
 
@@ -153,10 +153,9 @@ def _why(found, one):
 def _limits(found, shown, load):
     """Ends of the axis of all panels: from zero to one, farther where bands are, within reason."""
     cells = [found.sel(quantity=quantity, load=load, definition=name) for quantity, name in shown]
-    low = min([0.0, *(float(np.nanmin([one.first_order_low, np.zeros(one.first_order.shape)])) for one in cells)])
-    ones = np.ones(cells[0].first_order.shape) if cells else 1.0
-    high = max([1.0, *(float(np.nanmax([one.total_order_high, one.first_order_high, ones])) for one in cells)])
-    return max(low, -0.3) - 0.02, min(high, 1.5) + 0.02
+    low = [np.nan_to_num(cell.first_order_low.values).min() for cell in cells]
+    high = [np.nan_to_num(cell[f"{order}_order_high"].values).max() for cell in cells for order in ("first", "total")]
+    return max(min([0.0, *low]), -0.3) - 0.02, min(max([1.0, *high]), 1.5) + 0.02
 
 
 def _bars(panel, indices, colour):
@@ -172,7 +171,7 @@ def _bars(panel, indices, colour):
 
 
 def _note(found, size):
-    """What bars and bands are, and how many base samples they are of."""
+    """What bars and bands show, and the number of their base samples."""
     used, without = found.base_samples.values, found.base_samples_without.values
     text = "full: first order, pale: total order; lines: bootstrap bands, 95 %"
     lost = int(without.max())
@@ -216,25 +215,21 @@ def plot_effects(data, ax=None, *, load=None, quantity="deformation_error"):
     """
     effects, samples = group(data, "effects", alone=False), group(data, "samples", alone=False)
     asked = (samples.status != 0).any("sample")
-    load = choose(asked, load=load, quantity=None)["load"]
-    effects = effects.sel(
-        load=load, quantity=choose(effects.main_effect.notnull() | True, quantity=quantity)["quantity"]
-    )
-    shown = asked.sel(load=load)
-    definitions = shown["definition"].values[shown.values].tolist()
+    load = choose(asked, load=load)["load"]
+    choose(effects.main_effect.notnull() | True, quantity=quantity)
+    effects = effects.sel(load=load, quantity=quantity)
+    definitions = labels_of(asked.sel(load=[load]), "definition")
     definitions = definitions[:1] if quantity == "best_stiffness" else definitions
     names, every = effects.parameter.values.tolist(), effects["definition"].values.tolist()
     columns = min(COLUMNS, len(names))
     figure, axes, flat, height = style.multiples(ax, len(names), columns, 1.75, sharey=True)
     lines = [style.line(every.index(name)) for name in definitions]
     text, factor, unit = QUANTITY_AXES[quantity]
-    title = f"{_of(samples, load)}: mean {text} over each parameter alone"
-    title = labels.wrapped(title, (style.PAGE if columns > 1 else style.COLUMN) - 0.1, 8.5)
+    title = _titled(samples, load, f"mean {text} over each parameter alone", columns)
+    over = 0.14 * labels.lines_of(title)
     if figure is not None and ax is None:
-        figure.set_size_inches(style.size(figure)[0], height + 0.45 + 0.14 * labels.lines_of(title))
-    style.arrange(figure, axes, left=0.62, right=0.14, bottom=0.86, top=0.16 + 0.14 * labels.lines_of(title),
-                  across=0.2, down=0.5, title=title)  # fmt: skip
-    drawn = False
+        figure.set_size_inches(style.size(figure)[0], height + 0.45 + over)
+    style.arrange(figure, axes, left=0.62, right=0.14, bottom=0.86, top=0.16 + over, across=0.2, down=0.5, title=title)
     for number, (panel, name) in enumerate(zip(flat, names)):
         values = effects.parameter_value.sel(parameter=name).values
         by, of = _unit(name, values)
@@ -245,10 +240,8 @@ def plot_effects(data, ax=None, *, load=None, quantity="deformation_error"):
             label = "uniform springs" if quantity == "best_stiffness" else definition
             panel.plot(x, mean, label=label, **line | {"marker": ""})
             panel.fill_between(x, mean - 2 * error, mean + 2 * error, color=line["color"], alpha=0.15, linewidth=0)
-            drawn |= bool(np.isfinite(mean).any())
-        logarithmic = _is_logarithmic(values)
         ends = np.array([x.min(), x.max()])
-        if logarithmic:
+        if _is_logarithmic(values):
             panel.set(xscale="log", xlim=ends * (ends[1] / ends[0]) ** np.array([-0.05, 0.05]))
             style.plain(panel, "x")
         else:
@@ -257,15 +250,12 @@ def plot_effects(data, ax=None, *, load=None, quantity="deformation_error"):
         panel.set_xlabel(_axis(PARAMETER_AXES[name][0], of))
         if number % columns == 0:
             panel.set_ylabel(_axis(text, unit))
-    if not drawn:
-        for panel in flat:
+        if not effects.main_effect.sel(definition=definitions).notnull().any():
             labels.say(panel, "no scene has a value", bare=False)
     if figure is not None:
         handles, texts = flat[0].get_legend_handles_labels()
         figure.legend(handles, texts, loc="lower center", ncols=len(texts), borderaxespad=0.2)
-        width, tall = style.size(figure)
-        note = labels.wrapped(_lacking(samples, load, definitions), width - 0.2)
-        figure.text(0.1 / width, 0.3 / tall, note, fontsize=style.SMALL, color="0.25")
+    _note_below(figure, _lacking(samples, load, definitions), 0.3)
     return flat
 
 
@@ -283,18 +273,11 @@ def _lacking(samples, load, definitions):
     return "; ".join(said)
 
 
-def sobol(tree):
+def _each_load(name, plot, tree):
     """Stem, function that plots, and selection of each figure."""
-    for load in _loads(tree):
-        yield f"sobol_{load}", plot_sobol, {"load": load}
+    for load in labels_of((tree["samples"].to_dataset().status != 0).any("sample"), "load"):
+        yield f"{name}_{load}", plot, {"load": load}
 
 
-def effects(tree):
-    """Stem, function that plots, and selection of each figure."""
-    for load in _loads(tree):
-        yield f"effects_{load}", plot_effects, {"load": load}
-
-
-def _loads(tree):
-    asked = (tree["samples"].to_dataset().status != 0).any(["sample", "definition"])
-    return asked["load"].values[asked.values].tolist()
+sobol = partial(_each_load, "sobol", plot_sobol)
+effects = partial(_each_load, "effects", plot_effects)
