@@ -1,4 +1,4 @@
-"""Parts of a study for several sites, dealt out by their expected cost: each scene is in one of them.
+"""Divide a study into parts for several sites, by expected cost; each scene is in one part.
 
 A part follows from the whole study and its number alone, so that all sites agree on it. Keys and numbers are those of
 the whole study.
@@ -20,27 +20,27 @@ if TYPE_CHECKING:
     from ..runs.stages import Task
 
 Name = tuple[str | int, ...]
-"""Of a piece, within its kind of study."""
+"""Name of a piece within its study kind."""
 
 
 @dataclass(frozen=True)
 class Division:
-    """How a study is divided: what stays together (``by``, see `DEALT_BY`), and the most seconds of a piece."""
+    """How a study is divided: what stays together (`by`, see `DEALT_BY`), and the most seconds of a piece."""
 
     by: str
     most: float
 
     def pieces(self, seconds: float, tasks: int) -> int:
-        """Number of pieces that so many tasks of so many seconds make."""
+        """Return the number of pieces of some tasks."""
         return min(tasks, ceil(seconds / self.most)) if self.most and seconds else 1
 
     def of_section(self, found: Mapping[Name, float]) -> dict[Name, float]:
-        """Seconds of the pieces of a section of a study, all of which is one piece where grids stay together."""
+        """Return the seconds of a section's pieces; a section is one piece if grids stay together."""
         return {(): sum(found.values())} if self.by == "grid" else dict(found)
 
 
 def by_task(kind: str, tasks: "Callable[[Study], Iterable[Task]]", piece: Callable[[Any], Name]) -> dict[str, Any]:
-    """How a kind is divided whose part of a study is a tuple, and each of that a task."""
+    """Return how to divide a kind whose part of a study is a tuple with a task an entry."""
 
     def pieces(study: "Study", costs: Costs, division: Division) -> dict[Name, float]:
         return division.of_section({piece(task.of): task.seconds(costs) for task in tasks(study)})
@@ -53,7 +53,7 @@ def by_task(kind: str, tasks: "Callable[[Study], Iterable[Task]]", piece: Callab
 
 
 def dealt(study: "Study", count: int, by: str) -> list[tuple[float, dict[str, list[Name]]]]:
-    """Pieces of a study, dealt out."""
+    """Deal out the pieces of a study: the share of the cost of each part, and its pieces by kind."""
     found = _pieces(study, Division(by, 0.0))
     total = sum(found.values())
     most = total / count
@@ -69,7 +69,7 @@ def dealt(study: "Study", count: int, by: str) -> list[tuple[float, dict[str, li
                          f"{len(found)}{other}")  # fmt: skip
     seconds, held = [0.0] * count, [0] * count
     shares: list[dict[str, list[Name]]] = [{} for _ in range(count)]
-    # The longest first, each to the part that has least.
+    # The longest first, each to the part with the least work.
     for kind, name in sorted(found, key=lambda piece: -found[piece]):
         least = min(range(count), key=lambda number: (seconds[number], held[number], number))
         seconds[least] += found[kind, name]
@@ -79,7 +79,7 @@ def dealt(study: "Study", count: int, by: str) -> list[tuple[float, dict[str, li
 
 
 def part_of(study: "Study") -> "Study":
-    """The part of a study that it says it is."""
+    """Return the part of a study that its file asks for."""
     if study.part is None:
         return study
     _, share = dealt(study, study.part.of, study.part.by)[study.part.number - 1]
@@ -87,19 +87,19 @@ def part_of(study: "Study") -> "Study":
 
 
 def taken(study: "Study", share: Mapping[str, list[Name]]) -> "Study":
-    """What a study asks for with some of its pieces alone."""
+    """Return a study with some of its pieces alone."""
     for kind in kinds():
         if not study.parts[kind.name]:
             continue
         names = share.get(kind.name, [])
-        if () in names:  # all of it
+        if () in names:  # the whole section
             continue
         study = kind.take(study, names) if kind.take else replace(study, parts=study.parts | {kind.name: ()})
     return study
 
 
 def _pieces(study: "Study", division: Division) -> dict[tuple[str, Name], float]:
-    """Seconds of each piece by kind and name."""
+    """Return the seconds of each piece by kind and name."""
     costs = Costs(Path("no costs"), {name: cost for kind in kinds() for name, cost in kind.costs.items()})
     found: dict[tuple[str, Name], float] = {}
     for kind in kinds():
@@ -110,6 +110,6 @@ def _pieces(study: "Study", division: Division) -> dict[tuple[str, Name], float]
 
 
 def _seconds(kind: "Kind", study: "Study", costs: Costs) -> float:
-    """Seconds of all tasks of a kind."""
+    """Return the seconds of all tasks of a kind."""
     made = (stage.members(study, costs) for stage in kind.stages if stage.members)
     return sum(seconds for members in made for seconds, _ in members.values())

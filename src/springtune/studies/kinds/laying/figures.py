@@ -18,7 +18,7 @@ def laying(tree):
 def plot_laying(data, ax=None, *, loading=None, friction=None):
     """Strips laid on a trapezoid: a row a loading and friction with the shape, the area's error and the elongation.
 
-    Networks lie on each other to the eye, so that only one has its shape drawn; the others are told by their numbers.
+    Networks look alike, so that only the shape of one is drawn; the numbers tell them apart.
 
     Parameters
     ----------
@@ -55,34 +55,34 @@ def plot_laying(data, ax=None, *, loading=None, friction=None):
             laid = laid.sel({name: [label]})
     shown = cells(laid.status != 0, ("loading", "friction"))
     names = labels_of(laid.status != 0, "definition")
-    wide = [1.9, 1.0, 1.0]
     high = 1.05 + 0.16 * max(len(names), 4)
-    figure, axes = style.panels(ax, len(shown), 3, figsize=(style.PAGE, 0.25 + high * len(shown)), widths=wide)
-    place = {"left": 0.52, "right": 0.1, "top": 0.3, "down": 0.97}
-    style.arrange(figure, axes, bottom=0.74, across=0.14 + max(map(labels.width, names), default=0.0), **place)
+    size = (style.PAGE, 0.25 + high * len(shown))
+    figure, axes = style.panels(ax, len(shown), 3, figsize=size, widths=[1.9, 1.0, 1.0])
+    place = {"left": 0.52, "right": 0.1, "top": 0.3, "bottom": 0.74, "down": 0.97}
+    style.arrange(figure, axes, across=0.14 + max(map(labels.width, names), default=0.0), **place)
     for row, cell in zip(axes, shown):
         _row(row, laid.sel(cell), cell, names)
         row[0].apply_aspect()  # its limits
-    labels.settle(figure, axes, {**place, "bottom": 0.74, "across": 0.06})
+    labels.settle(figure, axes, place | {"across": 0.06})
     return axes
 
 
 def _row(row, laid, cell, names):
-    """The panels of one loading and friction."""
+    """Draw the panels of one loading and friction."""
     shape, area, elongation = row
     friction = f", friction {cell['friction']:g}" if cell["friction"] else ""
     first = _shape(shape, laid, names)
     shape.set(title=f"{cell['loading']}{friction}", xlabel="x [mm]", ylabel="y [mm]")
     shape.set(aspect="equal", adjustable="datalim")
     labels.note(shape, first)
-    known, reference = float(laid.reference_elongation_error_estimate), 100 * float(laid.reference_elongation)
+    known, reference = 100 * float(laid.reference_elongation_error_estimate), 100 * float(laid.reference_elongation)
     if np.isfinite(reference):
+        found = ", error unknown"
         if np.isfinite(known):
-            elongation.axvspan(reference - 100 * known, reference + 100 * known, color="0.87", zorder=0)
+            elongation.axvspan(reference - known, reference + known, color="0.87", zorder=0)
+            found = f" ± {known:.2g}"
         elongation.axvline(reference, color="0.45", linewidth=1.5)
-        found = f" ± {100 * known:.2g}" if np.isfinite(known) else ", error unknown"
-        said = f"grey: finite elements {reference:.2f}{found} %".replace("-", "−")
-        labels.note(elongation, labels.wrapped(said, _room(elongation)))
+        _note(elongation, f"grey: finite elements {reference:.2f}{found} %".replace("-", "−"))
     area.axvline(0, color="0.45", linewidth=1.5)
     for panel, name in ((area, "area_error"), (elongation, "elongation")):
         _dots(panel, laid, names, name)
@@ -90,21 +90,25 @@ def _row(row, laid, cell, names):
     elongation.set(xlabel="Elongation [%]", title="Lower fibre")
     elongation.tick_params(labelleft=False)
     if ((laid.status == 1).sum("mesh_size") > 1).any():
-        labels.note(area, labels.wrapped("filled: finest mesh; hollow: coarser", _room(area)))
+        _note(area, "filled: finest mesh; hollow: coarser")
 
 
-def _room(panel):
-    """Width of a panel [inch]."""
-    return panel.get_window_extent().width / panel.figure.dpi
+def _note(panel, text):
+    """Write a note as wide as a panel."""
+    labels.note(panel, labels.wrapped(text, panel.get_window_extent().width / panel.figure.dpi))
+
+
+def _points(laid, name):
+    """Points of an outline [mm], shape (n, 2)."""
+    points = 1e3 * np.stack([laid[f"{name}_{axis}"].values for axis in "xy"], axis=1)
+    return points[np.isfinite(points[:, 0])]
 
 
 def _shape(panel, laid, names):
-    """Draw the trapezoid, the reference and the finest network solved first; what was drawn, in words."""
-    corners = 1e3 * np.stack([laid.trapezoid_x.values, laid.trapezoid_y.values], axis=1)
-    panel.fill(*corners.T, facecolor="0.93", edgecolor="0.45", linewidth=0.8)
+    """Draw the trapezoid, the reference and the finest solved network of one definition; return a note on them."""
+    panel.fill(*_points(laid, "trapezoid").T, facecolor="0.93", edgecolor="0.45", linewidth=0.8)
     panel.axhline(0, color="0.45", linewidth=0.8)
-    reference = 1e3 * np.stack([laid.reference_x.values, laid.reference_y.values], axis=1)
-    reference, said = reference[np.isfinite(reference[:, 0])], "no reference"
+    reference, said = _points(laid, "reference"), "no reference"
     if len(reference):
         panel.fill(*reference.T, facecolor="0.72", edgecolor="none")
         said = "grey: finite elements"
@@ -112,15 +116,14 @@ def _shape(panel, laid, names):
         strips = laid.sel(definition=definition)
         for place in np.flatnonzero(strips.status.values == 1)[:1]:
             strip = strips.isel(mesh_size=place)
-            points = 1e3 * np.stack([strip.strip_x.values, strip.strip_y.values], axis=1)
-            points = points[np.isfinite(points[:, 0])]
+            points = _points(strip, "strip")
             panel.plot(*np.vstack([points, points[:1]]).T, color=style.line(1)["color"], linewidth=0.9)
             return f"{said}; line: {definition}, {1e3 * float(strip.mesh_size):g} mm"
     return f"{said}; no network was solved"
 
 
 def _dots(panel, laid, names, variable):
-    """A dot a definition and mesh size, the finest filled; where none was solved, why."""
+    """Draw a dot a definition and mesh size, the finest filled; without any, write why."""
     for number, definition in enumerate(names):
         strips, look = laid.sel(definition=definition), style.line(number)
         solved = np.flatnonzero(strips.status.values == 1)

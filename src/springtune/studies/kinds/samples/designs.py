@@ -22,7 +22,7 @@ PARAMETERS = {
 """Parameters of a sampled scene: kind of quantity, what it is, and its unit."""
 
 SOBOL_INDICES = "sobol-indices"
-"""The design whose rows differ in one parameter from each other, by which indices are estimated."""
+"""The design for Sobol indices: rows of a base sample differ in one parameter."""
 
 DESIGNS = (SOBOL_INDICES, "sobol", "latin-hypercube")
 """How samples are drawn."""
@@ -53,18 +53,12 @@ def blocks(design: str, size: int) -> list[tuple[int, int]]:
 
 
 def points(design: str, size: int, dimensions: int, seed: int, first: int = 0, last: int | None = None) -> np.ndarray:
-    """Points of the unit cube.
+    """Draw points `first` to `last` of the unit cube, shape (last - first, dimensions).
 
-    Returns
-    -------
-    ndarray of float, shape (last - first, dimensions)
-
-    Notes
-    -----
-    Sobol points are scrambled (Owen 1998, as scipy does), `dimensions` of them first for the rows A and as many for B.
-    A Latin hypercube has one point in each of `size` strata of every dimension; one of twice the size keeps its points,
-    each of which lies in one half of its stratum, and fills the other halves in an order of its own (as Sallaberry,
-    Helton and Hora, Reliab. Eng. Syst. Saf. 93:1047, 2008, without their correlations).
+    Sobol points are scrambled (Owen 1998, by scipy). A Latin hypercube has one point in each of `size` strata of every
+    dimension. One of twice the size keeps these points: each lies in one half of its stratum, and the other halves are
+    filled in an order of their own (Sallaberry, Helton and Hora, Reliab. Eng. Syst. Saf. 93:1047, 2008, but without
+    correlations).
 
     Examples
     --------
@@ -99,7 +93,7 @@ def _latin_hypercube(size: int, dimensions: int, seed: int) -> np.ndarray:
 
 
 def quantile(distribution: Mapping[str, Any], shares: np.ndarray) -> np.ndarray:
-    """Values of a distribution below which it has shares of its probability.
+    """Return the quantiles of a distribution.
 
     Examples
     --------
@@ -121,7 +115,7 @@ def quantile(distribution: Mapping[str, Any], shares: np.ndarray) -> np.ndarray:
     else:
         mean, deviation = distribution["mean"], distribution["deviation"]
         frozen = stats.truncnorm((low - mean) / deviation, (high - mean) / deviation, mean, deviation)
-    # Rounding must not take a value beyond what was checked.
+    # Rounding must not leave the range that was checked.
     return np.clip(frozen.ppf(shares), low, high)
 
 
@@ -144,13 +138,13 @@ def roles(design: str, names: Iterable[str]) -> list[str]:
 def draw(
     design: str, seed: int, parameters: Mapping[str, Mapping[str, Any]], first: int, last: int
 ) -> dict[str, np.ndarray]:
-    """Parameters of the scenes of some base samples, ``mesh_size`` among them, shape (n_rows,); see `roles`.
+    """Draw the parameters of the scenes of some base samples, with `mesh_size`, shape (n_rows,); see `roles`.
 
-    Rows A and B of a base sample are the halves of one point of twice the dimensions; AB_i is A with the parameter i of
-    B (Saltelli et al., Comput. Phys. Commun. 181:259, 2010).
+    Rows A and B of a base sample are the halves of one point of twice the dimensions; AB_i is A with parameter i of B
+    (Saltelli et al., Comput. Phys. Commun. 181:259, 2010).
     """
-    names = varied(parameters)
-    count, pair = len(names), design == SOBOL_INDICES
+    names, pair = varied(parameters), design == SOBOL_INDICES
+    count = len(names)
     size = 1 << (last - 1).bit_length()  # a power of two
     shares = points(design, size, count * (2 if pair else 1), seed, first, last)
     table = np.repeat(shares[:, None, :count], len(roles(design, names)), axis=1)
