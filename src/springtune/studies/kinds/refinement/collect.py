@@ -1,6 +1,6 @@
 """Refinements: the group ``/refinement``, and tables of its values and of where errors are zero or the tolerance."""
 
-from collections.abc import Collection
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -14,54 +14,55 @@ from .batches import crossings, refine, value_key
 from .kind import file_key
 from .outputs import REFINEMENT_TABLES, SPACINGS, VARIED
 
-OF_ONE = ("refinement",)
-VALUE, CROSSING = (*OF_ONE, "definition", "point"), (*OF_ONE, "definition", "crossing")
+OF_ONE, OF_EACH = ("refinement",), ("refinement", "definition")
+VALUE, CROSSING = (*OF_EACH, "point"), (*OF_EACH, "crossing")
 
 COORDINATES = (*(f"refined_{name}" for name in VARIED), "batch", "parameter")
 """Auxiliary coordinates."""
 
 
-def refinement_group(parameters: Collection[str]) -> Group:
-    """The group of a study."""
-    values, found = {}, {}
-    for name in (name for name in VARIED if name in parameters):
-        known = VARIED[name]
-        values[f"refined_{name}"] = (VALUE, known.unit, f"{known.meaning}, where it is varied", np.nan)
-        found[f"crossing_{name}"] = (CROSSING, known.unit, f"{known.meaning} at which the error is crossed", np.nan)
-        found[f"crossing_{name}_width"] = (CROSSING, known.unit, "distance of the values that enclose it", np.nan)
-    return Group(
-        "/refinement",
-        {
-            "parameter": (OF_ONE, "1", "what is varied", ""),
-            "scene": (OF_ONE, "1", "the scene of which it is varied: beam, mesh, material, load and kinematics", ""),
-            "spacing": (OF_ONE, "1", "whether values or their logarithms are evenly spaced", ""),
-            "tolerance": (OF_ONE, "1", "size of the error that matters", np.nan),
-            "value_count": (("refinement", "definition"), "1", "number of values", 0),
-            "halved": (("refinement", "definition"), "1", "batches after the first one", 0),
-            **values,
-            "batch": (VALUE, "1", "batch that the value came in, from 0; -1 where there is no value", -1),
-            "displacement": (VALUE, "m", "displacement of the network", np.nan),
-            "reference_displacement": (VALUE, "m", "displacement of the reference", np.nan),
-            "reference_error_estimate": (VALUE, "1", "bound on the relative error of the reference", np.nan),
-            "reference_applies": (VALUE, "1", "whether small strain applies; -1 where there is no reference", -1),
-            "deformation_error": (VALUE, "1", "(network - reference) / |reference|", np.nan),
-            "particles": (VALUE, "1", "number of particles", 0),
-            "status": (VALUE, "1", "what became of the scene", 0),
-            "message": (VALUE, "1", "why the scene is not solved, or its reference does not apply", ""),
-            "crossing_level": (CROSSING, "1", "error that is crossed: zero, or the tolerance", np.nan),
-            **found,
-            "crossing_change": (CROSSING, "1", "change of the error between the enclosing values", np.nan),
-        },
-        dimensions={
-            "refinement": "refinement, by name",
-            "point": "number of a value, in the order of their addition",
-            "crossing": "number of a crossing, ascending",
-        },
-    )
+def _of_parameter(name):
+    """Variables of what is varied."""
+    known = VARIED[name]
+    return {
+        f"refined_{name}": (VALUE, known.unit, f"{known.meaning}, where it is varied", np.nan),
+        f"crossing_{name}": (CROSSING, known.unit, f"{known.meaning} at which the error is crossed", np.nan),
+        f"crossing_{name}_width": (CROSSING, known.unit, "distance of the values that enclose it", np.nan),
+    }
 
 
-REFINEMENT = refinement_group(VARIED)
-"""The group with all that a study may vary."""
+OF_PARAMETERS = {variable: row for name in VARIED for variable, row in _of_parameter(name).items()}
+
+REFINEMENT = Group(
+    "/refinement",
+    {
+        "parameter": (OF_ONE, "1", "what is varied", ""),
+        "scene": (OF_ONE, "1", "the scene of which it is varied: beam, mesh, material, load and kinematics", ""),
+        "spacing": (OF_ONE, "1", "whether values or their logarithms are evenly spaced", ""),
+        "tolerance": (OF_ONE, "1", "size of the error that matters", np.nan),
+        "value_count": (OF_EACH, "1", "number of values", 0),
+        "halved": (OF_EACH, "1", "batches after the first one", 0),
+        **{name: row for name, row in OF_PARAMETERS.items() if row[0] == VALUE},
+        "batch": (VALUE, "1", "batch that the value came in, from 0; -1 where there is no value", -1),
+        "displacement": (VALUE, "m", "displacement of the network", np.nan),
+        "reference_displacement": (VALUE, "m", "displacement of the reference", np.nan),
+        "reference_error_estimate": (VALUE, "1", "bound on the relative error of the reference", np.nan),
+        "reference_applies": (VALUE, "1", "whether small strain applies; -1 where there is no reference", -1),
+        "deformation_error": (VALUE, "1", "(network - reference) / |reference|", np.nan),
+        "particles": (VALUE, "1", "number of particles", 0),
+        "status": (VALUE, "1", "what became of the scene", 0),
+        "message": (VALUE, "1", "why the scene is not solved, or its reference does not apply", ""),
+        "crossing_level": (CROSSING, "1", "error that is crossed: zero, or the tolerance", np.nan),
+        **{name: row for name, row in OF_PARAMETERS.items() if row[0] == CROSSING},
+        "crossing_change": (CROSSING, "1", "change of the error between the enclosing values", np.nan),
+    },
+    dimensions={
+        "refinement": "refinement, by name",
+        "point": "number of a value, in the order of their addition",
+        "crossing": "number of a crossing, ascending",
+    },
+)
+"""The group with all parameters; a study has the variables of those that it varies."""
 
 RESULTS = ("displacement", "reference_displacement", "reference_error_estimate", "deformation_error", "particles")
 """Numbers of a value's result that the dataset and the table have."""
@@ -76,11 +77,11 @@ def groups(study, folder):
         "crossing": max(1, *(len(where) for *_, where in found)),
     }
     axes = study.axes | {name: tuple(range(length)) for name, length in lengths.items()}
-    group = refinement_group({one.parameter for one in part})
-    data = Filler(group.empty(axes))
+    own = {variable for one in part for variable in _of_parameter(one.parameter)}
+    data = Filler(REFINEMENT.empty(axes, REFINEMENT.variables.keys() - OF_PARAMETERS.keys() | own))
     for one, values in zip(part, found):
         _put(one, *values, data)
-    return {group.name: data.data.set_coords([name for name in COORDINATES if name in data.data])}
+    return {REFINEMENT.name: data.data.set_coords([name for name in COORDINATES if name in data.data])}
 
 
 def _read(one, folder):
@@ -127,43 +128,23 @@ CROSSING_COLUMNS = ("refinement", "definition", "parameter", "unit", "error", "v
 
 
 def write(tree, folder):
-    """Write two CSV files."""
-    data = tree["refinement"].to_dataset()
-    for name, rows in zip(REFINEMENT_TABLES, (_values(data), _crossings(data))):
+    """Write two CSV files: a row a value, and a row a crossing."""
+    data, values, found = tree["refinement"].to_dataset(), [], []
+    for name, definition in product(data.refinement.values.tolist(), data.definition.values.tolist()):
+        cell = data.sel(refinement=name, definition=definition)
+        parameter = str(cell.parameter.item())
+        labels = {"refinement": name, "definition": definition, "parameter": parameter, "unit": VARIED[parameter].unit}
+        refined, of = cell[f"refined_{parameter}"].values, f"crossing_{parameter}"
+        for point in np.argsort(refined, kind="stable")[: int(cell.value_count)]:  # NaN comes last
+            one = cell.isel(point=point)
+            row = labels | {"value": float(refined[point]), "batch": int(one.batch)}
+            row |= {result: float(one[result]) for result in RESULTS}
+            values.append(row | {"status": STATUS[int(one.status)], "message": str(one.message.item())})
+        for number in np.flatnonzero(np.isfinite(cell.crossing_level.values)):
+            one = cell.isel(crossing=number)
+            variables = {"error": "crossing_level", "value": of, "width": f"{of}_width", "change": "crossing_change"}
+            found.append(labels | {column: float(one[variable]) for column, variable in variables.items()})
+    # A file without rows has its columns.
+    for name, rows in zip(REFINEMENT_TABLES, (values, found or [dict.fromkeys(CROSSING_COLUMNS, "")])):
         write_text(Path(folder) / name, csv_text(rows))
     return list(REFINEMENT_TABLES)
-
-
-def _cells(data):
-    """Each refinement and definition that has values: its part of the dataset, and its labels for a row."""
-    for name in data.refinement.values.tolist():
-        for definition in data.definition.values.tolist():
-            cell = data.sel(refinement=name, definition=definition)
-            if cell.value_count:
-                parameter = str(cell.parameter.item())
-                # NaN, where there is no value, comes last.
-                cell = cell.isel(point=np.argsort(cell[f"refined_{parameter}"].values, kind="stable"))
-                labels = {"refinement": name, "definition": definition, "parameter": parameter}
-                yield cell, labels | {"unit": VARIED[parameter].unit}
-
-
-def _values(data):
-    rows = []
-    for cell, labels in _cells(data):
-        for point in range(int(cell.value_count)):
-            one = cell.isel(point=point)
-            row = labels | {"value": float(one[f"refined_{labels['parameter']}"]), "batch": int(one.batch)}
-            row |= {name: float(one[name]) for name in RESULTS}
-            rows.append(row | {"status": STATUS[int(one.status)], "message": str(one.message.item())})
-    return rows
-
-
-def _crossings(data):
-    rows = []
-    for cell, labels in _cells(data):
-        for number in np.flatnonzero(np.isfinite(cell.crossing_level.values)):
-            one, name = cell.isel(crossing=number), f"crossing_{labels['parameter']}"
-            row = {"error": float(one.crossing_level), "value": float(one[name]), "width": float(one[f"{name}_width"])}
-            rows.append(labels | row | {"change": float(one.crossing_change)})
-    # A file without rows has its columns.
-    return rows or [dict.fromkeys(CROSSING_COLUMNS, "")]
