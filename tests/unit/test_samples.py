@@ -650,7 +650,7 @@ class TestRefusals:
             ("size: 16", "size: 4", "size", "give 8"),
             ("size: 16", "size: 262144", "size", "at most 1000000"),
             ("size: 16", "size: 16\n  design: saltelli", "design", "unknown design"),
-            ("size: 16", "size: 16\n  mesh_type: triangle", "mesh_type", "no mesh type"),
+            ("size: 16", "size: 16\n  mesh_type: triangle", "mesh_type", "unknown mesh type 'triangle'"),
             ("definition: lattice\n  p", "definition: [lattice, calibrated]\n  p", "definition", "'calibrated' needs"),
             ("definition: lattice\n  p", "definition: braced\n  p", "definition", "unknown definition"),
         ],

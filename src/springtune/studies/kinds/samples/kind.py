@@ -10,11 +10,10 @@ from springtune.mesh.types import MOST_MESHED
 from springtune.problem.geometry import warn_of_thickness
 from springtune.problem.loads import LOADS
 from springtune.problem.parameters import MOST_SCENES
-from springtune.problem.quantities import nearest
 from springtune.springs import DEFINITIONS
 
 from ...config.checks import MORE_SCENES, most_scenes
-from ...config.fields import DefinitionName, Flag, Kinematics, Load, MeshType, OneOrMore, Scalar, number, one_of
+from ...config.fields import DefinitionName, Flag, Kinematics, Load, OneOrMore, Scalar, number, one_of
 from ...config.kind import Kind
 from ...config.messages import refuse, show
 from ...config.sections import Section
@@ -81,6 +80,7 @@ def _read_size(value: str) -> int:
 Size = Annotated[int, Scalar(_read_size, {"type": "integer", "minimum": SMALLEST_SIZE}, "a power of two such as 1024")]
 Seed = Annotated[int, number("a whole number from 0, such as 1", 0, 2**31, whole=True)]
 Design = Annotated[str, one_of("design", DESIGNS)]
+MadeType = Annotated[str, one_of("mesh type", MESH_TYPES)]
 FailurePolicy = Annotated[str, one_of("policy", FAILURES)]
 
 
@@ -98,7 +98,7 @@ class SamplesConfig(Section):
     )
     size: Size = Field(description="Number of points drawn: a power of two.")
     seed: Seed = Field("1", validate_default=True, description="Of the random numbers.")
-    mesh_type: MeshType = Field("structured", validate_default=True, description="Mesh type, of those that are made.")
+    mesh_type: MadeType = Field("structured", validate_default=True, description="Mesh type, of those that are made.")
     load: Annotated[list[Load], OneOrMore()] = Field(description="Loads, each of every point.")
     definition: Annotated[list[DefinitionName], OneOrMore()] = Field(
         description="Definitions that need no reference and no stated stiffness."
@@ -170,13 +170,7 @@ def _check(config, problems):
         _check_sizes(sample, problems)
     if not sample.varied:
         problems.add(where, "nothing varies; give at least one parameter a range such as {from: 100 mm, to: 400 mm}")
-    if section.mesh_type not in MESH_TYPES:
-        problems.add(
-            ("samples", "mesh_type"),
-            f"'{section.mesh_type}' is no mesh type that is made; {nearest(section.mesh_type, MESH_TYPES)}",
-        )
-    else:
-        _check_definitions(section, problems)
+    _check_definitions(section, problems)
     most = most_scenes()
     if sample.scenes > most:
         each = f"{sample.rows // sample.size} rows x {len(sample.loads)} loads x {len(sample.definitions)} definitions"
@@ -220,14 +214,13 @@ def _check_sizes(sample, problems):
         if largest > side:
             problems.add(path, f"up to {_mm(largest)} is larger than the smallest side of a beam, {_mm(side)}; give at "
                          f"most {_mm(side)}, or a 'relative_mesh_size'")  # fmt: skip
-    if sample.mesh_type in MESH_TYPES:
-        box = length["high"], height["low" if relative else "high"]
-        smallest = size["low"] * (height["low"] if relative else 1.0)
-        particles = MESH_TYPES[sample.mesh_type].particles(*box, smallest) if smallest**2 else float("inf")
-        if particles > MOST_MESHED:
-            low, beam = f"{size['low']:g}" if relative else _mm(size["low"]), f"{_mm(box[0])} x {_mm(box[1])}"
-            most = f"more than {MOST_MESHED:.0e}"
-            problems.add(path, f"{low} makes {particles:.0e} particles of a beam {beam}, {most}; give a larger 'from'")
+    box = length["high"], height["low" if relative else "high"]
+    smallest = size["low"] * (height["low"] if relative else 1.0)
+    particles = MESH_TYPES[sample.mesh_type].particles(*box, smallest) if smallest**2 else float("inf")
+    if particles > MOST_MESHED:
+        low, beam = f"{size['low']:g}" if relative else _mm(size["low"]), f"{_mm(box[0])} x {_mm(box[1])}"
+        most = f"more than {MOST_MESHED:.0e}"
+        problems.add(path, f"{low} makes {particles:.0e} particles of a beam {beam}, {most}; give a larger 'from'")
 
 
 def _mm(length: float) -> str:
