@@ -42,14 +42,16 @@ class TrapezoidConfig(Section):
 class LayingConfig(Section):
     """A strip laid on a trapezoid: every combination of the values listed, as in a grid.
 
-    The reference of a loading and friction is a strip of linear triangles on a mesh of its own, and two coarser ones
-    that tell the band in which it is known.
+    The reference of a loading and friction is a strip of linear triangles on a mesh of its own. Two coarser meshes give
+    the band of its error.
     """
 
     strip: BeamName = Field(description="Beam that is the strip.")
-    trapezoid: TrapezoidConfig = Field(description="What it is laid on.")
+    trapezoid: TrapezoidConfig = Field(description="Trapezoid below the strip.")
     material: MaterialName = Field(description="Material of the strip.")
-    support: MaterialName = Field(description="Material of the trapezoid; from 1e4 times as stiff on it is rigid.")
+    support: MaterialName = Field(
+        description="Material of the trapezoid, which is rigid from 1e4 times the strip's modulus on."
+    )
     definition: Annotated[list[DefinitionName], OneOrMore()] = Field(
         description="Definitions that derive a stiffness and need no reference."
     )
@@ -60,8 +62,8 @@ class LayingConfig(Section):
     loading: Annotated[list[Loading], OneOrMore()] = Field(
         "pressure",
         validate_default=True,
-        description="`pressure`: on the upper face, following it; `gravity`: the same force as weight; `ends`: the "
-        "ends are drawn down to the floor.",
+        description="`pressure`: on the upper face, following it; `gravity`: the same force as weight; `ends`: draws "
+        "the ends down to the floor.",
     )
     pressure: Stress = Field(description="Pressure, or weight over the upper face.")
     friction: Annotated[list[Friction], OneOrMore()] = Field(

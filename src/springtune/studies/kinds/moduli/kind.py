@@ -23,7 +23,7 @@ from .outputs import OUTPUTS
 class PatchConfig(Section):
     """Box on whose meshes effective moduli are measured: between rollers for E and nu, under even shear for G.
 
-    They are those of the mesh that a beam of this extent gets: give the extent of the beam that they stand beside.
+    Its mesh is that of a beam of this extent: give the extent of the beam to compare with.
     """
 
     length: Length = Field("100 mm", validate_default=True, description="Extent along x.")
@@ -32,7 +32,7 @@ class PatchConfig(Section):
 
 @dataclass(frozen=True)
 class Measurement:
-    """Effective moduli of a definition on a patch, for the Poisson's ratio that it is asked for."""
+    """Effective moduli of a definition on a patch, for a wanted Poisson's ratio."""
 
     definition: str
     mesh_type: str
@@ -42,7 +42,7 @@ class Measurement:
 
 @dataclass(frozen=True)
 class Measurements:
-    """Measurements of a study, and the box on whose meshes they are made; its thickness does not matter."""
+    """Measurements of a study, and the box of their meshes; its thickness does not matter."""
 
     patch: Beam
     measurements: tuple[Measurement, ...]
@@ -96,7 +96,7 @@ def _tasks(study):
 
 
 def _mesh_of(study, one):
-    """Mesh of a patch test: on the box, or of the meshes from files that of the shortest beam."""
+    """Mesh of a patch test: of the box, or from the file of the shortest beam."""
     if one.mesh_type in MESH_TYPES:
         return MeshSpec(study.parts["moduli"].patch, one.mesh_type, one.mesh_size)
     found = [mesh for label, mesh in study.mesh_files.items() if label[::2] == (one.mesh_type, one.mesh_size)]
@@ -120,7 +120,7 @@ KIND = Kind(
                 "false",
                 validate_default=True,
                 description="Whether effective moduli are measured for each definition, mesh type, mesh size and "
-                "Poisson's ratio, on the box under `patch`. Definitions that are told their stiffness have none.",
+                "Poisson's ratio, on the box under `patch`. Definitions with a given stiffness have none.",
             ),
         )
     },

@@ -72,23 +72,21 @@ class RefinementConfig(Section):
     """Values of one parameter, added in batches where the error changes its sign or crosses a tolerance.
 
     The first batch is evenly spaced. Every further one halves all intervals in which the deformation error crosses
-    zero or the tolerance, of either sign, until they are as narrow as the resolution, or there are as many values as
-    there may be. Each definition has values of its own. A larger `most` goes on where a smaller one ended.
+    zero or the tolerance, of either sign. It ends when intervals are as narrow as `resolution`, or with `most` values.
+    Each definition has values of its own. A larger `most` goes on where a smaller one ended.
     """
 
     beam: BeamName = Field(description="Beam.")
-    mesh_type: MadeType = Field("structured", validate_default=True, description="Mesh type, of those that are made.")
-    mesh_size: Length | None = Field(
-        None, description="Length of an edge; not where it is the parameter, needed elsewhere."
-    )
+    mesh_type: MadeType = Field("structured", validate_default=True, description="Generated mesh type.")
+    mesh_size: Length | None = Field(None, description="Length of an edge; required unless it is the parameter.")
     material: MaterialName = Field(description="Material.")
     load: Load = Field(description="Load.")
-    force: Force | None = Field(None, description="Magnitude; not where it is the parameter, needed elsewhere.")
+    force: Force | None = Field(None, description="Magnitude; required unless it is the parameter.")
     definition: Annotated[list[DefinitionName], OneOrMore()] = Field(
         description="Definitions that derive a stiffness and need no reference."
     )
     kinematics: Kinematics = Field("nonlinear", validate_default=True, description="Kinematics of the network.")
-    parameter: ParameterName = Field(description="What is varied: " + "; ".join(
+    parameter: ParameterName = Field(description="Parameter to vary: " + "; ".join(
         f"`{name}`, {one.meaning}" for name, one in VARIED.items()) + ".")  # fmt: skip
     start: End = Field(alias="from", description="Smallest value, with its unit.")
     stop: End = Field(alias="to", description="Largest value, with its unit.")
@@ -100,9 +98,9 @@ class RefinementConfig(Section):
     resolution: Share = Field(
         "0.1 %",
         validate_default=True,
-        description="Width of an interval that is narrow enough, of that between the ends.",
+        description="Width of the narrowest intervals, as a share of the distance between the ends.",
     )
-    most: Count = Field("33", validate_default=True, description="Values at most, of each definition.")
+    most: Count = Field("33", validate_default=True, description="Most values of each definition.")
 
 
 @dataclass(frozen=True)

@@ -31,11 +31,11 @@ Drawn = dict[str, Any]
 
 
 class ParametersConfig(Section):
-    """What a sampled scene is made of: each a value, or a distribution that it is drawn from.
+    """Parameters of sampled scenes: each is a value, or a distribution to draw it from.
 
     `{from: 100 mm, to: 400 mm}` is uniform; `{from: 1 MPa, to: 1 GPa, distribution: log-uniform}` has a uniform
     logarithm; `{from: 1 mm, mode: 2 mm, to: 5 mm, distribution: triangular}`; `{mean: 40 mm, deviation: 2 mm,
-    distribution: normal}` ends where `from` and `to` say, else 4 deviations from the mean or at the last legal value.
+    distribution: normal}` ends at `from` and `to`, by default 4 deviations from the mean or at the last legal value.
     """
 
     length: Annotated[Drawn, Distributed("length", "{from: 100 mm, to: 400 mm}")] = Field(
@@ -46,7 +46,7 @@ class ParametersConfig(Section):
         "1 mm", validate_default=True, description="Extent out of the plane."
     )
     mesh_size: Annotated[Drawn, Distributed("mesh_size", "{from: 2 mm, to: 5 mm}")] | None = Field(
-        None, description="Length of an edge; at most the smaller side of any beam. Give this or the next."
+        None, description="Length of an edge; at most the smaller side of any beam. Give this or `relative_mesh_size`."
     )
     relative_mesh_size: Annotated[Drawn, Distributed("relative_mesh_size", "{from: 0.1, to: 0.3}")] | None = Field(
         None, description="Length of an edge over the height."
@@ -87,40 +87,40 @@ FailurePolicy = Annotated[str, one_of("policy", FAILURES)]
 class SamplesConfig(Section):
     """Scenes whose parameters are drawn from distributions, and which of these parameters matter.
 
-    A sample of twice the size keeps its scenes and adds as many; what is stored is not solved again.
+    A sample of twice the size keeps its scenes and adds as many. Stored scenes are not solved again.
     """
 
     design: Design = Field(
         SOBOL_INDICES,
         validate_default=True,
-        description="`sobol-indices`: Saltelli's, for first- and total-order Sobol indices: `size` times as many "
-        "scenes as parameters that vary, and two more; `sobol`: scrambled Sobol points; `latin-hypercube`.",
+        description="`sobol-indices`: Saltelli's design for first- and total-order Sobol indices, with `size` x "
+        "(varied parameters + 2) points; `sobol`: scrambled Sobol points; `latin-hypercube`.",
     )
-    size: Size = Field(description="Number of points drawn: a power of two.")
-    seed: Seed = Field("1", validate_default=True, description="Of the random numbers.")
-    mesh_type: MadeType = Field("structured", validate_default=True, description="Mesh type, of those that are made.")
-    load: Annotated[list[Load], OneOrMore()] = Field(description="Loads, each of every point.")
+    size: Size = Field(description="Number of points: a power of two. For `sobol-indices`, of base samples.")
+    seed: Seed = Field("1", validate_default=True, description="Seed of the random numbers.")
+    mesh_type: MadeType = Field("structured", validate_default=True, description="Generated mesh type.")
+    load: Annotated[list[Load], OneOrMore()] = Field(description="Loads; each acts on every point's scene.")
     definition: Annotated[list[DefinitionName], OneOrMore()] = Field(
         description="Definitions that need no reference and no stated stiffness."
     )
     kinematics: Kinematics = Field(
         "linear",
         validate_default=True,
-        description="`linear`: thickness, Young's modulus and force only scale what is solved once; `nonlinear` solves "
-        "each scene, which takes some ten times as long.",
+        description="`linear` solves scenes once that differ in thickness, Young's modulus and force alone; "
+        "`nonlinear` solves each scene, which takes some ten times as long.",
     )
     best_stiffness: Flag = Field(
         "true",
         validate_default=True,
-        description="Whether the uniform stiffness without an error is found, too; of linear kinematics.",
+        description="Whether to find the uniform stiffness without an error, too; with linear kinematics only.",
     )
     failures: FailurePolicy = Field(
         DROP,
         validate_default=True,
-        description="Where scenes have no value, `drop` leaves the whole base samples out of the indices that they are "
-        "part of; `withhold` gives no index. Both count them.",
+        description="If scenes have no value, `drop` leaves their whole base samples out of indices, and `withhold` "
+        "gives no indices. Both count them.",
     )
-    parameters: ParametersConfig = Field(description="What a scene is made of.")
+    parameters: ParametersConfig = Field(description="Parameters of the scenes.")
 
 
 @dataclass(frozen=True)
