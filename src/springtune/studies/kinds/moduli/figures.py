@@ -11,10 +11,10 @@ from ...output.selection import choose, group, labelled_beam, labels_of, unswept
 from .outputs import figures
 
 FLOOR = 1e-5
-"""Smallest error drawn on a logarithmic axis [1]; below is rounding and the reference's own error."""
+"""Smallest error drawn on a logarithmic axis [1]; smaller ones are rounding and the reference's own error."""
 
 MOST_NAMED = 6
-"""Lines with a name in a panel of errors against mesh size; the others are there in grey."""
+"""Most named lines in a panel of errors against mesh size; the others are grey."""
 
 BASELINE = "uniform"
 """The definition that is named beside the best ones."""
@@ -33,7 +33,7 @@ def definitions(tree):
 
 
 def _main(root, names, selection):
-    """Labels that most scenes of a study have; where a selection has none of these, those that most of its own have."""
+    """Labels with most scenes of a study; if a selection has no such scene, those with most of its own scenes."""
     chosen = selection | {name: most_requested(root, name) for name in names}
     if (root.status.sel(chosen) != 0).any():
         return chosen
@@ -74,7 +74,7 @@ def _room(panel):
 
 
 def _statuses(flags):
-    """How many of some cells became what, in words."""
+    """Count the cells of each status, in words."""
     counts = {STATUS[flag].replace("_", " "): int((flags == flag).sum()) for flag in np.unique(flags[flags != 0])}
     return ", ".join(f"{name} ({count})" for name, count in counts.items()) or "none was asked for"
 
@@ -140,7 +140,7 @@ def _moduli(panel, here):
 def plot_definitions_size(data, ax=None, *, beam=None, material=None, load=None, kinematics=None):
     """Field error against mesh size with fitted rates, a panel a mesh type, a line a definition.
 
-    Definitions that are one line to the eye share it; of many the best and `uniform` have names, the others are grey.
+    Definitions that look like one line share it. Only the best and `uniform` have names; the others are grey.
 
     Parameters
     ----------
@@ -243,7 +243,7 @@ def plot_definitions_loads(data, ax=None, *, beam=None, mesh_type=None, material
     beam, mesh_type, kinematics : str, optional
         Labels of the scenes. One that is not given must leave no choice.
     materials : sequence of str, optional
-        By default of those with most scenes three, from the lowest to the highest Poisson's ratio.
+        By default three of those with most scenes, from the lowest to the highest Poisson's ratio.
 
     Returns
     -------
@@ -335,7 +335,7 @@ def _heat(panel, errors, flags, beyond):
 
 
 def _spread(root, solved):
-    """Materials of which most loads are there; of these the first, the middle and the last by Poisson's ratio."""
+    """The first, middle and last material by Poisson's ratio, of those with most loads."""
     counts = solved.any("mesh_size").sum(["definition", "load"]).values
     full = np.flatnonzero(counts > 0.5 * counts.max() if counts.any() else counts == 0)
     order = full[np.argsort(root.material_poisson_ratio.values[full], kind="stable")]

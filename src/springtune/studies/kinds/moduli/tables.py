@@ -65,7 +65,7 @@ ADVICE = (
 
 
 COARSENESS = (0.05, 0.1, np.inf)
-"""Mesh size over the height of the beam [1] up to which errors are summed up together."""
+"""Largest mesh sizes over the height of the beam [1] of each line of the advice."""
 
 
 def _advice(root, materials):
@@ -106,7 +106,7 @@ def _advice(root, materials):
 
 
 def _range(errors, flags):
-    """Lowest to highest error of the cells that were asked for, and how many have none."""
+    """Lowest to highest error of the requested cells, and the number without an error."""
     there = errors[flags == 1]
     ends = list(dict.fromkeys(_signed(value) for value in (there.min(), there.max()))) if len(there) else []
     text = " to ".join([*(end.removesuffix(" %") for end in ends[:-1]), *ends[-1:]])
@@ -130,7 +130,7 @@ def decision(tree: xr.DataTree) -> str:
 
 
 def _beyond(root):
-    """Scenes of these tables whose reference does not apply; nothing without any."""
+    """Scenes of these tables whose reference does not apply; empty without any."""
     if "reference_applies" not in root:
         return []
     place = ("material", "load")
@@ -143,7 +143,7 @@ def _beyond(root):
 
 
 def _materials(root, beam):
-    """Name by Poisson's ratio: the material nearest to 0.3 and the one with the largest, of those with most scenes."""
+    """Materials by Poisson's ratio: nearest to 0.3, and the largest one, of those with most scenes."""
     requested = (root.status.sel(beam=beam) != 0).any(["mesh_type", "mesh_size", "definition", "kinematics"])
     counts, ratios = requested.sum("load").values, root.material_poisson_ratio.values
     found = np.flatnonzero(counts == counts.max())
@@ -152,7 +152,7 @@ def _materials(root, beam):
 
 
 def _attained(root, moduli, mesh_type, beam, materials):
-    """Moduli and deformation errors of one and the same mesh size, the finest, of the beam that most scenes are of."""
+    """Moduli and deformation errors on the finest mesh size that has both, for the beam with most scenes."""
     loads = [load for load in TABLE_LOADS if load in root["load"].values]
     fine, height = min(root.mesh_size.values), float(root.beam_height.sel(beam=beam))
     here, moduli_here = root.sel(mesh_type=mesh_type, beam=beam), moduli.sel(mesh_type=mesh_type)

@@ -20,8 +20,8 @@ def refinement(tree):
 def plot_refinement(data, ax=None, *, refinement=None):
     """Deformation error over what is varied: a panel a refinement, a line a definition, a marker a value.
 
-    Hollow markers are of networks that are not stable, and of those that deform beyond what the reference is good for.
-    The tolerance is a grey band; ticks on the line of no error are where an error is zero.
+    Hollow markers show networks that are not stable or deform too far for the reference. The grey band is the
+    tolerance; ticks on the zero line show where the error is zero.
 
     Parameters
     ----------

@@ -107,7 +107,7 @@ def groups(study, folder):
         "bin": tuple(range(min(MOST_BINS, max(4, points // BIN_POINTS)))),
     }
     data = SAMPLES.empty(axes)
-    # A network without a mesh has no particles; that of another definition, solved within other limits, may have some.
+    # Without a mesh, as beyond limits, a network has no particles; other definitions may have a mesh.
     data["particles"].values[:] = np.max([found["particles"] for found in results.values()], axis=0)
     _solved(sample, data, drawn, results)
     _referred(sample, data, drawn, folder / "samples")
@@ -205,7 +205,7 @@ def _answers(sample, drawn, folder, kind, aspects):
 
 
 def _fitted(sample, data, drawn, results):
-    """Put the uniform stiffness without an error: that of the uniform network times how much it is too soft."""
+    """Put the uniform stiffness without an error: the solved one times its displacement over the reference."""
     for load, i in _loads(data, sample):
         found = results[plan.result_key(sample, load, plan.UNIFORM)]
         membrane = drawn["young_modulus"] * drawn["thickness"]

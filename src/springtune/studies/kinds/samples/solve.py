@@ -1,8 +1,8 @@
 """Stage `sample`: the networks of sampled scenes.
 
-A scene's network is that of E t = 1 under a force over E t: in linear kinematics thickness, modulus and force only
-scale an answer, and rows that differ in these alone are solved once. Meshes of as many cells and rows follow each
-other, since their networks share numbering, sparsity and symbolic factorization.
+Networks have E t = 1 and carry the force over E t. In linear kinematics thickness, modulus and force only scale the
+result: rows that differ in these alone are solved once. Meshes with as many cells along x and y follow each other: they
+share numbering, sparsity and symbolic factorization.
 """
 
 import time
@@ -22,19 +22,19 @@ from ...runs import store
 from .designs import draw
 
 DRAWN = "drawn"
-"""Name of the parameters among the results of a task."""
+"""Key of the parameters among the results of a task."""
 
 GONE_NETWORK = "lost "
-"""Beginning of the names of networks that went beyond the limits."""
+"""Prefix of the keys of networks beyond the limits."""
 
 TOGETHER = {"linear": 32, "nonlinear": 4}
-"""Tasks whose meshes are sorted together: of more of them more share cells."""
+"""Tasks whose meshes are sorted together; among more tasks more meshes share cells."""
 
 PART = "_part"
-"""End of the stem of the file of a task that is not done yet."""
+"""Suffix of the stem of an unfinished task's file."""
 
 SCALES = 1e-7
-"""Largest relative difference of an answer that was scaled from one that was not: they differ by rounding alone."""
+"""Largest relative difference of a scaled result from a solved one: rounding."""
 
 
 def run(content, costs, kept_back=store.KEPT_BACK):
@@ -51,13 +51,13 @@ def run(content, costs, kept_back=store.KEPT_BACK):
 
 
 def gone(content, key, why, limits):
-    """Store that a network went beyond its limits: its block is solved again without it."""
+    """Store that a network went beyond its limits; its block is then solved without it."""
     name = key.partition(" ")[0]
     store.add(Path(content["folder"]) / f"{name}.h5", {f"{GONE_NETWORK}{key}": {"message": why, store.LIMITS: limits}})
 
 
 class _Block:
-    """Rows of some base samples, and what is known of their scenes."""
+    """Rows of some base samples, and the results of their scenes so far."""
 
     def __init__(self, file, path, present, limits):
         (task,) = file["tasks"]
@@ -86,7 +86,7 @@ class _Block:
             self.done = np.all([one.pop("done") for one in self.found.values()], axis=0)
 
     def keep_part(self):
-        """Store what is known of a block that is not done."""
+        """Store the results of a block so far."""
         if not self.is_kept:
             store.add(self.part, {key: one | {"done": self.done} for key, one in self.results().items()})
             self.is_kept = True
@@ -97,7 +97,7 @@ class _Block:
         self.part.unlink(missing_ok=True)
 
     def results(self):
-        """What to store of scenes."""
+        """Results of scenes, as they are stored."""
         return {
             key: one | ({store.LIMITS: one["limited"]} if one["limited"] else {}) for key, one in self.found.items()
         }
@@ -112,7 +112,7 @@ class _Block:
         return found
 
     def keep(self, key, rows, scale, result):
-        """Note what became of the scenes of some rows, a result over a scale each."""
+        """Keep a result for the scenes of some rows, times a scale each."""
         found = self.found[key]
         found["displacement"][rows] = result["displacement"] * scale
         found["status"][rows] = result["status"]
@@ -122,12 +122,12 @@ class _Block:
 
 
 def _solve_together(blocks, costs, kept_back):
-    """Solve blocks: mesh after mesh, those of as many cells after each other."""
+    """Solve blocks mesh by mesh; meshes with as many cells follow each other."""
     meshes = [(box, block, rows) for block in blocks for box, rows in block.meshes().items()]
     meshes.sort(key=lambda one: [round(side / one[0][2]) for side in one[0][:2]])
     like, scaling, since = None, {}, time.perf_counter()
     for box, block, rows in meshes:
-        begin = time.process_time()  # which a busy machine does not change: bundles are made by it
+        begin = time.process_time()  # for the sizes of bundles, whatever else the machine does
         like = _solve_mesh(block, box, np.array(rows), like, scaling, costs) or like
         block.seconds += time.process_time() - begin
         if costs.broken:
@@ -144,7 +144,7 @@ def _solve_together(blocks, costs, kept_back):
 
 
 def _solve_mesh(block, box, rows, like, scaling, costs):
-    """Solve the scenes of some rows of a block that share a mesh; the meshed sheet, if there is one."""
+    """Solve the scenes of rows of a block that share a mesh; return the meshed sheet, or None."""
 
     def attempt(name, function):
         key = f"{block.file['name']} {rows[0]} {name}"
@@ -192,7 +192,7 @@ def _failed(why, **limits):
 
 
 def _objection(sheet, scene, drawn, row):
-    """Why answers of a definition do not scale on the mesh of a row, or an empty string; None without an answer."""
+    """Return why results of a definition do not scale on a mesh, or an empty string; None without a result."""
     ratio, modulus, thickness = (float(drawn[name][row]) for name in ("poisson_ratio", "young_modulus", "thickness"))
     own, load = Sheet(sheet.mesh, thickness, like=sheet), 1.0 / (modulus * thickness)
     answers = [_solved(sheet, scene, ratio, load, "linear"), _solved(own, scene, ratio, 1.0, "linear", modulus=modulus)]
@@ -208,7 +208,7 @@ def _objection(sheet, scene, drawn, row):
 
 
 def _solved(sheet, scene, ratio, load, kinematics, follower=False, modulus=1.0):
-    """Result of a network under a force: without a modulus one of E t = 1, and the force is over E t [m]."""
+    """Result of a network under a force; with the default modulus E t = 1, and the force is over E t [m]."""
     kind = LOAD_KINDS[scene["kind"]]
     try:
         springs, _ = sheet.derive(scene["definition"], Material(modulus, float(ratio)))
