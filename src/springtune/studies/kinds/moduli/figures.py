@@ -191,10 +191,9 @@ def plot_definitions_size(data, ax=None, *, beam=None, material=None, load=None,
 
 def _field_errors(panel, error, status):
     """Draw the errors of one mesh type, see `_by_mesh_type`: the best definitions and the baseline have names."""
-    asked = np.flatnonzero((status != 0).any("definition").values)
-    error, status = error.isel(mesh_size=asked), status.isel(mesh_size=asked)
-    every = error.transpose("definition", "mesh_size").values
-    flags = status.transpose("definition", "mesh_size").values
+    asked = labels_of(status != 0, "mesh_size")
+    error = error.sel(mesh_size=asked)
+    every, flags = (one.transpose("definition", ...).values for one in (error, status.sel(mesh_size=asked)))
     sizes, names = 1e3 * error.mesh_size.values, error.definition.values
     known = np.isfinite(every)
     curves = {str(name): 100 * np.maximum(row, FLOOR) for name, row, there in zip(names, every, known) if there.any()}
@@ -273,16 +272,14 @@ def plot_definitions_loads(data, ax=None, *, beam=None, mesh_type=None, material
     for material in materials:
         choose(root.status != 0, material=material)
     if solved.any():
-        root = root.isel(definition=np.flatnonzero(solved.any(["mesh_size", "load", "material"])))
-    root = root.isel(load=np.flatnonzero((root.status != 0).any(["mesh_size", "definition", "material"])))
+        root = root.sel(definition=labels_of(solved, "definition"))
+    root = root.sel(load=labels_of(root.status != 0, "load"))
     names, loads = root.definition.values.tolist(), root["load"].values.tolist()
     left, bottom = 0.12 + max(map(labels.width, names)), 0.32 + max(map(labels.width, loads))
-    room = {wide: (wide - left - 0.62 - 0.08 * (len(materials) - 1)) / (len(loads) * len(materials))
-            for wide in (style.COLUMN, style.PAGE)}  # fmt: skip
-    wide = style.COLUMN if room[style.COLUMN] >= CELL_WIDTH else style.PAGE
-    figure, axes = style.panels(
-        ax, ncols=len(materials), sharey=True, figsize=(wide, 0.62 + bottom + 0.165 * len(names))
-    )
+    room = style.COLUMN - left - 0.62 - 0.08 * (len(materials) - 1)
+    wide = style.COLUMN if room >= CELL_WIDTH * len(loads) * len(materials) else style.PAGE
+    size = wide, 0.62 + bottom + 0.165 * len(names)
+    figure, axes = style.panels(ax, ncols=len(materials), sharey=True, figsize=size)
     title = f"{labelled_beam(root, chosen['beam'])}, {chosen['mesh_type']}"
     lines = labels.wrapped(f"{title}: deformation error [%] on the finest mesh solved", wide - 0.1, 8.5)
     style.arrange(figure, axes, left=left, right=0.62, bottom=bottom, top=0.35 + 0.14 * labels.lines_of(lines),
@@ -312,13 +309,13 @@ def plot_definitions_loads(data, ax=None, *, beam=None, mesh_type=None, material
 
 
 CELL_WIDTH = 0.3
-"""Width that the number in a cell needs [inch]."""
+"""Width of the number in a cell [inch]."""
 
 
 def _heat(panel, errors, flags, beyond):
-    """Draw errors by definition and load, each with its number, marked beyond small strain: an image."""
+    """Draw errors by definition and load with their numbers, marked beyond small strain; return the image."""
     error = np.full(errors.shape[1:], np.nan)
-    for values in 100 * errors[::-1]:  # the finest mesh that each was solved on stays
+    for values in 100 * errors[::-1]:  # the finest solved mesh comes last and stays
         error = np.where(np.isfinite(values), values, error)
     asked = (flags != 0).any(axis=0)
     shade = np.log10(np.clip(np.abs(error), 0.1, 100))
