@@ -23,7 +23,7 @@ OUTPUTS = (
     ),
 )
 
-BESIDE = (("reference_x", "reference_y", "finite elements"), ("trapezoid_x", "trapezoid_y", "trapezoid"))
+REFERENCE_LINES = (("reference_x", "reference_y", "finite elements"), ("trapezoid_x", "trapezoid_y", "trapezoid"))
 
 VIEWS = (
     View(
@@ -32,7 +32,7 @@ VIEWS = (
         "A strip laid on the floor: its outline, the area that it leaves under it, and how far it stretches.",
         (
             Plot("outline of the strip", "strip_y", "strip_x", "definition", along="outline_point", equal=True,
-                 beside=BESIDE),
+                 beside=REFERENCE_LINES),
             Plot("error of the area", "area_error", "mesh_size", "definition"),
             Plot("errors of the area by friction", "area_error", "friction", "definition", "map"),
             Plot("elongation of the lower fibre", "elongation", "mesh_size", "definition"),
