@@ -315,9 +315,8 @@ def _over_values(panel, here, looks, parameter):
     x = unit * here[parameter].values
 
     def listed(values):
-        return (
-            f"{min(values):.4g}" if len(values) == 1 else f"{len(values)} from {min(values):.4g} to {max(values):.4g}"
-        )
+        several = f"{len(values)} from {min(values):.4g} to {max(values):.4g}"
+        return several if len(values) > 1 else f"{values[0]:.4g}"
 
     # What other beams or grids ask for makes no gaps.
     ends, said = _lines(panel, x, here, looks, listed, False)

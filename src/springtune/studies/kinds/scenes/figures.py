@@ -307,15 +307,8 @@ def plot_deformed(
     style.arrange(figure, axes, **place)
     grid, axes = axes, axes[:, 0]
     for panel, name in zip(axes, beams):
-        _deformed(
-            panel,
-            fields.sel(beam=name),
-            cut.sel(beam=name),
-            selection,
-            ", ".join(
-                [labelled_beam(root, name), *swept_words({one: value.sel(beam=name) for one, value in values.items()})]
-            ),
-        )
+        words = [labelled_beam(root, name), *swept_words({one: value.sel(beam=name) for one, value in values.items()})]
+        _deformed(panel, fields.sel(beam=name), cut.sel(beam=name), selection, ", ".join(words))
         panel.apply_aspect()  # its limits
     over = labels.TITLE_LINE * (max(labels.lines_of(panel.get_title("left")) for panel in axes) - 1)
     if ax is None:
@@ -337,7 +330,7 @@ def _deformed(panel, fields, root, selection, beam):
             break
     fields = fields.isel(mesh_size=places[-1] if len(places) else 0)
     here = fields.sel(load)
-    rest, moved = 1e3 * np.stack([fields.x.values, fields.y.values], axis=1), 1e3 * plane(here, "displacement_{}")
+    rest, moved = 1e3 * plane(fields, "{}"), 1e3 * plane(here, "displacement_{}")
     outline, there = 1e3 * plane(fields, "outline_{}"), 1e3 * plane(here, "reference_displacement_{}")
     kept = np.isfinite(outline[:, 0])
     outline, there = outline[kept], there[kept]
