@@ -24,23 +24,6 @@ from .outputs import pressed
 from .stored import PACKED, fields_key, unpacked
 from .variables import BLOCK, CELL, FIELDS, FINITE_STRAIN, ROOT, SENSITIVITY, fields_of, swept
 
-COPIED = (
-    "displacement",
-    "stiffness",
-    "message",
-    "iterations",
-    "residual",
-    "negative_pivots",
-    "field_error",
-    "definition_seconds",
-    "definition_evaluations",
-    "spring_ratio",
-    "load_share",
-    "solver",
-)
-"""What of a scene's result goes into the dataset as it is."""
-
-
 SMALL_STRAIN = "small-strain-plane-stress"
 """Name of the reference that all studies have."""
 
@@ -169,7 +152,7 @@ def _scenes(study, folder, root, block, fields, objections):
     """Results of the scenes, each mesh's read once, into the root and, where they are there, its groups."""
     compared = set()  # places of fields that have their reference
     calibration = _calibration(study, folder)
-    arrays = ["face_profile"] * (block is not None)
+    arrays, known = ["face_profile"] * (block is not None), set(root.data.data_vars)
     shown = plan.shown_scenes(study) if fields else ()
     for mesh, scenes in plan.by_mesh(study.scenes).items():
         names = plan.solved_keys(study, mesh, calibration)
@@ -186,12 +169,10 @@ def _scenes(study, folder, root, block, fields, objections):
         rows = []
         for scene, name in zip(scenes, names):
             result = results[name]
-            values = {"status": result["status"], "solve_seconds": result["seconds"]}
-            values |= {label: result[label] for label in COPIED if label in result}
+            values = {name: value for name, value in result.items() if name in known}
             why = against[id(scene.material), scene.load, scene.force, scene.kinematics]
-            if why and result["status"] in (Status.SOLVED, Status.UNSTABLE):
-                values["message"] = "; ".join(filter(None, (values.get("message"), why)))
-            rows.append(values)
+            values["message"] = with_objection(result, result.get("message", ""), why)
+            rows.append(values | {"solve_seconds": result["seconds"]})
         root.put_each(rows, labels)
         for scene, name, place in zip(scenes, names, labels) if block or of_fields else ():
             if LOADS[scene.load].kind.pressed:
@@ -206,6 +187,11 @@ def _scenes(study, folder, root, block, fields, objections):
                 if tuple(body.values()) not in compared:  # scenes differ in their definitions
                     compared.add(tuple(body.values()))
                     fields.put_rows(_at_particles(study, folder, scene, fields.data), **body)
+
+
+def with_objection(result, message, why):
+    """Message of a scene, and what there is against its reference where it has an equilibrium."""
+    return "; ".join(filter(None, (message, why if result["status"] in (Status.SOLVED, Status.UNSTABLE) else "")))
 
 
 def _at_particles(study, folder, scene, fields):
@@ -337,38 +323,48 @@ def _fields(study, folder, axes):
     whole = plan.shown_scenes(study)
     scenes = [scene for scene in study.scenes if scene in whole]
     shown = {scene.mesh for scene in scenes}
-    kept = [
-        mesh for mesh in study.meshes if mesh in shown and not stored.is_refused(folder / "meshes", plan.stem(mesh))
+    names = {mesh: plan.stem(mesh) for mesh in study.meshes if mesh in shown}
+    meshes = [
+        (_mesh_labels(mesh), stored.read(folder / "meshes", name).mesh)
+        for mesh, name in names.items()
+        if not stored.is_refused(folder / "meshes", name)
     ]
-    meshes = {mesh: stored.read(folder / "meshes", plan.stem(mesh)).mesh for mesh in kept}
     outlines = {one: _outline(study, folder, one) for one in dict.fromkeys(map(_reference_of, scenes))}
-    cells = {spec: cells_of(mesh) for spec, mesh in meshes.items()}
-    lengths = {
-        "particle": max((len(mesh.points) for mesh in meshes.values()), default=1),
-        "spring": max((len(mesh.edges) for mesh in meshes.values()), default=1),
-        "spring_end": 2,
-        "cell": max((len(corners) for corners in cells.values()), default=1),
-        "cell_corner": max((corners.shape[1] for corners in cells.values()), default=3),
-        "outline_point": max((len(points) for points, _ in outlines.values()), default=1),
-    }
-    numbers = {name: tuple(range(length)) for name, length in lengths.items()}
-    fields = Filler(fields_of(study).empty(axes | numbers))
-    fields.data.attrs["Conventions"] = "CF-1.11 UGRID-1.0"
-    for spec, mesh in meshes.items():
-        labels = _mesh_labels(spec)
-        fields.put_rows({"x": mesh.points[:, 0], "y": mesh.points[:, 1]}, **labels)
-        fields.put_rows({"spring_nodes": mesh.edges, "cell_nodes": cells[spec]}, **labels)
+    fields = fields_on(fields_of(study), axes, meshes, [points for points, _ in outlines.values()])
     for scene in scenes:
         labels = study.labels(scene)
         fields.put({f"{OF_FIELDS}{name}": labels[name] for name in study.swept}, **labels)
     for one, (points, displacements) in outlines.items():
-        moved = one.force * displacements
-        beam, load = {"beam": one.beam.name}, {"material": one.material.name, "load": one.load}
-        fields.put_rows({"outline_x": points[:, 0], "outline_y": points[:, 1]}, **beam)
-        fields.put_rows(
-            {"reference_displacement_x": moved[:, 0], "reference_displacement_y": moved[:, 1]}, **beam, **load
-        )
+        labels = {"beam": one.beam.name, "material": one.material.name, "load": one.load}
+        put_outline(fields, points, one.force * displacements, **labels)
     return fields
+
+
+def fields_on(group, axes, meshes, outlines):
+    """Group of whole fields on meshes, each with its labels; displacements, and outlines, are still to come."""
+    cells = [cells_of(mesh) for _, mesh in meshes]
+    lengths = {
+        "particle": [len(mesh.points) for _, mesh in meshes],
+        "spring": [len(mesh.edges) for _, mesh in meshes],
+        "spring_end": [2],
+        "cell": list(map(len, cells)),
+        "cell_corner": [corners.shape[1] for corners in cells] or [3],
+        "outline_point": list(map(len, outlines)),
+    }
+    found = Filler(group.empty(axes | {name: tuple(range(max(1, *each, 1))) for name, each in lengths.items()}))
+    found.data.attrs["Conventions"] = "CF-1.11 UGRID-1.0"
+    for (labels, mesh), corners in zip(meshes, cells):
+        places = {"x": mesh.points[:, 0], "y": mesh.points[:, 1]}
+        found.put_rows(places | {"spring_nodes": mesh.edges, "cell_nodes": corners}, **labels)
+    return found
+
+
+def put_outline(fields, points, moved, **labels):
+    """Write the outline of a reference at rest, and its displacements."""
+    values = {"outline_x": points[:, 0], "outline_y": points[:, 1]}
+    fields.put_rows(
+        values | {"reference_displacement_x": moved[:, 0], "reference_displacement_y": moved[:, 1]}, **labels
+    )
 
 
 def cells_of(mesh):

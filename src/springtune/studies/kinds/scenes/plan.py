@@ -2,7 +2,8 @@
 
 import hashlib
 from collections import defaultdict
-from functools import cache, partial
+from dataclasses import replace
+from functools import cache, lru_cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +15,7 @@ from ...config.remembered import once_a_study
 from ...config.shown import shown
 from ...runs.hashing import hash_of
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key, stage_key
-from ...runs.stages import products
+from ...runs.stages import Task, products, stage
 from . import stored
 from .interpolated import expected_solves, interpolants
 from .stored import calibrated_key
@@ -22,13 +23,15 @@ from .stored import calibrated_key
 if TYPE_CHECKING:
     from ...config.model import SceneSpec, Study
 
-INTERPOLANT = "interpolant"
-"""What stands in the place of a kind at finite strain."""
-
 
 def particles(mesh):
     """Number of particles of a mesh, about."""
-    return mesh.beam.length * mesh.beam.height / (0.866 * mesh.mesh_size**2)
+    return particles_in(mesh.beam.length * mesh.beam.height, mesh.mesh_size)
+
+
+def particles_in(area, mesh_size):
+    """Number of particles in an area, about."""
+    return area / (0.866 * mesh_size**2)
 
 
 _grouped: dict[int, tuple[Any, Any]] = {}
@@ -58,9 +61,13 @@ def mesh_key(mesh):
 
 
 def mesh_parameters(mesh):
-    """What of its source a mesh depends on: not on where its file is, but on its ending, which says its format."""
-    source = mesh_source(mesh)
-    return source | {"file": mesh.file.suffix} if mesh.file else source
+    """What of its source a mesh depends on."""
+    return parameters(mesh_source(mesh))
+
+
+def parameters(source):
+    """What of its source results depend on: not on where a file is, but on its ending, which says its format."""
+    return source | {"file": Path(source["file"]).suffix} if "file" in source else source
 
 
 def mesh_source(mesh):
@@ -68,8 +75,19 @@ def mesh_source(mesh):
     source = {"length": mesh.beam.length, "height": mesh.beam.height}
     if mesh.file is None:
         return source | {"mesh_type": mesh.mesh_type, "mesh_size": mesh.mesh_size}
-    content = hashlib.sha256(mesh.file.read_bytes()).hexdigest()
-    return source | {"file": str(mesh.file), "unit": mesh.unit, "content": content}
+    return source | file_source(mesh.file, mesh.unit)
+
+
+def file_source(file, unit):
+    """A mesh file, its unit and the hash of its content, as what a mesh is made from."""
+    state = Path(file).stat()
+    return {"file": str(file), "unit": unit, "content": _content(file, state.st_size, state.st_mtime_ns)}
+
+
+@lru_cache(maxsize=256)
+def _content(file, size, time):
+    """Hash of a file; each of its scenes asks."""
+    return hashlib.sha256(Path(file).read_bytes()).hexdigest()
 
 
 @cache
@@ -249,10 +267,9 @@ def _mesh_members(study, costs):
 
 
 def _meshes(study, folder, members):
-    return {
-        "folder": str(folder / "meshes"),
-        "files": [{"name": stem(mesh), "key": mesh_key(mesh)} | mesh_source(mesh) for mesh, *_ in members],
-    }
+    sources = [(mesh, mesh_source(mesh)) for mesh, *_ in members]
+    files = [{"name": stem(mesh), "key": mesh_key(mesh)} | source for mesh, source in sources]
+    return {"folder": str(folder / "meshes"), "files": files}
 
 
 def mesh_products(content):
@@ -260,62 +277,50 @@ def mesh_products(content):
     return [path for mesh in content["files"] for path in stored.files(content["folder"], mesh["name"])]
 
 
-def _reference_members(study, costs):
-    """References in groups: unit problems that share elements and differ in Poisson's ratio; each at finite strain."""
-    groups, boxes = defaultdict(dict), {}
-    for reference in study.references:
-        if "interpolant" in reference_of(study, reference.beam, reference.material, reference.load):
-            kind = LOADS[reference.load].kind.name
-            boxes[kind] = interpolants(study)[kind]
-            continue
-        aspect_ratio, nu, kind = _unit_problem(reference.beam, reference.material, reference.load)
-        groups[hash_of(aspect_ratio, kind)].setdefault(nu, (reference, None))
-    members = {
-        name: (sum(costs.of("reference") for _ in group), list(group.values())) for name, group in groups.items()
-    }
-    for kind, (box, _) in boxes.items():
-        members[interpolant_key(kind, box)] = costs.of("interpolant", expected_solves(box)), [(kind, INTERPOLANT)]
-    for reference in study.references:
+def _reference_tasks(study):
+    """References that are solved by themselves: those that share elements in one job, each at finite strain alone."""
+    found = {}
+    for one in study.references:
+        body = one.beam, one.material, one.load
+        if "interpolant" not in reference_of(study, *body):
+            problem, key = _unit_problem(*body), solved_reference(*body)["key"]
+            name = hash_of(problem[0], problem[2])
+            found[key] = Task({"problem": problem}, costs=[("reference", 0)], name=name, key=key)
         for kind in study.further_references:
-            name = hash_of(kind, _finite_problem(reference))
-            members[name] = costs.of("finite"), [(reference, kind)]
+            law, _, plane = kind.partition("-plane-")
+            load, key = LOADS[one.load], finite_key(one, kind)
+            values = {"law": law, "plane": plane, "load": load.kind.name, "force": one.force, "follower": load.follower}
+            values |= {"beam": beam_key(one.beam), "material": material_key(one.material)}
+            found[key] = Task(values, costs=[("finite", 0)], name=hash_of(kind, _finite_problem(one)), key=key)
+    return found.values()
+
+
+_REFERENCE = stage(
+    "reference",
+    "studies.kinds.scenes.reference",
+    "Solving the finite-element references",
+    _reference_tasks,
+    "references",
+)
+
+
+def _reference_members(study, costs):
+    """References, and interpolants with the unit problems that are asked of them."""
+    members = dict(_REFERENCE.members(study, costs))
+    asked = {(one.beam, one.material, one.load) for one in study.references}
+    for kind, (box, problems) in interpolants(study).items():
+        if not asked.isdisjoint(problems):  # a part of a study may ask for none
+            key = interpolant_key(kind, box)
+            keys = {solved_reference(*body)["key"]: problem for body, problem in problems.items()}
+            task = {"key": key, "kind": kind, "box": box, "problems": keys}
+            members[key] = costs.of("interpolant", expected_solves(box)), task
     return members
 
 
-def _references(study, folder, groups):
-    """References and their kinds at finite strain, nothing of a unit problem."""
-    members = [one for group in groups for one in group]
-    interpolated = [_interpolant(study, name) for name, kind in members if kind == INTERPOLANT]
-    references = [member for member in members if member[1] != INTERPOLANT]
-    tasks = [
-        {"key": solved_reference(*problem)["key"], "cost": ["reference", 0], "problem": _unit_problem(*problem)}
-        for problem in ((one.beam, one.material, one.load) for one, kind in references if kind is None)
-    ]
-    tasks += [
-        {
-            "key": finite_key(one, kind),
-            "cost": ["finite", 0],
-            "beam": beam_key(one.beam),
-            "material": material_key(one.material),
-            "force": one.force,
-            "load": LOADS[one.load].kind.name,
-            "law": kind.partition("-plane-")[0],
-            "plane": kind.partition("-plane-")[2],
-            "follower": LOADS[one.load].follower,
-        }
-        for one, kind in references
-        if kind is not None
-    ]
-    files = [{"name": task["key"], "tasks": [task]} for task in tasks]
-    more = {"interpolants": interpolated} if interpolated else {}
-    return {"folder": str(folder / "references"), "files": files} | more
-
-
-def _interpolant(study, kind):
-    """Interpolant, and the unit problems that are asked of it by the keys of those that are solved by themselves."""
-    box, problems = interpolants(study)[kind]
-    keys = {solved_reference(*body)["key"]: problem for body, problem in problems.items()}
-    return {"key": interpolant_key(kind, box), "kind": kind, "box": box, "problems": keys}
+def _references(study, folder, members):
+    interpolated = [one for one in members if isinstance(one, dict)]
+    content = _REFERENCE.content(study, folder, [one for one in members if not isinstance(one, dict)])
+    return content | ({"interpolants": interpolated} if interpolated else {})
 
 
 def _reference_products(content):
@@ -334,6 +339,12 @@ def _curve(study, curve):
     }
 
 
+def _on_meshes(study, folder, name, files, **more):
+    """Content of a job whose tasks stand on meshes and references; nothing without tasks."""
+    read = {one: str(folder / one) for one in ("meshes", "references")}
+    return files and {"folder": str(folder / name), "files": files} | read | more
+
+
 def _sensitivity(study, folder, members):
     curves = by_mesh(study.curves)
     files = [
@@ -342,12 +353,7 @@ def _sensitivity(study, folder, members):
         for mesh in meshes
         if mesh in curves  # asking otherwise would add it for all who ask later
     ]
-    return files and {
-        "folder": str(folder / "curves"),
-        "meshes": str(folder / "meshes"),
-        "references": str(folder / "references"),
-        "files": files,
-    }
+    return _on_meshes(study, folder, "curves", files)
 
 
 def _solve(study, folder, members):
@@ -358,13 +364,8 @@ def _solve(study, folder, members):
         for mesh in meshes
         if mesh in scenes  # as above; a part of a study may have curves alone
     ]
-    return files and {
-        "calibration": str(calibration_path(folder)) if calibrated(study) else None,
-        "folder": str(folder / "solutions"),
-        "meshes": str(folder / "meshes"),
-        "references": str(folder / "references"),
-        "files": files,
-    }
+    calibration = str(calibration_path(folder)) if calibrated(study) else None
+    return _on_meshes(study, folder, "solutions", files, calibration=calibration)
 
 
 def _scenes(study, mesh):
@@ -427,15 +428,7 @@ def _calibrate(study, folder, members):
 
 
 STAGES = (
-    Stage(
-        "reference",
-        "studies.kinds.scenes.reference",
-        "Solving the finite-element references",
-        _references,
-        _reference_products,
-        _reference_members,
-        folder="references",
-    ),
+    replace(_REFERENCE, content=_references, products=_reference_products, members=_reference_members),
     Stage("mesh", "studies.kinds.scenes.mesh", "Meshing", _meshes, mesh_products, _mesh_members, folder="meshes"),
     Stage(
         "sensitivity",

@@ -1,21 +1,21 @@
 """Shapes, gathered in the group ``/shapes``."""
 
+from dataclasses import asdict
+
 import numpy as np
 
 from springtune.problem.compare import deformation_error
-from springtune.problem.status import Status
 from springtune.reference.limits import beyond_linear
 
 from ...output.dataset import Filler
 from ...runs import store
 from ..scenes import stored
-from ..scenes.variables import OF_MESH
+from ..scenes.collect import with_objection
+from ..scenes.variables import OF_MESH, OF_SCENE
 from . import plan
 from .names import QUANTITY_UNITS
 from .task_values import named, quantity_key
 from .variables import SHAPES
-
-COPIED_OF_SCENE = ("status", "message", "definition_seconds", "negative_pivots")
 
 
 def groups(study, folder):
@@ -93,19 +93,14 @@ def _mesh(one, folder, found):
 
 
 def _scene(part, one, result, references, expected, found):
-    labels = {
-        name: getattr(one, name)
-        for name in ("shape", "mesh_type", "mesh_size", "material", "load", "definition", "kinematics")
-    }
+    labels = asdict(one)
     reference, objections = references.get((one.shape, one.material, one.load), ({}, {}))
-    values = {name: result[name] for name in COPIED_OF_SCENE if name in result} | {"solve_seconds": result["seconds"]}
+    values = {name: result[name] for name in OF_SCENE if name in result} | {"solve_seconds": result["seconds"]}
     case = part.shape[one.shape].loads[one.load]
     whys = [reference.get("message", ""), *reference.get("lacking", {}).values()]
     whys = [f"no reference: {named(why, part.shape[one.shape], case)}" for why in whys if why]
     why = "; ".join(filter(None, (*whys, objections.get(one.kinematics, ""))))
-    values["message"] = named(values.get("message", ""), part.shape[one.shape], case)
-    if why and result["status"] in (Status.SOLVED, Status.UNSTABLE):
-        values["message"] = "; ".join(filter(None, (values["message"], why)))
+    values["message"] = with_objection(result, named(result.get("message", ""), part.shape[one.shape], case), why)
     found.put(values, **labels)
     for quantity in case.quantities:
         key = quantity_key(quantity)

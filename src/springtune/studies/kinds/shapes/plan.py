@@ -1,10 +1,8 @@
 """Stages of shapes: what their jobs are to do, and the keys of what they store."""
 
-import hashlib
 from collections import defaultdict
 from dataclasses import replace
-from functools import lru_cache
-from pathlib import Path
+from operator import attrgetter
 from typing import TYPE_CHECKING
 
 from ...config.kind import Stage
@@ -12,7 +10,7 @@ from ...runs import driver
 from ...runs.hashing import hash_of
 from ...runs.keys import definition_key, material_key, mesh_type_key, stage_key
 from ...runs.stages import Task, products, stage
-from ..scenes.plan import mesh_products
+from ..scenes.plan import file_source, mesh_products, parameters, particles_in
 from .names import OWN_FILE
 from .outputs import DRAWING
 
@@ -41,7 +39,7 @@ def file_name(one):
 def particles(part, one):
     """Number of particles of a scene's mesh, about."""
     shape = part.shape[one.shape]
-    return FILE_PARTICLES if shape.file else shape.area / (0.866 * one.mesh_size**2)
+    return FILE_PARTICLES if shape.file else particles_in(shape.area, one.mesh_size)
 
 
 # -- keys --------------------------------------------------------------------------------------------------------------
@@ -51,23 +49,7 @@ def _source(shape):
     """What the geometry of a shape is made from."""
     from .task_values import geometry  # here, as below: studies of beams read the stages as well
 
-    described = geometry(shape)
-    if not shape.file:
-        return described
-    state = Path(shape.file).stat()
-    content = _content(shape.file, state.st_size, state.st_mtime_ns)
-    return described | {"file": shape.file, "unit": shape.unit, "content": content}
-
-
-@lru_cache(maxsize=256)
-def _content(file, size, time):
-    """Hash of a file; each of its scenes asks."""
-    return hashlib.sha256(Path(file).read_bytes()).hexdigest()
-
-
-def _parameters(source):
-    """What of it results depend on: not on where a file is, but on its ending, which says its format."""
-    return source | {"file": Path(source["file"]).suffix} if "file" in source else source
+    return geometry(shape) | (file_source(shape.file, shape.unit) if shape.file else {})
 
 
 def mesh_source(part, one):
@@ -82,7 +64,7 @@ def mesh_source(part, one):
 def mesh_key(part, one):
     """Key of a scene's mesh."""
     return hash_of(
-        _parameters(mesh_source(part, one)),
+        parameters(mesh_source(part, one)),
         stage_key("studies.kinds.shapes.mesh"),
         _reader(part.shape[one.shape]),
     )
@@ -107,7 +89,7 @@ def reference_task(part, shape, material, name):
     """Task of a reference."""
     task = {"shape": _source(part.shape[shape])} | _case(part, shape, material, name)
     code = stage_key("studies.kinds.shapes.reference", driver.DRIVER), _reader(part.shape[shape])
-    key = hash_of(task | {"shape": _parameters(task["shape"])}, code)
+    key = hash_of(task | {"shape": parameters(task["shape"])}, code)
     return {"key": key} | task
 
 
@@ -128,20 +110,16 @@ def draws(study):
 
 def shown(part):
     """Scenes whose networks are drawn: of a shape and load the finest mesh that is not too large, one material."""
-    cases = defaultdict(list)
+    cases, size = defaultdict(list), attrgetter("mesh_size")
     for one in part.scenes:
         cases[one.shape, one.load].append(one)
     found = set()
     for scenes in cases.values():
         few = [one for one in scenes if particles(part, one) <= MOST_DRAWN]
-        mesh = min(few, key=_size) if few else max(scenes, key=_size)
+        mesh = min(few, key=size) if few else max(scenes, key=size)
         alike = [one for one in scenes if mesh_name(one) == mesh_name(mesh)]
         found |= {one for one in alike if (one.material, one.kinematics) == (alike[0].material, alike[0].kinematics)}
     return found
-
-
-def _size(one):
-    return one.mesh_size
 
 
 def by_mesh(part):
@@ -188,7 +166,7 @@ def _solve(study, folder, members):
     files = [
         {
             "name": file_name(scenes[0]),
-            "shape": _parameters(_source(part.shape[scenes[0].shape])),
+            "shape": parameters(_source(part.shape[scenes[0].shape])),
             "tasks": list({task["key"]: task for task in (scene_task(part, one, kept) for one in scenes)}.values()),
         }
         for scenes in members
