@@ -154,7 +154,7 @@ def _scenes(study, folder, root, block, fields, objections):
     calibration = _calibration(study, folder)
     arrays, known = ["face_profile"] * (block is not None), set(root.data.data_vars)
     shown = plan.shown_scenes(study) if fields else ()
-    for mesh, scenes in plan.by_mesh(study.scenes).items():
+    for mesh, scenes in plan.scenes_by_mesh(study).items():
         names = plan.solved_keys(study, mesh, calibration)
         path = folder / "solutions" / f"{plan.stem(mesh)}.h5"
         results = store.read(path, set(names), arrays)
@@ -228,7 +228,7 @@ def _printed(study, root):
 
 def _sensitivity(study, folder, displacements, axes):
     curves = Filler(swept(SENSITIVITY, study).empty(axes))
-    for mesh, members in plan.by_mesh(study.curves).items():
+    for mesh, members in plan.curves_by_mesh(study).items():
         names = [plan.curve_key(study, curve) for curve in members]
         results = store.read(folder / "curves" / f"{plan.stem(mesh)}.h5", names, ["displacement", "stable"])
         for curve, name in zip(members, names):

@@ -10,7 +10,7 @@ from ...output.drawing import fitted, in_words
 from ...output.own_law import of_own_law
 from ...output.selection import at, cells, group, labelled_beam, labels_of, last_swept
 from .figures import USUAL, by_beam, each, named, swept_words
-from .outputs import SCENE_LABELS
+from .outputs import SCENE_LABELS, SWEPT_SHOWN
 
 MOST_LINES = 6
 """Definitions in one panel; more of them take further rows of panels."""
@@ -189,15 +189,6 @@ def _over_sizes(panel, here, looks, first):
 
 # -- against what is swept ---------------------------------------------------------------------------------------------
 
-ALONG_X = {
-    "force": ("Force [N]", 1.0),
-    "thickness": ("Thickness [mm]", 1e3),
-    "young_modulus": ("Young's modulus [MPa]", 1e-6),
-    "poisson_ratio": ("Poisson's ratio", 1.0),
-    "stiffness_scale": ("Factor on the stiffness", 1.0),
-}
-"""What is written along the axis of a parameter, and the unit there over that of the dataset."""
-
 WIDE = 20.0
 """Largest value over the smallest from which on an axis is logarithmic."""
 
@@ -311,7 +302,7 @@ def _of_beam(root, name, parameter, mesh_size):
 
 def _over_values(panel, here, looks, parameter):
     """Draw errors over a parameter: as `_lines`."""
-    here, (words, unit) = here.transpose("definition", parameter, ...), ALONG_X[parameter]
+    here, (words, _, unit) = here.transpose("definition", parameter, ...), SWEPT_SHOWN[parameter]
     x = unit * here[parameter].values
 
     def listed(values):

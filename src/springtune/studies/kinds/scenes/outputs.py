@@ -19,6 +19,15 @@ SENSITIVITY_LABELS = ("beam", "mesh_type", "material", "load")
 SCENE_LABELS = ("mesh_type", "material", "load")
 """The same for figures of errors against mesh size, and of deformed networks."""
 
+SWEPT_SHOWN = {
+    "force": ("Force [N]", "force_N", 1.0),
+    "thickness": ("Thickness [mm]", "thickness_mm", 1e3),
+    "young_modulus": ("Young's modulus [MPa]", "young_modulus_MPa", 1e-6),
+    "poisson_ratio": ("Poisson's ratio", "poisson_ratio", 1.0),
+    "stiffness_scale": ("Factor on the stiffness", "stiffness_scale", 1.0),
+}
+"""What a study sweeps along an axis and in a column, and the unit there over that of the dataset."""
+
 PLOTS, ERRORS = "studies.kinds.scenes.figures", "studies.kinds.scenes.errors"
 
 COLLECTION = "scenes.pvd"

@@ -5,7 +5,7 @@ from collections import defaultdict
 from dataclasses import replace
 from functools import cache, lru_cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from springtune.problem.loads import LOADS
 from springtune.reference.similarity import unit_problem, unit_scales
@@ -34,21 +34,23 @@ def particles_in(area, mesh_size):
     return area / (0.866 * mesh_size**2)
 
 
-_grouped: dict[int, tuple[Any, Any]] = {}
+def _by_mesh(items):
+    groups = defaultdict(list)
+    for item in items:
+        groups[item.mesh].append(item)
+    return dict(groups)
 
 
-def by_mesh(items):
-    """Scenes or curves of a study by their mesh."""
-    # Every bundle asks: the tuple of a study is known by its place, since comparing 10,000 scenes is no way to find it.
-    if len(_grouped) > 8:
-        _grouped.clear()
-    known, groups = _grouped.get(id(items), (None, None))
-    if known is not items:
-        groups = defaultdict(list)
-        for item in items:
-            groups[item.mesh].append(item)
-        _grouped[id(items)] = items, groups
-    return groups
+@once_a_study("scenes")
+def scenes_by_mesh(study):
+    """Scenes of a study by their mesh."""
+    return _by_mesh(study.scenes)
+
+
+@once_a_study("curves")
+def curves_by_mesh(study):
+    """Sensitivity curves of a study by their mesh."""
+    return _by_mesh(study.curves)
 
 
 # -- keys --------------------------------------------------------------------------------------------------------------
@@ -152,7 +154,7 @@ def curve_key(study, curve):
 def scene_key(study: "Study", scene: "SceneSpec") -> str:
     """Key of a scene; a calibrated one's result is stored under a key that holds the calibrated stiffness, too."""
     return hash_of(
-        _commons(study).of(scene)["key"],
+        _common(study, scene)[1],
         scene.force,
         _given_stiffness(study, scene),
         _thickness_ratio(study, scene),
@@ -162,43 +164,37 @@ def scene_key(study: "Study", scene: "SceneSpec") -> str:
 
 @once_a_study("scenes", "curves", "grids", "outputs", "stiffness_table", "calibration")
 def scene_keys(study):
-    """Keys of a study's scenes by their mesh, in the order of `by_mesh`: tasks and the dataset both want them."""
-    return {mesh: [scene_key(study, scene) for scene in scenes] for mesh, scenes in by_mesh(study.scenes).items()}
+    """Keys of a study's scenes by their mesh, in the order of `scenes_by_mesh`: for tasks and the dataset."""
+    return {mesh: [scene_key(study, scene) for scene in scenes] for mesh, scenes in scenes_by_mesh(study).items()}
 
 
-class _Commons:
-    """What scenes share that differ in force or by a factor on the stiffness, asked for once."""
-
-    def __init__(self, study):
-        self._study, self._known = study, {}
-
-    def of(self, scene):
-        """A part of a scene's task, and its key."""
-        # By their places: hashing materials for each of 100,000 scenes is no way to know them.
-        place = id(scene.mesh), id(scene.material), scene.load, scene.definition, scene.kinematics
-        if place not in self._known:
-            # The scene is kept with it, so that nothing else comes to be in these places.
-            self._known[place] = self._found(scene), scene
-        return self._known[place][0]
-
-    def _found(self, scene):
+def _common(study, scene):
+    """What scenes share that differ in force or by a factor on the stiffness: part of their tasks, and its key."""
+    # By their places: hashing materials for each of 100,000 scenes is slow.
+    place = id(scene.mesh), id(scene.material), scene.load, scene.definition, scene.kinematics
+    known = _commons(study)
+    if place not in known:
         load, mesh = LOADS[scene.load], scene.mesh
         task = {
             "material": material_key(scene.material),
             "kind": load.kind.name,
-            # Linear kinematics know no other place of what a force follows than that at rest.
+            # In linear kinematics follower forces keep their initial direction.
             "follower": load.follower and scene.kinematics == "nonlinear",
             "definition": scene.definition,
             "kinematics": scene.kinematics,
         }
-        reference = reference_of(self._study, mesh.beam, scene.material, scene.load)
+        reference = reference_of(study, mesh.beam, scene.material, scene.load)
         if "interpolant" not in reference:  # which has no field, all that a scene wants of it
             task["reference"] = reference
         code = stage_key("studies.kinds.scenes.solve"), definition_key(scene.definition)
-        return {"task": task, "key": hash_of(mesh_key(mesh), mesh.beam.thickness, task, code)}
+        key = hash_of(mesh_key(mesh), mesh.beam.thickness, task, code)
+        known[place] = task, key, scene  # the scene, so that nothing else comes to be in these places
+    return known[place][:2]
 
 
-_commons = once_a_study("grids", "outputs")(_Commons)
+@once_a_study("grids", "outputs")
+def _commons(study):
+    return {}
 
 
 @once_a_study("grids")
@@ -214,7 +210,7 @@ def solved_keys(study, mesh, calibration):
         calibrated_key(key, calibration[calibration_name(scene)]["stiffness"])
         if scene.definition == "calibrated"
         else key
-        for scene, key in zip(by_mesh(study.scenes)[mesh], scene_keys(study)[mesh])
+        for scene, key in zip(scenes_by_mesh(study)[mesh], scene_keys(study)[mesh])
     ]
 
 
@@ -253,7 +249,7 @@ def _given_stiffness(study, scene):
 def _mesh_members(study, costs):
     """Meshes, and what they and all their scenes and curves cost."""
     seconds = {stem(mesh): costs.of("mesh", particles(mesh)) for mesh in study.meshes}
-    for mesh, scenes in by_mesh(study.scenes).items():
+    for mesh, scenes in scenes_by_mesh(study).items():
         name, cost = stem(mesh), cache(partial(costs.of, units=particles(mesh)))
         for scene in scenes:
             seconds[name] += cost(scene.kinematics)
@@ -346,23 +342,23 @@ def _on_meshes(study, folder, name, files, **more):
 
 
 def _sensitivity(study, folder, members):
-    curves = by_mesh(study.curves)
+    curves = curves_by_mesh(study)
     files = [
         {"name": stem(mesh), "tasks": [_curve(study, curve) for curve in curves[mesh]]}
         for meshes in members
         for mesh in meshes
-        if mesh in curves  # asking otherwise would add it for all who ask later
+        if mesh in curves
     ]
     return _on_meshes(study, folder, "curves", files)
 
 
 def _solve(study, folder, members):
-    scenes = by_mesh(study.scenes)
+    scenes = scenes_by_mesh(study)
     files = [
         {"name": stem(mesh), "thickness": mesh.beam.thickness, "tasks": _scenes(study, mesh)}
         for meshes in members
         for mesh in meshes
-        if mesh in scenes  # as above; a part of a study may have curves alone
+        if mesh in scenes  # a part of a study may have curves alone
     ]
     calibration = str(calibration_path(folder)) if calibrated(study) else None
     return _on_meshes(study, folder, "solutions", files, calibration=calibration)
@@ -370,13 +366,13 @@ def _solve(study, folder, members):
 
 def _scenes(study, mesh):
     """Tasks of a mesh's scenes."""
-    scenes, keys = by_mesh(study.scenes)[mesh], scene_keys(study)[mesh]
-    commons, kept = _commons(study), shown_scenes(study)
-    return [_scene(study, scene, commons.of(scene)["task"], key, kept) for scene, key in zip(scenes, keys)]
+    scenes, keys = scenes_by_mesh(study)[mesh], scene_keys(study)[mesh]
+    kept = shown_scenes(study)
+    return [_scene(study, scene, key, kept) for scene, key in zip(scenes, keys)]
 
 
-def _scene(study, scene, common, key, kept):
-    task = common | {"key": key, "force": scene.force}
+def _scene(study, scene, key, kept):
+    task = _common(study, scene)[0] | {"key": key, "force": scene.force}
     stiffness = _given_stiffness(study, scene)
     if stiffness is not None:
         task["stiffness"] = stiffness
@@ -385,8 +381,7 @@ def _scene(study, scene, common, key, kept):
     if scene in kept:
         task["keep_fields"] = True
     if scene.definition == "calibrated":
-        task["calibration"] = calibration_name(scene)
-        task["thickness_ratio"] = _thickness_ratio(study, scene)
+        task |= {"calibration": calibration_name(scene), "thickness_ratio": _thickness_ratio(study, scene)}
     return task
 
 

@@ -7,7 +7,7 @@ from springtune.problem.parameters import SWEPT
 
 from ...output.dataset import STATUS
 from ...output.own_law import OWN_LAWS, of_own_law
-from .outputs import TABLE, stem
+from .outputs import SWEPT_SHOWN, TABLE, stem
 
 ROW = ("beam", "mesh_size")
 
@@ -82,17 +82,7 @@ def _table(cells, selection, finite=None):
     present = requested.any(axis=tuple(range(requested.ndim - 1)))
     definitions = [name for name, there in zip(labels["definition"], present) if there]
     found = {"number": number, "stem": stem(selection, number), "rows": rows, "definitions": definitions}
-    return found | {"swept": [SWEPT_COLUMNS[name][0] for name in swept if name != "force"], **selection}
-
-
-SWEPT_COLUMNS = {
-    "force": ("force_N", 1.0),
-    "thickness": ("thickness_mm", 1e3),
-    "young_modulus": ("young_modulus_MPa", 1e-6),
-    "poisson_ratio": ("poisson_ratio", 1.0),
-    "stiffness_scale": ("stiffness_scale", 1.0),
-}
-"""Columns of what a study sweeps, and units in them over those of the dataset."""
+    return found | {"swept": [SWEPT_SHOWN[name][1] for name in swept if name != "force"], **selection}
 
 
 def _row(values, labels, place, swept, sign):
@@ -141,7 +131,7 @@ def _row(values, labels, place, swept, sign):
 
 def _swept(labels):
     """Columns of what a study sweeps, of the labels of a cell."""
-    return {column: unit * labels[name] for name, (column, unit) in SWEPT_COLUMNS.items() if name in labels}
+    return {column: unit * labels[name] for name, (_, column, unit) in SWEPT_SHOWN.items() if name in labels}
 
 
 # Selecting each cell by its labels takes a thousand times as long as taking all of them by their numbers.

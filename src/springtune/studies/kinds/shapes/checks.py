@@ -3,6 +3,8 @@
 import re
 from pathlib import Path
 
+import numpy as np
+
 from springtune.mesh import MeshError
 from springtune.problem.quantities import nearest
 from springtune.springs import DEFINITIONS
@@ -134,22 +136,9 @@ def _check_held(shape, path, problems):
             for x, y in places:
                 x, y = (x - left) / size, (y - low) / size
                 rows += [(1.0, 0.0, -y)] * (support.x is not None) + [(0.0, 1.0, x)] * (support.y is not None)
-        if _rank(rows) < 3:
+        if not rows or np.linalg.matrix_rank(np.array(rows), tol=1e-9) < 3:
             message = "leave the body free to move, or to turn; hold it against both, such as {left: fixed}"
             problems.add((*path, "loads", name, "supports"), message)
-
-
-def _rank(rows):
-    """Rank of rows of three numbers of the size of one."""
-    found, rows = 0, [list(row) for row in rows]
-    for column in range(3):
-        pivot = max(rows, key=lambda row: abs(row[column]), default=None)
-        if pivot is None or abs(pivot[column]) < 1e-9:
-            continue
-        rows.remove(pivot)
-        rows = [[a - b * row[column] / pivot[column] for a, b in zip(row, pivot)] for row in rows]
-        found += 1
-    return found
 
 
 def _check_outlines(shape, path, problems):

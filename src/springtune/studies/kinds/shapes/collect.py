@@ -13,9 +13,11 @@ from ..scenes import stored
 from ..scenes.collect import with_objection
 from ..scenes.variables import OF_MESH, OF_SCENE
 from . import plan
-from .names import QUANTITY_UNITS
 from .task_values import named, quantity_key
 from .variables import SHAPES
+
+QUANTITY_UNITS = {"displacement": "m", "stress": "Pa", "reaction": "N", "area": "m2", "energy": "J"}
+"""Units of the values in the dataset."""
 
 
 def groups(study, folder):

@@ -11,7 +11,6 @@ from ...runs.hashing import hash_of
 from ...runs.keys import definition_key, material_key, mesh_type_key, stage_key
 from ...runs.stages import Task, products, stage
 from ..scenes.plan import file_source, mesh_products, parameters, particles_in
-from .names import OWN_FILE
 from .outputs import DRAWING
 
 if TYPE_CHECKING:
@@ -21,6 +20,9 @@ if TYPE_CHECKING:
 
 MOST_DRAWN = 1500
 """Particles, about, of the largest mesh that is drawn where a coarser one is there."""
+
+OWN_FILE = "file"
+"""Mesh type of a shape whose mesh is that of its file."""
 
 FILE_PARTICLES = 2000.0
 """Particles of a mesh from a file, for costs, before it is read."""

@@ -36,20 +36,16 @@ def solve(task, family):
     described, grouped, sheets = family
     shape = shape_of(described, task["thickness"], task["load"])
     chosen = {"definition": task["definition"], "kinematics": task["kinematics"]}
-    try:
-        check_case(grouped, shape.loads[ONE_LOAD])
-    except ValueError as error:
-        return failed(task, str(error))
-    begin, sheet = time.perf_counter(), sheets.get(shape.thickness)
+    sheet = sheets.get(shape.thickness)
     derived = sheet.deriving if sheet else 0.0
     try:
-        try:
-            scene = Scene(shape, grouped, materials_of(task["materials"]), ONE_LOAD, sheet=sheet, **chosen)
-        except DefinitionError:
-            raise
-        except ValueError as error:  # loads on what is held, quantities that the mesh has not
-            return failed(task, str(error))
-        sheets[shape.thickness] = scene.sheet
+        check_case(grouped, shape.loads[ONE_LOAD])
+        scene = Scene(shape, grouped, materials_of(task["materials"]), ONE_LOAD, sheet=sheet, **chosen)
+    except ValueError as error:  # loads on what is held, quantities that the mesh has not, definitions that refuse it
+        return failed(task, str(error))
+    sheets[shape.thickness] = scene.sheet
+    begin = time.perf_counter()
+    try:
         found = scene.solve()
     except DefinitionError as error:
         return failed(task, str(error)) | {"seconds": time.perf_counter() - begin}

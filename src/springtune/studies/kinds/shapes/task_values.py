@@ -45,13 +45,15 @@ def load(case: LoadCase) -> dict[str, Any]:
 
 def shape_of(described: dict[str, Any], thickness: float = 1.0, case: dict[str, Any] | None = None) -> Shape:
     """Shape of what `geometry` gives, of a thickness [m]."""
+    described = _frozen(described)
     holes = (Hole(_segments(hole["outline"]), hole["part"]) for hole in described["holes"])
-    points = {name: _pair(point) for name, point in described["points"].items()}
     loads = {} if case is None else {ONE_LOAD: load_of(case)}
     file = described.get("file", "")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", AssumptionWarning)  # whoever read the study said it
-        return Shape(UNNAMED, thickness, _segments(described["outline"]), tuple(holes), points, loads, file)
+        return Shape(
+            UNNAMED, thickness, _segments(described["outline"]), tuple(holes), described["points"], loads, file
+        )
 
 
 def by_key(values: dict[str, float], case: LoadCase) -> dict[str, float]:
@@ -72,26 +74,20 @@ def named(message: str, shape: Shape, case: LoadCase) -> str:
 
 def load_of(described: dict[str, Any]) -> LoadCase:
     """Load of what `load` gives."""
-    return LoadCase(
-        described["name"],
-        tuple(Support(**one) for one in described["supports"]),
-        tuple(Traction(one["group"], _pair(one["force"])) for one in described["tractions"]),
-        tuple(Pressure(**one) for one in described["pressures"]),
-        _pair(described["gravity"]),
-        tuple(Quantity(**one) for one in described["quantities"]),
-    )
+    kinds = {"supports": Support, "tractions": Traction, "pressures": Pressure, "quantities": Quantity}
+    parts = {name: tuple(kind(**one) for one in _frozen(described[name])) for name, kind in kinds.items()}
+    return LoadCase(**(_frozen(described) | parts))
 
 
-def _segments(sides: list[dict[str, Any]]) -> tuple[Segment, ...]:
-    return tuple(
-        Segment(_pair(side["start"]), None if side["centre"] is None else _pair(side["centre"]), side["group"])
-        for side in sides
-    )
+def _segments(sides: Any) -> tuple[Segment, ...]:
+    return tuple(Segment(**side) for side in sides)
 
 
-def _pair(values: Any) -> tuple[float, float]:
-    x, y = values
-    return x, y
+def _frozen(value: Any) -> Any:
+    """A value with tuples in the place of lists, which JSON makes of them."""
+    if isinstance(value, dict):
+        return {name: _frozen(one) for name, one in value.items()}
+    return tuple(map(_frozen, value)) if isinstance(value, list | tuple) else value
 
 
 def materials_of(described: dict[str, dict[str, Any]]) -> dict[str, AnyMaterial]:
