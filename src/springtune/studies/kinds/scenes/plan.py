@@ -21,6 +21,8 @@ from .interpolated import expected_solves, interpolants
 from .stored import calibrated_key
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     from ...config.model import SceneSpec, Study
 
 
@@ -230,13 +232,21 @@ def _thickness_ratio(study, scene):
 @once_a_study("curves")
 def _calibrating(study):
     """Thickness of the beam that calibrates each group of scenes [m]; a study gives a group one."""
-    curves = [one for one in study.curves if (one.mesh.beam.name, one.load) == study.calibration]
-    return {calibration_name(one): one.mesh.beam.thickness for one in curves}
+    return {calibration_name(one): one.mesh.beam.thickness for one in _calibrating_curves(study)}
+
+
+def _calibrating_curves(study):
+    return [one for one in study.curves if (one.mesh.beam.name, one.load) == study.calibration]
 
 
 def calibration_name(scene):
     """Name of the group of curves that calibrates a scene."""
     return f"{scene.mesh.mesh_type}_{hash_of(material_key(scene.material))[:8]}_{scene.kinematics}"
+
+
+def _group(one):
+    """What a scene or curve shares with those that calibrate it."""
+    return one.mesh.mesh_type, one.material, one.kinematics
 
 
 def _given_stiffness(study, scene):
@@ -398,28 +408,100 @@ def calibration_path(folder):
 
 def _calibrate_members(study, costs):
     """Groups of scenes that share a calibrated stiffness, in one job."""
-    groups = {}
-    for scene in calibrated(study):
-        groups[calibration_name(scene)] = scene.mesh.mesh_type, scene.material, scene.kinematics
+    groups = {calibration_name(scene): _group(scene) for scene in calibrated(study)}
     return {"all": (0.0, sorted(groups.items()))} if groups else {}
 
 
 def _calibrate(study, folder, members):
-    tasks = []
-    for name, (mesh_type, material, kinematics) in (pair for groups in members for pair in groups):
-        curves = [
-            {"mesh": stem(curve.mesh), "curve": curve_key(study, curve), "load": curve.load, "force": curve.force}
-            for curve in study.curves
-            if (curve.mesh.beam.name, curve.load) == study.calibration
-            and (curve.mesh.mesh_type, curve.material, curve.kinematics) == (mesh_type, material, kinematics)
-        ]
-        tasks.append({"name": name, "members": curves})
+    def named(curve):
+        place = {"mesh": stem(curve.mesh), "curve": curve_key(study, curve)}
+        return place | {"load": curve.load, "force": curve.force}
+
+    tasks = [
+        {"name": name, "members": [named(one) for one in _calibrating_curves(study) if _group(one) == group]}
+        for groups in members
+        for name, group in groups
+    ]
     return {
         "file": str(calibration_path(folder)),
         "curves": str(folder / "curves"),
         "groups": tasks,
         "code": stage_key("studies.kinds.scenes.calibrate"),
     }
+
+
+# -- parts of a study --------------------------------------------------------------------------------------------------
+
+
+def pieces(study, costs, division):
+    """Seconds of each piece: of a mesh's scenes and curves, of a part of them, or of a grid's."""
+    if division.by == "grid":
+        return {("grid", name): sum(_seconds(one, costs) for one in items) for name, items in _by_grid(study).items()}
+    found = {}
+    for name, items in _by_stem(study).items():
+        each = [_seconds(one, costs) for one in items]
+        meshed = costs.of("mesh", particles(items[0].mesh))
+        count = division.pieces(sum(each), len(each))
+        for number in range(count):
+            found[name, number, count] = meshed + sum(_slice(each, number, count))
+    return found
+
+
+def take(study, names):
+    """The study with some of its pieces, and what these need, alone."""
+    by_grid, by_stem = _by_grid(study), _by_stem(study)
+    chosen = set()
+    for first, *rest in names:
+        chosen.update(by_grid[rest[0]] if first == "grid" else _slice(by_stem[first], *map(int, rest)))
+    return of_scenes(study, chosen)
+
+
+def of_scenes(study: "Study", chosen: "Collection[object]") -> "Study":
+    """A study of a few scenes and curves of another one, and of what these need."""
+    scenes = tuple(scene for scene in study.scenes if scene in chosen)
+    groups = {_group(scene) for scene in scenes if scene.definition == "calibrated"}
+    calibrating = {one for one in _calibrating_curves(study) if _group(one) in groups}
+    curves = tuple(one for one in study.curves if one in chosen or one in calibrating)
+    asked = [*scenes, *curves]
+    bodies = {(one.mesh.beam, one.material, one.load, one.force) for one in asked}
+    meshes = {one.mesh for one in asked}
+    return replace(
+        study,
+        scenes=scenes,
+        curves=curves,
+        meshes=tuple(mesh for mesh in study.meshes if mesh in meshes),
+        references=tuple(one for one in study.references if (one.beam, one.material, one.load, one.force) in bodies),
+        parts=study.parts | {"scenes": study.parts["scenes"] if asked else ()},
+    )
+
+
+def _by_grid(study):
+    """Scenes and curves by the first grid that asks for them."""
+    found, seen = {}, set()
+    for grid in study.grids:
+        found[grid.name] = [one for one in dict.fromkeys((*grid.curves, *grid.scenes)) if one not in seen]
+        seen.update(found[grid.name])
+    return {name: asked for name, asked in found.items() if asked}
+
+
+def _by_stem(study):
+    """Scenes and curves by the file of their mesh, which sheets of several thicknesses share."""
+    found = defaultdict(list)
+    for one in (*study.curves, *study.scenes):
+        found[stem(one.mesh)].append(one)
+    return found
+
+
+def _slice(items, number, count):
+    """One of so many pieces, in order, of items."""
+    return items[len(items) * number // count : len(items) * (number + 1) // count]
+
+
+def _seconds(one, costs):
+    """What a scene or a curve is expected to take."""
+    count = particles(one.mesh)
+    kinds = (one.kinematics, one.definition) if hasattr(one, "definition") else ("curve",)
+    return sum(costs.of(kind, count) for kind in kinds)
 
 
 STAGES = (
