@@ -345,10 +345,20 @@ def _curve(study, curve):
     }
 
 
-def _on_meshes(study, folder, name, files, **more):
+def on_meshes(folder, name, files, **more):
     """Content of a job whose tasks stand on meshes and references; nothing without tasks."""
     read = {one: str(folder / one) for one in ("meshes", "references")}
     return files and {"folder": str(folder / name), "files": files} | read | more
+
+
+def mesh_stage(name, module, message, content, members):
+    """Stage that makes meshes."""
+    return Stage(name, module, message, content, mesh_products, members, folder="meshes")
+
+
+def stage_on_meshes(name, module, message, content, folder, mesh="mesh", every=()):
+    """Stage that works on the bundles of one that makes meshes."""
+    return Stage(name, module, message, content, products, like=mesh, same=(mesh,), every=every, folder=folder)
 
 
 def _sensitivity(study, folder, members):
@@ -359,7 +369,7 @@ def _sensitivity(study, folder, members):
         for mesh in meshes
         if mesh in curves
     ]
-    return _on_meshes(study, folder, "curves", files)
+    return on_meshes(folder, "curves", files)
 
 
 def _solve(study, folder, members):
@@ -371,7 +381,7 @@ def _solve(study, folder, members):
         if mesh in scenes  # a part of a study may have curves alone
     ]
     calibration = str(calibration_path(folder)) if calibrated(study) else None
-    return _on_meshes(study, folder, "solutions", files, calibration=calibration)
+    return on_meshes(folder, "solutions", files, calibration=calibration)
 
 
 def _scenes(study, mesh):
@@ -506,17 +516,14 @@ def _seconds(one, costs):
 
 STAGES = (
     replace(_REFERENCE, content=_references, products=_reference_products, members=_reference_members),
-    Stage("mesh", "studies.kinds.scenes.mesh", "Meshing", _meshes, mesh_products, _mesh_members, folder="meshes"),
-    Stage(
+    mesh_stage("mesh", "studies.kinds.scenes.mesh", "Meshing", _meshes, _mesh_members),
+    stage_on_meshes(
         "sensitivity",
         "studies.kinds.scenes.sensitivity",
         "Tracing the sensitivity curves",
         _sensitivity,
-        products,
-        like="mesh",
-        same=("mesh",),
+        "curves",
         every=("reference",),
-        folder="curves",
     ),
     Stage(
         "calibrate",
@@ -527,15 +534,12 @@ STAGES = (
         _calibrate_members,
         every=("sensitivity",),
     ),
-    Stage(
+    stage_on_meshes(
         "solve",
         "studies.kinds.scenes.solve",
         "Solving the networks",
         _solve,
-        products,
-        like="mesh",
-        same=("mesh",),
+        "solutions",
         every=("reference", "calibrate"),
-        folder="solutions",
     ),
 )

@@ -5,12 +5,11 @@ from dataclasses import replace
 from operator import attrgetter
 from typing import TYPE_CHECKING
 
-from ...config.kind import Stage
 from ...runs import driver
 from ...runs.hashing import hash_of
 from ...runs.keys import definition_key, material_key, mesh_type_key, stage_key
-from ...runs.stages import Task, products, stage
-from ..scenes.plan import file_source, mesh_products, parameters, particles_in
+from ...runs.stages import Task, stage
+from ..scenes.plan import file_source, mesh_stage, on_meshes, parameters, particles_in, stage_on_meshes
 from .outputs import DRAWING
 
 if TYPE_CHECKING:
@@ -173,7 +172,7 @@ def _solve(study, folder, members):
         }
         for scenes in members
     ]
-    return {"folder": str(folder / "solutions"), "meshes": str(folder / "meshes"), "files": files}
+    return on_meshes(folder, "solutions", files)
 
 
 # -- parts of a study --------------------------------------------------------------------------------------------------
@@ -222,23 +221,13 @@ STAGES = (
         _reference_tasks,
         "shape_references",
     ),
-    Stage(
-        "shape_mesh",
-        "studies.kinds.shapes.mesh",
-        "Meshing shapes",
-        _meshes,
-        mesh_products,
-        _mesh_members,
-        folder="meshes",
-    ),
-    Stage(
+    mesh_stage("shape_mesh", "studies.kinds.shapes.mesh", "Meshing shapes", _meshes, _mesh_members),
+    stage_on_meshes(
         "shape_solve",
         "studies.kinds.shapes.solve",
         "Solving the networks of shapes",
         _solve,
-        products,
-        like="shape_mesh",
-        same=("shape_mesh",),
-        folder="solutions",
+        "solutions",
+        "shape_mesh",
     ),
 )
