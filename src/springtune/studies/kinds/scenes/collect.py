@@ -323,12 +323,8 @@ def _fields(study, folder, axes):
     whole = plan.shown_scenes(study)
     scenes = [scene for scene in study.scenes if scene in whole]
     shown = {scene.mesh for scene in scenes}
-    names = {mesh: plan.stem(mesh) for mesh in study.meshes if mesh in shown}
-    meshes = [
-        (_mesh_labels(mesh), stored.read(folder / "meshes", name).mesh)
-        for mesh, name in names.items()
-        if not stored.is_refused(folder / "meshes", name)
-    ]
+    read = {mesh: stored.read(folder / "meshes", plan.stem(mesh)) for mesh in study.meshes if mesh in shown}
+    meshes = [(_mesh_labels(mesh), found.mesh) for mesh, found in read.items() if found]
     outlines = {one: _outline(study, folder, one) for one in dict.fromkeys(map(_reference_of, scenes))}
     fields = fields_on(fields_of(study), axes, meshes, [points for points, _ in outlines.values()])
     for scene in scenes:

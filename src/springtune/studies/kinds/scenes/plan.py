@@ -5,7 +5,7 @@ from collections import defaultdict
 from dataclasses import replace
 from functools import cache, lru_cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from springtune.problem.loads import LOADS
 from springtune.reference.similarity import unit_problem, unit_scales
@@ -124,9 +124,7 @@ def interpolant_key(kind, box):
 def solved_reference(beam, material, load):
     """Reference that is solved by itself, under the key of its unit problem, which scaled beams share."""
     length, displacement = unit_scales(beam, material, LOADS[load].kind)
-    code = stage_key(
-        "studies.kinds.scenes.reference", without=("reference.finite_strain", "studies.kinds.scenes.stored_interpolant")
-    )
+    code = stage_key("studies.kinds.scenes.reference", without=("reference.finite_strain", "reference.interpolant"))
     key = hash_of(_unit_problem(beam, material, load), code)
     return {"key": key, "length": length, "displacement": displacement}
 
@@ -472,7 +470,7 @@ def of_scenes(study: "Study", chosen: "Collection[object]") -> "Study":
     groups = {_group(scene) for scene in scenes if scene.definition == "calibrated"}
     calibrating = {one for one in _calibrating_curves(study) if _group(one) in groups}
     curves = tuple(one for one in study.curves if one in chosen or one in calibrating)
-    asked = [*scenes, *curves]
+    asked: list[Any] = [*scenes, *curves]
     bodies = {(one.mesh.beam, one.material, one.load, one.force) for one in asked}
     meshes = {one.mesh for one in asked}
     return replace(

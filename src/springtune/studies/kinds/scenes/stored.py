@@ -80,22 +80,19 @@ def read_notes(folder: str | Path, name: str) -> dict[str, Any]:
     return notes
 
 
-def is_refused(folder: str | Path, name: str) -> bool:
-    """Whether a mesh could not be made."""
-    return "message" in read_notes(folder, name)
-
-
 def prepared(folder: str | Path, name: str) -> GroupedMesh:
     """Mesh by its name, for tasks that need it."""
+    if found := read(folder, name):
+        return found
     notes = read_notes(folder, name)
-    if "message" in notes:
-        raise RefusedError(notes["message"], "limits" in notes)
-    return read(folder, name)
+    raise RefusedError(notes["message"], "limits" in notes)
 
 
-def read(folder: str | Path, name: str) -> GroupedMesh:
-    """Mesh by its name with its groups, of which a beam's has none."""
+def read(folder: str | Path, name: str) -> GroupedMesh | None:
+    """Mesh by its name with its groups, of which a beam's has none; None where it could not be made."""
     (path, _), notes = files(folder, name), read_notes(folder, name)
+    if "message" in notes:
+        return None
     _checked(path, notes["checksum"])
     mesh = read_mesh(path)
     if "groups" not in notes:

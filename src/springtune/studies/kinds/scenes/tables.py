@@ -163,14 +163,13 @@ def _own_laws(references, places):
     return found
 
 
-def _compared(place, network, reference, error):
-    """Columns of a network beside a reference."""
-    return {
-        "mesh_size_mm": 1e3 * place["mesh_size"],
-        "network_mm": 1e3 * network,
-        "reference_mm": 1e3 * reference,
-        "error_percent": 100 * error,
-    }
+def _rows(data, places, names, arrays):
+    """Rows of networks beside references, from cells at some places."""
+    values = (_at(places, array) for array in arrays)
+    for place, network, reference, error in zip(_labels(data, places), *values):
+        row = {name: place[name] for name in names} | _swept(place)
+        row |= {"mesh_size_mm": 1e3 * place["mesh_size"], "network_mm": 1e3 * network}
+        yield row | {"reference_mm": 1e3 * reference, "error_percent": 100 * error}
 
 
 def _finite_strain(finite, root):
@@ -181,12 +180,8 @@ def _finite_strain(finite, root):
     finite, root = finite.isel(nonlinear), root[["displacement"]].isel(nonlinear)
     places = _places(finite.deformation_error, (*dimensions, *swept))
     arrays = root.displacement, finite.reference_displacement, finite.deformation_error
-    rows = [
-        {name: place[name] for name in ("material", "load", "beam", "mesh_type", "definition", "reference")}
-        | _swept(place)
-        | _compared(place, *values)
-        for place, *values in zip(_labels(finite, places), *(_at(places, array) for array in arrays))
-    ]
+    names = ("material", "load", "beam", "mesh_type", "definition", "reference")
+    rows = list(_rows(finite, places, names, arrays))
     note = (
         "Networks of nonlinear kinematics against finite elements of rubber: neo-Hookean ones, or of the law that is "
         "fitted to a uniaxial test. At finite strain an error holds the difference of two material laws, where "
@@ -206,13 +201,8 @@ def _block(block, root):
     linear = (block.kinematics.values == "linear")[places["kinematics"]]
     places["reference"] = np.where(linear, 0, _own_laws(block.reference_face_displacement, places))
     arrays = block.face_displacement, block.reference_face_displacement, block.face_error
-    rows = [
-        {name: place[name] for name in ("beam", "material", "load", "mesh_type", "definition", "kinematics")}
-        | {"reference": str(place["reference"])}
-        | _swept(place)
-        | _compared(place, *values)
-        for place, *values in zip(_labels(block, places), *(_at(places, array) for array in arrays))
-    ]
+    names = ("beam", "material", "load", "mesh_type", "definition", "kinematics", "reference")
+    rows = list(_rows(block, places, names, arrays))
     note = (
         "Displacement of the middle of the pressed face along the load. Networks of nonlinear kinematics are compared "
         "with the reference at finite strain in plane stress where the study has it, linear ones with that of small "

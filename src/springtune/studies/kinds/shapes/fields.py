@@ -21,9 +21,9 @@ def groups(study, folder):
     drawn = plan.shown(part)
     for one in (one for one in part.scenes if one in drawn):
         cases.setdefault((one.shape, one.load), []).append(one)
-    meshes = {case: _mesh(scenes[0], folder) for case, scenes in cases.items()}
+    meshes = {case: stored.read(folder / "meshes", plan.file_name(scenes[0])) for case, scenes in cases.items()}
     outlines = {case: _outline(part, scenes[0], folder) for case, scenes in cases.items()}
-    there = [({"case": ", ".join(case)}, mesh) for case, mesh in meshes.items() if mesh is not None]
+    there = [({"case": ", ".join(case)}, found.mesh) for case, found in meshes.items() if found]
     axes = study.axes | {"case": tuple(map(", ".join, cases))}
     found = fields_on(SHAPE_FIELDS, axes, there, [points for points, *_ in outlines.values()])
     for case, scenes in cases.items():
@@ -34,7 +34,7 @@ def groups(study, folder):
         points, moved, rounds = outlines[case]
         put_outline(found, points, moved, case=label)
         found.put_rows({"outline_round": rounds}, case=label)
-        if meshes[case] is None:
+        if not meshes[case]:
             continue
         path = folder / "solutions" / f"{plan.file_name(one)}.h5"
         keys = {scene: fields_key(plan.scene_task(part, scene)["key"]) for scene in scenes}
@@ -46,12 +46,6 @@ def groups(study, folder):
                 values = {"displacement_x": x, "displacement_y": y, "spring_force": kept["spring_forces"]}
                 found.put_rows(values, case=label, definition=scene.definition)
     return {SHAPE_FIELDS.name: found.data}
-
-
-def _mesh(one, folder):
-    """Mesh of a scene; None where there is none."""
-    name = plan.file_name(one)
-    return None if stored.is_refused(folder / "meshes", name) else stored.read(folder / "meshes", name).mesh
 
 
 def _outline(part, one, folder):
