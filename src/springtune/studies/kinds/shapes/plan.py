@@ -104,11 +104,6 @@ def scene_task(part, one, kept=()):
     return {"key": key} | task | ({"keep_fields": True} if one in kept else {})
 
 
-def draws(study):
-    """Whether a study's dataset has the networks that are drawn."""
-    return DRAWING in study.outputs
-
-
 def shown(part):
     """Scenes whose networks are drawn: of a shape and load the finest mesh that is not too large, one material."""
     cases, size = defaultdict(list), attrgetter("mesh_size")
@@ -163,7 +158,7 @@ def _reference_tasks(study):
 
 def _solve(study, folder, members):
     part = study.parts["shapes"]
-    kept = shown(part) if draws(study) else ()
+    kept = shown(part) if DRAWING in study.outputs else ()
     files = [
         {
             "name": file_name(scenes[0]),
