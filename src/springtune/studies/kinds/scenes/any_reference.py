@@ -30,7 +30,7 @@ def read(folder, reference, fields=()):
 
 
 def read_interpolant(folder, key):
-    """Interpolant or None, unit problems that were solved in its place by key, seconds of each, and why."""
+    """Interpolant or None, unit problems solved in its place by key, seconds of one answer, and why there is none."""
     path = Path(folder) / f"{key}.h5"
     state = path.stat() if path.exists() else None
     return _opened(path, key, (state.st_size, state.st_mtime_ns) if state else None)
@@ -38,7 +38,7 @@ def read_interpolant(folder, key):
 
 @lru_cache(maxsize=8)
 def _opened(path, key, state):
-    """What `read_interpolant` gives of a file in its state."""
+    """Cache of `read_interpolant` by the size and time of the file."""
     arrays = ("aspect_range", "nu_range", "values")
     results = store.read(path, {key} | (store.stored(path) if state else set()), arrays)
     known = results.pop(key)

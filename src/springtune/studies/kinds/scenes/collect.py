@@ -65,7 +65,7 @@ def groups(study, folder):
 
 
 def _bodies(study, root):
-    """Materials and beams; what rubber was fitted by, and how well, beside its modulus."""
+    """Write materials and beams; the fit of a rubber goes into a comment."""
     fits = {}
     for material in {scene.material for scene in study.scenes}:
         values = {
@@ -110,7 +110,7 @@ def _meshes(study, folder, root):
 
 
 def _references(study, folder, root):
-    """Displacement of each reference, and by reference and kinematics objections to it."""
+    """Write references; return the displacement of each, and the objection by reference and kinematics."""
     displacements, objections, interpolated = {}, {}, 0
     read = cache(lambda beam, material, load: _reference(study, folder, Reference(beam, material, load, 1.0)))
     for one in study.references:
@@ -149,7 +149,7 @@ def _reference(study, folder, one, fields=()):
 
 
 def _scenes(study, folder, root, block, fields, objections):
-    """Results of the scenes, each mesh's read once, into the root and, where they are there, its groups."""
+    """Write the results of the scenes into the root and the groups; each file is read once."""
     compared = set()  # places of fields that have their reference
     calibration = _calibration(study, folder)
     arrays, known = ["face_profile"] * (block is not None), set(root.data.data_vars)
@@ -190,12 +190,12 @@ def _scenes(study, folder, root, block, fields, objections):
 
 
 def with_objection(result, message, why):
-    """Message of a scene, and what there is against its reference where it has an equilibrium."""
+    """Message of a scene; of a solved one with the objection to its reference."""
     return "; ".join(filter(None, (message, why if result["status"] in (Status.SOLVED, Status.UNSTABLE) else "")))
 
 
 def _at_particles(study, folder, scene, fields):
-    """Displacements of the reference of a scene where its particles are at rest [m]; nothing without a reference."""
+    """Displacements of the reference at the places of the particles at rest [m]; empty without a reference."""
     reference = plan.reference_of(study, scene.mesh.beam, scene.material, scene.load)
     found = any_reference.read(folder / "references", reference, ["x", "y", "displacements"])
     if "x" not in found:
@@ -256,7 +256,7 @@ def _sensitivity(study, folder, displacements, axes):
 
 
 def _block(study, folder, axes):
-    """Group of pressed faces with the references of all kinds; scenes are still to come."""
+    """Group of pressed faces with all references and, so far, no scenes."""
     kinds = (SMALL_STRAIN, *study.further_references)
     block = Filler(swept(BLOCK, study).empty(axes | {"reference": kinds, "face_position": tuple(FACE_POSITIONS)}))
     for one in study.references:
@@ -289,7 +289,7 @@ def _finite_reference(folder, one, kind, fields=()):
 
 
 def _compare(error, network, reference):
-    """Write deformation errors where both displacements are: of a dataset that is mostly holes few cells."""
+    """Write deformation errors where both displacements are known: often few cells."""
     network, reference = (array.transpose(*error.dims).values for array in xr.broadcast(network, reference))
     there = np.isfinite(network) & np.isfinite(reference)
     error.values[there] = deformation_error(network[there], reference[there])
@@ -319,7 +319,7 @@ def _face_reference(study, folder, one, kind):
 
 
 def _fields(study, folder, axes):
-    """Group of whole fields with the meshes and the references' outlines; displacements are still to come."""
+    """Group of whole fields with meshes and references and, so far, no displacements of networks."""
     whole = plan.shown_scenes(study)
     scenes = [scene for scene in study.scenes if scene in whole]
     shown = {scene.mesh for scene in scenes}
@@ -337,7 +337,7 @@ def _fields(study, folder, axes):
 
 
 def fields_on(group, axes, meshes, outlines):
-    """Group of whole fields on meshes, each with its labels; displacements, and outlines, are still to come."""
+    """Group of whole fields with meshes, each at its labels."""
     cells = [cells_of(mesh) for _, mesh in meshes]
     lengths = {
         "particle": [len(mesh.points) for _, mesh in meshes],

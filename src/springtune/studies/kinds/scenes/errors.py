@@ -19,7 +19,7 @@ MOST_LINES = 6
 
 
 def like_with_like(data):
-    """Root of a dataset whose errors of nonlinear networks are against finite strain, where it has that reference."""
+    """Root of a dataset; errors of nonlinear networks are against finite strain where that is known."""
     root = group(data, "/")
     finite = data["finite_strain"].to_dataset() if "finite_strain" in getattr(data, "children", ()) else None
     finite = None if finite is None else of_own_law(finite)
@@ -31,7 +31,7 @@ def like_with_like(data):
 
 
 def compared(root, selection):
-    """Title of a figure of errors: what it is of, and whether they are against finite strain."""
+    """Title of a figure of errors."""
     finite = root.attrs.get("finite_strain") and selection["kinematics"] != "linear"
     return ", ".join(
         [*named(selection, "mesh_type", "material", "load"), *(["against finite strain"] if finite else [])]
@@ -39,14 +39,14 @@ def compared(root, selection):
 
 
 def _by_beam(root, beam, mesh_type, material, load, kinematics):
-    """Data of a figure with a panel a beam, the beams, the selection, and the look of each definition."""
+    """Data of a figure with one panel a beam, the beams, the selection, and the line style of each definition."""
     root, beams, selection = by_beam(root, beam, mesh_type, material, load, kinematics)
     looks = {name: style.line(number) for number, name in enumerate(labels_of(root.status != 0, "definition"))}
     return root, beams, selection, looks
 
 
 def _parts(present):
-    """Definitions that a beam has, in parts that one panel can show."""
+    """Definitions of a beam, split into parts of at most `MOST_LINES`."""
     asked = labels_of(present, "definition")
     return [part.tolist() for part in np.array_split(asked, -(-len(asked) // MOST_LINES))]
 
@@ -273,12 +273,12 @@ def plot_sweep(
 
 
 def _most(present, parameter):
-    """Values that a beam has of a parameter, at most."""
+    """Largest number of values of a parameter that a beam has."""
     return int(present.any([name for name in present.dims if name not in ("beam", parameter)]).sum(parameter).max())
 
 
 def _of_beam(root, name, parameter, mesh_size):
-    """Errors of a beam over a parameter and definitions, with what they are of in words."""
+    """Errors of a beam over a parameter and definitions; the attribute `words` is the panel's title."""
     here = root.sel(beam=name)
     present = here.status != 0
     sizes = labels_of(present, "mesh_size")

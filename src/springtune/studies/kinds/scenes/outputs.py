@@ -1,4 +1,4 @@
-"""What is made of scenes."""
+"""Outputs of scenes."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING
@@ -28,7 +28,7 @@ SWEPT_SHOWN = {
 }
 """What a study sweeps along an axis and in a column, and the unit there over that of the dataset."""
 
-PLOTS, ERRORS = "studies.kinds.scenes.figures", "studies.kinds.scenes.errors"
+PLOTS, ERROR_PLOTS = "studies.kinds.scenes.figures", "studies.kinds.scenes.errors"
 
 COLLECTION = "scenes.pvd"
 """What ParaView opens."""
@@ -70,7 +70,7 @@ def _cells(items: "Iterable[SceneSpec | CurveSpec]") -> Iterator[dict[str, str]]
 
 
 def _sweeps(study: "Study") -> dict[str, Mapping[str, str]]:
-    """Selections of the figures of sweeps: those under which a parameter has several values, by stem."""
+    """Selections of figures of sweeps by stem: where a parameter has several values."""
     found: dict[str, Mapping[str, str]] = {}
     for name in study.swept:
         values: dict[tuple[str, ...], set[float]] = {}
@@ -102,7 +102,7 @@ OUTPUTS = (
         "size",
         "figures of errors against mesh size",
         figures=lambda study: distinct("size", SCENE_LABELS, _cells(study.scenes)),
-        plot=f"{ERRORS}:size",
+        plot=f"{ERROR_PLOTS}:size",
         job="scenes",
         usual=True,
     ),
@@ -118,7 +118,7 @@ OUTPUTS = (
         "sweep",
         "figures of errors against what grids sweep: force, thickness, Young's modulus, Poisson's ratio, stiffness",
         figures=_sweeps,
-        plot=f"{ERRORS}:sweep",
+        plot=f"{ERROR_PLOTS}:sweep",
         job="scenes",
         usual=True,
     ),

@@ -1,4 +1,4 @@
-"""Stages of scenes: what their jobs are to do, and the keys of what they store."""
+"""Stages of scenes: tasks of their jobs, and keys of their results."""
 
 import hashlib
 from collections import defaultdict
@@ -27,12 +27,12 @@ if TYPE_CHECKING:
 
 
 def particles(mesh):
-    """Number of particles of a mesh, about."""
+    """Approximate number of particles of a mesh."""
     return particles_in(mesh.beam.length * mesh.beam.height, mesh.mesh_size)
 
 
 def particles_in(area, mesh_size):
-    """Number of particles in an area, about."""
+    """Approximate number of particles in an area."""
     return area / (0.866 * mesh_size**2)
 
 
@@ -65,17 +65,17 @@ def mesh_key(mesh):
 
 
 def mesh_parameters(mesh):
-    """What of its source a mesh depends on."""
+    """Parameters that a mesh depends on."""
     return parameters(mesh_source(mesh))
 
 
 def parameters(source):
-    """What of its source results depend on: not on where a file is, but on its ending, which says its format."""
+    """Parameters that results depend on: of a file its ending, which tells the format, and not its folder."""
     return source | {"file": Path(source["file"]).suffix} if "file" in source else source
 
 
 def mesh_source(mesh):
-    """What a mesh is made from."""
+    """Source of a mesh: its box and mesh size, or its file."""
     source = {"length": mesh.beam.length, "height": mesh.beam.height}
     if mesh.file is None:
         return source | {"mesh_type": mesh.mesh_type, "mesh_size": mesh.mesh_size}
@@ -83,20 +83,20 @@ def mesh_source(mesh):
 
 
 def file_source(file, unit):
-    """A mesh file, its unit and the hash of its content, as what a mesh is made from."""
+    """Source of a mesh from a file: path, unit and hash of the content."""
     state = Path(file).stat()
     return {"file": str(file), "unit": unit, "content": _content(file, state.st_size, state.st_mtime_ns)}
 
 
 @lru_cache(maxsize=256)
 def _content(file, size, time):
-    """Hash of a file; each of its scenes asks."""
+    """Hash of a file in its state; each of its scenes asks."""
     return hashlib.sha256(Path(file).read_bytes()).hexdigest()
 
 
 @cache
 def stem(mesh):
-    """Stem of a mesh's files: says what it is, not by which labels a study knows it; beams of one extent share it."""
+    """Stem of a mesh's files; beams of the same extent share it, whatever their labels."""
     extent = f"{1e3 * mesh.beam.length:g}x{1e3 * mesh.beam.height:g}"
     own = f"_{mesh_source(mesh)['content'][:8]}" if mesh.file else ""
     return f"{extent}_{mesh.mesh_type}_{1e3 * mesh.mesh_size:g}mm{own}"
@@ -130,7 +130,7 @@ def solved_reference(beam, material, load):
 
 
 def finite_key(reference, kind):
-    """Key of a reference at finite strain, which no load scales."""
+    """Key of a reference at finite strain."""
     return hash_of(kind, _finite_problem(reference), stage_key("studies.kinds.scenes.reference"))
 
 
@@ -152,7 +152,7 @@ def curve_key(study, curve):
 
 
 def scene_key(study: "Study", scene: "SceneSpec") -> str:
-    """Key of a scene; a calibrated one's result is stored under a key that holds the calibrated stiffness, too."""
+    """Key of a scene; results of calibrated scenes are stored under `solved_keys`."""
     return hash_of(
         _common(study, scene)[1],
         scene.force,
@@ -169,7 +169,7 @@ def scene_keys(study):
 
 
 def _common(study, scene):
-    """What scenes share that differ in force or by a factor on the stiffness: part of their tasks, and its key."""
+    """Part of a task, and its key, that scenes share if only force or stiffness factor differ."""
     # By their places: hashing materials for each of 100,000 scenes is slow.
     place = id(scene.mesh), id(scene.material), scene.load, scene.definition, scene.kinematics
     known = _commons(study)
@@ -199,7 +199,7 @@ def _commons(study):
 
 @once_a_study("grids")
 def shown_scenes(study):
-    """Scenes whose whole fields are kept, whether or not they are drawn: of a part those of the whole study."""
+    """Scenes whose whole fields are stored, chosen from the whole study."""
     scenes = study.scenes if study.part is None else {scene for grid in study.grids for scene in grid.scenes}
     return shown(scenes, study.swept)
 
@@ -221,7 +221,7 @@ def stiffnesses(study, curve):
 
 
 def _thickness_ratio(study, scene):
-    """Thickness over that of the beam that calibrates: stiffness is in proportion to it."""
+    """Thickness over that of the calibrating beam; stiffness is proportional to it."""
     if scene.definition != "calibrated":
         return 1.0
     return scene.mesh.beam.thickness / _calibrating(study)[calibration_name(scene)]
@@ -243,7 +243,7 @@ def calibration_name(scene):
 
 
 def _group(one):
-    """What a scene or curve shares with those that calibrate it."""
+    """Mesh type, material and kinematics, which a scene shares with its calibrating curves."""
     return one.mesh.mesh_type, one.material, one.kinematics
 
 
@@ -255,7 +255,7 @@ def _given_stiffness(study, scene):
 
 
 def _mesh_members(study, costs):
-    """Meshes, and what they and all their scenes and curves cost."""
+    """Meshes, and the cost of each with all its scenes and curves."""
     seconds = {stem(mesh): costs.of("mesh", particles(mesh)) for mesh in study.meshes}
     for mesh, scenes in scenes_by_mesh(study).items():
         name, cost = stem(mesh), cache(partial(costs.of, units=particles(mesh)))
@@ -282,7 +282,7 @@ def mesh_products(content):
 
 
 def _reference_tasks(study):
-    """References that are solved by themselves: those that share elements in one job, each at finite strain alone."""
+    """Tasks of references that are not interpolated; those that share elements are in one job."""
     found = {}
     for one in study.references:
         body = one.beam, one.material, one.load
@@ -299,7 +299,7 @@ def _reference_tasks(study):
     return found.values()
 
 
-_REFERENCE = stage(
+_REFERENCE_STAGE = stage(
     "reference",
     "studies.kinds.scenes.reference",
     "Solving the finite-element references",
@@ -310,7 +310,7 @@ _REFERENCE = stage(
 
 def _reference_members(study, costs):
     """References, and interpolants with the unit problems that are asked of them."""
-    members = dict(_REFERENCE.members(study, costs))
+    members = dict(_REFERENCE_STAGE.members(study, costs))
     asked = {(one.beam, one.material, one.load) for one in study.references}
     for kind, (box, problems) in interpolants(study).items():
         if not asked.isdisjoint(problems):  # a part of a study may ask for none
@@ -323,7 +323,7 @@ def _reference_members(study, costs):
 
 def _references(study, folder, members):
     interpolated = [one for one in members if isinstance(one, dict)]
-    content = _REFERENCE.content(study, folder, [one for one in members if not isinstance(one, dict)])
+    content = _REFERENCE_STAGE.content(study, folder, [one for one in members if not isinstance(one, dict)])
     return content | ({"interpolants": interpolated} if interpolated else {})
 
 
@@ -344,7 +344,7 @@ def _curve(study, curve):
 
 
 def on_meshes(folder, name, files, **more):
-    """Content of a job whose tasks stand on meshes and references; nothing without tasks."""
+    """Content of a job whose tasks read meshes and references; empty without tasks."""
     read = {one: str(folder / one) for one in ("meshes", "references")}
     return files and {"folder": str(folder / name), "files": files} | read | more
 
@@ -415,7 +415,7 @@ def calibration_path(folder):
 
 
 def _calibrate_members(study, costs):
-    """Groups of scenes that share a calibrated stiffness, in one job."""
+    """All groups of scenes that share a calibrated stiffness, in one job."""
     groups = {calibration_name(scene): _group(scene) for scene in calibrated(study)}
     return {"all": (0.0, sorted(groups.items()))} if groups else {}
 
@@ -456,7 +456,7 @@ def pieces(study, costs, division):
 
 
 def take(study, names):
-    """The study with some of its pieces, and what these need, alone."""
+    """Study reduced to some pieces and what they need."""
     by_grid, by_stem = _by_grid(study), _by_stem(study)
     chosen = set()
     for first, *rest in names:
@@ -465,7 +465,7 @@ def take(study, names):
 
 
 def of_scenes(study: "Study", chosen: "Collection[object]") -> "Study":
-    """A study of a few scenes and curves of another one, and of what these need."""
+    """Study reduced to some scenes and curves and what they need."""
     scenes = tuple(scene for scene in study.scenes if scene in chosen)
     groups = {_group(scene) for scene in scenes if scene.definition == "calibrated"}
     calibrating = {one for one in _calibrating_curves(study) if _group(one) in groups}
@@ -501,19 +501,19 @@ def _by_stem(study):
 
 
 def _slice(items, number, count):
-    """One of so many pieces, in order, of items."""
+    """Piece `number` of `count` of some items."""
     return items[len(items) * number // count : len(items) * (number + 1) // count]
 
 
 def _seconds(one, costs):
-    """What a scene or a curve is expected to take."""
+    """Expected seconds of a scene or a curve."""
     count = particles(one.mesh)
     kinds = (one.kinematics, one.definition) if hasattr(one, "definition") else ("curve",)
     return sum(costs.of(kind, count) for kind in kinds)
 
 
 STAGES = (
-    replace(_REFERENCE, content=_references, products=_reference_products, members=_reference_members),
+    replace(_REFERENCE_STAGE, content=_references, products=_reference_products, members=_reference_members),
     mesh_stage("mesh", "studies.kinds.scenes.mesh", "Meshing", _meshes, _mesh_members),
     stage_on_meshes(
         "sensitivity",

@@ -29,14 +29,14 @@ REFERENCE_TOLERANCE = 1e-4
 
 
 def run(content, costs):
-    """Solve the references of a bundle that are not there yet."""
+    """Solve the missing references of a bundle."""
     driver.solve_files(sys.modules[__name__], content, costs)
     for task in content.get("interpolants", ()):
         make_interpolant(Path(content["folder"]) / f"{task['key']}.h5", task, costs)
 
 
 def make_interpolant(path: Path, task: dict[str, Any], costs: "TaskCosts") -> None:
-    """Build an interpolant if it is not there yet; without one, solve the unit problems that are asked of it."""
+    """Build a missing interpolant; if it meets no tolerance, solve its unit problems one by one."""
     if task["key"] not in store.stored(path, costs.limits):
         begin = time.perf_counter()
         result = costs.attempt(task["key"], partial(_built, task), partial(failed, task))
@@ -62,7 +62,7 @@ def make_interpolant(path: Path, task: dict[str, Any], costs: "TaskCosts") -> No
 
 
 def _built(task):
-    """An interpolant, within its own tolerance or within that of references; else why there is none."""
+    """Interpolant within its own tolerance or that of references, else the reason."""
     # Here, since few studies need it.
     from springtune.reference.interpolant import TOLERANCE, Interpolant, NotCertifiedError
 

@@ -22,7 +22,7 @@ parts = stored.parts
 
 
 def tasks(family, content):
-    """Scenes of a mesh under the keys of their results, and what is calibrated for them."""
+    """Scenes of a mesh under the keys of their results, with their calibrated stiffness."""
     calibration = checked_json.demand(content["calibration"]) if content["calibration"] else {}
     if not calibration:
         return family["tasks"]
@@ -62,7 +62,7 @@ def order(scene):
 
 
 def stored_key(scene, calibration):
-    """Key of a scene's result; as `springtune.studies.kinds.scenes.plan.solved_key`, from the task."""
+    """Key of a scene's result; as in `springtune.studies.kinds.scenes.plan.solved_keys`, from the task."""
     group = scene.get("calibration")
     return calibrated_key(scene["key"], calibration[group]["stiffness"]) if group else scene["key"]
 
@@ -134,7 +134,7 @@ def _solved(sheet, scene, reference):
 
 
 def _fields(springs, solution, kinematics):
-    """Displacements of the particles [m], stiffness [N/m] and axial force [N] of the springs, these to be looked at."""
+    """Displacements of the particles [m], stiffness [N/m] and axial force [N] of the springs."""
     network, moved = solution.problem.network, solution.equilibrium.displacements
     forces = springs.reference * network.spring_forces(moved, kinematics == "linear")
     return {

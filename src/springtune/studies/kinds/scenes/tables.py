@@ -40,7 +40,7 @@ OF_ROWS = (
 
 
 def _read(array):
-    """An array in memory; texts are read a beam at a time: netCDF's library takes ten times their room meanwhile."""
+    """Read an array; texts one beam at a time, since netCDF takes ten times their room."""
     if array.dtype != object or "beam" not in array.dims:
         return array.variable
     each = [array.variable.isel(beam=[number]).values for number in range(array.sizes["beam"])]
@@ -54,7 +54,7 @@ def _selections(root):
 
 
 def _finite(tree):
-    """References at finite strain, and errors of networks of nonlinear kinematics against them; None without any."""
+    """References at finite strain and the errors against them; None without any."""
     found = tree["finite_strain"].to_dataset() if "finite_strain" in tree else None
     found = None if found is None else of_own_law(found)
     if found is None:
@@ -130,7 +130,7 @@ def _row(values, labels, place, swept, sign):
 
 
 def _swept(labels):
-    """Columns of what a study sweeps, of the labels of a cell."""
+    """Columns of swept parameters from the labels of a cell."""
     return {column: unit * labels[name] for name, (_, column, unit) in SWEPT_SHOWN.items() if name in labels}
 
 
@@ -138,23 +138,23 @@ def _swept(labels):
 
 
 def _places(values, dimensions):
-    """Numbers of the labels of the cells that have a value, by dimension; in the order of these dimensions."""
+    """Indices of the cells that have a value, by dimension."""
     return dict(zip(dimensions, np.argwhere(np.isfinite(values.transpose(*dimensions).values)).T))
 
 
 def _at(places, array):
-    """Values of an array at such cells."""
+    """Values of an array at such indices."""
     return array.values[tuple(places[name] for name in array.dims)].tolist()
 
 
 def _labels(data, places):
-    """Labels of each of such cells by dimension."""
+    """Labels by dimension of each such cell."""
     columns = [map(data[name].values.tolist().__getitem__, numbers) for name, numbers in places.items()]
     return (dict(zip(places, labels)) for labels in zip(*columns))
 
 
 def _own_laws(references, places):
-    """Numbers of the references in plane stress of each cell's own law; 0, the first one, without any."""
+    """Index of the plane-stress reference of each cell's own law; 0 without any."""
     known = references.reference.values.tolist()
     kinds = [known.index(kind) for kind in OWN_LAWS if kind in known]
     found = np.full(len(places["beam"]), kinds[-1] if kinds else 0)

@@ -9,7 +9,7 @@ from ...output.dataset import Filler
 from ...runs import store
 from ..scenes import stored
 from ..scenes.collect import with_objection
-from ..scenes.variables import OF_MESH, OF_SCENE
+from ..scenes.variables import MESH_ROWS, SCENE_ROWS
 from . import plan
 from .task_values import named, quantity_key
 from .variables import SHAPES
@@ -34,7 +34,7 @@ def groups(study, folder):
 
 
 def _quantities(part, found):
-    """Put what quantities are."""
+    """Write what quantities are."""
     for shape, load in dict.fromkeys((one.shape, one.load) for one in part.scenes):
         found.put({"shape_thickness": part.shape[shape].thickness}, shape=shape)
         for one in part.shape[shape].loads[load].quantities:
@@ -46,7 +46,7 @@ def _quantities(part, found):
 
 
 def _references(study, part, folder, found):
-    """Put references; by shape, material and load their values by key, and the objection to each kinematics."""
+    """Write references; return result and objections by shape, material and load."""
     answers = {}
     for shape, material, load in part.referred:
         task = plan.reference_task(part, shape, material, load)
@@ -80,13 +80,13 @@ def _references(study, part, folder, found):
 def _mesh(one, folder, found):
     notes = stored.read_notes(folder / "meshes", plan.file_name(one))
     labels = {"shape": one.shape, "mesh_type": one.mesh_type, "mesh_size": one.mesh_size}
-    found.put({name: notes[name] for name in OF_MESH if name in notes}, **labels)
+    found.put({name: notes[name] for name in MESH_ROWS if name in notes}, **labels)
 
 
 def _scene(part, one, result, references, found):
     labels = vars(one)
     reference, objections = references.get((one.shape, one.material, one.load), ({}, {}))
-    values = {name: result[name] for name in OF_SCENE if name in result} | {"solve_seconds": result["seconds"]}
+    values = {name: result[name] for name in SCENE_ROWS if name in result} | {"solve_seconds": result["seconds"]}
     case = part.shape[one.shape].loads[one.load]
     whys = [reference.get("message", ""), *reference.get("lacking", {}).values()]
     whys = [f"no reference: {named(why, part.shape[one.shape], case)}" for why in whys if why]

@@ -33,7 +33,7 @@ class ShapeScene:
 
 @dataclass(frozen=True)
 class Shapes:
-    """What a study asks of shapes: those with scenes, the material of each part, and mesh sizes over the rest's."""
+    """Shapes of a study, their scenes, the materials of parts, and refinements."""
 
     declared: dict[str, Shape]
     shapes: tuple[Shape, ...]
@@ -82,7 +82,7 @@ def _load(name, case):
 
 
 def shape_of_config(name, shape, folder):
-    """Shape of its section, its file seen from a folder."""
+    """Shape from its section; files are relative to a folder."""
     return Shape(
         name,
         shape.thickness,
@@ -96,7 +96,7 @@ def shape_of_config(name, shape, folder):
 
 
 def _scenes(config):
-    """Scenes of all grids, and which of them have a reference."""
+    """Scenes of all grids, and the cases that have a reference."""
     found, referred = {}, {}
     for grid in config.shape_grids.values():
         for name in grid.shape:

@@ -1,4 +1,4 @@
-"""Networks of shapes that are drawn, gathered in the group ``/shape_fields``."""
+"""Drawn networks of shapes, gathered in the group ``/shape_fields``."""
 
 import numpy as np
 
@@ -49,7 +49,7 @@ def groups(study, folder):
 
 
 def _outline(part, one, folder):
-    """Points of the outline, their displacements by the reference, and the round that each is of."""
+    """Points of the outline, their displacements in the reference, and the number of their round."""
     case = one.shape, one.material, one.load
     if case in part.referred:
         key = plan.reference_task(part, *case)["key"]

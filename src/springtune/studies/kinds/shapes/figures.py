@@ -125,7 +125,7 @@ def described(cut, name):
 
 
 def _points(cut, name, definition):
-    """Particles, seconds, sizes of errors [%], and whether each counts, of a line, by particles."""
+    """Particles, seconds, sizes of errors [%] and whether each counts, of one line, by particles."""
     against = _against(cut, name)
     line = cut.sel(definition=definition, quantity=name).stack(mesh=("mesh_type", "mesh_size"))
     seconds = line.solve_seconds.values + np.nan_to_num(line.definition_seconds.values)
@@ -144,7 +144,7 @@ def _against(cut, name):
 
 
 def _errors_of(panels, cut, name, points):
-    """Draw lines of a quantity over particles, and over seconds: where they end in both panels."""
+    """Draw lines of a quantity over particles and over seconds; return their ends in both panels."""
     one, ends = cut.sel(quantity=name), ([], [])
     estimate, difference = (
         100 * abs(float(one[f"reference_{error}"])) for error in ("error_estimate", "expected_error")
@@ -393,7 +393,7 @@ def plot_shape(data, ax=None, *, shape=None, load=None, definition=None):
 
 
 def _few(cut, asked):
-    """Definitions to draw, in their order: those that have an answer before others, and `FIRST` before the rest."""
+    """Definitions to draw: solved ones before others, and `FIRST` before the rest."""
     solved = {name: int(cut.status.sel(definition=name)) == STATUS.index("solved") for name in asked}
     order = sorted(asked, key=lambda name: (not solved[name], name not in FIRST))
     return [name for name in asked if name in order[:MOST_NETWORKS]]
@@ -410,14 +410,14 @@ def _scale(case, wanted, extent):
 
 
 def _largest_force(case, wanted):
-    """Force at the ends of the colours [N]: three in a hundred springs are beyond."""
+    """Force at the ends of the colour scale [N]; 3 % of the springs are beyond."""
     forces = case.spring_force.sel(definition=[name for name in wanted if name in case.definition.values]).values
     forces = np.abs(forces[np.isfinite(forces)])
     return float(np.quantile(forces, 0.97)) if len(forces) and forces.max() > 0 else 1.0
 
 
 def _network(panel, case, cut, name, scale, most):
-    """Draw one network; its lines, or nothing where there is none."""
+    """Draw one network; return its lines, or None."""
     one = case.sel(definition=name) if name in case.definition.values else None
     drawn = one is not None and bool(np.isfinite(one.displacement_x.values).any())
     outline, there = plane(case, "outline_{}"), plane(case, "reference_displacement_{}")
@@ -453,7 +453,7 @@ def _network(panel, case, cut, name, scale, most):
 
 
 def _bar(figure, lines, case):
-    """Scale of the colours, and what lines are, below all panels."""
+    """Draw the colour scale and explain the lines below all panels."""
     width, height = style.size(figure)
     if lines is not None:
         place = figure.add_axes((0.45 / width, 0.36 / height, min(3.0, 0.45 * width) / width, 0.08 / height))

@@ -1,4 +1,4 @@
-"""Stages of shapes: what their jobs are to do, and the keys of what they store."""
+"""Stages of shapes: tasks of their jobs, and keys of their results."""
 
 from collections import defaultdict
 from dataclasses import replace
@@ -28,17 +28,17 @@ FILE_PARTICLES = 2000.0
 
 
 def mesh_name(one):
-    """Stem of the files of a scene's mesh, and of what is solved on it."""
+    """Readable name of a scene's mesh."""
     return f"{one.shape}_{one.mesh_type}" + ("" if one.mesh_type == OWN_FILE else f"_{1e3 * one.mesh_size:.9g}mm")
 
 
 def file_name(one):
-    """The same beside files of beams, whose names begin with a number."""
+    """Stem of its files, which differs from those of beams."""
     return f"shape_{mesh_name(one)}"
 
 
 def particles(part, one):
-    """Number of particles of a scene's mesh, about."""
+    """Approximate number of particles of a scene's mesh."""
     shape = part.shape[one.shape]
     return FILE_PARTICLES if shape.file else particles_in(shape.area, one.mesh_size)
 
@@ -47,14 +47,14 @@ def particles(part, one):
 
 
 def _source(shape):
-    """What the geometry of a shape is made from."""
+    """Geometry of a shape, or its file."""
     from .task_values import geometry  # here, as below: studies of beams read the stages as well
 
     return geometry(shape) | (file_source(shape.file, shape.unit) if shape.file else {})
 
 
 def mesh_source(part, one):
-    """What a scene's mesh is made from."""
+    """Source of a scene's mesh."""
     source = _source(part.shape[one.shape])
     if "file" in source:
         return source
@@ -72,12 +72,12 @@ def mesh_key(part, one):
 
 
 def _reader(shape):
-    """What reads the mesh file of a shape, the library behind it included; nothing where it has none."""
+    """Key of the code that reads the mesh file of a shape; empty without a file."""
     return mesh_type_key(OWN_FILE) if shape.file else ""
 
 
 def _case(part, shape, material, name):
-    """What a shape of its materials under a load is, but for its geometry; no density where nothing weighs."""
+    """Thickness, load and materials of a scene; densities only under gravity."""
     from .task_values import load
 
     case = part.shape[shape].loads[name]
@@ -130,7 +130,7 @@ def by_mesh(part):
 
 
 def _mesh_members(study, costs):
-    """Meshes with their scenes, and what all of that costs."""
+    """Meshes with their scenes, and the cost of both."""
     part = study.parts["shapes"]
     members = {}
     for name, scenes in by_mesh(part).items() if part else ():
@@ -186,13 +186,13 @@ def pieces(study, costs, division):
 
 
 def take(study, names):
-    """The study with some of its pieces alone."""
+    """Study reduced to some pieces."""
     wanted = set(names)
     return of_shape_scenes(study, {one for one in study.parts["shapes"].scenes if (one.shape, one.load) in wanted})
 
 
 def of_shape_scenes(study: "Study", chosen: "Collection[object]") -> "Study":
-    """A study of a few scenes of shapes of another one, and of what these need."""
+    """Study reduced to some scenes of shapes and what they need."""
     part = study.parts["shapes"]
     scenes = tuple(scene for scene in part.scenes if scene in chosen) if part else ()
     if not scenes:

@@ -94,7 +94,7 @@ class Vector:
 
 
 class Words:
-    """Annotation of what is expected where the items of a list or mapping do not tell."""
+    """Annotation with words for the expected value of a list or mapping."""
 
     def __init__(self, words: str) -> None:
         self.words = words
@@ -117,7 +117,7 @@ Anything = Annotated[str, Scalar(str, {"type": ["string", "number"]}, "a value w
 
 
 def _or_text(*texts: str) -> Any:
-    """What the schema says of a section in the place of which a text may stand."""
+    """Schema of a section that may be given as a text."""
 
     def extend(schema: dict[str, Any]) -> None:
         section = dict(schema)

@@ -17,7 +17,7 @@ parts = stored.parts
 
 
 def prepare(family, content):
-    """Mesh of a family of scenes, and the sheets of its thicknesses, which scenes add."""
+    """Shape, mesh, and the sheets by thickness, which scenes add."""
     return family["shape"], stored.prepared(content["meshes"], family["name"]), {}
 
 
@@ -68,7 +68,7 @@ def solve(task, family):
 
 
 def cost(task, family, result, seconds):
-    """Seconds of the network, and those of deriving its springs: these once, in the scene that asked first."""
+    """Seconds of the network, and of deriving its springs in the scene that asked first."""
     particles, deriving = len(family[1].mesh.points), result.pop("deriving", 0.0)
     yield "shape_scene", particles, seconds - deriving
     yield task["definition"], particles, deriving

@@ -4,7 +4,7 @@ from ...output.dataset import STATUS
 from ...output.selection import cells
 from .variables import SCENE_AXES
 
-COLUMNS = ("shape", "load", "quantity", "definition", "kinematics", "material", "mesh_type")
+LABEL_COLUMNS = ("shape", "load", "quantity", "definition", "kinematics", "material", "mesh_type")
 """First columns: what a value is of."""
 
 
@@ -21,7 +21,7 @@ def tables(tree):
                 sources[f"{place['shape']}, {name}: {one.source.item()}"] = None
             about = place | {"quantity": name}
             rows.append(
-                {key: about[key] for key in COLUMNS}
+                {key: about[key] for key in LABEL_COLUMNS}
                 | {"mesh_size_mm": 1e3 * place["mesh_size"], "particles": float(one.particles)}
                 | {"value": float(one.value), "reference": float(one.reference_value)}
                 | {"expected": float(one.expected_value), "units": str(one.quantity_units.item())}
