@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from runpy import run_path
 
 import numpy as np
 import pytest
@@ -29,7 +30,6 @@ from springtune.studies.kinds.benchmark.approaches import APPROACHES
 from springtune.studies.kinds.benchmark.collect import BENCHMARK
 from springtune.studies.kinds.benchmark.measure import LoadedBeam
 from springtune.studies.kinds.benchmark.names import OTHER_APPROACHES, approach_names
-from springtune.studies.kinds.benchmark.tables import comparison
 
 BEAM = Beam(0.1, 0.02, 1e-3, "100x20")
 SCENES = {
@@ -227,16 +227,32 @@ def test_a_case_that_fails_is_stored_with_its_message():
     assert found["status"][0, 0] == Status.FAILED and found["message"][0, 0]
 
 
-def test_comparison_flags_what_became_slower():
-    values = np.full((1, 3, 2), 0.1)
+def test_comparison_flags_what_became_slower(tmp_path, monkeypatch, capsys):
+    pages = run_path("tools/pages.py")
+    dimensions, values = ("scene", "approach", "mesh_size"), np.full((1, 3, 2), 0.1)
     coordinates = {"scene": ["a"], "approach": ["x", "y", "z"], "mesh_size": [1e-3, 2e-3]}
-    old = xr.Dataset({"seconds": (("scene", "approach", "mesh_size"), values),
-                      "seconds_spread": (("scene", "approach", "mesh_size"), 0.01 * values)}, coordinates)  # fmt: skip
+    old = xr.Dataset({"seconds": (dimensions, values), "seconds_spread": (dimensions, 0.01 * values)}, coordinates)
     new = 2.0 * old  # a machine half as fast
-    assert comparison(old, new)[1] == 0
+    assert pages["comparison"](old, new)[1] == 0
     new["seconds"][0, 1] *= 2
-    lines, flagged = comparison(old, new)
+    lines, flagged = pages["comparison"](old, new)
     assert flagged == 1 and any("y" in line and "slower" in line for line in lines)
+    root = xr.Dataset(attrs={"springtune_version": "1"})
+    for name, groups in {"old": {"/benchmark": old}, "new": {"/benchmark": new}, "without": {}}.items():
+        xr.DataTree.from_dict({"/": root, **groups}).to_netcdf(tmp_path / f"{name}.nc", engine="h5netcdf")
+
+    def compare(*names):
+        monkeypatch.setattr(sys, "argv", ["pages.py", "--compare", *(str(tmp_path / f"{name}.nc") for name in names)])
+        pages["main"]()
+
+    compare("old", "old")
+    with pytest.raises(SystemExit, match="1"):
+        compare("old", "new")
+    assert "  2.00  y  slower" in capsys.readouterr().out
+    with pytest.raises(SystemExit, match="without.nc: has no group /benchmark; run config/benchmark.yaml"):
+        compare("without", "old")
+    with pytest.raises(SystemExit, match="none.nc.*; run config/benchmark.yaml"):
+        compare("none", "old")
 
 
 # -- what makes it fast ------------------------------------------------------------------------------------------------

@@ -64,7 +64,13 @@ REFINEMENT = Group(
 )
 """The group with all parameters; a study has the variables of those that it varies."""
 
-NUMBERS_OF_VALUE = ("displacement", "reference_displacement", "reference_error_estimate", "deformation_error", "particles")
+NUMBERS_OF_VALUE = (
+    "displacement",
+    "reference_displacement",
+    "reference_error_estimate",
+    "deformation_error",
+    "particles",
+)
 """Numbers of a value's result that the dataset and the table have."""
 
 
