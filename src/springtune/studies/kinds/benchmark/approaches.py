@@ -345,4 +345,4 @@ APPROACHES = {
     "calculix-cps3": calculix_cps3,
     "calculix-cps8": calculix_cps8,
 }
-"""Approaches besides definitions, by their names in `springtune.studies.kinds.benchmark.names`."""
+"""Approaches besides definitions, by their names in `OTHER_APPROACHES`."""

@@ -9,7 +9,7 @@ from springtune.problem.status import Status
 from ...output import labels, style
 from ...output.dataset import STATUS
 from ...output.selection import choose, group
-from .names import PARTS
+from . import PARTS
 from .outputs import figures
 
 APPROACH_FAMILIES = {

@@ -10,7 +10,7 @@ from springtune.safe_io.atomic import write_text
 from springtune.safe_io.escapes import markdown
 
 from ...output.tables import markdown_table
-from .names import PARTS
+from . import PARTS
 from .outputs import PAGE
 
 TARGETS = (0.01, 0.001, 0.0001)

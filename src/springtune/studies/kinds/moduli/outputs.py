@@ -9,9 +9,6 @@ from ...output.views import Plot, View
 if TYPE_CHECKING:
     from ...config.model import Study
 
-PATCH = ("definition", "mesh_type", "mesh_size", "poisson_ratio")
-"""Dimensions of the moduli."""
-
 TABLES = ("definitions.csv", "moduli.csv", "which_definition.md")
 """Tables that compare definitions: of scenes, of moduli, and what to use."""
 
