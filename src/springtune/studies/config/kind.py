@@ -86,6 +86,11 @@ class Output:
         return self.plot.partition(":")[0]
 
 
+def needs(part: str, why: str) -> Callable[[Study], str]:
+    """`Output.lack` of an output that needs a part of a study."""
+    return lambda study: "" if study.parts[part] else why
+
+
 @dataclass(frozen=True)
 class Stage:
     """A stage before the dataset: jobs that each work off a bundle of tasks.

@@ -1,13 +1,9 @@
 """Figures and the page of the benchmark, and what the page to browse shows of it."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
-from ...config.kind import Output
+from ...config.kind import Output, needs
 from ...output.views import Plot, View
-
-if TYPE_CHECKING:
-    from ...config.model import Study
 
 PAGE = "speed.md"
 
@@ -22,10 +18,6 @@ def figures(scenes: Sequence[object]) -> dict[str, dict[str, object]]:
     }
 
 
-def _lack(study: "Study") -> str:
-    return "" if study.parts["benchmark"] else "shows a benchmark and the study has none; add a section 'benchmark'"
-
-
 OUTPUTS = (
     Output(
         "benchmark",
@@ -34,7 +26,7 @@ OUTPUTS = (
         plot="studies.kinds.benchmark.figures:benchmark",
         tables=lambda study: [PAGE],
         write="studies.kinds.benchmark.tables",
-        lack=_lack,
+        lack=needs("benchmark", "shows a benchmark and the study has none; add a section 'benchmark'"),
     ),
 )
 

@@ -145,10 +145,8 @@ def measure(scene, approaches, sizes, finest, most_seconds, second_beam=None):
         "reference_seconds": time.perf_counter() - begin,
         "machine_load": os.getloadavg()[0],
     }
-    shape = len(approaches), len(sizes)
     names = ("displacement", "seconds", "seconds_spread", "cold_seconds", "peak_memory", "unknowns")
-    arrays = {name: np.full(shape, np.nan) for name in (*names, *(f"{part}_seconds" for part in PARTS))}
-    status, message = _blank(shape)
+    cases = _Cases((len(approaches), len(sizes)), *names, *(f"{part}_seconds" for part in PARTS))
     meshes, beyond = {}, {}
     for mesh_type in {approach.partition("/")[2] for approach in approaches if "/" in approach}:
         MESH_TYPES[mesh_type](1.0, 0.5, 0.25)  # libraries are read
@@ -163,17 +161,30 @@ def measure(scene, approaches, sizes, finest, most_seconds, second_beam=None):
                 found = _case(scene, approach, sizes[j], meshes, most_seconds)
             if found.get("beyond"):
                 beyond[approach] = sizes[j], found["message"]
-            _note(found, arrays, status, message, (i, j))
-    result |= arrays | {"status": status, "message": message}
-    result["error"] = (arrays["displacement"] - reference.displacement) / abs(reference.displacement)
-    result |= _second(scene, second_beam, approaches, sizes, status == Status.SOLVED, most_seconds)
+            cases.note(found, i, j)
+    result |= cases.numbers | cases.judged("")
+    result["error"] = (result["displacement"] - reference.displacement) / abs(reference.displacement)
+    result |= _second(scene, second_beam, approaches, sizes, cases.status == Status.SOLVED, most_seconds)
     result["assured_error"] = assured(result["error"], result["second_error"])
     return result | rates(result, sizes)
 
 
-def _blank(shape):
-    """Status and message of cells that nobody asks for."""
-    return np.zeros(shape, dtype=np.int8), np.full(shape, "", dtype=object)
+class _Cases:
+    """Numbers of cases by name, their statuses and messages; cells that nobody asks for are blank."""
+
+    def __init__(self, shape, *names):
+        self.numbers = {name: np.full(shape, np.nan) for name in names}
+        self.status, self.message = np.zeros(shape, dtype=np.int8), np.full(shape, "", dtype=object)
+
+    def note(self, found, *place):
+        """Note what a process found: its numbers, or what became of it."""
+        self.status[place], self.message[place] = found.get("status", Status.SOLVED), found.get("message", "")
+        for name, values in self.numbers.items() if "status" not in found else ():
+            values[place] = found[name]
+
+    def judged(self, name):
+        """Statuses and messages, by their names in the dataset."""
+        return {f"{name}status": self.status, f"{name}message": self.message}
 
 
 def _failed(message, status=Status.FAILED):
@@ -184,27 +195,17 @@ def _limit(seconds):
     return f"{seconds:g} s of the processor (`most_seconds` of the benchmark)"
 
 
-def _note(found, arrays, status, message, place):
-    """Put what a process found into arrays: its numbers, or what became of it."""
-    status[place], message[place] = found.get("status", Status.SOLVED), found.get("message", "")
-    if "status" not in found:
-        for name, values in arrays.items():
-            values[place] = found[name]
-
-
 def _second(scene, beam, approaches, sizes, solved, most_seconds):
     """Errors on another beam of the cases that were solved [1], and what became of them; nothing without one."""
-    arrays = {"displacement": np.full(solved.shape, np.nan)}
-    status, message = _blank(solved.shape)
-    told = {"second_status": status, "second_message": message}
+    cases = _Cases(solved.shape, "displacement")
     if beam is None:
-        return told | {"second_error": arrays["displacement"]}
+        return cases.judged("second_") | {"second_error": cases.numbers["displacement"]}
     scene, meshes = replace(scene, beam=beam), {}
     reference = solve_small_strain(beam, scene.material, scene.force, kind=scene.kind).displacement
     for i, j in np.argwhere(solved):
-        found = _case(scene, approaches[i], sizes[j], meshes, most_seconds, once=True)
-        _note(found, arrays, status, message, (i, j))
-    return told | {"second_error": (arrays["displacement"] / reference - 1) * np.sign(reference)}
+        cases.note(_case(scene, approaches[i], sizes[j], meshes, most_seconds, once=True), i, j)
+    error = (cases.numbers["displacement"] / reference - 1) * np.sign(reference)
+    return cases.judged("second_") | {"second_error": error}
 
 
 def _case(scene, approach, size, meshes, most_seconds, once=False):
@@ -328,21 +329,19 @@ def _curves(alarm, scene, size):
     def problem():
         return Sheet(mesh, scene.beam.thickness).problem(scene.kind, Springs(1.0, uniform(mesh)))
 
-    together, apart = np.zeros(len(CURVE_COUNTS)), np.zeros(len(CURVE_COUNTS))
+    together, force = np.zeros(len(CURVE_COUNTS)), scene.force / (COEFFICIENT * membrane)
     for number, count in enumerate(CURVE_COUNTS):
         loads = scene.force / (COEFFICIENT * membrane * np.linspace(0.4, 1.6, count))
         together[number] = _median(alarm, lambda loads=loads: trace(problem(), pattern, loads))
-    one = _median(alarm, lambda: problem().nonlinear(scene.force / (COEFFICIENT * membrane)))
-    linear = _median(alarm, lambda: problem().linear(scene.force / (COEFFICIENT * membrane)))
-    apart[:] = one * np.array(CURVE_COUNTS)
+    one = _median(alarm, lambda: problem().nonlinear(force))
+    linear = _median(alarm, lambda: problem().linear(force))
+    apart = one * np.array(CURVE_COUNTS)
     return {"curve_seconds": together, "separate_seconds": apart, "nonlinear_seconds": one, "linear_seconds": linear}
 
 
 def solvers(scene, sizes, most_seconds):
     """Seconds of linear solvers, shape (n_solvers, n_sizes): from a matrix to its solution, and for the next matrix."""
-    shape = len(SOLVERS), len(sizes)
-    arrays = {name: np.full(shape, np.nan) for name in ("solver_seconds", "solver_again_seconds")}
-    status, message = _blank(shape)
+    cases = _Cases((len(SOLVERS), len(sizes)), "solver_seconds", "solver_again_seconds")
     for j, size in enumerate(sizes):
         mesh = MESH_TYPES["structured"](scene.beam.length, scene.beam.height, size)
         for i, name in enumerate(SOLVERS):
@@ -350,8 +349,8 @@ def solvers(scene, sizes, most_seconds):
                 found = _failed("CHOLMOD is not installed; install springtune[cholesky]")
             else:
                 found = in_process(_solver, most_seconds, scene, mesh, name)
-            _note(found, arrays, status, message, (i, j))
-    return arrays | {"solver_status": status, "solver_message": message}
+            cases.note(found, i, j)
+    return cases.numbers | cases.judged("solver_")
 
 
 def _solver(alarm, scene, mesh, name):
@@ -374,15 +373,13 @@ def explicit(scene, sizes, most_seconds, updates=UPDATES):
     A step reads each spring's ends, rest vector, length and stiffness, and four vectors of each particle, of which it
     writes two.
     """
-    shape = len(sizes), len(THREAD_COUNTS), len(PRECISIONS)
-    arrays = {name: np.full(shape, np.nan) for name in ("explicit_steps", "spring_updates", "explicit_bandwidth")}
-    arrays["explicit_error"] = np.full((shape[0], shape[2]), np.nan)
-    status, message = _blank(shape[:1])
+    cases, shape = _Cases(len(sizes)), (len(sizes), len(THREAD_COUNTS), len(PRECISIONS))
+    names = ("explicit_steps", "spring_updates", "explicit_bandwidth")
+    cases.numbers = {name: np.full(shape, np.nan) for name in names} | {"explicit_error": np.full(shape[::2], np.nan)}
     for j, size in enumerate(sizes):
-        found = in_process(_explicit, most_seconds, scene, size, updates)
-        _note(found, arrays, status, message, (j,))
+        cases.note(in_process(_explicit, most_seconds, scene, size, updates), j)
     copied = [_copied(count) for count in THREAD_COUNTS]
-    return arrays | {"explicit_status": status, "explicit_message": message, "copy_bandwidth": np.array(copied)}
+    return cases.numbers | cases.judged("explicit_") | {"copy_bandwidth": np.array(copied)}
 
 
 def _explicit(alarm, scene, size, updates):

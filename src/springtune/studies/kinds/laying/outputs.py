@@ -4,17 +4,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...config.kind import Output
+from ...config.kind import Output, needs
 from ...output.views import Plot, View
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from ...config.model import Study
-
-
-def _lack(study: "Study") -> str:
-    return "" if study.parts["laying"] else "shows laid strips and the study has none; add a section 'laying'"
 
 
 OUTPUTS = (
@@ -23,7 +17,7 @@ OUTPUTS = (
         "the figure of laid strips",
         figures=lambda study: {"laying": {}},
         plot="studies.kinds.laying.figures:laying",
-        lack=_lack,
+        lack=needs("laying", "shows laid strips and the study has none; add a section 'laying'"),
     ),
 )
 

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...config.kind import Output, stem
+from ...config.kind import Output, needs, stem
 from ...output.views import Plot, View
 from .designs import SOBOL_INDICES
 
@@ -22,8 +22,7 @@ QUANTITIES = {
 """Quantities that have indices and main effects."""
 
 
-def _lack(study: "Study") -> str:
-    return "" if study.parts["samples"] else "shows sampled scenes and the study has none; add a section 'samples'"
+_lack = needs("samples", "shows sampled scenes and the study has none; add a section 'samples'")
 
 
 def _lack_indices(study: "Study") -> str:

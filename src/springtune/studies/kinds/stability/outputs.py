@@ -1,13 +1,9 @@
 """Figures and the page of the experiments on stability, and what the page to browse shows of them."""
 
 from collections.abc import Collection
-from typing import TYPE_CHECKING
 
-from ...config.kind import Output
+from ...config.kind import Output, needs
 from ...output.views import Plot, View
-
-if TYPE_CHECKING:
-    from ...config.model import Study
 
 PAGE = "stability.md"
 
@@ -29,10 +25,6 @@ def figures(experiments: Collection[str]) -> dict[str, dict[str, object]]:
     return {f"stability_{name}": {} for name, needed in NEEDED.items() if needed in experiments}
 
 
-def _lack(study: "Study") -> str:
-    return "" if study.parts["stability"] else "shows experiments and the study has none; add a section 'stability'"
-
-
 OUTPUTS = (
     Output(
         "stability",
@@ -41,7 +33,7 @@ OUTPUTS = (
         plot="studies.kinds.stability.figures:stability",
         tables=lambda study: [PAGE],
         write="studies.kinds.stability.tables",
-        lack=_lack,
+        lack=needs("stability", "shows experiments and the study has none; add a section 'stability'"),
     ),
 )
 
