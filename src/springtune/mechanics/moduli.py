@@ -23,7 +23,7 @@ import numpy as np
 
 from ..linalg.factors import SingularError
 from ..mesh.cells import Mesh, MeshError
-from ..mesh.parts import connected
+from ..mesh.sheets import connected
 from .energies import Energy
 from .network import Network
 

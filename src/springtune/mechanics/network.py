@@ -16,7 +16,7 @@ from scipy.sparse import csc_array
 from ..linalg import SOLVERS
 from ..linalg.factors import CHOLESKY, Factor, SingularError, SuperLUFactor
 from ..mesh.cells import Mesh
-from ..mesh.parts import check_held
+from ..mesh.sheets import check_held
 from .energies import Energy
 from .follower import FollowerPressure
 from .pattern import Pattern

@@ -15,7 +15,7 @@ from scipy.sparse import coo_array
 from ..linalg.factors import SingularError, factorize
 from ..mesh.cells import MeshError, signed_areas
 from ..mesh.groups import GroupedMesh
-from ..mesh.parts import check_held
+from ..mesh.sheets import check_held
 from ..problem.materials import AnyMaterial
 from ..problem.shapes import LoadCase, Quantity, Shape
 from .coarse_meshes import LARGEST_TURN, CoarseMesh, Corner, Side, corners_of, outline_mesh

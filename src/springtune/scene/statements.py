@@ -17,6 +17,7 @@ from ..mesh import Mesh
 from ..mesh.groups import GroupedMesh
 from ..problem.boundary import (
     cell_at,
+    check_case,
     displacement_weights,
     followed,
     forces,
@@ -25,7 +26,6 @@ from ..problem.boundary import (
     reaction_weights,
     supported,
 )
-from ..problem.cases import check_case
 from ..problem.geometry import Beam, warn_of_thickness
 from ..problem.loads import LOADS, LoadKind
 from ..problem.materials import ANY_MATERIAL, AnyMaterial, Material, Rubber
