@@ -17,20 +17,10 @@ Examples
 
 from .cells import Mesh, MeshError, corner_angles, quality, signed_areas
 from .formats import read_beam_mesh, read_mesh, write_mesh
-from .types import (
-    MESH_TYPES,
-    ROW_HEIGHT,
-    MeshType,
-    alternating,
-    braced,
-    free,
-    isosceles,
-    lattice,
-    mesh_type,
-    right,
-    row_height,
-    structured,
-)
+from .free import free
+from .rows import ROW_HEIGHT, isosceles, lattice, row_height, structured
+from .squares import alternating, braced, right
+from .types import MESH_TYPES, MeshType, mesh_type
 
 __all__ = [
     "MESH_TYPES",

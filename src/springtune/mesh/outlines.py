@@ -11,9 +11,10 @@ import numpy as np
 
 from .cells import Mesh, MeshError, signed_areas
 from .groups import GroupedMesh
+from .rows import ROW_HEIGHT
 from .sheets import nearer
 from .sides import OutlineSide, Point
-from .types import ROW_HEIGHT, too_many
+from .types import too_many
 
 LEAST_AROUND = 6
 """Fewest edges of a full turn of an arc, so that a small hole remains."""

@@ -1,0 +1,127 @@
+"""Rows of isosceles triangles fitted to a box: equilateral ones (`structured`) and others (`isosceles`)."""
+
+import math
+from numbers import Integral, Real
+
+import numpy as np
+
+from .cells import Mesh, MeshError
+from .types import MOST_MESHED, check_box, mesh_type, nearest_counts, nearest_whole
+
+ROW_HEIGHT = math.sqrt(3) / 2
+"""Height of a row of equilateral triangles of unit edge."""
+
+
+@mesh_type("structured", order=10, row_height=ROW_HEIGHT)
+def structured(length: float, height: float, size: float) -> Mesh:
+    r"""Rows of near-equilateral triangles along x, fitted to the box.
+
+    The numbers of cells and rows are nearest to the exact lattice, then stretched to fit; lengths in m. Every other
+    line of points is shifted by half a cell and closed with a point on either end::
+
+        +---+---+---+      4 points, as the lowest line
+        |\ / \ / \ /|
+        +-+---+---+-+      shifted by half an edge, closed at both ends: 5 points
+        |/ \ / \ / \|
+        +---+---+---+
+    """
+    return _fitted(length, height, *nearest_counts(length, height, size, ROW_HEIGHT))
+
+
+def isosceles(length: float, height: float, size: float, poisson_ratio: float) -> Mesh:
+    """Rows of isosceles triangles whose shape sets Poisson's ratio under load along x.
+
+    Only the row springs carry a uniaxial load along the rows, so ``nu = (a / 2h)^2`` whatever their stiffness: rows
+    of height ``h = a / (2 sqrt(nu))``. An anisotropic mesh, as in figure 4b of the paper. `size` is a [m]; the number
+    of rows is the nearest, that of cells along x keeps the shape best.
+    """
+    return _fitted(length, height, *_isosceles_counts(length, height, size, poisson_ratio))
+
+
+def _isosceles_counts(length: float, height: float, size: float, poisson_ratio: float) -> tuple[int, int]:
+    check_box(length, height, size)
+    if not (isinstance(poisson_ratio, Real) and 1e-6 <= poisson_ratio <= 1):
+        raise MeshError(f"poisson_ratio: {poisson_ratio!r} has no such rows; give a number above 0 and at most 1")
+    rows = nearest_whole(height / row_height(size, poisson_ratio))
+    size = 2 * math.sqrt(poisson_ratio) * height / rows
+    return nearest_whole(length / size), rows
+
+
+def row_height(size: float, poisson_ratio: float) -> float:
+    """Return the height [m] of a row of isosceles triangles of base `size` [m] that sets Poisson's ratio.
+
+    Examples
+    --------
+    >>> row_height(2e-3, 0.25)
+    0.002
+    """
+    return size / (2 * math.sqrt(poisson_ratio))
+
+
+def _declare_isosceles(order: float, poisson_ratio: float) -> None:
+    def made(length: float, height: float, size: float) -> Mesh:
+        return isosceles(length, height, size, poisson_ratio)
+
+    def stretch(length: float, height: float, size: float) -> float:
+        cells, rows = _isosceles_counts(length, height, size, poisson_ratio)
+        return length / cells / (height / (shape * rows))
+
+    shape = row_height(1.0, poisson_ratio)
+    made.__doc__ = f"Rows of triangles along x whose shape sets a Poisson's ratio of {poisson_ratio:g}."
+    mesh_type(f"isosceles-{poisson_ratio:g}", order=order, row_height=shape, own_stretch=stretch)(made)
+
+
+_declare_isosceles(order=60, poisson_ratio=0.3)
+_declare_isosceles(order=70, poisson_ratio=0.5)
+
+
+def _fitted(length: float, height: float, cells: int, rows: int) -> Mesh:
+    straight = np.linspace(0.0, length, cells + 1)
+    shifted = np.concatenate([[0.0], 0.5 * (straight[:-1] + straight[1:]), [length]])
+    lines = [straight if row % 2 == 0 else shifted for row in range(rows + 1)]
+    mesh = _join(lines, np.linspace(0.0, height, rows + 1))
+    vars(mesh)["_box_fault"] = ""  # rows fill it once: `springtune.mesh.sheets.box_fault` need not look
+    return mesh
+
+
+def lattice(cells: int, rows: int, size: float = 1.0, row_height: float | None = None) -> Mesh:
+    """Exact lattice with staggered ends: every particle inside has the same neighbours.
+
+    Closed forms of a lattice are exact on it: lines of points have one length, every other one is shifted by half an
+    edge, and no triangle is cut. `size` is the edge along the rows [m]; `row_height` [m] is by default that of
+    equilateral triangles.
+    """
+    row_height = ROW_HEIGHT * size if row_height is None else row_height
+    for name, value in (("cells", cells), ("rows", rows)):
+        if not (isinstance(value, Integral) and 1 <= value <= MOST_MESHED):
+            raise MeshError(f"{name}: {value!r} is not a whole number above zero; give one, such as 10")
+    check_box(cells * size, rows * row_height, size)
+    line = size * np.arange(cells + 1.0)
+    return _join([line + 0.5 * size * (row % 2) for row in range(rows + 1)], row_height * np.arange(rows + 1.0))
+
+
+def _join(lines: list[np.ndarray], heights: np.ndarray) -> Mesh:
+    """Join lines of points, each sorted along x, by triangles: always the next point that is further left."""
+    starts = np.concatenate([[0], np.cumsum([len(line) for line in lines])])
+    points = np.concatenate([np.stack([line, np.full(len(line), y)], axis=1) for line, y in zip(lines, heights)])
+    triangles = []
+    known: dict[tuple[int, int], tuple[np.ndarray, np.ndarray]] = {}  # lines of few kinds alternate
+    for row, (low, high) in enumerate(zip(lines[:-1], lines[1:])):
+        pair = id(low), id(high)
+        if pair not in known:
+            known[pair] = _joined(low, high)
+        corners, above = known[pair]
+        triangles.append(corners + np.where(above, starts[row + 1], starts[row]))
+    return Mesh(points, np.concatenate(triangles))
+
+
+def _joined(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles between two lines: places of their corners in these, and whether a corner is of the upper one."""
+    # Merging the mid points of both lines' cells from left to right gives the order of the triangles.
+    mids = np.concatenate([low[:-1] + low[1:], high[:-1] + high[1:]])
+    upper = np.repeat([False, True], [len(low) - 1, len(high) - 1])
+    upper = upper[np.argsort(mids, kind="stable")]
+    i = np.concatenate([[0], np.cumsum(~upper)])[:-1]
+    j = np.concatenate([[0], np.cumsum(upper)])[:-1]
+    above = np.stack([np.zeros_like(upper), upper, np.ones_like(upper)], axis=1)
+    return np.stack([i, np.where(upper, j + 1, i + 1), j], axis=1), above
