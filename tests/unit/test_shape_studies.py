@@ -409,7 +409,7 @@ def test_studies_of_beams_pay_nothing_for_shapes():
     found = set(run.stdout.split())
     assert "springtune.studies.kinds.shapes.kind" in found
     heavy = {f"springtune.studies.kinds.shapes.{name}" for name in ("sections", "checks", "expand", "described")}
-    assert not (heavy | {"springtune.problem.shapes", "springtune.problem.outlines"}) & found
+    assert not (heavy | {"springtune.problem.shapes", "springtune.mesh.sides"}) & found
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,7 @@ from springtune.problem.compare import deformation_error
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import Rubber
 from springtune.problem.status import Status
-from springtune.reference.field import interpolate, outline
-from springtune.reference.limits import objection
+from springtune.reference.answers import interpolate, objection, outline
 from springtune.springs.lattice import predicted_stiffness
 
 from ...config.model import Reference

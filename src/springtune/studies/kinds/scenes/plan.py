@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from springtune.problem.loads import LOADS
-from springtune.reference.similarity import unit_problem, unit_scales
+from springtune.reference.answers import unit_problem, unit_scales
 
 from ...config.kind import Stage
 from ...config.remembered import once_a_study

@@ -4,7 +4,7 @@ import numpy as np
 
 from springtune.problem.compare import deformation_error
 from springtune.problem.status import Status
-from springtune.reference.limits import beyond_linear
+from springtune.reference.answers import beyond_linear
 
 from ...output.dataset import Filler
 from ...runs import store

@@ -5,7 +5,7 @@ import time
 from pathlib import Path
 
 from springtune.mesh import quality
-from springtune.mesh.group_files import read_shape
+from springtune.mesh.formats import read_shape
 from springtune.mesh.outlines import mesh_shape
 
 from . import stored

@@ -4,7 +4,7 @@ import time
 
 import numpy as np
 
-from springtune.problem.cases import check_case
+from springtune.problem.boundary import check_case
 from springtune.problem.status import Status
 from springtune.scene.single import Scene
 from springtune.springs import DefinitionError
