@@ -17,9 +17,9 @@ from springtune.safe_io.escapes import markdown
 from ..output.browse import page as browse
 from ..output.reading import check_links
 from ..runs import provenance, records, rerun
-from ..runs.commands import COMMANDS_FILE
 from ..runs.dependencies import OURS, PACKAGE
 from ..runs.plan import plan
+from ..runs.workload import COMMANDS_FILE
 from . import environment
 from .merge_parts import ELSEWHERE
 from .verify import files as verified

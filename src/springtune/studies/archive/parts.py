@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 from springtune.registry import NAME, NAME_RULE
 from springtune.safe_io import atomic
 
+from ..config.load import digest_of, is_part, named_files, part_text
 from ..config.messages import StudyError
 from ..config.model import Part
-from ..config.partial import digest_of, is_part, named_files, part_text
 from ..kinds.division import dealt, taken
 
 if TYPE_CHECKING:

@@ -13,8 +13,7 @@ from springtune.problem.status import Status
 from springtune.reference.answers import interpolate, objection, outline
 from springtune.springs.lattice import predicted_stiffness
 
-from ...config.model import Reference
-from ...config.shown import keeps_fields
+from ...config.model import Reference, keeps_fields
 from ...output.dataset import NO_NODE, Filler
 from ...output.selection import OF_FIELDS
 from ...runs import checked_json, store

@@ -10,9 +10,8 @@ from springtune.problem.loads import LOADS
 from springtune.reference.answers import unit_problem, unit_scales
 
 from ...config.kind import Stage
-from ...config.remembered import once_a_study
-from ...config.shown import shown
-from ...runs.hashing import hash_of
+from ...config.model import once_a_study, shown
+from ...runs.checked_json import hash_of
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key, stage_key
 from ...runs.stages import products
 from . import stored_mesh

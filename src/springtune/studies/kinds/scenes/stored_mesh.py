@@ -9,7 +9,7 @@ from typing import Any
 from springtune.mesh import Mesh, read_mesh, write_mesh
 
 from ...runs import checked_json
-from ...runs.damage import DamagedError, set_aside
+from ...runs.checked_json import DamagedError, set_aside
 from ...runs.driver import RefusedError
 from ...runs.records import checksum
 

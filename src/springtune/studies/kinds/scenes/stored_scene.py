@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from ...runs.hashing import hash_of
+from ...runs.checked_json import hash_of
 
 FIELD_ARRAYS = {"displacements": "f8", "spring_stiffnesses": "f4", "spring_forces": "f4"}
 """Arrays of all particles and springs, and their types."""

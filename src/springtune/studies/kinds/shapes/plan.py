@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from ...config.kind import Stage
 from ...runs import driver
-from ...runs.hashing import hash_of
+from ...runs.checked_json import hash_of
 from ...runs.keys import definition_key, material_key, mesh_type_key, stage_key
 from ...runs.stages import Task, products, stage
 from .names import OWN_FILE

@@ -9,8 +9,8 @@ from springtune.problem.status import Status
 from springtune.scene.single import Scene
 from springtune.springs import DefinitionError
 
+from ...runs.checked_json import hash_of
 from ...runs.driver import RefusedError
-from ...runs.hashing import hash_of
 from ..scenes import stored_scene
 from . import stored
 from .task_values import ONE_LOAD, by_key, materials_of, shape_of
