@@ -8,7 +8,7 @@ import numpy as np
 from springtune.safe_io.atomic import write_text
 
 from ...output.dataset import STATUS, Filler, Group
-from ...output.tables import csv_text
+from ...output.text import csv_text
 from ...runs import store
 from .batches import crossings, refine, value_key
 from .kind import file_key
@@ -64,7 +64,13 @@ REFINEMENT = Group(
 )
 """The group with all parameters; a study has the variables of those that it varies."""
 
-NUMBERS_OF_VALUE = ("displacement", "reference_displacement", "reference_error_estimate", "deformation_error", "particles")
+NUMBERS_OF_VALUE = (
+    "displacement",
+    "reference_displacement",
+    "reference_error_estimate",
+    "deformation_error",
+    "particles",
+)
 """Numbers of a value's result that the dataset and the table have."""
 
 
