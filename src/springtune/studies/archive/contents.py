@@ -426,13 +426,11 @@ def _elsewhere(folder: Path) -> bool:
 
 def _departures(checkout: Path, attributes: dict[str, str]) -> dict[str, tuple[str, str]]:
     """Versions of the dataset that differ from the locked ones."""
-    locked: dict[str, str] = {}
+    wanted: dict[str, str] = {}
     for lock in LOCK_FILES:
-        locked |= locked(checkout / lock)
+        wanted |= locked(checkout / lock)
     used = json.loads(attributes.get("software", "{}"))
-    return {
-        name: (locked[name], version) for name, version in sorted(used.items()) if locked.get(name, version) != version
-    }
+    return {name: (wanted[name], one) for name, one in sorted(used.items()) if wanted.get(name, one) != one}
 
 
 # -- the archive -------------------------------------------------------------------------------------------------------
