@@ -246,7 +246,9 @@ def _parameters(one):
 
 def file_key(one):
     """Key of the file of a refinement: of all that its results depend on besides their values."""
-    return hash_of(_parameters(one), [stage_key(REFINING), mesh_type_key(one.mesh_type), definition_key(one.definition)])
+    return hash_of(
+        _parameters(one), [stage_key(REFINING), mesh_type_key(one.mesh_type), definition_key(one.definition)]
+    )
 
 
 def _tasks(study):
