@@ -299,6 +299,15 @@ def _field(data: "xarray.DataTree", labels: "dict[str, Label]") -> "xarray.Datas
             listed = ", ".join(map(repr, known)) or "none"
             raise ValueError(f"fields are not kept of {name} {asked[name]!r}; they are of {listed}")
         found = found.assign_coords({name: kept}).drop_vars(f"{OF_FIELDS}{name}")
+    found = network(found)
+    found.attrs["Conventions"] = "CF-1.11 UGRID-1.0"
+    return found
+
+
+def network(found: "xarray.Dataset") -> "xarray.Dataset":
+    """Leave out particles, springs and cells that one network of a group lacks."""
+    import numpy as np
+
     for name, dimension in (("x", "particle"), (SPRING_NODES, "spring"), (CELL_NODES, "cell")):
         there = found[name].notnull().values.reshape(found.sizes[dimension], -1).any(axis=1)
         found = found.isel({dimension: np.flatnonzero(there)})
@@ -307,6 +316,5 @@ def _field(data: "xarray.DataTree", labels: "dict[str, Label]") -> "xarray.Datas
     for name in (SPRING_NODES, CELL_NODES):
         connectivity = found[name].fillna(-1).astype("int32")
         connectivity.encoding = {"_FillValue": np.int32(-1), "dtype": "int32"}
-        found[name] = connectivity.assign_attrs(fields[name].attrs)
-    found.attrs["Conventions"] = "CF-1.11 UGRID-1.0"
+        found[name] = connectivity.assign_attrs(found[name].attrs)
     return found
