@@ -15,7 +15,7 @@ from springtune.mesh import write_mesh
 from springtune.studies.archive import verify
 from springtune.studies.config.kind import outputs
 from springtune.studies.kinds import collect, load_study
-from springtune.studies.kinds.shapes import stored
+from springtune.studies.kinds.scenes import stored
 from springtune.studies.kinds.shapes.checks import READ_AT_ONCE
 from springtune.studies.kinds.shapes.plan import mesh_key, reference_task, scene_task
 from springtune.studies.kinds.shapes.reference import rounds_of
@@ -213,8 +213,8 @@ def test_a_mesh_is_stored_with_its_groups(tmp_path):
     core = st.Hole.circle((0.05, 0.02), 0.008, part="core")
     grouped = st.mesh_shape(st.Shape.rectangle(0.1, 0.04, holes=[core], points={"corner": (0, 0)}), 0.01)
     grouped = replace(grouped, unusable={"odd one": "is not on the outline"})
-    store.add(tmp_path / "one.h5", {"key": stored.packed(grouped) | {"message": ""}})
-    again = stored.read(tmp_path, "one", "key")
+    stored.write_made(tmp_path, "one", "key", grouped, {})
+    again = stored.read(tmp_path, "one")
     assert again.mesh.shares_cells(grouped.mesh) and np.array_equal(again.mesh.points, grouped.mesh.points)
     assert list(again.sides) == list(grouped.sides) and again.unusable == grouped.unusable
     assert all(np.array_equal(again.sides[name], edges) for name, edges in grouped.sides.items())
@@ -478,9 +478,9 @@ def test_scenes_whose_mesh_was_beyond_limits_are_solved_once_these_are_raised(lo
     study = loaded(COOK.replace("[16 mm, 8 mm]", "16 mm").replace("linear}", "linear, reference: false}"))
     jobs = {job.stage.name: job for job in plan(study, tmp_path / "results/study", 1).jobs.values()}
     mesh, solve = jobs["shape_mesh"], jobs["shape_solve"]
-    driver.gone(mesh.stage.module, mesh.content, "cook_free_16mm", "not done", "1 s")
+    driver.gone(mesh.stage.module, mesh.content, "shape_cook_free_16mm", "not done", "1 s")
     driver.run(solve.stage.module, solve.content, Limited())
-    (path,) = (tmp_path / "results/study/shape_solutions").iterdir()
+    (path,) = (tmp_path / "results/study/solutions").iterdir()
     assert store.stored(path, "1 s") and not store.stored(path, "1 min")
     tree, told = done(study, tmp_path / "results/study")
     assert "2 solved" in told

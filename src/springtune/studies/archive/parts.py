@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from ..config.model import Study
 
 HASH = re.compile("[0-9a-f]{24}")
-"""Form of `springtune.studies.runs.keys.hash_of`."""
+"""Form of `springtune.studies.runs.checked_json.hash_of`."""
 
 TIMES = "seconds"
 """Ending of names of values that differ in every run."""
