@@ -226,4 +226,4 @@ def _joined(mesh: Mesh, parts: "list[tuple[Energy, np.ndarray, float]]") -> "Ene
         # What an energy has besides its cells is in proportion to its stiffness.
         moduli[part.name] = np.concatenate([scale * one for one, (_, _, scale) in zip(own, parts)])[order]
     corners = mesh.cells[first.corners.shape[1]][cells[order]]
-    return replace(first, points=mesh.points, corners=corners, **moduli)  # type: ignore[type-var]
+    return replace(first, points=mesh.points, corners=corners, **moduli)
