@@ -196,7 +196,7 @@ def arranged(
     sharey: bool = False,
     widths: Sequence[float] | None = None,
     across: float = 0.1,
-    **place: float,
+    **place: Any,
 ) -> Iterator[tuple[np.ndarray, dict[Axes, list[End]]]]:
     """Panels to draw on, and the ends of their lines to name; afterwards `settle` and `name_lines`.
 

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from ...config.kind import Output, needs
-from ...output.views import Plot, View
+from ...output.browse import Plot, View
 
 PAGE = "speed.md"
 

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...config.kind import Output, needs
-from ...output.views import Plot, View
+from ...output.browse import Plot, View
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -52,7 +52,7 @@ def tables(tree: "xr.DataTree") -> list[dict[str, Any]]:
         rows.append(
             {name: place[name] for name in ("loading", "friction", "definition")}
             | {
-                "mesh_size_mm": 1e3 * place["mesh_size"],
+                "mesh_size_mm": 1e3 * float(place["mesh_size"]),
                 "area_mm2": 1e6 * float(cell.area_under_strip),
                 "area_error_percent": 100 * float(cell.area_error),
                 "elongation_percent": 100 * float(cell.elongation),

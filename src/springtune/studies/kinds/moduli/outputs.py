@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 
 from ...config.kind import Output, needs
-from ...output.views import Plot, View
+from ...output.browse import Plot, View
 
 TABLES = ("definitions.csv", "moduli.csv", "which_definition.md")
 """Tables that compare definitions: of scenes, of moduli, and what to use."""

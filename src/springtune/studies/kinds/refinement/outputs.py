@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from springtune.units import UnitError, parse
 
 from ...config.kind import Output, needs
-from ...output.views import Plot, View
+from ...output.browse import Plot, View
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from ...config.fields import DefinitionName, Flag, Kinematics, Load, OneOrMore, 
 from ...config.kind import Kind
 from ...config.messages import refuse, show
 from ...config.sections import Section
-from ...runs.hashing import hash_of
+from ...runs.checked_json import hash_of
 from ...runs.keys import definition_key, mesh_type_key, stage_key
 from ...runs.stages import Task, stage
 from ..scenes.interpolated import expected_solves

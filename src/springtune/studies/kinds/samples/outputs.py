@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...config.kind import Output, needs, stem
-from ...output.views import Plot, View
+from ...output.browse import Plot, View
 from .designs import SOBOL_INDICES
 
 if TYPE_CHECKING:
@@ -90,7 +90,8 @@ def tables(tree: "xr.DataTree") -> list[dict[str, Any]]:
     """Tables of the page, see `springtune.studies.kinds.scenes.tables.tables`."""
     if "sobol" not in tree:
         return []
-    found, rows = tree["sobol"].to_dataset(), {}
+    found = tree["sobol"].to_dataset()
+    rows: dict[tuple[str, ...], dict[str, Any]] = {}
     for place in np.argwhere(found.base_samples.values > 0):
         cell = found.isel(dict(zip(found.base_samples.dims, place)))
         quantity, load, definition = (str(cell[name].values) for name in ("quantity", "load", "definition"))

@@ -3,7 +3,7 @@
 from collections.abc import Collection
 
 from ...config.kind import Output, needs
-from ...output.views import Plot, View
+from ...output.browse import Plot, View
 
 PAGE = "stability.md"
 

@@ -11,7 +11,7 @@ from springtune.safe_io.escapes import markdown
 
 from ...output.dataset import STATUS
 from ...output.selection import cells, labels_of
-from ...output.tables import markdown_table
+from ...output.text import markdown_table
 from .outputs import PAGE
 
 
