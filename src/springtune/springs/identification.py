@@ -8,6 +8,7 @@ Unknowns are logarithms of the stiffnesses, from a tenth to ten times those of `
 anisotropic material those of `springtune.springs.energy_fit`, with a tenth of their mean in place of zeros.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -16,7 +17,7 @@ import numpy as np
 from ..mesh import Mesh, MeshError
 from ..problem.materials import AnyMaterial, Material
 from . import energy_fit, lattice
-from .base import DefinitionError, membrane_stiffness
+from .base import DefinitionError, Springs, membrane_stiffness
 
 SPAN = 10.0
 """Largest factor between a spring and where its search starts [1]."""
@@ -104,6 +105,15 @@ class Misfit:
         for case in cases:
             self.groups.setdefault(case.held.tobytes(), []).append(case)
         self.patterns = {name: Network(mesh, group[0].held, self.start) for name, group in self.groups.items()}
+
+    @property
+    def bounds(self) -> list[tuple[float, float]]:
+        """Least and largest logarithm of each spring."""
+        return [(-math.log(SPAN), math.log(SPAN))] * len(self.start)
+
+    def springs(self, logarithms: np.ndarray) -> Springs:
+        """Springs of logarithms that a search found."""
+        return Springs(self.reference, self.start * np.exp(logarithms), evaluations=self.evaluations)
 
     def __call__(self, logarithms: np.ndarray) -> float:
         """Misfit at natural logarithms of the stiffnesses over their start, shape (n_edges,)."""

@@ -13,7 +13,7 @@ with equal materials they give nearly what one material gives.
 
 from collections.abc import Mapping
 from dataclasses import fields, replace
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -33,25 +33,6 @@ MAIN_PART = ""
 
 CELL_FIELDS = "points", "corners"
 """Fields of an energy that say where its cells are."""
-
-
-class Derives(Protocol):
-    """Interface of a definition, the package's or the user's own."""
-
-    @property
-    def uniform(self) -> bool:
-        """Whether all springs have one stiffness."""
-
-    @property
-    def uniaxial(self) -> bool:
-        """Whether it supports only loads along a beam."""
-
-    @property
-    def needs(self) -> str:
-        """Its fourth argument, or an empty string."""
-
-    def springs(self, mesh: Mesh, material: AnyMaterial, thickness: float, given: object = None) -> Springs:
-        """Springs of a mesh."""
 
 
 def cells_of_parts(grouped: GroupedMesh) -> dict[str, dict[int, np.ndarray]]:
@@ -102,13 +83,15 @@ def check_materials(grouped: GroupedMesh, materials: Mapping[str, AnyMaterial]) 
 
 
 def derive_by_parts(
-    definition: Derives,
+    definition: Any,
     grouped: GroupedMesh,
     materials: Mapping[str, AnyMaterial],
     thickness: float,
     given: object = None,
 ) -> Springs:
     """Return the springs of a body with parts of several materials; `thickness` in m.
+
+    `definition` is one of the package or the user's own.
 
     Examples
     --------
@@ -226,4 +209,4 @@ def _joined(mesh: Mesh, parts: "list[tuple[Energy, np.ndarray, float]]") -> "Ene
         # What an energy has besides its cells is in proportion to its stiffness.
         moduli[part.name] = np.concatenate([scale * one for one, (_, _, scale) in zip(own, parts)])[order]
     corners = mesh.cells[first.corners.shape[1]][cells[order]]
-    return replace(first, points=mesh.points, corners=corners, **moduli)  # type: ignore[type-var]
+    return replace(first, points=mesh.points, corners=corners, **moduli)
