@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import csc_array, diags_array, sparray
+from scipy.sparse import diags_array, sparray
 from scipy.sparse.linalg import eigsh
 
 from ..linalg.factors import SingularError
@@ -26,7 +26,7 @@ from .integrators import EXPLICIT, IMPLICIT, INTEGRATORS, LAGGED, PRECISIONS, Ba
 from .network import Network
 from .newton import TOLERANCE
 from .statics import StaticProblem
-from .stepping import make_stepper
+from .stepping import Moving, make_stepper
 
 CHECK = 64
 """Steps between checks of an explicit run; a check costs about two steps, one for rest some twenty."""
@@ -42,34 +42,6 @@ def masses(mesh: Mesh, density: float, thickness: float) -> np.ndarray:
     `density` is in kg/m3, `thickness` in m.
     """
     return density * thickness * mesh.particle_areas
-
-
-def centre(mesh: Mesh, masses: np.ndarray) -> np.ndarray:
-    """Centre of mass [m], shape (2,), of masses [kg] of shape (n_points,)."""
-    return masses @ mesh.points / masses.sum()
-
-
-def rayleigh(ratios: tuple[float, float], frequencies: tuple[float, float]) -> tuple[float, float]:
-    r"""Return Rayleigh's alpha [1/s] and beta [s] for given damping ratios at two angular frequencies [rad/s].
-
-    .. math:: \xi(\omega) = \frac{\alpha}{2 \omega} + \frac{\beta \omega}{2}
-
-    Examples
-    --------
-    >>> alpha, beta = rayleigh((0.02, 0.02), (10.0, 30.0))
-    >>> round(alpha, 6), round(beta, 6)
-    (0.3, 0.001)
-    """
-    (first, second), (low, high) = ratios, frequencies
-    if low == high:
-        raise ValueError(f"two damping targets at one frequency, {low:g} rad/s; give two frequencies")
-    alpha, beta = np.linalg.solve([[0.5 / low, 0.5 * low], [0.5 / high, 0.5 * high]], [first, second])
-    if alpha < 0 or beta < 0:
-        raise ValueError(
-            f"ratios {first:g} and {second:g} at {low:g} and {high:g} rad/s need negative damping (alpha = {alpha:.3g} "
-            f"1/s, beta = {beta:.3g} s); give ratios nearer to each other or frequencies farther apart"
-        )
-    return float(alpha), float(beta)
 
 
 @dataclass(frozen=True)
@@ -106,7 +78,7 @@ class Run:
     samples: np.ndarray
 
 
-class Motion:
+class Motion(Moving):
     """Network with masses, dampers and a load.
 
     `inertia` (n_points,) is mass over reference stiffness [s2] and `load` (n_points, 2) force over it [m].
@@ -129,53 +101,7 @@ class Motion:
     (array([0.1, 0. ]), 'moving')
     """
 
-    def __init__(
-        self,
-        network: Network,
-        inertia: np.ndarray,
-        load: np.ndarray | None = None,
-        mass_damping: float = 0.0,
-        dampers: np.ndarray | None = None,
-        linear: bool = False,
-    ) -> None:
-        self.network, self.linear = network, linear
-        self.load = np.zeros(network.held.shape) if load is None else load
-        self.mass_damping, self.dampers = mass_damping, dampers
-        self.inertia = np.repeat(np.asarray(inertia, dtype=float)[:, None], 2, axis=1)
-        bad = int((~(self.inertia > 0) & ~network.held).any(axis=1).sum())
-        if bad:
-            raise ValueError(f"{bad} particles can move and have no mass; remove particles without cells from the mesh")
-        if mass_damping < 0 or (dampers is not None and (dampers < 0).any()):
-            raise ValueError("a damping is negative, and a run would gain energy; give 0 or more")
-
     # -- before a run -----------------------------------------------------------------------------------------------
-
-    @cached_property
-    def mass(self) -> np.ndarray:
-        """Inertia of each unknown [s2], shape (unknowns,)."""
-        return self.network.reduce(self.inertia)
-
-    @cached_property
-    def stiffness_matrix(self) -> csc_array:
-        """Tangent at rest [1]."""
-        return self.network.tangent()
-
-    @cached_property
-    def damper_matrix(self) -> csc_array | None:
-        """Matrix of the dampers along springs at rest [s]; None without any."""
-        if self.dampers is None:
-            return None
-        return Network(self.network.mesh, self.network.held, self.dampers, like=self.network).tangent()
-
-    def damper_tangent(self, displacements: np.ndarray) -> csc_array | None:
-        """Derivative of the dampers' forces by the velocities [s], the springs turned by displacements [m]; or None."""
-        if self.dampers is None or self.linear:
-            return self.damper_matrix
-        along = self.network.rest_vectors + self.network.stretch(displacements)
-        along = along / np.linalg.norm(along, axis=1)[:, None]
-        apart = np.concatenate([along, -along], axis=1)
-        matrices = self.dampers[:, None, None] * apart[:, :, None] * apart[:, None, :]
-        return self.network.stiffness_of(self.network.mesh.edges, matrices)
 
     @cached_property
     def particle_bound(self) -> float:
@@ -251,12 +177,6 @@ class Motion:
         return Motion(self.network, self.inertia[:, 0], self.load, 2 * self.loaded_frequency, self.dampers, self.linear)
 
     # -- mechanics --------------------------------------------------------------------------------------------------
-
-    def missing(self, displacements: np.ndarray) -> np.ndarray:
-        """Load less resistance [m], shape (unknowns,)."""
-        resist = self.network.linear_resistance if self.linear else self.network.resistance
-        with np.errstate(over="ignore", invalid="ignore"):
-            return self.network.reduce(self.load) - resist(displacements)
 
     def energy(self, displacements: np.ndarray, velocities: np.ndarray) -> float:
         """Kinetic energy, plus that of the network, less the work of the load, over the reference stiffness [m2]."""
