@@ -1,12 +1,11 @@
 """Points of an equilibrium path, one after the other by arc length."""
 
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
-from ..linalg.factors import Factor, SingularError
-from .network import Network
-from .newton import TOLERANCE
+from ..linalg.factors import SingularError
+from .newton import TOLERANCE, LoadedNetwork
 
 BEYOND = 0.25
 """First increment beyond the last load step, over that step."""
@@ -26,33 +25,8 @@ NEARLY = 1e-3
 MOST_BEHIND = 60
 """Most points behind a limit point in search of a stable one that carries the load."""
 
-FEW, MANY = 3, 8
-"""Newton steps of a point of a path at or below which the next increment grows, and beyond which it is halved."""
-
-
-class Continued(Protocol):
-    """Problem with an equilibrium path, such as `springtune.mechanics.statics.StaticProblem`."""
-
-    network: Network
-    load_norm: float
-
-    def load_at(self, displacements: np.ndarray) -> np.ndarray:
-        """Load pattern at displacements."""
-
-    def rate(self, displacements: np.ndarray) -> np.ndarray:
-        """As `load_at`, with the forces of growing prescribed displacements."""
-
-    def moved(self, s: float, displacements: np.ndarray) -> np.ndarray:
-        """Displacements with those prescribed at a load inserted."""
-
-    def factorize_tangent(self, s: float, displacements: np.ndarray) -> Factor:
-        """Factor of the tangent of resistance less load."""
-
-    def holds(self, s: float, displacements: np.ndarray) -> bool:
-        """Whether displacements, in equilibrium or not, have a tangent without negative eigenvalues."""
-
-    def stability(self, s: float, displacements: np.ndarray, factor: Factor) -> tuple[int, bool]:
-        """Negative eigenvalues of the tangent, and whether the equilibrium flutters."""
+FEW, MANY, MOST_OF_POINT = 3, 8, 12
+"""Newton steps of a point: up to which the next increment grows, beyond which it is halved, and most of them."""
 
 
 class Point(NamedTuple):
@@ -65,7 +39,7 @@ class Point(NamedTuple):
 
 
 def next_point(
-    problem: Continued, s: float, last: Point, direction: np.ndarray | None, length: float, shortest: float
+    problem: LoadedNetwork, s: float, last: Point, direction: np.ndarray | None, length: float, shortest: float
 ) -> tuple[Point | None, float]:
     """Return the next point, or None, and its increment's length [m], halved while Newton's method fails.
 
@@ -87,11 +61,13 @@ def next_point(
     return None, length
 
 
-def _correct(problem: Continued, last: Point, du: np.ndarray, ds: float, scale: float, most: int = 12) -> Point | None:
+def _correct(
+    problem: LoadedNetwork, last: Point, du: np.ndarray, ds: float, scale: float, most: int = 12
+) -> Point | None:
     """Newton's method in the plane across an increment; None where it does not converge."""
     network, across = problem.network, du
     u, at = last.u + du, last.load + ds
-    for step in range(1, most + 1):
+    for step in range(1, MOST_OF_POINT + 1):
         displacements = problem.moved(at, network.expand(u))
         load = problem.load_at(displacements)
         with np.errstate(over="ignore", invalid="ignore"):
@@ -131,7 +107,7 @@ class Continuation(NamedTuple):
 
 
 def continued(
-    problem: Continued, load: float, last: np.ndarray, before: np.ndarray, target: float, farthest: float = 0.0
+    problem: LoadedNetwork, load: float, last: np.ndarray, before: np.ndarray, target: float, farthest: float = 0.0
 ) -> Continuation:
     """Follow a path by arc length from an equilibrium to a load, or to the limit point where it turns back.
 
