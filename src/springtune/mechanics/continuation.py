@@ -61,9 +61,7 @@ def next_point(
     return None, length
 
 
-def _correct(
-    problem: LoadedNetwork, last: Point, du: np.ndarray, ds: float, scale: float, most: int = 12
-) -> Point | None:
+def _correct(problem: LoadedNetwork, last: Point, du: np.ndarray, ds: float, scale: float) -> Point | None:
     """Newton's method in the plane across an increment; None where it does not converge."""
     network, across = problem.network, du
     u, at = last.u + du, last.load + ds
