@@ -151,14 +151,8 @@ class Interpolant:
 
     def arrays(self) -> dict[str, Any]:
         """Numbers and arrays that `from_arrays` takes, such as a file holds."""
-        return {
-            "kind": self.kind.name,
-            "aspect_range": np.array(self.aspect_range),
-            "nu_range": np.array(self.nu_range),
-            "values": self.values,
-            "error_estimate": self.error_estimate,
-            "solves": self.solves,
-        }
+        ranges = {name: np.array(getattr(self, name)) for name in ("aspect_range", "nu_range")}
+        return vars(self) | ranges | {"kind": self.kind.name}
 
     @classmethod
     def from_arrays(cls, kind: LoadKind, arrays: Mapping[str, Any]) -> Self:
@@ -168,23 +162,21 @@ class Interpolant:
         return cls(kind, (first, last), (least, largest), np.asarray(arrays["values"]), error_estimate, solves)
 
 
+@dataclass
 class _Box:
     """Solves and results for an interpolant over a box."""
 
-    def __init__(
-        self,
-        kind: LoadKind,
-        aspect_range: tuple[float, float],
-        nu_range: tuple[float, float],
-        tolerance: float,
-        most: int | None,
-        solve: Solver,
-    ) -> None:
-        self.kind, self.aspect_range, self.nu_range = kind, aspect_range, nu_range
-        self.tolerance, self.most, self.solver = tolerance, most, solve
+    kind: LoadKind
+    aspect_range: tuple[float, float]
+    nu_range: tuple[float, float]
+    tolerance: float
+    most: int | None
+    solver: Solver
+
+    def __post_init__(self) -> None:
         #: Answers in the order of `NAMES`, and error estimates, by place in the box: from -1 to 1 along each axis.
         self.solved: dict[tuple[float, float], tuple[np.ndarray, float]] = {}
-        self.counts = [3 if last > first else 1 for first, last in (aspect_range, nu_range)]
+        self.counts = [3 if last > first else 1 for first, last in (self.aspect_range, self.nu_range)]
 
     def certified(self) -> tuple[np.ndarray, float]:
         """Values at the nodes and the error estimate."""
