@@ -432,7 +432,9 @@ def test_refusals():
         with pytest.raises(ValueError, match=message):
             solve_shape(shape, load, materials)
 
-    refused("no group is named 'rihgt'; did you mean 'right'", *square((end,), tractions=(Traction("rihgt", (1.0, 0.0)),)))
+    refused(
+        "no group is named 'rihgt'; did you mean 'right'", *square((end,), tractions=(Traction("rihgt", (1.0, 0.0)),))
+    )
     refused(
         "its supports leave the body free to move along y; hold it",
         *square((end,), (Support("left", x=0.0),), tractions=pull),

@@ -181,13 +181,7 @@ class CholeskyFactor:
 
 
 def factorize(matrix: sparray, solver: str | None = None) -> SuperLUFactor | CholeskyFactor:
-    """Factorize a symmetric matrix of any sparsity.
-
-    Examples
-    --------
-    >>> factorize(csc_array([[2.0, 1.0], [1.0, 2.0]])).solve(np.array([3.0, 3.0]))
-    array([1., 1.])
-    """
+    """Factorize a symmetric matrix of any sparsity."""
     matrix = csc_array(matrix)
     matrix.sort_indices()
     cholesky = solver == "Cholesky" or CHOLESKY and solver != "SuperLU"
@@ -260,15 +254,7 @@ class PinnedFactor:
 
 
 def factorize_pinned(matrix: csc_array, analysis: Analysis, choices: Sequence[np.ndarray]) -> PinnedFactor | None:
-    """Factorize an indefinite matrix with a full diagonal and ascending rows; None if no choice of pins helps.
-
-    Examples
-    --------
-    >>> matrix = csc_array(np.array([[1.0, 2.0], [2.0, 1.0]]))
-    >>> factor = factorize_pinned(matrix, Analysis(matrix.indices, matrix.indptr), [np.array([0])])
-    >>> factor.negative_pivots, factor.solve(np.array([3.0, 3.0]))
-    (1, array([1., 1.]))
-    """
+    """Factorize an indefinite matrix with a full diagonal and ascending rows; None if no choice of pins helps."""
     columns = np.repeat(np.arange(matrix.shape[0]), np.diff(matrix.indptr))
     diagonal = np.flatnonzero(matrix.indices == columns)
     stiffness = PIN * float(np.abs(matrix.data[diagonal]).max())

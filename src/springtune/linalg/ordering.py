@@ -13,14 +13,6 @@ def nested_dissection(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
     Parts are cut across their longer side at the median; particles beyond the cut that touch it separate the halves
     (A. George, SIAM J. Numer. Anal. 10:345, 1973). `points` (n_points, 2) [m]; `edges` (n_edges, 2) share matrix
     entries.
-
-    Examples
-    --------
-    In a line of 99 particles the middle one goes last:
-
-    >>> line = np.arange(99)
-    >>> int(nested_dissection(np.stack([line, 0 * line], axis=1), np.stack([line[:-1], line[1:]], axis=1))[-1])
-    49
     """
     count, joined = len(points), _joined(len(points), edges)
     pointers, neighbours = joined.indptr, joined.indices
@@ -62,15 +54,6 @@ def narrow(count: int, edges: np.ndarray) -> np.ndarray:
     """Return an order of particles with a small bandwidth: unchanged, or reversed Cuthill-McKee.
 
     Only changed if that at least halves the bandwidth, the largest distance of an edge's ends.
-
-    Examples
-    --------
-    A line whose particles are numbered from both ends in turns, and one that is in order:
-
-    >>> narrow(6, np.array([[0, 2], [2, 4], [4, 5], [3, 5], [1, 3]])).tolist()
-    [1, 3, 5, 4, 2, 0]
-    >>> narrow(4, np.array([[0, 1], [1, 2], [2, 3]])).tolist()
-    [0, 1, 2, 3]
     """
     from scipy.sparse.csgraph import reverse_cuthill_mckee
 
@@ -84,12 +67,6 @@ def spread(points: np.ndarray, count: int) -> np.ndarray:
     """Return up to `count` particles spread over a mesh, in ascending order.
 
     Those next to the middles of parts, which are halved across their longer side.
-
-    Examples
-    --------
-    >>> line = np.arange(100.0)
-    >>> spread(np.stack([line, 0 * line], axis=1), 4).tolist()
-    [12, 37, 62, 87]
     """
     parts = [np.arange(len(points))]
     while len(parts) < count and len(points) >= 2 * len(parts):

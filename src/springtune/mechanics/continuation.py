@@ -112,21 +112,6 @@ def continued(
     The equilibrium is at `load` with displacements `last`; `before` is one shortly before. Loads are over the
     reference stiffness [m]. `farthest` is the increment behind a limit point, norm of all displacements [m]; 0 stops
     there.
-
-    Examples
-    --------
-    The arch of `springtune.mechanics.arc_length.follow`, from equilibria at 90 and 95 % of its largest load on:
-
-    >>> from springtune.mechanics.network import Network
-    >>> from springtune.mechanics.statics import StaticProblem
-    >>> from springtune.mesh.cells import Mesh
-    >>> mesh = Mesh(np.array([[-1.0, 0.0], [1.0, 0.0], [0.0, 0.1]]), np.array([[0, 1, 2]]))
-    >>> held = np.array([[True, True], [True, True], [True, False]])
-    >>> network = Network(mesh, held, (mesh.edges != [0, 1]).any(axis=1).astype(float))
-    >>> problem = StaticProblem(network, np.array([[0.0, 0.0], [0.0, 0.0], [0.0, 1.0]]))
-    >>> before, last = (problem.nonlinear(-share * 3.83e-4).displacements for share in (0.9, 0.95))
-    >>> print(f"{continued(problem, -0.95 * 3.83e-4, last, before, -5e-4).limit:.3g}")
-    -0.000383
     """
     network, limit, lost = problem.network, np.nan, np.nan
     direction = network.reduce(last - before)

@@ -84,21 +84,6 @@ class Motion(Moving):
     `inertia` (n_points,) is mass over reference stiffness [s2] and `load` (n_points, 2) force over it [m].
     `mass_damping` is alpha [1/s]. `dampers` (n_springs,) is damping along each spring over the reference stiffness
     [s]; ``beta * network.stiffness`` is Rayleigh damping by stiffness.
-
-    Examples
-    --------
-    A mass of 1 on a spring of stiffness 1: explicit steps up to 2 are stable, and the period is two pi.
-
-    >>> mesh = Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 1.0]]), np.array([[0, 1, 2]]))
-    >>> held = np.array([[True, True], [False, True], [True, True]])
-    >>> network = Network(mesh, held, (mesh.edges == [0, 1]).all(axis=1).astype(float))
-    >>> motion = Motion(network, np.ones(3), linear=True)
-    >>> round(motion.step_limit("central-difference"), 9)
-    2.0
-    >>> start = np.array([[0.0, 0.0], [0.1, 0.0], [0.0, 0.0]])
-    >>> found = motion.run("central-difference", 2 * np.pi / 1000, 1000, start)
-    >>> found.displacements[1].round(6), found.status
-    (array([0.1, 0. ]), 'moving')
     """
 
     # -- before a run -----------------------------------------------------------------------------------------------

@@ -60,21 +60,6 @@ def trace(problem: StaticProblem, weights: np.ndarray, targets: np.ndarray) -> t
         NaN where the path from rest reaches no equilibrium.
     stable : ndarray of bool, shape (n,)
         Whether the path from rest reaches the load and is stable up to there.
-
-    Examples
-    --------
-    A strip of triangles under a pull at its end: twice the load gives a little less than twice the displacement.
-
-    >>> from springtune.mechanics.network import Network
-    >>> from springtune.mesh import MESH_TYPES
-    >>> mesh = MESH_TYPES["structured"](0.1, 0.02, 5e-3)
-    >>> x = mesh.points[:, 0]
-    >>> held = np.repeat((x <= x.min())[:, None], 2, axis=1)
-    >>> pulled = np.stack([(x >= x.max()) / (x >= x.max()).sum(), 0 * x], axis=1)
-    >>> problem = StaticProblem(Network(mesh, held, np.ones(len(mesh.edges))), pulled)
-    >>> values, stable = trace(problem, pulled, np.array([1e-4, 2e-4]))
-    >>> bool(stable.all()), float((values[1] / values[0]).round(4))
-    (True, 1.9998)
     """
     path = StablePath(problem, weights, targets)
     return path.values, path.stable

@@ -63,15 +63,7 @@ class TensileTest:
 
     @classmethod
     def read(cls, path: str | Path) -> "TensileTest":
-        """Read a CSV file of stretch and nominal stress, with the unit in the column's head.
-
-        Examples
-        --------
-        >>> from springtune.problem.rubber import TensileTest
-        >>> test = TensileTest.read("config/treloar/uniaxial.csv")
-        >>> len(test.stretch), float(test.stretch.max())
-        (24, 7.6)
-        """
+        """Read a CSV file of stretch and nominal stress, with the unit in the column's head."""
         try:
             lines = read(path, LARGEST_CSV).decode("utf-8-sig").splitlines()
         except ValueError as error:

@@ -112,14 +112,6 @@ class Interpolant:
 
         `aspect_range` and `nu_range` (-1 < nu <= 0.5) are first and last values [1], equal for a function of the
         other alone; `tolerance` is the largest accepted relative error estimate [1].
-
-        Examples
-        --------
-        >>> from springtune.problem.loads import AXIAL
-        >>> found = Interpolant.build(AXIAL, (4, 6), (0.3, 0.35))
-        >>> answers = found.evaluate([4.5, 5], 0.3)
-        >>> (2 * np.array([4.5, 5]) - answers.displacement).round(3)  # what the clamp takes off the bar's
-        array([0.024, 0.024])
         """
         (first, last), (least, largest) = aspect_range, nu_range
         if not 0 < first <= last < np.inf:

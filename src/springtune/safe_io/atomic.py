@@ -62,15 +62,6 @@ def remove_unfinished(folder: str | Path, below: bool = True) -> None:
     """Remove files in a folder that killed writers left; those of running processes stay.
 
     On another machine a process counts as running if it wrote within the last hour.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     write_text(Path(folder) / "note.txt.99999999.unfinished", "half of")
-    ...     remove_unfinished(folder)
-    ...     list(Path(folder).iterdir())
-    []
     """
     for path in (Path(folder).rglob if below else Path(folder).glob)(f"*{UNFINISHED}"):
         with suppress(FileNotFoundError):  # just finished, or another run was quicker
@@ -93,16 +84,7 @@ def write_bytes(path: str | Path, content: bytes) -> None:
 
 
 def write_text(path: str | Path, text: str) -> None:
-    """Write UTF-8 text atomically; create missing folders.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     write_text(Path(folder) / "deep/note.txt", "all of it")
-    ...     (Path(folder) / "deep/note.txt").read_text()
-    'all of it'
-    """
+    """Write UTF-8 text atomically; create missing folders."""
     write_bytes(path, text.encode())
 
 
