@@ -106,7 +106,8 @@ def parse(text: str, kind: str) -> float:
     number, unit = found.groups()
     if not unit:
         raise UnitError(f"'{text}' has no unit; {remedy}")
-    known = _measure(_spelling(unit))
+    spelling = _spelling(unit)
+    known = _KNOWN.get(spelling) or _ask_pint(spelling)
     if known is None:
         near = get_close_matches(unit, COMMON[kind], n=1, cutoff=0.5)
         meant = f", did you mean '{near[0]}'?" if near else ";"
@@ -133,11 +134,6 @@ def _spelling(unit: str) -> str:
 def _article(kind: str) -> str:
     article = "an" if kind[0] in "aeiou" else "a"
     return f"{article} {kind}" if kind in QUANTITY_KINDS else kind
-
-
-def _measure(unit: str) -> tuple[str, Decimal] | None:
-    """Return kind and size in SI units of a unit; None if unknown."""
-    return _KNOWN.get(unit) or _ask_pint(unit)
 
 
 @cache

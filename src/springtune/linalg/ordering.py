@@ -54,6 +54,15 @@ def narrow(count: int, edges: np.ndarray) -> np.ndarray:
     """Return an order of particles with a small bandwidth: unchanged, or reversed Cuthill-McKee.
 
     Only changed if that at least halves the bandwidth, the largest distance of an edge's ends.
+
+    Examples
+    --------
+    A line whose particles are numbered from both ends in turns, and one that is in order:
+
+    >>> narrow(6, np.array([[0, 2], [2, 4], [4, 5], [3, 5], [1, 3]])).tolist()
+    [1, 3, 5, 4, 2, 0]
+    >>> narrow(4, np.array([[0, 1], [1, 2], [2, 3]])).tolist()
+    [0, 1, 2, 3]
     """
     from scipy.sparse.csgraph import reverse_cuthill_mckee
 

@@ -85,17 +85,11 @@ def _correct(problem: LoadedNetwork, last: Point, du: np.ndarray, ds: float, sca
 class Continuation(NamedTuple):
     """Path beyond an equilibrium.
 
-    Attributes
-    ----------
-    limit : float
-        Largest load before the path turns back with one more negative eigenvalue [m], or NaN.
-    lost : float
-        First load at which the path was unstable before it turns back [m], or NaN.
-    end : Point or None
-        Stable point at or beyond the target, the last below it before a limit point, or the one behind it that
-        regains the load.
-    inverts : bool
-        Whether a cell inverts before the path turns back or reaches the target.
+    - `limit`: Largest load before the path turns back with one more negative eigenvalue [m], or NaN.
+    - `lost`: First load at which the path was unstable before it turns back [m], or NaN.
+    - `end`: Stable point at or beyond the target, the last below it before a limit point, or the one behind it that
+      regains the load.
+    - `inverts`: Whether a cell inverts before the path turns back or reaches the target.
     """
 
     limit: float

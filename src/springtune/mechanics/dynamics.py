@@ -48,23 +48,14 @@ def masses(mesh: Mesh, density: float, thickness: float) -> np.ndarray:
 class Run:
     """Result of a run.
 
-    Attributes
-    ----------
-    displacements, velocities : ndarray of float, shape (n_points, 2)
-        Final state [m], [m/s].
-    status : str
-        ``"rest"`` (stable), ``"unstable"`` (at rest on an unstable equilibrium), ``"moving"`` (all steps done),
-        ``"diverged"`` or ``"inverted"``.
-    message : str
-        What went wrong and what to do; else empty.
-    time : float
-        [s]
-    residual : float
-        Final out-of-balance force over the load [1]; without a load, over the reference stiffness [m].
-    step_bound : float
-        Step [s] that is safe by `Motion.particle_bound`; infinite for implicit schemes.
-    samples : ndarray of float, shape (n, 4)
-        Time [s], and energy [m2] and momentum [m s] over the reference stiffness, if asked for.
+    - `displacements`, `velocities` (n_points, 2): Final state [m], [m/s].
+    - `status`: ``"rest"`` (stable), ``"unstable"`` (at rest on an unstable equilibrium), ``"moving"`` (all steps
+      done), ``"diverged"`` or ``"inverted"``.
+    - `message`: What went wrong and what to do; else empty.
+    - `time`: [s]
+    - `residual`: Final out-of-balance force over the load [1]; without a load, over the reference stiffness [m].
+    - `step_bound`: Step [s] that is safe by `Motion.particle_bound`; infinite for implicit schemes.
+    - `samples` (n, 4): Time [s], and energy [m2] and momentum [m s] over the reference stiffness, if asked for.
     """
 
     displacements: np.ndarray
@@ -211,14 +202,17 @@ class Motion(Moving):
         if name in IMPLICIT and (precision, threads) != ("float64", 1):
             raise ValueError(f"'{name}' takes its steps in double precision and one thread; give neither")
         stepper = make_stepper(self, integrator, step, precision, threads)
-        stepper.begin(*self._beginning(start, velocities))
+        shape = self.network.held.shape
+        v = np.zeros(shape) if velocities is None else np.array(velocities, dtype=float)
+        v[self.network.held] = 0.0
+        stepper.begin(np.zeros(shape) if start is None else np.array(start, dtype=float), v)
         pace = sample or (CHECK if name in EXPLICIT else 1)
         samples: list[list[float]] = []
         done = 0
         with closing(stepper):
             while True:
                 u, v = stepper.state(exact=bool(sample) or rest is not None or done >= steps)
-                end = self._end(stepper.failed, u, v, name, step, done)
+                end = self._bad_end(stepper.failed, u, v, name, step, done)
                 if end is not None:
                     u, v = stepper.state()
                     break
@@ -226,11 +220,9 @@ class Motion(Moving):
                     samples.append([done * step, self.energy(u, v), *(self.inertia * v).sum(axis=0)])
                     if watch is not None:
                         watch(done * step, u, v)
-                if rest is not None and done and self._at_rest(u, v, rest):
-                    end = self._rest_end(u, name, done)
-                    break
-                if done >= steps:
-                    end = self._moving_end(u, rest, steps)
+                at_rest = rest is not None and done > 0 and self._at_rest(u, v, rest)
+                if at_rest or done >= steps:
+                    end = self._good_end(u, name, done, at_rest, rest)
                     break
                 count = min(pace, steps - done)
                 stepper.advance(count)
@@ -238,14 +230,7 @@ class Motion(Moving):
         sampled = np.array(samples).reshape(-1, 4)
         return Run(u, v, *end, done, done * step, self.residual(u), self.step_bound(name), sampled)
 
-    def _beginning(self, start: np.ndarray | None, velocities: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
-        shape = self.network.held.shape
-        u = np.zeros(shape) if start is None else np.array(start, dtype=float)
-        v = np.zeros(shape) if velocities is None else np.array(velocities, dtype=float)
-        v[self.network.held] = 0.0
-        return u, v
-
-    def _end(
+    def _bad_end(
         self, failed: str, u: np.ndarray, v: np.ndarray, integrator: str, step: float, done: int
     ) -> tuple[str, str] | None:
         """Status and message of a failed run; None if it may go on."""
@@ -261,27 +246,21 @@ class Motion(Moving):
         """Displacement beyond which a run has left its model [m]."""
         return BLOWN_UP * np.ptp(self.network.mesh.points, axis=0).max()
 
-    def _rest_end(self, u: np.ndarray, integrator: str, done: int) -> tuple[str, str]:
-        """Status and message of a run that came to rest."""
+    def _good_end(
+        self, u: np.ndarray, integrator: str, done: int, at_rest: bool, rest: float | None
+    ) -> tuple[str, str]:
+        """Status and message of a run that came to rest, or took its last step."""
         if self.network.inverted(u):
-            return self._inverted_end(done)
-        status, message = self.judge_rest(u)
-        if status == "unstable" and integrator == "backward-euler":
-            message += ", in smaller steps, since large ones stay where they would otherwise be driven away"
-        return status, message
-
-    def _moving_end(self, u: np.ndarray, rest: float | None, steps: int) -> tuple[str, str]:
-        """Status and message after the last step of a run."""
-        if self.network.inverted(u):
-            return self._inverted_end(steps)
+            return "inverted", f"triangles are inverted after {done} steps; use less load or smaller steps"
+        if at_rest:
+            status, message = self.judge_rest(u)
+            if status == "unstable" and integrator == "backward-euler":
+                message += ", in smaller steps, since large ones stay where they would otherwise be driven away"
+            return status, message
         if rest is None:
             return "moving", ""
         residual = self.residual(u)
-        return "moving", f"not at rest after {steps} steps, residual {residual:.1e}; take more steps or other damping"
-
-    @staticmethod
-    def _inverted_end(done: int) -> tuple[str, str]:
-        return "inverted", f"triangles are inverted after {done} steps; use less load or smaller steps"
+        return "moving", f"not at rest after {done} steps, residual {residual:.1e}; take more steps or other damping"
 
     def _at_rest(self, u: np.ndarray, v: np.ndarray, rest: float) -> bool:
         if self.residual(u) > rest:

@@ -17,38 +17,25 @@ percent.
 """
 
 from functools import cached_property
-from typing import Protocol
+from typing import Any
 
 import numpy as np
 
 from ..linalg.factors import SingularError
 from ..mesh.cells import Mesh, MeshError
 from ..mesh.sheets import connected
-from .energies import Energy
 from .network import Network
 
 EVEN = 1e-6
 """Tolerance of a strip's length over its extent [1]: coordinates from files have few digits."""
 
 
-class Elastic(Protocol):
-    """Springs as a patch test needs them; `springtune.springs.Springs` fits.
+Elastic = Any
+"""Springs as patch tests need them, such as `springtune.springs.Springs`.
 
-    `relative` (n_springs,) is stiffness over the reference stiffness [1]; `lateral` is the pull on the faces over the
-    axial stress [1], or 0.
-    """
-
-    @property
-    def relative(self) -> np.ndarray:
-        """Stiffness over the reference stiffness [1]."""
-
-    @property
-    def energies(self) -> tuple[Energy, ...]:
-        """Energies besides the springs'."""
-
-    @property
-    def lateral(self) -> float:
-        """Pull on the faces over the axial stress [1]."""
+`relative` (n_springs,) is stiffness over the reference stiffness [1], `energies` are those besides the springs', and
+`lateral` is the pull on the faces over the axial stress [1], or 0.
+"""
 
 
 def ends(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:

@@ -47,24 +47,15 @@ KEEP_TANGENT = 0.03
 class Equilibrium:
     """Result of a solve.
 
-    Attributes
-    ----------
-    displacements : ndarray of float, shape (n_points, 2)
-        Displacements [m]; of the last iterate if it did not converge.
-    residual : float
-        Norm of the out-of-balance force over that of the load [1].
-    factor : Factor or None
-        Factorized tangent; at the solution if it converged.
-    error_estimate : float
-        Estimated relative error of the displacements [1], or NaN.
-    unstable_share, limit_share : float
-        Shares of the load at which the path is unstable, and at which it turns back [1], or NaN.
-    load_share : float
-        Largest share of the load with a good equilibrium [1]; 1 if it converged.
-    last : ndarray of float, shape (n_points, 2), or None
-        Displacements at that share, if below 1.
-    snapped : bool
-        Whether the path regains the load in a stable equilibrium behind the limit point.
+    - `displacements` (n_points, 2): Displacements [m]; of the last iterate if it did not converge.
+    - `residual`: Norm of the out-of-balance force over that of the load [1].
+    - `factor`: Factorized tangent; at the solution if it converged.
+    - `error_estimate`: Estimated relative error of the displacements [1], or NaN.
+    - `unstable_share`, `limit_share`: Shares of the load at which the path is unstable, and at which it turns back
+      [1], or NaN.
+    - `load_share`: Largest share of the load with a good equilibrium [1]; 1 if it converged.
+    - `last` (n_points, 2), or None: Displacements at that share, if below 1.
+    - `snapped`: Whether the path regains the load in a stable equilibrium behind the limit point.
     """
 
     displacements: np.ndarray

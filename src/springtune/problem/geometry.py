@@ -4,7 +4,7 @@ import warnings
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from .quantities import positive
+from .quantities import positive, put
 
 
 class AssumptionWarning(UserWarning):
@@ -64,11 +64,11 @@ class Beam:
 
     def __post_init__(self) -> None:
         for side in ("length", "height", "thickness"):
-            object.__setattr__(self, side, positive(getattr(self, side), "length", side))
+            put(self, **{side: positive(getattr(self, side), "length", side)})
         if not isinstance(self.name, str):
             raise ValueError(f"name: {self.name!r} is not a text; give one such as '200x40', or none")
         if not self.name:
-            object.__setattr__(self, "name", f"{1e3 * self.length:g}x{1e3 * self.height:g}")
+            put(self, name=f"{1e3 * self.length:g}x{1e3 * self.height:g}")
         warn_of_thickness(self.thickness, (self.length, self.height), f"beam {self.name!r}")
 
     @property

@@ -21,10 +21,9 @@ from dataclasses import dataclass, field
 from numbers import Real
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
-from .quantities import positive, quantity
+import numpy as np
 
-if TYPE_CHECKING:
-    import numpy as np
+from .quantities import positive, put, quantity
 
 
 @dataclass(frozen=True)
@@ -77,11 +76,8 @@ class Material:
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        _check_name(self.name)
-        set_ = object.__setattr__  # of a frozen class
-        set_(self, "young_modulus", positive(self.young_modulus, "stress", "Young's modulus"))
-        if self.density is not None:
-            set_(self, "density", positive(self.density, "density", "density"))
+        _check_label(self)
+        put(self, young_modulus=positive(self.young_modulus, "stress", "Young's modulus"))
         if not (isinstance(self.poisson_ratio, Real) and -1 < self.poisson_ratio <= 0.5):
             raise ValueError(
                 f"Poisson's ratio of {self.name!r} is {self.poisson_ratio!r}: isotropic materials have -1 < nu <= 0.5; "
@@ -98,8 +94,6 @@ class Material:
         >>> (st.Material("210 GPa", 0.3).plane_stress / 1e9).round(2).tolist()
         [[230.77, 69.23, 0.0], [69.23, 230.77, 0.0], [0.0, 0.0, 80.77]]
         """
-        import numpy as np  # here: making a material needs none
-
         modulus, nu = self.young_modulus, self.poisson_ratio
         diagonal, coupling, shear = modulus / (1 - nu**2), modulus * nu / (1 - nu**2), modulus / (2 * (1 + nu))
         return np.array([[diagonal, coupling, 0.0], [coupling, diagonal, 0.0], [0.0, 0.0, shear]])
@@ -175,14 +169,9 @@ class Rubber(Material):
             raise ValueError(
                 f"coefficients: {coefficients!r} is no law of rubber; give 1 to {MOST_TERMS} numbers in Pa"
             )
-        set_ = object.__setattr__  # of a frozen class
-        set_(self, "coefficients", tuple(map(float, given)))
-        set_(self, "young_modulus", 6 * self.coefficients[0])
-        set_(self, "poisson_ratio", 0.5)
-        set_(self, "largest", float(largest))
-        set_(self, "test_errors", tuple((_known_test(test), float(error)) for test, error in test_errors))
-        set_(self, "density", density)
-        set_(self, "name", name)
+        errors = tuple((_known_test(test), float(error)) for test, error in test_errors)
+        put(self, coefficients=tuple(map(float, given)), largest=float(largest), test_errors=errors)
+        put(self, young_modulus=6 * self.coefficients[0], poisson_ratio=0.5, density=density, name=name)
         self.__post_init__()
 
     @property
@@ -224,8 +213,6 @@ class Rubber(Material):
         >>> [round(float(st.Rubber.excess(test, 2.0)), 3) for test in ("uniaxial", "equibiaxial", "pure shear")]
         [2.0, 5.062, 2.25]
         """
-        import numpy as np  # here: making a material needs none
-
         q = np.asarray(stretch, float)
         other = {"uniaxial": q**-0.5, "equibiaxial": q, "pure shear": np.ones_like(q)}[_known_test(test)]
         return np.asarray(q**2 + other**2 + (q * other) ** -2 - 3)
@@ -257,8 +244,6 @@ class Rubber(Material):
         >>> [round(float(rubber.stress(test, 1 + 1e-6)), 3) for test in ("uniaxial", "equibiaxial", "pure shear")]
         [1.0, 2.0, 1.333]
         """
-        import numpy as np  # here: making a material needs none
-
         q, excess = np.asarray(stretch, float), self.excess(test, stretch)
         slope = np.zeros(q.shape)
         for n, c in enumerate(self.coefficients, 1):
@@ -330,13 +315,10 @@ class AnisotropicMaterial:
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        _check_name(self.name)
-        set_ = object.__setattr__  # of a frozen class
+        _check_label(self)
         for constant in CONSTANTS:
             read = positive if constant in ("C11", "C22", "C66") else quantity
-            set_(self, constant, read(getattr(self, constant), "stress", constant))
-        if self.density is not None:
-            set_(self, "density", positive(self.density, "density", "density"))
+            put(self, **{constant: read(getattr(self, constant), "stress", constant)})
         fault = indefinite(self.C11, self.C22, self.C12, self.C66, self.C16, self.C26)
         if fault:
             raise ValueError(f"material {self.name!r}: {fault}")
@@ -445,8 +427,6 @@ class AnisotropicMaterial:
         >>> [f"{one.young_modulus_x / 1e9:.1f} GPa, {one.poisson_ratio_xy:.3f}" for one in constants]
         ['54.1 GPa, 0.311', '54.1 GPa, 0.311', '54.1 GPa, 0.311']
         """
-        import numpy as np  # here: making a material needs none
-
         parts: list[tuple[AnyMaterial, np.ndarray, float]] = []
         for number, ply in enumerate(plies):
             if not (isinstance(ply, tuple | list) and len(ply) == 3 and isinstance(ply[0], ANY_MATERIAL)):
@@ -491,8 +471,6 @@ class AnisotropicMaterial:
         >>> st.AnisotropicMaterial.of(st.Material("1 MPa", 0.0).plane_stress).C66
         500000.0
         """
-        import numpy as np  # here: making a material needs none
-
         given = np.asarray(stiffness, dtype=float)
         if given.shape != (3, 3) or not np.allclose(given, given.T, rtol=1e-9, atol=1e-12 * np.abs(given).max()):
             raise ValueError(f"stiffness: {stiffness!r} is no symmetric array of shape (3, 3); give one in Pa")
@@ -509,8 +487,6 @@ class AnisotropicMaterial:
         >>> st.AnisotropicMaterial(3.0, 2.0, 0.5, 1.0, C16=0.1).plane_stress.tolist()
         [[3.0, 0.5, 0.1], [0.5, 2.0, 0.0], [0.1, 0.0, 1.0]]
         """
-        import numpy as np  # here: making a material needs none
-
         return np.array(
             [[self.C11, self.C12, self.C16], [self.C12, self.C22, self.C26], [self.C16, self.C26, self.C66]]
         )
@@ -588,16 +564,12 @@ ANY_MATERIAL = (Material, AnisotropicMaterial)
 class EngineeringConstants(NamedTuple):
     """Engineering constants of a sheet along two axes, as coupons show them.
 
-    Attributes
-    ----------
-    young_modulus_x, young_modulus_y : float
-        Young's modulus along each axis [Pa].
-    poisson_ratio_xy : float
-        Contraction along the second axis over extension along the first, pulled along the first [1].
-    shear_modulus : float
-        [Pa]
-    shear_by_x : float
-        Shear angle over extension along the first axis, pulled along it [1]; none along axes of the material.
+    - `young_modulus_x`, `young_modulus_y`: Young's modulus along each axis [Pa].
+    - `poisson_ratio_xy`: Contraction along the second axis over extension along the first, pulled along the first
+      [1].
+    - `shear_modulus`: [Pa]
+    - `shear_by_x`: Shear angle over extension along the first axis, pulled along it [1]; none along axes of the
+      material.
     """
 
     young_modulus_x: float
@@ -609,8 +581,6 @@ class EngineeringConstants(NamedTuple):
 
 def engineering_constants(stiffness: np.ndarray, angle: float = 0.0) -> EngineeringConstants:
     """Return engineering constants of a stiffness in plane stress (3, 3) [Pa], along axes turned by `angle` [rad]."""
-    import numpy as np  # here: making a material needs none
-
     compliance = np.linalg.inv(rotated(stiffness, -angle) if angle else stiffness)
     (along, coupled, sheared), across, shear = compliance[0].tolist(), float(compliance[1, 1]), float(compliance[2, 2])
     return EngineeringConstants(1 / along, 1 / across, -coupled / along, 1 / shear, sheared / along)
@@ -618,8 +588,6 @@ def engineering_constants(stiffness: np.ndarray, angle: float = 0.0) -> Engineer
 
 def rotated(stiffness: np.ndarray, angle: float) -> np.ndarray:
     """Return a stiffness in plane stress (3, 3) turned counter-clockwise by `angle` [rad]."""
-    import numpy as np  # here: making a material needs none
-
     c, s = math.cos(angle), math.sin(angle)
     # Strains along the turned axes of strains along x and y; the energy is the same.
     strains = np.array([[c * c, s * s, c * s], [s * s, c * c, -c * s], [-2 * c * s, 2 * c * s, c * c - s * s]])
@@ -677,6 +645,9 @@ def _known_test(test: str) -> str:
     return test
 
 
-def _check_name(name: object) -> None:
-    if not isinstance(name, str):
-        raise ValueError(f"name: {name!r} is not a text; give one such as 'steel', or none")
+def _check_label(material: AnyMaterial) -> None:
+    """Refuse a name that is not a text; read the density."""
+    if not isinstance(material.name, str):
+        raise ValueError(f"name: {material.name!r} is not a text; give one such as 'steel', or none")
+    if material.density is not None:
+        put(material, density=positive(material.density, "density", "density"))

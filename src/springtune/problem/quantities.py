@@ -33,6 +33,12 @@ def positive(value: float | str, kind: str, name: str) -> float:
     return number
 
 
+def put(frozen: object, **values: object) -> None:
+    """Set fields of a frozen dataclass as it is made."""
+    for name, value in values.items():
+        object.__setattr__(frozen, name, value)
+
+
 LEAST, MOST = 1e-40, 1e40
 """Quantities between which products of several stay numbers [SI units]; forces are what they are."""
 

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 from ..mesh.sides import OutlineSide, Point, Round, enclosed, extent, in_mm, meeting, turned, winds_about
 from ..registry import NAME, NAME_RULE
 from .geometry import beam_label, warn_of_thickness
-from .quantities import nearest, positive, quantity
+from .quantities import nearest, positive, put, quantity
 
 Place = tuple[float | str, float | str]
 """Coordinates [m], or texts with their unit."""
@@ -97,9 +97,9 @@ class Segment:
         def __init__(self, start: Place, centre: Place | None = None, group: str = "") -> None: ...
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "start", _place(self.start, "start of a segment"))
+        put(self, start=_place(self.start, "start of a segment"))
         if self.centre is not None:
-            object.__setattr__(self, "centre", _place(self.centre, "centre of a segment"))
+            put(self, centre=_place(self.centre, "centre of a segment"))
         _named(self.group, "group of a segment", empty=True)
 
 
@@ -147,7 +147,7 @@ class Hole:
     part: str = ""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "outline", _all_of(self.outline, Segment, "outline of a hole"))
+        put(self, outline=_all_of(self.outline, Segment, "outline of a hole"))
         _named(self.part, "part of a hole", empty=True)
         what = f"part {self.part!r}" if self.part else "hole"
         _round(self.outline, what)
@@ -261,7 +261,7 @@ class Support:
         for axis in ("x", "y"):
             if getattr(self, axis) is not None:
                 value = quantity(getattr(self, axis), "length", f"support on {self.group!r}, {axis}")
-                object.__setattr__(self, axis, value)
+                put(self, **{axis: value})
         if self.x is None and self.y is None:
             raise ValueError(f"support on {self.group!r}: holds neither x nor y; give x=0, y=0 or both")
 
@@ -299,7 +299,7 @@ class Traction:
     def __post_init__(self) -> None:
         _named(self.group, "group of a traction")
         force = _vector(self.force, "force", f"traction on {self.group!r}, force", "('4 kN', 0)")
-        object.__setattr__(self, "force", force)
+        put(self, force=force)
 
 
 @dataclass(frozen=True)
@@ -337,12 +337,12 @@ class Pressure:
 
     def __post_init__(self) -> None:
         _named(self.group, "group of a pressure")
-        object.__setattr__(self, "pressure", quantity(self.pressure, "stress", f"pressure on {self.group!r}"))
+        put(self, pressure=quantity(self.pressure, "stress", f"pressure on {self.group!r}"))
         if not isinstance(self.follower, bool):
             raise ValueError(f"pressure on {self.group!r}, follower: {self.follower!r}; give True or False")
 
 
-COMPONENTS = {
+COMPONENTS: dict[str, tuple[str, ...]] = {
     "displacement": ("x", "y"),
     "reaction": ("x", "y"),
     "stress": ("xx", "yy", "xy"),
@@ -409,7 +409,7 @@ class Quantity:
         what = f"quantity {self.name!r}"
         if self.kind not in COMPONENTS:
             raise ValueError(f"{what}: unknown kind {self.kind!r}; {nearest(str(self.kind), COMPONENTS)}")
-        components: tuple[str, ...] = COMPONENTS[self.kind]
+        components = COMPONENTS[self.kind]
         if components:
             _named(self.of, f"{what}, of")
             if self.component not in components:
@@ -420,7 +420,7 @@ class Quantity:
             kind = {"displacement": "length", "reaction": "force", "stress": "stress"}.get(self.kind)
             if kind is None and isinstance(self.expected, str):
                 raise ValueError(f"{what}, expected: {self.expected!r}; give a number in SI units")
-            object.__setattr__(self, "expected", quantity(self.expected, kind or "length", f"{what}, expected"))
+            put(self, expected=quantity(self.expected, kind or "length", f"{what}, expected"))
         if not isinstance(self.source, str):
             raise ValueError(f"{what}, source: {self.source!r} is not a text; give one")
 
@@ -467,20 +467,16 @@ class LoadCase:
     def __post_init__(self) -> None:
         _named(self.name, "load")
         what = f"load {self.name!r}"
-        for name, kind in (
-            ("supports", Support),
-            ("tractions", Traction),
-            ("pressures", Pressure),
-            ("quantities", Quantity),
-        ):
-            object.__setattr__(self, name, _all_of(getattr(self, name), kind, f"{what}, {name}"))
+        kinds = {"supports": Support, "tractions": Traction, "pressures": Pressure, "quantities": Quantity}
+        for name, kind in kinds.items():
+            put(self, **{name: _all_of(getattr(self, name), kind, f"{what}, {name}")})
         try:
             gravity = tuple(float(one) for one in self.gravity)
         except (TypeError, ValueError):
             gravity = ()
         if len(gravity) != 2 or not all(map(math.isfinite, gravity)):
             raise ValueError(f"{what}, gravity: {self.gravity!r}; give x and y such as (0, -9.81), in m/s2")
-        object.__setattr__(self, "gravity", gravity)
+        put(self, gravity=gravity)
         if not self.supports:
             raise ValueError(f"{what}: has no supports, so nothing keeps the body in its place; add some")
         for axis in ("x", "y"):
@@ -625,12 +621,12 @@ class Shape:
     def __post_init__(self) -> None:
         _named(self.name, "shape")
         what = f"shape {self.name!r}"
-        object.__setattr__(self, "thickness", positive(self.thickness, "length", f"{what}, thickness"))
-        object.__setattr__(self, "unit", positive(self.unit, "length", f"{what}, unit"))
-        object.__setattr__(self, "outline", _all_of(self.outline, Segment, f"{what}, outline"))
-        object.__setattr__(self, "holes", _all_of(self.holes, Hole, f"{what}, holes"))
+        put(self, thickness=positive(self.thickness, "length", f"{what}, thickness"))
+        put(self, unit=positive(self.unit, "length", f"{what}, unit"))
+        put(self, outline=_all_of(self.outline, Segment, f"{what}, outline"))
+        put(self, holes=_all_of(self.holes, Hole, f"{what}, holes"))
         points = {name: _place(point, f"{what}, point {name!r}") for name, point in dict(self.points).items()}
-        object.__setattr__(self, "points", points)
+        put(self, points=points)
         for name, load in dict(self.loads).items():
             _all_of([load], LoadCase, f"{what}, loads")
             if name != load.name:
@@ -646,7 +642,7 @@ class Shape:
             return
         try:
             self._check_rounds()
-            object.__setattr__(self, "points", {name: self._placed(name, point) for name, point in points.items()})
+            put(self, points={name: self._placed(name, point) for name, point in points.items()})
             for load in self.loads.values():
                 load.check_names(self.groups, self.points)
         except ValueError as error:
@@ -686,7 +682,7 @@ class Shape:
                 raise ValueError(f"{inside[0]}: is inside {other_what}, where nothing is; remove one of them")
         if enclosed(sides) < 0:
             back = tuple(Segment(one.start, one.centre, one.group) for one in turned(sides))
-            object.__setattr__(self, "outline", back)
+            put(self, outline=back)
         names = set(self.groups) & set(self.points)
         if names:
             raise ValueError(f"{sorted(names)[0]!r} names a point and sides; rename one of them")

@@ -68,21 +68,14 @@ class FiniteStrainError(ReferenceNotConvergedError):
 class FiniteStrainSolution:
     """Displacements of a beam at finite strain.
 
-    Attributes
-    ----------
-    displacement : float
-        Displacement of the load, see `springtune.problem.loads` [m].
-    mean_displacement : float
-        Mean displacement of the loaded side along the force [m].
-    error_estimate : float
-        Relative difference to the coarser mesh, several times the error, plus the errors of Newton's method and
-        rounding. Under pressure twice the larger one of the middle and the mean.
-    positions, profile : ndarray of float, shape (n,)
-        Places on the loaded side over its length [1], ascending, and displacements there along the force [m].
-    x, y : ndarray of float, shape (n_x,) and (n_y,)
-        Grid of the field at rest [m], denser near the corners.
-    displacements : ndarray of float, shape (n_x, n_y, 2)
-        Displacements on the grid [m].
+    - `displacement`: Displacement of the load, see `springtune.problem.loads` [m].
+    - `mean_displacement`: Mean displacement of the loaded side along the force [m].
+    - `error_estimate`: Relative difference to the coarser mesh, several times the error, plus the errors of
+      Newton's method and rounding. Under pressure twice the larger one of the middle and the mean.
+    - `positions`, `profile` (n,): Places on the loaded side over its length [1], ascending, and displacements there
+      along the force [m].
+    - `x`, `y` (n_x,) and (n_y,): Grid of the field at rest [m], denser near the corners.
+    - `displacements` (n_x, n_y, 2): Displacements on the grid [m].
     """
 
     displacement: float

@@ -77,18 +77,12 @@ class Answers:
 class Interpolant:
     """Answers of the unit problems of one kind of load over a box of aspect ratios and Poisson's ratios.
 
-    Attributes
-    ----------
-    aspect_range, nu_range : tuple of float
-        First and last aspect ratio and Poisson's ratio [1].
-    values : ndarray of float, shape (4, n_aspect, n_nu)
-        At the nodes, last to first, in the order of `NAMES`: logarithms of displacement and mean displacement, of 1
-        plus rotation over strain (rotation can be zero), and of the strain.
-    error_estimate : float
-        Bound on the relative error of each displacement [1]: `SAFETY` times the largest difference at the checks, and
-        the largest error estimate of the solves.
-    solves : int
-        Number of unit problems solved, with checks.
+    - `aspect_range`, `nu_range`: First and last aspect ratio and Poisson's ratio [1].
+    - `values` (4, n_aspect, n_nu): At the nodes, last to first, in the order of `NAMES`: logarithms of displacement
+      and mean displacement, of 1 plus rotation over strain (rotation can be zero), and of the strain.
+    - `error_estimate`: Bound on the relative error of each displacement [1]: `SAFETY` times the largest difference
+      at the checks, and the largest error estimate of the solves.
+    - `solves`: Number of unit problems solved, with checks.
     """
 
     kind: LoadKind

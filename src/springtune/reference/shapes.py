@@ -49,19 +49,14 @@ Field = Callable[[np.ndarray, np.ndarray], np.ndarray]
 class ShapeReference:
     """Converged displacements of a shape under a load case.
 
-    Attributes
-    ----------
-    values : dict of str to float
-        Quantities of interest, in SI units; exactly zero if less than ten times their error bound, as by symmetry.
-    error_estimates : dict of str to float
-        Relative error bounds [1]: over the value, or over a thousandth of the body's largest value of its kind if
-        that is larger.
-    energy : float
-        Strain energy [J].
-    rotation, strain : float
-        Rotation [rad] and strain [1] that limit its use, see `springtune.reference.answers`.
-    negligible : tuple of str
-        Quantities below a thousandth of the largest of their kind, whose relative errors are meaningless.
+    - `values`: Quantities of interest, in SI units; exactly zero if less than ten times their error bound, as by
+      symmetry.
+    - `error_estimates`: Relative error bounds [1]: over the value, or over a thousandth of the body's largest value
+      of its kind if that is larger.
+    - `energy`: Strain energy [J].
+    - `rotation`, `strain`: Rotation [rad] and strain [1] that limit its use, see `springtune.reference.answers`.
+    - `negligible`: Quantities below a thousandth of the largest of their kind, whose relative errors are
+      meaningless.
     """
 
     values: dict[str, float]

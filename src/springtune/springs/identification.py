@@ -35,17 +35,24 @@ class Case:
     displacements: np.ndarray
 
 
+def tested_body(mesh: Mesh) -> np.ndarray:
+    """Directions to hold of the free body of a patch test, shape (n_points, 2); refuse a mesh of several parts."""
+    from ..mechanics.moduli import free_body  # here: see `springtune.springs`
+
+    try:
+        return free_body(mesh)
+    except MeshError as error:
+        raise DefinitionError(f"{error}; or take 'van-gelder', which needs no test") from None
+
+
 def patch_cases(mesh: Mesh, material: AnyMaterial, thickness: float) -> list[Case]:
     """Return tension along x and y and shear of the free mesh under even tractions; exact displacements are known.
 
     `thickness` is in m.
     """
-    from ..mechanics.moduli import free_body, outline_forces  # here: see `springtune.springs`
+    from ..mechanics.moduli import outline_forces  # here: see `springtune.springs`
 
-    try:
-        free_body(mesh)
-    except MeshError as error:
-        raise DefinitionError(f"{error}; or take 'van-gelder', which needs no test") from None
+    tested_body(mesh)
     x, y = mesh.points.T
     corner = _first_least(x + y)
     held = np.zeros(mesh.points.shape, dtype=bool)
