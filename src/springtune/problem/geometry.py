@@ -2,9 +2,8 @@
 
 import warnings
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-from .quantities import positive, put
+from .quantities import Number, positive, put
 
 
 class AssumptionWarning(UserWarning):
@@ -51,16 +50,10 @@ class Beam:
     Beam(length=0.2, height=0.04, thickness=0.001, name='200x40')
     """
 
-    length: float
-    height: float
-    thickness: float = 1e-3
+    length: Number
+    height: Number
+    thickness: Number = 1e-3
     name: str = ""
-
-    if TYPE_CHECKING:  # what it takes, where what it holds are numbers
-
-        def __init__(
-            self, length: float | str, height: float | str, thickness: float | str = 1e-3, name: str = ""
-        ) -> None: ...
 
     def __post_init__(self) -> None:
         for side in ("length", "height", "thickness"):

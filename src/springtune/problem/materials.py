@@ -19,11 +19,11 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from numbers import Real
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from .quantities import positive, put, quantity
+from .quantities import Number, positive, put, quantity
 
 
 @dataclass(frozen=True)
@@ -59,21 +59,11 @@ class Material:
     Material(young_modulus=210000000000.0, poisson_ratio=0.3, density=7850.0, name='steel')
     """
 
-    young_modulus: float
+    young_modulus: Number
     poisson_ratio: float
-    density: float | None = None
+    density: Number | None = None
     name: str = "material"
     isotropic: ClassVar[bool] = True
-
-    if TYPE_CHECKING:  # what it takes, where what it holds are numbers
-
-        def __init__(
-            self,
-            young_modulus: float | str,
-            poisson_ratio: float,
-            density: float | str | None = None,
-            name: str = "material",
-        ) -> None: ...
 
     def __post_init__(self) -> None:
         _check_label(self)
@@ -161,7 +151,7 @@ class Rubber(Material):
         coefficients: Sequence[float],
         largest: float = math.inf,
         test_errors: Sequence[tuple[str, float]] = (),
-        density: float | str | None = None,
+        density: Number | None = None,
         name: str = "rubber",
     ) -> None:
         given = list(coefficients)
@@ -290,29 +280,15 @@ class AnisotropicMaterial:
     [[9.0, 1.5, 0.0], [1.5, 4.0, 0.0], [0.0, 0.0, 2.0]]
     """
 
-    C11: float
-    C22: float
-    C12: float
-    C66: float
-    C16: float = 0.0
-    C26: float = 0.0
-    density: float | None = None
+    C11: Number
+    C22: Number
+    C12: Number
+    C66: Number
+    C16: Number = 0.0
+    C26: Number = 0.0
+    density: Number | None = None
     name: str = "material"
     isotropic: ClassVar[bool] = False
-
-    if TYPE_CHECKING:  # what it takes, where what it holds are numbers
-
-        def __init__(
-            self,
-            C11: float | str,
-            C22: float | str,
-            C12: float | str,
-            C66: float | str,
-            C16: float | str = 0.0,
-            C26: float | str = 0.0,
-            density: float | str | None = None,
-            name: str = "material",
-        ) -> None: ...
 
     def __post_init__(self) -> None:
         _check_label(self)
@@ -326,12 +302,12 @@ class AnisotropicMaterial:
     @classmethod
     def orthotropic(
         cls,
-        young_modulus_x: float | str,
-        young_modulus_y: float | str,
+        young_modulus_x: Number,
+        young_modulus_y: Number,
         poisson_ratio_xy: float,
-        shear_modulus: float | str,
-        angle: float | str = 0.0,
-        density: float | str | None = None,
+        shear_modulus: Number,
+        angle: Number = 0.0,
+        density: Number | None = None,
         name: str = "material",
     ) -> AnisotropicMaterial:
         """Make a material with two axes, such as a ply of fibres, from engineering constants.
@@ -389,8 +365,8 @@ class AnisotropicMaterial:
     @classmethod
     def laminate(
         cls,
-        plies: Sequence[tuple[AnyMaterial, float | str, float | str]],
-        density: float | str | None = None,
+        plies: Sequence[tuple[AnyMaterial, Number, Number]],
+        density: Number | None = None,
         name: str = "laminate",
     ) -> AnisotropicMaterial:
         """Make one sheet of bonded plies: the mean of their stiffnesses by thickness.
@@ -443,9 +419,7 @@ class AnisotropicMaterial:
         return cls.of(np.sum([part / total * turned for _, turned, part in parts], axis=0), density, name)
 
     @classmethod
-    def of(
-        cls, stiffness: np.ndarray, density: float | str | None = None, name: str = "material"
-    ) -> AnisotropicMaterial:
+    def of(cls, stiffness: np.ndarray, density: Number | None = None, name: str = "material") -> AnisotropicMaterial:
         """Make a material from a stiffness in plane stress.
 
         Parameters
@@ -491,7 +465,7 @@ class AnisotropicMaterial:
             [[self.C11, self.C12, self.C16], [self.C12, self.C22, self.C26], [self.C16, self.C26, self.C66]]
         )
 
-    def rotated(self, angle: float | str) -> AnisotropicMaterial:
+    def rotated(self, angle: Number) -> AnisotropicMaterial:
         """Return the material, turned counter-clockwise in the sheet.
 
         Parameters
@@ -520,7 +494,7 @@ class AnisotropicMaterial:
         turned = rotated(self.plane_stress, quantity(angle, "angle", "angle"))
         return AnisotropicMaterial.of(turned, self.density, self.name)
 
-    def constants_at(self, angle: float | str = 0.0) -> EngineeringConstants:
+    def constants_at(self, angle: Number = 0.0) -> EngineeringConstants:
         """Return the engineering constants along turned axes, as of a coupon cut out at that angle.
 
         Parameters

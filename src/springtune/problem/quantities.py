@@ -3,6 +3,10 @@
 import math
 from collections.abc import Iterable
 from difflib import get_close_matches
+from typing import Any
+
+Number = float | Any
+"""A number in SI units, for which a text with its unit may be given as well."""
 
 
 def quantity(value: float | str, kind: str, name: str) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..safe_io.inputs import LARGEST_CSV, read
 from .materials import MOST_TERMS, RUBBER_TESTS, Rubber
-from .quantities import positive
+from .quantities import Number, positive
 
 LEAST_SHARE = 0.05
 """Share of the largest stress below which errors are relative to it: small stresses are read off coarsely."""
@@ -131,7 +131,7 @@ def fit_rubber(
     equibiaxial: TensileTest | str | Path | None = None,
     pure_shear: TensileTest | str | Path | None = None,
     terms: int = MOST_TERMS,
-    density: float | str | None = None,
+    density: Number | None = None,
     name: str = "rubber",
 ) -> Rubber:
     """Fit Yeoh's law to a uniaxial test, and compare it with other tests.

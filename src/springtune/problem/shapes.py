@@ -17,15 +17,15 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..mesh.sides import OutlineSide, Point, Round, enclosed, extent, in_mm, meeting, turned, winds_about
 from ..registry import NAME, NAME_RULE
 from .geometry import beam_label, warn_of_thickness
-from .quantities import nearest, positive, put, quantity
+from .quantities import Number, nearest, positive, put, quantity
 
-Place = tuple[float | str, float | str]
-"""Coordinates [m], or texts with their unit."""
+Place = tuple[Number, Number]
+"""Coordinates [m]."""
 
 ON_SIDE = 1e-6
 """Distance from a side at which a named point is put on it, over the extent of the shape: coordinates are rounded."""
@@ -88,13 +88,9 @@ class Segment:
     Segment(start=(0.02, 0.0), centre=None, group='lower')
     """
 
-    start: Point
-    centre: Point | None = None
+    start: Place
+    centre: Place | None = None
     group: str = ""
-
-    if TYPE_CHECKING:  # what it takes, where what it holds are numbers
-
-        def __init__(self, start: Place, centre: Place | None = None, group: str = "") -> None: ...
 
     def __post_init__(self) -> None:
         put(self, start=_place(self.start, "start of a segment"))
@@ -159,7 +155,7 @@ class Hole:
             )
 
     @classmethod
-    def circle(cls, centre: Place, radius: float | str, group: str | None = None, part: str = "") -> "Hole":
+    def circle(cls, centre: Place, radius: Number, group: str | None = None, part: str = "") -> "Hole":
         """Make a circle of four arcs.
 
         Parameters
@@ -189,8 +185,8 @@ class Hole:
     def ellipse(
         cls,
         centre: Place,
-        across: float | str,
-        along: float | str,
+        across: Number,
+        along: Number,
         group: str | None = None,
         part: str = "",
     ) -> "Hole":
@@ -249,12 +245,8 @@ class Support:
     """
 
     group: str
-    x: float | None = None
-    y: float | None = None
-
-    if TYPE_CHECKING:
-
-        def __init__(self, group: str, x: float | str | None = None, y: float | str | None = None) -> None: ...
+    x: Number | None = None
+    y: Number | None = None
 
     def __post_init__(self) -> None:
         _named(self.group, "group of a support")
@@ -290,11 +282,7 @@ class Traction:
     """
 
     group: str
-    force: tuple[float, float]
-
-    if TYPE_CHECKING:
-
-        def __init__(self, group: str, force: tuple[float | str, float | str]) -> None: ...
+    force: tuple[Number, Number]
 
     def __post_init__(self) -> None:
         _named(self.group, "group of a traction")
@@ -328,12 +316,8 @@ class Pressure:
     """
 
     group: str
-    pressure: float
+    pressure: Number
     follower: bool = False
-
-    if TYPE_CHECKING:
-
-        def __init__(self, group: str, pressure: float | str, follower: bool = False) -> None: ...
 
     def __post_init__(self) -> None:
         _named(self.group, "group of a pressure")
@@ -389,20 +373,8 @@ class Quantity:
     kind: str
     of: str = ""
     component: str = ""
-    expected: float | None = None
+    expected: Number | None = None
     source: str = ""
-
-    if TYPE_CHECKING:
-
-        def __init__(
-            self,
-            name: str,
-            kind: str,
-            of: str = "",
-            component: str = "",
-            expected: float | str | None = None,
-            source: str = "",
-        ) -> None: ...
 
     def __post_init__(self) -> None:
         _named(self.name, "quantity")
@@ -596,27 +568,13 @@ class Shape:
     """
 
     name: str
-    thickness: float
-    outline: tuple[Segment, ...] = ()
-    holes: tuple[Hole, ...] = ()
-    points: Mapping[str, Point] = field(default_factory=dict)
+    thickness: Number
+    outline: Sequence[Segment] = ()
+    holes: Sequence[Hole] = ()
+    points: Mapping[str, Place] = field(default_factory=dict)
     loads: Mapping[str, LoadCase] = field(default_factory=dict)
     file: str = ""
-    unit: float = 1.0
-
-    if TYPE_CHECKING:
-
-        def __init__(
-            self,
-            name: str,
-            thickness: float | str,
-            outline: Iterable[Segment] = (),
-            holes: Iterable[Hole] = (),
-            points: Mapping[str, Place] = ...,
-            loads: Mapping[str, LoadCase] = ...,
-            file: str = "",
-            unit: float | str = 1.0,
-        ) -> None: ...
+    unit: Number = 1.0
 
     def __post_init__(self) -> None:
         _named(self.name, "shape")
@@ -819,9 +777,9 @@ class Shape:
     @classmethod
     def rectangle(
         cls,
-        length: float | str,
-        height: float | str,
-        thickness: float | str = 1e-3,
+        length: Number,
+        height: Number,
+        thickness: Number = 1e-3,
         name: str = "",
         holes: Iterable[Hole] = (),
         points: Mapping[str, Place] | None = None,
