@@ -11,8 +11,7 @@ import numpy as np
 from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import cg
 
-from ..linalg.factors import Factor, factorize
-from ..linalg.ordering import narrow
+from ..linalg.factors import Factor, factorize, narrow
 from .integrators import EXPLICIT, LAGGED, BackwardEuler
 from .network import Network
 
