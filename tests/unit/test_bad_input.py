@@ -574,8 +574,8 @@ class TestDatasets:
 
     @pytest.mark.parametrize("name", ["an external link", "stored outside of the file", "a virtual dataset"])
     def test_data_of_other_files_are_refused_wherever_a_dataset_is_opened(self, path, name, monkeypatch):
-        from springtune.studies.paper.datasets import PaperError
-        from springtune.studies.paper.datasets import read as for_paper
+        from springtune.studies.paper import PaperError
+        from springtune.studies.paper.numbers import read as for_paper
 
         monkeypatch.chdir(path.parent)
         shutil.copy(path, path.with_name("other.nc"))

@@ -29,12 +29,12 @@ def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 def following(field: np.ndarray) -> np.ndarray:
     """Values at the next corner of each."""
-    return np.roll(field, -1, axis=-2)
+    return field.take(range(1 - field.shape[-2], 1), axis=-2)
 
 
 def preceding(field: np.ndarray) -> np.ndarray:
     """Values at the corner before each."""
-    return np.roll(field, 1, axis=-2)
+    return field.take(range(-1, field.shape[-2] - 1), axis=-2)
 
 
 def _products(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -152,7 +152,7 @@ class Network:
 
     def stretch(self, displacements: np.ndarray) -> np.ndarray:
         """Difference of the displacements of each spring's ends [m], shape (n_springs, 2)."""
-        return displacements[self.second] - displacements[self.first]
+        return displacements.take(self.second, axis=0) - displacements.take(self.first, axis=0)
 
     def gather(self, forces: np.ndarray) -> np.ndarray:
         """Unknowns' share of spring forces, shape (n_springs, 2), that pull the first end towards the second."""

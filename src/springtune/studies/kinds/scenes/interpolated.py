@@ -10,8 +10,7 @@ from springtune.problem.loads import LOADS
 from springtune.reference.answers import unit_problem
 from springtune.springs import DEFINITIONS
 
-from ...config.remembered import once_a_study
-from ...config.shown import keeps_fields, shown
+from ...config.model import keeps_fields, once_a_study, shown
 
 if TYPE_CHECKING:
     from springtune.problem.geometry import Beam
