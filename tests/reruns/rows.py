@@ -320,7 +320,7 @@ CODE = {
         {"nonlinear": 1, "laying": 4, "contrast": 1},
     ),
     "definition of a laid strip": ("springs/area.py", "", f"laying {AFTER}", {"laying": 1}),
-    "definition that is not asked for": ("springs/annealed.py", "", "", {}),
+    "definition that is not asked for": ("springs/searched.py", "", "", {}),
     "mesh type": ("mesh/rows.py", "", f"mesh {SOLVING}", NETWORKS | {"mesh": 4, "nonlinear": 24}),
     "mesh type that is not asked for": ("mesh/free.py", "", "", {}),
     "paths": ("mechanics/series.py", "", CURVES, {"curve": 16}),
