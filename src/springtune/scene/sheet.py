@@ -145,6 +145,12 @@ class Loading:
     dead: np.ndarray | None = None
 
 
+def box_loading(mesh: Mesh, kind: LoadKind, follower: bool = False) -> Loading:
+    """Load of 1 N on a box; with `follower` it turns with its side."""
+    turning = FollowerPressure.of_side(mesh, *loaded_edges(mesh, kind)) if follower else None
+    return Loading((kind, follower), held(mesh, kind), weights(mesh, kind), follower=turning)
+
+
 @dataclass(frozen=True)
 class Solution:
     """An equilibrium of a network, judged.
@@ -224,6 +230,7 @@ class Sheet:
         self.held = cache(lambda kind: held(mesh, kind))
         self.weights = cache(lambda kind: weights(mesh, kind))
         self.measured = cache(lambda kind: measured(mesh, kind))
+        self.loading = cache(lambda kind, follower=False: box_loading(mesh, kind, follower))
         self.references: dict[tuple[object, ...], Any] = {}
         self._most = networks
         self._derived: tuple[tuple[object, ...], Springs, float] | None = None
@@ -234,69 +241,51 @@ class Sheet:
     def derive(
         self,
         definition: AnyDefinition,
-        material: AnyMaterial,
+        material: AnyMaterial | Mapping[str, AnyMaterial],
         stiffness: float | None = None,
-        case: tuple[LoadKind, float, np.ndarray | None] | None = None,
+        case: tuple[LoadKind | Loading, float, np.ndarray | None] | None = None,
+        grouped: GroupedMesh | None = None,
     ) -> tuple[Springs, float]:
-        """Springs of a definition.
+        """Springs of a definition, and the seconds that deriving them took; the last ones are kept.
 
         Parameters
         ----------
+        material : Material, AnisotropicMaterial or mapping of str to those
+            By part of `grouped` where there are several.
         stiffness : float, optional
-            Uniform stiffness [N/m], for definitions that are told one.
-        case : tuple of LoadKind, float and ndarray, optional
-            For definitions that are told cases: load, force [N] and displacements for 1 N that the network should have
-            [m/N], shape (n_points, 2), or None where there are none; even tension and shear of the mesh itself without.
+            Uniform stiffness [N/m], for definitions that need one.
+        case : tuple of LoadKind or Loading, float and ndarray, optional
+            For definitions that are fitted to cases: load, its factor and the displacements that the network should
+            have for a factor of 1, shape (n_points, 2), or None where there are none. Without a case the definition is
+            fitted to even tension and shear of the mesh itself.
         """
         definition = definition_of(definition)
-        key: tuple[object, ...] = definition, material, stiffness
+        by_part = material if isinstance(material, Mapping) else {"": material}
+        first, *others = by_part.values()
         given: float | list[Case] | None = stiffness
-        if definition.needs == "cases":
-            given = patch_cases(self.mesh, material, self.thickness) if case is None else self._cases(*case)
-            key += case[:2] if case else ()
+        key: tuple[object, ...] = definition, tuple(by_part.items()), grouped if others else None, stiffness
+        if definition.needs == "cases" and case is None:
+            given = patch_cases(self.mesh, first, self.thickness)
+        elif definition.needs == "cases" and case is not None:
+            loading, factor, field = self._loading(case[0]), *case[1:]
+            if field is None:
+                raise DefinitionError("needs the reference's displacements, and there are none")
+            given = [Case(loading.held, factor * loading.pattern, factor * field)]
+            key += loading.key, factor
         elif definition.needs == "stiffness" and stiffness is None:
             raise DefinitionError("needs a uniform stiffness, and there is none; give one in N/m")
-        return self._once(key, lambda: definition.springs(self.mesh, material, self.thickness, given))
-
-    def derive_on_shape(
-        self,
-        definition: Definition | OwnDefinition,
-        materials: Mapping[str, AnyMaterial],
-        grouped: GroupedMesh,
-        stiffness: float | None = None,
-        cases: list[Case] | None = None,
-        case_key: tuple[object, ...] = (),
-    ) -> tuple[Springs, float]:
-        """As `derive`, of a body of any outline and of one material or more.
-
-        Parameters
-        ----------
-        stiffness : float, optional
-            Uniform stiffness [N/m], for definitions that are told one.
-        """
-        given = cases if definition.needs == "cases" else stiffness
-        key = definition, grouped, tuple(materials.items()), stiffness, case_key if definition.needs == "cases" else ()
-        if len(materials) == 1:
-            (material,) = materials.values()
-            return self._once(key, lambda: definition.springs(self.mesh, material, self.thickness, given))
-        from ..springs.parts import derive_by_parts  # here: most bodies are of one material
-
-        return self._once(key, lambda: derive_by_parts(definition, grouped, materials, self.thickness, given))
-
-    def _once(self, key: tuple[object, ...], make: Callable[[], Springs]) -> tuple[Springs, float]:
-        """Springs, and the seconds that deriving them took: the last ones are kept."""
         if self._derived is None or self._derived[0] != key:
             begin = time.perf_counter()
-            springs = make()
+            if others and grouped is not None:
+                from ..springs.parts import derive_by_parts  # here: most bodies are of one material
+
+                springs = derive_by_parts(definition, grouped, by_part, self.thickness, given)
+            else:
+                springs = definition.springs(self.mesh, first, self.thickness, given)
             seconds = time.perf_counter() - begin
             self.deriving += seconds
             self._derived = key, springs, seconds
         return self._derived[1], self._derived[2]
-
-    def _cases(self, kind: LoadKind, force: float, field: np.ndarray | None) -> list[Case]:
-        if field is None:
-            raise DefinitionError("needs the reference's displacements, and there are none")
-        return [Case(self.held(kind), force * self.weights(kind), force * field)]
 
     def network(self, directions: np.ndarray, springs: Springs) -> Network:
         """Network of springs, some of its directions held.
@@ -326,29 +315,26 @@ class Sheet:
         self._networks[name] = network, problems  # the last one used is the last one to go
         return network, problems
 
-    def pattern(self, kind: LoadKind, springs: Springs) -> np.ndarray:
-        """Forces of a load of 1, those that go with the springs included [1], shape (n_points, 2)."""
-        pattern = self.weights(kind)
+    def _loading(self, load: LoadKind | Loading, follower: bool = False) -> Loading:
+        return load if isinstance(load, Loading) else self.loading(load, follower)
+
+    def pattern(self, load: LoadKind | Loading, springs: Springs) -> np.ndarray:
+        """Forces of a load for a factor of 1, those that go with the springs included, shape (n_points, 2)."""
+        pattern = self._loading(load).pattern
         if springs.lateral:
             pattern = pattern + springs.lateral / np.ptp(self.mesh.points[:, 1]) * lateral_forces(self.mesh)
         return pattern
 
-    def problem(self, kind: LoadKind, springs: Springs, follower: bool = False) -> StaticProblem:
-        """Static problem of springs under a load."""
-        network, problems = self._known(self.held(kind), springs)
-        label = (kind, springs.lateral, follower)
-        if label not in problems:
-            turning = FollowerPressure.of_side(self.mesh, *loaded_edges(self.mesh, kind)) if follower else None
-            problems[label] = StaticProblem(network, self.pattern(kind, springs), turning)
-        return problems[label]
-
-    def stated(self, loading: Loading, springs: Springs) -> StaticProblem:
-        """Static problem of springs under any loading; at ``s = 1 / springs.reference`` it is the whole load."""
+    def problem(self, load: LoadKind | Loading, springs: Springs, follower: bool = False) -> StaticProblem:
+        """Static problem of springs under a load; its factor is over the reference stiffness."""
+        loading = self._loading(load, follower)
         network, problems = self._known(loading.held, springs)
-        label = loading.key, None if loading.given is None else springs.reference
+        label = loading.key, springs.lateral, None if loading.given is None else springs.reference
         if label not in problems:
             given = None if loading.given is None else springs.reference * loading.given
-            problems[label] = StaticProblem(network, loading.pattern, loading.follower, dead=loading.dead, given=given)
+            problems[label] = StaticProblem(
+                network, self.pattern(loading, springs), loading.follower, dead=loading.dead, given=given
+            )
         return problems[label]
 
     def solve(

@@ -237,7 +237,7 @@ class Scene:
         >>> scene.displacement_of(0.01 * scene.mesh.points).__round__(12)
         0.002
         """
-        return self.statement.displacement(self.sheet, displacements)
+        return self.statement.displacement(displacements)
 
     @property
     def held(self) -> np.ndarray:
@@ -251,7 +251,7 @@ class Scene:
         >>> scene.held.sum().item()
         20
         """
-        return self.statement.held(self.sheet)
+        return self.statement.loading.held
 
     @property
     def forces(self) -> np.ndarray:
@@ -275,7 +275,7 @@ class Scene:
     @property
     def problem(self) -> StaticProblem:
         """Network under the pattern of the load."""
-        return self.statement.problem(self.sheet, self.springs)
+        return self.sheet.problem(self.statement.loading, self.springs)
 
     def solve(self) -> "Result":
         """Equilibrium under the force.
@@ -324,7 +324,7 @@ class Scene:
             solution.displacement,
             time.perf_counter() - begin,
             derived,
-            self.statement.values(self.sheet, springs, solution),
+            self.statement.values(springs, solution),
         )
 
     @property
