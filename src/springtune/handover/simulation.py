@@ -15,7 +15,7 @@ from ..mechanics.network import Network
 from ..mechanics.statics import SingularError, StaticProblem
 from ..mesh import Mesh
 from ..problem.status import Status
-from .terms import Terms
+from .terms import Net
 
 STEP_SHARE = 0.8
 """Step that is written, over the largest stable one at rest, in equilibrium and where the net swings to on its way:
@@ -29,23 +29,6 @@ WORDS = {
     "compressible": "rubber",
 }
 """What energies besides springs are of, by their kind."""
-
-
-@dataclass(frozen=True, eq=False)
-class Net:
-    """A network as plain arrays; the attributes are those of `springtune.SpringNet`, the header with the thickness."""
-
-    points: np.ndarray
-    springs: np.ndarray
-    rest_lengths: np.ndarray
-    stiffness: np.ndarray
-    held: np.ndarray
-    forces: np.ndarray
-    triangles: np.ndarray
-    quads: np.ndarray
-    energies: tuple[Terms, ...]
-    header: Mapping[str, Any]
-    masses: np.ndarray | None = None
 
 
 class EquilibriumWarning(UserWarning):

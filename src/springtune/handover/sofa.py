@@ -12,7 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .simulation import Net, Simulation, about, commented, numbers, simulate
+from .simulation import Simulation, about, commented, numbers, simulate
+from .terms import Net
 
 PERIOD = 50
 """Steps of the slowest period that the load excites: backward Euler damps it by 6 % of the critical damping."""

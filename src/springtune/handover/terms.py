@@ -1,8 +1,11 @@
-"""Energies besides springs, as plain arrays."""
+"""A network as plain arrays, and the energies besides its springs."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
+
+from ..mesh.cells import no_cells
 
 FORMULAS = {
     "area": "W = 1/2 modulus (A - rest_area)^2 / rest_area of each cell, A its area",
@@ -64,3 +67,21 @@ class Terms:
     def units(self) -> dict[str, str]:
         """Unit of each of the values."""
         return VALUES[self.kind]
+
+
+@dataclass(frozen=True, eq=False)
+class Net:
+    """A network as plain arrays; `springtune.SpringNet` has what they are."""
+
+    points: np.ndarray
+    springs: np.ndarray
+    rest_lengths: np.ndarray
+    stiffness: np.ndarray
+    energies: tuple[Terms, ...]
+    masses: np.ndarray | None
+    thickness: float
+    held: np.ndarray
+    forces: np.ndarray
+    header: dict[str, Any]
+    triangles: np.ndarray = field(default_factory=lambda: no_cells(3))
+    quads: np.ndarray = field(default_factory=lambda: no_cells(4))

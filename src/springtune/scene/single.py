@@ -301,20 +301,15 @@ class Scene:
         >>> print(f"{result.status}: {1e3 * result.displacement:.4f} mm")
         solved: 0.3780 mm
         """
-        begin = time.perf_counter()
+        begin, derived = time.perf_counter(), None
         try:
             springs, derived = self._derived
-        except SingularError as error:  # of the patch test that scales springs
-            seconds = time.perf_counter() - begin
-            return Result(self, None, Status.FAILED, str(error), np.nan, np.nan, 0.0, seconds, self.statement.none())
-        begin = time.perf_counter()
-        try:
+            begin = time.perf_counter()
             solution = self.statement.solve(self.sheet, springs)
-        except SingularError as error:
+        except SingularError as error:  # of the network, or of the patch test that scales springs
             seconds = time.perf_counter() - begin
-            return Result(
-                self, None, Status.FAILED, str(error), np.nan, np.nan, seconds, derived, self.statement.none()
-            )
+            times = (0.0, seconds) if derived is None else (seconds, derived)
+            return Result(self, None, Status.FAILED, str(error), np.nan, np.nan, *times, self.statement.none())
         return Result(
             self,
             solution.equilibrium,
