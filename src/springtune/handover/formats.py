@@ -391,13 +391,7 @@ def write_vtu_with(
     of_springs: Mapping[str, np.ndarray],
     numbers: Mapping[str, float] | None = None,
 ) -> None:
-    """Write a net, and more data of its particles and springs, for ParaView.
-
-    Parameters
-    ----------
-    of_particles : mapping of str to ndarray, shape (n_points,) or (n_points, 2)
-    of_springs : mapping of str to ndarray of float, shape (n_springs,)
-    """
+    """Write a net for ParaView, with more data of its particles, (n_points,) or (n_points, 2), and of its springs."""
     arrays = arrays_of(net)
     data = {new: arrays[old] for old, new in POINT_NAMES.items() if old in arrays}
     data["held"] = data["held"].astype(np.int8)

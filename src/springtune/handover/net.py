@@ -35,7 +35,7 @@ from ..problem.quantities import positive
 from ..problem.status import Status
 from ..scene.meshes import A_BEAM, A_MATERIAL, A_MESH, check_filled, is_a
 from ..scene.motion import stable_steps
-from ..scene.sheet import AnyDefinition, OwnDefinition, Sheet, check_stiffness, definition_of, named
+from ..scene.sheet import AnyDefinition, Sheet, check_stiffness, definition_of, named
 from ..scene.single import Scene
 from ..scene.statements import ShapeStatement
 from ..springs import Definition, DefinitionError, Springs
@@ -307,13 +307,7 @@ class SpringNet(Net):
 
 
 def terms(energy: Energy, reference: float) -> Terms:
-    """Energy of a network as plain arrays.
-
-    Parameters
-    ----------
-    reference : float
-        Reference stiffness that its moduli are over [N/m].
-    """
+    """Energy of a network as plain arrays; its moduli are over `reference` [N/m]."""
     points, corners = energy.points, energy.corners
     values: dict[str, np.ndarray]
     if isinstance(energy, AreaEnergy):
@@ -378,7 +372,7 @@ def _merged(given: list[Terms]) -> tuple[Terms, ...]:
 
 
 def _parts(
-    definition: Definition | OwnDefinition,
+    definition: Definition,
     sheet: Sheet,
     materials: Sequence[AnyMaterial],
     springs: Springs,
@@ -436,7 +430,7 @@ def _beam(beam: Beam) -> dict[str, Any]:
     return {"name": beam.name, "length": beam.length, "height": beam.height, "thickness": beam.thickness}
 
 
-def described(definition: Definition | OwnDefinition) -> tuple[str, str]:
+def described(definition: Definition) -> tuple[str, str]:
     """Formula of a definition in words, and where it comes from."""
     function = inspect.unwrap(definition.function)
     own = inspect.getdoc(function) or ""
@@ -448,7 +442,7 @@ def described(definition: Definition | OwnDefinition) -> tuple[str, str]:
 
 def _expected_errors(
     sheet: Sheet,
-    definition: Definition | OwnDefinition,
+    definition: Definition,
     springs: Springs,
     beam: Beam,
     material: Material,

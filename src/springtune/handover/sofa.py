@@ -44,15 +44,7 @@ class Component(NamedTuple):
 
 
 class SofaScene(NamedTuple):
-    """What a scene has, in the order in which SOFA is to make it.
-
-    Attributes
-    ----------
-    step : float
-        [s]
-    root, sheet, predicted : list of Component
-        Of the three nodes; the sheet's first two are the integrator, whose class goes by the version, and its solver.
-    """
+    """Nodes of a scene in SOFA's order; the first two components of `sheet` are integrator and solver; step in s."""
 
     step: float
     about: list[str]
@@ -130,10 +122,7 @@ def add_integrator(root, sheet):
 
 
 def sofa_python(net: Net) -> str:
-    """Scene of a net for SOFA v24.06 and later with SofaPython3, in Python.
-
-    Parameters and errors as of `sofa_xml`.
-    """
+    """Scene of a net for SOFA v24.06 and later with SofaPython3, in Python; errors as of `sofa_xml`."""
     scene = _scene(net)
     said = "\n".join(f"# {line}" for line in scene.about)
     entries = {

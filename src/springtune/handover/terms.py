@@ -43,15 +43,11 @@ OF_CORNERS = ("rest_angle", "rest_length", "tensile", "coupling", "rest_weight")
 
 @dataclass(frozen=True, eq=False)
 class Terms:
-    """Energies of one kind, besides the springs': a row for each cell.
+    """Energies of one kind besides the springs: a row for each cell.
 
-    Attributes
-    ----------
-    cells : ndarray of int, shape (n_cells, n_corners)
-        Particles of each cell, counter-clockwise: all triangles of a net, or all of its quadrilaterals.
-    values : dict of str to ndarray of float, shape (n_cells,) or (n_cells, n_corners)
-        By the names of `VALUES`; those of sides are of the side opposite each corner, and `coupling` of the two
-        sides that meet in it.
+    `cells` (n_cells, n_corners) are particles, counter-clockwise: all triangles of a net, or all of its quadrilaterals.
+    `values`, by the names of `VALUES`, have shape (n_cells,) or (n_cells, n_corners). Values of sides are of the side
+    opposite to each corner, and `coupling` of the two sides that meet in it.
     """
 
     kind: str

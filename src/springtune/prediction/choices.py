@@ -75,13 +75,7 @@ References = dict[str, ReferenceSolution | str]
 
 
 class QuantityReference(NamedTuple):
-    """What a quantity of interest of a shape is.
-
-    Attributes
-    ----------
-    error_estimate : float
-        Relative [1].
-    """
+    """A quantity of interest of a shape by finite elements, and its relative error estimate [1]."""
 
     value: float
     error_estimate: float
@@ -309,10 +303,9 @@ def beam_statements(
 
 
 def best_first(choices: Iterable[Choice], known: References | ShapeReferences) -> list[Choice]:
-    """Choices of a mesh, the best one by its worst error first.
+    """Choices of a mesh, the least worst error first.
 
-    Errors that differ by less than the references are sure of are equal. Of these come springs alone first, then names
-    in the order of the alphabet.
+    Errors that differ by less than the error estimates count as equal: then springs alone come first, then names.
     """
     return in_order(choices, lambda one: one.worst, lambda one: (one.energies, one.definition), as_sure_as(known))
 
@@ -350,7 +343,7 @@ def only_load(shape: Shape, load: str | None) -> str:
 def shape_references(statement: ShapeStatement) -> ShapeReferences:
     """References of the quantities of interest of a shape under a load case.
 
-    One that has none, such as the stress at a corner, does not cost the others theirs.
+    A quantity without a reference, such as the stress at a corner, leaves the others theirs.
     """
     from ..reference.shapes import solve_each  # here, since finite elements take half a second to import
 
@@ -369,13 +362,7 @@ def shape_references(statement: ShapeStatement) -> ShapeReferences:
 
 
 def displacement_of(sheet: Sheet, springs: Springs, kind: LoadKind) -> float | str:
-    """Displacement of a load for a force of the springs' reference stiffness times a metre, linear kinematics.
-
-    Returns
-    -------
-    float or str
-        [1]; or why there is none.
-    """
+    """Displacement [1] under the springs' reference stiffness times 1 m, linear kinematics; or why there is none."""
     try:
         found = sheet.solve(kind, springs, springs.reference, "linear")
     except SingularError as error:
@@ -384,13 +371,7 @@ def displacement_of(sheet: Sheet, springs: Springs, kind: LoadKind) -> float | s
 
 
 def error_of(displacement: float | str, springs: Springs, load: str, known: ReferenceSolution | str) -> float | str:
-    """Error of springs under a load: what `Choice.errors` has, and the header of a `springtune.SpringNet`.
-
-    Returns
-    -------
-    float or str
-        [1]; NaN where there is no reference; why the network has no displacement.
-    """
+    """Error under a load [1], NaN without a reference; or why the network has no displacement."""
     if isinstance(displacement, str):
         return displacement
     if isinstance(known, str):
@@ -401,23 +382,9 @@ def error_of(displacement: float | str, springs: Springs, load: str, known: Refe
 class Trial:
     """Definitions solved on a mesh, under loads of a beam or a load case of a shape; equal springs once.
 
-    Parameters
-    ----------
-    statements : list of Statement
-        Of one mesh, in linear kinematics.
-    known : dict
-        References by load of a beam, or by quantity of interest of a shape.
-    among : iterable of str, optional
-        Definitions to try; all that are worth a choice without.
-
-    Attributes
-    ----------
-    names : list of str
-        Definitions that give springs here, equal springs once.
-    same : dict of str to str
-        For each definition that gives springs, the one of `names` with equal springs.
-    failures : dict of str to dict of str to str
-        For each definition that gives none, as `Choice.failures`.
+    `statements` are of one mesh, in linear kinematics; `known` are references by load of a beam or by quantity of a
+    shape; `among` restricts the definitions. `names` are the definitions with springs, equal springs once; `same` has
+    the one of `names` for each definition with springs; `failures` are as of `Choice`, for each definition without.
     """
 
     def __init__(

@@ -251,13 +251,7 @@ class MeshSearch:
 
 
 def asked_error(value: float | str) -> float:
-    """Error that is to be kept [1].
-
-    Examples
-    --------
-    >>> asked_error("1 %"), asked_error(0.01)
-    (0.01, 0.01)
-    """
+    """Error to keep [1], of a number or a text such as "1 %"."""
     number = math.nan
     if isinstance(value, str):
         text = value.strip()
@@ -371,20 +365,7 @@ def find_shape_mesh(
 ) -> MeshSearch:
     """As `find_mesh`, of a shape: all quantities of a load case keep the error.
 
-    Parameters
-    ----------
-    load : str, optional
-        Of the shape; its only one without.
-    make : callable, optional
-        From a mesh size [m] to a mesh; `springtune.mesh_shape` of the shape without.
-
-    Examples
-    --------
-    >>> import springtune as st
-    >>> study = st.load_study("config/shapes.yaml")
-    >>> best = st.find_mesh(study.shape("cook"), study.material("third"), "2 %", load="shear").best
-    >>> best.confirmed, best.choice.worst <= 0.02
-    (True, True)
+    `make` makes a mesh of a size [m]; `springtune.mesh_shape` by default.
     """
     is_a(shape, Shape, "shape", A_SHAPE)
     if shape.file:
@@ -444,18 +425,9 @@ def _searched(
 class _Family:
     """Meshes of a body that differ in their size.
 
-    Attributes
-    ----------
-    side : float
-        Smaller side of the body, which no mesh size exceeds [m].
-    one_cell : float
-        Mesh size of one cell across it [m].
-    particles : callable
-        From a mesh size [m] to the number of particles, about.
-    statements : callable
-        From a mesh size [m] to the statements on its mesh, one for each load.
-    stretch : callable or None
-        From a mesh size [m] to the stretch of the cells; None where it does not depend on the size.
+    `side` is the smaller side of the body [m], which no mesh size exceeds; `one_cell` the mesh size of one cell across
+    it. From a mesh size [m] come about how many `particles`, `statements` on the mesh, and the `stretch` of its cells,
+    if it depends on the size.
     """
 
     name: str
@@ -653,10 +625,10 @@ class _Search:
         return [cells for cells in whole if name in self._tried[cells].errors]
 
     def _promising(self, name: str) -> bool:
-        """Whether a definition may keep the error on the finest mesh, as far as the last ones tell.
+        """Whether a definition may keep the error on the finest mesh, by its last errors.
 
-        An error that changes in proportion to the mesh size changes from n cells to m by the 1 - n/m of what it changed
-        by from n/2 to n, and by less if in proportion to a higher power.
+        An error in proportion to the mesh size changes from n cells to m by 1 - n/m of its change from n/2 to n, and by
+        less if in proportion to a higher power.
         """
         on = self._on(name)
         doubling = self._doubling(name)

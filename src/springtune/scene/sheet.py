@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
+from math import inf
 from typing import Any, TypeVar
 
 import numpy as np
@@ -29,63 +30,19 @@ NETWORKS = 6
 """Factorized networks of a mesh that are kept: scenes come in an order in which few are enough."""
 
 
-@dataclass(frozen=True)
-class OwnDefinition:
-    """A function of one's own in the place of a definition of `springtune.springs.DEFINITIONS`.
-
-    Attributes
-    ----------
-    function : callable
-        (mesh, material, thickness) -> Springs.
-    """
-
-    function: Callable[..., Springs]
-    uniform: bool = False
-    uniaxial: bool = False
-    needs: str = ""
-    finite_strain: bool = False
-
-    @property
-    def name(self) -> str:
-        """What it is called in messages."""
-        return getattr(self.function, "__name__", type(self.function).__name__)
-
-    def springs(self, mesh: Mesh, material: AnyMaterial, thickness: float, given: object = None) -> Springs:
-        """Springs of a mesh, checked."""
-        found = self.function(mesh, material, thickness)
-        if not isinstance(found, Springs):
-            raise DefinitionError(f"returns {type(found).__name__}; return springtune.Springs(reference, relative)")
-        if np.shape(found.relative) != (len(mesh.edges),) or not found.reference > 0:
-            raise DefinitionError(
-                f"returns {np.shape(found.relative)} stiffnesses over {found.reference!r} N/m; return one for each of "
-                f"the {len(mesh.edges)} edges of the mesh, over a reference stiffness above zero"
-            )
-        return found
-
-
-AnyDefinition = str | Definition | OwnDefinition | Callable[..., Springs]
+AnyDefinition = str | Definition | Callable[..., Springs]
 """Definition by its name, or a function of one's own."""
 
 Entry = TypeVar("Entry")
 
 
-def definition_of(definition: AnyDefinition) -> Definition | OwnDefinition:
-    """Definition by its name, or of a function of one's own.
-
-    Parameters
-    ----------
-    definition : str, Definition or callable
-        Key of `springtune.springs.DEFINITIONS`, or (mesh, material, thickness) -> Springs.
-
-    Examples
-    --------
-    >>> definition_of("lattice").name
-    'lattice'
-    """
-    if isinstance(definition, Definition | OwnDefinition):
+def definition_of(definition: AnyDefinition) -> Definition:
+    """Definition by its name, or of a function (mesh, material, thickness) -> Springs."""
+    if isinstance(definition, Definition):
         return definition
     if callable(definition):
-        return OwnDefinition(definition)
+        name = getattr(definition, "__name__", type(definition).__name__)
+        return Definition(name, definition, inf, False, (3, 4), False, "", True, False)
     return chosen(DEFINITIONS, definition, "definition")
 
 
@@ -96,7 +53,7 @@ def chosen(known: Mapping[str, Entry], name: object, what: str) -> Entry:
     raise ValueError(f"{what}: {name!r} is unknown; {nearest(str(name), known)}")
 
 
-def check_stiffness(definition: Definition | OwnDefinition, stiffness: object) -> None:
+def check_stiffness(definition: Definition, stiffness: object) -> None:
     """Refuse a definition that lacks the uniform stiffness that it is told, or has one that it does not use."""
     if (definition.needs == "stiffness") == (stiffness is not None):
         return
@@ -111,7 +68,7 @@ def check_stiffness(definition: Definition | OwnDefinition, stiffness: object) -
 
 
 @contextmanager
-def named(definition: Definition | OwnDefinition) -> Iterator[None]:
+def named(definition: Definition) -> Iterator[None]:
     """Context in which a definition that refuses a mesh or material is named."""
     try:
         yield
@@ -121,20 +78,10 @@ def named(definition: Definition | OwnDefinition) -> Iterator[None]:
 
 @dataclass(frozen=True, eq=False)
 class Loading:
-    """What a load does to the particles of a mesh.
+    """What a load of factor 1 does to the particles of a mesh; arrays have shape (n_points, 2).
 
-    Attributes
-    ----------
-    held : ndarray of bool, shape (n_points, 2)
-        Directions that cannot move, or move as they are told.
-    pattern : ndarray of float, shape (n_points, 2)
-        Forces at rest for a factor of 1 [N].
-    given : ndarray of float, shape (n_points, 2), or None
-        Prescribed displacements for a factor of 1 [m]; None where there are none.
-    follower : FollowerPressure or None
-        Forces that turn with their sides for a factor of 1 [N].
-    dead : ndarray of float, shape (n_points, 2), or None
-        The pattern without those; None where they are all of it, or none.
+    `held` directions are fixed or moved by `given` [m]. `pattern` are the forces at rest [N], of which `dead` keep
+    their direction and `follower` turns with its sides; `dead` is None where the pattern is all of one sort.
     """
 
     key: tuple[object, ...]
@@ -155,14 +102,9 @@ def box_loading(mesh: Mesh, kind: LoadKind, follower: bool = False) -> Loading:
 class Solution:
     """An equilibrium of a network, judged.
 
-    Attributes
-    ----------
-    load : float
-        Force over the reference stiffness [m].
-    negative_pivots : int or float
-        Negative eigenvalues of the tangent; NaN where there is no equilibrium, or the tangent is singular.
-    displacement : float
-        Of the load [m], or the first quantity of a load case; NaN where there is no equilibrium.
+    `load` is the factor of the loading over the reference stiffness. `displacement` is that of the load [m], or the
+    first quantity of a load case. `negative_pivots` counts negative eigenvalues of the tangent. Both are NaN without
+    equilibrium.
     """
 
     problem: StaticProblem
@@ -177,15 +119,7 @@ class Solution:
 def solved(
     problem: StaticProblem, load: float, kinematics: str, displacement: Callable[[np.ndarray], float]
 ) -> Solution:
-    """Equilibrium of a problem, judged.
-
-    Parameters
-    ----------
-    load : float
-        Force over the reference stiffness [m].
-    displacement : callable
-        What is read from displacements of the particles [m], shape (n_points, 2).
-    """
+    """Equilibrium of a problem, judged; `displacement` reads its value from displacements [m], (n_points, 2)."""
     found = problem.linear(load) if kinematics == "linear" else problem.nonlinear(load)
     status, message, pivots = problem.judge(load, found)
     value = displacement(found.displacements) if found.converged else np.nan
@@ -193,25 +127,19 @@ def solved(
 
 
 class Sheet:
-    """A meshed sheet on which scenes are solved.
+    """A meshed sheet of a thickness [m], on which scenes are solved.
 
     Networks that differ in their reference stiffness alone are assembled and factorized once; networks with the same
     directions held share their numbering of unknowns; the springs derived last are kept for further loads.
 
-    Parameters
-    ----------
-    thickness : float
-        Of the sheet [m].
-
     Attributes
     ----------
-    held, weights, measured : callable
-        Of a kind of load, see `springtune.problem.boundary`: directions held, pattern of the forces, and weights of the
-        displacements that make its displacement; each computed once.
+    held, weights, measured, loading : callable
+        Of a kind of load, see `springtune.problem.boundary`; each computed once.
     deriving : float
-        Seconds that deriving springs has taken so far.
+        Seconds spent on deriving springs so far.
     references : dict
-        Those of load cases of a shape that have been solved.
+        Solved references of load cases of a shape.
 
     Examples
     --------
@@ -248,16 +176,9 @@ class Sheet:
     ) -> tuple[Springs, float]:
         """Springs of a definition, and the seconds that deriving them took; the last ones are kept.
 
-        Parameters
-        ----------
-        material : Material, AnisotropicMaterial or mapping of str to those
-            By part of `grouped` where there are several.
-        stiffness : float, optional
-            Uniform stiffness [N/m], for definitions that need one.
-        case : tuple of LoadKind or Loading, float and ndarray, optional
-            For definitions that are fitted to cases: load, its factor and the displacements that the network should
-            have for a factor of 1, shape (n_points, 2), or None where there are none. Without a case the definition is
-            fitted to even tension and shear of the mesh itself.
+        A mapping has the materials by part of `grouped`. `case`, for definitions that are fitted to cases, is the load,
+        its factor and the wanted displacements for a factor of 1, or None if there are none; by default the definition
+        is fitted to even tension and shear of the mesh itself.
         """
         definition = definition_of(definition)
         by_part = material if isinstance(material, Mapping) else {"": material}
@@ -288,13 +209,7 @@ class Sheet:
         return self._derived[1], self._derived[2]
 
     def network(self, directions: np.ndarray, springs: Springs) -> Network:
-        """Network of springs, some of its directions held.
-
-        Parameters
-        ----------
-        directions : ndarray of bool, shape (n_points, 2)
-            True where a particle cannot move in x or y.
-        """
+        """Network of springs that is held in some `directions`, shape (n_points, 2)."""
         return self._known(directions, springs)[0]
 
     def _known(
@@ -340,13 +255,7 @@ class Sheet:
     def solve(
         self, kind: LoadKind, springs: Springs, force: float, kinematics: str, follower: bool = False
     ) -> Solution:
-        """Equilibrium of springs under a force, judged.
-
-        Parameters
-        ----------
-        force : float
-            With its sign [N].
-        """
+        """Equilibrium of springs under a force with its sign [N], judged."""
         problem = self.problem(kind, springs, follower)
         return solved(problem, force / springs.reference, kinematics, lambda moved: self.displacement(kind, moved))
 

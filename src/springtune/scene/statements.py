@@ -36,7 +36,7 @@ from ..problem.shapes import LoadCase, Quantity, Shape
 from ..reference.limits import beyond_linear
 from ..springs import Definition, DefinitionError, Springs
 from .meshes import A_BEAM, A_MATERIAL, A_MESH, A_SHAPE, check_filled, check_meshed, is_a
-from .sheet import Loading, OwnDefinition, Sheet, Solution, box_loading, chosen, solved
+from .sheet import Loading, Sheet, Solution, box_loading, chosen, solved
 
 if TYPE_CHECKING:
     from ..reference.finite_strain import FiniteStrainSolution
@@ -52,16 +52,8 @@ A_GROUPED_MESH = "springtune.mesh_shape(shape, '5 mm')"
 class Statement(ABC):
     """A body under a load: what is held and loaded, what is read, and the reference.
 
-    Attributes
-    ----------
-    label : str
-        Load in words.
-    force : float
-        Factor of `loading`: of a beam the force with its sign [N], of a shape 1.
-    size : float
-        Size of the load: of a beam the force [N], of a shape the scale [1].
-    case : LoadCase
-        Supports, forces and quantities of interest, on groups of `grouped`.
+    `force` is the factor of `loading`: the force on a beam with its sign [N], 1 of a shape. `size` is the size of the
+    load: the force [N], or the scale of a load case [1].
     """
 
     body: str
@@ -92,7 +84,7 @@ class Statement(ABC):
         return ", ".join(dict.fromkeys(one.name for one in self.materials))
 
     @abstractmethod
-    def check(self, definition: Definition | OwnDefinition) -> None:
+    def check(self, definition: Definition) -> None:
         """Refuse a definition that is not for the body or the load."""
 
     @abstractmethod
@@ -112,9 +104,7 @@ class Statement(ABC):
         found = cast("ReferenceSolution | ShapeReference", self.reference(sheet))
         return beyond_linear(found.rotation, found.strain)
 
-    def springs(
-        self, sheet: Sheet, definition: Definition | OwnDefinition, stiffness: float | None
-    ) -> tuple[Springs, float]:
+    def springs(self, sheet: Sheet, definition: Definition, stiffness: float | None) -> tuple[Springs, float]:
         """Springs of a definition, and the seconds that deriving them took."""
         case = (self.loading, self.force, self._unit_field(sheet)) if definition.needs == "cases" else None
         return sheet.derive(definition, self.by_part, stiffness, case, self.grouped)
@@ -222,7 +212,7 @@ class BeamStatement(Statement):
         self.grouped = loaded_box(mesh, self.kind)
         self.loading = box_loading(mesh, self.kind, self.follower)
 
-    def check(self, definition: Definition | OwnDefinition) -> None:
+    def check(self, definition: Definition) -> None:
         """Refuse a definition that is not for the load."""
         if definition.uniaxial and not self.kind.uniaxial:
             raise ValueError(
@@ -336,7 +326,7 @@ class ShapeStatement(Statement):
                     "stress has a jump there; ask for it on one side"
                 )
 
-    def check(self, definition: Definition | OwnDefinition) -> None:
+    def check(self, definition: Definition) -> None:
         """Refuse a definition that is for beams alone."""
         if definition.uniaxial:
             raise ValueError(
@@ -349,9 +339,7 @@ class ShapeStatement(Statement):
                 "prescribes displacements; choose another definition, or a load of forces"
             )
 
-    def springs(
-        self, sheet: Sheet, definition: Definition | OwnDefinition, stiffness: float | None
-    ) -> tuple[Springs, float]:
+    def springs(self, sheet: Sheet, definition: Definition, stiffness: float | None) -> tuple[Springs, float]:
         """Springs of a definition, and the seconds that deriving them took."""
         springs, seconds = super().springs(sheet, definition, stiffness)
         if springs.lateral:
@@ -454,13 +442,7 @@ def _solve_finite(
 
 
 def unit_reference(beam: Beam, material: Material, kind: LoadKind, force: float) -> "ReferenceSolution":
-    """Reference under a force, solved once for all beams, materials and forces that differ by factors.
-
-    Parameters
-    ----------
-    force : float
-        [N]
-    """
+    """Reference under a force [N], solved once for all beams, materials and forces that differ by factors."""
     from ..reference.similarity import unit_problem, unit_scales
 
     length, displacement = unit_scales(beam, material, kind)
