@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 
 from ..mesh import MESH_TYPES, Mesh, read_beam_mesh
-from ..mesh.box import box_fault
-from ..mesh.group_files import read_shape as read_grouped
+from ..mesh.formats import read_shape as read_grouped
 from ..mesh.groups import GroupedMesh
 from ..mesh.outlines import mesh_shape as mesh_outlined
+from ..mesh.sheets import box_fault
+from ..mesh.sides import OutlineSide, in_mm
 from ..problem.boundary import part_names
 from ..problem.geometry import Beam
 from ..problem.materials import AnisotropicMaterial, AnyMaterial, Material, only_isotropic
-from ..problem.outlines import OutlineSide, in_mm
 from ..problem.quantities import positive
 from ..problem.shapes import Shape
 from .sheet import chosen

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from ..mechanics.follower import FollowerPressure
-from ..mechanics.network import Network
+from ..mechanics.network import FollowerPressure, Network
 from ..mesh import Mesh
 from ..mesh.groups import GroupedMesh
 from ..problem.boundary import (
     cell_at,
+    check_case,
     displacement_weights,
     followed,
     forces,
@@ -27,13 +27,12 @@ from ..problem.boundary import (
     reaction_weights,
     supported,
 )
-from ..problem.cases import check_case
 from ..problem.geometry import Beam, warn_of_thickness
 from ..problem.loads import LOADS, LoadKind
 from ..problem.materials import ANY_MATERIAL, AnyMaterial, Material, Rubber
 from ..problem.quantities import positive
 from ..problem.shapes import LoadCase, Quantity, Shape
-from ..reference.limits import beyond_linear
+from ..reference.answers import beyond_linear
 from ..springs import Definition, DefinitionError, Springs
 from .meshes import A_BEAM, A_MATERIAL, A_MESH, A_SHAPE, check_filled, check_meshed, is_a
 from .sheet import Loading, Sheet, Solution, box_loading, chosen, solved
@@ -443,7 +442,7 @@ def _solve_finite(
 
 def unit_reference(beam: Beam, material: Material, kind: LoadKind, force: float) -> "ReferenceSolution":
     """Reference under a force [N], solved once for all beams, materials and forces that differ by factors."""
-    from ..reference.similarity import unit_problem, unit_scales
+    from ..reference.answers import unit_problem, unit_scales
 
     length, displacement = unit_scales(beam, material, kind)
     return _solve_unit(*unit_problem(beam, material, kind)).scaled(force * displacement, length)
