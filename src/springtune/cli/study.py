@@ -4,6 +4,7 @@ import inspect
 import json
 import os
 from pathlib import Path
+from string import Template
 from typing import TYPE_CHECKING
 
 import click
@@ -17,66 +18,6 @@ from .run import checkout_here, checkout_of_run, how_to_get_one
 
 if TYPE_CHECKING:
     from pydantic.fields import FieldInfo
-
-TEMPLATE = """\
-{schema}# `springtune scenes {path}` says what this study asks for, `springtune run {path}` does it.
-# Every quantity carries its unit. Names of beams, materials and grids are yours; {manual} explains every key.
-title: "{title}"
-beams:
-  100x20: {{length: 100 mm, height: 20 mm, thickness: 1 mm}}
-materials:
-  steel: {{young_modulus: 210 GPa, poisson_ratio: 0.3}}
-grids:  # all combinations of the values of a grid are its scenes; [5 mm, 2 mm] are two values
-  pulled:
-    beam: 100x20
-    mesh_type: structured  # or {mesh_types}
-    mesh_size: 5 mm
-    material: steel
-    load: traction  # or {loads}
-    force: 20 kN
-    definition: [lattice, patch]  # rules for the stiffness of springs: `springtune definitions` lists them
-outputs: [sensitivity, deformed, tables]
-"""
-
-SHAPE_TEMPLATE = """\
-{schema}# `springtune scenes {path}` says what this study asks for, `springtune run {path}` does it.
-# Every quantity carries its unit. Names of shapes, groups, loads, quantities, materials and grids are yours;
-# {manual} explains every key.
-title: "{title}"
-materials:
-  steel: {{young_modulus: 210 GPa, poisson_ratio: 0.3}}
-shapes:
-  plate:
-    thickness: 1 mm
-    outline:  # sides from corner to corner, counter-clockwise, each of a group; with a `centre` it is an arc
-      - {{from: [0, 0], group: lower}}
-      - {{from: [100 mm, 0], group: right}}
-      - {{from: [100 mm, 40 mm], group: upper}}
-      - {{from: [0, 40 mm], group: left}}
-    holes: [{{circle: {{centre: [50 mm, 20 mm], radius: 8 mm}}, group: hole}}]
-    # file: plate.msh  # a mesh file, with groups of its own, in the place of outline, holes, points and refined
-    points: {{top: [50 mm, 28 mm]}}  # particles of every mesh, to be held, loaded or asked for
-    refined: {{hole: 0.5}}  # edges there, over the mesh size
-    loads:
-      pull:
-        supports: {{left: fixed}}  # or displacements by group or point: {{x: 0 mm}} leaves y free
-        forces: {{right: [4 kN, 0]}}  # along x and y, spread over the group
-        # pressures: {{hole: 1 MPa}}  # towards the body; gravity: [0, -9.81 m/s^2] needs densities
-        quantities:  # what is asked; errors are theirs
-          stretch: {{displacement: x, of: right}}
-          peak: {{stress: xx, at: top}}
-shape_grids:  # all combinations of the values of a grid are its scenes; [8 mm, 4 mm] are two values
-  plate:
-    shape: plate
-    mesh_size: [8 mm, 4 mm]
-    material: steel
-    definition: [lattice, patch]  # rules for the stiffness of springs: `springtune definitions` lists them
-    kinematics: linear  # small strain; nonlinear: springs keep their length law
-outputs: [shapes, tables]
-"""
-
-LOADS_BY_FORCE = ("compression", "bending", "shear")
-"""Loads that a person is told of first; all take a force."""
 
 
 @click.command(
@@ -92,8 +33,6 @@ def new(study: str, shape: bool) -> None:
     STUDY is its name, or the path of its file. A name alone becomes config/<name>.yaml in a checkout, and <name>.yaml
     elsewhere. What is there already is never overwritten.
     """
-    from ..safe_io.atomic import write_text
-
     path = _path(study)
     if not NAME.fullmatch(path.stem):
         raise WrongCall(f"'{path.stem}' cannot name a study; {NAME_RULE}")
@@ -102,7 +41,7 @@ def new(study: str, shape: bool) -> None:
     if not path.parent.is_dir():
         raise click.ClickException(f"{path.parent}: there is no such folder; make it, or name another")
     try:
-        write_text(path, template_text(path, SHAPE_TEMPLATE if shape else TEMPLATE))
+        write_text(path, template_text(path, "shape" if shape else "beam"))
     except OSError as error:
         raise click.ClickException(
             f"{path}: cannot be written: {error.strerror or error}; name another place"
@@ -127,20 +66,19 @@ def _path(given: str) -> Path:
     return path
 
 
-def template_text(path: Path, template: str = TEMPLATE) -> str:
-    """Text of a study to begin with."""
+def template_text(path: Path, body: str) -> str:
+    """Text of a study of a beam or of a shape to begin with."""
     from ..mesh import MESH_TYPES
 
     schema = _beside(path, SCHEMA)
     words = path.stem.replace("-", " ").replace("_", " ").strip() or path.stem
-    return template.format(
-        schema=f"# yaml-language-server: $schema={schema}\n" if schema else "",
-        manual="config/README.md",
+    template = Template(Path(__file__).with_name(f"study_of_a_{body}.yaml").read_text())
+    text = template.substitute(
         path=path.as_posix(),
         title=words[0].upper() + words[1:],
         mesh_types=", ".join(name for name in MESH_TYPES if name.isalpha() and name != "structured"),
-        loads=", ".join(LOADS_BY_FORCE),
     )
+    return f"# yaml-language-server: $schema={schema}\n{text}" if schema else text
 
 
 def _beside(path: Path, name: str) -> str | None:

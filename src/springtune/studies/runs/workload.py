@@ -49,38 +49,22 @@ class Estimate:
     products: list[Path] = field(default_factory=list)
 
 
-def keys_of(content: Any) -> list[str]:
-    """Keys of the results that a task file asks for, one a task.
-
-    Examples
-    --------
-    >>> sorted(keys_of({"folder": "x", "scenes": [{"key": "a", "reference": {"key": "r"}}, {"key": "b"}]}))
-    ['a', 'b']
-    """
-    if isinstance(content, dict):
-        if "key" in content:
-            return [content["key"]]
-        content = list(content.values())
-    return [key for part in content for key in keys_of(part)] if isinstance(content, list) else []
-
-
-def results_of(content: Any, name: str = "") -> set[tuple[str, str]]:
-    """Results that a task file asks for: the name of what each is stored for, such as its mesh, and its key.
+def results_of(content: Any, name: str = "") -> list[tuple[str, str]]:
+    """Results that a task file requests, one a task: the name of its file, such as its mesh, and its key.
 
     Examples
     --------
     Two meshes that are alike are two files:
 
-    >>> sorted(results_of({"meshes": [{"name": "one", "key": "a"}, {"name": "two", "key": "a"}]}))
+    >>> results_of({"meshes": [{"name": "one", "key": "a"}, {"name": "two", "key": "a", "reference": {"key": "r"}}]})
     [('one', 'a'), ('two', 'a')]
     """
     if isinstance(content, dict):
         name = content["name"] if isinstance(content.get("name"), str) else name
         if "key" in content:
-            return {(name, content["key"])}
+            return [(name, content["key"])]
         content = list(content.values())
-    parts = content if isinstance(content, list) else ()
-    return {result for part in parts for result in results_of(part, name)}
+    return [found for part in content for found in results_of(part, name)] if isinstance(content, list) else []
 
 
 def computed(done: Path) -> int | None:
@@ -112,7 +96,7 @@ def _of_bundles(study: "Study", plan: Plan) -> dict[str, Estimate]:
     parts: dict[tuple[str, str], list[Estimate]] = {}
     for name, job in plan.jobs.items():
         products = [Path(path) for path in job.products]
-        found[name] = Estimate(job.stage.message, max(1, len(keys_of(job.content))), 0.0, 1, products)
+        found[name] = Estimate(job.stage.message, max(1, len(results_of(job.content))), 0.0, 1, products)
         parts.setdefault((job.stage.like or job.stage.name, job.label), []).append(found[name])
     # Stages that share bundles share their seconds, too, as they share their tasks: what each takes is not told apart.
     for place, sharing in parts.items():
