@@ -38,7 +38,7 @@ from springtune.cli.results import info_text, verified
 from springtune.handover.formats import ENDINGS
 from springtune.mechanics.moduli import axial_moduli
 from springtune.mesh import MESH_TYPES, MeshError, corner_angles, read_beam_mesh, signed_areas, write_mesh
-from springtune.mesh.group_files import read_shape
+from springtune.mesh.formats import read_shape
 from springtune.mesh.outlines import mesh_shape
 from springtune.mesh.sheets import sheet_fault
 from springtune.safe_io.escapes import UNSEEN, markdown, no_mathematics, rst

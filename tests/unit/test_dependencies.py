@@ -300,7 +300,7 @@ def test_meshers_count_with_their_meshes():
 LOOKED_UP = (
     "studies.kinds.collect",
     "studies.output.present",
-    "studies.output.browse.job",
+    "studies.output.browse.page",
     "studies.output.page",
     "studies.paper.build",
 )

@@ -249,7 +249,7 @@ class AskedShape:
 
     def mesh(self) -> "GroupedMesh":
         """The mesh, finer where the study says so."""
-        from ..mesh.group_files import read_shape  # here, since studies are read without scipy
+        from ..mesh.formats import read_shape  # here, since studies are read without scipy
         from ..mesh.outlines import mesh_shape
 
         if self.size is None:

@@ -164,7 +164,9 @@ def _browse_digest(study: "Study") -> str:
         path.name: records.checksum(path) for path in sorted((PACKAGE / "studies/output/browse/assets").iterdir())
     }
     return hash_of(
-        linked(study), [stage_key(name) for name in ("studies.output.browse.job", *modules("outputs", "views"))], assets
+        linked(study),
+        [stage_key(name) for name in ("studies.output.browse.page", *modules("outputs", "views"))],
+        assets,
     )
 
 

@@ -7,7 +7,7 @@ from math import ceil, floor, log, log10
 from typing import TYPE_CHECKING
 
 from springtune.problem.loads import LOADS
-from springtune.reference.similarity import unit_problem
+from springtune.reference.answers import unit_problem
 from springtune.springs import DEFINITIONS
 
 from ...config.model import keeps_fields, once_a_study, shown

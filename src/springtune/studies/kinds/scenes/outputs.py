@@ -17,7 +17,7 @@ SENSITIVITY_LABELS = ("beam", "mesh_type", "material", "load")
 SCENE_LABELS = ("mesh_type", "material", "load")
 """The same for figures of errors against mesh size, and of deformed networks."""
 
-PLOTS = "studies.kinds.scenes.figures"
+PLOTS, ERRORS = "studies.kinds.scenes.figures", "studies.kinds.scenes.errors"
 
 COLLECTION = "scenes.pvd"
 """What ParaView opens."""
@@ -91,7 +91,7 @@ OUTPUTS = (
         "size",
         "figures of errors against mesh size",
         figures=lambda study: distinct("size", SCENE_LABELS, _cells(study.scenes)),
-        plot=f"{PLOTS}:size",
+        plot=f"{ERRORS}:size",
         job="scenes",
         usual=True,
     ),
@@ -107,7 +107,7 @@ OUTPUTS = (
         "sweep",
         "figures of errors against what grids sweep: force, thickness, Young's modulus, Poisson's ratio, stiffness",
         figures=_sweeps,
-        plot="studies.kinds.scenes.sweeps:sweep",
+        plot=f"{ERRORS}:sweep",
         job="scenes",
         usual=True,
     ),
