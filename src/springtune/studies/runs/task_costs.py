@@ -17,9 +17,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
-from springtune.mesh import MeshError
 from springtune.safe_io.inputs import virtual_memory
-from springtune.springs import DefinitionError
 
 from .checked_json import DamagedError
 
@@ -139,9 +137,6 @@ def _passed_on(child: int) -> Iterator[None]:
             signal.signal(number, handler)
 
 
-REFUSALS = (DefinitionError, MeshError)
-
-
 def own_reason(error: Exception) -> str:
     """Return the reason of a failed task, or an empty string if the program is broken.
 
@@ -152,7 +147,10 @@ def own_reason(error: Exception) -> str:
     >>> own_reason(TypeError("unsupported operand"))
     ''
     """
-    if isinstance(error, REFUSALS):
+    from springtune.mesh import MeshError  # here: most jobs have no failed task
+    from springtune.springs import DefinitionError
+
+    if isinstance(error, DefinitionError | MeshError):
         return str(error)
     told = f"{type(error).__name__}: {error}"
     if isinstance(error, RuntimeError):

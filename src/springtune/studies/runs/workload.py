@@ -11,8 +11,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from springtune.springs import DEFINITIONS
-
 from . import checked_json
 from .plan import COSTS_FILE, Costs, Needs, Plan, usual_costs
 from .run_tasks import TASKS
@@ -69,6 +67,8 @@ def results_of(content: Any, name: str = "") -> list[tuple[str, str]]:
 
 def computed(done: Path) -> int | None:
     """Number of tasks that a job computed, without those whose results were stored; None if unknown."""
+    from springtune.springs import DEFINITIONS
+
     work = (checked_json.read(done) or {}).get("work")
     # Costs of definitions are recorded besides those of their tasks.
     return None if work is None else sum(row[0] for name, row in work.items() if name not in DEFINITIONS)
