@@ -1,4 +1,4 @@
-"""Commands of studies before they run: write one, list what it asks for, split and merge it, its schema."""
+"""Commands for studies: new, scenes, definitions, split, merge and schema."""
 
 import inspect
 import json
@@ -56,7 +56,7 @@ def new(study: str, shape: bool) -> None:
 
 
 def _path(given: str) -> Path:
-    """Where a study is to be."""
+    """Path of a new study."""
     path = Path(given)
     if path.suffix not in (".yaml", ".yml"):
         if not path.name:
@@ -67,7 +67,7 @@ def _path(given: str) -> Path:
 
 
 def template_text(path: Path, body: str) -> str:
-    """Text of a study of a beam or of a shape to begin with."""
+    """Text of a new study of a beam or of a shape."""
     from ..mesh import MESH_TYPES
 
     schema = _beside(path, SCHEMA)
@@ -82,7 +82,7 @@ def template_text(path: Path, body: str) -> str:
 
 
 def _beside(path: Path, name: str) -> str | None:
-    """A file of the checkout's config, as seen from a study; None where there is none."""
+    """Path of a file in the checkout's config, relative to a study; None if there is none."""
     checkout = checkout_of_run()
     file = checkout / CONFIG_FOLDER / name if checkout else None
     if file is None or not file.is_file():
@@ -133,7 +133,7 @@ def definitions() -> None:
 
 
 BY = ("mesh", "grid")
-"""What may stay together: as `springtune.studies.config.sections.DEALT_BY`, which help does not wait for."""
+"""As `springtune.studies.config.sections.DEALT_BY`, without its import."""
 
 MOST_PARTS = 1000
 """As `springtune.studies.config.sections.MOST_PARTS`."""
@@ -246,7 +246,7 @@ def schema(write: bool, folder: Path) -> None:
 
 
 def schema_text() -> str:
-    """JSON schema of studies, as the file holds it."""
+    """JSON schema of studies as text."""
     from ..studies.config.kind import kinds
     from ..studies.config.sections import json_schema, study_model
 
@@ -254,7 +254,7 @@ def schema_text() -> str:
 
 
 def manual_text(frame: str) -> str:
-    """Manual of studies: the hand-written text around the generated tables stays."""
+    """Manual of studies with new tables; the text around them stays."""
     before, begin, rest = frame.partition(BEGIN)
     _, end, after = rest.partition(END)
     if not begin or not end:
