@@ -54,7 +54,7 @@ CHECKOUT_FILES = (
 """Required files of a checkout."""
 
 FOLDERS = {
-    "src": (".css", ".html", ".js", ".py", ".pyi", ".typed"),
+    "src": (".css", ".html", ".js", ".py", ".pyi", ".typed", ".yaml"),
     "workflow": (".csl", "README.md", ".rst", ".smk", ".typ", ".yaml", ".yml"),
     "requirements": (".in", ".txt"),
 }

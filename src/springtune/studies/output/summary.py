@@ -272,7 +272,7 @@ def _computed(study: "Study", plan: Plan, since: float) -> str:
         record, stage = plan.record(name), job.stage.name
         number = computed(record)
         if number is not None:
-            asked[stage] = asked.get(stage, 0) + len(results_of(job.content))
+            asked[stage] = asked.get(stage, 0) + len(set(results_of(job.content)))
             new[stage] = new.get(stage, 0) + (number if _done(record) >= since else 0)
     told = [f"{stage} {number} of {asked[stage]}" for stage, number in new.items() if number]
     if told:
