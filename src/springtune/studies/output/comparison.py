@@ -179,7 +179,7 @@ def compare(
     [('stiffness', '100x20', 2.0)]
     """
     nodes = [{node.path: node.to_dataset() for node in tree.subtree} for tree in with_swept([before, after])]
-    held = sorted({str(name) for groups in nodes for data in groups.values() for name in data.variables})
+    held = sorted({str(name) for side in nodes for data in side.values() for name in data.variables})
     for pattern in ignored:
         if not any(fnmatchcase(name, pattern) for name in held):
             raise ValueError(f"--ignore {pattern}: neither has it; {nearest(pattern, held)}")
@@ -187,7 +187,7 @@ def compare(
     wanted = {"/" + name.strip("/") for name in groups} or {*known}
     for name in sorted(wanted - {*known}):
         raise ValueError(f"--group {name.strip('/')}: neither has it; known: {', '.join(known)}")
-    sides = [[path for path in groups if path in wanted] for groups in nodes]
+    sides = [[path for path in side if path in wanted] for side in nodes]
     alone = (
         [path for path in sides[0] if path not in sides[1]],
         [path for path in sides[1] if path not in sides[0] and not part],
@@ -312,7 +312,7 @@ class _Group:
         common = [self.axes[one].common() for one in names]
         if not all(len(among) for among, *_ in common):
             return VariableChanges(name, 0, 0, [])
-        kind = _Kind(*pair, self.how.own.get(variable_name(self.path, name), self.how.tolerance))
+        kind = Values(*pair, self.how.own.get(variable_name(self.path, name), self.how.tolerance))
         tolerances = self.pair[0].get(OF_CELLS)
         tolerances = tolerances if tolerances is not None and set(tolerances.dims) <= set(names) else None
         asked = [None if mask is None else mask.any(set(mask.dims) - set(names)) for mask in self.asked]
@@ -370,8 +370,8 @@ def _over(
     return found
 
 
-class _Kind:
-    """Comparison of numbers, flags or texts."""
+class Values:
+    """Comparison of two variables with numbers, flags or texts."""
 
     def __init__(self, a: xr.DataArray, b: xr.DataArray, tolerance: Tolerance) -> None:
         self.units = str(a.attrs.get("units", b.attrs.get("units", "1")))
@@ -385,13 +385,19 @@ class _Kind:
             return self.words[side].get(int(value), "")
         return str(value) if self.text else float(value)
 
+    def missing(self, side: int, values: np.ndarray) -> np.ndarray:
+        """Return where values are missing, or flags say that nothing was requested."""
+        if self.words is not None:
+            values = _as_words(values, self.words[side])
+        return values == "" if values.dtype.kind in "OUS" else np.isnan(values)
+
     def excess(
         self, values: Sequence[np.ndarray], asked: Sequence[np.ndarray], cells: int, tolerances: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Difference over tolerance in the values' shape, and where it is defined."""
         text = self.text or self.words is not None
         a, b = values if self.words is None else map(_as_words, values, self.words)
-        missing = [one == "" if text else np.isnan(one) for one in (a, b)]
+        missing = [self.missing(side, one) for side, one in enumerate(values)]
         unmatched = (missing[0] & ~missing[1] & asked[0]) | (missing[1] & ~missing[0] & asked[1])
         both = ~missing[0] & ~missing[1]
         excess = np.where(unmatched, np.inf, 0.0)
