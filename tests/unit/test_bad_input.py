@@ -26,7 +26,7 @@ from springtune.mesh import (
     structured,
     write_mesh,
 )
-from springtune.mesh.group_files import read_shape
+from springtune.mesh.formats import read_shape
 from springtune.safe_io.inputs import virtual_memory
 from springtune.studies.output import reading
 from springtune.studies.output.browse.page import page

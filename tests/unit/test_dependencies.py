@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from springtune.mesh import MESH_TYPES
 from springtune.springs import DEFINITIONS, Springs, definition
 from springtune.studies.runs import checked_json, dependencies, keys
+from springtune.studies.runs.dependencies import read
 from springtune.studies.runs.plan import stages
-from springtune.studies.runs.syntax import read
 
 MODULE = '''\
 """What it is for."""

@@ -71,7 +71,8 @@ def read(path: str | Path, most: int) -> bytes:
 def virtual_memory() -> int:
     """Bytes that this process has mapped; 0 where the system does not say."""
     try:
-        return int(Path("/proc/self/statm").read_text().split()[0]) * mmap.PAGESIZE
+        with open("/proc/self/statm", "rb", buffering=0) as file:
+            return int(file.read().split()[0]) * mmap.PAGESIZE
     except OSError:
         return 0
 

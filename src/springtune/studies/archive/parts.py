@@ -21,26 +21,25 @@ from springtune.safe_io import atomic
 from springtune.safe_io.escapes import shown
 from springtune.safe_io.inputs import check_alone
 
+from ..config.load import digest_of, is_part, named_files, part_text, whole_text
 from ..config.messages import StudyError, clipped
 from ..config.model import Part
-from ..config.partial import digest_of, is_part, named_files, part_text, whole_text
 from ..config.yaml_lines import read_yaml
 from ..kinds.division import dealt, part_of, taken
 from ..kinds.scenes.plan import scene_key
 from ..output.reading import attributes
 from ..runs import checked_json, driver, locks, records, rerun, store
-from ..runs.damage import DamagedError
+from ..runs.checked_json import DamagedError
 from ..runs.keys import installed
 from ..runs.plan import plan
 from ..runs.run_tasks import RECORDS, TASKS
-from ..runs.task_costs import TaskCosts
-from ..runs.task_limits import Watch
+from ..runs.task_costs import TaskCosts, Watch
 
 if TYPE_CHECKING:
     from ..config.model import Study
 
 HASH = re.compile("[0-9a-f]{24}")
-"""Form of `springtune.studies.runs.hashing.hash_of`."""
+"""Form of `springtune.studies.runs.checked_json.hash_of`."""
 
 TIMES = "seconds"
 """Ending of names of values that differ in every run."""

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..config.kind import FORMATS, kinds, modules, outputs
-from ..config.shown import keeps_fields
+from ..config.model import keeps_fields
 from . import checked_json, records
+from .checked_json import hash_of
 from .dependencies import CODE_FILE, OURS, PACKAGE
-from .hashing import hash_of
 from .keys import stage_key
 from .plan import BUNDLES_FILE, Plan, plan, table_files
 from .provenance import inputs
