@@ -1,13 +1,41 @@
-"""A study's jobs, done in this process in the order of a run."""
+"""Studies of `studies.yaml`, what their reader says, and their jobs, done in this process in the order of a run."""
 
 from pathlib import Path
 
+import pytest
+import yaml
+
+from springtune.studies.config.messages import StudyError
 from springtune.studies.kinds import collect, load_study
 from springtune.studies.kinds.scenes import plan as scenes
 from springtune.studies.output import present
-from springtune.studies.output.browse import job as browse
+from springtune.studies.output.browse import page as browse
 from springtune.studies.runs import rerun, run_tasks
 from springtune.studies.runs.plan import plan
+
+STUDIES = yaml.safe_load((Path(__file__).parent / "studies.yaml").read_text())
+
+
+def study_text(names, *changes):
+    """Text of a study, or of several in one file, in which some texts stand in place of others."""
+    text = "".join(STUDIES[name] for name in names.split())
+    for old, new in changes:
+        assert old in text, old
+        text = text.replace(old, new, 1)
+    return text
+
+
+def load_text(folder, text, name="study.yaml"):
+    """Load a study from its text, or its bytes."""
+    (folder / name).write_bytes(text if isinstance(text, bytes) else text.encode())
+    return load_study(folder / name)
+
+
+def refusal(folder, text, name="study.yaml"):
+    """Message that the text of a study gets, without the folder."""
+    with pytest.raises(StudyError) as caught:
+        load_text(folder, text, name)
+    return str(caught.value).replace(f"{folder}/", "")
 
 
 class Campaign:

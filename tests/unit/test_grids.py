@@ -85,28 +85,6 @@ class TestRanges:
         study = load(mesh_size={"from": "1 mm", "to": "5 mm", "points": "9"})
         assert study.axes["mesh_size"] == (1e-3, 1.5e-3, 2e-3, 2.5e-3, 3e-3, 3.5e-3, 4e-3, 4.5e-3, 5e-3)
 
-    @pytest.mark.parametrize(
-        ("given", "said"),
-        [
-            ({"from": "5 mm", "to": "1 mm", "points": "3"}, "'5 mm' is not below 'to', '1 mm'; exchange them"),
-            ({"from": "1 mm", "to": "5 mm"}, "a range without 'points'; give from, to and points"),
-            ({"from": "1 mm", "to": "5 mm", "points": "1"}, "'1' is out of range; give a whole number from 2"),
-            ({"from": "1 mm", "to": "5 mm", "points": "3", "step": "1"}, "unknown key 'step' of a range"),
-            ({"from": "1 mm", "to": "5 mm", "points": "3", "spacing": "log"}, "'log' is no spacing; give linear or"),
-            ({"from": "1 mm", "to": "5 kg", "points": "3"}, "'5 kg' is of dimension [mass]; give a length"),
-            ({}, "a mapping instead of a length such as '5 mm', a list, or a range"),
-        ],
-    )
-    def test_bad_range(self, refusal, given, said):
-        message = refusal(mesh_size=given)
-        assert message.startswith("study.yaml:")
-        assert "grids.one.mesh_size" in message
-        assert said in message
-
-    def test_poisson_ratio_has_no_logarithm_at_zero(self, refusal):
-        message = refusal(poisson_ratio={"from": "0", "to": "0.4", "points": "3", "spacing": "logarithmic"})
-        assert "grids.one.poisson_ratio.from: '0' has no logarithm" in message
-
 
 NUMBERS = {
     "mesh_size": ["2 mm", "5 mm", "10 mm"],
@@ -161,36 +139,6 @@ class TestCombinations:
         assert "'25 mm' is larger than beam 'short'" in refusal(**grid)
         assert len(load(**grid, exclude={"beam": "short", "mesh_size": "25 mm"}).scenes) == 3
 
-    @pytest.mark.parametrize(
-        ("keys", "said"),
-        [
-            (
-                {"mesh_size": ["2 mm", "5 mm"], "force": ["1 N", "2 N", "3 N"], "zip": ["mesh_size", "force"]},
-                "grids.one.zip: 2 of 'mesh_size', 3 of 'force' cannot go together; give each as many values",
-            ),
-            ({"zip": ["mesh_size", "thickness"]}, "'thickness' is zipped and has no values"),
-            ({"zip": ["mesh_size", "color"]}, "unknown parameter 'color'"),
-            ({"zip": ["mesh_size"]}, "instead of two parameters or more"),
-            ({"zip": [["mesh_size", "force"], ["force", "load"]]}, "'force' is zipped twice"),
-            ({"zip": "mesh_size"}, "'mesh_size' instead of parameters that go together"),
-            ({"force": {"long": "1 N"}, "zip": ["beam", "force"]}, "'force' is zipped and has values for each beam"),
-            ({"exclude": {"mesh_size": "3 mm"}}, "no combination of the grid has these values of mesh_size"),
-            ({"exclude": {"mesh_size": "10 mm"}}, "leaves nothing of the grid"),
-            ({"exclude": {}}, "no parameter at all"),
-            ({"exclude": {"mesh_size": "10 kg"}}, "'10 kg' is of dimension [mass]"),
-            (
-                {"exclude": "10 mm"},
-                "'10 mm' instead of keys and values; give those to leave out, such as {mesh_size: 1 mm}",
-            ),
-            ({"exclude": [["10 mm"]]}, "a list instead of keys and values; give those to leave out, such as"),
-        ],
-    )
-    def test_refused(self, refusal, keys, said):
-        message = refusal(**keys)
-        assert message.startswith("study.yaml:")
-        assert said in message
-        assert "\n" not in message
-
     def test_too_many_are_refused_before_they_are_made(self, refusal, monkeypatch):
         many = {"mesh_size": {"from": "2 mm", "to": "5 mm", "points": "10000"}}
         forces = {"from": "1 N", "to": "5 N", "points": "10000"}
@@ -212,10 +160,6 @@ class TestCombinations:
         )
         monkeypatch.setenv(MOST_SCENES_VARIABLE, "")  # as if it were not there
         assert "4000000 scenes" in refusal(mesh_size=many, thickness=many)
-
-    def test_labels_that_are_found_by_one_number_are_one(self, refusal):
-        message = refusal(force=["1 N", "1.0000000001 N"])
-        assert "grids: force has 1.0 and 1.0000000001, which are one label; write them alike" in message
 
     def test_a_stated_stiffness_is_near_that_of_every_modulus(self, load):
         stated = "definitions: {paper: {stiffness: [{mesh_type: structured, material: steel, value: 800 N/m}]}}\ngrids:"
