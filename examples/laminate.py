@@ -1,8 +1,8 @@
 """Oblique fibres: a sheet that is pulled along x also shears.
 
 Rollers and a point leave it in uniform strain, known from the sheet's compliance. `delingette` (linear triangles) takes
-any six constants and finds it on any mesh. With a hole, errors are against the finite-element reference, and definitions
-for isotropic sheets refuse.
+any six constants and finds it on any mesh. With a hole, errors are against the finite-element reference.
+Definitions for isotropic sheets refuse the material.
 """
 
 import matplotlib.pyplot as plt

@@ -1,4 +1,4 @@
-"""A definition of one's own: every spring gets E t. What Young's modulus does the network then have?
+"""A definition of one's own: every spring gets E t, and the error of Young's modulus that follows.
 
 An equilateral network of springs k has E t = 2 k / sqrt(3). Outline springs of full stiffness make a strip of height H
 stiffer by 1 + sqrt(3)/2 a/H. So the error is 2/sqrt(3) (1 + sqrt(3)/2 a/H) - 1: a quarter here.

@@ -1,7 +1,7 @@
 """Poisson's ratio: a network of springs alone has 1/3; springs with coupling have the material's.
 
-Central springs obey Cauchy's relation C1122 = C1212, so an isotropic plane network has 1/3. (The last printed digits come
-from the zigzag ends of the rows.) `delingette` couples the sides of each triangle.
+Central springs obey Cauchy's relation C1122 = C1212, so an isotropic plane network has 1/3. (The last printed digits
+come from the zigzag ends of the rows.) `delingette` couples the sides of each triangle.
 """
 
 import math

@@ -1,8 +1,8 @@
 """A pressed block: why the paper's stiffness seems to depend on the load (its section 4.1).
 
 A rubber block is fixed on one long face and pressed on the other. It cannot widen, so Poisson's ratio matters. Springs
-alone have the mesh's, springs with coupling (`delingette`) the material's. The paper's finite elements move the middle of
-the face by 3.14 mm.
+alone have the mesh's, springs with coupling (`delingette`) the material's. The paper's finite elements move the middle
+of the face by 3.14 mm.
 """
 
 import springtune as st

@@ -1,7 +1,7 @@
 """Rubber at any stretch: Treloar's three tests beside the laws that are fitted to the first of them.
 
-Yeoh's law, and neo-Hooke's as its first term, are areas and springs of zero rest length on every triangle. Springs alone
-reach a stretch of 2, where an equilateral lattice lies flat. They are fitted up to 1.9.
+Yeoh's law, and neo-Hooke's as its first term, are areas and springs of zero rest length on every triangle. Springs
+alone reach a stretch of 2, where an equilateral lattice lies flat. They are fitted up to 1.9.
 """
 
 from pathlib import Path

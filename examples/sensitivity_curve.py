@@ -1,4 +1,4 @@
-"""A sensitivity curve: which uniform stiffness gives a beam its displacement?
+"""A sensitivity curve: which uniform stiffness gives a beam its displacement.
 
 Springs on the outline belong to one triangle, not two, and make the beam too stiff. So the best stiffness is below
 sqrt(3)/2 E t, by 1 + sqrt(3)/2 a/H. The paper found 170e6 N/m by hand, for all mesh sizes.

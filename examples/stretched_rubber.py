@@ -1,7 +1,7 @@
 """Rubber at twice its length: springs and areas of definition `neo-hooke`.
 
-An incompressible neo-Hookean sheet at stretch l, free to become narrower and thinner, carries mu (l - 1/l^2) per area at
-rest. `neo-hooke` is that law on each triangle.
+An incompressible neo-Hookean sheet at stretch l, free to become narrower and thinner, carries mu (l - 1/l^2) per area
+at rest. `neo-hooke` is that law on each triangle.
 """
 
 import matplotlib.pyplot as plt
