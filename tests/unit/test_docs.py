@@ -5,6 +5,7 @@ import re
 import shutil
 from contextlib import redirect_stdout
 from pathlib import Path
+from runpy import run_path
 
 import matplotlib
 import numpy as np
@@ -195,6 +196,20 @@ def test_every_module_of_the_rooms_shown_is_on_the_site():
     rooms = {room for room, _ in listed}
     assert rooms
     assert listed == {(room, path.stem) for room in rooms for path in (package / room).glob("[a-z]*.py")}
+
+
+def test_tables_of_studies_are_put_between_the_marks_of_their_pages(tmp_path):
+    pages = run_path(str(REPOSITORY / "tools/pages.py"))
+    for name in pages["TABLES"]:
+        text, page = (REPOSITORY / "docs" / name).read_text(), tmp_path / name
+        page.write_text(text)
+        pages["put"](page, "new tables\n")
+        begin, end = text.index(pages["BEGIN"]), text.index(pages["END"], text.index(pages["BEGIN"]))
+        kept = page.read_text()
+        assert kept == f"{text[:begin]}{pages['BEGIN']}\nnew tables\n\n{text[end:]}"
+    page.write_text("no marks")
+    with pytest.raises(SystemExit, match="the marks around the tables are missing"):
+        pages["put"](page, "new tables\n")
 
 
 def test_every_picture_is_of_a_study_or_an_example():

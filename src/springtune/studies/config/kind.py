@@ -84,6 +84,11 @@ class Output:
         return self.plot.partition(":")[0]
 
 
+def needs(part: str, why: str) -> Callable[[Study], str]:
+    """`Output.lack` of an output that needs a part of a study."""
+    return lambda study: "" if study.parts[part] else why
+
+
 @dataclass(frozen=True)
 class Stage:
     """A stage before the dataset: jobs that each work off a bundle of tasks.
@@ -160,12 +165,14 @@ class Kind:
         Of that part: labels of the dimensions of its groups.
     summary : callable, optional
         Of that part: rows of what `springtune scenes` prints, each a name, a number and a remark.
-    variables : dict of str to tuple
-        Variables of its group, see `springtune.studies.output.dataset.Group`.
+    variables, dimensions : dict
+        Variables and own dimensions of its group, see `springtune.studies.output.dataset.Group`.
+    attributes : callable, optional
+        Of that part: attributes of its group.
     stages : tuple of Stage
     outputs : tuple of Output
-    tables : callable, optional
-        Of a study: stems of its tables on the page of all tables; ``tables(tree)`` in its module ``tables`` makes them.
+    tables, tables_by : callable and str, optional
+        Of a study: stems of its tables on the page of all tables; and the module whose ``tables(tree)`` makes them.
     costs : dict of str to tuple
         Seconds of a task by its name in records, in any case and per unit, before any was measured.
     pieces : callable, optional
@@ -185,9 +192,12 @@ class Kind:
     axes: Callable[[Any], Mapping[str, Collection[str | float]]] = lambda part: {}
     summary: Callable[[Any], list[list[object]]] = lambda part: []
     variables: dict[str, tuple[tuple[str, ...], str, str, Any]] = field(default_factory=dict)
+    dimensions: dict[str, str | tuple[str, str]] = field(default_factory=dict)
+    attributes: Callable[[Any], Mapping[str, object]] = lambda part: {}
     stages: tuple[Stage, ...] = ()
     outputs: tuple[Output, ...] = ()
     tables: Callable[[Study], list[str]] | None = None
+    tables_by: str = "tables"
     costs: dict[str, tuple[float, float]] = field(default_factory=dict)
     pieces: Callable[[Study, Any, Any], Mapping[tuple[str | int, ...], float]] | None = None
     take: Callable[[Study, Collection[tuple[str | int, ...]]], Study] | None = None

@@ -28,7 +28,7 @@ class Task:
     also : sequence
         What its key depends on besides its values and the stage's code: keys of definitions and mesh types.
     labels : dict
-        Cell of the dataset that its result is for.
+        Cell of the dataset that its result is for, or cells of several labels.
     of : object
         What the study has that it is made from.
     costs : sequence of tuple
@@ -46,7 +46,7 @@ class Task:
 
     values: Mapping[str, Any]
     also: Sequence[object] = ()
-    labels: Mapping[str, str | float] = field(default_factory=dict)
+    labels: Mapping[str, Any] = field(default_factory=dict)
     of: Any = None
     costs: Sequence[tuple[str, float] | tuple[str, float, float]] = ()
     name: str = ""
