@@ -115,7 +115,7 @@ def test_exactly_these_results_are_computed_and_the_dataset_is_that_of_a_fresh_r
 def package(tmp_path_factory):
     """A copy of the package, to be edited."""
     folder = tmp_path_factory.mktemp("package") / "springtune"
-    shutil.copytree(Path(springtune.__file__).parent, folder, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(Path(springtune.__file__).parent, folder)  # with what is compiled, and its times
     return folder
 
 

@@ -8,7 +8,7 @@ import yaml
 from springtune.studies.config.messages import StudyError
 from springtune.studies.kinds import collect, load_study
 from springtune.studies.kinds.scenes import plan as scenes
-from springtune.studies.output import present
+from springtune.studies.output import present, reading
 from springtune.studies.output.browse import job as browse
 from springtune.studies.runs import rerun, run_tasks
 from springtune.studies.runs.plan import plan
@@ -83,6 +83,11 @@ class Campaign:
         for name in names:
             self.do(name)
         return names
+
+    def collected(self):
+        """The dataset, when all that it is made of has run."""
+        self.finish(rerun.COLLECT)
+        return reading.open(self.folder)
 
     def do(self, name):
         """A job, by the function that its rule calls."""

@@ -107,7 +107,7 @@ def test_a_deleted_result_is_made_again(grown):
 def test_a_force_that_cannot_be_carried_is_a_marked_hole(run):
     run.write("heavy.yaml", study("5 mm", "compression", "100 MN"))
     with contextlib.chdir(run.folder):
-        Campaign("heavy.yaml").finish()
+        Campaign("heavy.yaml").finish("collect")
     # By name, in what a run shows at its end.
     told = (run.folder / "results/heavy/summary.txt").read_text()
     assert "scenes, not converged: 2 of 2\n  small, structured, 5 mm, steel, compression, paper, nonlinear: " in told
