@@ -14,6 +14,8 @@ from springtune.studies.runs import bundles, checked_json, commands, records
 from springtune.studies.runs.plan import plan, usual_costs
 from springtune.studies.runs.task_costs import TaskCosts
 
+from campaigns import STUDIES
+
 USUAL = usual_costs()
 
 COSTS = st.dictionaries(st.integers(0, 60).map("task {}".format), st.floats(1e-3, 30.0), min_size=1, max_size=40)
@@ -95,15 +97,7 @@ def test_memory_follows_the_largest_job_of_a_stage_and_forgets_slowly(tmp_path):
     assert run(solve_0=3e9) == {"solve": 3e9, "mesh": 1e9}
 
 
-STUDY = """
-title: Bundles of a study
-beams: {small: {length: 50 mm, height: 20 mm}}
-materials: {steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}}
-outputs: [size]
-grids:
-  one: {beam: small, mesh_type: [structured, right], mesh_size: [10 mm, 8 mm, 5 mm], material: steel, load: traction,
-        force: 20 kN, definition: lattice, kinematics: linear, sensitivity: false}
-"""
+STUDY = STUDIES["bundles"]
 
 
 @pytest.fixture

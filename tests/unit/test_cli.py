@@ -34,6 +34,8 @@ from springtune.studies.config.kind import kinds
 from springtune.studies.config.sections import sections, study_model
 from springtune.studies.kinds import load_study
 
+from campaigns import STUDIES
+
 CONFIG = Path(__file__).parents[2] / "config"
 RENEW = "run `springtune schema --write`"
 
@@ -58,27 +60,7 @@ def completed(words, number):
 class TestThickBodies:
     """Plane stress is an assumption about thin sheets: a beam 1 km thick was taken without a word."""
 
-    STUDY = """\
-title: Thick
-materials: {steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}}
-beams: {block: {length: 60 mm, height: 12 mm, thickness: 1 km}, sheet: {length: 60 mm, height: 12 mm}}
-shapes:
-  plate:
-    thickness: 20 mm
-    outline: [{from: [0, 0]}, {from: [60 mm, 0], group: right}, {from: [60 mm, 12 mm]}, {from: [0, 12 mm], group: left}]
-    loads: {pull: {supports: {left: fixed}, forces: {right: [1 N, 0]}, quantities: {end: {displacement: x, of: right}}}}
-grids:
-  one: {beam: [block, sheet], mesh_type: right, mesh_size: 4 mm, material: steel, load: traction,
-        force: {block: 1 N, sheet: 1 N}, definition: patch}
-  two: {beam: sheet, mesh_type: right, mesh_size: 4 mm, material: steel, load: traction, force: 1 N, definition: patch,
-        thickness: [1 mm, 15 mm]}
-shape_grids: {one: {shape: plate, mesh_size: 4 mm, material: steel, definition: patch}}
-refine:
-  thicker: {parameter: thickness, from: 1 mm, to: 30 mm, tolerance: 1 %, beam: sheet, mesh_type: right, mesh_size: 4 mm,
-            material: steel, load: traction, force: 1 N, definition: patch}
-samples: {size: 8, mesh_type: right, load: traction, definition: patch, parameters: {length: 60 mm, height: 12 mm,
-          thickness: {from: 1 mm, to: 13 mm}, mesh_size: 4 mm, young_modulus: 210 GPa, poisson_ratio: 0.3, force: 1 N}}
-"""
+    STUDY = STUDIES["cli_thickbodies"]
 
     def test_a_study_says_each(self, tmp_path):
         path = tmp_path / "thick.yaml"

@@ -11,48 +11,11 @@ import springtune as st
 from springtune.cli import main
 from springtune.mesh import write_mesh
 
+from campaigns import STUDIES
+
 SHAPES = Path(__file__).parents[2] / "config/shapes.yaml"
 
-STUDY = """
-title: Shapes for the command line
-materials:
-  steel: {young_modulus: 210 GPa, poisson_ratio: 0.3, density: 7850 kg/m^3}
-  third: {young_modulus: 1 MPa, poisson_ratio: 0.3333333333333333}
-shapes:
-  plate:
-    outline:
-      - {from: [0, 0], group: lower}
-      - {from: [40 mm, 0], group: right}
-      - {from: [40 mm, 20 mm], group: upper}
-      - {from: [0, 20 mm], group: left}
-    holes: [{circle: {centre: [20 mm, 10 mm], radius: 4 mm}, group: hole}]
-    refined: {hole: 0.5}
-    loads:
-      pull:
-        supports: {left: fixed}
-        forces: {right: [10 N, 0]}
-        quantities: {end: {displacement: x, of: right}, corner: {displacement: x, at: corner}}
-      push:
-        supports: {left: fixed}
-        pressures: {hole: {pressure: 1 MPa, follower: true}}
-        quantities: {end: {displacement: x, of: right}}
-      move:
-        supports: {left: fixed, right: {x: 0.1 mm}}
-        quantities: {force: {reaction: x, of: right}}
-    points: {corner: [0, 0]}
-  own:
-    file: own.msh
-    loads:
-      pull:
-        supports: {left: fixed}
-        forces: {right: [10 N, 0]}
-        quantities: {end: {displacement: x, of: right}}
-  other: {outline: [{from: [0, 0]}, {from: [1 mm, 0]}, {from: [1 mm, 1 mm]}], loads: {none: {supports: {a: fixed},
-    gravity: [1 m/s^2, 0], quantities: {work: energy}}}, points: {a: [0, 0], b: [1 mm, 0]}}
-shape_grids:
-  one: {shape: plate, mesh_size: 4 mm, material: steel, load: pull, definition: lattice}
-  two: {shape: own, material: [steel, third], definition: lattice}
-"""
+STUDY = STUDIES["cli_shapes"]
 
 
 def run(*arguments):

@@ -16,18 +16,9 @@ from springtune.studies.config.messages import StudyError
 from springtune.studies.kinds import load_study
 from springtune.studies.output.selection import at, last_swept
 
-from campaigns import Campaign
+from campaigns import STUDIES, Campaign
 
-HEAD = """\
-title: A study
-beams:
-  long: {length: 200 mm, height: 30 mm}
-  short: {length: 100 mm, height: 20 mm, thickness: 2 mm}
-materials:
-  steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}
-grids:
-  one:
-"""
+HEAD = STUDIES["grids_head"]
 GRID = {
     "beam": "long",
     "mesh_type": "structured",

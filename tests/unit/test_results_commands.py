@@ -25,6 +25,8 @@ from springtune.studies.output import dataset, present
 from springtune.studies.runs import checked_json, locks
 from springtune.studies.runs.orphans import orphans
 
+from campaigns import STUDIES
+
 AXES = {
     "beam": ("200x40", "100x20"),
     "mesh_type": ("structured", "free"),
@@ -434,15 +436,7 @@ class TestField:
             st.field(without)
 
 
-STUDY = """
-title: Two sizes
-beams: {b: {length: 20 mm, height: 10 mm}}
-materials: {m: {young_modulus: 1 GPa, poisson_ratio: 0.3}}
-grids:
-  g: {beam: b, mesh_type: right, mesh_size: [5 mm, SIZE], material: m, load: LOAD, force: 1 N, definition: lattice,
-      sensitivity: false}
-outputs: [size, tables]
-"""
+STUDY = STUDIES["results_commands"]
 
 
 class TestClean:

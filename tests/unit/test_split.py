@@ -25,27 +25,11 @@ from springtune.studies.kinds.division import dealt, part_of
 from springtune.studies.runs import checked_json, records, store
 from springtune.studies.runs.plan import plan
 
-from campaigns import Campaign
+from campaigns import STUDIES, Campaign
 
 CONFIG = Path(__file__).parents[2] / "config"
 
-STUDY = """
-title: A study for several sites
-beams: {small: {length: 50 mm, height: 10 mm}, thick: {length: 50 mm, height: 10 mm, thickness: 2 mm}}
-materials:
-  steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}
-  rubber: {young_modulus: 1 MPa, poisson_ratio: 0.5}
-definitions: {calibrated: {beam: small, load: traction}}
-sensitivity: {points: 5}
-outputs: [tables, deformed]
-grids:
-  pulled:
-    {beam: [small, thick], mesh_type: [structured, right], mesh_size: 5 mm, material: [steel, rubber], load: traction,
-     force: 0.1 N, definition: [calibrated, lattice]}
-  again:
-    {beam: small, mesh_type: structured, mesh_size: [5 mm, 2.5 mm], material: steel, load: [traction, bending],
-     force: 0.1 N, definition: [lattice, area], sensitivity: false, moduli: true}
-"""
+STUDY = STUDIES["split"]
 """Scenes that two grids ask for, a mesh that two beams share, stiffness from scenes of another part, whole fields."""
 
 

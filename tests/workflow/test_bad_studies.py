@@ -12,6 +12,8 @@ import springtune as st
 from springtune.cli import main
 from springtune.mesh import write_mesh
 
+from campaigns import STUDIES
+
 BOMB = "a0: &a0 [x, y]\n" + "".join(f"a{n}: &a{n} [*a{n - 1}, *a{n - 1}, *a{n - 1}]\n" for n in range(1, 30))
 
 BAD = {
@@ -79,20 +81,7 @@ def test_run_called_wrongly_exits_with_2(arguments, says):
     assert told.exit_code == 2 and says in told.stderr
 
 
-FILES = """
-title: One bad mesh file
-beams: {a: {length: 50 mm, height: 10 mm}}
-materials: {steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}}
-mesh_files:
-  good: [{file: good.vtu, beam: a, mesh_size: 5 mm}]
-  cut: [{file: cut.vtu, beam: a, mesh_size: 5 mm}]
-  lost: [{file: lost.vtu, beam: a, mesh_size: 5 mm}]
-sensitivity: {points: 5}
-outputs: tables
-grids:
-  all: {beam: a, mesh_type: [structured, good, cut, lost], mesh_size: 5 mm, material: steel, load: traction,
-        force: 1 kN, definition: [lattice, patch], moduli: true}
-"""
+FILES = STUDIES["bad_studies_files"]
 
 
 @pytest.mark.slow

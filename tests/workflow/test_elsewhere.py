@@ -10,14 +10,9 @@ import pytest
 
 from springtune.studies.runs import commands, locks
 
-STUDY = """
-title: Elsewhere
-beams: {small: {length: 50 mm, height: 20 mm}}
-materials: {steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}}
-grids:
-  one: {beam: small, mesh_type: structured, mesh_size: [10 mm, 5 mm], material: steel, load: traction, force: 20 kN,
-        definition: lattice, kinematics: linear, sensitivity: false}
-"""
+from campaigns import STUDIES
+
+STUDY = STUDIES["elsewhere"]
 
 
 def test_a_plan_for_a_cluster_has_jobs_of_the_wanted_time(run):

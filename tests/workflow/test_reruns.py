@@ -17,24 +17,9 @@ from springtune.studies.config.messages import StudyError
 from springtune.studies.kinds import load_study
 from springtune.studies.runs import checked_json
 
-from campaigns import Campaign
+from campaigns import STUDIES, Campaign
 
-STUDY = """
-title: Reruns
-beams: {{small: {{length: 50 mm, height: 20 mm}}}}
-materials: {{steel: {{young_modulus: 210 GPa, poisson_ratio: 0.3}}}}
-definitions:
-  paper: {{stiffness: [{{mesh_type: structured, material: steel, value: 170e6 N/m}}]}}
-grids:
-  one:
-    beam: small
-    mesh_type: structured
-    mesh_size: [{sizes}]
-    material: steel
-    load: {load}
-    force: {force}
-    definition: [paper, lattice]
-"""
+STUDY = STUDIES["reruns"]
 
 
 def study(sizes="10 mm, 5 mm", load="traction", force="20 kN"):

@@ -18,25 +18,9 @@ import springtune
 from springtune.safe_io.processes import this_host
 from springtune.studies.runs import checked_json, store
 
-from campaigns import Campaign
+from campaigns import STUDIES, Campaign
 
-STUDY = """
-title: Survival
-beams: {small: {length: 50 mm, height: 20 mm}}
-materials: {steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}}
-outputs: [size]
-grids:
-  one:
-    beam: small
-    mesh_type: structured
-    mesh_size: [10 mm, 5 mm]
-    material: steel
-    load: [traction, compression]
-    force: 20 kN
-    definition: [lattice, delingette]
-    kinematics: linear
-    sensitivity: false
-"""
+STUDY = STUDIES["survival"]
 
 
 def everything(folder):
