@@ -9,7 +9,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import springtune as st
-from springtune.mechanics.affine import affine_stiffness
+from springtune.mechanics.moduli import affine_stiffness
 from springtune.mesh import braced, lattice
 
 FIT = st.DEFINITIONS["energy-fit"]

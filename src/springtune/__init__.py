@@ -27,8 +27,8 @@ _NAMES = {
     "studies.kinds.moduli.figures": ("plot_definitions_loads", "plot_definitions_size", "plot_moduli"),
     "studies.kinds.refinement.figures": ("plot_refinement",),
     "studies.kinds.samples.figures": ("plot_effects", "plot_sobol"),
-    "studies.kinds.scenes.figures": ("plot_block", "plot_deformed", "plot_sensitivity", "plot_size"),
-    "studies.kinds.scenes.sweeps": ("plot_sweep",),
+    "studies.kinds.scenes.figures": ("plot_block", "plot_deformed", "plot_sensitivity"),
+    "studies.kinds.scenes.errors": ("plot_size", "plot_sweep"),
     "studies.kinds.shapes.figures": ("plot_shape", "plot_shape_errors", "plot_shapes"),
     "studies.kinds.stability.figures": (
         "plot_stability_buckling",

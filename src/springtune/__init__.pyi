@@ -55,11 +55,11 @@ from .studies.kinds.moduli.figures import plot_moduli as plot_moduli
 from .studies.kinds.refinement.figures import plot_refinement as plot_refinement
 from .studies.kinds.samples.figures import plot_effects as plot_effects
 from .studies.kinds.samples.figures import plot_sobol as plot_sobol
+from .studies.kinds.scenes.errors import plot_size as plot_size
+from .studies.kinds.scenes.errors import plot_sweep as plot_sweep
 from .studies.kinds.scenes.figures import plot_block as plot_block
 from .studies.kinds.scenes.figures import plot_deformed as plot_deformed
 from .studies.kinds.scenes.figures import plot_sensitivity as plot_sensitivity
-from .studies.kinds.scenes.figures import plot_size as plot_size
-from .studies.kinds.scenes.sweeps import plot_sweep as plot_sweep
 from .studies.kinds.shapes.figures import plot_shape as plot_shape
 from .studies.kinds.shapes.figures import plot_shape_errors as plot_shape_errors
 from .studies.kinds.shapes.figures import plot_shapes as plot_shapes

@@ -41,7 +41,7 @@ from mechanics import (
     squares_forces,
 )
 from springtune.linalg.factors import SingularError
-from springtune.mechanics.follower import FollowerPressure
+from springtune.mechanics.network import FollowerPressure
 from springtune.mesh import MESH_TYPES
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import Material

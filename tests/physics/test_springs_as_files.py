@@ -17,7 +17,7 @@ from springtune.handover.formats import ENDINGS
 from springtune.mechanics.energies import AngleEnergy, AreaEnergy
 from springtune.mechanics.integrators import EXPLICIT, IMPLICIT
 from springtune.studies.kinds.scenes.solve import solved
-from springtune.studies.kinds.scenes.stored_scene import packed, unpacked
+from springtune.studies.kinds.scenes.stored import packed, unpacked
 
 STEEL = st.Material("210 GPa", 0.3, density="7850 kg/m^3", name="steel")
 AS_STIFF = st.Rubber([35e9, -5e9, 1e9], density="7850 kg/m^3")

@@ -9,7 +9,7 @@ from springtune.studies.config.messages import StudyError
 from springtune.studies.kinds import collect, load_study
 from springtune.studies.kinds.scenes import plan as scenes
 from springtune.studies.output import present, reading
-from springtune.studies.output.browse import job as browse
+from springtune.studies.output.browse import page as browse
 from springtune.studies.runs import rerun, run_tasks
 from springtune.studies.runs.plan import plan
 

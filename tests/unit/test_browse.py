@@ -128,7 +128,7 @@ class TestPage:
 
     def test_imports_nothing_heavy(self):
         code = (
-            "import sys, springtune.studies.output.browse.job\n"
+            "import sys, springtune.studies.output.browse.page\n"
             "print(sorted({'xarray', 'matplotlib', 'scipy', 'bokeh', 'pydantic', 'snakemake'} & set(sys.modules)))"
         )
         done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)

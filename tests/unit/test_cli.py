@@ -19,7 +19,7 @@ import springtune
 from counting import counted
 from springtune import prediction
 from springtune.cli import COMMANDS, main
-from springtune.cli.recommendation import prediction_json, prediction_text
+from springtune.cli.recommendation import beam_subject, prediction_json, prediction_text
 from springtune.cli.study import BEGIN, END, MANUAL, SCHEMA, manual_text, schema_text
 from springtune.handover.formats import ENDINGS, FOR_SIMULATORS
 from springtune.mesh import MESH_TYPES, Mesh, braced, write_mesh
@@ -326,7 +326,7 @@ class TestPredict:
         known = known | {"bending": "its error estimate is 1"}
         mesh = MESH_TYPES["structured"](beam.length, beam.height, 5e-3)
         found = prediction.predict(beam, mesh, material, known)
-        lines = prediction_text("", ABOUT, beam, material, found, known).splitlines()
+        lines = prediction_text(beam_subject(beam, material, known), "", ABOUT, found).splitlines()
         rows = [line for line in lines if line.startswith("  ")]
         assert len(rows) > 5 and all("no reference" in row for row in rows[1:])
         assert "bending: no reference; its error estimate is 1" in lines
@@ -337,7 +337,8 @@ class TestPredict:
         numbers["errors"] = dict.fromkeys(prediction.CASES, np.nan)
         failed = numbers | {"extra": "", "failures": {"patch test": "unstable: the network is unstable at rest"}}
         found = [replace(one, **failed) if one.definition == "patch" else one for one in found]
-        text = prediction_text("", ABOUT, beam, material, sorted(found, key=lambda one: one.worst), known)
+        ordered = sorted(found, key=lambda one: one.worst)
+        text = prediction_text(beam_subject(beam, material, known), "", ABOUT, ordered)
         assert "with springs alone: van-gelder" in text
         rows = {line.split()[0]: line for line in text.splitlines() if line.startswith("  ")}
         assert rows["patch"].split()[-5:] == ["unstable"] * 5
@@ -492,7 +493,7 @@ class TestPredictAMesh:
         beam, material = Beam(0.1, 0.02), Material(210e9, 0.3)
         known = prediction.references(beam, material)
         choices, sizes = prediction.extrapolate("braced", 1e-3, beam, material, known, most=600)
-        found = json.loads(prediction_json(beam, material, {"type": "braced"}, choices, known, sizes))
+        found = json.loads(prediction_json(beam_subject(beam, material, known), {"type": "braced"}, choices, sizes))
         low, high = found["choices"][0]["errors"]["bending"]
         assert low < high and found["extrapolated_from"] == sizes
 

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from springtune.mesh import MESH_TYPES
 from springtune.springs import DEFINITIONS, Springs, definition
 from springtune.studies.runs import checked_json, dependencies, keys
+from springtune.studies.runs.dependencies import read
 from springtune.studies.runs.plan import stages
-from springtune.studies.runs.syntax import read
 
 MODULE = '''\
 """What it is for."""
@@ -300,7 +300,7 @@ def test_meshers_count_with_their_meshes():
 LOOKED_UP = (
     "studies.kinds.collect",
     "studies.output.present",
-    "studies.output.browse.job",
+    "studies.output.browse.page",
     "studies.output.page",
     "studies.paper.build",
 )

@@ -32,13 +32,13 @@ from springtune.studies.kinds.moduli.figures import (
 )
 from springtune.studies.kinds.refinement.figures import plot_refinement
 from springtune.studies.kinds.scenes import figures
+from springtune.studies.kinds.scenes.errors import plot_size
 from springtune.studies.kinds.scenes.figures import (
     NETWORK_LINE,
     draw_curve,
     plot_block,
     plot_deformed,
     plot_sensitivity,
-    plot_size,
 )
 from springtune.studies.kinds.shapes.figures import plot_shape, plot_shape_errors, plot_shapes
 from springtune.studies.kinds.stability.figures import (

@@ -10,8 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from springtune.studies.runs.task_costs import LOST, TaskCosts
-from springtune.studies.runs.task_limits import Watch, guarded
+from springtune.studies.runs.task_costs import LOST, TaskCosts, Watch, guarded
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits are the kernel's, and another one's differ")
 
@@ -88,7 +87,7 @@ def test_a_limit_of_the_whole_job_is_kept(tmp_path):
     """As clusters set it (ulimit -v): what a task may take on top would be more."""
     program = (
         "import resource; resource.setrlimit(resource.RLIMIT_AS, (3 * 10**9, 3 * 10**9))\n"
-        "from springtune.studies.runs.task_limits import Watch\n"
+        "from springtune.studies.runs.task_costs import Watch\n"
         "with Watch({'seconds': 60.0, 'memory': 4e9}).over('key'):\n"
         "    print(resource.getrlimit(resource.RLIMIT_AS))"
     )
@@ -129,7 +128,7 @@ def test_errors_end_the_job(tmp_path, capfd, error):
 SLEEPER = """
 import sys, time
 from pathlib import Path
-from springtune.studies.runs.task_limits import Watch, guarded
+from springtune.studies.runs.task_costs import Watch, guarded
 
 def sleep():
     Path(sys.argv[1]).write_text(str(__import__("os").getpid()))

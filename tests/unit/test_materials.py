@@ -15,7 +15,7 @@ from springtune.problem.materials import CONSTANTS, AnisotropicMaterial, Materia
 from springtune.studies.config.expand import declared
 from springtune.studies.config.kind import kinds
 from springtune.studies.config.sections import study_model
-from springtune.studies.runs.hashing import hash_of
+from springtune.studies.runs.checked_json import hash_of
 from springtune.studies.runs.keys import beam_key, material_key
 
 from campaigns import STUDIES

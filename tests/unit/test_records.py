@@ -13,9 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from springtune.studies.runs import checked_json, driver, records, run_tasks, store
-from springtune.studies.runs.damage import ASIDE, DamagedError
-from springtune.studies.runs.task_costs import TaskCosts
-from springtune.studies.runs.task_limits import Watch
+from springtune.studies.runs.checked_json import ASIDE, DamagedError
+from springtune.studies.runs.task_costs import TaskCosts, Watch
 
 JSON = st.recursive(
     st.none() | st.booleans() | st.integers(-(2**53), 2**53) | st.floats(allow_nan=False) | st.text(),

@@ -15,7 +15,7 @@ from springtune.mesh import MESH_TYPES
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import Material
 from springtune.problem.status import Status
-from springtune.reference.similarity import unit_scales
+from springtune.reference.answers import unit_scales
 from springtune.reference.small_strain import solve_unit
 from springtune.scene.sheet import Sheet
 from springtune.springs import DEFINITIONS

@@ -15,7 +15,7 @@ from springtune.mesh import write_mesh
 from springtune.studies.archive import verify
 from springtune.studies.config.kind import outputs
 from springtune.studies.kinds import collect
-from springtune.studies.kinds.shapes import stored
+from springtune.studies.kinds.scenes import stored
 from springtune.studies.kinds.shapes.checks import READ_AT_ONCE
 from springtune.studies.kinds.shapes.plan import mesh_key, reference_task, scene_task
 from springtune.studies.kinds.shapes.reference import rounds_of
@@ -130,8 +130,8 @@ def test_a_mesh_is_stored_with_its_groups(tmp_path):
     core = st.Hole.circle((0.05, 0.02), 0.008, part="core")
     grouped = st.mesh_shape(st.Shape.rectangle(0.1, 0.04, holes=[core], points={"corner": (0, 0)}), 0.01)
     grouped = replace(grouped, unusable={"odd one": "is not on the outline"})
-    store.add(tmp_path / "one.h5", {"key": stored.packed(grouped) | {"message": ""}})
-    again = stored.read(tmp_path, "one", "key")
+    stored.write_made(tmp_path, "one", "key", grouped, {})
+    again = stored.read(tmp_path, "one")
     assert again.mesh.shares_cells(grouped.mesh) and np.array_equal(again.mesh.points, grouped.mesh.points)
     assert list(again.sides) == list(grouped.sides) and again.unusable == grouped.unusable
     assert all(np.array_equal(again.sides[name], edges) for name, edges in grouped.sides.items())
@@ -325,7 +325,7 @@ def test_studies_of_beams_pay_nothing_for_shapes():
     found = set(run.stdout.split())
     assert "springtune.studies.kinds.shapes.kind" in found
     heavy = {f"springtune.studies.kinds.shapes.{name}" for name in ("sections", "checks", "expand", "described")}
-    assert not (heavy | {"springtune.problem.shapes", "springtune.problem.outlines"}) & found
+    assert not (heavy | {"springtune.problem.shapes", "springtune.mesh.sides"}) & found
 
 
 def test_figures_of_two_loads_never_share_a_name(refusal):
@@ -378,9 +378,9 @@ def test_scenes_whose_mesh_was_beyond_limits_are_solved_once_these_are_raised(lo
     study = load(COOK.replace("[16 mm, 8 mm]", "16 mm").replace("linear}", "linear, reference: false}"))
     jobs = {job.stage.name: job for job in plan(study, tmp_path / "results/study", 1).jobs.values()}
     mesh, solve = jobs["shape_mesh"], jobs["shape_solve"]
-    driver.gone(mesh.stage.module, mesh.content, "cook_free_16mm", "not done", "1 s")
+    driver.gone(mesh.stage.module, mesh.content, "shape_cook_free_16mm", "not done", "1 s")
     driver.run(solve.stage.module, solve.content, Limited())
-    (path,) = (tmp_path / "results/study/shape_solutions").iterdir()
+    (path,) = (tmp_path / "results/study/solutions").iterdir()
     assert store.stored(path, "1 s") and not store.stored(path, "1 min")
     tree, told = done(study, tmp_path / "results/study")
     assert "2 solved" in told

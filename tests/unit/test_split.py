@@ -17,7 +17,7 @@ from hypothesis import strategies as some
 
 from springtune.cli import main
 from springtune.safe_io import atomic
-from springtune.studies.archive import merge_parts
+from springtune.studies.archive import parts as of_parts
 from springtune.studies.config.messages import StudyError
 from springtune.studies.config.model import Part
 from springtune.studies.kinds import load_study
@@ -62,11 +62,11 @@ def check_division(study, count, by):
     assert sum(shares) == pytest.approx(1)
     # All that the study stores, and nothing else, under the same keys.
     asked = [
-        {key for job in plan(one, Path("nowhere"), 1).jobs.values() for key in merge_parts.keys_of(job.content)}
+        {key for job in plan(one, Path("nowhere"), 1).jobs.values() for key in of_parts.keys_of(job.content)}
         for one in (study, *parts)
     ]
     of_lists = {key for job in plan(study, Path("nowhere"), 1).jobs.values() if job.stage.name == "calibrate"
-                for key in merge_parts.keys_of(job.content)}  # fmt: skip
+                for key in of_parts.keys_of(job.content)}  # fmt: skip
     assert asked[0] - of_lists <= set().union(*asked[1:]) <= asked[0]
     return parts
 
@@ -435,7 +435,7 @@ def test_fetched_results_are_adopted(there):
     for stage in dict.fromkeys(job.stage.name for job in campaign.plan.jobs.values()):
         made.append(Path(f"{stage}.tar"))
         object_storage.pack(campaign.folder, sorted(campaign.folder.glob(f"done/{stage}_*.json")), made[-1])
-    assert len(checked_json.read(campaign.folder / merge_parts.ELSEWHERE)["files"]) == len(
+    assert len(checked_json.read(campaign.folder / of_parts.ELSEWHERE)["files"]) == len(
         [*campaign.folder.glob("*/*.h5")]
     ) + len([*campaign.folder.glob("meshes/*")])
     campaign.folder.rename("results/before")

@@ -15,7 +15,7 @@ from springtune.studies.kinds.scenes.variables import ROOT
 from springtune.studies.kinds.stability import tables as stability
 from springtune.studies.kinds.stability.collect import STABILITY
 from springtune.studies.output import page as tables_page
-from springtune.studies.output.tables import decimals, number
+from springtune.studies.output.text import decimals, number
 
 
 def cells(line):

@@ -13,9 +13,9 @@ from pathlib import Path
 import h5py
 
 from springtune.studies.kinds import load_study
-from springtune.studies.kinds.scenes import stored_mesh
+from springtune.studies.kinds.scenes import stored
 from springtune.studies.kinds.scenes.solve import stored_key
-from springtune.studies.kinds.scenes.stored_scene import fields_key, unpacked
+from springtune.studies.kinds.scenes.stored import fields_key, unpacked
 from springtune.studies.runs import checked_json, driver, store
 from springtune.studies.runs.plan import plan
 from springtune.studies.runs.task_costs import TaskCosts
@@ -32,7 +32,7 @@ def keys(content, calibration):
     return found
 
 
-def stored(path):
+def results_in(path):
     """Results in a file by key, arrays included."""
     results = store.read(path, store.stored(path))
     with h5py.File(path) as file:
@@ -46,12 +46,12 @@ def computed(study, folder):
     found = {}
     for job in plan(study, folder, 1).jobs.values():
         driver.run(job.stage.module, job.content, TaskCosts())
-        if job.stage.name == "mesh":
+        if job.stage.name in ("mesh", "shape_mesh"):
             for one in job.content["files"]:
-                found["mesh", one["name"], "points"] = stored_mesh.read(job.content["folder"], one["name"]).points
+                found["mesh", one["name"], "points"] = stored.read(job.content["folder"], one["name"]).mesh.points
             continue
         calibration = checked_json.read(folder / "calibration.json")
-        results = {key: one for path in job.products if path.endswith(".h5") for key, one in stored(path).items()}
+        results = {key: one for path in job.products if path.endswith(".h5") for key, one in results_in(path).items()}
         for place, key in enumerate(keys(job.content, calibration)):
             one = results[key] | unpacked(results.get(fields_key(key), {}))
             found |= {(job.stage.name, place, name): value for name, value in one.items()}

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from springtune.studies.runs import commands, locks
+from springtune.studies.runs import locks, workload
 
 from campaigns import STUDIES
 
@@ -86,7 +86,7 @@ def test_no_path_ends_the_script_of_a_report():
     """Snakemake writes paths of parameters into it as they are."""
     one = Path("here/a<")
     for path in (one / "script>b<script>alert(1)<" / "script>mine.yaml", Path("<!--<script>/mine.yaml")):
-        assert "use no <" in commands.refusal(path, Path("/home"), Path("/home"), Path("/bin/python"), on_cluster=False)
+        assert "use no <" in workload.refusal(path, Path("/home"), Path("/home"), Path("/bin/python"), on_cluster=False)
 
 
 @pytest.mark.parametrize(
@@ -126,8 +126,8 @@ def test_a_folder_of_another_study_is_refused(run):
 def test_slurm_gets_no_path_that_its_plugin_would_have_to_quote(what, name):
     """It puts paths into double quotes for a shell; nothing is submitted then."""
     paths = dict.fromkeys(("config", "folder", "checkout", "python"), Path("/home/müller/x+y/a.b,c=d@e:f"))
-    assert commands.refusal(**paths | {"python": Path("/usr/bin/python3")}, on_cluster=True) == ""
-    told = commands.refusal(**paths | {"python": Path("/usr/bin/python3"), what: Path("/home", name)}, on_cluster=True)
+    assert workload.refusal(**paths | {"python": Path("/usr/bin/python3")}, on_cluster=True) == ""
+    told = workload.refusal(**paths | {"python": Path("/usr/bin/python3"), what: Path("/home", name)}, on_cluster=True)
     assert told == (
         f"{f'/home/{name}'!r}: the plugin for Slurm passes paths to a shell without quotes; use letters, digits and "
         "@ + = : , . / _ - in names of files and folders"
@@ -153,8 +153,8 @@ def test_a_job_on_a_node_reads_no_study_and_writes_its_own_files_alone(run, repo
         "threads": 1,
         "command": "echo '{braces}' $HDF5_USE_FILE_LOCKING > results/unread/done/solve_3.json",
     }
-    commands.remember(folder, [told | {"wildcards": {"bundle": "2"}, "command": "false"}, told])
-    before = (folder / commands.COMMANDS_FILE).read_bytes()
+    workload.remember_commands(folder, [told | {"wildcards": {"bundle": "2"}, "command": "false"}, told])
+    before = (folder / workload.COMMANDS_FILE).read_bytes()
     command = [sys.executable, "-m", "snakemake", "--snakefile", repository / "Snakefile", "--mode", "remote",
                "--target-jobs", "solve:bundle=3", "--allowed-rules", "solve", "--cores", "all", "--force", "--nolock",
                "--no-hooks", "--ignore-incomplete", "--configfiles", "unread.yaml",
@@ -163,5 +163,5 @@ def test_a_job_on_a_node_reads_no_study_and_writes_its_own_files_alone(run, repo
     assert done.returncode == 0, done.stderr
     assert (folder / "done/solve_3.json").read_text() == "{braces} FALSE\n"
     made = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
-    assert made - {"logs/solve_3.log"} == {commands.COMMANDS_FILE, "done/solve_3.json", "benchmarks/solve_3.tsv"}
-    assert (folder / commands.COMMANDS_FILE).read_bytes() == before
+    assert made - {"logs/solve_3.log"} == {workload.COMMANDS_FILE, "done/solve_3.json", "benchmarks/solve_3.tsv"}
+    assert (folder / workload.COMMANDS_FILE).read_bytes() == before

@@ -14,7 +14,6 @@ from springtune.studies.runs import locks, rerun, workload
 from springtune.studies.runs.workload import READ
 from springtune.studies.runs.plan import plan, stages
 from springtune.safe_io.escapes import rst
-from springtune.studies.runs import commands
 from springtune.safe_io.atomic import remove_unfinished
 from springtune.studies.runs.dependencies import CODE_FILE, OURS
 from springtune.studies.kinds import load_study
@@ -65,7 +64,7 @@ def refused(why):
 
 
 ON_CLUSTER = NODES is not None
-WHY_NOT = commands.refusal(CONFIG, Path.cwd(), Path(workflow.basedir), Path(sys.executable), ON_CLUSTER)
+WHY_NOT = workload.refusal(CONFIG, Path.cwd(), Path(workflow.basedir), Path(sys.executable), ON_CLUSTER)
 if WHY_NOT and not IS_CHILD:
     refused(WHY_NOT)
 UNTOLD = chosen_untold()
@@ -163,7 +162,7 @@ def begin():
             one.write()
         OURS.remember(RESULTS.parent / CODE_FILE)
         if ON_CLUSTER:
-            commands.remember(RESULTS, jobs_to_run())
+            workload.remember_commands(RESULTS, jobs_to_run())
     except locks.LockedError as error:
         raise WorkflowError(str(error)) from None
     except OSError as error:
@@ -185,12 +184,12 @@ def tell_start():
             if outputs and Path(outputs[0]).is_relative_to(one.folder)
         ]
         names += [study.name] if own or study is STUDY else []
-        found |= workload.loads(study, one, own)
+        found |= workload.estimates(study, one, own)
     cores = (
         max(1, min(workflow.resource_settings.nodes, len(jobs))) if ON_CLUSTER else CORES
     )  # on a cluster, jobs side by side
     text = f"{', '.join(names)}: {workload.told(found, cores)}"
-    logger.info(text, extra={"loads": found, "cores": cores})
+    logger.info(text, extra={"estimates": found, "cores": cores})
 
 
 def tell_end(how):

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from snakemake.exceptions import WorkflowError
 
-from springtune.studies.runs import commands
+from springtune.studies.runs import workload
 from springtune.studies.runs.run_tasks import STATE, source_state
 
 BEGUN = time.time()

@@ -50,7 +50,7 @@ def noted_job():
     targets = parse_target_jobs_cli_args(rest[:number])
     if len(targets) != 1:  # a group's
         return None
-    return commands.recall(Path("results") / CONFIG.stem, targets[0].rulename, targets[0].wildcards_dict)
+    return workload.recall_command(Path("results") / CONFIG.stem, targets[0].rulename, targets[0].wildcards_dict)
 
 
 NOTED = noted_job()

@@ -2,10 +2,10 @@
 
 import os
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
-from functools import reduce
+from dataclasses import dataclass, fields, replace
+from functools import reduce, wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -249,7 +249,7 @@ class AskedShape:
 
     def mesh(self) -> "GroupedMesh":
         """The mesh, finer where the study says so."""
-        from ..mesh.group_files import read_shape  # here, since studies are read without scipy
+        from ..mesh.formats import read_shape  # here, since studies are read without scipy
         from ..mesh.outlines import mesh_shape
 
         if self.size is None:
@@ -358,16 +358,52 @@ def _materials(
     return {one: replace(other, density=heavy) if other.density is None else other for one, other in found.items()}
 
 
-def known_materials(context: click.Context, parameter: click.Parameter, begun: str) -> list[str]:
-    """Materials whose names begin so, for a shell to complete."""
-    return [name for name in MATERIALS if name.startswith(begun)]
+def names_from(
+    known: Callable[[], Iterable[str]],
+) -> Callable[[click.Context, click.Parameter, str], list[str]]:
+    """Completion of a name; the names are imported when a shell asks."""
+    return lambda context, parameter, begun: [name for name in known() if name.startswith(begun)]
 
 
 AnyCommand = Callable[..., None]
 
 
-def sheet_options(mesh_help: str, mesh_type: str | None = None) -> Callable[[AnyCommand], AnyCommand]:
-    """Decorator that adds them to a command, with what its mesh may be, and is without the option."""
+@dataclass(frozen=True)
+class SheetOptions:
+    """Options of a sheet, its mesh and its material, which several commands share."""
+
+    beam: str | None
+    shape: str | None
+    thickness: str
+    mesh_type: str | None
+    size: str | None
+    unit: str
+    material: str | None
+    young: str | None
+    poisson: str | None
+    density: str | None
+
+    def asked_beam(self) -> "tuple[Beam, Material]":
+        """Beam and its material; ValueError names the option."""
+        material = asked_material(self.material, self.young, self.poisson, self.density)
+        return asked_beam(self.beam or "", self.thickness), material
+
+    def asked_shape(self, load: str | None, sized: bool = True) -> "AskedShape":
+        """Shape of a study; ValueError names the option."""
+        return asked_shape(self.shape or "", load, self.material, self.density, self.size, sized=sized)
+
+    def asked_mesh(self, beam: "Beam") -> "tuple[str, float | None]":
+        """Name of a beam's mesh, and its length of an edge [m], None for a mesh file; ValueError names the option."""
+        mesh_type = self.mesh_type or "structured"
+        if is_made(mesh_type):
+            return f"{mesh_type} {self.size}", asked_size(beam, mesh_type, self.size)
+        return Path(mesh_type).name, None
+
+
+def sheet_options(
+    mesh_help: str, density_help: str, mesh_type: str | None = None
+) -> Callable[[AnyCommand], AnyCommand]:
+    """Decorator that adds these options to a command, which gets them as `SheetOptions`."""
     each = (
         click.option("--beam", help="Length x height in mm, such as 200x40."),
         click.option(
@@ -383,13 +419,23 @@ def sheet_options(mesh_help: str, mesh_type: str | None = None) -> Callable[[Any
         click.option("--unit", default="1 m", show_default=True, help="Unit of the coordinates in a mesh file."),
         click.option(
             "--material",
-            shell_complete=known_materials,
+            shell_complete=names_from(lambda: MATERIALS),
             help=f"One of {', '.join(MATERIALS)}; or give --young and --poisson; of a shape one of its study.",
         ),
         click.option("--young", help="Young's modulus, such as '210 GPa'."),
         click.option("--poisson", help="Poisson's ratio, from 0 to 0.5."),
+        click.option("--density", help=f"Density, such as '7850 kg/m^3': {density_help}."),
     )
-    return lambda command: reduce(lambda made, option: option(made), reversed(each), command)
+
+    def decorate(command: AnyCommand) -> AnyCommand:
+        @wraps(command)
+        def call(**given: Any) -> None:
+            sheet = SheetOptions(**{one.name: given.pop(one.name) for one in fields(SheetOptions)})
+            command(sheet, **given)
+
+        return reduce(lambda made, option: option(made), reversed(each), call)
+
+    return decorate
 
 
 RESULTS_FOLDER, CONFIG_FOLDER = Path("results"), Path("config")

@@ -448,9 +448,8 @@ def archive(
         raise click.ClickException(
             "the library rocrate is missing; install the extra: pip install 'springtune[archive]'"
         ) from None
-    from ..studies.archive.archive import write
     from ..studies.archive.contents import ArchiveError, stored_size
-    from ..studies.archive.crate import CitationError
+    from ..studies.archive.crate import CitationError, write
 
     target = out or folder.with_name(f"{folder.name}.crate.zip")
     if target.is_dir() or target.suffix != ".zip":

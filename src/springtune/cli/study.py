@@ -226,7 +226,7 @@ def split(config: Path, count: int, by: str, out: Path | None, most: int | None)
     are about equal in what they are expected to cost; a section such as `laying` is in one of them.
     """
     allow(most)
-    from ..studies.archive.parts import told, write_parts  # here, so that --help does not wait for it
+    from ..studies.archive.parts import share_table, write_parts  # here, so that --help does not wait for it
     from ..studies.config.messages import StudyError
     from ..studies.kinds import load_study
 
@@ -237,7 +237,7 @@ def split(config: Path, count: int, by: str, out: Path | None, most: int | None)
         raise click.ClickException(str(error)) from None
     except OSError as error:
         raise click.ClickException(f"{error.filename}: cannot be written: {error.strerror}") from None
-    click.echo(aligned(told(written), left=0, right=(1, 2, 3)))
+    click.echo(aligned(share_table(written), left=0, right=(1, 2, 3)))
     results = " ".join(f"results/{one.study.name}" for one in written)
     click.echo(f"\nspringtune run {written[0].path}   # and so on, each where it is to run; then, with all results in "
                f"one place,\nspringtune merge {config} {results}")  # fmt: skip
@@ -260,7 +260,7 @@ def merge(config: Path, results: tuple[Path, ...], incomplete: bool) -> None:
     code, packages and Python; nothing is written before all fits. `st.merge` in Python joins datasets of different
     studies.
     """
-    from ..studies.archive.merge_parts import MergeError, merge_sites, told  # here, so that --help does not wait for it
+    from ..studies.archive.parts import MergeError, merge_sites, merge_text  # here, so that --help does not wait for it
     from ..studies.config.messages import StudyError
     from ..studies.kinds import load_study
     from ..studies.runs.locks import LockedError
@@ -271,7 +271,7 @@ def merge(config: Path, results: tuple[Path, ...], incomplete: bool) -> None:
         raise click.ClickException(str(error)) from None
     except OSError as error:
         raise click.ClickException(f"{error.filename}: {error.strerror}; the same command goes on from here") from None
-    click.echo(told(merged, results))
+    click.echo(merge_text(merged, results))
     click.echo(f"springtune run {config}   # collects the dataset" + (", and computes the rest" if merged.left else ""))
 
 

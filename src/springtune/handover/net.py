@@ -402,12 +402,12 @@ def _everywhere(energy: Energy, mesh: Mesh) -> Energy:
     if len(energy.corners) == len(cells):
         return energy
     rows, moduli = rows_of(cells, energy.corners), {}
-    for part in fields(energy):  # type: ignore[arg-type]
+    for part in fields(energy):
         own = getattr(energy, part.name)
         if isinstance(own, np.ndarray) and part.name not in ("points", "corners"):
             moduli[part.name] = np.zeros((len(cells), *own.shape[1:]))
             moduli[part.name][rows] = own
-    return replace(energy, corners=cells, **moduli)  # type: ignore[type-var]
+    return replace(energy, corners=cells, **moduli)
 
 
 def _merged(given: list[Terms]) -> tuple[Terms, ...]:

@@ -21,7 +21,7 @@ from scipy.sparse.linalg import eigsh
 
 from ..linalg.factors import SingularError
 from ..mesh.cells import Mesh
-from ..mesh.parts import free_motion
+from ..mesh.sheets import free_motion
 from .integrators import EXPLICIT, IMPLICIT, INTEGRATORS, LAGGED, PRECISIONS, BackwardEuler
 from .network import Network
 from .newton import TOLERANCE

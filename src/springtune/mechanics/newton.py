@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -228,8 +229,13 @@ def error_estimate(
 ) -> float:
     """Return the estimated relative error of displacements [1], from the Newton step left and rounding of forces."""
     rounding = network.rounding(displacements, linear)
-    signs = np.random.default_rng(0).choice([-1.0, 1.0], len(rounding))
-    return norm(factor.estimate(missing + signs * rounding)) / (norm(displacements.ravel()) or 1.0)
+    return norm(factor.estimate(missing + _signs(len(rounding)) * rounding)) / (norm(displacements.ravel()) or 1.0)
+
+
+@lru_cache(maxsize=4)
+def _signs(count: int) -> np.ndarray:
+    """Random signs of rounding errors, the same for all networks of a size."""
+    return np.random.default_rng(0).choice([-1.0, 1.0], count)
 
 
 def refine(

@@ -203,4 +203,10 @@ class Pattern:
 
     def matrix(self, data: np.ndarray) -> csc_array:
         """Sparse matrix of these entries."""
-        return csc_array((data, self.indices, self.pointers), shape=(self.size, self.size))
+        found = copy(self._empty)  # without the checks of a new one
+        found.data = data
+        return found
+
+    @cached_property
+    def _empty(self) -> csc_array:
+        return csc_array((np.zeros(len(self.indices)), self.indices, self.pointers), shape=(self.size, self.size))

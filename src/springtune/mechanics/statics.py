@@ -18,8 +18,7 @@ from ..linalg.factors import SingularError as SingularError
 from ..problem.status import Status
 from .continuation import continued
 from .expansion import Expansion
-from .follower import FollowerPressure
-from .network import Network
+from .network import FollowerPressure, Network
 from .newton import KEEP_TANGENT, MAX_FACTORIZATIONS, Equilibrium, Iterate, Newton, norm, refine, uncertainty
 
 FAR = 0.15

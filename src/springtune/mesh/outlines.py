@@ -5,7 +5,7 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Real
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -13,10 +13,8 @@ from .cells import Mesh, MeshError, signed_areas
 from .groups import GroupedMesh
 from .rows import ROW_HEIGHT
 from .sheets import nearer
+from .sides import OutlineSide, Point
 from .types import too_many
-
-Point = tuple[float, float]
-"""Coordinates [m]."""
 
 LEAST_AROUND = 6
 """Fewest edges of a full turn of an arc, so that a small hole remains."""
@@ -34,52 +32,8 @@ MOST_ROUNDS = 20
 """Most times that a mesh is made anew because netgen divided edges of arcs."""
 
 
-class OutlineSide(Protocol):
-    """A side, see `springtune.problem.outlines.OutlineSide`."""
-
-    @property
-    def group(self) -> str: ...  # noqa: D102
-    @property
-    def arc(self) -> tuple[float, float, float, float] | None: ...  # noqa: D102
-    def at(self, parameter: float) -> Point: ...  # noqa: D102
-    def length_to(self, parameter: float) -> float: ...  # noqa: D102
-    def aside(self, low: float, high: float) -> float: ...  # noqa: D102
-    def divided(self, count: int, low: float, high: float) -> list[float]: ...  # noqa: D102
-    def nearest(self, point: Point) -> tuple[float, float]: ...  # noqa: D102
-    def parameter_near(self, point: Point, distance: float) -> float | None: ...  # noqa: D102
-
-
-class Round(Protocol):
-    """A closed round of sides, see `springtune.problem.outlines.Round`."""
-
-    @property
-    def sides(self) -> Sequence[OutlineSide]: ...  # noqa: D102
-    @property
-    def inner(self) -> str | None: ...  # noqa: D102
-    @property
-    def outer(self) -> str | None: ...  # noqa: D102
-    @property
-    def around(self) -> int | None: ...  # noqa: D102
-    @property
-    def area(self) -> float: ...  # noqa: D102
-    def winds_about(self, point: Point) -> bool: ...  # noqa: D102
-
-
-class Outlined(Protocol):
-    """Shape that can be meshed: a `springtune.Shape`."""
-
-    @property
-    def name(self) -> str: ...  # noqa: D102
-    @property
-    def file(self) -> str: ...  # noqa: D102
-    @property
-    def rounds(self) -> Sequence[Round]: ...  # noqa: D102
-    @property
-    def points(self) -> Mapping[str, Point]: ...  # noqa: D102
-    @property
-    def area(self) -> float: ...  # noqa: D102
-    @property
-    def extent(self) -> tuple[Point, Point]: ...  # noqa: D102
+Outlined = Any
+"""A `springtune.Shape`, which is of a room above."""
 
 
 @dataclass(frozen=True)

@@ -80,7 +80,7 @@ def _fitted(length: float, height: float, cells: int, rows: int) -> Mesh:
     shifted = np.concatenate([[0.0], 0.5 * (straight[:-1] + straight[1:]), [length]])
     lines = [straight if row % 2 == 0 else shifted for row in range(rows + 1)]
     mesh = _join(lines, np.linspace(0.0, height, rows + 1))
-    vars(mesh)["_box_fault"] = ""  # rows fill it once: `springtune.mesh.box.box_fault` need not look
+    vars(mesh)["_box_fault"] = ""  # rows fill it once: `springtune.mesh.sheets.box_fault` need not look
     return mesh
 
 

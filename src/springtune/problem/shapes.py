@@ -19,9 +19,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from ..mesh.sides import OutlineSide, Point, Round, enclosed, extent, in_mm, meeting, turned, winds_about
 from ..registry import NAME, NAME_RULE
 from .geometry import beam_label, warn_of_thickness
-from .outlines import OutlineSide, Point, Round, enclosed, extent, in_mm, meeting, turned, winds_about
 from .quantities import nearest, positive, quantity
 
 Place = tuple[float | str, float | str]

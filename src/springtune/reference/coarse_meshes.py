@@ -19,7 +19,7 @@ from scipy import spatial
 
 from ..mesh.cells import MeshError, signed_areas
 from ..mesh.groups import GroupedMesh
-from ..problem.outlines import OutlineSide, Point
+from ..mesh.sides import OutlineSide, Point
 from ..problem.shapes import Shape
 from .small_strain import ELEMENT_GROWTH, SHRINKAGE
 

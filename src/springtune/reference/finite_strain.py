@@ -28,7 +28,7 @@ from ..linalg.factors import SingularError, SuperLUFactor
 from ..problem.geometry import Beam
 from ..problem.loads import BOTTOM, FACE, LEFT, LoadKind
 from ..problem.materials import Material, Rubber
-from .field import interpolate
+from .answers import interpolate
 from .small_strain import ReferenceNotConvergedError
 
 COUNTS = (5, 8)
@@ -96,7 +96,7 @@ class FiniteStrainSolution:
     displacements: np.ndarray
 
     def at(self, points: np.ndarray) -> np.ndarray:
-        """Return displacements [m] at rest points (n, 2) [m], see `springtune.reference.field.interpolate`."""
+        """Return displacements [m] at rest points (n, 2) [m], see `springtune.reference.answers.interpolate`."""
         return interpolate(self.x, self.y, self.displacements, points)
 
 

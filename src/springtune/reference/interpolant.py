@@ -1,6 +1,6 @@
 r"""Tensor Chebyshev interpolant of a unit problem: thousands of beams for tens of solves.
 
-The unit problem (`springtune.reference.similarity`) depends on the aspect ratio a and Poisson's ratio nu alone, and
+The unit problem (`springtune.reference.answers`) depends on the aspect ratio a and Poisson's ratio nu alone, and
 is analytic in :math:`(\log a, \nu)`. Logarithms of its answers are interpolated: displacements are powers of the
 aspect ratio towards either end, hence straight lines in :math:`\log a`, for any kind of load. The Chebyshev
 coefficients fall geometrically (Trefethen, Approximation Theory and Approximation Practice, 2013, theorem 8.2), and

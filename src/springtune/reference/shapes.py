@@ -15,11 +15,11 @@ from scipy.sparse import coo_array
 from ..linalg.factors import SingularError, factorize
 from ..mesh.cells import MeshError, signed_areas
 from ..mesh.groups import GroupedMesh
-from ..mesh.parts import check_held
+from ..mesh.sheets import check_held
 from ..problem.materials import AnyMaterial
 from ..problem.shapes import LoadCase, Quantity, Shape
+from .answers import most_rotation_and_strain
 from .coarse_meshes import LARGEST_TURN, CoarseMesh, Corner, Side, corners_of, outline_mesh
-from .limits import most_rotation_and_strain
 from .small_strain import ReferenceNotConvergedError
 from .triangles import SIDE_CORNERS, function_counts, shape_functions, side_fit, side_functions, tabulated
 
@@ -59,7 +59,7 @@ class ShapeReference:
     energy : float
         Strain energy [J].
     rotation, strain : float
-        Rotation [rad] and strain [1] that limit its use, see `springtune.reference.limits`.
+        Rotation [rad] and strain [1] that limit its use, see `springtune.reference.answers`.
     negligible : tuple of str
         Quantities below a thousandth of the largest of their kind, whose relative errors are meaningless.
     """

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from ..mesh import MESH_TYPES, Mesh, read_beam_mesh
-from ..mesh.box import box_fault
+from ..mesh.sheets import box_fault
 from ..problem.geometry import Beam
 from ..problem.materials import AnisotropicMaterial, Material, only_isotropic
 from ..problem.quantities import positive

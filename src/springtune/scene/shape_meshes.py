@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 
-from ..mesh.group_files import read_shape as read_grouped
+from ..mesh.formats import read_shape as read_grouped
 from ..mesh.groups import GroupedMesh
 from ..mesh.outlines import mesh_shape as mesh_outlined
+from ..mesh.sides import OutlineSide, in_mm
 from ..problem.boundary import part_names
 from ..problem.materials import AnyMaterial
-from ..problem.outlines import OutlineSide, in_mm
 from ..problem.quantities import positive
 from ..problem.shapes import Shape
 from .meshes import A_SHAPE, is_a

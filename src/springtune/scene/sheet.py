@@ -10,9 +10,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ..mechanics.follower import FollowerPressure
 from ..mechanics.moduli import lateral_forces
-from ..mechanics.network import Network
+from ..mechanics.network import FollowerPressure, Network
 from ..mechanics.newton import Equilibrium
 from ..mechanics.statics import StaticProblem
 from ..mesh import Mesh

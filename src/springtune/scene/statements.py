@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..mechanics.follower import FollowerPressure
+from ..mechanics.network import FollowerPressure
 from ..mechanics.statics import StaticProblem
 from ..mesh import Mesh
 from ..mesh.groups import GroupedMesh
 from ..problem.boundary import (
     cell_at,
+    check_case,
     displacement_weights,
     followed,
     forces,
@@ -25,13 +26,12 @@ from ..problem.boundary import (
     reaction_weights,
     supported,
 )
-from ..problem.cases import check_case
 from ..problem.geometry import Beam, warn_of_thickness
 from ..problem.loads import LOADS, LoadKind
 from ..problem.materials import ANY_MATERIAL, AnyMaterial, Material, Rubber
 from ..problem.quantities import positive
 from ..problem.shapes import LoadCase, Quantity, Shape
-from ..reference.limits import beyond_linear
+from ..reference.answers import beyond_linear
 from ..springs import Definition, DefinitionError, Springs
 from ..springs.identification import Case
 from .meshes import A_BEAM, A_MATERIAL, A_MESH, A_SHAPE, check_filled, is_a
@@ -482,7 +482,7 @@ def unit_reference(beam: Beam, material: Material, kind: LoadKind, force: float)
     force : float
         [N]
     """
-    from ..reference.similarity import unit_problem, unit_scales
+    from ..reference.answers import unit_problem, unit_scales
 
     length, displacement = unit_scales(beam, material, kind)
     return _solve_unit(*unit_problem(beam, material, kind)).scaled(force * displacement, length)

@@ -199,7 +199,7 @@ def _law(energy: "Energy") -> tuple[object, ...]:
 
     Rubber laws may differ in their terms and in their range of data.
     """
-    names = [part.name for part in fields(energy) if part.name not in (*CELL_FIELDS, "coefficients", "largest")]  # type: ignore[arg-type]
+    names = [part.name for part in fields(energy) if part.name not in (*CELL_FIELDS, "coefficients", "largest")]
     values = [getattr(energy, name) for name in names]
     return tuple(value.shape[1:] if isinstance(value, np.ndarray) else value for value in values if value is not None)
 
@@ -212,7 +212,7 @@ def _joined(mesh: Mesh, parts: "list[tuple[Energy, np.ndarray, float]]") -> "Ene
     cells = np.concatenate([where for _, where, _ in parts])
     order = np.argsort(cells)
     moduli: dict[str, Any] = {}
-    for part in fields(first):  # type: ignore[arg-type]
+    for part in fields(first):
         own = [getattr(energy, part.name) for energy, _, _ in parts]
         if part.name == "largest":  # a range of data, not a modulus
             own = [np.broadcast_to(one, len(where)) for one, (_, where, _) in zip(own, parts)]
@@ -226,4 +226,4 @@ def _joined(mesh: Mesh, parts: "list[tuple[Energy, np.ndarray, float]]") -> "Ene
         # What an energy has besides its cells is in proportion to its stiffness.
         moduli[part.name] = np.concatenate([scale * one for one, (_, _, scale) in zip(own, parts)])[order]
     corners = mesh.cells[first.corners.shape[1]][cells[order]]
-    return replace(first, points=mesh.points, corners=corners, **moduli)  # type: ignore[type-var]
+    return replace(first, points=mesh.points, corners=corners, **moduli)

@@ -1,4 +1,4 @@
-"""Select and check the files of an archive; `springtune.studies.archive.archive` writes it."""
+"""Select and check the files of an archive; `springtune.studies.archive.crate` writes it."""
 
 import hashlib
 import json
@@ -17,11 +17,11 @@ from springtune.safe_io.escapes import markdown
 from ..output.browse import page as browse
 from ..output.reading import check_links
 from ..runs import provenance, records, rerun
-from ..runs.commands import COMMANDS_FILE
 from ..runs.dependencies import OURS, PACKAGE
+from ..runs.keys import installed
 from ..runs.plan import plan
-from . import environment
-from .merge_parts import ELSEWHERE
+from ..runs.workload import COMMANDS_FILE
+from .parts import ELSEWHERE
 from .verify import files as verified
 
 if TYPE_CHECKING:
@@ -37,6 +37,9 @@ CODE, INPUTS = "code", "inputs"
 CITATION = "CITATION.cff"
 OF_RESULTS = "results"
 
+LOCK_FILES = ("requirements/run.txt", "requirements/cholesky.txt")
+"""Lock files of studies; the second is an optional extra."""
+
 CHECKOUT_FILES = (
     "Snakefile",
     "Makefile",
@@ -46,7 +49,7 @@ CHECKOUT_FILES = (
     "LICENSE",
     CITATION,
     "tools/setup.sh",
-    *environment.LOCK_FILES,
+    *LOCK_FILES,
 )
 """Required files of a checkout."""
 
@@ -188,7 +191,7 @@ def gather(
         inputs=tuple(sorted(set(names.values()) - {own})),
         code=code,
         attributes=attributes,
-        machine=environment.machine() if tell_machine else {},
+        machine=machine() if tell_machine else {},
         departures=_departures(checkout, attributes),
         untold=untold,
     )
@@ -423,13 +426,11 @@ def _elsewhere(folder: Path) -> bool:
 
 def _departures(checkout: Path, attributes: dict[str, str]) -> dict[str, tuple[str, str]]:
     """Versions of the dataset that differ from the locked ones."""
-    locked: dict[str, str] = {}
-    for lock in environment.LOCK_FILES:
-        locked |= environment.locked(checkout / lock)
+    wanted: dict[str, str] = {}
+    for lock in LOCK_FILES:
+        wanted |= locked(checkout / lock)
     used = json.loads(attributes.get("software", "{}"))
-    return {
-        name: (locked[name], version) for name, version in sorted(used.items()) if locked.get(name, version) != version
-    }
+    return {name: (wanted[name], one) for name, one in sorted(used.items()) if wanted.get(name, one) != one}
 
 
 # -- the archive -------------------------------------------------------------------------------------------------------
@@ -454,13 +455,13 @@ described in `{METADATA}`: this is an RO-Crate.
 | `{found.config}` | the study |
 | `{found.dataset}` | its dataset: NetCDF-4, for xarray or any HDF5 viewer |
 | `{found.folder}/{rerun.PAGE}` | a page to browse it |
-| `{CODE}/` | the program, with the versions of all packages in `{CODE}/{environment.LOCK_FILES[0]}` |
+| `{CODE}/` | the program, with the versions of all packages in `{CODE}/{LOCK_FILES[0]}` |
 
 To check that all is as it was packed:
 
     sha256sum -c {SUMS}
 
-To compute it again, with Python {environment.minor(found.software["python"])} and make, and to compare:
+To compute it again, with Python {minor(found.software["python"])} and make, and to compare:
 
     cd {CODE}
     make study STUDY={study}
@@ -479,3 +480,53 @@ def of_text(name: str, text: str) -> Packed:
     """Archive file with a given text."""
     content = text.encode(errors="surrogateescape")
     return Packed(name, content, hashlib.sha256(content).hexdigest(), len(content))
+
+
+# -- software and machine ----------------------------------------------------------------------------------------------
+
+
+def minor(version: str) -> str:
+    """Python version without its last number, as wheels use it.
+
+    Examples
+    --------
+    >>> minor("3.11.7")
+    '3.11'
+    """
+    return ".".join(version.split(".")[:2])
+
+
+def locked(path: Path) -> dict[str, str]:
+    """Versions that a lock file requests on this machine."""
+    from packaging.requirements import InvalidRequirement, Requirement
+    from packaging.utils import canonicalize_name
+
+    found = {}
+    for line in path.read_text().splitlines():
+        text = line.removesuffix("\\").strip()
+        if not text or text.startswith(("#", "-")):
+            continue
+        try:
+            one = Requirement(text)
+        except InvalidRequirement:
+            continue
+        if one.marker is None or one.marker.evaluate():
+            found[str(canonicalize_name(one.name))] = str(one.specifier).removeprefix("==")
+    return found
+
+
+def departures(lock: Path) -> dict[str, tuple[str, str]]:
+    """Installed versions that differ from a lock file."""
+    here = {name: (version, installed(name)) for name, version in locked(lock).items()}
+    return {name: pair for name, pair in here.items() if pair[0] != pair[1]}
+
+
+def machine() -> dict[str, str]:
+    """Properties of the machine that numbers and times depend on, without names."""
+    found = {"architecture": platform.machine(), "system": platform.system(), "cores": str(os.cpu_count())}
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        lines = []
+    models = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return found | ({"processor": models[0]} if models else {})

@@ -21,12 +21,11 @@ from ..kinds.shapes.plan import of_shape_scenes
 from ..output import reading
 from ..output.summary import SCENES
 from ..runs import checked_json, driver, records, rerun, store
-from ..runs.damage import ASIDE, DamagedError, rename
+from ..runs.checked_json import ASIDE, DamagedError, rename
 from ..runs.keys import installed
 from ..runs.plan import BUNDLES_FILE, plan
 from ..runs.run_tasks import RECORDS, TASKS
-from ..runs.task_costs import TaskCosts
-from ..runs.task_limits import LIMITS_TOLD
+from ..runs.task_costs import LIMITS_TOLD, TaskCosts
 
 if TYPE_CHECKING:
     import xarray as xr

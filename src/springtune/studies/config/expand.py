@@ -17,7 +17,9 @@ from springtune.springs.lattice import COEFFICIENT
 
 from .checks import check_cells, check_files, check_numbers, mesh_type_names, stated_rows
 from .combinations import Combination, combinations
+from .csv_files import read_printed
 from .fields import RANGE_DIGITS
+from .kind import Kind
 from .messages import Problems, clipped
 from .model import (
     FURTHER_REFERENCES,
@@ -28,10 +30,8 @@ from .model import (
     Reference,
     SceneSpec,
     Study,
-    StudyKind,
     swept_value,
 )
-from .printed import read_printed
 from .sections import StudyConfig
 
 Ranks = dict[str, dict[str, int]]
@@ -287,7 +287,7 @@ def _calibrating(config: StudyConfig, scenes: Sequence[SceneSpec], problems: Pro
 
 
 def build(
-    config: StudyConfig, grids: tuple[Grid, ...], kinds: Sequence[StudyKind], problems: Problems, about: dict[str, Any]
+    config: StudyConfig, grids: tuple[Grid, ...], kinds: Sequence[Kind], problems: Problems, about: dict[str, Any]
 ) -> Study:
     """Build the study with the parts of all study kinds."""
     ranks = _ranks(config)

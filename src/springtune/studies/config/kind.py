@@ -12,10 +12,8 @@ from typing import TYPE_CHECKING, Any
 from springtune.registry import imported
 
 if TYPE_CHECKING:
-    from .expand import Declared
     from .messages import Problems
     from .model import Study
-    from .sections import StudyConfig
 
 _PACKAGES = Path(__file__).parents[1] / "kinds"
 
@@ -107,7 +105,7 @@ class Stage:
     products : callable
         Of that content: files that a job makes besides its record.
     members : callable, optional
-        Of a study and a machine's `springtune.studies.runs.bundles.Costs`: by name, the seconds that it takes and a
+        Of a study and a machine's `springtune.studies.runs.plan.Costs`: by name, the seconds that it takes and a
         value. Not of a stage that works on the bundles of another one.
     like : str
         Stage whose bundles it works on.
@@ -171,7 +169,7 @@ class Kind:
     costs : dict of str to tuple
         Seconds of a task by its name in records, in any case and per unit, before any was measured.
     pieces : callable, optional
-        Of a study, `springtune.studies.runs.bundles.Costs` and a `springtune.studies.kinds.division.Division`: seconds
+        Of a study, `springtune.studies.runs.plan.Costs` and a `springtune.studies.kinds.division.Division`: seconds
         of each piece that a part of a study may have of it, by name. A kind without is in one part as a whole.
     take : callable, optional
         Of a study and names of pieces: the study with these alone.
@@ -182,8 +180,8 @@ class Kind:
     grid_fields: dict[str, tuple[Any, Any]] = field(default_factory=dict)
     alone: tuple[str, ...] = ()
     files: Callable[[Any], Iterable[Path]] = lambda part: ()
-    check: Callable[[StudyConfig, Problems], None] = lambda config, problems: None
-    expand: Callable[[StudyConfig, Declared], Any] = lambda config, declared: ()
+    check: Callable[[Any, Problems], None] = lambda config, problems: None
+    expand: Callable[[Any, Any], Any] = lambda config, declared: ()
     axes: Callable[[Any], Mapping[str, Collection[str | float]]] = lambda part: {}
     summary: Callable[[Any], list[list[object]]] = lambda part: []
     variables: dict[str, tuple[tuple[str, ...], str, str, Any]] = field(default_factory=dict)

@@ -51,8 +51,8 @@ from .fields import (
     number,
     one_of,
 )
+from .kind import Kind, Output
 from .messages import refuse, show
-from .model import StudyKind, StudyOutput
 
 MOST_PARTS = 1000
 """Most parts that a study is split into."""
@@ -543,12 +543,12 @@ class Later(NamedTuple):
         return imported(f"{self.module}:{self.name}")
 
 
-def study_model(kinds: Sequence[StudyKind], given: Container[object] | None = None) -> type[StudyConfig]:
+def study_model(kinds: Sequence[Kind], given: Container[object] | None = None) -> type[StudyConfig]:
     """Model of a study: `StudyConfig` and the keys that study kinds add to it and to its grids."""
     # Of each field its type and pydantic's description.
     grid_fields: dict[str, Any] = {}
     study_fields: dict[str, Any] = {}
-    outputs: list[StudyOutput] = []
+    outputs: list[Output] = []
     for kind in kinds:
         grid_fields |= kind.grid_fields
         for name, (annotation, field) in kind.study_fields.items():

@@ -12,9 +12,9 @@ from springtune.safe_io import atomic
 
 from ..config.kind import kinds, outputs
 from ..output import dataset, summary
-from ..runs import bundles, provenance, records, rerun
+from ..runs import provenance, records, rerun
 from ..runs.dependencies import CODE_FILE, OURS
-from ..runs.plan import COSTS_FILE, plan, usual_costs
+from ..runs.plan import COSTS_FILE, plan, remember_costs, usual_costs
 from ..runs.run_tasks import RECORDS, with_repair
 from ..runs.stages import results
 from . import load_study
@@ -39,7 +39,7 @@ def _collected(
         raise SystemExit(str(error)) from None
     told = output.with_name(summary.FILE)
     atomic.write_text(told, summary.text(groups, study.title))
-    bundles.remember(folder.parent / COSTS_FILE, sorted(folder.glob(f"{RECORDS}/*_*.json")), usual_costs())
+    remember_costs(folder.parent / COSTS_FILE, sorted(folder.glob(f"{RECORDS}/*_*.json")), usual_costs())
     return [output, told]
 
 

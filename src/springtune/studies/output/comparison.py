@@ -13,9 +13,8 @@ import xarray as xr
 
 from springtune.problem.quantities import nearest
 
-from .alignment import Axis, axis
-from .flags import NOT_REQUESTED, flag_words, is_flagged
-from .swept import with_swept
+from .alignment import Axis, axis, with_swept
+from .dataset import NOT_REQUESTED, flag_words, is_flagged
 from .text import NUMBER, without_numbers
 
 RELATIVE = 1e-6

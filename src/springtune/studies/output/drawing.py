@@ -1,14 +1,20 @@
-"""Plots of a single scene and of a single curve, in the style of all figures."""
+"""Plots of a single scene and of a single curve in the style of all figures, and what figures of networks share."""
 
+import math
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 
+from springtune.problem.status import Status
+
 from . import labels, style
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from springtune.mesh import Mesh
     from springtune.scene.curve import Curve
 
@@ -71,3 +77,47 @@ def draw_curve(ax: Axes | None, curve: "Curve") -> Axes:
     room = panel.get_window_extent().width / panel.figure.dpi
     labels.note(panel, labels.wrapped("; ".join(said), room))
     return panel
+
+
+# -- networks of a dataset ---------------------------------------------------------------------------------------------
+
+
+def in_words(flags: "int | Iterable[int] | np.ndarray") -> str:
+    """Statuses of cells that were asked for in words, each once."""
+    return ", ".join(str(Status(int(flag))).replace("_", " ") for flag in np.unique(np.asarray(flags)) if flag)
+
+
+def fitted(panel: Axes, texts: Iterable[str], size: float = style.SMALL) -> str:
+    """Texts, one a line, wrapped to the width of a panel."""
+    room = panel.get_window_extent().width / panel.figure.dpi
+    return "\n".join(labels.wrapped(text, room, size) for text in texts)
+
+
+def magnification(wanted: float) -> float:
+    """Largest of 1, 2 or 5 times a power of ten that is not above a factor."""
+    power = 10.0 ** math.floor(math.log10(wanted))
+    return max(step for step in (1, 2, 5) if step * power <= wanted * (1 + 1e-9)) * power
+
+
+def largest(values: np.ndarray) -> float:
+    """Largest size of values; 0 where none is known."""
+    return float(np.nanmax(np.abs(values), initial=0.0)) if np.isfinite(values).any() else 0.0
+
+
+def plane(fields: "xr.Dataset", name: str) -> np.ndarray:
+    """Vectors in the plane from their components, such as ``"displacement_{}"``, shape (n, 2)."""
+    return np.stack([fields[name.format(axis)].values for axis in "xy"], axis=1)
+
+
+def extent(places: np.ndarray, nothing: tuple[float, float]) -> tuple[float, float]:
+    """Width and height of places, shape (n, 2), of which some may not be known; else those given."""
+    known = places[np.isfinite(places).all(axis=1)]
+    wide, high = np.ptp(known, axis=0) if len(known) else (0.0, 0.0)
+    return (float(wide), float(high)) if min(wide, high) > 0 else nothing
+
+
+def spring_ends(fields: "xr.Dataset") -> tuple[np.ndarray, np.ndarray]:
+    """Particles at the ends of the springs of a network, shape (n_springs, 2), and which rows are springs."""
+    nodes = fields.spring_nodes.transpose("spring", "spring_end").fillna(-1).values.astype(int)
+    kept = (nodes >= 0).all(axis=1)
+    return nodes[kept], kept

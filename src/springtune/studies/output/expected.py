@@ -22,7 +22,7 @@ from springtune.safe_io.inputs import fault
 from . import dataset, reading
 from .alignment import axis
 from .comparison import MEASURED, OF_CELLS, RELATIVE, Tolerance, cell_dimensions, variable_name
-from .flags import flag_words, is_flagged
+from .dataset import flag_words, is_flagged
 from .text import NUMBER, cell_text
 
 DEFAULTS = {

@@ -8,10 +8,9 @@ from fnmatch import fnmatchcase
 import numpy as np
 import xarray as xr
 
-from .alignment import Axis, axis
+from .alignment import Axis, axis, with_swept
 from .comparison import MEASURED
-from .flags import NOT_REQUESTED, flag_words, is_flagged, nothing
-from .swept import with_swept
+from .dataset import NOT_REQUESTED, flag_words, is_flagged, nothing
 from .text import cell_text, number_text
 
 SAME_VALUE = 1e-9

@@ -11,7 +11,7 @@ import xarray as xr
 from springtune.safe_io.atomic import write_text
 
 from ..config.kind import kinds
-from .tables import csv_text, decimals, number
+from .text import csv_text, decimals, number
 
 ANSWERED = ("solved", "unstable", "linear_only")
 """Statuses of networks with a displacement."""

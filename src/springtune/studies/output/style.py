@@ -118,12 +118,14 @@ def styled(plot: Callable[P, Drawn]) -> Callable[P, Drawn]:
 
 
 def _as_written(panel: Axes) -> None:
-    """Take texts as they are: a label with dollar signs is no formula. Powers of ten beside ticks are."""
+    """Take texts as they are: no formulas between $ signs, no ligatures. Powers of ten beside ticks are formulas."""
     legend = panel.get_legend()
     found = [panel.xaxis.label, panel.yaxis.label, *panel.get_children(), *panel.figure.get_children()]
     for one in (*found, *(legend.get_texts() if legend else ())):
         if isinstance(one, Text):
             one.set_parse_math(False)
+            if hasattr(one, "set_fontfeatures"):  # since matplotlib 3.11: a ligature embeds a PDF's font twice
+                one.set_fontfeatures(["-liga"])
 
 
 def panels(

@@ -16,7 +16,7 @@ from springtune.problem.status import Status
 from springtune.safe_io.escapes import shown
 
 from ..runs import checked_json, rerun
-from ..runs.damage import ASIDE
+from ..runs.checked_json import ASIDE
 from ..runs.plan import Plan
 from ..runs.workload import clock, computed, results_of
 from .own_law import of_own_law

@@ -15,8 +15,7 @@ from pydantic import BaseModel, ConfigDict
 from springtune.safe_io import atomic
 
 from . import PaperError
-from .datasets import HASH_SHOWN, Dataset, chosen
-from .numbers import checked
+from .numbers import HASH_SHOWN, Dataset, checked, chosen
 
 if TYPE_CHECKING:
     from matplotlib.figure import SubFigure

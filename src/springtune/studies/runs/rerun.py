@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..config.kind import FORMATS, kinds, modules, outputs
-from ..config.shown import keeps_fields
+from ..config.model import keeps_fields
 from . import checked_json, records
+from .checked_json import hash_of
 from .dependencies import CODE_FILE, OURS, PACKAGE
-from .hashing import hash_of
 from .keys import stage_key
 from .plan import BUNDLES_FILE, Plan, plan, table_files
 from .provenance import inputs
@@ -164,7 +164,9 @@ def _browse_digest(study: "Study") -> str:
         path.name: records.checksum(path) for path in sorted((PACKAGE / "studies/output/browse/assets").iterdir())
     }
     return hash_of(
-        linked(study), [stage_key(name) for name in ("studies.output.browse.job", *modules("outputs", "views"))], assets
+        linked(study),
+        [stage_key(name) for name in ("studies.output.browse.page", *modules("outputs", "views"))],
+        assets,
     )
 
 

@@ -18,10 +18,8 @@ from springtune.problem.geometry import AssumptionWarning
 from springtune.registry import imported
 
 from . import checked_json, driver, records
-from .damage import DamagedError, set_aside
-from .hashing import hash_of
-from .task_costs import TaskCosts
-from .task_limits import Watch, guarded
+from .checked_json import DamagedError, hash_of, set_aside
+from .task_costs import TaskCosts, Watch, guarded
 
 Made = TypeVar("Made")
 

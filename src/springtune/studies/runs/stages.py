@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 from ..config.kind import Stage
 from . import driver, store
-from .hashing import hash_of
+from .checked_json import hash_of
 from .keys import stage_key
 
 if TYPE_CHECKING:
     from ..config.model import Study
-    from .bundles import Costs
+    from .plan import Costs
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ import numpy as np
 
 from springtune.safe_io import atomic
 
-from .damage import DamagedError, set_aside
+from .checked_json import DamagedError, set_aside
 
 if TYPE_CHECKING:
     import h5py

@@ -1,14 +1,21 @@
-"""How much a run has to do: tasks of its jobs, the seconds they are expected to take, and where they have got to."""
+"""What the jobs of a run have to do: tasks and expected seconds; and commands of jobs on other machines.
 
-from collections.abc import Iterable
+A job on another machine calls Snakemake, which reads the Snakefile once more, twice with Slurm. What a job needs of it
+is its command and the files that it makes: with these noted, its reading costs the same whatever the size of the study.
+"""
+
+import os
+import re
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from springtune.springs import DEFINITIONS
 
-from . import bundles, checked_json
-from .plan import COSTS_FILE, Plan, usual_costs
+from . import checked_json
+from .plan import COSTS_FILE, Costs, Needs, Plan, usual_costs
+from .run_tasks import TASKS
 
 if TYPE_CHECKING:
     from ..config.model import Study
@@ -24,7 +31,7 @@ AFTER = "Dataset, figures and tables"
 
 
 @dataclass
-class Load:
+class Estimate:
     """What a job has to do.
 
     Attributes
@@ -83,7 +90,7 @@ def computed(done: Path) -> int | None:
     return None if work is None else sum(row[0] for name, row in work.items() if name not in DEFINITIONS)
 
 
-def loads(study: "Study", plan: Plan, jobs: Iterable[tuple[int, str, int, list[str]]]) -> dict[int, Load]:
+def estimates(study: "Study", plan: Plan, jobs: Iterable[tuple[int, str, int, list[str]]]) -> dict[int, Estimate]:
     """What each job of a run has to do."""
     folder = plan.folder
     of_bundles = _of_bundles(study, plan)
@@ -92,32 +99,34 @@ def loads(study: "Study", plan: Plan, jobs: Iterable[tuple[int, str, int, list[s
     for number, rule, threads, outputs in jobs:
         if outputs:
             stem = Path(outputs[0]).stem if Path(outputs[0]) == plan.record(Path(outputs[0]).stem) else ""
-            load = of_bundles.get(stem) or _presented(folder, rule, outputs)
-            load.threads = threads
-            found.append((order.get(stem, len(order)), number, load))
-    return {number: load for _, number, load in sorted(found, key=lambda row: row[:2])}
+            estimate = of_bundles.get(stem) or _presented(folder, rule, outputs)
+            estimate.threads = threads
+            found.append((order.get(stem, len(order)), number, estimate))
+    return {number: estimate for _, number, estimate in sorted(found, key=lambda row: row[:2])}
 
 
-def _of_bundles(study: "Study", plan: Plan) -> dict[str, Load]:
-    """Loads of all bundles of a study, by the stem of their files."""
-    start_up = bundles.Costs(plan.folder.parent / COSTS_FILE, usual_costs()).start_up
-    found: dict[str, Load] = {}
-    parts: dict[tuple[str, str], list[Load]] = {}
+def _of_bundles(study: "Study", plan: Plan) -> dict[str, Estimate]:
+    """Estimates of all bundles of a study, by the stem of their files."""
+    start_up = Costs(plan.folder.parent / COSTS_FILE, usual_costs()).start_up
+    found: dict[str, Estimate] = {}
+    parts: dict[tuple[str, str], list[Estimate]] = {}
     for name, job in plan.jobs.items():
         products = [Path(path) for path in job.products]
-        found[name] = Load(job.stage.message, max(1, len(keys_of(job.content))), 0.0, 1, products)
+        found[name] = Estimate(job.stage.message, max(1, len(keys_of(job.content))), 0.0, 1, products)
         parts.setdefault((job.stage.like or job.stage.name, job.label), []).append(found[name])
     # Stages that share bundles share their seconds, too, as they share their tasks: what each takes is not told apart.
     for place, sharing in parts.items():
-        tasks = sum(load.tasks for load in sharing)
-        for load in sharing:
-            load.seconds = plan.needs[place].seconds * load.tasks / tasks + start_up
+        tasks = sum(estimate.tasks for estimate in sharing)
+        for estimate in sharing:
+            estimate.seconds = plan.needs[place].seconds * estimate.tasks / tasks + start_up
     return found
 
 
-def _presented(folder: Path, rule: str, outputs: list[str]) -> Load:
-    """Load of a job after the stages: what it took before, if it ran before."""
-    return Load(AFTER, len(outputs), _seconds_presented(folder, rule, len(outputs)), products=list(map(Path, outputs)))
+def _presented(folder: Path, rule: str, outputs: list[str]) -> Estimate:
+    """Estimate of a job after the stages: what it took before, if it ran before."""
+    return Estimate(
+        AFTER, len(outputs), _seconds_presented(folder, rule, len(outputs)), products=list(map(Path, outputs))
+    )
 
 
 def _seconds_presented(folder: Path, rule: str, files: int) -> float:
@@ -128,14 +137,14 @@ def _seconds_presented(folder: Path, rule: str, files: int) -> float:
         return always + each * files
 
 
-def presented_needs(folder: Path, rule: str, files: int) -> bundles.Needs:
+def presented_needs(folder: Path, rule: str, files: int) -> Needs:
     """What a job asks a cluster for that makes no results of scenes."""
-    return bundles.Needs(_seconds_presented(folder, rule, files))
+    return Needs(_seconds_presented(folder, rule, files))
 
 
-def told(found: dict[int, Load], cores: int) -> str:
+def told(found: dict[int, Estimate], cores: int) -> str:
     """What a run has to do, in a line."""
-    seconds = sum(load.seconds * min(load.threads, cores) for load in found.values()) / cores
+    seconds = sum(estimate.seconds * min(estimate.threads, cores) for estimate in found.values()) / cores
     jobs = f"{len(found)} job{'' if len(found) == 1 else 's'}"
     return f"{jobs}, about {clock(seconds)} on {cores} core{'' if cores == 1 else 's'} if nothing is stored yet"
 
@@ -153,3 +162,60 @@ def clock(seconds: float) -> str:
         return f"{seconds} s"
     minutes, rest = divmod(seconds, 60)
     return f"{minutes}:{rest:02d} min" if minutes < 60 else f"{minutes // 60}:{minutes % 60:02d} h"
+
+
+COMMANDS_FILE = f"{TASKS}/commands.json"
+"""File in a study's folder: commands of the jobs of its last run on other machines."""
+
+ON_CLUSTERS = re.compile(r"[\w@+=:,./-]*")
+"""Paths that may be part of a command for Slurm."""
+
+
+def refusal(config: Path, folder: Path, checkout: Path, python: Path, on_cluster: bool) -> str:
+    """Why no study can run with some paths.
+
+    Rules quote all that they give to a shell, so most paths are fine. What is refused is what libraries cannot have.
+
+    Examples
+    --------
+    >>> checkout, python = Path("/srv/springtune"), Path("/usr/bin/python3")
+    >>> refusal(Path("config/$(date).yaml"), Path("/home/me/a b"), checkout, python, on_cluster=False)
+    ''
+    """
+    for path in (config, folder, checkout, python):
+        try:
+            str(path).encode()
+        except UnicodeEncodeError:
+            return f"{str(path)!r}: not UTF-8, as texts of results are; rename the file or folder"
+        if on_cluster and not ON_CLUSTERS.fullmatch(str(path)):
+            why = "the plugin for Slurm passes paths to a shell without quotes"
+            return f"{str(path)!r}: {why}; use letters, digits and @ + = : , . / _ - in names of files and folders"
+    if re.search("</script|<!--|<script", str(config), re.IGNORECASE):
+        return f"{str(config)!r}: Snakemake writes it into a report as it is; use no < in names of files and folders"
+    if "\\" in str(folder):
+        return f"{str(folder)!r}: the netCDF library reads \\ in a path as /; run in a folder without \\ in its name"
+    if os.pathsep in str(python.parent):
+        return f"{str(python)!r}: {os.pathsep} separates folders on PATH; install Python in a folder without it"
+    return ""
+
+
+def remember_commands(folder: Path, jobs: Iterable[Mapping[str, Any]]) -> None:
+    """Note the jobs of a run."""
+    checked_json.write(folder / COMMANDS_FILE, list(jobs))
+
+
+def recall_command(folder: Path, rule: str, wildcards: Mapping[str, str]) -> Any:
+    """What is noted of a job.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     remember_commands(Path(folder), [{"rule": "solve", "wildcards": {"bundle": "3"}, "command": "true"}])
+    ...     recall_command(Path(folder), "solve", {"bundle": "3"})["command"]
+    'true'
+    """
+    for job in checked_json.read(folder / COMMANDS_FILE) or ():
+        if job["rule"] == rule and job["wildcards"] == dict(wildcards):
+            return job
+    return None

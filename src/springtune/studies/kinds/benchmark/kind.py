@@ -12,7 +12,7 @@ from springtune.problem.geometry import Beam
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import Material
 from springtune.problem.quantities import nearest
-from springtune.reference.program import program
+from springtune.reference.calculix import program
 from springtune.springs import DEFINITIONS
 
 from ...config.checks import check_beam_material, check_density, check_known, check_particles, check_product

@@ -36,8 +36,7 @@ from springtune.scene.sheet import Sheet
 from springtune.springs import DefinitionError, Springs
 from springtune.springs.lattice import COEFFICIENT, half_weight, uniform
 
-from ...runs.failures import own_reason
-from ...runs.task_limits import go_with_parent
+from ...runs.task_costs import go_with_parent, own_reason
 from .approaches import APPROACHES, network
 from .names import CURVE_COUNTS, PARTS, THREAD_COUNTS
 

@@ -9,7 +9,7 @@ from springtune.problem.status import Status
 from springtune.safe_io.atomic import write_text
 from springtune.safe_io.escapes import markdown
 
-from ...output.tables import markdown_table
+from ...output.text import markdown_table
 from .names import PARTS
 from .outputs import PAGE
 

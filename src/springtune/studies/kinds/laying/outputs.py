@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from ...config.kind import Output
-from ...output.views import Plot, View
+from ...output.browse import Plot, View
 
 if TYPE_CHECKING:
     from ...config.model import Study

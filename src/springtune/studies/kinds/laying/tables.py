@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...output.tables import cells_with_values
+from ...output.selection import cells
 
 
 def tables(tree):
@@ -10,7 +10,7 @@ def tables(tree):
     if "laying" not in tree:
         return []
     laid, rows = tree["laying"].to_dataset(), []
-    for place in cells_with_values(laid.area_under_strip, ("loading", "friction", "mesh_size", "definition")):
+    for place in cells(np.isfinite(laid.area_under_strip), ("loading", "friction", "mesh_size", "definition")):
         cell = laid.sel(place)
         rows.append(
             {name: place[name] for name in ("loading", "friction", "definition")}

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from ...config.kind import Output
-from ...output.views import Plot, View
+from ...output.browse import Plot, View
 
 if TYPE_CHECKING:
     from ...config.model import Study

@@ -8,7 +8,7 @@ import numpy as np
 from springtune.safe_io.atomic import write_text
 
 from ...output.dataset import STATUS, Filler, Group
-from ...output.tables import csv_text
+from ...output.text import csv_text
 from ...runs import store
 from .batches import crossings, refine, value_key
 from .kind import file_key
@@ -64,7 +64,7 @@ REFINEMENT = Group(
 )
 """The group with all parameters; a study has the variables of those that it varies."""
 
-NUMBERS_OF_VALUE = ("displacement", "reference_displacement", "reference_error_estimate", "deformation_error", "particles")
+VALUE_NUMBERS = ("displacement", "reference_displacement", "reference_error_estimate", "deformation_error", "particles")
 """Numbers of a value's result that the dataset and the table have."""
 
 
@@ -115,7 +115,7 @@ def _put(one, places, batches, results, where, data):
     data.put({"value_count": len(places), "halved": max(batches)}, **labels)
     for point, (place, batch, result) in enumerate(zip(places, batches, results)):
         values = {f"refined_{one.parameter}": one.rule.value(place), "batch": batch}
-        known = ("status", "message", "reference_applies", *NUMBERS_OF_VALUE)
+        known = ("status", "message", "reference_applies", *VALUE_NUMBERS)
         data.put(values | {name: result[name] for name in known if name in result}, point=point, **labels)
     for number, crossing in enumerate(where):
         values = {"crossing_level": crossing.level, "crossing_change": crossing.change}
@@ -138,7 +138,7 @@ def write(tree, folder):
         for point in np.argsort(refined, kind="stable")[: int(cell.value_count)]:  # NaN comes last
             one = cell.isel(point=point)
             row = labels | {"value": float(refined[point]), "batch": int(one.batch)}
-            row |= {result: float(one[result]) for result in NUMBERS_OF_VALUE}
+            row |= {result: float(one[result]) for result in VALUE_NUMBERS}
             values.append(row | {"status": STATUS[int(one.status)], "message": str(one.message.item())})
         for number in np.flatnonzero(np.isfinite(cell.crossing_level.values)):
             one = cell.isel(crossing=number)

@@ -30,7 +30,7 @@ from ...config.fields import (
 from ...config.kind import Kind
 from ...config.messages import refuse, show
 from ...config.sections import Section
-from ...runs.hashing import hash_of
+from ...runs.checked_json import hash_of
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key, stage_key
 from ...runs.stages import Task, stage
 from .batches import Rule
@@ -225,7 +225,7 @@ def _summary(refinements):
     return [["refined", first, f"values to begin with, at most {most}, where errors cross zero or a tolerance"]]
 
 
-REFINING = "studies.kinds.refinement.solve"
+REFINER = "studies.kinds.refinement.solve"
 """Module that solves refinements."""
 
 USUAL_PARTICLES = 1e3
@@ -246,7 +246,7 @@ def _parameters(one):
 
 def file_key(one):
     """Key of the file of a refinement: of all that its results depend on besides their values."""
-    return hash_of(_parameters(one), [stage_key(REFINING), mesh_type_key(one.mesh_type), definition_key(one.definition)])
+    return hash_of(_parameters(one), [stage_key(REFINER), mesh_type_key(one.mesh_type), definition_key(one.definition)])
 
 
 def _tasks(study):
@@ -278,7 +278,7 @@ KIND = Kind(
     expand=_expand,
     axes=_axes,
     summary=_summary,
-    stages=(stage("refinement", REFINING, "Refining where errors matter", _tasks),),
+    stages=(stage("refinement", REFINER, "Refining where errors matter", _tasks),),
     outputs=OUTPUTS,
     costs={"refinement": (3e-2, 1.2e-5)},
 )

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from springtune.units import UnitError, parse
 
 from ...config.kind import Output
-from ...output.views import Plot, View
+from ...output.browse import Plot, View
 
 if TYPE_CHECKING:
     from ...config.model import Study

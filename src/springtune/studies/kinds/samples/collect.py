@@ -7,8 +7,7 @@ import numpy as np
 from springtune.problem.compare import deformation_error
 from springtune.problem.loads import LOADS
 from springtune.problem.status import Status
-from springtune.reference.limits import beyond_linear
-from springtune.reference.similarity import unit_scales
+from springtune.reference.answers import beyond_linear, unit_scales
 from springtune.springs.lattice import COEFFICIENT
 
 from ...output.dataset import Group

@@ -4,7 +4,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from ...config.kind import Output, stem
-from ...output.views import Plot, View
+from ...output.browse import Plot, View
 from .designs import SOBOL_INDICES
 
 if TYPE_CHECKING:

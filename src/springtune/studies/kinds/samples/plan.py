@@ -5,7 +5,7 @@ from functools import cache
 
 from springtune.problem.loads import LOADS
 
-from ...runs.hashing import hash_of
+from ...runs.checked_json import hash_of
 from ...runs.keys import definition_key, mesh_type_key, stage_key
 from ...runs.stages import Task, stage
 from ..scenes.interpolated import expected_solves

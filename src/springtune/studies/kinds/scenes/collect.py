@@ -10,18 +10,16 @@ from springtune.problem.compare import deformation_error
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import Rubber
 from springtune.problem.status import Status
-from springtune.reference.field import interpolate, outline
-from springtune.reference.limits import objection
+from springtune.reference.answers import interpolate, objection, outline
 from springtune.springs.lattice import predicted_stiffness
 
-from ...config.model import Reference
-from ...config.shown import keeps_fields
+from ...config.model import Reference, keeps_fields
 from ...output.dataset import NO_NODE, Filler
 from ...output.selection import OF_FIELDS
 from ...runs import checked_json, store
-from . import any_reference, plan, stored_mesh
+from . import any_reference, plan, stored
 from .outputs import pressed
-from .stored_scene import PACKED, fields_key, unpacked
+from .stored import PACKED, fields_key, unpacked
 from .variables import BLOCK, CELL, FIELDS, FINITE_STRAIN, ROOT, SENSITIVITY, fields_of, swept
 
 COPIED = (
@@ -122,7 +120,7 @@ def _calibration(study, folder):
 
 def _meshes(study, folder, root):
     for mesh in study.meshes:
-        notes = stored_mesh.read_notes(folder / "meshes", plan.stem(mesh))
+        notes = stored.read_notes(folder / "meshes", plan.stem(mesh))
         root.put({label: value for label, value in notes.items() if label in root.data}, **_mesh_labels(mesh))
 
 
@@ -338,11 +336,9 @@ def _fields(study, folder, axes):
     scenes = [scene for scene in study.scenes if scene in whole]
     shown = {scene.mesh for scene in scenes}
     kept = [
-        mesh
-        for mesh in study.meshes
-        if mesh in shown and not stored_mesh.is_refused(folder / "meshes", plan.stem(mesh))
+        mesh for mesh in study.meshes if mesh in shown and not stored.is_refused(folder / "meshes", plan.stem(mesh))
     ]
-    meshes = {mesh: stored_mesh.read(folder / "meshes", plan.stem(mesh)) for mesh in kept}
+    meshes = {mesh: stored.read(folder / "meshes", plan.stem(mesh)).mesh for mesh in kept}
     outlines = {one: _outline(study, folder, one) for one in dict.fromkeys(map(_reference_of, scenes))}
     cells = {spec: cells_of(mesh) for spec, mesh in meshes.items()}
     lengths = {

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, TypeVar
 
 from ...config.model import CurveSpec, SceneSpec
-from ...runs.bundles import Costs
+from ...runs.plan import Costs
 from .plan import particles, stem
 
 if TYPE_CHECKING:

@@ -1,7 +1,5 @@
 """Figures of scenes: sensitivity curves, errors against mesh size, deformed networks, the pressed block."""
 
-import math
-
 import numpy as np
 
 from springtune.problem.loads import LOADS
@@ -9,8 +7,8 @@ from springtune.problem.parameters import with_unit
 
 from ...config.kind import distinct
 from ...output import labels, style
-from ...output.dataset import NO_NODE, STATUS
-from ...output.own_law import of_own_law, own_law
+from ...output.drawing import extent, fitted, in_words, largest, magnification, plane, spring_ends
+from ...output.own_law import own_law
 from ...output.selection import at, cells, choose, group, labelled_beam, labels_of, last_swept, shown_swept
 from .outputs import SCENE_LABELS, SENSITIVITY_LABELS
 
@@ -22,14 +20,14 @@ MOST_SHOWN = 60.0
 
 def sensitivity(tree):
     """Figures of sensitivity curves: stem, function that plots, and selection."""
-    yield from _each("sensitivity", plot_sensitivity, group(tree, "sensitivity").status, SENSITIVITY_LABELS)
+    yield from each("sensitivity", plot_sensitivity, group(tree, "sensitivity").status, SENSITIVITY_LABELS)
 
 
 USUAL = "nonlinear"
 """Kinematics that a figure is of; where a study asks for other ones alone it is of those, and says so."""
 
 
-def _each(name, plot, status, names):
+def each(name, plot, status, names):
     """Figures of each selection that has cells, of the usual kinematics or, without them, of the first that it has."""
     for stem, selection in distinct(name, names, cells(status != 0, names)).items():
         there = labels_of((status != 0).sel(selection), "kinematics")
@@ -142,7 +140,7 @@ def draw_curve(panel, curve, unit, name, look, known):
     known = np.flatnonzero(np.isfinite(error))
     if not len(known):
         return [], seen
-    seen |= {STATUS[flag] for flag in np.unique(flags[np.isnan(error)]) if flag > 1}
+    seen |= {in_words(flag) for flag in flags[np.isnan(error)] if flag > 1}
     return [(stiffness[known[-1]] / unit, error[known[-1]], name, colour)], seen
 
 
@@ -150,7 +148,7 @@ KEY = {
     "minimum": ("minimum", {"marker": "o", "markersize": 4.5, "linestyle": ""}),
     "predicted": ("predicted", {"marker": "|", "markersize": 9, "markeredgewidth": 1.2, "linestyle": ""}),
     "unstable": ("thin: unstable", {"linewidth": 0.5}),
-    "not_converged": ("gap: not converged", {"linestyle": ""}),
+    "not converged": ("gap: not converged", {"linestyle": ""}),
     "failed": ("gap: failed", {"linestyle": ""}),
 }
 """What of a sensitivity figure is explained beside its curves, and how it looks."""
@@ -170,9 +168,8 @@ def _sensitivity_title(panel, root, selection, swept):
     shown = dict(selection)
     if root is not None and "beam" in shown:
         shown["beam"] = labelled_beam(root, shown["beam"])
-    room = panel.get_window_extent().width / panel.figure.dpi
     words = [*named(shown, "beam", "mesh_type", "material", "load"), *swept]
-    first = labels.wrapped(", ".join(words), room, 8)
+    first = fitted(panel, [", ".join(words)], 8)
     if root is None:
         return first
     reference = float(root.reference_displacement)
@@ -195,12 +192,10 @@ def _mark_printed(panel, printed, unit):
 
 def _why_no_curve(curves):
     """Words in place of curves none of which has an error."""
-    flags = np.unique(curves.status.values[curves.status.values != 0])
-    if 1 in flags:
+    if 1 in curves.status.values:
         return "solved, but without a reference there is no error"
-    said = ", ".join(STATUS[flag].replace("_", " ") for flag in flags)
     messages = [text for text in np.unique(curves.message.values.astype(str)) if text] if "message" in curves else []
-    return f"no stiffness has an error: {said}" + "".join(f"; {text}" for text in messages[:1])
+    return "; ".join([f"no stiffness has an error: {in_words(curves.status.values)}", *messages[:1]])
 
 
 def _force(newtons):
@@ -222,176 +217,6 @@ def named(selection, *names):
     """Labels of a selection for a title."""
     found = [str(selection[name]) for name in names if name in selection]
     return found + [str(name) for name in [selection.get("kinematics", USUAL)] if name != USUAL]
-
-
-# -- errors against mesh size ------------------------------------------------------------------------------------------
-
-
-def size(tree):
-    """Figures of errors against mesh size: one for each mesh type, material and load; see `sensitivity`."""
-    yield from _each("size", plot_size, group(tree, "/").status, SCENE_LABELS)
-
-
-@style.styled
-def plot_size(data, ax=None, *, beam=None, mesh_type=None, material=None, load=None, kinematics="nonlinear"):
-    """Deformation error against mesh size, a panel a beam, a line a definition.
-
-    Parameters
-    ----------
-    data : xarray.DataTree or xarray.Dataset
-        A study's dataset, or its root.
-    ax : Figure or sequence of Axes, optional
-        Where to plot: as many Axes as beams; by default a new figure.
-    beam : str, optional
-        One beam in place of all.
-    mesh_type, material, load, kinematics : str, optional
-        Labels of the scenes. One that is not given must leave no choice.
-
-    Returns
-    -------
-    ndarray of matplotlib.axes.Axes, shape (n_beams,)
-        One a beam.
-
-    Raises
-    ------
-    ValueError
-        If the selection leaves a choice, or nothing, or ``ax`` is not as many Axes as beams.
-
-    Examples
-    --------
-    >>> import springtune as st  # tree = st.open("results/mine")
-    >>> axes = st.plot_size(tree, mesh_type="structured", material="steel", load="traction")
-    >>> [panel.get_title(loc="left") for panel in axes]
-    ['100x20 mm', '200x40 mm']
-    >>> axes[0].get_xlabel(), axes[0].get_ylabel()
-    ('Mesh size [mm]', 'Deformation error [%]')
-    """
-    root = like_with_like(data)
-    root, beams, selection = by_beam(root, beam, mesh_type, material, load, kinematics)
-    values = last_swept(root.status != 0, "mesh_size")
-    root = at(root, values)
-    parts = {name: parts_of(root.status.sel(beam=name) != 0) for name in beams}
-    shown = [(name, number) for name in beams for number in range(len(parts[name]))]
-    looks = {one: style.line(number) for number, one in enumerate(labels_of(root.status != 0, "definition"))}
-
-    def draw(panel, one):
-        name, number = one
-        drawn = _errors(
-            panel, root.sel(beam=name), {each: looks[each] for each in parts[name][number]}, one == shown[0]
-        )
-        part = f", {number + 1} of {len(parts[name])}" if len(parts[name]) > 1 else ""
-        panel.set_xlabel("Mesh size [mm]")
-        return ", ".join([labelled_beam(root, name) + part, *swept_words(_of_beam(values, name))]), *drawn
-
-    return error_panels(ax, shown, draw, compared(root, selection), bool(values))
-
-
-def like_with_like(data):
-    """Root of a dataset whose errors of nonlinear networks are against finite strain, where it has that reference."""
-    root = group(data, "/")
-    finite = data["finite_strain"].to_dataset() if "finite_strain" in getattr(data, "children", ()) else None
-    finite = None if finite is None else of_own_law(finite)
-    if finite is None:
-        return root
-    errors = finite.deformation_error
-    errors = root.deformation_error.where(root.kinematics == "linear", errors).transpose(*root.deformation_error.dims)
-    return root.assign(deformation_error=errors).assign_attrs(finite_strain=True)
-
-
-def compared(root, selection):
-    """Title of a figure of errors: what it is of, and whether they are against finite strain."""
-    finite = root.attrs.get("finite_strain") and selection["kinematics"] != "linear"
-    return ", ".join(
-        [*named(selection, "mesh_type", "material", "load"), *(["against finite strain"] if finite else [])]
-    )
-
-
-def error_panels(ax, shown, draw, title, swept):
-    """Small multiples of deformation errors, shape (n_panels,)."""
-    columns = min(3, len(shown)) if len(shown) != 4 else 2
-    figure, axes, flat, height = style.multiples(ax, len(shown), columns, 2.1, sharey=True)
-    place = {"left": 0.55, "right": 0.06, "top": 0.48, "across": 0.12, "title": title}
-    style.arrange(figure, axes, bottom=0.4, down=0.7, **place)
-    drawn = []
-    for panel, one in zip(flat, shown):
-        words, *found = draw(panel, one)
-        drawn.append(found)
-        panel.set_title(labels.wrapped(words, panel.get_window_extent().width / panel.figure.dpi, 8))
-    under = labels.LINE * max(labels.lines_of(said) for _, said in drawn)
-    over = labels.TITLE_LINE * (max(labels.lines_of(panel.get_title("left")) for panel in flat) - 1) if swept else 0.0
-    if ax is None:
-        figure.set_size_inches(style.size(figure)[0], height + len(axes) * (under + over))
-    for panel in axes[:, 0]:
-        panel.set_ylabel("Deformation error [%]")
-    place |= {"top": 0.48 + over, "bottom": 0.4 + under, "down": 0.7 + under + over, "across": 0.06}
-    labels.settle(figure, axes, place)
-    for panel, (ends, said) in zip(flat, drawn):
-        labels.name_lines(panel, ends)
-        if ends:
-            labels.note(panel, said)
-        else:
-            labels.say(panel, "no errors: " + said.replace("\n", "; "))
-    return flat
-
-
-MOST_LINES = 6
-"""Definitions in one panel; more of them take further rows of panels."""
-
-
-def _errors(panel, here, looks, first):
-    """Draw errors of one beam over mesh size, a look a definition: ends of lines for names, and what a note says."""
-    here = here.isel(mesh_size=np.flatnonzero((here.status != 0).any("definition").values))
-    sizes, ends, said, statuses = 1e3 * here.mesh_size.values, [], [], set()
-    for definition, look in looks.items():
-        end, doubts, lost = error_line(panel, sizes, here.sel(definition=definition), definition, look)
-        ends, statuses = ends + end, statuses | doubts
-        for reason, values in lost.items():
-            said.append(f"{definition}, {', '.join(f'{value:g}' for value in values)} mm: {reason}")
-    if statuses:
-        said.insert(0, f"hollow: {', '.join(sorted(statuses))}")
-    if "paper_displacement" in here:
-        printed = 100 * (here.paper_displacement.values / here.paper_reference_displacement.values - 1)
-        if (here.force < 0).all():  # printed without sign
-            printed = -printed
-        if np.isfinite(printed).any():
-            panel.plot(sizes, printed, "x", color="0.35", markersize=4.5, label="as printed")
-            said = ["×: as the paper prints", *said] if first else said
-    panel.set_xscale("log")
-    panel.set_xticks(sizes, [f"{size:g}" for size in sizes])
-    panel.minorticks_off()
-    panel.set_xlim(sizes.min() / 1.2, sizes.max() * 1.2)
-    if ends:
-        panel.hlines(0, *panel.get_xlim(), color="0.3", linewidth=0.7, zorder=1)  # not below names
-    room = panel.get_window_extent().width / panel.figure.dpi
-    return ends, "\n".join(labels.wrapped(text, room) for text in said)
-
-
-def error_line(panel, x, cell, name, look, asked=...):
-    """Draw the errors of a definition, shape (n,), hollow where their equilibrium is in doubt."""
-    error, flags = 100 * cell.deformation_error.values, cell.status.values
-    known, ends, lost = np.isfinite(error), [], {}
-    if known.any():
-        panel.plot(x[asked], error[asked], label=name, **look)
-        last = np.flatnonzero(known)[-1]
-        ends = [(x[last], error[last], name, look["color"])]
-    doubtful = known & (flags > 1)
-    if doubtful.any():
-        panel.plot(x[doubtful], error[doubtful], linestyle="", marker=look["marker"], color=look["color"],
-                   markerfacecolor="white", markersize=4.5, zorder=4)  # fmt: skip
-    for value, flag in zip(x[~known], flags[~known]):
-        if flag:
-            lost.setdefault("no reference" if flag == 1 else STATUS[flag].replace("_", " "), []).append(value)
-    return ends, {STATUS[flag].replace("_", " ") for flag in flags[doubtful]}, lost
-
-
-def parts_of(present):
-    """Definitions that a beam has, in parts that one panel can show."""
-    asked = labels_of(present, "definition")
-    return [part.tolist() for part in np.array_split(asked, -(-len(asked) // MOST_LINES))]
-
-
-def _of_beam(values, beam):
-    return {name: value.sel(beam=beam) for name, value in values.items()}
 
 
 def by_beam(root, beam, mesh_type, material, load, kinematics):
@@ -417,7 +242,7 @@ def deformed(tree):
     solved = status.sel(definition=names).isin((1, 2, 4)).any("mesh_size")
     if "displacement_x" in fields:
         solved = fields.displacement_x.isel(particle=0).notnull().any("mesh_size")
-    for stem, plot, selection in _each("deformed", plot_deformed, status, SCENE_LABELS):
+    for stem, plot, selection in each("deformed", plot_deformed, status, SCENE_LABELS):
         here = solved.sel({name: label for name, label in selection.items() if name in solved.dims})
         counts = dict(zip(names, here.sum("beam").transpose("definition").values.tolist()))
         best = [name for name in names if counts[name] == max(counts.values())]
@@ -471,7 +296,7 @@ def plot_deformed(
     chosen = {one: selection[one] for one in ("material", "load")}
     values = {name: value.sel(chosen) for name, value in values.items()}
     cut = at(cut, values)
-    extents = [_extent(fields.sel(beam=name)) for name in beams]
+    extents = [extent(plane(fields.sel(beam=name), "outline_{}"), (5.0, 1.0)) for name in beams]
     room = style.COLUMN - 0.42 - 0.08
     heights = [float(np.clip(1.25 * room * high / wide, 0.45, 1.8)) for wide, high in extents]
     figure, axes = style.panels(
@@ -487,7 +312,9 @@ def plot_deformed(
             fields.sel(beam=name),
             cut.sel(beam=name),
             selection,
-            ", ".join([labelled_beam(root, name), *swept_words(_of_beam(values, name))]),
+            ", ".join(
+                [labelled_beam(root, name), *swept_words({one: value.sel(beam=name) for one, value in values.items()})]
+            ),
         )
         panel.apply_aspect()  # its limits
     over = labels.TITLE_LINE * (max(labels.lines_of(panel.get_title("left")) for panel in axes) - 1)
@@ -501,13 +328,6 @@ def plot_deformed(
     return axes
 
 
-def _extent(fields):
-    """Width and height of a body at rest."""
-    sides = [fields[f"outline_{axis}"].values for axis in "xy"]
-    found = [np.ptp(side[np.isfinite(side)]) if np.isfinite(side).any() else 0.0 for side in sides]
-    return found if min(found) > 0 else (5.0, 1.0)
-
-
 def _deformed(panel, fields, root, selection, beam):
     load = {"material": selection["material"], "load": selection["load"]}
     # Of the meshes that this beam has, the one that this load is asked for on.
@@ -516,17 +336,13 @@ def _deformed(panel, fields, root, selection, beam):
         if len(places):
             break
     fields = fields.isel(mesh_size=places[-1] if len(places) else 0)
-    rest = 1e3 * np.stack([fields.x.values, fields.y.values], axis=1)
-    moved = 1e3 * np.stack([fields.displacement_x.sel(load).values, fields.displacement_y.sel(load).values], axis=1)
-    outline = 1e3 * np.stack([fields.outline_x.values, fields.outline_y.values], axis=1)
-    there = 1e3 * np.stack(
-        [fields.reference_displacement_x.sel(load).values, fields.reference_displacement_y.sel(load).values], axis=1
-    )
+    here = fields.sel(load)
+    rest, moved = 1e3 * np.stack([fields.x.values, fields.y.values], axis=1), 1e3 * plane(here, "displacement_{}")
+    outline, there = 1e3 * plane(fields, "outline_{}"), 1e3 * plane(here, "reference_displacement_{}")
     kept = np.isfinite(outline[:, 0])
     outline, there = outline[kept], there[kept]
-    shown = there if np.isfinite(there).any() else moved
-    largest = np.nanmax(np.abs(shown), initial=0.0) if np.isfinite(shown).any() else 0.0
-    scale = _round(0.06 * np.ptp(outline[:, 0]) / largest) if largest > 0 and len(outline) else 1
+    most = largest(there if np.isfinite(there).any() else moved)
+    scale = magnification(0.06 * np.ptp(outline[:, 0]) / most) if most > 0 and len(outline) else 1
     lacking = []
     if np.isfinite(there).any():
         panel.fill(*(outline + scale * there).T, facecolor="0.82", edgecolor="0.45", linewidth=0.8)
@@ -534,10 +350,9 @@ def _deformed(panel, fields, root, selection, beam):
         lacking.append("no reference")
     if len(outline):
         panel.plot(*np.vstack([outline, outline[:1]]).T, color="0.5", linewidth=0.6, linestyle=(0, (3, 3)))
-    nodes = fields.spring_nodes.transpose("spring", "spring_end").fillna(NO_NODE).values.astype(int)
-    ends = nodes[(nodes != NO_NODE).all(axis=1)]
+    ends, _ = spring_ends(fields)
     flag = int(root.status.sel(mesh_size=fields.mesh_size.values))
-    status = "not asked for" if flag == 0 else STATUS[flag].replace("_", " ")
+    status = in_words(flag) or "not asked for"
     panel.set(aspect="equal", adjustable="datalim", xlabel="x [mm]", ylabel="y [mm]")
     text = f"{beam}, mesh {1e3 * float(fields.mesh_size):g} mm, displaced ×\u00a0{scale:g}"
     if np.isfinite(moved).any():
@@ -548,19 +363,12 @@ def _deformed(panel, fields, root, selection, beam):
         lacking += [status] if flag not in (0, 1) else []
     else:
         labels.say(panel, f"no network: {status}" if flag != 1 else "no network stored", bare=False)
-    room = panel.get_window_extent().width / panel.figure.dpi
-    panel.set_title(labels.wrapped(", ".join([text, *lacking]), room, 8))
+    panel.set_title(fitted(panel, [", ".join([text, *lacking])], 8))
     panel.grid(False)
 
 
 NETWORK_LINE = 0.35
 """Width of the lines of springs [pt]."""
-
-
-def _round(value):
-    """Nearest of 1, 2, 5 times a power of ten below."""
-    power = 10.0 ** math.floor(math.log10(value))
-    return max(step for step in (1, 2, 5) if step * power <= value * (1 + 1e-9)) * power
 
 
 # -- the pressed block -------------------------------------------------------------------------------------------------
@@ -689,7 +497,7 @@ def _stiffness(panel, curves, root):
         cells = root.sel(definition=definition, kinematics="linear", load=loads)
         errors = 100 * np.abs(cells.deformation_error.values)
         known, flags = np.isfinite(errors), cells.status.values
-        lacking = [f"{load} {STATUS[flag].replace('_', ' ') if flag else 'not asked for'}"
+        lacking = [f"{load} {in_words(flag) or 'not asked for'}"
                    for load, flag, there in zip(loads, flags, known) if not there]  # fmt: skip
         if lacking and (flags != 0).any():
             said.append(f"{definition}: {', '.join(lacking)}")
@@ -699,8 +507,7 @@ def _stiffness(panel, curves, root):
             panel.plot([low, high], [worst, worst], label=definition, **look)
             ends.append((high, worst, f"{definition}, worst: {worst:.2g} %", look["color"]))
     panel.set(xlim=(low, high), ylim=(0, min(40.0, 1.05 * highest)))
-    room = panel.get_window_extent().width / panel.figure.dpi
-    return ends, "\n".join(labels.wrapped(text, room) for text in said), ""
+    return ends, fitted(panel, said), ""
 
 
 def _membrane(curves):
@@ -767,9 +574,8 @@ def _profile(panel, block, root, load):
             shown.append((definition, solved[0], -1e3 * profiles.sel(kinematics=solved[0]).values))
         else:
             flags = root.status.sel(load=load, definition=definition)
-            flags = flags.where(flags.kinematics.isin(usual), 0).values
-            words = [STATUS[flag].replace("_", " ") for flag in np.unique(flags[flags != 0])] or ["not asked for"]
-            said.append(f"{definition}: {', '.join(words)}")
+            words = in_words(flags.where(flags.kinematics.isin(usual), 0).values) or "not asked for"
+            said.append(f"{definition}: {words}")
     for number, (definition, kinematics, profile) in enumerate(shown[:MOST_FACES]):
         look, name = style.line(number) | {"marker": ""}, f"{definition}, {kinematics}"
         panel.plot(x, profile, label=name, **look)
@@ -779,11 +585,9 @@ def _profile(panel, block, root, load):
         said.append("the reference is of small strain, not all networks are: add further_references")
     if len(shown) > MOST_FACES:
         said.append(f"in the dataset, too: {', '.join(name for name, _, _ in shown[MOST_FACES:])}")
-    room = panel.get_window_extent().width / panel.figure.dpi
-    text = "\n".join(labels.wrapped(one, room) for one in said)
     if not shown and not ends:
         return [], "", "No network is solved and there is no reference: " + "; ".join(said or ["nothing was asked for"])
     low, high = min(map(np.nanmin, highest)), max(map(np.nanmax, highest))
     panel.set_xlim(x.min() - 0.02, x.max() + 0.02)
     panel.set_ylim(low - 0.08 * (high - low), high + 0.08 * (high - low) if high > low else high + 1)
-    return ends, text, ""
+    return ends, fitted(panel, said), ""

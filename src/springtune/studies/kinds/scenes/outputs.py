@@ -6,9 +6,7 @@ from typing import TYPE_CHECKING
 from springtune.problem.loads import LOADS
 
 from ...config.kind import Output, distinct
-from ...config.model import swept_value
-from ...config.remembered import once_a_study
-from ...config.shown import shown
+from ...config.model import once_a_study, shown, swept_value
 
 if TYPE_CHECKING:
     from ...config.model import CurveSpec, SceneSpec, Study
@@ -19,7 +17,7 @@ SENSITIVITY_LABELS = ("beam", "mesh_type", "material", "load")
 SCENE_LABELS = ("mesh_type", "material", "load")
 """The same for figures of errors against mesh size, and of deformed networks."""
 
-PLOTS = "studies.kinds.scenes.figures"
+PLOTS, ERRORS = "studies.kinds.scenes.figures", "studies.kinds.scenes.errors"
 
 COLLECTION = "scenes.pvd"
 """What ParaView opens."""
@@ -93,7 +91,7 @@ OUTPUTS = (
         "size",
         "figures of errors against mesh size",
         figures=lambda study: distinct("size", SCENE_LABELS, _cells(study.scenes)),
-        plot=f"{PLOTS}:size",
+        plot=f"{ERRORS}:size",
         job="scenes",
         usual=True,
     ),
@@ -109,7 +107,7 @@ OUTPUTS = (
         "sweep",
         "figures of errors against what grids sweep: force, thickness, Young's modulus, Poisson's ratio, stiffness",
         figures=_sweeps,
-        plot="studies.kinds.scenes.sweeps:sweep",
+        plot=f"{ERRORS}:sweep",
         job="scenes",
         usual=True,
     ),

@@ -7,17 +7,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from springtune.problem.loads import LOADS
-from springtune.reference.similarity import unit_problem, unit_scales
+from springtune.reference.answers import unit_problem, unit_scales
 
 from ...config.kind import Stage
-from ...config.remembered import once_a_study
-from ...config.shown import shown
-from ...runs.hashing import hash_of
+from ...config.model import once_a_study, shown
+from ...runs.checked_json import hash_of
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key, stage_key
 from ...runs.stages import products
-from . import stored_mesh
+from . import stored
 from .interpolated import expected_solves, interpolants
-from .stored_scene import calibrated_key
+from .stored import calibrated_key
 
 if TYPE_CHECKING:
     from ...config.model import SceneSpec, Study
@@ -255,8 +254,9 @@ def _meshes(study, folder, members):
     }
 
 
-def _mesh_products(content):
-    return [path for mesh in content["files"] for path in stored_mesh.files(content["folder"], mesh["name"])]
+def mesh_products(content):
+    """Files of the meshes of a job, beams' or shapes'."""
+    return [path for mesh in content["files"] for path in stored.files(content["folder"], mesh["name"])]
 
 
 def _reference_members(study, costs):
@@ -435,7 +435,7 @@ STAGES = (
         _reference_members,
         folder="references",
     ),
-    Stage("mesh", "studies.kinds.scenes.mesh", "Meshing", _meshes, _mesh_products, _mesh_members, folder="meshes"),
+    Stage("mesh", "studies.kinds.scenes.mesh", "Meshing", _meshes, mesh_products, _mesh_members, folder="meshes"),
     Stage(
         "sensitivity",
         "studies.kinds.scenes.sensitivity",

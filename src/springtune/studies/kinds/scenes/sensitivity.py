@@ -11,18 +11,18 @@ import numpy as np
 
 from springtune.problem.loads import LOAD_KINDS
 from springtune.problem.status import Status
-from springtune.reference.limits import objection
+from springtune.reference.answers import objection
 from springtune.scene.curve import ending, follow, meeting
 from springtune.scene.sheet import Sheet
 
 from . import any_reference as references
-from . import stored_mesh
+from . import stored
 
 
 def prepare(family, content):
     """Sheet of a mesh, and the folder of references."""
     # Curves depend on stiffnesses alone, so the thickness is 1 m.
-    return Sheet(stored_mesh.prepared(content["meshes"], family["name"]), 1.0), content["references"]
+    return Sheet(stored.prepared(content["meshes"], family["name"]).mesh, 1.0), content["references"]
 
 
 def failed(curve, why):

@@ -9,16 +9,15 @@ from springtune.problem.boundary import FACE_POSITIONS
 from springtune.problem.loads import LOAD_KINDS
 from springtune.problem.materials import material_of
 from springtune.problem.status import Status
-from springtune.reference.field import field_error, interpolate
+from springtune.reference.answers import field_error, interpolate
 from springtune.scene.sheet import Sheet, definition_of
 from springtune.springs import DEFINITIONS, DefinitionError
 
 from ...runs import checked_json
-from . import stored_mesh, stored_scene
-from . import stored_reference as references
-from .stored_scene import calibrated_key
+from . import stored
+from .stored import calibrated_key
 
-parts = stored_scene.parts
+parts = stored.parts
 
 
 def tasks(family, content):
@@ -34,7 +33,7 @@ def tasks(family, content):
 
 def prepare(family, content):
     """Sheet of a mesh, and the fields of references on it."""
-    mesh = stored_mesh.prepared(content["meshes"], family["name"])
+    mesh = stored.prepared(content["meshes"], family["name"]).mesh
     return Sheet(mesh, family["thickness"]), References(content["references"], mesh)
 
 
@@ -66,7 +65,7 @@ class References:
         key = reference["key"]
         if key not in self.fields:  # for 1 N, of whichever material asks first
             labels = ("x", "y", "displacements")
-            found = references.read(self.folder, reference | {"displacement": 1.0}, labels)
+            found = stored.read_reference(self.folder, reference | {"displacement": 1.0}, labels)
             grid = [found.get(label) for label in labels]
             self.fields[key] = None if grid[0] is None else interpolate(*grid, self.mesh.points)
         field = self.fields[key]

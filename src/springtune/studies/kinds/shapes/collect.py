@@ -4,16 +4,17 @@ import numpy as np
 
 from springtune.problem.compare import deformation_error
 from springtune.problem.status import Status
-from springtune.reference.limits import beyond_linear
+from springtune.reference.answers import beyond_linear
 
 from ...output.dataset import Filler
 from ...runs import store
+from ..scenes import stored
+from ..scenes.variables import OF_MESH
 from . import plan
 from .names import QUANTITY_UNITS
 from .task_values import named, quantity_key
 from .variables import SHAPES
 
-OF_MESH = ("particles", "springs", "minimum_angle", "edge_length_spread", "mesh_seconds")
 COPIED_OF_SCENE = ("status", "message", "definition_seconds", "negative_pivots")
 
 
@@ -23,10 +24,10 @@ def groups(study, folder):
     found = Filler(SHAPES.empty(study.axes))
     expected = _quantities(part, found)
     references = _references(study, part, folder, found, expected)
-    for name, scenes in plan.by_mesh(part).items():
-        _mesh(part, scenes[0], folder / "shape_meshes" / f"{name}.h5", found)
+    for scenes in plan.by_mesh(part).values():
+        _mesh(scenes[0], folder, found)
         tasks = {plan.scene_task(part, one)["key"]: one for one in scenes}
-        results = store.read(folder / "shape_solutions" / f"{name}.h5", tasks)
+        results = store.read(folder / "solutions" / f"{plan.file_name(scenes[0])}.h5", tasks)
         for one in scenes:
             _scene(part, one, results[plan.scene_task(part, one)["key"]], references, expected, found)
     return {SHAPES.name: found.data}
@@ -85,9 +86,8 @@ def _references(study, part, folder, found, expected):
     return answers
 
 
-def _mesh(part, one, path, found):
-    key = plan.mesh_key(part, one)
-    notes = store.read(path, [key])[key]
+def _mesh(one, folder, found):
+    notes = stored.read_notes(folder / "meshes", plan.file_name(one))
     labels = {"shape": one.shape, "mesh_type": one.mesh_type, "mesh_size": one.mesh_size}
     found.put({name: notes[name] for name in OF_MESH if name in notes}, **labels)
 

@@ -4,9 +4,10 @@ import numpy as np
 
 from ...output.dataset import Filler
 from ...runs import store
+from ..scenes import stored
 from ..scenes.collect import cells_of
-from ..scenes.stored_scene import PACKED, fields_key, unpacked
-from . import plan, stored
+from ..scenes.stored import PACKED, fields_key, unpacked
+from . import plan
 from .variables import SHAPE_FIELDS
 
 OUTLINE_ARRAYS = ("outline_points", "outline_displacements", "outline_lengths")
@@ -51,7 +52,7 @@ def groups(study, folder):
             continue
         found.put_rows({"x": mesh.points[:, 0], "y": mesh.points[:, 1]}, case=label)
         found.put_rows({"spring_nodes": mesh.edges, "cell_nodes": cells[case]}, case=label)
-        path = folder / "shape_solutions" / f"{plan.mesh_name(one)}.h5"
+        path = folder / "solutions" / f"{plan.file_name(one)}.h5"
         keys = {scene: fields_key(plan.scene_task(part, scene)["key"]) for scene in scenes}
         results = store.read(path, set(keys.values()), [PACKED])
         for scene, key in keys.items():
@@ -65,8 +66,8 @@ def groups(study, folder):
 
 def _mesh(part, one, folder):
     """Mesh of a scene; None where there is none."""
-    found = stored.read(folder / "shape_meshes", plan.mesh_name(one), plan.mesh_key(part, one))
-    return None if isinstance(found, str) else found.mesh
+    name = plan.file_name(one)
+    return None if stored.is_refused(folder / "meshes", name) else stored.read(folder / "meshes", name).mesh
 
 
 def _outline(part, one, folder):

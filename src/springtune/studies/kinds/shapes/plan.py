@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 
 from ...config.kind import Stage
 from ...runs import driver
-from ...runs.hashing import hash_of
+from ...runs.checked_json import hash_of
 from ...runs.keys import definition_key, material_key, mesh_type_key, stage_key
 from ...runs.stages import Task, products, stage
+from ..scenes.plan import mesh_products
 from .names import OWN_FILE
 from .outputs import DRAWING
 
@@ -30,6 +31,11 @@ FILE_PARTICLES = 2000.0
 def mesh_name(one):
     """Stem of the files of a scene's mesh, and of what is solved on it."""
     return f"{one.shape}_{one.mesh_type}" + ("" if one.mesh_type == OWN_FILE else f"_{1e3 * one.mesh_size:.9g}mm")
+
+
+def file_name(one):
+    """The same beside files of beams, whose names begin with a number."""
+    return f"shape_{mesh_name(one)}"
 
 
 def particles(part, one):
@@ -77,7 +83,7 @@ def mesh_key(part, one):
     """Key of a scene's mesh."""
     return hash_of(
         _parameters(mesh_source(part, one)),
-        stage_key("studies.kinds.shapes.mesh", driver.DRIVER),
+        stage_key("studies.kinds.shapes.mesh"),
         _reader(part.shape[one.shape]),
     )
 
@@ -164,11 +170,8 @@ def _mesh_members(study, costs):
 def _meshes(study, folder, members):
     part = study.parts["shapes"]
     return {
-        "folder": str(folder / "shape_meshes"),
-        "files": [
-            {"name": mesh_name(one), "tasks": [{"key": mesh_key(part, one), "source": mesh_source(part, one)}]}
-            for one, *_ in members
-        ],
+        "folder": str(folder / "meshes"),
+        "files": [{"name": file_name(one), "key": mesh_key(part, one)} | mesh_source(part, one) for one, *_ in members],
     }
 
 
@@ -184,14 +187,13 @@ def _solve(study, folder, members):
     kept = shown(part) if draws(study) else ()
     files = [
         {
-            "name": mesh_name(scenes[0]),
-            "mesh": mesh_key(part, scenes[0]),
+            "name": file_name(scenes[0]),
             "shape": _parameters(_source(part.shape[scenes[0].shape])),
             "tasks": list({task["key"]: task for task in (scene_task(part, one, kept) for one in scenes)}.values()),
         }
         for scenes in members
     ]
-    return {"folder": str(folder / "shape_solutions"), "meshes": str(folder / "shape_meshes"), "files": files}
+    return {"folder": str(folder / "solutions"), "meshes": str(folder / "meshes"), "files": files}
 
 
 # -- parts of a study --------------------------------------------------------------------------------------------------
@@ -245,9 +247,9 @@ STAGES = (
         "studies.kinds.shapes.mesh",
         "Meshing shapes",
         _meshes,
-        products,
+        mesh_products,
         _mesh_members,
-        folder="shape_meshes",
+        folder="meshes",
     ),
     Stage(
         "shape_solve",
@@ -257,6 +259,6 @@ STAGES = (
         products,
         like="shape_mesh",
         same=("shape_mesh",),
-        folder="shape_solutions",
+        folder="solutions",
     ),
 )

@@ -4,26 +4,21 @@ import time
 
 import numpy as np
 
-from springtune.problem.cases import check_case
+from springtune.problem.boundary import check_case
 from springtune.problem.status import Status
 from springtune.scene.single import Scene
 from springtune.springs import DefinitionError
 
-from ...runs.driver import RefusedError
-from ...runs.hashing import hash_of
-from ..scenes import stored_scene
-from . import stored
+from ...runs.checked_json import hash_of
+from ..scenes import stored
 from .task_values import ONE_LOAD, by_key, materials_of, shape_of
 
-parts = stored_scene.parts
+parts = stored.parts
 
 
 def prepare(family, content):
     """Mesh of a family of scenes, and the sheets of its thicknesses, which scenes add."""
-    grouped = stored.read(content["meshes"], family["name"], family["mesh"])
-    if isinstance(grouped, str):
-        raise RefusedError(grouped, stored.is_limited(content["meshes"], family["name"], family["mesh"]))
-    return family["shape"], grouped, {}
+    return family["shape"], stored.prepared(content["meshes"], family["name"]), {}
 
 
 def failed(task, why):

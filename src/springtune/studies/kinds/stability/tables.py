@@ -9,7 +9,7 @@ from springtune.safe_io.atomic import write_text
 from springtune.safe_io.escapes import markdown
 
 from ...output.dataset import STATUS
-from ...output.tables import markdown_table
+from ...output.text import markdown_table
 from .outputs import PAGE
 
 

@@ -1,0 +1,192 @@
+"""What stages store of meshes, references and scenes, and how it is read.
+
+A mesh is a VTU file and a note with its key, its checksum, its quality and, of a shape, its groups. A mesh that cannot
+be made has no VTU file, and its note says why.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from springtune.mesh import Mesh, read_mesh, write_mesh
+from springtune.mesh.groups import GroupedMesh
+
+from ...runs import checked_json, store
+from ...runs.checked_json import DamagedError, hash_of, set_aside
+from ...runs.driver import RefusedError
+from ...runs.records import checksum
+
+# -- meshes ------------------------------------------------------------------------------------------------------------
+
+
+def files(folder: str | Path, name: str) -> tuple[Path, Path]:
+    """File of a mesh, and that of its notes."""
+    return Path(folder) / f"{name}.vtu", Path(folder) / f"{name}.json"
+
+
+def write_made(folder: str | Path, name: str, key: str, made: Mesh | GroupedMesh, known: dict[str, float]) -> None:
+    """Store a mesh and, where it has any, its groups."""
+    path, notes = files(folder, name)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    # The notes name the mesh they belong to, so they go first and come last.
+    notes.unlink(missing_ok=True)
+    write_mesh(path, made.mesh if isinstance(made, GroupedMesh) else made)
+    groups = {"groups": _plain(made)} if isinstance(made, GroupedMesh) else {}
+    checked_json.write(notes, {"key": key, "checksum": checksum(path), **known, **groups})
+
+
+def _plain(grouped: GroupedMesh) -> dict[str, Any]:
+    """Groups of a mesh: edges of sides, coordinates of points, and numbers of the cells of parts."""
+    return {
+        "sides": {name: edges.tolist() for name, edges in grouped.sides.items()},
+        "points": {name: [float(x) for x in point] for name, point in grouped.points.items()},
+        "parts": {
+            name: {str(corners): np.flatnonzero(inside).tolist() for corners, inside in cells.items()}
+            for name, cells in grouped.parts.items()
+        },
+        "unusable": dict(grouped.unusable),
+    }
+
+
+def refuse(folder: str | Path, name: str, key: str, why: dict[str, str]) -> None:
+    """Store that a mesh cannot be made: ``message``, and ``limits`` where it went beyond them."""
+    path, notes = files(folder, name)
+    path.unlink(missing_ok=True)
+    checked_json.write(notes, {"key": key, **why})
+
+
+def is_stored(folder: str | Path, name: str, key: str, limits: str) -> bool:
+    """Whether a mesh is stored, or that it cannot be made; one that is damaged is set aside."""
+    path, notes = files(folder, name)
+    if not notes.exists():
+        return False
+    try:
+        known = read_notes(folder, name)
+        if known["key"] != key or known.get("limits", limits) != limits:
+            return False
+        if "message" not in known and path.exists():
+            _checked(path, known["checksum"])
+        return "message" in known or path.exists()
+    except DamagedError as error:
+        set_aside(error)
+        return False
+
+
+def read_notes(folder: str | Path, name: str) -> dict[str, Any]:
+    """What is known of a mesh: its ``key`` and ``checksum``, what it took and its quality."""
+    notes: dict[str, Any] = checked_json.demand(files(folder, name)[1])
+    return notes
+
+
+def is_refused(folder: str | Path, name: str) -> bool:
+    """Whether a mesh could not be made."""
+    return "message" in read_notes(folder, name)
+
+
+def prepared(folder: str | Path, name: str) -> GroupedMesh:
+    """Mesh by its name, for tasks that need it."""
+    notes = read_notes(folder, name)
+    if "message" in notes:
+        raise RefusedError(notes["message"], "limits" in notes)
+    return read(folder, name)
+
+
+def read(folder: str | Path, name: str) -> GroupedMesh:
+    """Mesh by its name with its groups, of which a beam's has none."""
+    (path, _), notes = files(folder, name), read_notes(folder, name)
+    _checked(path, notes["checksum"])
+    mesh = read_mesh(path)
+    if "groups" not in notes:
+        return GroupedMesh(mesh)
+    groups, count = notes["groups"], {corners: len(cells) for corners, cells in mesh.cells.items()}
+    return GroupedMesh(
+        mesh,
+        {side: np.array(edges, dtype=np.int64).reshape(-1, 2) for side, edges in groups["sides"].items()},
+        {point: np.array(place) for point, place in groups["points"].items()},
+        {
+            part: {int(corners): np.isin(np.arange(count[int(corners)]), inside) for corners, inside in cells.items()}
+            for part, cells in groups["parts"].items()
+        },
+        groups["unusable"],
+    )
+
+
+def _checked(path: Path, wanted: str) -> None:
+    if not path.exists():
+        raise DamagedError(path, "it is missing")
+    if checksum(path) != wanted:
+        raise DamagedError(path, "its checksum is not that of its content")
+
+
+# -- references --------------------------------------------------------------------------------------------------------
+
+SCALED = ("displacement", "mean_displacement", "displacements")
+
+
+def read_reference(folder: str | Path, reference: dict[str, Any], fields: tuple[str, ...] = ()) -> dict[str, Any]:
+    """Reference that is solved by itself for 1 N [m, rad, 1]; not converged, it has ``message`` and ``seconds`` alone.
+
+    ``reference`` has the ``key`` of its unit problem and the scales ``length`` [m] and ``displacement`` [m/N].
+    """
+    return scaled(store.read_one(folder, reference["key"], fields), reference)
+
+
+def scaled(found: dict[str, Any], reference: dict[str, Any]) -> dict[str, Any]:
+    """Answer of a unit problem at the size of a beam and for 1 N."""
+    scales = dict.fromkeys(SCALED, reference["displacement"]) | dict.fromkeys("xy", reference["length"])
+    scales |= dict.fromkeys(("rotation", "strain"), reference["displacement"] / reference["length"])
+    return {name: value * scales[name] if name in scales else value for name, value in found.items()}
+
+
+# -- scenes ------------------------------------------------------------------------------------------------------------
+
+FIELD_ARRAYS = {"displacements": "f8", "spring_stiffnesses": "f4", "spring_forces": "f4"}
+"""Arrays of all particles and springs, and their types."""
+
+PACKED = "fields"
+"""What they are stored as: one array, since three take as long to write as the scene to solve."""
+
+
+def calibrated_key(key: str, stiffness: float | None) -> str:
+    """Key of a scene with a calibrated stiffness [N/m], or None."""
+    return hash_of(key, stiffness)
+
+
+def fields_key(key: str) -> str:
+    """Key of the fields of a scene."""
+    return hash_of(key, "fields")
+
+
+def parts(task: dict[str, Any], result: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """What is stored of a result of a task, by key: numbers and, where they are kept, fields."""
+    fields = {fields_key(task["key"]): packed(result)} if task.get("keep_fields") else {}
+    return fields | {task["key"]: {name: value for name, value in result.items() if name not in FIELD_ARRAYS}}
+
+
+def packed(result: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Fields of a result as they are stored; nothing where it has none."""
+    if not FIELD_ARRAYS.keys() <= result.keys():
+        return {}
+    arrays = [result[name].astype(kind).ravel() for name, kind in FIELD_ARRAYS.items()]
+    lengths = np.array([len(array) for array in arrays])
+    return {PACKED: np.concatenate([array.view("u1") for array in (lengths, *arrays)])}
+
+
+def unpacked(stored: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Fields of what is stored: `packed`, undone.
+
+    Examples
+    --------
+    >>> fields = {"displacements": np.ones((2, 2)), "spring_stiffnesses": np.ones(3), "spring_forces": np.zeros(3)}
+    >>> {name: array.shape for name, array in unpacked(packed(fields)).items()}
+    {'displacements': (2, 2), 'spring_stiffnesses': (3,), 'spring_forces': (3,)}
+    """
+    if PACKED not in stored:
+        return {}
+    head = 8 * len(FIELD_ARRAYS)
+    lengths = stored[PACKED][:head].view("i8")
+    sizes = [length * np.dtype(kind).itemsize for length, kind in zip(lengths, FIELD_ARRAYS.values())]
+    parts = np.split(stored[PACKED][head:], np.cumsum(sizes)[:-1])
+    found = {name: part.view(kind) for part, (name, kind) in zip(parts, FIELD_ARRAYS.items())}
+    return found | {"displacements": found["displacements"].reshape(-1, 2)}
