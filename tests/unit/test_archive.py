@@ -32,7 +32,8 @@ from springtune.studies.output import reading
 from springtune.studies.output.comparison import Tolerance, compare
 from springtune.studies.runs import checked_json, provenance
 
-from campaigns import STUDIES, Campaign
+from campaigns import Campaign
+from tables import STUDIES
 
 REPOSITORY = Path(__file__).parents[2]
 

@@ -31,7 +31,7 @@ from springtune.safe_io.inputs import virtual_memory
 from springtune.studies.output import reading
 from springtune.studies.output.browse.page import page
 
-from campaigns import STUDIES
+from tables import STUDIES
 
 BEAM, STEEL = st.Beam("100 mm", "20 mm"), st.Material("210 GPa", 0.3)
 

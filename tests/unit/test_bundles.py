@@ -13,7 +13,7 @@ from springtune.studies.kinds.stability.names import EXPERIMENTS
 from springtune.studies.runs import checked_json, plan, records, workload
 from springtune.studies.runs.task_costs import TaskCosts
 
-from campaigns import STUDIES
+from tables import STUDIES
 
 USUAL = plan.usual_costs()
 

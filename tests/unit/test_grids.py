@@ -16,7 +16,8 @@ from springtune.studies.config.messages import StudyError
 from springtune.studies.kinds import load_study
 from springtune.studies.output.selection import at, last_swept
 
-from campaigns import STUDIES, Campaign
+from campaigns import Campaign
+from tables import STUDIES
 
 HEAD = STUDIES["grids_head"]
 GRID = {

@@ -13,7 +13,7 @@ from springtune.cli import main
 from springtune.safe_io.processes import this_host
 from springtune.studies.runs import checked_json, locks
 
-from campaigns import STUDIES
+from tables import STUDIES
 
 STUDY = Path("results/mine")
 

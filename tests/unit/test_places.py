@@ -22,7 +22,7 @@ from springtune.problem.materials import Material
 from springtune.springs import DEFINITIONS, Springs, definition
 from springtune.studies.runs import dependencies
 
-from campaigns import STUDIES
+from tables import STUDIES
 
 STEEL = Material(name="steel", young_modulus=210e9, poisson_ratio=0.3)
 

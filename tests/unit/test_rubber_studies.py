@@ -17,7 +17,8 @@ from springtune.studies.kinds.scenes.errors import like_with_like
 from springtune.studies.runs.keys import material_key
 from springtune.studies.runs.provenance import inputs
 
-from campaigns import STUDIES, Campaign, load_text
+from campaigns import Campaign, load_text
+from tables import STUDIES
 
 TRELOAR = Path(__file__).parents[2] / "config/treloar"
 

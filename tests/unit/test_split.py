@@ -25,7 +25,8 @@ from springtune.studies.kinds.division import dealt, part_of
 from springtune.studies.runs import checked_json, records, store
 from springtune.studies.runs.plan import plan
 
-from campaigns import STUDIES, Campaign
+from campaigns import Campaign
+from tables import STUDIES, refused_calls
 
 CONFIG = Path(__file__).parents[2] / "config"
 
@@ -183,17 +184,7 @@ def test_files_that_a_study_names_go_with_its_parts(study):
     assert once(parts, "scenes") == ({*load_study(study).scenes}, True)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["config/many.yaml", "--into", "999"], "scenes or other tasks cannot be 999 parts; ask for at most"),
-        (["config/many.yaml", "--into", "9", "--by", "grid"], "3 grids and sections cannot be 9 parts"),
-        (["config/none.yaml", "--into", "2"], "config/none.yaml: cannot be read"),
-        (["config/other.yaml", "--into", "2"], "config/other-1-of-2.yaml: is another study"),
-        (["config/many-1-of-2.yaml", "--into", "2"], "is part 1 of 2 of a study already; split the whole one"),
-        ([f"config/{'a' * 56}.yaml", "--into", "2"], "cannot name a part; rename the study"),
-    ],
-)
+@pytest.mark.parametrize(("arguments", "message"), refused_calls("split"))
 def test_a_study_that_cannot_be_split_is_told(study, arguments, message):
     assert run("split", study, "--into", 2).exit_code == 0
     for name in ("other", "other-1-of-2", "a" * 56):

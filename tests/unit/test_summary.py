@@ -26,7 +26,7 @@ from springtune.studies.output.dataset import Filler
 from springtune.studies.runs import checked_json, plan, records, rerun, workload
 from springtune.studies.runs.dependencies import CODE_FILE, Code
 
-from campaigns import STUDIES
+from tables import STUDIES
 
 AXES = {
     "beam": ("100x20", "80x10"),

@@ -12,7 +12,7 @@ import springtune as st
 from springtune.cli import main
 from springtune.mesh import write_mesh
 
-from campaigns import STUDIES
+from tables import STUDIES
 
 BOMB = "a0: &a0 [x, y]\n" + "".join(f"a{n}: &a{n} [*a{n - 1}, *a{n - 1}, *a{n - 1}]\n" for n in range(1, 30))
 

@@ -11,7 +11,8 @@ from springtune.studies.kinds import collect
 from springtune.studies.output import page
 from springtune.studies.runs import store
 
-from campaigns import STUDIES, Campaign
+from campaigns import Campaign
+from tables import STUDIES
 
 STUDY = STUDIES["beyond_reference"]
 

@@ -12,7 +12,7 @@ from springtune.studies.runs import checked_json, driver, store
 from springtune.studies.runs.plan import plan
 from springtune.studies.runs.task_costs import TaskCosts
 
-from campaigns import STUDIES
+from tables import STUDIES
 
 STUDY = STUDIES["company"]
 

@@ -10,7 +10,7 @@ import pytest
 
 from springtune.studies.runs import locks, workload
 
-from campaigns import STUDIES
+from tables import STUDIES
 
 STUDY = STUDIES["elsewhere"]
 

@@ -17,7 +17,8 @@ from springtune.studies.config.messages import StudyError
 from springtune.studies.kinds import load_study
 from springtune.studies.runs import checked_json
 
-from campaigns import STUDIES, Campaign
+from campaigns import Campaign
+from tables import STUDIES
 
 STUDY = STUDIES["reruns"]
 

@@ -3,7 +3,7 @@
 import pytest
 import xarray as xr
 
-from campaigns import STUDIES
+from tables import STUDIES
 
 STUDY = STUDIES["sampled_study"]
 

@@ -18,7 +18,8 @@ import springtune
 from springtune.safe_io.processes import this_host
 from springtune.studies.runs import checked_json, store
 
-from campaigns import STUDIES, Campaign
+from campaigns import Campaign
+from tables import STUDIES
 
 STUDY = STUDIES["survival"]
 
