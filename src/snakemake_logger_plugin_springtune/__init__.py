@@ -76,14 +76,14 @@ class LogHandler(LogHandlerBase):
         return able and not otherwise and not quiet & {"all", "progress", "rules"}
 
     def _show(self, record: LogRecord) -> None:
-        loads = getattr(record, "loads", None)
+        estimates = getattr(record, "estimates", None)
         if not self.wanted:
             self._plain().emit(record)
-        elif loads is not None:
+        elif estimates is not None:
             from .display import Display
 
             title, colourless = record.getMessage(), self.common_settings.nocolor
-            self.display = Display(loads, record.cores, title, colourless)  # type: ignore[attr-defined]
+            self.display = Display(estimates, record.cores, title, colourless)  # type: ignore[attr-defined]
         elif getattr(record, "ends", False):
             self._stop()
             sys.stderr.write(record.getMessage() + "\n")

@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 if TYPE_CHECKING:
-    from springtune.studies.runs.workload import Load
+    from springtune.studies.runs.workload import Estimate
 
 LOOKED_AT = 200
 """Most expected files checked at a time."""
@@ -27,34 +27,34 @@ OVERDUE = 0.2
 class Job:
     """A job and its progress."""
 
-    def __init__(self, load: "Load") -> None:
-        self.load = load
+    def __init__(self, estimate: "Estimate") -> None:
+        self.estimate = estimate
         self.begun = self.ended = 0.0
         self.failed = False
-        self.waiting = list(load.products)
+        self.waiting = list(estimate.products)
         self.before = 0.0
 
     def start(self) -> None:
         """Mark as running."""
         self.begun, self.before = time.monotonic(), time.time()
         # It may be run again after it failed.
-        self.ended, self.failed, self.waiting = 0.0, False, list(self.load.products)
+        self.ended, self.failed, self.waiting = 0.0, False, list(self.estimate.products)
 
     def made(self) -> float:
         """Share of its files made since it started."""
         if self.ended:
             return 0.0 if self.failed else 1.0
-        if not self.begun or not self.load.products:
+        if not self.begun or not self.estimate.products:
             return 0.0
         late = self.waiting[LOOKED_AT:]
         self.waiting = [path for path in self.waiting[:LOOKED_AT] if not _newer(path, self.before)] + late
-        return 1 - len(self.waiting) / len(self.load.products)
+        return 1 - len(self.waiting) / len(self.estimate.products)
 
     def left(self, pace: float) -> float:
         """Remaining seconds at a pace of so many for each expected one."""
         if self.ended:
             return 0.0
-        expected = pace * self.load.seconds
+        expected = pace * self.estimate.seconds
         if not self.begun:
             return expected
         gone = time.monotonic() - self.begun
@@ -76,13 +76,13 @@ class Display:
 
     def __init__(
         self,
-        loads: "Mapping[int, Load]",
+        estimates: "Mapping[int, Estimate]",
         cores: int,
         title: str,
         colourless: bool = False,
         console: Console | None = None,
     ) -> None:
-        self.jobs = {number: Job(load) for number, load in loads.items()}
+        self.jobs = {number: Job(estimate) for number, estimate in estimates.items()}
         self.cores, self.begun, self.over = cores, time.monotonic(), False
         self.console = console or Console(stderr=True, no_color=colourless, highlight=False)
         self.console.print(Text(title, "bold"))
@@ -124,14 +124,14 @@ class Display:
         """Estimate the run's remaining seconds from finished jobs."""
         now = time.monotonic()
         took = [
-            (job.load.seconds, (job.ended or now) - job.begun, bool(job.ended))
+            (job.estimate.seconds, (job.ended or now) - job.begun, bool(job.ended))
             for job in self.jobs.values()
             if job.begun and not job.failed
         ]
         # A job that runs tells something, too, once it takes longer than expected.
         told = [(expected, gone) for expected, gone, over in took if over or gone > expected]
         pace = (sum(gone for _, gone in told) + PRIOR) / (sum(expected for expected, _ in told) + PRIOR)
-        rest = [(job.left(pace), min(job.load.threads, self.cores)) for job in self.jobs.values()]
+        rest = [(job.left(pace), min(job.estimate.threads, self.cores)) for job in self.jobs.values()]
         shared = sum(seconds * threads for seconds, threads in rest) / self.cores
         return max([shared, *(seconds for seconds, _ in rest)])
 
@@ -144,7 +144,7 @@ class Display:
         table.add_column(no_wrap=True)
         parts: dict[str, list[Job]] = {}
         for job in self.jobs.values():
-            parts.setdefault(job.load.part, []).append(job)
+            parts.setdefault(job.estimate.part, []).append(job)
         for part, jobs in parts.items():
             table.add_row(*self._row(part, jobs))
         gone, left = time.monotonic() - self.begun, self.left()
@@ -154,8 +154,8 @@ class Display:
         return table
 
     def _row(self, part: str, jobs: list[Job]) -> tuple[Text, ProgressBar, Text, Text]:
-        tasks = sum(job.load.tasks for job in jobs)
-        done = sum(job.load.tasks * job.made() for job in jobs)
+        tasks = sum(job.estimate.tasks for job in jobs)
+        done = sum(job.estimate.tasks * job.made() for job in jobs)
         failed, running = any(job.failed for job in jobs), any(job.begun and not job.ended for job in jobs)
         style = "red" if failed else "" if running else "green" if done >= tasks else "dim"
         begun = [job.begun for job in jobs if job.begun]

@@ -38,7 +38,7 @@ from springtune.cli.results import info_text, verified
 from springtune.handover.formats import ENDINGS
 from springtune.mechanics.moduli import axial_moduli
 from springtune.mesh import MESH_TYPES, MeshError, corner_angles, read_beam_mesh, signed_areas, write_mesh
-from springtune.mesh.group_files import read_shape
+from springtune.mesh.formats import read_shape
 from springtune.mesh.outlines import mesh_shape
 from springtune.mesh.sheets import sheet_fault
 from springtune.safe_io.escapes import UNSEEN, markdown, no_mathematics, rst
@@ -55,7 +55,7 @@ from springtune.studies.output.export import export
 from springtune.studies.output.page import html as tables_page
 from springtune.studies.output.page import shown as shown_table
 from springtune.studies.output.style import png_and_pdf, styled
-from springtune.studies.runs import commands, rerun
+from springtune.studies.runs import rerun, workload
 from springtune.studies.runs.plan import plan
 
 import synthetic
@@ -729,7 +729,7 @@ def plan_paths(path):
     except st.StudyError as error:
         raise Refused(str(error)) from None
     here = Path.cwd()
-    why = commands.refusal(Path(path.name), here, here, Path(sys.executable), on_cluster=False)
+    why = workload.refusal(Path(path.name), here, here, Path(sys.executable), on_cluster=False)
     if why:
         raise Refused(why)
     jobs = rerun.jobs(study, plan(study, Path("results") / study.name, 2))

@@ -6,8 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from springtune.mechanics.arc_length import follow
-from springtune.mechanics.follower import FollowerPressure
-from springtune.mechanics.network import Network
+from springtune.mechanics.network import FollowerPressure, Network
 from springtune.mechanics.statics import StaticProblem
 from springtune.mesh import MESH_TYPES, Mesh
 from springtune.problem.materials import Material

@@ -41,7 +41,7 @@ from mechanics import (
     squares_forces,
 )
 from springtune.linalg.factors import SingularError
-from springtune.mechanics.follower import FollowerPressure
+from springtune.mechanics.network import FollowerPressure
 from springtune.mesh import MESH_TYPES
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import Material
@@ -415,7 +415,7 @@ def audit_snap(scene, path=True):
     share = body.follow(guess, judge=judge)[1]
     verdict.force = force = float(guess * (share or 1e-3) * scene.level)
     loading = Loading(("arch",), held, pattern, given, pressure)
-    problem = Sheet(mesh, arch.thickness).stated(replace_scale(loading, force), springs)
+    problem = Sheet(mesh, arch.thickness).problem(replace_scale(loading, force), springs)
     found = solved(problem, 1 / springs.reference, "nonlinear", lambda moved: 0.0)
     verdict.status, verdict.message = str(found.status), found.message
     result = {"displacements": found.equilibrium.displacements}

@@ -7,8 +7,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from springtune.mechanics.affine import affine_stiffness
-from springtune.mechanics.moduli import axial_moduli, outline_stiffness
+from springtune.mechanics.moduli import affine_stiffness, axial_moduli, outline_stiffness
 from springtune.mechanics.network import Network
 from springtune.mesh import MESH_TYPES, Mesh, lattice, signed_areas
 from springtune.mesh.groups import GroupedMesh

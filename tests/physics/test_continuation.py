@@ -13,7 +13,7 @@ from springtune.problem.boundary import held, weights
 from springtune.problem.loads import AXIAL, BENDING, FACE, SHEAR
 from springtune.problem.materials import Material
 from springtune.problem.status import Status
-from springtune.reference.limits import elastica
+from springtune.reference.answers import elastica
 from springtune.springs import DEFINITIONS
 
 HEIGHT = 0.02

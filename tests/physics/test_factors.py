@@ -9,13 +9,18 @@ from hypothesis import strategies as st
 from scipy.sparse import csc_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-from springtune.linalg.factors import Analysis, SingularError, SuperLUFactor, factorize
+from springtune.linalg.factors import (
+    Analysis,
+    SingularError,
+    SuperLUFactor,
+    factorize,
+    factorize_pinned,
+    nested_dissection,
+    spread,
+)
 from springtune.linalg.multigrid import IndefiniteError, Multigrid, bilinear
-from springtune.linalg.ordering import nested_dissection, spread
-from springtune.linalg.pinned import factorize_pinned
 from springtune.mechanics.arc_length import follow
-from springtune.mechanics.follower import FollowerPressure
-from springtune.mechanics.network import PINNED, Network, successor
+from springtune.mechanics.network import PINNED, FollowerPressure, Network, successor
 from springtune.mechanics.series import trace
 from springtune.mechanics.statics import StaticProblem
 from springtune.mesh import MESH_TYPES

@@ -9,8 +9,8 @@ from scipy.optimize import minimize_scalar
 from springtune.problem.geometry import Beam
 from springtune.problem.loads import AXIAL, BENDING, FACE, SHEAR
 from springtune.problem.materials import Material
+from springtune.reference.answers import elastica
 from springtune.reference.finite_strain import FiniteStrainError, NeoHooke, solve_neo_hooke
-from springtune.reference.limits import elastica
 from springtune.reference.small_strain import solve_small_strain
 
 BLOCK = Beam(0.2, 0.04, 1e-3, "200x40")

@@ -15,7 +15,7 @@ from skfem.models.elasticity import linear_elasticity
 from springtune.problem.geometry import Beam
 from springtune.problem.loads import AXIAL, BENDING, BOTH, FACE, LEFT, LOAD_KINDS, RIGHT, SHEAR, TOP, LoadKind
 from springtune.problem.materials import Material
-from springtune.reference.field import outline
+from springtune.reference.answers import outline
 from springtune.reference.small_strain import (
     FIRST_LEVEL,
     ReferenceNotConvergedError,

@@ -7,7 +7,7 @@ from scipy.integrate import solve_bvp
 from springtune.problem.geometry import Beam
 from springtune.problem.loads import BENDING
 from springtune.problem.materials import Material
-from springtune.reference.limits import (
+from springtune.reference.answers import (
     beyond_linear,
     elastica,
     most_rotation_and_strain,

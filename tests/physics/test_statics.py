@@ -8,8 +8,7 @@ import pytest
 from scipy.optimize import root
 
 from springtune.linalg.factors import SingularError
-from springtune.mechanics.follower import FollowerPressure
-from springtune.mechanics.network import Network
+from springtune.mechanics.network import FollowerPressure, Network
 from springtune.mechanics.newton import TOLERANCE
 from springtune.mechanics.statics import SMALLEST_STEP, StaticProblem
 from springtune.mesh import Mesh

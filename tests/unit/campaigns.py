@@ -1,13 +1,29 @@
-"""A study's jobs, done in this process in the order of a run."""
+"""Studies of `studies.yaml`, what their reader says, and their jobs, done in this process in the order of a run."""
 
 from pathlib import Path
 
+import pytest
+
+from springtune.studies.config.messages import StudyError
 from springtune.studies.kinds import collect, load_study
 from springtune.studies.kinds.scenes import plan as scenes
-from springtune.studies.output import present
-from springtune.studies.output.browse import job as browse
+from springtune.studies.output import present, reading
+from springtune.studies.output.browse import page as browse
 from springtune.studies.runs import rerun, run_tasks
 from springtune.studies.runs.plan import plan
+
+
+def load_text(folder, text, name="study.yaml"):
+    """Load a study from its text, or its bytes."""
+    (folder / name).write_bytes(text if isinstance(text, bytes) else text.encode())
+    return load_study(folder / name)
+
+
+def refusal(folder, text, name="study.yaml"):
+    """Message that the text of a study gets, without the folder."""
+    with pytest.raises(StudyError) as caught:
+        load_text(folder, text, name)
+    return str(caught.value).replace(f"{folder}/", "")
 
 
 class Campaign:
@@ -55,6 +71,11 @@ class Campaign:
         for name in names:
             self.do(name)
         return names
+
+    def collected(self):
+        """The dataset, when all that it is made of has run."""
+        self.finish(rerun.COLLECT)
+        return reading.open(self.folder)
 
     def do(self, name):
         """A job, by the function that its rule calls."""

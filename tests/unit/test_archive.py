@@ -26,28 +26,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from springtune.cli import main
-from springtune.studies.archive import archive, contents, environment, reproduction
+from springtune.studies.archive import contents, crate, reproduction
 from springtune.studies.kinds import load_study
 from springtune.studies.output import reading
 from springtune.studies.output.comparison import Tolerance, compare
 from springtune.studies.runs import checked_json, provenance
 
 from campaigns import Campaign
+from tables import STUDIES
 
 REPOSITORY = Path(__file__).parents[2]
 
 HOST, PERSON = "a-host-of-its-own", "0000-0002-1825-0097"
 
-STUDY = """
-title: One <script>network</script> of `a file's` [mesh](javascript:x)
-beams: {20x10: {length: 20 mm, height: 10 mm}}
-materials: {steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}}
-mesh_files: {plate: [{file: plate mesh.vtu, beam: 20x10, mesh_size: 5 mm}]}
-outputs: [tables]
-grids:
-  one: {rows: forces.csv, beam: 20x10, mesh_type: plate, mesh_size: 5 mm, material: steel, load: traction,
-        definition: lattice, sensitivity: false}
-"""
+STUDY = STUDIES["archive"]
 
 CITATION = f"""
 cff-version: 1.2.0
@@ -627,10 +619,10 @@ class TestVerify:
             text = contents.Packed("", b"", "", size)
             return dict.fromkeys([*map(str, range(number)), "ro-crate-metadata.json", "SHA256SUMS"], text)
 
-        archive.check_limits(files(99_998, 2**24))
+        crate.check_limits(files(99_998, 2**24))
         for number, size in ((99_999, 1), (1, 2**24 + 1)):
             with pytest.raises(contents.ArchiveError, match="an archive holds at most 100000, with 16777216 bytes"):
-                archive.check_limits(files(number, size))
+                crate.check_limits(files(number, size))
 
     def test_options_of_the_other_kind_are_wrong_calls(self, made):
         path = made / "results/one.crate.zip"
@@ -703,12 +695,12 @@ class TestEnvironment:
             "# by uv\nnumpy==0.1 \\\n    --hash=sha256:00\n"
             "PyYAML==6.0 ; python_version >= '3'\nnone==1 ; os_name == 'x'\n"
         )
-        assert environment.locked(lock) == {"numpy": "0.1", "pyyaml": "6.0"}
-        assert environment.departures(lock)["numpy"][0] == "0.1"
+        assert contents.locked(lock) == {"numpy": "0.1", "pyyaml": "6.0"}
+        assert contents.departures(lock)["numpy"][0] == "0.1"
 
     def test_another_python_is_another_environment(self, tmp_path):
         (tmp_path / "lock.txt").write_text("")
-        here = environment.minor(platform.python_version())
+        here = contents.minor(platform.python_version())
         assert reproduction.own_environment(tmp_path / "lock.txt", platform.python_version()) == {}
         assert reproduction.own_environment(tmp_path / "lock.txt", "3.99.1") == {"python": ("3.99", here)}
 
@@ -717,7 +709,7 @@ class TestEnvironment:
         [
             (1.0, {}, True),
             (1 + 1e-12, {}, True),  # no machine is told: it may be another one
-            (1 + 1e-12, environment.machine(), False),
+            (1 + 1e-12, contents.machine(), False),
             (1 + 1e-3, {}, False),
         ],
         ids=["same bits", "another machine", "this machine", "another number"],
@@ -744,7 +736,7 @@ class TestEnvironment:
             data = xr.Dataset({"error": ("approach", values), "seconds": ("approach", [seconds, seconds])})
             data["status"] = ("approach", np.array(flags, dtype="i1"), meanings)
             data.to_netcdf(path, mode="a", group="benchmark", engine="h5netcdf")
-        found = reproduction.compared(*files, environment.machine())
+        found = reproduction.compared(*files, contents.machine())
         assert (found.same, found.ended_otherwise) == (same, ended_otherwise)
 
 

@@ -26,21 +26,16 @@ from springtune.mesh import (
     structured,
     write_mesh,
 )
-from springtune.mesh.group_files import read_shape
+from springtune.mesh.formats import read_shape
 from springtune.safe_io.inputs import virtual_memory
 from springtune.studies.output import reading
 from springtune.studies.output.browse.page import page
 
+from tables import STUDIES
+
 BEAM, STEEL = st.Beam("100 mm", "20 mm"), st.Material("210 GPa", 0.3)
 
-SMALL = """
-title: small
-beams: {a: {length: 200 mm, height: 30 mm}}
-materials: {steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}}
-grids:
-  g: {mesh_type: structured, mesh_size: 5 mm, material: steel, load: traction, force: 1 kN, definition: lattice,
-      beam: a}
-"""
+SMALL = "\n" + STUDIES["bad_input_small"]  # of a file, lines are told from 2 on
 
 
 def sizes(count):
@@ -574,8 +569,8 @@ class TestDatasets:
 
     @pytest.mark.parametrize("name", ["an external link", "stored outside of the file", "a virtual dataset"])
     def test_data_of_other_files_are_refused_wherever_a_dataset_is_opened(self, path, name, monkeypatch):
-        from springtune.studies.paper.datasets import PaperError
-        from springtune.studies.paper.datasets import read as for_paper
+        from springtune.studies.paper import PaperError
+        from springtune.studies.paper.numbers import read as for_paper
 
         monkeypatch.chdir(path.parent)
         shutil.copy(path, path.with_name("other.nc"))

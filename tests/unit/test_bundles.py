@@ -9,48 +9,49 @@ from hypothesis import strategies as st
 
 from springtune.springs import DEFINITIONS
 from springtune.studies.kinds import load_study
-from springtune.studies.kinds.stability.names import EXPERIMENTS
-from springtune.studies.runs import bundles, checked_json, commands, records
-from springtune.studies.runs.plan import plan, usual_costs
+from springtune.studies.kinds.stability import EXPERIMENTS
+from springtune.studies.runs import checked_json, plan, records, workload
 from springtune.studies.runs.task_costs import TaskCosts
 
-USUAL = usual_costs()
+from tables import STUDIES
+
+USUAL = plan.usual_costs()
 
 COSTS = st.dictionaries(st.integers(0, 60).map("task {}".format), st.floats(1e-3, 30.0), min_size=1, max_size=40)
 
 
 @given(costs=COSTS, cores=st.integers(1, 16), start_up=st.floats(0.1, 2.0))
 def test_every_task_is_in_one_bundle_and_bundles_are_balanced(costs, cores, start_up):
-    found = bundles.share_out(costs, cores, start_up, {})
+    found = plan.share_out(costs, cores, start_up, {})
     names = [name for members in found.values() for name in members]
     assert sorted(names) == sorted(costs)
     # Largest first to the least: no bundle has more than the even share and one task.
     even = sum(costs.values()) / len(found)
     assert max(sum(costs[name] for name in members) for members in found.values()) <= even + max(costs.values()) + 1e-9
-    assert found == bundles.share_out(dict(reversed(costs.items())), cores, start_up, {})
+    assert found == plan.share_out(dict(reversed(costs.items())), cores, start_up, {})
 
 
 @given(costs=COSTS, added=COSTS, cores=st.integers(1, 4), factor=st.floats(0.1, 10))
 def test_what_was_shared_out_stays_where_it_is(costs, added, cores, factor):
-    before = bundles.share_out(costs, cores, 0.5, {})
+    before = plan.share_out(costs, cores, 0.5, {})
     dearer = {name: factor * cost for name, cost in costs.items()}
-    assert bundles.share_out(dearer, cores, 0.5, before) == before
-    after = bundles.share_out(costs | added, cores, 0.5, before)
+    assert plan.share_out(dearer, cores, 0.5, before) == before
+    after = plan.share_out(costs | added, cores, 0.5, before)
     assert all(after[label][: len(members)] == members for label, members in before.items())
     assert sorted(name for members in after.values() for name in members) == sorted(costs | added)
-    kept = bundles.share_out(added, cores, 0.5, after)
+    kept = plan.share_out(added, cores, 0.5, after)
     assert all(set(kept[label]) <= set(after[label]) for label in kept)
 
 
 @pytest.mark.parametrize("seconds, count", [(0.3, 1), (1.5, 2), (15.0, 2), (39.0, 4), (400.0, 40)])
 def test_start_up_is_a_small_share_of_a_job_and_cores_are_kept_busy(seconds, count):
     costs = {str(number): seconds / 400 for number in range(400)}
-    assert len(bundles.share_out(costs, 2, 0.5, {})) == count
+    assert len(plan.share_out(costs, 2, 0.5, {})) == count
 
 
 @given(costs=COSTS, lasting=st.floats(1.0, 100.0))
 def test_on_a_cluster_a_job_lasts_as_long_as_is_wanted(costs, lasting):
-    found = bundles.share_out(costs, 1, 0.5, {}, lasting)
+    found = plan.share_out(costs, 1, 0.5, {}, lasting)
     assert sorted(name for members in found.values() for name in members) == sorted(costs)
     loads = [sum(costs[name] for name in members) for members in found.values()]
     # As near as whole bundles can be, and tasks are not torn apart.
@@ -59,20 +60,20 @@ def test_on_a_cluster_a_job_lasts_as_long_as_is_wanted(costs, lasting):
 
 
 def test_a_job_asks_for_what_it_is_expected_to_need_and_twice_that_at_each_retry():
-    needs = bundles.Needs(seconds=1000.0, memory=3e9, most_memory=8e9)
-    least = bundles.TIME_MARGIN * needs.seconds / 60, bundles.MEMORY_MARGIN * needs.memory / 1e6
+    needs = plan.Needs(seconds=1000.0, memory=3e9, most_memory=8e9)
+    least = plan.TIME_MARGIN * needs.seconds / 60, plan.MEMORY_MARGIN * needs.memory / 1e6
     asked = [(needs.minutes(attempt), needs.megabytes(attempt)) for attempt in (1, 2, 3, 4)]
-    assert least[0] + bundles.QUEUED / 60 <= asked[0][0] <= least[0] + bundles.QUEUED / 60 + 1
+    assert least[0] + plan.QUEUED / 60 <= asked[0][0] <= least[0] + plan.QUEUED / 60 + 1
     assert asked[0][1] == least[1]
     assert asked[1] == (2 * asked[0][0], 2 * asked[0][1])
     assert [minutes for minutes, _ in asked] == [asked[0][0] * 2**retry for retry in range(4)]
     # No task may need more than the study's limits allow.
-    assert asked[2][1] == asked[3][1] == (8e9 + bundles.LEAST_MEMORY) / 1e6
+    assert asked[2][1] == asked[3][1] == (8e9 + plan.LEAST_MEMORY) / 1e6
 
 
 def test_before_anything_was_measured_a_job_asks_for_some_memory_and_never_for_too_little():
-    assert bundles.Needs(1.0).megabytes(1) == bundles.MEMORY / 1e6
-    assert bundles.Needs(1.0, memory=1.0).megabytes(1) == bundles.LEAST_MEMORY / 1e6
+    assert plan.Needs(1.0).megabytes(1) == plan.MEMORY / 1e6
+    assert plan.Needs(1.0, memory=1.0).megabytes(1) == plan.LEAST_MEMORY / 1e6
 
 
 def test_memory_follows_the_largest_job_of_a_stage_and_forgets_slowly(tmp_path):
@@ -85,9 +86,9 @@ def test_memory_follows_the_largest_job_of_a_stage_and_forgets_slowly(tmp_path):
                 file, {"start_up": 0.1, "work": {"reference": [1, 0, 1.0]} if most else {}, "memory": most}
             )
             os.utime(file, (time.time() + 10,) * 2)
-        bundles.remember(path, done, USUAL)
+        plan.remember_costs(path, done, USUAL)
         os.utime(path)
-        return bundles.Costs(path, USUAL).memory
+        return plan.Costs(path, USUAL).memory
 
     assert run(solve_0=2e9, solve_1=4e9, mesh_0=1e9) == {"solve": 4e9, "mesh": 1e9}
     assert run(solve_0=1e8) == {"solve": 2e9, "mesh": 1e9}
@@ -95,15 +96,7 @@ def test_memory_follows_the_largest_job_of_a_stage_and_forgets_slowly(tmp_path):
     assert run(solve_0=3e9) == {"solve": 3e9, "mesh": 1e9}
 
 
-STUDY = """
-title: Bundles of a study
-beams: {small: {length: 50 mm, height: 20 mm}}
-materials: {steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}}
-outputs: [size]
-grids:
-  one: {beam: small, mesh_type: [structured, right], mesh_size: [10 mm, 8 mm, 5 mm], material: steel, load: traction,
-        force: 20 kN, definition: lattice, kinematics: linear, sensitivity: false}
-"""
+STUDY = STUDIES["bundles"]
 
 
 @pytest.fixture
@@ -113,7 +106,7 @@ def planned(tmp_path):
     study, folder = load_study(tmp_path / "six.yaml"), tmp_path / "results/six"
 
     def planned(cores=1, lasting=None, write=False):
-        found = plan(study, folder, cores, lasting)
+        found = plan.plan(study, folder, cores, lasting)
         if write:
             found.write()
         return found
@@ -154,24 +147,24 @@ def test_stages_of_a_bundle_have_its_seconds(planned):
 
 def test_two_new_tasks_run_two_bundles_again():
     costs = {str(number): 1.0 for number in range(400)}
-    before = bundles.share_out(costs, 2, 0.5, {})
-    after = bundles.share_out(costs | {"new": 1.0, "newer": 1.0}, 2, 0.5, before)
+    before = plan.share_out(costs, 2, 0.5, {})
+    after = plan.share_out(costs | {"new": 1.0, "newer": 1.0}, 2, 0.5, before)
     assert sum(after[label] != before.get(label) for label in after) == 2
 
 
 def test_costs_follow_what_the_machine_measures(tmp_path):
     path, done = tmp_path / "costs.json", tmp_path / "done_0.json"
-    assert bundles.Costs(path, USUAL).of("reference") == USUAL["reference"][0]
+    assert plan.Costs(path, USUAL).of("reference") == USUAL["reference"][0]
     spent = TaskCosts()
     for _ in range(10):
         spent.add("reference", 0, 3 * USUAL["reference"][0])
         spent.add("a kind of no cost", 0, 1.0)
     checked_json.write(done, spent.summary())
-    bundles.remember(path, [done], USUAL)
-    assert bundles.Costs(path, USUAL).of("reference") == pytest.approx(3 * USUAL["reference"][0])
-    assert bundles.Costs(path, USUAL).start_up == spent.start_up + bundles.SPAWNED
+    plan.remember_costs(path, [done], USUAL)
+    assert plan.Costs(path, USUAL).of("reference") == pytest.approx(3 * USUAL["reference"][0])
+    assert plan.Costs(path, USUAL).start_up == spent.start_up + plan.SPAWNED
     before = path.read_text()
-    bundles.remember(path, [done], USUAL)  # the same jobs again say nothing new
+    plan.remember_costs(path, [done], USUAL)  # the same jobs again say nothing new
     assert path.read_text() == before
 
 
@@ -183,8 +176,8 @@ def test_every_experiment_and_every_definition_that_searches_has_a_cost():
 def test_commands_are_those_of_their_job_alone(tmp_path):
     told = [{"rule": rule, "wildcards": {"bundle": label}, "command": f"{rule} {label}"}
             for rule in ("mesh", "solve") for label in "01"]  # fmt: skip
-    assert commands.recall(tmp_path, "solve", {"bundle": "1"}) is None
-    commands.remember(tmp_path, [*told, {"rule": "collect", "wildcards": {}, "command": "collect"}])
-    assert commands.recall(tmp_path, "solve", {"bundle": "1"})["command"] == "solve 1"
-    assert commands.recall(tmp_path, "collect", {})["command"] == "collect"
-    assert commands.recall(tmp_path, "solve", {"bundle": "2"}) is None
+    assert workload.recall_command(tmp_path, "solve", {"bundle": "1"}) is None
+    workload.remember_commands(tmp_path, [*told, {"rule": "collect", "wildcards": {}, "command": "collect"}])
+    assert workload.recall_command(tmp_path, "solve", {"bundle": "1"})["command"] == "solve 1"
+    assert workload.recall_command(tmp_path, "collect", {})["command"] == "collect"
+    assert workload.recall_command(tmp_path, "solve", {"bundle": "2"}) is None

@@ -17,17 +17,9 @@ from springtune.studies.kinds import load_study
 from springtune.studies.output.selection import at, last_swept
 
 from campaigns import Campaign
+from tables import STUDIES
 
-HEAD = """\
-title: A study
-beams:
-  long: {length: 200 mm, height: 30 mm}
-  short: {length: 100 mm, height: 20 mm, thickness: 2 mm}
-materials:
-  steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}
-grids:
-  one:
-"""
+HEAD = STUDIES["grids_head"]
 GRID = {
     "beam": "long",
     "mesh_type": "structured",
@@ -85,28 +77,6 @@ class TestRanges:
         study = load(mesh_size={"from": "1 mm", "to": "5 mm", "points": "9"})
         assert study.axes["mesh_size"] == (1e-3, 1.5e-3, 2e-3, 2.5e-3, 3e-3, 3.5e-3, 4e-3, 4.5e-3, 5e-3)
 
-    @pytest.mark.parametrize(
-        ("given", "said"),
-        [
-            ({"from": "5 mm", "to": "1 mm", "points": "3"}, "'5 mm' is not below 'to', '1 mm'; exchange them"),
-            ({"from": "1 mm", "to": "5 mm"}, "a range without 'points'; give from, to and points"),
-            ({"from": "1 mm", "to": "5 mm", "points": "1"}, "'1' is out of range; give a whole number from 2"),
-            ({"from": "1 mm", "to": "5 mm", "points": "3", "step": "1"}, "unknown key 'step' of a range"),
-            ({"from": "1 mm", "to": "5 mm", "points": "3", "spacing": "log"}, "'log' is no spacing; give linear or"),
-            ({"from": "1 mm", "to": "5 kg", "points": "3"}, "'5 kg' is of dimension [mass]; give a length"),
-            ({}, "a mapping instead of a length such as '5 mm', a list, or a range"),
-        ],
-    )
-    def test_bad_range(self, refusal, given, said):
-        message = refusal(mesh_size=given)
-        assert message.startswith("study.yaml:")
-        assert "grids.one.mesh_size" in message
-        assert said in message
-
-    def test_poisson_ratio_has_no_logarithm_at_zero(self, refusal):
-        message = refusal(poisson_ratio={"from": "0", "to": "0.4", "points": "3", "spacing": "logarithmic"})
-        assert "grids.one.poisson_ratio.from: '0' has no logarithm" in message
-
 
 NUMBERS = {
     "mesh_size": ["2 mm", "5 mm", "10 mm"],
@@ -161,36 +131,6 @@ class TestCombinations:
         assert "'25 mm' is larger than beam 'short'" in refusal(**grid)
         assert len(load(**grid, exclude={"beam": "short", "mesh_size": "25 mm"}).scenes) == 3
 
-    @pytest.mark.parametrize(
-        ("keys", "said"),
-        [
-            (
-                {"mesh_size": ["2 mm", "5 mm"], "force": ["1 N", "2 N", "3 N"], "zip": ["mesh_size", "force"]},
-                "grids.one.zip: 2 of 'mesh_size', 3 of 'force' cannot go together; give each as many values",
-            ),
-            ({"zip": ["mesh_size", "thickness"]}, "'thickness' is zipped and has no values"),
-            ({"zip": ["mesh_size", "color"]}, "unknown parameter 'color'"),
-            ({"zip": ["mesh_size"]}, "instead of two parameters or more"),
-            ({"zip": [["mesh_size", "force"], ["force", "load"]]}, "'force' is zipped twice"),
-            ({"zip": "mesh_size"}, "'mesh_size' instead of parameters that go together"),
-            ({"force": {"long": "1 N"}, "zip": ["beam", "force"]}, "'force' is zipped and has values for each beam"),
-            ({"exclude": {"mesh_size": "3 mm"}}, "no combination of the grid has these values of mesh_size"),
-            ({"exclude": {"mesh_size": "10 mm"}}, "leaves nothing of the grid"),
-            ({"exclude": {}}, "no parameter at all"),
-            ({"exclude": {"mesh_size": "10 kg"}}, "'10 kg' is of dimension [mass]"),
-            (
-                {"exclude": "10 mm"},
-                "'10 mm' instead of keys and values; give those to leave out, such as {mesh_size: 1 mm}",
-            ),
-            ({"exclude": [["10 mm"]]}, "a list instead of keys and values; give those to leave out, such as"),
-        ],
-    )
-    def test_refused(self, refusal, keys, said):
-        message = refusal(**keys)
-        assert message.startswith("study.yaml:")
-        assert said in message
-        assert "\n" not in message
-
     def test_too_many_are_refused_before_they_are_made(self, refusal, monkeypatch):
         many = {"mesh_size": {"from": "2 mm", "to": "5 mm", "points": "10000"}}
         forces = {"from": "1 N", "to": "5 N", "points": "10000"}
@@ -212,10 +152,6 @@ class TestCombinations:
         )
         monkeypatch.setenv(MOST_SCENES_VARIABLE, "")  # as if it were not there
         assert "4000000 scenes" in refusal(mesh_size=many, thickness=many)
-
-    def test_labels_that_are_found_by_one_number_are_one(self, refusal):
-        message = refusal(force=["1 N", "1.0000000001 N"])
-        assert "grids: force has 1.0 and 1.0000000001, which are one label; write them alike" in message
 
     def test_a_stated_stiffness_is_near_that_of_every_modulus(self, load):
         stated = "definitions: {paper: {stiffness: [{mesh_type: structured, material: steel, value: 800 N/m}]}}\ngrids:"
@@ -309,15 +245,6 @@ class TestSwept:
         assert len({study.name_of(scene) for scene in study.scenes}) == 64
 
 
-def run(path):
-    """Dataset of a study, all its jobs done in this process."""
-    campaign = Campaign(path)
-    campaign.plan.write()
-    for name in campaign.jobs:
-        campaign.do(name)
-    return springtune.open(campaign.folder)
-
-
 @pytest.fixture(scope="module")
 def swept(tmp_path_factory):
     """A study that sweeps everything, and the same cells one by one."""
@@ -348,9 +275,9 @@ def swept(tmp_path_factory):
         (folder / f"one{number}.yaml").write_text(head.replace("grids:", "outputs: tables\ngrids:") + lines)
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
-        trees = run("all.yaml"), {number: run(f"one{number}.yaml") for number in alone}
-    yield *trees, alone
-    for tree in (trees[0], *trees[1].values()):
+        trees = [Campaign(f"{name}.yaml").collected() for name in ("all", *(f"one{number}" for number in alone))]
+    yield trees[0], dict(zip(alone, trees[1:])), alone
+    for tree in trees:
         tree.close()
 
 
@@ -393,6 +320,7 @@ def test_a_stiffer_network_gives_way_as_one_under_less_force(swept):
 
 def test_figures_show_the_last_values_and_say_which(swept):
     tree, _, _ = swept
+    assert springtune.plot_sensitivity(tree)
     (panel,) = springtune.plot_size(tree)
     title = panel.get_title(loc="left").replace("\n", " ").replace("\u00a0", " ")
     assert title == "long (200 x 30 mm), 125 N, thickness 3 mm, E = 2 GPa, nu = 0.5"
@@ -469,7 +397,7 @@ def test_the_beam_that_calibrates_has_its_thickness_from_its_own_curves(here):
     path = of_grids(
         here, "thick", [calibrating, other], definitions={"calibrated": {"beam": "60x20", "load": "bending"}}
     )
-    with run(path) as tree:
+    with Campaign(path).collected() as tree:
         root = tree.to_dataset().sel(definition="calibrated").squeeze(drop=True)
         bending, traction = (
             root.sel(load="bending", thickness=1e-3),
@@ -485,7 +413,8 @@ def test_who_needs_a_field_has_it_whoever_asks_first(here):
     many = {"load": "compression", "force": "1 kN", "definition": "uniform", "mesh_size": "10 mm"}
     many |= {"poisson_ratio": {"from": "0.01", "to": "0.49", "points": "49"}}
     fitted = {"load": "traction", "force": "1 kN", "definition": ["annealed", "lattice"], "mesh_size": "10 mm"}
-    with run(of_grids(here, "fields", [many, fitted | {"poisson_ratio": ["0.2", "0.3"]}])) as tree:
+    study = of_grids(here, "fields", [many, fitted | {"poisson_ratio": ["0.2", "0.3"]}])
+    with Campaign(study).collected() as tree:
         root = tree.to_dataset().squeeze(drop=True)
         asked = root.where(root.status != 0)
         assert int((root.status > 1).sum()) == 0
@@ -524,7 +453,8 @@ def test_what_is_zipped_with_the_mesh_size_is_shown_on_its_own_meshes(here):
         "zip": ["mesh_size", "force"],
     }
     path = of_grids(here, "zipped", [grid], outputs=["deformed", "size", "sweep"])
-    with run(path) as tree:
+    Campaign(path).finish()
+    with springtune.open("results/zipped") as tree:
         assert np.isfinite(tree["fields"].displacement_x.values).any()
         (panel,) = springtune.plot_size(tree, kinematics="linear")
         errors = tree.deformation_error.squeeze(drop=True)
@@ -553,7 +483,8 @@ def test_fields_of_a_sweep_say_of_which_values_they_are(here):
     grid = {"load": ["traction", "bending"], "force": ["1 kN", "2 kN"], "thickness": ["1 mm", "2 mm"]}
     grid |= {"mesh_size": "10 mm"}
     coarse = grid | {"load": "traction", "mesh_size": "20 mm", "force": "1 kN"}
-    with run(of_grids(here, "said", [grid, coarse], outputs=["deformed", "paraview"])) as tree:
+    Campaign(of_grids(here, "said", [grid, coarse], outputs=["deformed", "paraview"])).finish()
+    with springtune.open("results/said") as tree:
         fields = tree["fields"].to_dataset()[["shown_force", "shown_thickness"]].squeeze(drop=True)
         # Each load has its coarsest mesh, and the last values there.
         assert fields.shown_force.sel(load=["traction", "bending"]).values.tolist() == [1e3, 2e3]

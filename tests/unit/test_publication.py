@@ -13,11 +13,9 @@ import xarray as xr
 import yaml
 
 from springtune.studies.paper import PaperError
-from springtune.studies.paper.build import run
-from springtune.studies.paper.datasets import read
+from springtune.studies.paper.build import run, typed_numbers
 from springtune.studies.paper.figures import draw
-from springtune.studies.paper.numbers import numbers, table
-from springtune.studies.paper.typed import typed_numbers
+from springtune.studies.paper.numbers import numbers, read, table
 
 import synthetic
 

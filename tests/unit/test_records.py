@@ -13,9 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from springtune.studies.runs import checked_json, driver, records, run_tasks, store
-from springtune.studies.runs.damage import ASIDE, DamagedError
-from springtune.studies.runs.task_costs import TaskCosts
-from springtune.studies.runs.task_limits import Watch
+from springtune.studies.runs.checked_json import ASIDE, DamagedError
+from springtune.studies.runs.task_costs import TaskCosts, Watch
 
 JSON = st.recursive(
     st.none() | st.booleans() | st.integers(-(2**53), 2**53) | st.floats(allow_nan=False) | st.text(),
@@ -113,12 +112,12 @@ class TestStore:
             keeper["two"] = {"displacement": 1 / 0}
         assert store.stored(tmp_path / "results.h5") == {"one"}
 
-    def test_files_from_before_there_were_checksums_hold_nothing(self, tmp_path, capsys):
+    def test_files_without_checksum_are_set_aside(self, tmp_path, capsys):
         path = tmp_path / "results.h5"
         with h5py.File(path, "w") as file:
             file["scalars"] = "{}"
-        assert store.stored(path) == set() and path.exists()
-        assert capsys.readouterr().err == ""
+        assert store.stored(path) == set() and not path.exists()
+        assert "it is no file of results; set aside as results.h5.damaged" in capsys.readouterr().err
         store.add(path, {"one": self.RESULT})
         assert store.stored(path) == {"one"}
 

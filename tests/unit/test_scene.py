@@ -9,7 +9,7 @@ import pytest
 
 import springtune as st
 from springtune.problem.loads import LOADS
-from springtune.reference.similarity import unit_problem, unit_scales
+from springtune.reference.answers import unit_problem, unit_scales
 from springtune.scene.sheet import Sheet
 from springtune.studies.kinds.scenes.solve import solved
 

@@ -13,11 +13,11 @@ from hypothesis import strategies as some
 
 import springtune as st
 from springtune.mesh import Mesh, MeshError, quality, signed_areas, write_mesh
-from springtune.mesh.group_files import read_shape
+from springtune.mesh.formats import read_shape
 from springtune.mesh.groups import GroupedMesh
 from springtune.mesh.outlines import mesh_shape
 from springtune.mesh.sheets import outline_of, sheet_fault
-from springtune.problem.cases import check_case
+from springtune.problem.boundary import check_case
 from springtune.problem.shapes import Hole, LoadCase, Segment, Shape, Support, Traction
 
 

@@ -14,12 +14,13 @@ import springtune as st
 from springtune.mesh import write_mesh
 from springtune.studies.archive import verify
 from springtune.studies.config.kind import outputs
-from springtune.studies.kinds import collect, load_study
+from springtune.studies.kinds import collect
 from springtune.studies.kinds.scenes import stored
 from springtune.studies.kinds.shapes.checks import READ_AT_ONCE
 from springtune.studies.kinds.shapes.plan import mesh_key, reference_task, scene_task
 from springtune.studies.kinds.shapes.reference import rounds_of
-from springtune.studies.kinds.shapes.task_values import ONE_LOAD, geometry, load, named, shape_of
+from springtune.studies.kinds.shapes.task_values import ONE_LOAD, geometry, named, shape_of
+from springtune.studies.kinds.shapes.task_values import load as values_of
 from springtune.studies.output import page
 from springtune.studies.output.dataset import STATUS
 from springtune.studies.output.export import export
@@ -28,50 +29,11 @@ from springtune.studies.runs.plan import plan, table_files
 from springtune.studies.runs.task_costs import TaskCosts
 from springtune.studies.runs.workload import results_of
 
+from campaigns import load_text
+from tables import STUDIES
+
 REPOSITORY = Path(__file__).parents[2]
-
-COOK = """\
-title: A tapered panel
-materials: {third: {young_modulus: 1 MPa, poisson_ratio: 0.3333333333333333}}
-shapes:
-  cook:
-    outline:
-      - {from: [0, 0], group: lower}
-      - {from: [48 mm, 44 mm], group: right}
-      - {from: [48 mm, 60 mm], group: upper}
-      - {from: [0, 44 mm], group: left}
-    points: {tip: [48 mm, 52 mm]}
-    loads:
-      shear:
-        supports: {left: fixed}
-        forces: {right: [0, 1 N]}
-        quantities:
-          tip: {displacement: y, at: tip, expected: 23.96 mm, source: somebody}
-          work: energy
-shape_grids:
-  all: {shape: cook, mesh_size: [16 mm, 8 mm], material: third, definition: [delingette, lattice], kinematics: linear}
-"""
-
-
-@pytest.fixture
-def loaded(tmp_path):
-    """Reads a study from its text, in a folder of its own."""
-
-    def read(text, name="study"):
-        (tmp_path / f"{name}.yaml").write_text(text)
-        return load_study(tmp_path / f"{name}.yaml")
-
-    return read
-
-
-@pytest.fixture
-def refusal(loaded):
-    def read(text):
-        with pytest.raises(st.StudyError) as refused:
-            loaded(text)
-        return str(refused.value)
-
-    return read
+COOK = STUDIES["shapes"]
 
 
 def done(study, folder):
@@ -87,50 +49,6 @@ def done(study, folder):
 
 
 # -- what a study may hold ---------------------------------------------------------------------------------------------
-
-REFUSED = {
-    "misspelt group": (("right: [0, 1 N]", "rihgt: [0, 1 N]"), "study.yaml:14: shapes.cook.loads.shear.forces.rihgt: "
-                       "unknown group or point 'rihgt'; did you mean 'right'?"),
-    "misspelt point": (("at: tip", "at: tpi"), "quantities.tip.at: unknown point 'tpi'; did you mean 'tip'?"),
-    "misspelt support": (("{left: fixed}", "{felt: fixed}"), "supports.felt: unknown group or point 'felt'"),
-    "no support": (("{left: fixed}", "{left: {x: 0}}"), "loads.shear.supports: leave the body free to move"),
-    "no such support": (("{left: fixed}", "{left: held}"), "'held' is no support; give fixed, or displacements"),
-    "holds nothing": (("{left: fixed}", "{left: {}}"), "holds nothing; give fixed"),
-    "not a length": (("from: [0, 44 mm]", "from: [0, 44 MPa]"), "'44 MPa' is a stress; give a length"),
-    "no unit": (("[0, 1 N]", "[0, 1]"), "'1' has no unit; give a force"),
-    "one coordinate": (("from: [0, 44 mm]", "from: 44 mm"), "'44 mm' instead of lengths along x and y"),
-    "force of one": (("[0, 1 N]", "1 N"), "instead of forces along x and y, such as [400 kN, 0]"),
-    "unknown quantity": (("work: energy", "work: enregy"), "'enregy' is no quantity; give area or energy"),
-    "two quantities": (("displacement: y, at", "displacement: y, stress: yy, at"), "displacement and stress at once"),
-    "stress of a group": (("displacement: y, at: tip, expected: 23.96 mm", "stress: yy, of: right, expected: 1 MPa"),
-                          "a stress has no 'of'; give at: a point"),
-    "expected of another kind": (("23.96 mm", "23.96 MPa"), "expected: '23.96 MPa' is a stress; give a length"),
-    "source of nothing": (("expected: 23.96 mm, ", ""), "source: a source of no value; give 'expected'"),
-    "reaction of what is free": (("work: energy", "work: {reaction: x, of: right}"), "unknown support 'right'"),
-    "sides that cross": (("[48 mm, 60 mm]", "[-20 mm, 10 mm]"), "shapes.cook.outline: "),
-    "unknown material": (("material: third", "material: thrid"), "unknown material 'thrid'; did you mean 'third'?"),
-    "unknown shape": (("shape: cook", "shape: cok"), "unknown shape 'cok'; did you mean 'cook'?"),
-    "unknown load": (("material: third,", "material: third, load: pull,"), "shape 'cook' has no load 'pull'"),
-    "mesh too coarse": (("16 mm", "1 m"), "is larger than shape 'cook'; give at most 48 mm"),
-    "mesh too fine": (("16 mm", "1 nm"), "gives"),
-    "no mesh size": (("mesh_size: [16 mm, 8 mm], ", ""), "'mesh_size' is missing; give a length"),
-    "definition with a reference": (("lattice]", "evolved]"), "'evolved' is for triangles with a reference"),
-    "definition of a beam": (("lattice]", "baudet-corrected]"), "shape_grids.all.definition"),
-    "mesh type of a beam": (("shape: cook,", "shape: cook, mesh_type: structured,"), "unknown mesh type 'structured'"),
-    "no such file": (("    outline:", "    file: none.msh\n    outline:"), "both 'outline' and 'file'; give the sides"),
-    "nothing of shapes": (("shape_grids:", "sensitivity: {points: 3}\nnothing:"), "unknown key 'nothing'"),
-    "unknown part": (("    points:", "    parts: {fibre: third}\n    points:"), "unknown part 'fibre'; no hole has"),
-    "refined nowhere": (("    points:", "    refined: {hole: 0.5}\n    points:"), "refined.hole: unknown group, point"),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("case", REFUSED)
-def test_what_is_wrong_is_refused_with_line_key_and_remedy(refusal, case):
-    (old, new), expected = REFUSED[case]
-    assert COOK.count(old) == 1
-    message = refusal(COOK.replace(old, new))
-    assert message.splitlines()[0].partition("study.yaml:")[2][0].isdigit()
-    assert expected in message
 
 
 def test_a_study_of_nothing_is_told_what_it_may_have(refusal):
@@ -152,41 +70,41 @@ def test_a_study_of_nothing_is_told_what_it_may_have(refusal):
 # -- what it expands to ------------------------------------------------------------------------------------------------
 
 
-def test_scenes_are_in_one_order_and_each_once(loaded):
-    one = loaded(COOK).parts["shapes"]
+def test_scenes_are_in_one_order_and_each_once(load):
+    one = load(COOK).parts["shapes"]
     again = "  again: {shape: cook, mesh_size: 8 mm, material: third, definition: [lattice], kinematics: linear}\n"
-    two = loaded(COOK.replace("[16 mm, 8 mm]", "[8 mm, 16 mm]") + again, "other").parts["shapes"]
+    two = load(COOK.replace("[16 mm, 8 mm]", "[8 mm, 16 mm]") + again, "other.yaml").parts["shapes"]
     assert one.scenes == two.scenes and len(one.scenes) == 4
     assert [(scene.mesh_size, scene.definition) for scene in one.scenes] == [
         (8e-3, "lattice"), (8e-3, "delingette"), (16e-3, "lattice"), (16e-3, "delingette"),
     ]  # fmt: skip
     assert one.referred == (("cook", "third", "shear"),)
-    without = loaded(COOK.replace("kinematics: linear", "reference: false"), "without").parts["shapes"]
+    without = load(COOK.replace("kinematics: linear", "reference: false"), "without.yaml").parts["shapes"]
     assert not without.referred and without.scenes[0].kinematics == "nonlinear"
 
 
-def test_keys_know_no_labels(loaded):
+def test_keys_know_no_labels(load):
     """A quantity that is renamed, or of which another value is expected, a load, a shape: nothing is solved again."""
-    one = loaded(COOK).parts["shapes"]
+    one = load(COOK).parts["shapes"]
     text = COOK.replace("cook", "panel").replace("shear:", "other:").replace("third", "soft")
     text = text.replace("tip: {displacement", "end: {displacement").replace("23.96 mm, source: somebody", "24 mm")
-    two = loaded(text, "two").parts["shapes"]
+    two = load(text, "two.yaml").parts["shapes"]
     for first, second in zip(one.scenes, two.scenes):
         assert mesh_key(one, first) == mesh_key(two, second)
         assert scene_task(one, first)["key"] == scene_task(two, second)["key"]
     assert reference_task(one, "cook", "third", "shear")["key"] == reference_task(two, "panel", "soft", "other")["key"]
-    stiffer = loaded(COOK.replace("1 MPa", "2 MPa"), "stiffer").parts["shapes"]
+    stiffer = load(COOK.replace("1 MPa", "2 MPa"), "stiffer.yaml").parts["shapes"]
     assert mesh_key(one, one.scenes[0]) == mesh_key(stiffer, stiffer.scenes[0])
     assert scene_task(one, one.scenes[0])["key"] != scene_task(stiffer, stiffer.scenes[0])["key"]
 
 
-def test_grids_and_shapes_share_the_axes_of_a_dataset(loaded):
+def test_grids_and_shapes_share_the_axes_of_a_dataset(load):
     grids = """\
 beams: {small: {length: 50 mm, height: 10 mm}}
 grids: {one: {beam: small, mesh_type: structured, mesh_size: 5 mm, material: third, load: traction, force: 1 N,
               definition: patch, sensitivity: false}}
 """
-    study = loaded(COOK + grids)
+    study = load(COOK + grids)
     assert study.axes["load"] == ("traction", "shear") and study.axes["mesh_size"] == (5e-3, 8e-3, 16e-3)
     assert study.axes["definition"] == ("lattice", "patch", "delingette") and study.axes["shape"] == ("cook",)
 
@@ -200,7 +118,7 @@ def test_tasks_have_all_of_a_shape():
     )  # fmt: skip
     points = {"top": (0.05, 0.028)}
     shape = st.Shape.rectangle(0.1, 0.04, holes=[hole], points=points, loads={"pull": case}, thickness=2e-3)
-    made = shape_of(geometry(shape), 2e-3, load(case))
+    made = shape_of(geometry(shape), 2e-3, values_of(case))
     assert (made.outline, made.holes, made.points) == (shape.outline, shape.holes, shape.points)
     plain = {"name": "pull", "quantities": case.quantities}
     assert replace(made.loads[ONE_LOAD], **plain) == case
@@ -238,8 +156,7 @@ def test_rounds_follow_each_other():
 def cook(tmp_path_factory):
     """A study of a shape alone, from its text to its dataset."""
     folder = tmp_path_factory.mktemp("cook")
-    (folder / "study.yaml").write_text(COOK)
-    study = load_study(folder / "study.yaml")
+    study = load_text(folder, COOK)
     return study, *done(study, folder / "results/study")
 
 
@@ -306,13 +223,13 @@ def test_networks_that_are_drawn_are_stored(cook):
     assert np.abs(fields.reference_displacement_y.values[held]).max() < 1e-9
 
 
-def test_what_cannot_be_solved_is_a_hole_that_says_why(loaded, tmp_path):
+def test_what_cannot_be_solved_is_a_hole_that_says_why(load, tmp_path):
     """A definition that cannot live on the mesh costs its own scenes; a reference that does not converge its error."""
     text = COOK.replace("delingette, lattice", "axis-exact, lattice").replace(
         "work: energy", "peak: {stress: yy, at: notch}"
     )
     text = text.replace("points: {", "points: {notch: [0, 44 mm], ").replace("[16 mm, 8 mm]", "16 mm")
-    tree, told = done(loaded(text), tmp_path / "results/study")
+    tree, told = done(load(text), tmp_path / "results/study")
     data = tree["shapes"].to_dataset().squeeze(drop=True)
     lost = data.sel(definition="axis-exact")
     assert STATUS[int(lost.status)] == "failed" and "isosceles" in lost.message.item()
@@ -352,8 +269,8 @@ def plate(tmp_path):
     return grouped
 
 
-def test_a_file_is_the_mesh_and_the_geometry(loaded, plate, tmp_path):
-    study = loaded(yaml.safe_dump(PLATE))
+def test_a_file_is_the_mesh_and_the_geometry(load, plate, tmp_path):
+    study = load(yaml.safe_dump(PLATE))
     assert study.parts["shapes"].scenes[0].mesh_type == "file" and study.axes["mesh_size"] == (0.0,)
     tree, _ = done(study, tmp_path / "results/study")
     cell = tree["shapes"].to_dataset().squeeze(drop=True)
@@ -365,7 +282,7 @@ def test_a_file_is_the_mesh_and_the_geometry(loaded, plate, tmp_path):
     (tmp_path / "elsewhere").mkdir()
     (tmp_path / "plate.msh").rename(tmp_path / "elsewhere/plate.msh")
     moved = PLATE | {"shapes": {"plate": PLATE["shapes"]["plate"] | {"file": "elsewhere/plate.msh"}}}
-    part = loaded(yaml.safe_dump(moved), "moved").parts["shapes"]
+    part = load(yaml.safe_dump(moved), "moved.yaml").parts["shapes"]
     assert mesh_key(part, part.scenes[0]) == before
     write_mesh(tmp_path / "elsewhere/plate.msh", st.mesh_shape(st.Shape.rectangle("100 mm", "40 mm"), "8 mm"))
     assert mesh_key(part, part.scenes[0]) != before
@@ -385,16 +302,16 @@ def test_groups_of_a_file_are_looked_at_as_the_study_is_read(refusal, plate):
     )
 
 
-def test_a_large_file_costs_its_own_scenes(loaded, plate, tmp_path):
+def test_a_large_file_costs_its_own_scenes(load, plate, tmp_path):
     """What is too large to be looked at as the study is read is looked at by its stages."""
     comment = b"$Comments\n" + READ_AT_ONCE // 10 * b"nothing at all\n" + b"$EndComments\n"
     path = tmp_path / "plate.msh"
     path.write_bytes(comment + path.read_bytes())
-    tree, _ = done(loaded(yaml.safe_dump(PLATE).replace("right", "rihgt")), tmp_path / "results/study")
+    tree, _ = done(load(yaml.safe_dump(PLATE).replace("right", "rihgt")), tmp_path / "results/study")
     cell = tree["shapes"].to_dataset().squeeze(drop=True)
     assert STATUS[int(cell.status)] == "failed" and "no group is named 'rihgt'" in cell.message.item()
     path.write_bytes(comment + b"$MeshFormat\n")
-    tree, _ = done(loaded(yaml.safe_dump(PLATE)), tmp_path / "results/broken")
+    tree, _ = done(load(yaml.safe_dump(PLATE)), tmp_path / "results/broken")
     cell = tree["shapes"].to_dataset().squeeze(drop=True)
     assert STATUS[int(cell.status)] == "failed" and cell.message.item().startswith("mesh: ")
 
@@ -409,23 +326,7 @@ def test_studies_of_beams_pay_nothing_for_shapes():
     found = set(run.stdout.split())
     assert "springtune.studies.kinds.shapes.kind" in found
     heavy = {f"springtune.studies.kinds.shapes.{name}" for name in ("sections", "checks", "expand", "described")}
-    assert not (heavy | {"springtune.problem.shapes", "springtune.problem.outlines"}) & found
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        ("[0, 1 N]", "[0, 0]", "shapes.cook.loads.shear: nothing moves or pulls the body"),
-        ("forces:", "gravity: [0, -9.81 m/s^2]\n        forces:", "all.material: 'third' has no density; add one"),
-        ("    outline:", "    unit: 1 mm\n    outline:", "shapes.cook.unit: is of the coordinates in a mesh file"),
-        ("{tip: [48 mm, 52 mm]}", "{tip: [49 mm, 52 mm]}", ":10: shapes.cook.points.tip: point 'tip'"),
-        ("{right: [0, 1 N]}", "1 N", "forces: '1 N' instead of names and their values, such as {name: value}"),
-        ("at: tip", "at: [tip]", "a list instead of the name of a point"),
-    ],
-)
-def test_what_no_scene_could_be_solved_with_is_refused_as_the_study_is_read(refusal, old, new, message):
-    assert old in COOK
-    assert message in refusal(COOK.replace(old, new, 1))
+    assert not (heavy | {"springtune.problem.shapes", "springtune.mesh.sides"}) & found
 
 
 def test_figures_of_two_loads_never_share_a_name(refusal):
@@ -438,7 +339,7 @@ def test_figures_of_two_loads_never_share_a_name(refusal):
     assert "figures of shape 'a_B' under 'c' and of 'a' under 'b_c' would have one name" in message
 
 
-def test_references_are_told_apart_whatever_they_are_called(loaded, tmp_path):
+def test_references_are_told_apart_whatever_they_are_called(load, tmp_path):
     content = yaml.safe_load(COOK)
     one, third = content["shapes"]["cook"], content["materials"]["third"]
     content["materials"] = {"c": third, "b_c": third | {"young_modulus": "2 MPa"}}
@@ -448,7 +349,7 @@ def test_references_are_told_apart_whatever_they_are_called(loaded, tmp_path):
         "one": grid | {"shape": "a", "material": "b_c"},
         "other": grid | {"shape": "a_b", "material": "c"},
     }
-    jobs = plan(loaded(yaml.safe_dump(content)), tmp_path / "results", 1).jobs.values()
+    jobs = plan(load(yaml.safe_dump(content)), tmp_path / "results", 1).jobs.values()
     tasks = [
         task
         for job in jobs
@@ -459,23 +360,23 @@ def test_references_are_told_apart_whatever_they_are_called(loaded, tmp_path):
     assert len({task["key"] for task in tasks}) == 2
 
 
-def test_twins_are_counted_as_often_as_they_are_computed(loaded, tmp_path):
+def test_twins_are_counted_as_often_as_they_are_computed(load, tmp_path):
     """Two shapes that are one body have two meshes, and one reference."""
     content = yaml.safe_load(COOK)
     content["shapes"]["twin"] = content["shapes"]["cook"]
     content["shape_grids"]["all"] |= {"shape": ["cook", "twin"], "mesh_size": "16 mm"}
-    made = plan(loaded(yaml.safe_dump(content)), tmp_path / "results", 1).jobs.values()
+    made = plan(load(yaml.safe_dump(content)), tmp_path / "results", 1).jobs.values()
     asked = dict.fromkeys((job.stage.name for job in made), 0)
     for job in made:
-        asked[job.stage.name] += len(results_of(job.content))
+        asked[job.stage.name] += len(set(results_of(job.content)))
     assert asked == {"shape_reference": 1, "shape_mesh": 2, "shape_solve": 4}
 
 
-def test_scenes_whose_mesh_was_beyond_limits_are_solved_once_these_are_raised(loaded, tmp_path):
+def test_scenes_whose_mesh_was_beyond_limits_are_solved_once_these_are_raised(load, tmp_path):
     class Limited(TaskCosts):
         limits = "1 s"
 
-    study = loaded(COOK.replace("[16 mm, 8 mm]", "16 mm").replace("linear}", "linear, reference: false}"))
+    study = load(COOK.replace("[16 mm, 8 mm]", "16 mm").replace("linear}", "linear, reference: false}"))
     jobs = {job.stage.name: job for job in plan(study, tmp_path / "results/study", 1).jobs.values()}
     mesh, solve = jobs["shape_mesh"], jobs["shape_solve"]
     driver.gone(mesh.stage.module, mesh.content, "shape_cook_free_16mm", "not done", "1 s")
@@ -486,27 +387,27 @@ def test_scenes_whose_mesh_was_beyond_limits_are_solved_once_these_are_raised(lo
     assert "2 solved" in told
 
 
-def test_a_scene_that_cannot_be_stated_is_a_hole(loaded, tmp_path):
+def test_a_scene_that_cannot_be_stated_is_a_hole(load, tmp_path):
     """All its force is on what is held: known once there is a mesh."""
     text = COOK.replace("forces: {right: [0, 1 N]}", "forces: {left: [0, 1 N]}")
-    tree, _ = done(loaded(text), tmp_path / "results/study")
+    tree, _ = done(load(text), tmp_path / "results/study")
     data = tree["shapes"].to_dataset()
     assert {STATUS[number] for number in data.status.values.ravel()} == {"failed"}
     assert all("neither pulls what is free" in message for message in data.message.values.ravel().tolist())
 
 
-def test_anisotropic_materials_are_told_without_their_names(loaded, tmp_path):
+def test_anisotropic_materials_are_told_without_their_names(load, tmp_path):
     text = COOK.replace(
         "{young_modulus: 1 MPa, poisson_ratio: 0.3333333333333333}",
         "{young_modulus_x: 2 MPa, young_modulus_y: 1 MPa, poisson_ratio_xy: 0.3, shear_modulus: 1 MPa}",
     )
-    tree, _ = done(loaded(text), tmp_path / "results/study")
+    tree, _ = done(load(text), tmp_path / "results/study")
     messages = tree["shapes"].to_dataset().message.sel(definition="lattice").values.ravel().tolist()
     assert all("needs an isotropic material and this one is anisotropic" in message for message in messages)
 
 
-def test_datasets_without_beams_say_where_their_networks_and_tables_are(loaded, tmp_path):
-    study = loaded(COOK.replace("kinematics: linear", "kinematics: linear, reference: false").replace(", 8 mm]", "]"))
+def test_datasets_without_beams_say_where_their_networks_and_tables_are(load, tmp_path):
+    study = load(COOK.replace("kinematics: linear", "kinematics: linear, reference: false").replace(", 8 mm]", "]"))
     tree, _ = done(study, tmp_path / "results/study")
     with pytest.raises(ValueError, match="group '/': it has no variables; give one of shapes, shape_fields"):
         export(tree, tmp_path / "table.csv")

@@ -1,47 +1,24 @@
 """The section `stability` of a study, and its stage."""
 
-import re
-
 import numpy as np
 import pytest
 
 from springtune.mechanics.integrators import BEHAVIOURS
 from springtune.problem.geometry import Beam
 from springtune.problem.materials import Material
-from springtune.studies.config.messages import StudyError
-from springtune.studies.kinds import load_study
-from springtune.studies.kinds.stability import experiments as stability
+from springtune.studies.kinds.stability import AXES, EXPERIMENTS, ONCE
+from springtune.studies.kinds.stability import solve as stability
 from springtune.studies.kinds.stability.collect import STABILITY
-from springtune.studies.kinds.stability.names import AXES, EXPERIMENTS, ONCE
 from springtune.studies.output.dataset import DIMENSIONS
 from springtune.studies.runs import dependencies as code
 from springtune.studies.runs import driver, store
 from springtune.studies.runs.task_costs import TaskCosts
 
-STUDY = """
-title: One experiment
-beams: {b: {length: 100 mm, height: 20 mm}}
-materials: {steel: {young_modulus: 210 GPa, poisson_ratio: 0.3, density: 7850 kg/m^3}}
-stability:
-  beam: b
-  material: steel
-  force: 20 kN
-  definition: [lattice, delingette]
-  mesh_size: [5 mm, 2.5 mm]
-grids:
-  one: {beam: b, mesh_type: structured, mesh_size: 5 mm, material: steel, load: traction, force: 20 kN,
-        definition: uniform, sensitivity: false}
-"""
+from tables import STUDIES
 
 
-def written(folder, text):
-    path = folder / "one.yaml"
-    path.write_text(text)
-    return path
-
-
-def test_experiments_are_one_a_definition_or_one_in_all(tmp_path):
-    found = load_study(written(tmp_path, STUDY))
+def test_experiments_are_one_a_definition_or_one_in_all(load):
+    found = load(STUDIES["stability"])
     names = [one.name for one in found.parts["stability"]]
     assert all(names.count(name) == (1 if name in ONCE else 2) for name in EXPERIMENTS)
     assert (
@@ -51,28 +28,9 @@ def test_experiments_are_one_a_definition_or_one_in_all(tmp_path):
     assert set(found.axes["definition"]) == {"uniform", "lattice", "delingette"}
 
 
-@pytest.mark.parametrize(
-    "old, new, message",
-    [
-        (", density: 7850 kg/m^3", "", "'steel' has no density; add one"),
-        ("density: 7850 kg/m^3", "density: 7850 kg", "give a density such as '7850 kg/m^3'"),
-        ("[lattice, delingette]", "calibrated", "choose of"),
-        ("mesh_size: [5 mm, 2.5 mm]", "mesh_size: 15 mm", "15 mm leaves few particles inside"),
-        ("force: 20 kN\n  definition", "force: 20 kN\n  mesh_type: braced\n  definition", "no mesh type of triangles"),
-        ("force: 20 kN\n  definition", "force: 20 kN\n  experiment: limit\n  definition", "did you mean 'limits'"),
-        ("  beam: b\n  material: steel", "  beam: c\n  material: steel", "unknown beam 'c'"),
-    ],
-)
-def test_what_cannot_be_done_is_refused(tmp_path, old, new, message):
-    assert old in STUDY
-    with pytest.raises(StudyError, match=re.escape(message)):
-        load_study(written(tmp_path, STUDY.replace(old, new, 1)))
-
-
-def test_output_without_experiments_is_refused(tmp_path):
-    text = STUDY[: STUDY.index("stability:")] + "outputs: stability\n" + STUDY[STUDY.index("grids:") :]
-    with pytest.raises(StudyError, match="add a section 'stability'"):
-        load_study(written(tmp_path, text))
+def test_output_without_experiments_is_refused(refusal):
+    head, _, rest = STUDIES["stability"].partition("stability:")
+    assert "add a section 'stability'" in refusal(f"{head}outputs: stability\n{rest[rest.index('grids:') :]}")
 
 
 def test_every_variable_has_its_dimensions_described():
@@ -87,7 +45,7 @@ def test_results_have_the_shapes_of_the_dataset(name):
     setup = stability.Setup(
         Beam(0.06, 0.02, 1e-3, "b"), Material(210e9, 0.3, 7850.0, "steel"), 2e4, "lattice", "structured", (5e-3,)
     )
-    for variable, values in stability.run(name, setup).items():
+    for variable, values in stability.RUN[name](setup).items():
         dimensions = [one for one in STABILITY.variables[variable][0] if one not in ("definition", "mesh_size")]
         assert np.shape(values) == tuple(len(AXES[one]) for one in dimensions), variable
 
@@ -100,7 +58,7 @@ def test_a_failing_experiment_is_stored_with_its_message(tmp_path):
     tasks = [{"key": "one", "name": "contrast"} | setup]
     content = {"folder": str(tmp_path), "files": [{"name": "one", "tasks": tasks}]}
     driver.run("studies.kinds.stability.solve", content, TaskCosts())
-    assert store.read(tmp_path / "one.h5", ["one"])["one"]["failure"]
+    assert store.read(tmp_path / "one.h5", ["one"])["one"]["experiment_message"]
 
 
 def test_static_stages_know_no_dynamics():

@@ -11,7 +11,7 @@ import pytest
 
 from springtune.studies.runs import dependencies as code
 from springtune.studies.runs import driver, store
-from springtune.studies.runs.hashing import hash_of
+from springtune.studies.runs.checked_json import hash_of
 from springtune.studies.runs.task_costs import TaskCosts
 
 

@@ -23,8 +23,10 @@ from springtune.studies.kinds.scenes.plan import curves_by_mesh
 from springtune.studies.kinds.scenes.variables import ROOT, SENSITIVITY
 from springtune.studies.output import summary
 from springtune.studies.output.dataset import Filler
-from springtune.studies.runs import bundles, checked_json, plan, records, rerun, workload
+from springtune.studies.runs import checked_json, plan, records, rerun, workload
 from springtune.studies.runs.dependencies import CODE_FILE, Code
+
+from tables import STUDIES
 
 AXES = {
     "beam": ("100x20", "80x10"),
@@ -124,14 +126,7 @@ class TestText:
         assert [line.partition(",")[0].strip() for line in named] == ["beam-a", "beam-j", "beam-b", "and 7 more"]
 
 
-STUDY = """
-title: Two definitions
-beams: {80x10: {length: 80 mm, height: 10 mm}}
-materials: {steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}}
-grids:
-  one: {beam: 80x10, mesh_type: structured, mesh_size: [2 mm, 5 mm], material: steel, load: traction, force: 1 kN,
-        definition: [lattice, patch]}
-"""
+STUDY = STUDIES["summary"]
 
 
 @pytest.fixture
@@ -150,7 +145,7 @@ def test_notes_that_are_another_ones_are_as_good_as_none(planned):
     for path in (folder / plan.BUNDLES_FILE, folder.parent / plan.COSTS_FILE, folder.parent / CODE_FILE):
         checked_json.write(path, {"seconds": 0.25})
     Code().recall(folder.parent / CODE_FILE)
-    bundles.remember(folder.parent / plan.COSTS_FILE, [], {})
+    plan.remember_costs(folder.parent / plan.COSTS_FILE, [], {})
     again = plan.plan(study, folder, 2)
     assert again.jobs == made.jobs
     found = rerun.jobs(study, again)
@@ -227,14 +222,14 @@ class TestWorkload:
         study, made, names = planned
         folder = made.folder
         jobs = [(number, "any", 1, [str(made.record(name))]) for number, name in enumerate(names)]
-        found = workload.loads(study, made, [*jobs, (98, "present_x", 1, ["a.png", "a.pdf"]), (99, "all", 1, [])])
+        found = workload.estimates(study, made, [*jobs, (98, "present_x", 1, ["a.png", "a.pdf"]), (99, "all", 1, [])])
         assert 99 not in found and found[98].part == workload.AFTER and found[98].tasks == 2
         tasks = {load.part: load.tasks for load in found.values()}
         assert tasks["Solving the networks"] == 4 and tasks["Meshing"] == 2
         assert tasks["Tracing the sensitivity curves"] == 2
         assert all(load.seconds > 0 and load.products for load in found.values())
         # What stages cost that share bundles is shared out, start-up comes on top.
-        costs = workload.bundles.Costs(folder.parent / plan.COSTS_FILE, plan.usual_costs())
+        costs = plan.Costs(folder.parent / plan.COSTS_FILE, plan.usual_costs())
         mesh = next(stage for stage in plan.stages() if stage.name == "mesh")
         expected = sum(seconds for seconds, _ in mesh.members(study, costs).values()) + 3 * costs.start_up
         stages = ("Meshing", "Tracing the sensitivity curves", "Solving the networks")
@@ -256,7 +251,7 @@ class TestEnding:
         study, made, names = planned
         since = time.time() - 100
         for name in names:
-            count = len(workload.keys_of(made.jobs[name].content))
+            count = len(workload.results_of(made.jobs[name].content))
             records.write(made.record(name), "digest", [], work={"linear": [count, 1.0, 1.0]})
             moment = since + (50 if name.startswith(new) else -50)
             os.utime(made.record(name), (moment, moment))
@@ -340,9 +335,9 @@ class TestHandler(TestLogHandlerBase):
 
     def test_terminal_shows_stages_then_the_ending(self, monkeypatch):
         made, terminal = on_terminal(monkeypatch)
-        loads = {1: workload.Load("Meshing", 3, 1.0), 2: workload.Load("Solving", 4, 1.0)}
+        loads = {1: workload.Estimate("Meshing", 3, 1.0), 2: workload.Estimate("Solving", 4, 1.0)}
         made.emit(record("Building DAG of jobs..."))
-        made.emit(record("two: 2 jobs", loads=loads, cores=2))
+        made.emit(record("two: 2 jobs", estimates=loads, cores=2))
         made.emit(record("x", event=LogEvent.JOB_INFO, jobid=1))
         made.emit(record("x", event=LogEvent.JOB_FINISHED, job_id=1))
         made.emit(record("x", event=LogEvent.JOB_INFO, jobid=2))
@@ -367,7 +362,7 @@ class TestHandler(TestLogHandlerBase):
         made = LogHandler(common_settings=MockOutputSettings(), settings=None)
         made.setFormatter(logging.Formatter("%(message)s"))
         for message in ("Building DAG of jobs...", "2 jobs", "what became of it"):
-            made.emit(record(message, **({"loads": {}, "cores": 2} if message == "2 jobs" else {})))
+            made.emit(record(message, **({"estimates": {}, "cores": 2} if message == "2 jobs" else {})))
         assert stream.getvalue() == "Building DAG of jobs...\n2 jobs\nwhat became of it\n"
 
     def test_continuous_integration_is_quiet(self, monkeypatch):
@@ -382,7 +377,7 @@ class TestHandler(TestLogHandlerBase):
 
     def test_a_display_that_fails_takes_no_message_with_it(self, monkeypatch):
         made, terminal = on_terminal(monkeypatch)
-        made.emit(record("two", loads={1: SimpleNamespace()}, cores=2))
+        made.emit(record("two", estimates={1: SimpleNamespace()}, cores=2))
         made.emit(record("still told"))
         assert "two" in terminal.getvalue() and "still told" in terminal.getvalue()
 
@@ -393,7 +388,7 @@ class TestDisplay:
         return Display(loads, 2, "title", console=console)
 
     def test_what_is_left_follows_jobs_that_are_done(self):
-        display = self.shown({1: workload.Load("a", 1, 100.0), 2: workload.Load("b", 1, 100.0)})
+        display = self.shown({1: workload.Estimate("a", 1, 100.0), 2: workload.Estimate("b", 1, 100.0)})
         try:
             assert display.left() == pytest.approx(100.0)  # a job each core
             now = time.monotonic()
@@ -408,7 +403,7 @@ class TestDisplay:
         paths = [tmp_path / str(number) for number in range(4)]
         paths[0].touch()
         os.utime(paths[0], (0, 0))  # from an earlier run
-        display = self.shown({1: workload.Load("a", 8, 10.0, 1, paths)})
+        display = self.shown({1: workload.Estimate("a", 8, 10.0, 1, paths)})
         try:
             display.begin(1)
             assert display.jobs[1].made() == 0

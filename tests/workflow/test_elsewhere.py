@@ -8,16 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from springtune.studies.runs import commands, locks
+from springtune.studies.runs import locks, workload
 
-STUDY = """
-title: Elsewhere
-beams: {small: {length: 50 mm, height: 20 mm}}
-materials: {steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}}
-grids:
-  one: {beam: small, mesh_type: structured, mesh_size: [10 mm, 5 mm], material: steel, load: traction, force: 20 kN,
-        definition: lattice, kinematics: linear, sensitivity: false}
-"""
+from tables import STUDIES
+
+STUDY = STUDIES["elsewhere"]
 
 
 def test_a_plan_for_a_cluster_has_jobs_of_the_wanted_time(run):
@@ -25,9 +20,10 @@ def test_a_plan_for_a_cluster_has_jobs_of_the_wanted_time(run):
     run.write("elsewhere.yaml", STUDY)
     code, output = run.snakemake("elsewhere.yaml", "-n", "--config", "job_minutes=1e-6")
     assert code == 0 and re.search(r"^solve +2$", output, re.MULTILINE), output
+    assert not (run.folder / "results").exists()  # of a study that was never run a plan writes nothing
 
 
-@pytest.mark.parametrize("minutes", ["soon", "-1", "true"])
+@pytest.mark.parametrize("minutes", ["-1", *(pytest.param(one, marks=pytest.mark.slow) for one in ("soon", "true"))])
 def test_a_time_that_is_none_is_refused_by_its_name(run, minutes):
     run.write("elsewhere.yaml", STUDY)
     code, output = run.snakemake("elsewhere.yaml", "-n", "--config", f"job_minutes={minutes}")
@@ -90,7 +86,7 @@ def test_no_path_ends_the_script_of_a_report():
     """Snakemake writes paths of parameters into it as they are."""
     one = Path("here/a<")
     for path in (one / "script>b<script>alert(1)<" / "script>mine.yaml", Path("<!--<script>/mine.yaml")):
-        assert "use no <" in commands.refusal(path, Path("/home"), Path("/home"), Path("/bin/python"), on_cluster=False)
+        assert "use no <" in workload.refusal(path, Path("/home"), Path("/home"), Path("/bin/python"), on_cluster=False)
 
 
 @pytest.mark.parametrize(
@@ -130,8 +126,8 @@ def test_a_folder_of_another_study_is_refused(run):
 def test_slurm_gets_no_path_that_its_plugin_would_have_to_quote(what, name):
     """It puts paths into double quotes for a shell; nothing is submitted then."""
     paths = dict.fromkeys(("config", "folder", "checkout", "python"), Path("/home/müller/x+y/a.b,c=d@e:f"))
-    assert commands.refusal(**paths | {"python": Path("/usr/bin/python3")}, on_cluster=True) == ""
-    told = commands.refusal(**paths | {"python": Path("/usr/bin/python3"), what: Path("/home", name)}, on_cluster=True)
+    assert workload.refusal(**paths | {"python": Path("/usr/bin/python3")}, on_cluster=True) == ""
+    told = workload.refusal(**paths | {"python": Path("/usr/bin/python3"), what: Path("/home", name)}, on_cluster=True)
     assert told == (
         f"{f'/home/{name}'!r}: the plugin for Slurm passes paths to a shell without quotes; use letters, digits and "
         "@ + = : , . / _ - in names of files and folders"
@@ -157,8 +153,8 @@ def test_a_job_on_a_node_reads_no_study_and_writes_its_own_files_alone(run, repo
         "threads": 1,
         "command": "echo '{braces}' $HDF5_USE_FILE_LOCKING > results/unread/done/solve_3.json",
     }
-    commands.remember(folder, [told | {"wildcards": {"bundle": "2"}, "command": "false"}, told])
-    before = (folder / commands.COMMANDS_FILE).read_bytes()
+    workload.remember_commands(folder, [told | {"wildcards": {"bundle": "2"}, "command": "false"}, told])
+    before = (folder / workload.COMMANDS_FILE).read_bytes()
     command = [sys.executable, "-m", "snakemake", "--snakefile", repository / "Snakefile", "--mode", "remote",
                "--target-jobs", "solve:bundle=3", "--allowed-rules", "solve", "--cores", "all", "--force", "--nolock",
                "--no-hooks", "--ignore-incomplete", "--configfiles", "unread.yaml",
@@ -167,5 +163,5 @@ def test_a_job_on_a_node_reads_no_study_and_writes_its_own_files_alone(run, repo
     assert done.returncode == 0, done.stderr
     assert (folder / "done/solve_3.json").read_text() == "{braces} FALSE\n"
     made = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
-    assert made - {"logs/solve_3.log"} == {commands.COMMANDS_FILE, "done/solve_3.json", "benchmarks/solve_3.tsv"}
-    assert (folder / commands.COMMANDS_FILE).read_bytes() == before
+    assert made - {"logs/solve_3.log"} == {workload.COMMANDS_FILE, "done/solve_3.json", "benchmarks/solve_3.tsv"}
+    assert (folder / workload.COMMANDS_FILE).read_bytes() == before

@@ -1,10 +1,10 @@
-"""What `springtune predict` says: as text, and as JSON."""
+"""Text and JSON of `springtune predict`."""
 
 import json
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
-from typing import TYPE_CHECKING, Any, cast
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
 
 from .. import __version__
 
@@ -14,35 +14,116 @@ if TYPE_CHECKING:
     from ..problem.materials import Material
     from ..scene.statements import ShapeStatement
 
+BEAM_ERRORS = "Errors are of the displacement of the loaded side"
+SHAPE_ERRORS = "Errors are (network - reference) / |reference| of each quantity"
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A beam under loads, or a shape under a load case, as a prediction names it.
+
+    Attributes
+    ----------
+    name, made_of : str
+        The body, and its material and thickness.
+    about : dict
+        The same as JSON.
+    known : dict
+        References by load; of a shape by quantity of interest.
+    load : str
+        Load case of a shape; empty for beams.
+    meaning : str
+        What an error is of.
+    dense : bool
+        Whether all materials have a density, so that there are largest time steps.
+    references : list
+        Rows of a table of references; empty for beams.
+    """
+
+    name: str
+    made_of: str
+    about: dict[str, Any]
+    known: "References | ShapeReferences"
+    load: str
+    meaning: str
+    dense: bool
+    references: list[list[str]]
+
+    @property
+    def estimate(self) -> str:
+        """Largest error estimate of the references."""
+        estimates = [found.error_estimate for found in self.known.values() if not isinstance(found, str)]
+        return f"{100 * max(estimates, default=0):.1g} %"
+
+
+def beam_subject(beam: "Beam", material: "Material", known: "References") -> Subject:
+    """Beam of a prediction."""
+    young = material.young_modulus
+    modulus = f"{young / 1e9:g} GPa" if young >= 1e9 else f"{young / 1e6:g} MPa"
+    made_of = f"{material.name}, E = {modulus}, nu = {material.poisson_ratio:g}, t = {1e3 * beam.thickness:g} mm"
+    references = {
+        load: {"message": found}
+        if isinstance(found, str)
+        else {"displacement_per_newton": float(found.displacement), "error_estimate": found.error_estimate}
+        for load, found in known.items()
+    }
+    about = {"beam": asdict(beam), "material": asdict(material), "loads": list(known), "references": references}
+    meaning = f"{BEAM_ERRORS}, {_signs(list(known))}"
+    return Subject(beam.label, made_of, about, known, "", meaning, material.density is not None, [])
+
+
+def shape_subject(statement: "ShapeStatement", known: "ShapeReferences") -> Subject:
+    """Shape of a prediction."""
+    units = {"displacement": "m", "reaction": "N", "stress": "Pa", "area": "m2", "energy": "J"}
+    unit = {one.name: units[one.kind] for one in statement.case.quantities}
+    about = {
+        "shape": statement.shape.name,
+        "load": statement.load,
+        "thickness": statement.thickness,
+        "materials": {part: asdict(one) for part, one in statement.by_part.items()},
+        "references": {
+            name: {"message": found} if isinstance(found, str) else found._asdict() for name, found in known.items()
+        },
+    }
+    references = [
+        [name, f"{found.value:.6g} {unit[name]}", f"{100 * found.error_estimate:.1g} %"]
+        for name, found in known.items()
+        if not isinstance(found, str)
+    ]
+    return Subject(
+        f"{statement.shape.name}, load {statement.load}",
+        f"{statement.named_materials}, t = {1e3 * statement.thickness:g} mm",
+        about,
+        known,
+        statement.load,
+        SHAPE_ERRORS,
+        all(one.density is not None for one in statement.materials),
+        references,
+    )
+
 
 def prediction_text(
+    subject: Subject,
     mesh_name: str,
     about: dict[str, Any],
-    beam: "Beam",
-    material: "Material",
     choices: "Sequence[Choice]",
-    known: "References",
     sizes: Sequence[float] = (),
 ) -> str:
-    """Text of a prediction.
-
-    Parameters
-    ----------
-    sizes : list of float, optional
-        Mesh sizes that bands are from [m]; none where the mesh itself was solved.
-    """
+    """Text of a prediction; `sizes` [m] are of the meshes that bands are extrapolated from."""
     from ..studies.output.text import aligned
 
-    loads = list(known)
-    rows = [["definition", "springs inside", "on the outline", *loads, "E", "nu", "besides springs"]]
-    notes = [f"{load}: no reference; {found}" for load, found in known.items() if isinstance(found, str)]
+    columns, of_beam = list(subject.known), not subject.load
+    rows = [["definition", "springs inside", "on the outline", *columns, *(["E", "nu"] * of_beam), "besides springs"]]
+    notes = [f"{name}: no reference; {found}" for name, found in subject.known.items() if isinstance(found, str)]
     for choice in choices:
-        rows.append([choice.definition])
-        rows[-1] += [_bounds(value, "{:.5g} N/m".format, "each its own") for value in (choice.inside, choice.outline)]
-        rows[-1] += [_bounds(choice.errors[load], _percent, _missing(choice, load)) for load in loads]
-        missing = _missing(choice, "patch test")
-        rows[-1] += [_bounds(choice.young_modulus_error, _percent, missing)]
-        rows[-1] += [_bounds(choice.poisson_ratio, _three_decimals, missing), choice.extra]
+        row = [choice.definition]
+        row += [_bounds(value, "{:.5g} N/m".format, "each its own") for value in (choice.inside, choice.outline)]
+        row += [_bounds(choice.errors[name], _percent, _missing(choice, subject.load or name)) for name in columns]
+        if of_beam:
+            missing = _missing(choice, "patch test")
+            row.append(_bounds(choice.young_modulus_error, _percent, missing))
+            row.append(_bounds(choice.poisson_ratio, _three_decimals, missing))
+        rows.append([*row, choice.extra])
         notes += [f"{choice.definition}, {part}: {reason}" for part, reason in choice.failures.items()]
     first, plain = (name or "none" for name in recommended(choices))
     particles, springs = about["particles"], about["springs"]
@@ -52,98 +133,29 @@ def prediction_text(
         low, high = 1e3 * min(sizes), 1e3 * max(sizes)
         mesh_type = mesh_name.partition(" ")[0]
         how = f"bands, extrapolated from solutions on {len(sizes)} {mesh_type} meshes of {low:.3g} to {high:.3g} mm"
+    ranked = "The first row is the best one by its worst error."
     lines = [
-        f"{beam.label}, {mesh_name}: {counts}; {_body_text(beam, material)}",
+        f"{subject.name}, {mesh_name}: {counts}; {subject.made_of}",
         "",
         f"recommended: {first}; with springs alone: {plain}",
         "",
-        aligned(rows, left=2, right=range(3, 5 + len(loads))),
+        aligned(rows, left=2, right=range(3, 3 + len(columns) + 2 * of_beam)),
         "",
-        f"Errors are of the displacement of the loaded side, {_soft(loads)}: {how},",
-        f"{KINEMATICS_TEXT} (error estimate {_estimate(known)}).",
-        "The first row is the best one by its worst error. E, its error, and nu are of a patch test between rollers.",
-        *notes,
+        f"{subject.meaning}{': ' if of_beam else ', '}{how},",
+        f"{KINEMATICS_TEXT} (error estimate {subject.estimate})." if of_beam else f"{KINEMATICS_TEXT}.",
+        f"{ranked} E, its error, and nu are of a patch test between rollers." if of_beam else ranked,
     ]
-    return "\n".join(lines)
+    if subject.references:
+        heads = ["quantity", "reference", "error estimate"]
+        lines += ["", aligned([heads, *subject.references], left=1, right=(1, 2))]
+    return "\n".join([*lines, *([""] if notes and not of_beam else []), *notes])
 
 
-def shape_text(
-    mesh_name: str,
-    about: dict[str, Any],
-    statement: "ShapeStatement",
-    choices: "Sequence[Choice]",
-    known: "ShapeReferences",
-) -> str:
-    """Text of a prediction for a shape.
-
-    Parameters
-    ----------
-    known : dict
-        What `springtune.prediction.shape_references` gave.
-    """
-    from ..studies.output.text import aligned
-
-    quantities, load = list(known), statement.load
-    rows = [["definition", "springs inside", "on the outline", *quantities, "besides springs"]]
-    notes = [f"{name}: no reference; {found}" for name, found in known.items() if isinstance(found, str)]
-    for choice in choices:
-        rows.append([choice.definition])
-        rows[-1] += [_bounds(value, "{:.5g} N/m".format, "each its own") for value in (choice.inside, choice.outline)]
-        rows[-1] += [_bounds(choice.errors[name], _percent, _missing(choice, load)) for name in quantities]
-        rows[-1] += [choice.extra]
-        notes += [f"{choice.definition}, {part}: {reason}" for part, reason in choice.failures.items()]
-    references = [[name, f"{found.value:.6g} {_unit(statement, name)}", f"{100 * found.error_estimate:.1g} %"]
-                  for name, found in known.items() if not isinstance(found, str)]  # fmt: skip
-    first, plain = (name or "none" for name in recommended(choices))
-    lines = [
-        f"{_shape_head(statement)}, {mesh_name}: {about['particles']} particles, {about['springs']} springs; "
-        f"{_made_of(statement)}",
-        "",
-        f"recommended: {first}; with springs alone: {plain}",
-        "",
-        aligned(rows, left=2, right=range(3, 3 + len(quantities))),
-        "",
-        "Errors are (network - reference) / |reference| of each quantity, solved on this mesh,",
-        f"{KINEMATICS_TEXT}.",
-        "The first row is the best one by its worst error.",
-    ]
-    if references:
-        lines += ["", aligned([["quantity", "reference", "error estimate"], *references], left=1, right=(1, 2))]
-    return "\n".join([*lines, *(["", *notes] if notes else [])])
-
-
-def _unit(statement: "ShapeStatement", name: str) -> str:
-    """Unit of a quantity of interest."""
-    kind = next(one.kind for one in statement.case.quantities if one.name == name)
-    return {"displacement": "m", "reaction": "N", "stress": "Pa", "area": "m2", "energy": "J"}[kind]
-
-
-def search_text(beam: "Beam", material: "Material", search: "MeshSearch", springs_alone: bool = False) -> str:
+def search_text(subject: Subject, search: "MeshSearch", springs_alone: bool = False) -> str:
     """Text of a search for a mesh."""
-    head = f"{beam.label}; {_body_text(beam, material)}"
-    meaning = f"Errors are of the displacement of the loaded side, {_soft(search.loads)}, solved on each mesh,"
-    return _search_text(head, "under", meaning, search, springs_alone, material.density is not None)
-
-
-def shape_search_text(statement: "ShapeStatement", search: "MeshSearch", springs_alone: bool = False) -> str:
-    """Text of a search for a mesh of a shape."""
-    head = f"{_shape_head(statement)}; {_made_of(statement)}"
-    meaning = "Errors are (network - reference) / |reference| of each quantity, solved on each mesh,"
-    dense = all(one.density is not None for one in statement.materials)
-    return _search_text(head, "in", meaning, search, springs_alone, dense)
-
-
-def _shape_head(statement: "ShapeStatement") -> str:
-    return f"{statement.shape.name}, load {statement.load}"
-
-
-def _made_of(statement: "ShapeStatement") -> str:
-    return f"{statement.named_materials}, t = {1e3 * statement.thickness:g} mm"
-
-
-def _search_text(head: str, where: str, meaning: str, search: "MeshSearch", springs_alone: bool, steps: bool) -> str:
     from ..studies.output.text import aligned
 
+    where, steps = "in" if subject.load else "under", subject.dense
     wanted = f"{100 * search.error:.6g} %"
     answers = [("with springs alone", search.best_springs)]
     tables = [("with springs alone", search.springs_by_type, True)]
@@ -151,7 +163,7 @@ def _search_text(head: str, where: str, meaning: str, search: "MeshSearch", spri
         answers.insert(0, ("recommended", search.best))
         tables.insert(0, ("with any definition", search.by_type, False))
     lines = [
-        f"{head}; an error of at most {wanted} {where} {_listed(search.loads)}",
+        f"{subject.name}; {subject.made_of}; an error of at most {wanted} {where} {_listed(search.loads)}",
         "",
         *(f"{what}: {_answer(one)}" for what, one in answers),
     ]
@@ -189,8 +201,8 @@ def _search_text(head: str, where: str, meaning: str, search: "MeshSearch", spri
         f"A mesh is taken with a definition that keeps {wanted} on it and on every finer mesh of its type that it was",
         "tried on, up to one with twice as many cells across, sizes between whole divisions included, and would if its",
         "errors changed once more by as much as over the last doubling. Meshes are ranked by their particles.",
-        meaning,
-        f"{KINEMATICS_TEXT} (error estimate {_estimate(search.known)}).",
+        f"{subject.meaning}, solved on each mesh,",
+        f"{KINEMATICS_TEXT} (error estimate {subject.estimate}).",
         "Static solve: of one load with its network assembled and factorized, measured here once.",
     ]
     lines += ["Largest step: of undamped explicit integrators, about rest, held nowhere."] if steps else []
@@ -198,20 +210,16 @@ def _search_text(head: str, where: str, meaning: str, search: "MeshSearch", spri
 
 
 def prediction_json(
-    beam: "Beam",
-    material: "Material",
-    mesh: dict[str, Any],
-    choices: "Sequence[Choice]",
-    known: "References",
-    sizes: Sequence[float] = (),
+    subject: Subject, mesh: dict[str, Any], choices: "Sequence[Choice]", sizes: Sequence[float] = ()
 ) -> str:
-    """A prediction as JSON; numbers that are not there are null, and those of a band are lists of two."""
+    """A prediction as JSON; numbers that are missing are null, and those of a band are lists of two."""
     first, plain = recommended(choices)
     return _json(
-        _head_json(beam, material, known)
+        {"springtune": __version__}
+        | subject.about
+        | {"mesh": mesh}
+        | ({} if subject.load else {"extrapolated_from": list(sizes)})
         | {
-            "mesh": mesh,
-            "extrapolated_from": list(sizes),
             "recommended": first,
             "recommended_springs_alone": plain,
             "choices": [_choice_json(choice) for choice in choices],
@@ -219,60 +227,8 @@ def prediction_json(
     )
 
 
-def shape_json(
-    statement: "ShapeStatement", mesh: dict[str, Any], choices: "Sequence[Choice]", known: "ShapeReferences"
-) -> str:
-    """A prediction for a shape as JSON; numbers that are not there are null.
-
-    Parameters
-    ----------
-    choices, known
-        As of `shape_text`.
-    """
-    first, plain = recommended(choices)
-    return _json(
-        _shape_json(statement, known)
-        | {
-            "mesh": mesh,
-            "recommended": first,
-            "recommended_springs_alone": plain,
-            "choices": [_choice_json(choice) for choice in choices],
-        }
-    )
-
-
-def search_json(beam: "Beam", material: "Material", search: "MeshSearch", springs_alone: bool = False) -> str:
-    """A search for a mesh as JSON; numbers that are not there are null."""
-    return _json(_head_json(beam, material, cast("References", search.known)) | _found_json(search, springs_alone))
-
-
-def shape_search_json(statement: "ShapeStatement", search: "MeshSearch", springs_alone: bool = False) -> str:
-    """A search for a mesh of a shape as JSON; numbers that are not there are null.
-
-    Parameters
-    ----------
-    statement, search, springs_alone
-        As of `shape_search_text`.
-    """
-    return _json(_shape_json(statement, cast("ShapeReferences", search.known)) | _found_json(search, springs_alone))
-
-
-def _shape_json(statement: "ShapeStatement", known: "ShapeReferences") -> dict[str, Any]:
-    """What is said of a shape and its references."""
-    return {
-        "springtune": __version__,
-        "shape": statement.shape.name,
-        "load": statement.load,
-        "thickness": statement.thickness,
-        "materials": {part: asdict(one) for part, one in statement.by_part.items()},
-        "references": {
-            name: {"message": found} if isinstance(found, str) else found._asdict() for name, found in known.items()
-        },
-    }
-
-
-def _found_json(search: "MeshSearch", springs_alone: bool) -> dict[str, Any]:
-    """What was found."""
+def search_json(subject: Subject, search: "MeshSearch", springs_alone: bool = False) -> str:
+    """A search for a mesh as JSON; numbers that are missing are null."""
 
     def one_json(one: "MeshChoice | None") -> dict[str, Any] | None:
         if one is None:
@@ -291,23 +247,19 @@ def _found_json(search: "MeshSearch", springs_alone: bool) -> dict[str, Any]:
     }
     asked = {"error": search.error, "most": search.most}
     tried = {"tried": [asdict(one) for one in search.tried]}
-    return asked | ({} if springs_alone else of_any) | alone | tried
+    head = {"springtune": __version__} | subject.about
+    return _json(head | asked | ({} if springs_alone else of_any) | alone | tried)
 
 
 def recommended(choices: "Sequence[Choice]") -> tuple[str | None, str | None]:
-    """The first definition without a failure, and the first one that has springs alone; None where there is none."""
+    """The best definition, and the best with springs alone; None if there is none."""
     solved = [choice for choice in choices if choice.worst < math.inf]
     plain = [choice for choice in solved if not choice.energies]
     return (solved[0].definition if solved else None), (plain[0].definition if plain else None)
 
 
 def size_text(size: float) -> str:
-    """Mesh size as the option takes it.
-
-    Parameters
-    ----------
-    size : float
-        [m]
+    """Mesh size [m] as the option takes it.
 
     Examples
     --------
@@ -318,14 +270,14 @@ def size_text(size: float) -> str:
 
 
 KINEMATICS_TEXT = "with linear kinematics (small strain), against the converged reference of small strain"
-"""How errors are measured."""
+"""Kinematics and reference of the errors."""
 
 ABOVE = "above zero where too soft"
-"""What the sign of an error means, where displacements are positive."""
+"""Meaning of the sign of an error for positive displacements."""
 
 
-def _soft(loads: Sequence[str]) -> str:
-    """What the signs of errors mean, (network - reference) / |reference|."""
+def _signs(loads: Sequence[str]) -> str:
+    """Meaning of the sign of (network - reference) / |reference|."""
     from ..problem.loads import LOADS
 
     against = [load for load in loads if LOADS[load].sign < 0]
@@ -333,17 +285,6 @@ def _soft(loads: Sequence[str]) -> str:
     if not against:
         return ABOVE
     return f"{ABOVE}, but under {_listed(against)} below" if along else "below zero where too soft"
-
-
-def _body_text(beam: "Beam", material: "Material") -> str:
-    young = material.young_modulus
-    modulus = f"{young / 1e9:g} GPa" if young >= 1e9 else f"{young / 1e6:g} MPa"
-    return f"{material.name}, E = {modulus}, nu = {material.poisson_ratio:g}, t = {1e3 * beam.thickness:g} mm"
-
-
-def _estimate(known: "References | ShapeReferences") -> str:
-    estimates = [found.error_estimate for found in known.values() if not isinstance(found, str)]
-    return f"{100 * max(estimates, default=0):.1g} %"
 
 
 def _listed(words: Sequence[str]) -> str:
@@ -362,7 +303,7 @@ def _order(one: "MeshChoice | None") -> tuple[bool, int]:
 
 
 def _nearest(search: "MeshSearch", mesh_type: str, springs_alone: bool) -> str:
-    """Why there is none: what came nearest to it."""
+    """Reason why no mesh was found, and the nearest one."""
     from ..prediction.choices import NEED_ENERGIES, as_sure_as, in_order
     from ..prediction.search import SPRINGS_ALONE
 
@@ -387,22 +328,6 @@ def _nearest(search: "MeshSearch", mesh_type: str, springs_alone: bool) -> str:
     return f"none up to {most:,} particles; nearest is {where}, {100 * worst:.3g} % off at worst"
 
 
-def _head_json(beam: "Beam", material: "Material", known: "References") -> dict[str, Any]:
-    references = {
-        load: {"message": found}
-        if isinstance(found, str)
-        else {"displacement_per_newton": float(found.displacement), "error_estimate": found.error_estimate}
-        for load, found in known.items()
-    }
-    return {
-        "springtune": __version__,
-        "beam": asdict(beam),
-        "material": asdict(material),
-        "loads": list(known),
-        "references": references,
-    }
-
-
 def _choice_json(choice: "Choice") -> dict[str, Any]:
     return asdict(choice) | {"worst": choice.worst}
 
@@ -412,7 +337,7 @@ def _json(content: dict[str, Any]) -> str:
         if isinstance(value, dict):
             return {name: plain(one) for name, one in value.items()}
         if isinstance(value, list | tuple):
-            # A band whose bounds are not there is not there.
+            # A band with a missing bound is missing.
             numbers = [plain(one) for one in value]
             return None if isinstance(value, tuple) and None in numbers else numbers
         return None if isinstance(value, float) and not math.isfinite(value) else value
@@ -421,7 +346,7 @@ def _json(content: dict[str, Any]) -> str:
 
 
 def _missing(choice: "Choice", part: str) -> str:
-    """Word for a number that is not there."""
+    """Word for a missing number."""
     if "springs" in choice.failures:
         return "refused"
     reason = choice.failures.get(part) or choice.failures.get("patch test")
@@ -429,7 +354,7 @@ def _missing(choice: "Choice", part: str) -> str:
 
 
 def _bounds(value: "Number", form: Callable[[float], str], missing: str) -> str:
-    """A number, or the two of a band."""
+    """A number, or the bounds of a band, as text."""
     numbers = value if isinstance(value, tuple) else (value,)
     texts = [missing if number != number else form(number) for number in numbers]
     return texts[0] if len(set(texts)) == 1 else " to ".join(texts)
@@ -440,6 +365,6 @@ def _three_decimals(value: float) -> str:
 
 
 def _percent(value: float) -> str:
-    """An error with two decimals below 10 %, and three digits above."""
+    """Error with two decimals below 10 %, otherwise three digits."""
     value = 100 * value
     return f"{round(value, 2) + 0.0:+.2f} %" if abs(value) < 10 else f"{value:+.3g} %"

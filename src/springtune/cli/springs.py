@@ -1,8 +1,9 @@
-"""The springs of a mesh, as files for other programs."""
+"""Write the springs of a mesh for other programs."""
 
 import re
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,15 +13,12 @@ import click
 from . import examples
 from .options import (
     SPRING_FILES,
+    SheetOptions,
     Unmet,
-    asked_beam,
-    asked_material,
     asked_mesh,
-    asked_shape,
-    asked_size,
     check_kind,
     check_target,
-    is_made,
+    names_from,
     refusals,
     sheet_options,
 )
@@ -32,21 +30,19 @@ if TYPE_CHECKING:
     from .options import AskedShape
 
 OPTIONS = re.compile(r"^(?=(load|force|scale|definition|stiffness|density|mujoco)\b)")
-"""Beginnings of messages that name an argument, which is an option here."""
+"""Begin of messages with the name of an argument, which is an option here."""
 
 
-def known_definitions(context: click.Context, parameter: click.Parameter, begun: str) -> list[str]:
-    """Definitions whose names begin so, for a shell to complete."""
+def _definitions() -> Iterable[str]:
     from .. import DEFINITIONS
 
-    return [name for name in DEFINITIONS if name.startswith(begun)]
+    return DEFINITIONS
 
 
-def known_loads(context: click.Context, parameter: click.Parameter, begun: str) -> list[str]:
-    """Loads whose names begin so, for a shell to complete."""
+def _loads() -> Iterable[str]:
     from ..problem.loads import LOADS
 
-    return [name for name in LOADS if name.startswith(begun)]
+    return LOADS
 
 
 @click.command(
@@ -59,19 +55,18 @@ def known_loads(context: click.Context, parameter: click.Parameter, begun: str) 
         "--definition lattice --out hole.xml",
     )
 )
-@sheet_options("A mesh type, or a mesh file.", "structured")
-@click.option("--density", help="Density, such as '7850 kg/m^3': for masses, and the largest stable time steps.")
+@sheet_options("A mesh type, or a mesh file.", "for masses, and the largest stable time steps", "structured")
 @click.option(
     "--definition",
     default="patch",
     show_default=True,
-    shell_complete=known_definitions,
+    shell_complete=names_from(_definitions),
     help="Rule for the stiffness; `springtune definitions` lists them, `springtune predict` recommends one.",
 )
 @click.option("--stiffness", help="Uniform stiffness, such as '170e6 N/m', for definitions that are told one.")
 @click.option(
     "--load",
-    shell_complete=known_loads,
+    shell_complete=names_from(_loads),
     help="What holds and pulls the beam, nothing without; or a shape, its only load without.",
 )
 @click.option("--force", help="Size of the force on a beam, such as '400 kN'.")
@@ -89,16 +84,7 @@ def known_loads(context: click.Context, parameter: click.Parameter, begun: str) 
     help=f"File: {SPRING_FILES}; one that is there is replaced.",
 )
 def springs(
-    beam: str | None,
-    shape: str | None,
-    thickness: str,
-    mesh_type: str,
-    size: str | None,
-    unit: str,
-    material: str | None,
-    young: str | None,
-    poisson: str | None,
-    density: str | None,
+    sheet: SheetOptions,
     definition: str,
     stiffness: str | None,
     load: str | None,
@@ -116,24 +102,32 @@ def springs(
     from ..handover.simulation import EquilibriumWarning
 
     with refusals("--out", target, partial(OPTIONS.sub, "--", count=1)):
-        check_kind(shape, beam, ("scale",))
+        check_kind(sheet.shape, sheet.beam, ("scale",))
         check_target("--out", target)
-        if shape is not None:
-            net = net_of_shape(asked_shape(shape, load, material, density, size), definition, scale, stiffness)
+        if sheet.shape is not None:
+            net = net_of_shape(sheet.asked_shape(load), definition, scale, stiffness)
         else:
-            assert beam is not None
-            sheet, solid = asked_beam(beam, thickness), asked_material(material, young, poisson, density)
-            made = is_made(mesh_type)
-            edge = asked_size(sheet, mesh_type, size) if made else None
-            mesh = asked_mesh(sheet, mesh_type, edge, unit)
-            name = f"{mesh_type} {size}" if made else Path(mesh_type).name
-            net = _net(sheet, solid, mesh, name, definition, stiffness, load, force)
+            beam, solid = sheet.asked_beam()
+            name, edge = sheet.asked_mesh(beam)
+            mesh = asked_mesh(beam, sheet.mesh_type or "structured", edge, sheet.unit)
+            net = _net(beam, solid, mesh, name, definition, stiffness, load, force)
         with warnings.catch_warnings(record=True) as heard:
             warnings.simplefilter("always", EquilibriumWarning)
             written = net.write(target, mujoco=mujoco)
     click.echo(written_text(net, written, mujoco))
     for one in heard:
         click.echo(str(one.message))
+
+
+@contextmanager
+def _derived(definition: str) -> Iterator[None]:
+    """Context in which springs are derived; a patch test that scales them may be singular."""
+    from ..mechanics.statics import SingularError
+
+    try:
+        yield
+    except SingularError as error:
+        raise Unmet(f"--definition: '{definition}' has no springs on this mesh: {error}; take another") from None
 
 
 def _net(
@@ -147,32 +141,22 @@ def _net(
     force: str | None,
 ) -> "SpringNet":
     from ..handover.net import SpringNet
-    from ..mechanics.statics import SingularError
     from ..scene.single import Scene
 
     if (load is None) != (force is None):
         if load is None:
             raise ValueError(f"--force: '{force}' is of no load; give --load such as traction, or leave --force out")
         raise ValueError(f"--force: missing; give the size of the force of --load {load}, such as '400 kN'")
-    try:
+    with _derived(definition):
         if load is None or force is None:
             return SpringNet.from_mesh(mesh, material, definition, beam=beam, stiffness=stiffness, mesh_name=name)
         scene = Scene(beam, mesh, material, load, force, definition=definition, stiffness=stiffness)
         return SpringNet.from_scene(scene, name)
-    except SingularError as error:  # of the patch test that scales springs
-        raise Unmet(f"--definition: '{definition}' has no springs on this mesh: {error}; take another") from None
 
 
 def net_of_shape(asked: "AskedShape", definition: str, scale: float = 1.0, stiffness: str | None = None) -> "SpringNet":
-    """Springs of a shape, held and loaded as its load case says.
-
-    Parameters
-    ----------
-    scale : float, optional
-        Factor on the load [1].
-    """
+    """Springs of a shape under its load case; `scale` [1] is a factor on the load."""
     from ..handover.net import SpringNet
-    from ..mechanics.statics import SingularError
     from ..scene.single import Scene
 
     if any(one.x or one.y for one in asked.shape.loads[asked.load].supports):
@@ -189,14 +173,12 @@ def net_of_shape(asked: "AskedShape", definition: str, scale: float = 1.0, stiff
         stiffness=stiffness,
         scale=scale,
     )
-    try:
+    with _derived(definition):
         return SpringNet.from_scene(scene, asked.mesh_name)
-    except SingularError as error:  # of the patch test that scales springs
-        raise Unmet(f"--definition: '{definition}' has no springs on this mesh: {error}; take another") from None
 
 
 def written_text(net: "SpringNet", written: "Iterable[Path]", mujoco: int | None = None) -> str:
-    """What was written, and how far off it is."""
+    """Written files and their expected errors, as text."""
     from ..handover.formats import for_mujoco
     from ..handover.mujoco import for_versions
 

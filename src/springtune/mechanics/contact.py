@@ -28,8 +28,7 @@ from scipy.sparse.linalg import splu
 
 from ..linalg.factors import SingularError, factorize
 from ..mesh.cells import Mesh
-from .follower import FollowerPressure
-from .network import Network
+from .network import FollowerPressure, Network
 
 REACH = 2.0
 """Distance up to which corners and edges are watched, over the mesh size."""

@@ -8,7 +8,7 @@ Inside, fields have shape (2, m, n_cells): numpy is several times faster on long
 """
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from hashlib import sha256
 
@@ -37,18 +37,26 @@ def preceding(field: np.ndarray) -> np.ndarray:
     return field.take(range(-1, field.shape[-2] - 1), axis=-2)
 
 
+def _products(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Products of all components of two vectors in the first axis, shape (2, 2, ...)."""
+    return a[:, None] * b[None]
+
+
+def area_slopes(positions: np.ndarray) -> np.ndarray:
+    """Derivative of each cell's area by each corner: half the vector between its neighbours, turned outwards."""
+    x, y = 0.5 * (following(positions) - preceding(positions))
+    return np.stack([y, -x])
+
+
+@dataclass(frozen=True)
 class Energy(ABC):
-    """Base of the energies.
+    """Base of the energies; what they have besides the cells are moduli, with a row for each cell.
 
     `points` (n_points, 2) are rest positions [m]; `corners` (n_cells, m) are each cell's particles, counter-clockwise.
     """
 
     points: np.ndarray
     corners: np.ndarray
-
-    @abstractmethod
-    def _moduli(self) -> tuple[np.ndarray, ...]:
-        """Moduli over the reference stiffness, each with a row for each cell."""
 
     @abstractmethod
     def _values(self, moved: np.ndarray) -> np.ndarray:
@@ -97,8 +105,9 @@ class Energy(ABC):
     @property
     def key(self) -> bytes:
         """Bytes that distinguish energies of one mesh."""
-        moduli = (np.ascontiguousarray(part).tobytes() for part in self._moduli())
-        return type(self).__name__.encode() + self._cells + b"".join(moduli)
+        moduli = (getattr(self, one.name) for one in fields(self)[2:])
+        content = (np.ascontiguousarray(part).tobytes() for part in moduli if part is not None)
+        return type(self).__name__.encode() + self._cells + b"".join(content)
 
     @cached_property
     def _cells(self) -> bytes:
@@ -113,6 +122,19 @@ class Energy(ABC):
     def _rest(self) -> np.ndarray:
         return self._at_corners(self.points)
 
+    @cached_property
+    def _rest_slopes(self) -> np.ndarray:
+        return area_slopes(self._rest)
+
+    @cached_property
+    def _rest_area(self) -> np.ndarray:
+        return 0.5 * dot(self._rest - self._rest[:, :1], self._rest_slopes).sum(axis=0)
+
+    def _growth(self, moved: np.ndarray) -> np.ndarray:
+        """Growth of each cell's area [m2], which is quadratic in the positions."""
+        moved = moved - moved[:, :1]
+        return (dot(self._rest_slopes, moved) + 0.5 * cross(moved, following(moved))).sum(axis=0)
+
     def _at_corners(self, field: np.ndarray) -> np.ndarray:
         return np.take(np.ascontiguousarray(field.T), self.corners.T, axis=1)
 
@@ -124,42 +146,22 @@ class AreaEnergy(Energy):
     .. math:: W = \tfrac{1}{2} \kappa (A - A_0)^2 / A_0
     """
 
-    points: np.ndarray
-    corners: np.ndarray
     modulus: np.ndarray
-
-    def _moduli(self) -> tuple[np.ndarray, ...]:
-        return (self.modulus,)
-
-    @staticmethod
-    def _slopes(positions: np.ndarray) -> np.ndarray:
-        """Derivative of the area by each corner: half the vector between its neighbours, turned outwards."""
-        x, y = 0.5 * (following(positions) - preceding(positions))
-        return np.stack([y, -x])
-
-    @cached_property
-    def _rest_slopes(self) -> np.ndarray:
-        return self._slopes(self._rest)
 
     @cached_property
     def _stiffness(self) -> np.ndarray:
-        return self.modulus / (0.5 * dot(self._rest - self._rest[:, :1], self._rest_slopes).sum(axis=0))
-
-    def _growth(self, moved: np.ndarray) -> np.ndarray:
-        moved = moved - moved[:, :1]
-        # The area is quadratic in the positions.
-        return (dot(self._rest_slopes, moved) + 0.5 * cross(moved, following(moved))).sum(axis=0)
+        return self.modulus / self._rest_area
 
     def _values(self, moved: np.ndarray) -> np.ndarray:
         return 0.5 * self._stiffness * self._growth(moved) ** 2
 
     def _forces(self, moved: np.ndarray) -> np.ndarray:
-        return self._stiffness * self._growth(moved) * self._slopes(self._rest + moved)
+        return self._stiffness * self._growth(moved) * area_slopes(self._rest + moved)
 
     def _couplings(self, moved: np.ndarray) -> np.ndarray:
-        slopes, pull = self._slopes(self._rest + moved), 0.5 * self._stiffness * self._growth(moved)
+        slopes, pull = area_slopes(self._rest + moved), 0.5 * self._stiffness * self._growth(moved)
         scaled = self._stiffness * slopes
-        blocks = np.stack([scaled[:, None, a] * slopes[None, :, b] for a, b in self._pairs])
+        blocks = np.stack([_products(scaled[:, a], slopes[:, b]) for a, b in self._pairs])
         sides = len(SIDES[self.corners.shape[1]])
         blocks[:sides, 0, 1] += pull
         blocks[:sides, 1, 0] -= pull
@@ -173,12 +175,7 @@ class AngleEnergy(Energy):
     .. math:: W = \tfrac{1}{2} \beta \sum_i (\theta_i - \theta_{i,0})^2
     """
 
-    points: np.ndarray
-    corners: np.ndarray
     modulus: np.ndarray
-
-    def _moduli(self) -> tuple[np.ndarray, ...]:
-        return (self.modulus,)
 
     def _change(self, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Change of each angle [rad], and the vectors from each corner to the next and to the one before."""
@@ -215,11 +212,8 @@ class AngleEnergy(Energy):
         blocks = np.empty((3, 2, 2, len(self.modulus)))
         # Side (j, k): corners j and k have their own angles there, and that of the corner opposite, i, sees both.
         for i, (j, k) in enumerate(self._pairs):
-            for c in range(2):
-                for d in range(2):
-                    blocks[i, c, d] = self.modulus * (
-                        own[c, j] * to_next[d, j] + to_last[c, k] * own[d, k] + to_next[c, i] * to_last[d, i]
-                    )
+            at_ends = _products(own[:, j], to_next[:, j]) + _products(to_last[:, k], own[:, k])
+            blocks[i] = self.modulus * (at_ends + _products(to_next[:, i], to_last[:, i]))
             x, y = a[:, j]
             bend = (pull[j] - pull[k]) / (x * x + y * y) ** 2
             off, diagonal = bend * (y * y - x * x), bend * (2 * x * y)
@@ -242,13 +236,8 @@ class BiquadraticEnergy(Energy):
     reference stiffness [1/m2].
     """
 
-    points: np.ndarray
-    corners: np.ndarray
     tensile: np.ndarray
     coupling: np.ndarray | None = None
-
-    def _moduli(self) -> tuple[np.ndarray, ...]:
-        return (self.tensile,) if self.coupling is None else (self.tensile, self.coupling)
 
     @staticmethod
     def _sides(field: np.ndarray) -> np.ndarray:
@@ -287,16 +276,14 @@ class BiquadraticEnergy(Energy):
         blocks = np.empty((3, 2, 2, sides.shape[2]))
         for i, (j, k) in enumerate(self._pairs):
             # Side i runs from corner j to corner k, side j from k to i, side k from i to j.
-            for c in range(2):
-                for d in range(2):
-                    block = -tensile[i] * sides[c, i] * sides[d, i]
-                    if coupling is not None:
-                        block -= coupling[i] * sides[c, k] * sides[d, j]
-                        block += coupling[j] * sides[c, k] * sides[d, i]
-                        block += coupling[k] * sides[c, i] * sides[d, j]
-                    blocks[i, c, d] = 4 * block
-                    if c == d:
-                        blocks[i, c, d] -= 2 * pull[i]
+            at_i, at_j, at_k = (sides[:, side] for side in (i, j, k))
+            block = _products(-tensile[i] * at_i, at_i)
+            if coupling is not None:
+                block -= _products(coupling[i] * at_k, at_j)
+                block += _products(coupling[j] * at_k, at_i)
+                block += _products(coupling[k] * at_i, at_j)
+            blocks[i] = 4 * block
+            blocks[i, [0, 1], [0, 1]] -= 2 * pull[i]
         return blocks
 
 
@@ -313,20 +300,9 @@ class _SheetEnergy(Energy):
     near rest. Flat or inverted triangles have no finite energy.
     """
 
-    points: np.ndarray
-    corners: np.ndarray
-
     @abstractmethod
     def _law(self, distortion: np.ndarray, growth: np.ndarray) -> tuple[np.ndarray, ...]:
         """Return the energy over the rest area and its derivatives by D, J, DD, DJ and JJ, at D and J - 1 > -1."""
-
-    @cached_property
-    def _rest_slopes(self) -> np.ndarray:
-        return AreaEnergy._slopes(self._rest)
-
-    @cached_property
-    def _rest_area(self) -> np.ndarray:
-        return 0.5 * dot(self._rest - self._rest[:, :1], self._rest_slopes).sum(axis=0)
 
     def _state(self, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, ...]]:
         """Derivatives of D and of J by each corner's position [1/m], and the law; NaN for inverted triangles."""
@@ -336,19 +312,18 @@ class _SheetEnergy(Energy):
         by_x, by_y = first * along + second * across, second * along - first * across
         with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
             law = self._law(*self._invariants(moved))
-        return 2 * np.stack([by_x, by_y]) / area, AreaEnergy._slopes(self._rest + moved) / area, law
+        return 2 * np.stack([by_x, by_y]) / area, area_slopes(self._rest + moved) / area, law
 
     def _apart(self, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The two terms whose squares make D, F11 - F22 and F12 + F21; of displacements less the first corner's."""
-        (x, y), (along, across) = moved, self._rest_slopes
+        """The two terms whose squares make D, F11 - F22 and F12 + F21."""
+        (x, y), (along, across) = moved - moved[:, :1], self._rest_slopes
         area = self._rest_area
         return (x * along - y * across).sum(axis=0) / area, (x * across + y * along).sum(axis=0) / area
 
     def _invariants(self, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """D and J - 1, NaN where a triangle is flat or inside out, of displacements less those of the first corner."""
+        """D and J - 1, NaN where a triangle is flat or inside out."""
         first, second = self._apart(moved)
-        # The area is quadratic in the positions.
-        growth = (dot(self._rest_slopes, moved) + 0.5 * cross(moved, following(moved))).sum(axis=0) / self._rest_area
+        growth = self._growth(moved) / self._rest_area
         return first**2 + second**2, np.where(growth > -1.0, growth, np.nan)
 
     def _values(self, moved: np.ndarray) -> np.ndarray:
@@ -364,16 +339,11 @@ class _SheetEnergy(Energy):
         along, across = self._rest_slopes
         area = self._rest_area
         d_pull, j_pull = area * (dd * d + dj * j), area * (dj * d + jj * j)
-        blocks = np.stack([d_pull[:, None, a] * d[None, :, b] + j_pull[:, None, a] * j[None, :, b]
-                           for a, b in self._pairs])  # fmt: skip
+        blocks = np.stack([_products(d_pull[:, a], d[:, b]) + _products(j_pull[:, a], j[:, b]) for a, b in self._pairs])
         bend = 2 * first_d / area
         for (a, b), block in zip(self._pairs, blocks):
-            same, turned = (
-                bend * (along[a] * along[b] + across[a] * across[b]),
-                bend * (across[a] * along[b] - along[a] * across[b]),
-            )
-            block[0, 0] += same
-            block[1, 1] += same
+            turned = bend * (across[a] * along[b] - along[a] * across[b])
+            block[[0, 1], [0, 1]] += bend * (along[a] * along[b] + across[a] * across[b])
             block[0, 1] += turned + 0.5 * first_j
             block[1, 0] -= turned + 0.5 * first_j
         return blocks
@@ -397,21 +367,15 @@ class YeohEnergy(_SheetEnergy):
     largest I_1 - 3 of the fitted test; the law extrapolates beyond it.
     """
 
-    points: np.ndarray
-    corners: np.ndarray
     coefficients: np.ndarray
     largest: float | np.ndarray = np.inf
-
-    def _moduli(self) -> tuple[np.ndarray, ...]:
-        return self.coefficients, np.array(self.largest)
 
     def objection(self, displacements: np.ndarray) -> str:
         """As of `Energy`: the number of triangles stretched beyond the data."""
         if not np.isfinite(self.largest).any():
             return ""
         with np.errstate(invalid="ignore"):
-            moved = self._at_corners(displacements)
-            distortion, growth = self._invariants(moved - moved[:, :1])
+            distortion, growth = self._invariants(self._at_corners(displacements))
             excess = distortion + _dilation(growth)[0]
         over = excess > self.largest
         beyond = int(over.sum())
@@ -461,13 +425,8 @@ class NeoHookeEnergy(_SheetEnergy):
     strain times the thickness over the reference stiffness [1].
     """
 
-    points: np.ndarray
-    corners: np.ndarray
     shear: np.ndarray
     bulk: np.ndarray
-
-    def _moduli(self) -> tuple[np.ndarray, ...]:
-        return self.shear, self.bulk
 
     def _volume(self, distortion: np.ndarray, area: np.ndarray) -> np.ndarray:
         """Logarithm v of the volume, of D and of ln J; NaN where there is no equilibrium across the sheet."""
@@ -506,11 +465,5 @@ class NeoHookeEnergy(_SheetEnergy):
         press = pull * distortion + 2.25 * self.bulk * grown * (2 * grown - 1)
         total, ratio = press + bend, 1.0 + growth
         second = press * bend / total
-        return (
-            value,
-            pull,
-            first / ratio,
-            -(pull**2) / total,
-            -pull * bend / total / ratio,
-            (second - first) / ratio**2,
-        )
+        by_both, by_area = -pull * bend / total / ratio, (second - first) / ratio**2
+        return value, pull, first / ratio, -(pull**2) / total, by_both, by_area

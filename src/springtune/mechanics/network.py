@@ -7,6 +7,7 @@ Stiffnesses are multiples of one reference stiffness and loads are forces over i
 and stiffnesses of equal F/k. A network may have energies besides its springs, see `springtune.mechanics.energies`.
 """
 
+import copy
 from collections.abc import Sequence
 from functools import cached_property
 
@@ -14,11 +15,10 @@ import numpy as np
 from scipy.sparse import csc_array
 
 from ..linalg import SOLVERS
-from ..linalg.factors import CHOLESKY, Factor, SingularError, SuperLUFactor
+from ..linalg.factors import CHOLESKY, Factor, SingularError, SuperLUFactor, factorize_pinned
 from ..mesh.cells import Mesh
-from ..mesh.parts import check_held
+from ..mesh.sheets import check_held
 from .energies import Energy
-from .follower import FollowerPressure
 from .pattern import Pattern
 
 LARGE = 200_000
@@ -38,15 +38,47 @@ PINNED = 5_000
 
 
 def successor(solver: str | None, unknowns: int, symmetric: bool, cholesky: bool = CHOLESKY) -> str | None:
-    """Return the solver that takes over if conjugate gradients with multigrid do not converge.
-
-    Examples
-    --------
-    >>> [successor(None, 500_000, symmetric, cholesky=True) for symmetric in (True, False)]
-    ['Cholesky', 'SuperLU']
-    """
+    """Return the solver that takes over if conjugate gradients with multigrid do not converge."""
     first, most = ("Cholesky", FACTORIZED) if symmetric and cholesky else ("SuperLU", LARGEST)
     return first if solver is None and unknowns <= most else None
+
+
+class FollowerPressure:
+    """Pressure that turns and grows with its edges.
+
+    Each edge of vector e carries ``e`` turned left by a right angle times its pressure, half on either end. `edges`
+    (n, 2) have the body to their left; `pressure`, one or (n,), is force over length towards the body [1/m].
+    """
+
+    def __init__(self, mesh: Mesh, edges: np.ndarray, pressure: float | np.ndarray) -> None:
+        self.edges = edges
+        self.rest = mesh.points[edges[:, 1]] - mesh.points[edges[:, 0]]
+        self.half = 0.5 * np.broadcast_to(pressure, len(edges))[:, None]
+        turn = np.array([[0.0, -1.0], [1.0, 0.0]])
+        on_either = np.block([-turn, turn])
+        self.derivative = self.half[:, :, None] * np.vstack([on_either, on_either])
+
+    @classmethod
+    def of_side(cls, mesh: Mesh, edges: np.ndarray, axis: int) -> "FollowerPressure":
+        """Return the pressure on a straight side of total force 1 at rest; `edges` (n, 2) may run either way."""
+        along = mesh.points[edges[:, 1], axis] - mesh.points[edges[:, 0], axis]
+        wanted = 1 if axis == 0 else -1
+        turned = np.where((wanted * along < 0)[:, None], edges[:, ::-1], edges)
+        return cls(mesh, turned, 1.0 / np.abs(along).sum())
+
+    @cached_property
+    def symmetric(self) -> "FollowerPressure":
+        """A load with the symmetric part of the derivative."""
+        load = copy.copy(self)
+        load.derivative = 0.5 * (self.derivative + self.derivative.swapaxes(1, 2))
+        return load
+
+    def forces(self, displacements: np.ndarray) -> np.ndarray:
+        """Return the forces on the particles [1], shape (n_points, 2)."""
+        sides = self.rest + displacements[self.edges[:, 1]] - displacements[self.edges[:, 0]]
+        field = np.zeros(displacements.shape)
+        np.add.at(field, self.edges, (self.half * np.stack([-sides[:, 1], sides[:, 0]], axis=1))[:, None, :])
+        return field
 
 
 class Network:
@@ -146,27 +178,29 @@ class Network:
             total += self._pattern.sum_cells(energy.corners, energy.forces(displacements))
         return total
 
-    def _pulls(self, displacements: np.ndarray) -> np.ndarray:
-        """Return the force of each spring on its first end over the reference stiffness [m], shape (n_springs, 2).
+    def _stretched(self, displacements: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return each spring's vector [m], its length [m] and the growth of its squared length [m2].
 
-        The elongation is ``(l^2 - L^2) / (l + L)``: subtracting lengths would lose digits at small strain.
+        Elongations are ``(l^2 - L^2) / (l + L)``: subtracting lengths would lose digits at small strain.
         """
         relative = self.stretch(displacements)
         vectors = self.rest_vectors + relative
-        lengths = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
         squares = np.einsum("ij,ij->i", self.rest_vectors + vectors, relative)
+        return vectors, np.sqrt(np.einsum("ij,ij->i", vectors, vectors)), squares
+
+    def _pulls(self, displacements: np.ndarray) -> np.ndarray:
+        """Return the force of each spring on its first end over the reference stiffness [m], shape (n_springs, 2)."""
+        vectors, lengths, squares = self._stretched(displacements)
         with np.errstate(divide="ignore", invalid="ignore"):
             pull = self.stiffness * squares / ((lengths + self.rest_lengths) * lengths)
         return pull[:, None] * vectors
 
     def spring_forces(self, displacements: np.ndarray, linear: bool = False) -> np.ndarray:
         """Return axial spring forces over the reference stiffness, tension positive [m]; energies are left out."""
-        relative = self.stretch(displacements)
         if linear:
-            return self.stiffness * np.einsum("ij,ij->i", self.rest_vectors, relative) / self.rest_lengths
-        vectors = self.rest_vectors + relative
-        lengths = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
-        squares = np.einsum("ij,ij->i", self.rest_vectors + vectors, relative)
+            along = np.einsum("ij,ij->i", self.rest_vectors, self.stretch(displacements))
+            return self.stiffness * along / self.rest_lengths
+        _, lengths, squares = self._stretched(displacements)
         return self.stiffness * squares / (lengths + self.rest_lengths)
 
     def rounding(self, displacements: np.ndarray, linear: bool = False) -> np.ndarray:
@@ -211,11 +245,8 @@ class Network:
 
     def energy(self, displacements: np.ndarray) -> float:
         """Energy of the network over the reference stiffness [m2]."""
-        relative = self.stretch(displacements)
-        vectors = self.rest_vectors + relative
-        lengths = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
-        elongations = np.einsum("ij,ij->i", self.rest_vectors + vectors, relative) / (lengths + self.rest_lengths)
-        springs = 0.5 * float(self.stiffness @ elongations**2)
+        _, lengths, squares = self._stretched(displacements)
+        springs = 0.5 * float(self.stiffness @ (squares / (lengths + self.rest_lengths)) ** 2)
         return springs + sum(energy.value(displacements) for energy in self.energies)
 
     def tangent(
@@ -321,8 +352,6 @@ class Network:
 
     def _pinned(self, matrix: csc_array) -> Factor | None:
         """Return Cholesky's factor with pins; None if they do not suffice, or are not needed."""
-        from ..linalg.pinned import factorize_pinned  # here: few networks are unstable
-
         factor = factorize_pinned(matrix, self._pattern.analysis, self._pattern.pins)
         return factor if factor is not None and factor.negative_pivots else None
 
@@ -368,8 +397,7 @@ class Network:
 
     def largest_stretch(self, displacements: np.ndarray) -> float:
         """Largest change of a spring's length over that at rest [1]."""
-        vectors = self.rest_vectors + self.stretch(displacements)
-        return float(np.abs(np.sqrt(np.einsum("ij,ij->i", vectors, vectors)) / self.rest_lengths - 1.0).max())
+        return float(np.abs(self._stretched(displacements)[1] / self.rest_lengths - 1.0).max())
 
     def largest_change(self, displacements: np.ndarray) -> float:
         """Largest change of a spring's vector over its length at rest [1]."""

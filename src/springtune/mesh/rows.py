@@ -48,13 +48,7 @@ def _isosceles_counts(length: float, height: float, size: float, poisson_ratio: 
 
 
 def row_height(size: float, poisson_ratio: float) -> float:
-    """Return the height [m] of a row of isosceles triangles of base `size` [m] that sets Poisson's ratio.
-
-    Examples
-    --------
-    >>> row_height(2e-3, 0.25)
-    0.002
-    """
+    """Return the height [m] of a row of isosceles triangles of base `size` [m] that sets Poisson's ratio."""
     return size / (2 * math.sqrt(poisson_ratio))
 
 
@@ -80,7 +74,7 @@ def _fitted(length: float, height: float, cells: int, rows: int) -> Mesh:
     shifted = np.concatenate([[0.0], 0.5 * (straight[:-1] + straight[1:]), [length]])
     lines = [straight if row % 2 == 0 else shifted for row in range(rows + 1)]
     mesh = _join(lines, np.linspace(0.0, height, rows + 1))
-    vars(mesh)["_box_fault"] = ""  # rows fill it once: `springtune.mesh.box.box_fault` need not look
+    vars(mesh)["_box_fault"] = ""  # rows fill it once: `springtune.mesh.sheets.box_fault` need not look
     return mesh
 
 

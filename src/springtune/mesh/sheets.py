@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .cells import Mesh, signed_areas
+from .cells import Mesh, MeshError, signed_areas
 
 DIGITS = 1e-6
 """Tolerance of coordinates in a file over the extent of the mesh: text formats have few digits."""
@@ -21,17 +21,6 @@ def sheet_fault(mesh: Mesh) -> str:
 
     Cells must be convex and meet in entire edges, at most two in each, without overlaps. Rounds of the outline must
     not touch themselves or each other: no slits, hanging points, or cells that meet only in a point.
-
-    Examples
-    --------
-    Two triangles that meet in a point:
-
-    >>> import numpy as np
-    >>> points = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [-1.0, 0.0], [-1.0, -1.0]])
-    >>> sheet_fault(Mesh(points, np.array([[0, 1, 2]])))
-    ''
-    >>> sheet_fault(Mesh(points, np.array([[0, 1, 2], [0, 3, 4]])))
-    'cells hang together in a point alone, at (0, 0) mm; join them by an edge, or part them'
     """
     fault = not_convex(mesh)
     if fault:
@@ -204,3 +193,140 @@ def in_words(points: np.ndarray) -> str:
 def edge_in_words(points: np.ndarray, ends: Sequence[int] | np.ndarray) -> str:
     """Both ends of an edge, in words."""
     return f"from {in_words(points[ends[0]])} to {in_words(points[ends[1]])}"
+
+
+def on_sides(mesh: Mesh, box: np.ndarray) -> Mesh:
+    """Return a mesh of a box (2,) [m] at the origin with its sides made straight."""
+    near = np.abs(mesh.points - box) <= DIGITS * box
+    points = np.where(near, box, np.where(mesh.points <= DIGITS * box, 0.0, mesh.points))
+    for corners in mesh.cells.values():
+        flat = corners[signed_areas(points, corners) <= 0]
+        if len(flat):
+            first = f"{len(flat)}, the first one at {in_words(points[flat[0]])}"
+            raise MeshError(f"cells within rounding of a side of the box: {first}; make them larger or remove them")
+    return Mesh(points, mesh.triangles, mesh.quads)
+
+
+def box_fault(mesh: Mesh) -> str:
+    """Return why a mesh does not fill its bounding box exactly once, with the remedy, or an empty string.
+
+    Examples
+    --------
+    A box without one of its cells:
+
+    >>> from springtune.mesh import Mesh, right
+    >>> whole = right(0.1, 0.02, 5e-3)
+    >>> box_fault(whole)
+    ''
+    >>> box_fault(Mesh(whole.points, whole.triangles[1:]))[:43]
+    'its cells cover 99.375 % of the box or over'
+    """
+    known: str | None = vars(mesh).get("_box_fault")
+    if known is None:
+        low = mesh.points.min(axis=0)
+        box = mesh.points.max(axis=0) - low
+        moved = Mesh(mesh.points - low, mesh.triangles, mesh.quads) if low.any() else mesh
+        try:
+            known = _misfilled(on_sides(moved, box), box)
+        except MeshError as error:
+            known = str(error)
+        vars(mesh)["_box_fault"] = known
+    return known
+
+
+def _misfilled(mesh: Mesh, box: np.ndarray) -> str:
+    """Return why a mesh does not fill a box exactly once, with the remedy, or an empty string.
+
+    All cells are convex and counter-clockwise, no two lie on one side of an edge, and the edges with one cell make
+    one round of the box. So as many cells cover a point as that round winds about it: one. This excludes slits, holes
+    and overlaps of any width, and parts that meet in a point.
+    """
+    points = mesh.points
+    fault = not_convex(mesh)
+    if fault:
+        return fault
+    share = mesh.area / box.prod()
+    lead = f"its cells cover {100 * share:.6g} % of the box or overlap: " if abs(share - 1) > DIGITS else ""
+    outline, fault = outline_of(mesh)
+    if fault:
+        return lead + fault
+    ends = points[outline]
+    on_side = [(ends[..., axis] == value).all(axis=1) for axis in range(2) for value in (0.0, box[axis])]
+    inside = ~np.any(on_side, axis=0)
+    if inside.any():
+        count = f"edges inside the box with one cell only: {inside.sum()}"
+        first = f"{count}, the first one {edge_in_words(points, outline[inside][0])}; close the hole there"
+        return lead + (opening(points, outline[inside], count) or first)
+    again = np.flatnonzero(np.bincount(outline[:, 0]) > 1)
+    if len(again) or lead:
+        where = in_words(points[again[0] if len(again) else outline[0, 0]])
+        return f"{lead}the outline runs through {where} more than once; give a mesh that fills the box once"
+    return ""
+
+
+def connected(edges: np.ndarray, count: int) -> np.ndarray:
+    """Return the number of each of `count` points' connected part; `edges` has shape (n_edges, 2).
+
+    Examples
+    --------
+    >>> connected(np.array([[0, 2], [3, 1]]), 5).tolist()
+    [0, 1, 0, 1, 2]
+    """
+    from scipy.sparse import coo_array  # here, since studies are read without scipy
+    from scipy.sparse.csgraph import connected_components
+
+    below = np.zeros(count, dtype=bool)
+    below[np.maximum(*edges.T)] = True
+    if below.sum() == count - 1:  # each point but the first is joined to one before it, as in rows
+        return np.zeros(count, dtype=np.int32)
+    joined = coo_array((np.ones(len(edges)), edges.T), shape=(count, count))
+    return np.asarray(connected_components(joined, directed=False)[1])
+
+
+def check_held(points: np.ndarray, edges: np.ndarray, held: np.ndarray, where: str) -> None:
+    """Refuse supports that leave a connected body free to move, unless all its points are held.
+
+    `points` (n_points, 2) [m], `edges` (n_edges, 2), `held` (n_points, 2).
+    """
+    components = connected(edges, len(points))
+    count = components.max() + 1
+    for number in range(count):
+        of_body = components == number if count > 1 else slice(None)
+        free = "" if held[of_body].all() else free_motion(points[of_body], held[of_body])
+        if free:
+            x, y = 1e3 * points[of_body].mean(axis=0)
+            body = (
+                "the body"
+                if count == 1
+                else f"one of the {count} bodies that are not joined, at ({x:.6g}, {y:.6g}) mm,"
+            )
+            raise ValueError(f"{where}: its supports leave {body} free to {free}; hold it")
+
+
+def free_motion(points: np.ndarray, held: np.ndarray) -> str:
+    """Return a rigid motion that supports leave free, in words, or an empty string.
+
+    `points` (n_points, 2) [m], `held` (n_points, 2).
+
+    Examples
+    --------
+    >>> free_motion(np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([[True, True], [False, False]]))
+    'turn about (0, 0) mm'
+    """
+    middle = points.mean(axis=0)
+    x, y = ((points - middle) / (np.ptp(points, axis=0).max() or 1.0)).T
+    across, along = -y[held[:, 0]], x[held[:, 1]]
+    rows = np.zeros((len(across) + len(along), 3))
+    rows[: len(across), 0], rows[len(across) :, 1], rows[:, 2] = 1.0, 1.0, np.concatenate([across, along])
+    sizes, motions = np.linalg.eigh(rows.T @ rows)
+    if sizes[0] > 1e-12 * max(sizes[-1], 1.0):
+        return ""
+    if sizes[1] <= 1e-12 * max(sizes[-1], 1.0):
+        return "move and turn"
+    u, v, turn = motions[:, 0]
+    if abs(turn) > 1e-6:
+        size = np.ptp(points, axis=0).max()
+        about = middle + np.array([-v, u]) / turn * size
+        x0, y0 = 1e3 * np.where(np.abs(about) > 1e-9 * size, about, 0.0)
+        return f"turn about ({x0:.6g}, {y0:.6g}) mm"
+    return "move along " + ("x" if abs(v) < 1e-6 else "y" if abs(u) < 1e-6 else f"({u:.3g}, {v:.3g})")

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..mesh.cells import Mesh, signed_areas
 from ..mesh.groups import GroupedMesh
+from ..mesh.sheets import check_held, in_words
 from .loads import MIDDLE, LoadKind, Side
 from .quantities import nearest
 from .shapes import LoadCase, Quantity
@@ -60,12 +61,17 @@ def measured(mesh: Mesh, kind: LoadKind) -> np.ndarray:
 
     The mean over the loaded side; for pressure its middle, interpolated along its edge.
     """
+    return displacement_weights(loaded_box(mesh, kind), kind.case.quantities[0])
+
+
+def loaded_box(mesh: Mesh, kind: LoadKind) -> GroupedMesh:
+    """Mesh of a box with the groups that a kind of load measures: its loaded side, or the middle of a pressed one."""
     if not kind.pressed:
-        return weights(mesh, kind)
+        return box(mesh, [kind.loaded])
     middle = np.zeros(2)
     middle[kind.normal] = kind.loaded.place(*mesh.points.max(axis=0))
     middle[kind.along] = 0.5 * (mesh.points[:, kind.along].min() + mesh.points[:, kind.along].max())
-    return displacement_weights(GroupedMesh(mesh, points={MIDDLE: middle}), kind.case.quantities[0])
+    return GroupedMesh(mesh, points={MIDDLE: middle})
 
 
 def supported(grouped: GroupedMesh, case: LoadCase) -> tuple[np.ndarray, np.ndarray]:
@@ -83,7 +89,7 @@ def supported(grouped: GroupedMesh, case: LoadCase) -> tuple[np.ndarray, np.ndar
                 others = [one.group for one in case.supports if particle in particles_of(grouped, one.group)]
                 raise ValueError(
                     f"load {case.name!r}: supports on {others[0]!r} and {support.group!r} move the particle at "
-                    f"{_shown(points[particle])} by different amounts along {'xy'[axis]}; make them agree there"
+                    f"{in_words(points[particle])} by different amounts along {'xy'[axis]}; make them agree there"
                 )
             held[particles, axis] = True
             given[particles, axis] = value
@@ -234,7 +240,7 @@ def particles_of(grouped: GroupedMesh, group: str) -> np.ndarray:
     point, found = _point(grouped, group), grouped.particle(group)
     if found is None:
         raise ValueError(
-            f"point: {group!r} at {_shown(point)} is no particle of the mesh, and what is held or pulled has to be "
+            f"point: {group!r} at {in_words(point)} is no particle of the mesh, and what is held or pulled has to be "
             "one; make the mesh with it, or name a corner"
         )
     return np.array([found])
@@ -244,10 +250,6 @@ def _point(grouped: GroupedMesh, name: str) -> np.ndarray:
     if name not in grouped.points:
         raise ValueError(f"group: {name!r} is unknown; {nearest(name, [*grouped.sides, *grouped.points])}")
     return np.asarray(grouped.points[name], dtype=float)
-
-
-def _shown(point: np.ndarray) -> str:
-    return f"({1e3 * point[0]:.6g}, {1e3 * point[1]:.6g}) mm"
 
 
 def interpolation(grouped: GroupedMesh, name: str) -> tuple[np.ndarray, np.ndarray]:
@@ -286,7 +288,7 @@ def cell_at(grouped: GroupedMesh, name: str) -> tuple[int, int, np.ndarray]:
             if shares is not None and shares.min() > best:
                 best, found = float(shares.min()), (count, int(cell), shares)
     if found is None:
-        raise ValueError(f"point: {name!r} at {_shown(point)} is outside of the mesh; move it, or correct its unit")
+        raise ValueError(f"point: {name!r} at {in_words(point)} is outside of the mesh; move it, or correct its unit")
     return found
 
 
@@ -324,3 +326,35 @@ def _shares(corners: np.ndarray) -> np.ndarray | None:
             break
     (a, b), (c, d) = 1 - place, place
     return np.array([a * b, c * b, c * d, a * d]) if np.isfinite(place).all() else None
+
+
+def check_case(grouped: GroupedMesh, case: LoadCase) -> None:
+    """Refuse a load case whose groups a mesh lacks, or that leaves cells free to move."""
+    case.check_names(grouped.sides, grouped.points, grouped.unusable)
+    where = f"load {case.name!r}"
+    pressed = {one.group for one in case.pressures}
+    held_and_pulled = [("support", one.group) for one in case.supports]
+    held_and_pulled += [("traction", one.group) for one in case.tractions]
+    for name in dict.fromkeys([*pressed, *(name for _, name in held_and_pulled), *(one.of for one in case.quantities)]):
+        fault = grouped.side_fault(name, directed=name in pressed) if name in grouped.sides else ""
+        if fault:
+            raise ValueError(f"{where}: {name!r} {fault}")
+    for what, name in held_and_pulled:
+        if name in grouped.points and grouped.particle(name) is None:
+            raise ValueError(f"{where}, {what}: point {name!r} is no particle of the mesh; move it to one")
+    for quantity in case.quantities:
+        if quantity.of in grouped.points and not _in_body(grouped.mesh, grouped.points[quantity.of]):
+            raise ValueError(f"{where}, quantity {quantity.name!r}: point {quantity.of!r} is not in the body; move it")
+    check_held(grouped.mesh.points, grouped.mesh.edges, supported(grouped, case)[0], where)
+
+
+def _in_body(mesh: Mesh, point: np.ndarray) -> bool:
+    """Whether a point is in a cell, or within rounding of one."""
+    small = 1e-9 * np.ptp(mesh.points, axis=0).max()
+    for corners in mesh.cells.values():
+        here = mesh.points[corners] - point
+        after = np.roll(here, -1, axis=1)
+        lengths = np.linalg.norm(after - here, axis=2)
+        if ((here[..., 0] * after[..., 1] - here[..., 1] * after[..., 0]) >= -small * lengths).all(axis=1).any():
+            return True
+    return False

@@ -30,9 +30,7 @@ from ..linalg.factors import factorize
 from ..problem.geometry import Beam
 from ..problem.loads import AXIAL, BOTTOM, LEFT, RIGHT, TOP, LoadKind
 from ..problem.materials import Material
-from .field import interpolate
-from .limits import rotation_and_strain
-from .similarity import unit_problem, unit_scales
+from .answers import interpolate, rotation_and_strain, unit_problem, unit_scales
 
 #: First and last level tried. Level p has polynomials of degree p and p layers of elements at a corner.
 FIRST_LEVEL, LAST_LEVEL = 3, 9
@@ -79,22 +77,13 @@ class ReferenceNotConvergedError(RuntimeError):
 class ReferenceSolution:
     """Converged displacements of a beam.
 
-    Attributes
-    ----------
-    displacement : float
-        Mean displacement of the loaded side along the force [m]; of a pressed side, its middle's.
-    mean_displacement : float
-        Mean displacement of the loaded side along the force [m].
-    error_estimate : float
-        Bound on the relative error of `displacement` [1].
-    x, y : ndarray of float, shape (n_x,) and (n_y,)
-        Grid of the field [m], denser near the outline.
-    displacements : ndarray of float, shape (n_x, n_y, 2)
-        Displacements on the grid [m].
-    rotation, strain : float
-        Rotation [rad] and strain [1] that limit its use, see `springtune.reference.limits`.
-    unknowns : int
-        Unknowns of the finest level, for the solved half.
+    - `displacement`: Mean displacement of the loaded side along the force [m]; of a pressed side, its middle's.
+    - `mean_displacement`: Mean displacement of the loaded side along the force [m].
+    - `error_estimate`: Bound on the relative error of `displacement` [1].
+    - `x`, `y` (n_x,) and (n_y,): Grid of the field [m], denser near the outline.
+    - `displacements` (n_x, n_y, 2): Displacements on the grid [m].
+    - `rotation`, `strain`: Rotation [rad] and strain [1] that limit its use, see `springtune.reference.answers`.
+    - `unknowns`: Unknowns of the finest level, for the solved half.
     """
 
     displacement: float
@@ -114,7 +103,7 @@ class ReferenceSolution:
         return replace(self, **{name: getattr(self, name) * by for name, by in names.items()})
 
     def at(self, points: np.ndarray) -> np.ndarray:
-        """Return displacements [m] at points (n, 2) [m] of the beam, see `springtune.reference.field.interpolate`."""
+        """Return displacements [m] at points (n, 2) [m] of the beam, see `springtune.reference.answers.interpolate`."""
         return interpolate(self.x, self.y, self.displacements, points)
 
 
@@ -128,7 +117,7 @@ def solve_small_strain(
 
     Notes
     -----
-    The displacement is exactly proportional to ``force / (E t)``, see `springtune.reference.similarity`.
+    The displacement is exactly proportional to ``force / (E t)``, see `springtune.reference.answers`.
 
     The mean displacement of the loaded side is twice the elastic energy over the force. The spaces of successive
     levels are nested, so its values :math:`J_p` rise towards the exact :math:`J` (Ritz), and the error is the sum of
@@ -160,7 +149,7 @@ def solve_small_strain(
 
 
 def solve_unit(aspect_ratio: float, nu: float, kind: LoadKind, tolerance: float = 1e-4) -> ReferenceSolution:
-    """Solve a beam of height 2 with E = 1 under traction 1, see `springtune.reference.similarity`."""
+    """Solve a beam of height 2 with E = 1 under traction 1, see `springtune.reference.answers`."""
     level, estimate = _converge(aspect_ratio, nu, kind, tolerance)
     x, y, field = level.field()
     rotation, strain = rotation_and_strain(x, y, field)

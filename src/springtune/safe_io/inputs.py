@@ -6,9 +6,13 @@ import os
 import signal
 import stat
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import h5py
 
 LARGEST_CSV = 5_000_000
 """Bytes of the largest CSV file that is read."""
@@ -123,14 +127,17 @@ def _timed(seconds: float) -> Iterator[None]:
         signal.signal(signal.SIGVTALRM, before)
 
 
-def check_alone(path: str | Path) -> None:
-    """Refuse an HDF5 file whose data are elsewhere: in another file of the machine, whatever that is."""
+def check_alone(path: str | Path, look: "Callable[[bytes, h5py.h5d.DatasetID], None] | None" = None) -> None:
+    """Refuse an HDF5 file whose data are elsewhere: in another file of the machine, whatever that is.
+
+    `look` is called with each array and its name.
+    """
     import h5py
 
     names: dict[str, str] = {}
     links: list[bytes] = []
 
-    def look(name: bytes, info: "h5py.h5l.LinkInfo") -> None:
+    def visit(name: bytes, info: "h5py.h5l.LinkInfo") -> None:
         if info.type == h5py.h5l.TYPE_HARD:
             links.append(name)
         elif info.type != h5py.h5l.TYPE_SOFT:
@@ -138,7 +145,7 @@ def check_alone(path: str | Path) -> None:
 
     try:
         with h5py.File(path) as file:
-            file.id.links.visit(look, info=True)
+            file.id.links.visit(visit, info=True)
             for link in links:  # afterwards: what is raised within a visit is not always passed on
                 one = h5py.h5o.open(file.id, link)
                 if isinstance(one, h5py.h5d.DatasetID):
@@ -148,6 +155,8 @@ def check_alone(path: str | Path) -> None:
                         names[_text(link)] = f"stored outside of the file, in {outside!r}"
                     if stored.get_layout() == h5py.h5d.VIRTUAL:
                         names[_text(link)] = "a virtual dataset"
+                    if look:
+                        look(link, one)
     except (LookupError, RuntimeError, SystemError, TypeError, ValueError) as error:
         raise OSError(f"damaged: {error}") from None
     for name, what in names.items():

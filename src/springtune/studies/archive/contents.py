@@ -1,4 +1,4 @@
-"""Select and check the files of an archive; `springtune.studies.archive.archive` writes it."""
+"""Select and check the files of an archive; `springtune.studies.archive.crate` writes it."""
 
 import hashlib
 import json
@@ -7,7 +7,7 @@ import platform
 import shutil
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from filecmp import cmp
+from filecmp import cmpfiles
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 
@@ -15,13 +15,13 @@ from springtune.safe_io.atomic import write_text
 from springtune.safe_io.escapes import markdown
 
 from ..output.browse import page as browse
-from ..output.reading import check_links
+from ..output.reading import attributes
 from ..runs import provenance, records, rerun
-from ..runs.commands import COMMANDS_FILE
 from ..runs.dependencies import OURS, PACKAGE
+from ..runs.keys import installed
 from ..runs.plan import plan
-from . import environment
-from .merge_parts import ELSEWHERE
+from ..runs.workload import COMMANDS_FILE
+from .parts import ELSEWHERE
 from .verify import files as verified
 
 if TYPE_CHECKING:
@@ -37,6 +37,9 @@ CODE, INPUTS = "code", "inputs"
 CITATION = "CITATION.cff"
 OF_RESULTS = "results"
 
+LOCK_FILES = ("requirements/run.txt", "requirements/cholesky.txt")
+"""Lock files of studies; the second is an optional extra."""
+
 CHECKOUT_FILES = (
     "Snakefile",
     "Makefile",
@@ -46,12 +49,12 @@ CHECKOUT_FILES = (
     "LICENSE",
     CITATION,
     "tools/setup.sh",
-    *environment.LOCK_FILES,
+    *LOCK_FILES,
 )
 """Required files of a checkout."""
 
 FOLDERS = {
-    "src": (".css", ".html", ".js", ".py", ".pyi", ".typed"),
+    "src": (".css", ".html", ".js", ".py", ".pyi", ".typed", ".yaml"),
     "workflow": (".csl", "README.md", ".rst", ".smk", ".typ", ".yaml", ".yml"),
     "requirements": (".in", ".txt"),
 }
@@ -171,7 +174,7 @@ def gather(
     packed = {name: _of_file(name, path) for name, path in paths.items()}
     packed |= {f"{CODE}/{name}": of_text(f"{CODE}/{name}", text) for name, text in code.texts.items()}
     dataset, page = (f"{OF_RESULTS}/{study.name}/{name}" for name in (rerun.DATASET, rerun.PAGE))
-    packed[dataset], attributes, host = _without(packed[dataset], {"host", *untold}, scratch)
+    packed[dataset], told, host = _without(packed[dataset], {"host", *untold}, scratch)
     if packed[dataset].sha256 != packed[dataset].original:  # the page has the attributes of the dataset
         write_text(scratch / rerun.PAGE, browse.page(scratch / rerun.DATASET, rerun.linked(study)))
         packed[page] = _of_file(page, scratch / rerun.PAGE)
@@ -187,9 +190,9 @@ def gather(
         config=own,
         inputs=tuple(sorted(set(names.values()) - {own})),
         code=code,
-        attributes=attributes,
-        machine=environment.machine() if tell_machine else {},
-        departures=_departures(checkout, attributes),
+        attributes=told,
+        machine=machine() if tell_machine else {},
+        departures=_departures(checkout, told),
         untold=untold,
     )
     packed[README] = of_text(README, _readme(found))
@@ -230,13 +233,8 @@ def _other_library(packed: Path) -> str:
         for path in folder.rglob("*")
         if path.is_file() and not _is_made(path.relative_to(folder).as_posix())
     }
-    pairs = {name: [folder / name for folder in (packed, PACKAGE)] for name in sorted(names)}
-    others = (
-        name
-        for name, pair in pairs.items()
-        if not (all(one.is_file() for one in pair) and cmp(pair[0], pair[1], False))
-    )
-    return next(others, "")
+    _, others, lacking = cmpfiles(packed, PACKAGE, sorted(names), shallow=False)
+    return min(others + lacking, default="")
 
 
 def _unfinished(study: "Study", folder: Path, faults: Iterable[tuple[str, str]], stale: Iterable[str]) -> str:
@@ -392,18 +390,14 @@ def _without(dataset: Packed, names: Collection[str], scratch: Path) -> tuple[Pa
 
     assert isinstance(dataset.source, Path)
     try:
-        check_links(dataset.source)
+        found = attributes(dataset.source)
     except ValueError as error:
         raise ArchiveError(str(error)) from None
-    copy = scratch / rerun.DATASET
+    host, copy = found.get("host", ""), scratch / rerun.DATASET
     shutil.copyfile(dataset.source, copy)
     with h5py.File(copy, "a") as file:
-        attributes = {
-            str(name): value.decode() if isinstance(value, bytes) else str(value) for name, value in file.attrs.items()
-        }
-        host = attributes.get("host", "")
         for name in names:
-            text = attributes.pop(name, "")
+            text = found.pop(name, "")
             if text and file.attrs.get_id(name).dtype.kind != "S":
                 option = next(option for option, other in rerun.BLANKED.items() if other == name).replace("_", "-")
                 raise ArchiveError(
@@ -413,7 +407,7 @@ def _without(dataset: Packed, names: Collection[str], scratch: Path) -> tuple[Pa
             if text:
                 file.attrs.modify(name, np.bytes_(b"-" * len(text)))
     packed = _of_file(dataset.name, copy)
-    return Packed(packed.name, packed.source, packed.sha256, packed.size, dataset.sha256), attributes, host
+    return Packed(packed.name, packed.source, packed.sha256, packed.size, dataset.sha256), found, host
 
 
 def _elsewhere(folder: Path) -> bool:
@@ -421,15 +415,13 @@ def _elsewhere(folder: Path) -> bool:
     return any((folder / note).is_file() for note in (COMMANDS_FILE, ELSEWHERE))
 
 
-def _departures(checkout: Path, attributes: dict[str, str]) -> dict[str, tuple[str, str]]:
+def _departures(checkout: Path, told: dict[str, str]) -> dict[str, tuple[str, str]]:
     """Versions of the dataset that differ from the locked ones."""
-    locked: dict[str, str] = {}
-    for lock in environment.LOCK_FILES:
-        locked |= environment.locked(checkout / lock)
-    used = json.loads(attributes.get("software", "{}"))
-    return {
-        name: (locked[name], version) for name, version in sorted(used.items()) if locked.get(name, version) != version
-    }
+    wanted: dict[str, str] = {}
+    for lock in LOCK_FILES:
+        wanted |= locked(checkout / lock)
+    used = json.loads(told.get("software", "{}"))
+    return {name: (wanted[name], one) for name, one in sorted(used.items()) if wanted.get(name, one) != one}
 
 
 # -- the archive -------------------------------------------------------------------------------------------------------
@@ -454,13 +446,13 @@ described in `{METADATA}`: this is an RO-Crate.
 | `{found.config}` | the study |
 | `{found.dataset}` | its dataset: NetCDF-4, for xarray or any HDF5 viewer |
 | `{found.folder}/{rerun.PAGE}` | a page to browse it |
-| `{CODE}/` | the program, with the versions of all packages in `{CODE}/{environment.LOCK_FILES[0]}` |
+| `{CODE}/` | the program, with the versions of all packages in `{CODE}/{LOCK_FILES[0]}` |
 
 To check that all is as it was packed:
 
     sha256sum -c {SUMS}
 
-To compute it again, with Python {environment.minor(found.software["python"])} and make, and to compare:
+To compute it again, with Python {minor(found.software["python"])} and make, and to compare:
 
     cd {CODE}
     make study STUDY={study}
@@ -479,3 +471,53 @@ def of_text(name: str, text: str) -> Packed:
     """Archive file with a given text."""
     content = text.encode(errors="surrogateescape")
     return Packed(name, content, hashlib.sha256(content).hexdigest(), len(content))
+
+
+# -- software and machine ----------------------------------------------------------------------------------------------
+
+
+def minor(version: str) -> str:
+    """Python version without its last number, as wheels use it.
+
+    Examples
+    --------
+    >>> minor("3.11.7")
+    '3.11'
+    """
+    return ".".join(version.split(".")[:2])
+
+
+def locked(path: Path) -> dict[str, str]:
+    """Versions that a lock file requests on this machine."""
+    from packaging.requirements import InvalidRequirement, Requirement
+    from packaging.utils import canonicalize_name
+
+    found = {}
+    for line in path.read_text().splitlines():
+        text = line.removesuffix("\\").strip()
+        if not text or text.startswith(("#", "-")):
+            continue
+        try:
+            one = Requirement(text)
+        except InvalidRequirement:
+            continue
+        if one.marker is None or one.marker.evaluate():
+            found[str(canonicalize_name(one.name))] = str(one.specifier).removeprefix("==")
+    return found
+
+
+def departures(lock: Path) -> dict[str, tuple[str, str]]:
+    """Installed versions that differ from a lock file."""
+    here = {name: (version, installed(name)) for name, version in locked(lock).items()}
+    return {name: pair for name, pair in here.items() if pair[0] != pair[1]}
+
+
+def machine() -> dict[str, str]:
+    """Properties of the machine that numbers and times depend on, without names."""
+    found = {"architecture": platform.machine(), "system": platform.system(), "cores": str(os.cpu_count())}
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        lines = []
+    models = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return found | ({"processor": models[0]} if models else {})

@@ -1,24 +1,56 @@
-"""Metadata of an archive: RO-Crate 1.1, profile Provenance Run Crate.
+"""Write an archive of a finished study: all that another machine needs to check it and to compute it again.
+
+It is a zip file:
+
+
+    ro-crate-metadata.json, README.md, SHA256SUMS
+    code/               package, rules, lock files and what builds them, as in the checkout; the study
+    code.diff           what of package, rules and study differs from the commit
+    inputs/             the study and its files, where they are outside of the checkout
+    results/<study>/    dataset, page, figures, tables, summary; what each job made, and how long it took
+
+and an RO-Crate 1.1, profile Provenance Run Crate.
 
 The main entity is the Snakefile; each rule is a step, each job an action. Unknown values are left out, and only people
 in CITATION.cff are named.
 """
 
 import json
+import shutil
+import tempfile
+import zipfile
+from collections.abc import Callable, Iterable, Mapping
 from datetime import UTC, datetime
+from io import BytesIO
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
-from ..runs import checked_json, rerun
+from springtune.safe_io import atomic
+
+from ..runs import checked_json, records, rerun
 from ..runs.plan import stages
-from . import environment
-from .contents import CODE, DIFF, INPUTS, METADATA, README
+from .contents import (
+    CITATION,
+    CODE,
+    DIFF,
+    INPUTS,
+    LOCK_FILES,
+    METADATA,
+    MOST_FILES,
+    MOST_TEXT,
+    README,
+    SUMS,
+    ArchiveError,
+    gather,
+    of_text,
+)
 
 if TYPE_CHECKING:
     from rocrate.model import Entity
     from rocrate.rocrate import ROCrate
 
-    from .contents import Contents
+    from ..config.model import Study
+    from .contents import Contents, Packed
 
 TERMS = "https://w3id.org/ro/terms/workflow-run#"
 """Namespace of terms that RO-Crate 1.1 lacks."""
@@ -177,8 +209,8 @@ class _Crate:
             found.dataset: "the dataset: NetCDF-4, every parameter a dimension",
             f"{found.folder}/{rerun.PAGE}": "a page to browse the dataset, which needs no network",
             f"{found.folder}/{rerun.SUMMARY}": "what is solved, what is not and why",
-            f"{CODE}/{environment.LOCK_FILES[0]}": "versions and hashes of all packages",
-            f"{CODE}/{environment.LOCK_FILES[1]}": "version and hashes of the package that factorizes by CHOLMOD",
+            f"{CODE}/{LOCK_FILES[0]}": "versions and hashes of all packages",
+            f"{CODE}/{LOCK_FILES[1]}": "version and hashes of the package that factorizes by CHOLMOD",
         }
         original = found.files[found.dataset].original
         if original != found.files[found.dataset].sha256:
@@ -264,7 +296,7 @@ class _Crate:
         drawn = ("Drawing figures and writing tables", "studies.output.present")
         after = {
             rerun.COLLECT: ("Comparing with the references, and collecting the dataset", "studies.kinds.collect"),
-            rerun.BROWSE: ("Writing the page to browse", "studies.output.browse.job"),
+            rerun.BROWSE: ("Writing the page to browse", "studies.output.browse.page"),
         }
         for name in found.jobs:
             if name not in found.plan.jobs:
@@ -394,3 +426,63 @@ def _benchmark(path: Path) -> dict[str, str]:
         return {}
     cells = dict(zip(head, row))
     return {name: cells[name] for name in USED if cells.get(name, "").replace(".", "", 1).isdigit()}
+
+
+# -- the zip file ------------------------------------------------------------------------------------------------------
+
+PACKED_AT = (1980, 1, 1, 0, 0, 0)
+"""Time of every archived file, zip's earliest, so that the same study gives the same bytes."""
+
+
+def write(
+    study: "Study",
+    folder: Path,
+    target: Path,
+    store: bool = False,
+    untracked: bool = False,
+    chosen: Mapping[str, bool] | None = None,
+    tell: "Callable[[Contents], None] | None" = None,
+) -> str:
+    """Write the archive of a study atomically."""
+    try:
+        atomic.check_folder(target)
+    except ValueError as error:
+        raise ArchiveError(str(error)) from None
+    with tempfile.TemporaryDirectory() as scratch:
+        found = gather(study, folder, Path(scratch), store, untracked, chosen)
+        cited = citation(Path(CITATION))
+        if tell:
+            tell(found)
+        packed = dict(found.files)
+        packed |= {METADATA: of_text(METADATA, metadata(found, cited))}
+        sums = "".join(f"{one.sha256}  {name}\n" for name, one in sorted(packed.items()))
+        packed |= {SUMS: of_text(SUMS, sums)}
+        check_limits(packed)
+        _zip(target, packed.values())
+    return records.checksum(target)
+
+
+def check_limits(packed: "Mapping[str, Packed]") -> None:
+    """Refuse archives that `springtune verify` would refuse."""
+    texts = max(packed[name].size for name in (METADATA, SUMS))
+    if len(packed) > MOST_FILES or texts > MOST_TEXT:
+        raise ArchiveError(
+            f"{len(packed)} files, and an archive holds at most {MOST_FILES}, with {MOST_TEXT} bytes of metadata; "
+            "leave out --with-store, or archive parts of the study"
+        )
+
+
+def _zip(target: Path, packed: "Iterable[Packed]") -> None:
+    """Write a zip file without time and place of writing."""
+    with (
+        atomic.replacing(target, synced=True) as unfinished,
+        zipfile.ZipFile(unfinished, "w", zipfile.ZIP_DEFLATED, compresslevel=6) as archive,
+    ):
+        for one in sorted(packed, key=lambda one: (one.name != METADATA, one.name)):
+            info = zipfile.ZipInfo(one.name, PACKED_AT)
+            info.compress_type, info.create_system = zipfile.ZIP_DEFLATED, 3  # Unix, whatever this system is
+            info.external_attr = (0o100755 if one.runs else 0o100644) << 16
+            info.file_size = one.size
+            source = BytesIO(one.source) if isinstance(one.source, bytes) else open(one.source, "rb")  # noqa: SIM115
+            with source, archive.open(info, "w", force_zip64=one.size > zipfile.ZIP64_LIMIT) as written:
+                shutil.copyfileobj(source, written)

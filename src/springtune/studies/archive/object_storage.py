@@ -12,7 +12,7 @@ from springtune.safe_io import atomic
 
 from ..kinds import load_study
 from ..runs import checked_json, records
-from .merge_parts import MergeError, adopt, is_stored, take_in
+from .parts import MergeError, adopt, is_stored, take_in
 
 CONTENTS = "contents.json"
 """First file in a pack: checksums by name."""

@@ -1,20 +1,366 @@
-"""Write the files of a study's parts for several sites."""
+"""Split a study into parts for several sites, and merge their results.
 
-from collections.abc import Iterable
+Keys of results hold code, packages and parameters, so a merge is the union of stored files. Everything is compared
+before anything is written.
+"""
+
+import json
+import os
+import re
+import sys
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from springtune.registry import NAME, NAME_RULE
 from springtune.safe_io import atomic
+from springtune.safe_io.escapes import shown
+from springtune.safe_io.inputs import check_alone
 
-from ..config.messages import StudyError
+from ..config.load import digest_of, is_part, named_files, part_text, whole_text
+from ..config.messages import StudyError, clipped
 from ..config.model import Part
-from ..config.partial import digest_of, is_part, named_files, part_text
-from ..kinds.division import dealt, taken
+from ..config.yaml_lines import read_yaml
+from ..kinds.division import dealt, part_of, taken
+from ..kinds.scenes.plan import scene_key
+from ..output.reading import attributes
+from ..runs import checked_json, driver, locks, records, rerun, store
+from ..runs.checked_json import DamagedError
+from ..runs.keys import installed
+from ..runs.plan import plan
+from ..runs.run_tasks import RECORDS, TASKS
+from ..runs.task_costs import TaskCosts, Watch
 
 if TYPE_CHECKING:
     from ..config.model import Study
+
+HASH = re.compile("[0-9a-f]{24}")
+"""Form of `springtune.studies.runs.checked_json.hash_of`."""
+
+TIMES = "seconds"
+"""Ending of names of values that differ in every run."""
+
+NAMED = 3
+
+STORED, MESH_FILE, MESHES = ".h5", ".vtu", "meshes"
+
+
+ELSEWHERE = f"{TASKS}/elsewhere.json"
+"""Note of files with results of other machines."""
+
+
+class MergeError(Exception):
+    """Results that do not fit together; the message names them and the remedy."""
+
+    def __init__(self, *lines: str) -> None:
+        super().__init__("\n".join(map(shown, lines)))
+
+
+class _NotStoredError(Exception):
+    """The result of a task is not stored."""
+
+
+class _OnlyStored(TaskCosts):
+    """Costs of jobs that must find all results stored."""
+
+    def __init__(self, limits: Mapping[str, float]) -> None:
+        super().__init__()
+        self.words = Watch(limits).words
+
+    @property
+    def limits(self) -> str:
+        """Limits of a task in words."""
+        return self.words
+
+    def attempt(self, key: str, function: Callable[[], Any], failed: Callable[[str], dict[str, Any]]) -> Any:
+        """Refuse to compute."""
+        raise _NotStoredError(key)
+
+
+@dataclass(frozen=True)
+class Site:
+    """Results of a part."""
+
+    folder: Path
+    study: "Study"
+    attributes: dict[str, str]
+
+    def place(self, product: str) -> Path:
+        """Path of a product in any results folder."""
+        return Path(product).relative_to(Path("results", self.attributes["study"]))
+
+
+@dataclass(frozen=True)
+class Merged:
+    """Outcome of a merge: `files` of the parts, `written` ones, and jobs `left` to run."""
+
+    folder: Path
+    files: int
+    written: int
+    missing: list[str]
+    left: int
+
+
+def merge_sites(study: "Study", folders: Sequence[Path], incomplete: bool = False) -> Merged:
+    """Merge the parts' results into ``results/<study>``.
+
+    No file is ever half written, so an interrupted merge can be repeated. Existing results stay.
+    """
+    target = Path("results", study.name)
+    locks.check_claim(target, study.path)
+    for folder in (target, *folders):
+        locks.check_idle(folder)
+    sites = [_site(study, folder) for folder in folders]
+    missing = [*_absent(study, sites)]
+    places: dict[Path, list[Path]] = defaultdict(list)
+    for site in sites:
+        found, faults = _examined(site)
+        missing += faults
+        for place in found:
+            places[place].append(site.folder / place)
+    if missing and not incomplete:
+        remedy = "nothing is merged; --incomplete merges what is there, and the study computes the rest"
+        raise MergeError(*missing, remedy)
+    locks.begin([target])
+    try:
+        locks.claim(target, study.path)
+        written = take_in(study, places, target)
+        left = adopt(study, target, os.cpu_count() or 1)
+    finally:
+        locks.end()
+    return Merged(target, len(places), written, missing, left)
+
+
+def take_in(study: "Study", places: Mapping[Path, Sequence[Path]], target: Path) -> int:
+    """Compare stored files, then add them to a study's results."""
+    names = {scene_key(study, scene): study.name_of(scene) for scene in study.scenes}
+    found = {place: _union(target / place, paths, names) for place, paths in sorted(places.items())}
+    makes = {place: make for place, make in found.items() if make}
+    atomic.remove_unfinished(target)
+    if makes:
+        before: dict[str, list[str]] = checked_json.read(target / ELSEWHERE, files=list) or {"files": []}
+        checked_json.write(
+            target / ELSEWHERE, {"files": sorted({*before["files"], *(place.as_posix() for place in makes)})}
+        )
+    for make in makes.values():
+        make()
+    return len(makes)
+
+
+def _site(study: "Study", folder: Path) -> Site:
+    """Read and check the folder of a part."""
+    path = folder / rerun.DATASET
+    if not folder.is_dir():
+        raise MergeError(f"{folder}: there is no such folder; give the folders of results of all parts")
+    if not path.is_file():
+        raise MergeError(f"{folder}: has no {rerun.DATASET}; run this part to its end, where it was computed")
+    try:
+        found = attributes(path)
+    except (OSError, ValueError) as error:
+        raise MergeError(f"{error}; run this part again, where it was computed") from None
+    text = found.get("config", "")
+    if not is_part(text):
+        raise MergeError(f"{folder}: is not of a part of a study; give the results of what `springtune split` wrote")
+    if digest_of(whole_text(text)) != digest_of(study.text):
+        why = _difference(whole_text(text), study.text)
+        raise MergeError(
+            f"{folder}: is a part of another study than {study.path}: {why}; split this one and run its parts"
+        )
+    said = read_yaml(text, str(path))[0]["part"]
+    part = Part(int(said["number"]), int(said["of"]), said["by"], said["study"])
+    name = found["study"]
+    return Site(folder, part_of(replace(study, name=name, part=part)), found)
+
+
+def _difference(one: str, other: str) -> str:
+    """First line in which texts differ."""
+    lines, others = one.splitlines(), other.splitlines()
+    for number, (mine, its) in enumerate(zip(lines, others), 1):
+        if mine != its:
+            return f"line {number} is '{clipped(mine.strip())}' there and '{clipped(its.strip())}' here"
+    return f"it has {len(lines)} lines there and {len(others)} here"
+
+
+def _absent(study: "Study", sites: Sequence[Site]) -> Iterator[str]:
+    """Missing parts with their scenes."""
+    parts = [site.study.part for site in sites if site.study.part]
+    ways = {(part.of, part.by): site.folder for part, site in zip(parts, sites)}
+    if len(ways) > 1:
+        told = ", ".join(f"{folder} of {count} by {by}" for (count, by), folder in ways.items())
+        raise MergeError(f"parts of different splits do not make up a study: {told}; give those of one")
+    for number in sorted(set(range(1, parts[0].of + 1)) - {part.number for part in parts}):
+        own = part_of(replace(study, part=replace(parts[0], number=number)))
+        scenes = _listed([own.name_of(scene) for scene in own.scenes], "scenes")
+        yield f"part {number} of {parts[0].of} is not among them: {scenes or 'no scenes, other tasks'}"
+
+
+def _listed(names: Sequence[str], what: str) -> str:
+    """Count and first names of a list; empty for none."""
+    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    return f"{len(names)} {what} ({', '.join(names[:NAMED])}{more})" if names else ""
+
+
+def _examined(site: Site) -> tuple[list[Path], list[str]]:
+    """Undamaged products of a part, and its faults."""
+    found, damaged = dict[Path, None](), list[str]()
+    done: set[str] = set()
+    for path in sorted((site.folder / TASKS).glob("*_*.json")):
+        note = checked_json.read(path, digest=str)
+        record = checked_json.read(site.folder / RECORDS / path.name, digest=str, products=dict)
+        if note is None or record is None or note["digest"] != record["digest"]:
+            continue
+        whole = True
+        for product, known in record["products"].items():
+            if known is None:
+                continue
+            file = site.folder / site.place(product)
+            if file.is_file() and file.stat().st_size == known[0] and records.checksum(file) == known[2]:
+                if is_stored(site.place(product)):
+                    found[site.place(product)] = None
+            else:
+                damaged.append(f"{file} is {'damaged' if file.is_file() else 'missing'}")
+                whole = False
+        done |= set(keys_of(note["content"])) if whole else set()
+    jobs = plan(site.study, Path("results", site.study.name), 1).jobs
+    lacking = {name: set(keys_of(job.content)) - done for name, job in jobs.items()}
+    lost = set().union(*lacking.values())
+    if not lost:
+        return [*found], []
+    scenes = [site.study.name_of(scene) for scene in site.study.scenes if scene_key(site.study, scene) in lost]
+    stages = sorted({jobs[name].stage.name for name, keys in lacking.items() if keys})
+    what = _listed(scenes, "scenes") or f"results of {', '.join(stages)}"
+    again = f"run {site.attributes['study']}.yaml again, where it was computed"
+    if damaged:
+        return [*found], [f"{site.folder}: {_listed(damaged, 'files')}, and so are not whole: {what}; {again}"]
+    return [*found], [f"{site.folder}: computed in another way than here, or not yet: {what}; {_otherwise(site)}"]
+
+
+def is_stored(place: Path) -> bool:
+    """Return whether a file holds results by key; others are derived from these."""
+    return place.suffix == STORED or place.parent.name == MESHES
+
+
+def _otherwise(site: Site) -> str:
+    """Difference of a site's installation from this one, with the remedy."""
+    from ..runs.provenance import git_commit  # here: a merge that fits asks for nothing of it
+
+    software = json.loads(site.attributes.get("software", "{}"))
+    packages = {name: version for name, version in software.items() if name != "python" and installed(name) != version}
+    told = [f"{name} {version} there and {installed(name)} here" for name, version in packages.items()]
+    python = ".".join(software.get("python", "").split(".")[:2])
+    here = f"{sys.version_info[0]}.{sys.version_info[1]}"
+    if python and python != here:
+        told.insert(0, f"Python {python} there and {here} here")
+    commit, own = site.attributes.get("git_commit", ""), git_commit(Path.cwd())
+    if not told and commit != own:
+        told = [f"the code is {commit or 'of no commit'} there and {own or 'of no commit'} here"]
+    if not told:
+        return f"run {site.attributes['study']}.yaml to its end, where it was computed"
+    return f"{', '.join(told)}; install the same in both places and run the part again where it was another"
+
+
+def keys_of(content: Any) -> Iterator[str]:
+    """Keys of results and their inputs in a task."""
+    if isinstance(content, str):
+        if HASH.fullmatch(content):
+            yield content
+    elif isinstance(content, dict):
+        for name, value in content.items():
+            yield from keys_of(name)
+            yield from keys_of(value)
+    elif isinstance(content, list | tuple):
+        for value in content:
+            yield from keys_of(value)
+
+
+def _union(target: Path, paths: Sequence[Path], names: Mapping[str, str]) -> Callable[[], None] | None:
+    """Return what writes the merged file, or None if it need not change."""
+    if target.parent.name == MESHES:
+        return _mesh(target, paths)
+    before = store.contents(target) if store.stored(target) else {}
+    found, origin = dict(before), dict.fromkeys(before, target)
+    for path in paths:
+        try:
+            check_alone(path)
+        except (OSError, ValueError) as error:
+            raise MergeError(f"{error}; run this part again, where it was computed") from None
+        for key, result in store.contents(path).items():
+            if key not in found or (store.LIMITS in found[key] and store.LIMITS not in result):
+                found[key], origin[key] = result, path
+            elif store.LIMITS not in result and not _same(found[key], result):
+                what = names.get(key.partition("/")[0], f"result {key}")
+                raise MergeError(
+                    f"{what}: {origin[key]} and {path} differ, though all that it depends on is the same; nothing is "
+                    "merged: compute it again in both places, one of which computes wrongly or not as its packages say"
+                )
+    new = {key: result for key, result in found.items() if origin[key] != target}
+    if not new:
+        return None
+    if not before and len(paths) == 1:
+        return lambda: atomic.write_bytes(target, paths[0].read_bytes())
+    return lambda: store.add(target, new)
+
+
+def _mesh(target: Path, paths: Sequence[Path]) -> Callable[[], None] | None:
+    """As `_union`, for a mesh or its notes, which come from one part."""
+    if target.suffix == MESH_FILE and len({records.checksum(path) for path in paths}) > 1:
+        told = " and ".join(map(str, paths))
+        raise MergeError(
+            f"{told} differ, though all that they depend on is the same; nothing is merged: split into fewer parts, so "
+            "that each mesh is made once, or give this one as a file (`mesh_files`)"
+        )
+    content = paths[0].read_bytes()
+    if target.is_file() and target.read_bytes() == content:
+        return None
+    return lambda: atomic.write_bytes(target, content)
+
+
+def _same(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
+    """Return whether results agree bit by bit, run times apart."""
+    names = {name for name in {**one, **other} if not name.endswith(TIMES)}
+    return all(name in one and name in other and _as_text(one[name]) == _as_text(other[name]) for name in names)
+
+
+def _as_text(value: Any) -> Any:
+    return (value.dtype.str, value.shape, value.tobytes()) if isinstance(value, np.ndarray) else repr(value)
+
+
+def adopt(study: "Study", folder: Path, cores: int) -> int:
+    """Record jobs as done whose results are all stored; existing records stay."""
+    planned = plan(study, folder, cores)
+    planned.write()
+    left = 0
+    for job in planned.jobs.values():
+        record, took = planned.record(job.name), folder / f"benchmarks/{job.name}.tsv"
+        if not records.fault(record, job.digest, job.products):
+            # Snakemake runs a job that is older than one before it, be it only by the file of what it took.
+            for path in filter(Path.exists, (record, took)):
+                path.touch()
+            continue
+        costs = _OnlyStored(study.limits)
+        try:
+            driver.run(job.stage.module, job.content, costs)
+        except (_NotStoredError, DamagedError):
+            left += 1
+            continue
+        took.unlink(missing_ok=True)  # of another run than this
+        records.write(record, job.digest, job.products, **costs.summary())
+    return left
+
+
+def merge_text(merged: Merged, parts: Iterable[Path]) -> str:
+    """Report of a merge."""
+    lines = [f"{merged.folder}: {len([*parts])} parts, {merged.files} files, {merged.written} of them written"]
+    if merged.missing:
+        lines += ["still to be computed:", *(f"  {line}" for line in merged.missing)]
+    return "\n".join(map(shown, lines))
+
+
+# -- split -------------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -62,7 +408,7 @@ def _named_files(study: "Study", folder: Path) -> dict[Path, bytes]:
     return {folder / file.relative_to(beside): file.read_bytes() for file in files}
 
 
-def told(written: Iterable[Written]) -> list[list[object]]:
+def share_table(written: Iterable[Written]) -> list[list[object]]:
     """Table of the parts, with a head."""
     rows: list[list[object]] = [["part", "scenes", "curves", "of the cost", "besides"]]
     for one in written:

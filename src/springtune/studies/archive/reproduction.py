@@ -24,7 +24,7 @@ from springtune.safe_io.inputs import fault
 
 from ..output import reading
 from ..runs import rerun
-from . import environment
+from . import contents
 from .contents import CODE, METADATA, MOST_FILES, MOST_TEXT, OF_RESULTS, SUMS
 
 if TYPE_CHECKING:
@@ -239,8 +239,8 @@ class Reproduced:
 
 def own_environment(lock: Path, python: str) -> dict[str, tuple[str, str]]:
     """Installed versions that differ from the archive's."""
-    found = environment.departures(lock)
-    here, wanted = (environment.minor(version) for version in (sys.version.split()[0], python))
+    found = contents.departures(lock)
+    here, wanted = (contents.minor(version) for version in (sys.version.split()[0], python))
     return found | ({"python": (wanted, here)} if wanted != here else {})
 
 
@@ -285,8 +285,8 @@ def _unpack(archive: zipfile.ZipFile, folder: Path, without: str, but: str) -> N
 
 
 def _python(code: Path, python: str, fresh: bool, say: Callable[[str], None]) -> Path:
-    """Python to run a checkout with: this one if it matches, else of a new environment."""
-    others = own_environment(code / environment.LOCK_FILES[0], python)
+    """Python to run a checkout with: this one if it matches, else of a new contents."""
+    others = own_environment(code / contents.LOCK_FILES[0], python)
     if not others and not fresh:
         say("environment: this one, whose packages are those of the archive's lock file")
         return Path(sys.executable)
@@ -302,7 +302,7 @@ def _python(code: Path, python: str, fresh: bool, say: Callable[[str], None]) ->
     if done.returncode:
         raise ReproductionError(
             f"the environment could not be set up (exit code {done.returncode}), see above: it needs Python "
-            f"{environment.minor(python)} as python3, and a package registry"
+            f"{contents.minor(python)} as python3, and a package registry"
         )
     return code / ".venv/bin/python"
 
@@ -321,7 +321,7 @@ def compared(kept: Path, made: Path, machine: dict[str, str]) -> Reproduced:
             exact = compare(before, after, Tolerance(0.0, 0.0), groups)
         near = compare(before, after, groups=groups) if exact.different else exact
         versions = [json.loads(tree.attrs["software"]) for tree in (before, after)]
-    here = environment.machine()
+    here = contents.machine()
     pairs = {name: (versions[0].get(name, "none"), versions[1].get(name, "none")) for name in versions[0] | versions[1]}
     pairs |= {
         name: (machine.get(name, "not told"), here.get(name, "not told")) for name in ("architecture", "processor")

@@ -17,7 +17,9 @@ from springtune.springs.lattice import COEFFICIENT
 
 from .checks import check_cells, check_files, check_numbers, mesh_type_names, stated_rows
 from .combinations import Combination, combinations
+from .csv_files import read_printed
 from .fields import RANGE_DIGITS
+from .kind import Kind
 from .messages import Problems, clipped
 from .model import (
     FURTHER_REFERENCES,
@@ -28,10 +30,8 @@ from .model import (
     Reference,
     SceneSpec,
     Study,
-    StudyKind,
     swept_value,
 )
-from .printed import read_printed
 from .sections import StudyConfig
 
 Ranks = dict[str, dict[str, int]]
@@ -142,7 +142,7 @@ def _order(ranks: Ranks) -> Callable[[MeshSpec | SceneSpec | CurveSpec | Referen
 
 
 def swept(config: StudyConfig) -> tuple[str, ...]:
-    """Parameters that are dimensions: those listed in a grid, and a force with several values."""
+    """Parameters that are dimensions: the ones given in a grid, and a force with several values."""
     found = {name for grid in config.grids.values() for name in SWEPT if name != "force" and getattr(grid, name)}
     several = [values for grid in config.grids.values() for values in (grid.force or {}).values()]
     several += [grid.pressure for grid in config.grids.values() if grid.pressure]
@@ -172,7 +172,7 @@ class _Bodies:
         if key not in self._materials:
             own = {name: one[name] for name in ("young_modulus", "poisson_ratio") if name in one}
             material = only_isotropic(self._declared.materials[key[0]], "put the sheet under 'shapes'")
-            # Moduli of rubber are those of its law: who asks for others is told so.
+            # Rubber keeps the moduli of its law; `expand` refuses others.
             self._materials[key] = material if isinstance(material, Rubber) else replace(material, **own)
         return self._materials[key]
 
@@ -287,7 +287,7 @@ def _calibrating(config: StudyConfig, scenes: Sequence[SceneSpec], problems: Pro
 
 
 def build(
-    config: StudyConfig, grids: tuple[Grid, ...], kinds: Sequence[StudyKind], problems: Problems, about: dict[str, Any]
+    config: StudyConfig, grids: tuple[Grid, ...], kinds: Sequence[Kind], problems: Problems, about: dict[str, Any]
 ) -> Study:
     """Build the study with the parts of all study kinds."""
     ranks = _ranks(config)

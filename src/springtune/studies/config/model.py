@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from springtune.problem.geometry import Beam
 from springtune.problem.materials import AnyMaterial, Material
+from springtune.problem.parameters import shown_order
 from springtune.problem.quantities import nearest
-
-from .messages import Problems
 
 if TYPE_CHECKING:
     from springtune.problem.shapes import Shape
@@ -67,12 +66,12 @@ class SceneSpec:
 
     @cached_property
     def _hash(self) -> int:
-        # Of the material what tells most apart: hashing all of it takes longer than the rest.
+        # Only the main properties of the material: hashing all of it takes longer than the rest.
         body = self.mesh, self.material.name, self.material.young_modulus, self.material.poisson_ratio
         return hash((body, self.load, self.force, self.definition, self.kinematics, self.stiffness_scale))
 
     def __hash__(self) -> int:
-        # As a mesh's.
+        # As for meshes.
         return self._hash
 
 
@@ -146,7 +145,7 @@ class Study:
     mesh_files : dict
         `MeshSpec` of meshes from files by (mesh type, beam's name, mesh size).
     parts : dict
-        What further study kinds ask for, by their names; nothing where the study does not have them.
+        Parts of study kinds by their names; empty if the study does not use a kind.
     limits : dict
         ``seconds`` of the processor and ``memory`` [byte] that one task may take.
     stiffness_ratios : tuple of float
@@ -158,12 +157,12 @@ class Study:
     axes : dict of str to tuple
         Labels of each dimension of the dataset: texts, for ``mesh_size`` numbers [m].
     swept : tuple of str
-        Of `springtune.problem.parameters.SWEPT`: those that are dimensions, too, their labels numbers.
+        Parameters of `springtune.problem.parameters.SWEPT` that are dimensions; their labels are numbers.
     test_files : tuple of Path
-        Of the tests of rubber that materials are fitted to or compared with.
+        Files of the tests that rubber is fitted to or compared with.
     part : Part or None
-        Which part of a study this is. Its scenes, curves, meshes, references and `parts` are its own; grids, axes and
-        all else are those of the whole study.
+        Part of a study. It has its own scenes, curves, meshes, references and `parts`; everything else, such as grids
+        and axes, is of the whole study.
     """
 
     name: str
@@ -266,57 +265,59 @@ def swept_value(one: SceneSpec | CurveSpec | Reference, beam: Beam, name: str) -
     return float(getattr(one if name == "stiffness_scale" else one.material, name))
 
 
-class StudyOutput(Protocol):
-    """Interface of an output, see `springtune.studies.config.kind.Output`."""
+MOST_STUDIES = 8
 
-    @property
-    def name(self) -> str:
-        """Name in a study."""
-
-    @property
-    def meaning(self) -> str:
-        """Description for the manual."""
-
-    @property
-    def usual(self) -> bool:
-        """Whether it is made by default."""
-
-    @property
-    def lack(self) -> Callable[[Study], str]:
-        """Return what a study lacks for it."""
+Answer = TypeVar("Answer")
 
 
-class StudyKind(Protocol):
-    """Interface of a study kind, see `springtune.studies.config.kind.Kind`."""
+def once_a_study(*names: str) -> Callable[[Callable[[Study], Answer]], Callable[[Study], Answer]]:
+    """Cache a function of a study while the named parts are the same objects."""
 
-    @property
-    def name(self) -> str:
-        """Name of its part of a study."""
+    def decorate(function: Callable[[Study], Answer]) -> Callable[[Study], Answer]:
+        # Cache by id(): hashing 10,000 scenes is slow. The parts are kept, so that no new object gets their id.
+        known: list[tuple[list[int], Answer, list[Any]]] = []
 
-    @property
-    def study_fields(self) -> Mapping[str, tuple[Any, Any]]:
-        """Keys added to a study."""
+        @wraps(function)
+        def answer(study: Study) -> Answer:
+            places = [id(getattr(study, name)) for name in names]
+            for before, found, _ in known:
+                if before == places:
+                    return found
+            known.insert(0, (places, function(study), [getattr(study, name) for name in names]))
+            del known[MOST_STUDIES:]
+            return known[0][1]
 
-    @property
-    def grid_fields(self) -> Mapping[str, tuple[Any, Any]]:
-        """Keys added to its grids."""
+        return answer
 
-    @property
-    def alone(self) -> Sequence[str]:
-        """Keys that replace beams and grids."""
+    return decorate
 
-    @property
-    def check(self) -> Callable[[Any, Problems], None]:
-        """Check the values of a config."""
 
-    @property
-    def expand(self) -> Callable[[Any, Any], Any]:
-        """Create its part of a study."""
+SHOWING = ("deformed", "paraview")
 
-    @property
-    def axes(self) -> Callable[[Any], Mapping[str, Collection[str | float]]]:
-        """Labels of the dimensions of its groups."""
 
-    @property
-    def outputs(self) -> Sequence[StudyOutput]:
-        """Outputs of the kind."""
+def keeps_fields(study: Study) -> bool:
+    """Return whether a study's dataset has whole fields, its group `/fields`."""
+    return any(name in study.outputs for name in SHOWING)
+
+
+def shown(scenes: Collection[SceneSpec], swept: Iterable[str]) -> frozenset[SceneSpec]:
+    """Scenes on the coarsest mesh, with one value of each swept parameter."""
+    names, coarsest = tuple(swept), dict[tuple[str, ...], float]()
+    for scene in scenes:
+        body, size = _body(scene), scene.mesh.mesh_size
+        if size >= coarsest.get(body, size):
+            coarsest[body] = size
+    # Few are on the coarsest mesh; only they are ranked.
+    ranked = [
+        (scene, body, [shown_order(name, swept_value(scene, scene.mesh.beam, name)) for name in names])
+        for scene in scenes
+        if scene.mesh.mesh_size == coarsest[body := _body(scene)]
+    ]
+    last: dict[tuple[str, ...], list[float]] = {}
+    for _, body, rank in ranked:
+        last[body] = max(last.get(body, rank), rank)
+    return frozenset(scene for scene, body, rank in ranked if rank == last[body])
+
+
+def _body(scene: SceneSpec) -> tuple[str, ...]:
+    return scene.mesh.beam.name, scene.mesh.mesh_type, scene.material.name, scene.load

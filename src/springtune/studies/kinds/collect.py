@@ -12,9 +12,9 @@ from springtune.safe_io import atomic
 
 from ..config.kind import kinds, outputs
 from ..output import dataset, summary
-from ..runs import bundles, provenance, records, rerun
+from ..runs import provenance, records, rerun
 from ..runs.dependencies import CODE_FILE, OURS
-from ..runs.plan import COSTS_FILE, plan, usual_costs
+from ..runs.plan import COSTS_FILE, plan, remember_costs, usual_costs
 from ..runs.run_tasks import RECORDS, with_repair
 from ..runs.stages import results
 from . import load_study
@@ -39,7 +39,7 @@ def _collected(
         raise SystemExit(str(error)) from None
     told = output.with_name(summary.FILE)
     atomic.write_text(told, summary.text(groups, study.title))
-    bundles.remember(folder.parent / COSTS_FILE, sorted(folder.glob(f"{RECORDS}/*_*.json")), usual_costs())
+    remember_costs(folder.parent / COSTS_FILE, sorted(folder.glob(f"{RECORDS}/*_*.json")), usual_costs())
     return [output, told]
 
 
@@ -54,13 +54,26 @@ def main(config: str, folder: str, output: str, record: str, digest: str, *untol
     records.write(record, digest, made, untold=list(untold))
 
 
+def group_of(kind: "Kind") -> dataset.Group:
+    """Group of a kind whose tasks have cells of it."""
+    return dataset.Group(f"/{kind.name}", kind.variables, kind.dimensions)
+
+
 def _of_tasks(kind: "Kind", study: "Study", folder: Path) -> dict[str, xr.Dataset]:
-    """Group of a kind whose tasks have a cell each."""
-    group = dataset.Group(f"/{kind.name}", kind.variables)
+    """Group of a kind whose tasks have cells of it."""
+    group = group_of(kind)
     found = dataset.Filler(group.empty(study.axes))
+    found.data.attrs = dict(kind.attributes(study.parts[kind.name]))
+    used = {dimension for dimensions, *_ in kind.variables.values() for dimension in dimensions}
     for stage in kind.stages:
-        for task, result in results(stage, study, folder):
-            found.put(result, **task.labels)
+        assert stage.tasks
+        labels = next(iter(stage.tasks(study))).labels
+        if used <= {name for name, label in labels.items() if not isinstance(label, list)}:  # a cell a task
+            for task, result in results(stage, study, folder):
+                found.put(result, **task.labels)
+        else:
+            for task, result in results(stage, study, folder, kind.variables):
+                found.put_arrays(result, task.labels)
     return {group.name: found.data}
 
 

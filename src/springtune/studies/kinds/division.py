@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..config.kind import kinds
 from ..config.messages import StudyError
-from ..runs.bundles import Costs
+from ..runs.plan import Costs
 
 if TYPE_CHECKING:
     from ..config.kind import Kind

@@ -8,12 +8,17 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import h5netcdf
+import h5py
 import numpy as np
 import xarray as xr
+from xarray.backends import BackendArray
+from xarray.core import indexing
 
 from springtune.problem.parameters import SWEPT
 from springtune.problem.status import Status
 from springtune.safe_io.atomic import replacing
+from springtune.safe_io.inputs import BeyondBound, bounded
 
 STATUS = tuple(map(str, Status))
 """Meanings of `status` flags in order of value."""
@@ -119,6 +124,12 @@ class Filler:
                 found = [self._texts.setdefault(one, one) for one in found]
             place = tuple(places[dimension][cells] for dimension in dimensions if dimension in places)
             array[place] = np.array(found, dtype=array.dtype)
+
+    def put_arrays(self, values: Mapping[str, object], labels: Mapping[str, Label | Sequence[Label]]) -> None:
+        """Write arrays into the cells of some labels, one or several of a dimension."""
+        for name, value in values.items():
+            array = self.data[name]
+            array.loc[{dimension: labels[str(dimension)] for dimension in array.dims if dimension in labels}] = value
 
     def put_rows(self, values: Mapping[str, Sequence[float] | np.ndarray], **labels: Label) -> None:
         """Write rows or tables that may be shorter than their dimensions."""
@@ -239,9 +250,6 @@ def _append(path: str | os.PathLike[str], group: str, data: xr.Dataset, names: S
         between.to_netcdf(path, mode="a", group=group, engine="netcdf4", encoding=encoding)
         return
     # Not netCDF's own library: HDF5 would then have to write into a file to read texts that were never stored.
-    import h5netcdf
-    import h5py
-
     (name,) = names
     array = data[name]
     chunk = _block(array.shape)
@@ -283,3 +291,73 @@ def _chunk(shape: Sequence[int], itemsize: int) -> tuple[int, ...]:
         chunk.append(max(1, min(length, room)))
         room //= chunk[-1]
     return tuple(reversed(chunk))
+
+
+# -- open --------------------------------------------------------------------------------------------------------------
+
+
+class _Texts(BackendArray):
+    """Texts of a file, read within bounded memory, since their length is unknown before."""
+
+    dtype = np.dtype(object)
+
+    def __init__(self, path: Path, name: str, shape: tuple[int, ...], most: float) -> None:
+        self.path, self.name, self.shape, self.most = path, name, shape, most
+
+    def __getitem__(self, key: indexing.ExplicitIndexer) -> Any:
+        return indexing.explicit_indexing_adapter(key, self.shape, indexing.IndexingSupport.BASIC, self._read)
+
+    def _read(self, key: tuple[Any, ...]) -> Any:
+        try:
+            with bounded(self.most), h5py.File(self.path) as file:
+                return file[self.name].asstr()[key]
+        except (BeyondBound, OSError, RuntimeError, UnicodeError):  # HDF5 says of missing memory only that it failed
+            raise ValueError(
+                f"{self.path}: its texts '{self.name.rpartition('/')[2]}' are damaged, or take more than "
+                f"{self.most / 1e9:.3g} GB; select what is needed first, or run the study again"
+            ) from None
+
+
+def opened(path: Path, most: float, texts: Collection[str] = ()) -> xr.DataTree:
+    """Open a file, and leave the arrays `texts` in it: xarray reads all texts, at the width of the longest."""
+    with _small_cache():
+        tree = xr.open_datatree(path, engine="netcdf4", drop_variables=[*texts])
+    if not texts:
+        return tree
+    with h5netcdf.File(path) as file:
+        for node in tree.subtree:
+            variables = (file if node is tree else file[node.path]).variables
+            data = node.to_dataset(inherit=False)
+            for name in set(texts) & set(variables):
+                array = _Texts(path, f"{node.path}/{name}", variables[name].shape, most)
+                lazy = indexing.LazilyIndexedArray(array)
+                data[name] = xr.Variable(variables[name].dimensions, lazy, dict(variables[name].attrs))
+            node.dataset = data[[name for name in variables if name in data.data_vars]]
+    return tree
+
+
+# -- flags -------------------------------------------------------------------------------------------------------------
+
+NOT_REQUESTED = "not_requested"
+
+
+def is_flagged(array: xr.DataArray) -> bool:
+    """Return whether a variable holds flags."""
+    return "flag_meanings" in array.attrs and array.dtype.kind in "iuf"
+
+
+def flag_words(array: xr.DataArray) -> dict[int, str]:
+    """Meanings of flags by value."""
+    values = np.atleast_1d(array.attrs.get("flag_values", [])).tolist()
+    return dict(zip(map(int, values), str(array.attrs["flag_meanings"]).split()))
+
+
+def nothing(arrays: Sequence[xr.DataArray]) -> tuple[object, np.dtype[Any]]:
+    """Fill value for some arrays, and a type that holds it and all their values."""
+    if arrays[0].dtype.kind in "OUS":
+        return "", np.dtype(object)
+    together = np.result_type(*(array.dtype for array in arrays))
+    if is_flagged(arrays[0]):
+        silent = [value for value, word in flag_words(arrays[0]).items() if word == NOT_REQUESTED]
+        return (silent or [-1])[0], np.dtype("int8") if together.kind == "f" else together
+    return np.nan, together if together.kind == "f" else np.dtype(float)

@@ -8,7 +8,7 @@ import json
 import os
 import shutil
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -21,6 +21,7 @@ from springtune.safe_io.atomic import UNFINISHED, check_folder, replacing, write
 from springtune.units import QUANTITY_KINDS, UnitError, parse
 
 from . import reading
+from .dataset import flag_words, is_flagged
 from .selection import at, shown_swept
 from .text import label_text
 
@@ -81,18 +82,21 @@ def table(
         widest = status if status is not None else max(data.data_vars.values(), key=lambda array: array.ndim)
         dimensions = _ordered(data, set(map(str, widest.dims)))
         chosen = [array for array in data.data_vars.values() if set(array.dims) <= set(dimensions)]
-    places = np.nonzero(_asked(data, status, chosen, dimensions)) if dimensions else ()
-    columns = []
-    for name, place in zip(dimensions, places):
-        labels = data[name] if name in data.coords else xr.DataArray(np.arange(data.sizes[name]))
-        columns.append(_column(name, labels, labels.values[place]))
-    rows = dict(zip(dimensions, places))
     named = {array.name for array in chosen} | set(data.dims)
     besides = [array for name, array in data.coords.items() if name not in named and set(array.dims) <= set(dimensions)]
-    for array in (*besides, *chosen):
-        values = array.values[tuple(rows[str(name)] for name in array.dims)]
-        columns.append(_column(str(array.name), array, np.broadcast_to(values, len(places[0]) if places else 1)))
-    return columns
+    labels = [
+        data[name] if name in data.coords else xr.DataArray(np.arange(data.sizes[name]), dims=name, name=name)
+        for name in dimensions
+    ]
+    sizes = {name: data.sizes[name] for name in dimensions}
+    asked = _asked(status, chosen, sizes)
+    return [_column(array, _spread(array, sizes)[asked]) for array in (*labels, *besides, *chosen)]
+
+
+def _spread(array: xr.DataArray, sizes: Mapping[str, int]) -> np.ndarray:
+    """Values over all dimensions of a table."""
+    spread = array.variable.compute().set_dims(sizes)  # type: ignore[no-untyped-call]
+    return np.asarray(spread.transpose(*sizes).values)
 
 
 def _group(tree: xr.DataTree, name: str) -> xr.Dataset:
@@ -147,36 +151,29 @@ def _ordered(data: xr.Dataset, names: set[str]) -> list[str]:
     return list(found)
 
 
-def _asked(
-    data: xr.Dataset, status: xr.DataArray | None, chosen: Sequence[xr.DataArray], dimensions: Sequence[str]
-) -> np.ndarray:
-    """Requested cells in the shape of the dimensions."""
-    shape = [data.sizes[name] for name in dimensions]
-
-    def spread(array: xr.DataArray) -> np.ndarray:
-        kept = array.transpose(*(name for name in dimensions if name in array.dims))
-        places = tuple(slice(None) if name in array.dims else np.newaxis for name in dimensions)
-        return np.broadcast_to(kept.values[places], shape)
-
-    if status is not None and set(status.dims) == set(dimensions):
-        return spread(status) != 0
+def _asked(status: xr.DataArray | None, chosen: Sequence[xr.DataArray], sizes: Mapping[str, int]) -> np.ndarray:
+    """Requested cells over all dimensions of a table."""
+    if not sizes:
+        return np.ones((), dtype=bool)
+    if status is not None and set(status.dims) == set(sizes):
+        return _spread(status, sizes) != 0
     # A number of all cells of a mesh, say, is no reason for a row: those with most dimensions are.
     most = max((array.ndim for array in chosen), default=0)
-    asked = np.zeros(shape, dtype=bool)
+    asked = np.zeros(list(sizes.values()), dtype=bool)
     for array in (one for one in chosen if one.ndim == most):
-        values = spread(array)
+        values = _spread(array, sizes)
         asked |= values.astype(str) != "" if values.dtype.kind in "OU" else ~np.isnan(values)
-    if status is not None and set(status.dims) <= set(dimensions):
-        asked &= spread(status) != 0
+    if status is not None and set(status.dims) <= set(sizes):
+        asked &= _spread(status, sizes) != 0
     return asked
 
 
-def _column(name: str, array: xr.DataArray, values: np.ndarray) -> Column:
-    meanings = array.attrs.get("flag_meanings")
-    if meanings:
-        words = dict(zip(np.atleast_1d(array.attrs["flag_values"]).tolist(), meanings.split()))
+def _column(array: xr.DataArray, values: np.ndarray) -> Column:
+    if is_flagged(array):
+        words = flag_words(array)
         values = np.array([words.get(value, "") for value in values.tolist()], dtype=object)
-    return Column(name, str(array.attrs.get("units", "1")), str(array.attrs.get("long_name", "")), values)
+    attributes = array.attrs
+    return Column(str(array.name), str(attributes.get("units", "1")), str(attributes.get("long_name", "")), values)
 
 
 # -- files -------------------------------------------------------------------------------------------------------------
@@ -270,10 +267,10 @@ def export(
                 f"{path}: ParaView gets the group 'fields', or --group {NETWORKS_OF_SHAPES}; leave --group and "
                 "--variables out"
             )
-        alone = not group.strip("/") and "fields" not in tree.children and NETWORKS_OF_SHAPES in tree.children
-        if alone or group.strip("/") == NETWORKS_OF_SHAPES:
-            return _shapes_for_paraview(tree, path, selection or {})
-        return _paraview(tree, path, selection or {})
+        of_shapes = "fields" not in tree.children and NETWORKS_OF_SHAPES in tree.children
+        if group.strip("/") == NETWORKS_OF_SHAPES or (of_shapes and not group.strip("/")):
+            return _paraview(_Shapes(tree, selection or {}), path)
+        return _paraview(_Scenes(tree, selection or {}), path)
     if ending == ".zarr":
         if group.strip("/") or variables or selection:
             raise RequestError(
@@ -316,43 +313,45 @@ def _mesh(
     return f"{path}: {sizes['particle']} particles, {sizes['spring']} springs, {sizes['cell']} cells, as UGRID has them"
 
 
-def _paraview(tree: xr.DataTree, path: Path, selection: Mapping[str, Sequence[str]]) -> str:
-    from springtune.handover.paraview import MOST_PIECES
-
-    if "fields" not in tree.children:
-        raise ValueError(reading.without_fields(tree))
-    scenes = [*_scenes_of(_selected(_group(tree, "fields"), selection))]
-    if not scenes:
-        raise ValueError("the group '/fields' has no solved scene of such labels; give others to --select")
-    files = _SceneFiles(tree)
-    if path.suffix.lower() == ".vtu":
-        if len(scenes) > 1:
-            several = {name: len({labels[name] for labels in scenes}) for name in scenes[0]}
-            choose = ", ".join(name for name, count in several.items() if count > 1)
-            raise ValueError(
-                f"{path}: {len(scenes)} scenes, and a .vtu file has one; --select one {choose}, or give a name ending "
-                "in .pvd for all of them"
-            )
-        files.write(path, scenes[0])
-        return f"{path}: {files.named(scenes[0])}"
-    if len(scenes) > MOST_PIECES:
-        raise ValueError(f"{path}: {len(scenes)} scenes, and at most {MOST_PIECES} are written; --select some")
-    write_scenes(tree, path, scenes)
-    return f"{path}: {len(scenes)} scenes, in the folder {path.with_suffix('')}"
-
-
-def write_scenes(
-    tree: xr.DataTree, path: Path, scenes: Sequence[Mapping[str, str | float]] | None = None
-) -> list[Path]:
+def write_scenes(tree: xr.DataTree, path: Path) -> list[Path]:
     """Write scenes of the group of fields as a ParaView collection."""
-    from springtune.handover.paraview import pieces_of, series
+    from springtune.handover.paraview import pieces_of
 
-    files = _SceneFiles(tree)
-    with series(path) as add:
-        for number, labels in enumerate(_scenes_of(tree["fields"].to_dataset()) if scenes is None else scenes):
-            add(float(number), partial(files.write, labels=labels), files.named(labels, "_").replace(" ", ""))
+    _write_series(_Scenes(tree, {}), path)
     return pieces_of(path)
 
+
+def _paraview(networks: _Scenes | _Shapes, path: Path) -> str:
+    """Write one network, or a collection of all."""
+    from springtune.handover.paraview import MOST_PIECES
+
+    found, one = networks.labels, networks.one
+    if not found:
+        raise ValueError(f"the group '{networks.group}' has no solved {one} of such labels; give others to --select")
+    if path.suffix.lower() == ".vtu":
+        if len(found) > 1:
+            several = ", ".join(name for name in found[0] if len({labels[name] for labels in found}) > 1)
+            raise ValueError(
+                f"{path}: {len(found)} {one}s, and a .vtu file has one; --select one {several}, or give a name ending "
+                "in .pvd for all of them"
+            )
+        networks.write(path, found[0])
+        return f"{path}: {networks.named(found[0])}"
+    if len(found) > MOST_PIECES:
+        raise ValueError(f"{path}: {len(found)} {one}s, and at most {MOST_PIECES} are written; --select some")
+    _write_series(networks, path)
+    return f"{path}: {len(found)} {one}s, in the folder {path.with_suffix('')}"
+
+
+def _write_series(networks: _Scenes | _Shapes, path: Path) -> None:
+    from springtune.handover.paraview import series
+
+    with series(path) as add:
+        for number, labels in enumerate(networks.labels):
+            add(float(number), partial(networks.write, labels=labels), networks.named(labels, "_").replace(" ", ""))
+
+
+NETWORKS_OF_SHAPES = "shape_fields"
 
 MESH = ("beam", "mesh_type", "mesh_size")
 """Dimensions that identify a mesh."""
@@ -361,28 +360,24 @@ NUMBERS = {
     "displacement": "displacement_of_the_load",
     "reference_displacement": "reference_displacement_of_the_load",
     "deformation_error": "deformation_error",
+    "force": "force_of_the_load",
 }
 """Scene variables written beside fields, and their names there."""
 
 
-def _scenes_of(fields: xr.Dataset) -> Iterator[dict[str, str | float]]:
-    """Labels of scenes with fields, in dataset order."""
-    order = (*MESH, "material", "load", "definition", "kinematics")
-    solved = fields.displacement_x.isel(particle=0, drop=True).notnull()
-    names = [*(name for name in order if name in solved.dims), *(name for name in solved.dims if name not in order)]
-    solved = solved.transpose(*names)
-    for place in np.argwhere(solved.values):
-        yield {str(name): solved[name].values[one].item() for name, one in zip(names, place)}
+class _Scenes:
+    """Networks of the group of fields."""
 
+    group, one = "/fields", "scene"
 
-class _SceneFiles:
-    """Writer of scenes: particles with displacements, springs as lines, cells."""
-
-    def __init__(self, tree: xr.DataTree) -> None:
+    def __init__(self, tree: xr.DataTree, selection: Mapping[str, Sequence[str]]) -> None:
+        if "fields" not in tree.children:
+            raise ValueError(reading.without_fields(tree))
         self.tree, root = tree, tree.to_dataset()
+        self.labels = _solved(_selected(_group(tree, "fields"), selection), (*MESH, "material", "load", "definition"))
         # Of what a study sweeps, the values whose fields it keeps.
         swept = shown_swept(tree["fields"].to_dataset(), root)
-        names = [name for name in NUMBERS if name in root]
+        names = [name for name in NUMBERS if name in root and name != "force"]
         self.numbers = at(root[names], swept)[names].assign(swept).load()
         self.mesh: dict[str, str | float] = {}  # the one of before: scenes of one follow each other
 
@@ -393,127 +388,102 @@ class _SceneFiles:
 
     def write(self, path: Path, labels: Mapping[str, str | float]) -> None:
         """Write a scene."""
-        from springtune.handover.paraview import write_vtu
-
         mesh = {name: label for name, label in labels.items() if name in MESH}
         if mesh != self.mesh:
             self.mesh, self.network = mesh, reading.field(self.tree, **mesh)
         found = self.network
         found = found.sel({name: label for name, label in labels.items() if name not in MESH and name in found.dims})
-        corners = found[reading.CELL_NODES].transpose("cell", ...).values
-        cells = {2: found[reading.SPRING_NODES].transpose("spring", ...).values}
-        for count in (3, 4):
-            cells[count] = corners[(corners >= 0).sum(axis=1) == count][:, :count]
-
-        def vectors(names: str) -> np.ndarray:
-            return np.stack([found[names.format(axis)].values for axis in "xy"], axis=1)
-
-        of_particles = {"displacement": vectors("displacement_{}")}
-        if "particle_reference_x" in found:
-            expected = vectors("particle_reference_{}")
-            if np.isfinite(expected).all():
-                error = of_particles["displacement"] - expected
-                of_particles |= {"reference_displacement": expected, "error": error}
-        named = {"stiffness": "stiffness", "force": "spring_force"}
-        of_springs = {name: {2: found[stored].values} for name, stored in named.items() if stored in found}
         numbers = {}
         for name, array in self.numbers.items():
             here = array.sel({dim: label for dim, label in labels.items() if dim in array.dims})
             if here.ndim == 0 and np.isfinite(here):
-                name = "force_of_the_load" if name == "force" else str(name)
-                numbers[NUMBERS.get(name, name)] = float(here)
-        said = {name: self.tree.attrs.get(name, "") for name in ("title", "study")} | dict(labels)
-        units = {"points": "m", "displacement": "m", "error": "m", "stiffness": "N/m", "force": "N", "mesh_size": "m"}
-        comment = json.dumps(said | {"units": units}, indent=1)
-        write_vtu(path, vectors("{}"), cells, of_particles, of_springs, numbers, comment)
+                numbers[NUMBERS.get(str(name), str(name))] = float(here)
+        units = {"error": "m", "stiffness": "N/m", "force": "N", "mesh_size": "m"}
+        _write_network(self.tree, path, found, numbers, labels, units)
 
 
-# -- networks of shapes ------------------------------------------------------------------------------------------------
-
-NETWORKS_OF_SHAPES = "shape_fields"
-
-CASE_LABELS = {"shape": "shape_name", "load": "load_name"}
-"""Variables by which cases of shapes are selected."""
-
-
-def _shapes_for_paraview(tree: xr.DataTree, path: Path, selection: Mapping[str, Sequence[str]]) -> str:
-    from springtune.handover.paraview import MOST_PIECES, series
-
-    fields = _group(tree, NETWORKS_OF_SHAPES).load()
-    scenes = _shape_scenes(fields, selection)
-    if not scenes:
-        raise ValueError(
-            f"the group '/{NETWORKS_OF_SHAPES}' has no solved network of such labels; give others to --select"
-        )
-    if path.suffix.lower() == ".vtu":
-        if len(scenes) > 1:
-            several = [name for name in (*CASE_LABELS, "definition") if len({one[name] for one in scenes}) > 1]
-            raise ValueError(
-                f"{path}: {len(scenes)} networks, and a .vtu file has one; --select one {', '.join(several)}, or give "
-                "a name ending in .pvd for all of them"
-            )
-        _write_shape(tree, fields, path, scenes[0])
-        return f"{path}: {', '.join(scenes[0].values())}"
-    if len(scenes) > MOST_PIECES:
-        raise ValueError(f"{path}: {len(scenes)} networks, and at most {MOST_PIECES} are written; --select some")
-    with series(path) as add:
-        for number, labels in enumerate(scenes):
-            add(float(number), partial(_write_shape, tree, fields, labels=labels), "_".join(labels.values()))
-    return f"{path}: {len(scenes)} networks of shapes, in the folder {path.with_suffix('')}"
-
-
-def _shape_scenes(fields: xr.Dataset, selection: Mapping[str, Sequence[str]]) -> list[dict[str, str]]:
-    """Labels of selected networks of shapes, in dataset order."""
-    known = {name: fields[stored].values.astype(str).tolist() for name, stored in CASE_LABELS.items()}
-    known["definition"] = fields["definition"].values.astype(str).tolist()
-    for name, wanted in selection.items():
-        if name not in known:
-            raise RequestError(f"--select {name}: networks of shapes are told apart by {', '.join(known)}")
-        for label in wanted:
-            if label not in known[name]:
-                there = nearest(label, dict.fromkeys(known[name]))
-                raise RequestError(f"--select {name}={label}: no such label; {there}")
-    solved = fields.displacement_x.isel(particle=0, drop=True).notnull().transpose("case", "definition").values
-    found = [
-        {"shape": known["shape"][case], "load": known["load"][case], "definition": known["definition"][definition]}
-        for case, definition in np.argwhere(solved).tolist()
+def _solved(fields: xr.Dataset, order: Sequence[str]) -> list[dict[str, str | float]]:
+    """Labels of networks with displacements, in dataset order."""
+    solved = fields.displacement_x.isel(particle=0, drop=True).notnull()
+    solved = solved.transpose(*(name for name in order if name in solved.dims), ...)
+    return [
+        {str(name): solved[name].values[number].item() for name, number in zip(solved.dims, place)}
+        for place in np.argwhere(solved.values)
     ]
-    return [one for one in found if all(one[name] in wanted for name, wanted in selection.items())]
 
 
-def _write_shape(tree: xr.DataTree, fields: xr.Dataset, path: Path, labels: Mapping[str, str]) -> None:
-    """Write a network of a shape: particles with displacements, springs as lines, cells."""
+def _write_network(
+    tree: xr.DataTree,
+    path: Path,
+    found: xr.Dataset,
+    numbers: Mapping[str, float],
+    labels: Mapping[str, str | float],
+    units: Mapping[str, str],
+) -> None:
+    """Write a network: particles with displacements, springs as lines, cells."""
     from springtune.handover.paraview import write_vtu
 
-    chosen = np.logical_and.reduce([fields[stored].values == labels[name] for name, stored in CASE_LABELS.items()])
-    one = fields.isel(case=int(np.argmax(chosen))).sel(definition=labels["definition"])
-    there = np.isfinite(one.x.values)
-    points, moved = (
-        np.stack([one[name.format(axis)].values[there] for axis in "xy"], axis=1).astype(float)
-        for name in ("{}", "displacement_{}")
-    )
-    # What is none was -1, and is NaN as it is read.
-    springs, corners = (
-        one[name].fillna(-1).values.astype(np.int64) for name in (reading.SPRING_NODES, reading.CELL_NODES)
-    )
-    present = springs[:, 0] >= 0
-    cells = {2: springs[present]}
+    def vectors(names: str) -> np.ndarray:
+        return np.stack([found[names.format(axis)].values for axis in "xy"], axis=1)
+
+    corners = found[reading.CELL_NODES].transpose("cell", ...).values
+    cells = {2: found[reading.SPRING_NODES].transpose("spring", ...).values}
     for count in (3, 4):
         cells[count] = corners[(corners >= 0).sum(axis=1) == count][:, :count]
-    about = {name: str(one[f"{name}_name"].values) for name in ("material", "kinematics", "mesh_type")}
-    size = float(one.case_mesh_size)
-    numbers, scenes = {"mesh_size": size}, tree["shapes"].to_dataset()
-    here = scenes.sel({**labels, **about}).sel(mesh_size=size, method="nearest")
-    for quantity in here["quantity"].values.tolist():
-        for name in ("value", "reference_value", "error"):
-            number = float(here[name].sel(quantity=quantity)) if name in here else np.nan
-            if np.isfinite(number):
-                numbers[f"{name}_of_{quantity}"] = number
-    said = {name: tree.attrs.get(name, "") for name in ("title", "study")} | dict(labels) | about
-    units = {"points": "m", "displacement": "m", "force": "N", "mesh_size": "m", "value": "SI", "error": "1"}
-    comment = json.dumps(said | {"units": units}, indent=1)
-    forces = {"force": {2: one.spring_force.values[present].astype(float)}}
-    write_vtu(path, points, cells, {"displacement": moved}, forces, numbers, comment)
+    of_particles = {"displacement": vectors("displacement_{}")}
+    if "particle_reference_x" in found:
+        expected = vectors("particle_reference_{}")
+        if np.isfinite(expected).all():
+            of_particles |= {"reference_displacement": expected, "error": of_particles["displacement"] - expected}
+    named = {"stiffness": "stiffness", "force": "spring_force"}
+    of_springs = {name: {2: found[stored].values} for name, stored in named.items() if stored in found}
+    said = {name: tree.attrs.get(name, "") for name in ("title", "study")} | dict(labels)
+    comment = json.dumps(said | {"units": {"points": "m", "displacement": "m"} | dict(units)}, indent=1)
+    write_vtu(path, vectors("{}"), cells, of_particles, of_springs, numbers, comment)
+
+
+class _Shapes:
+    """Networks of shapes, selected by shape, load and definition."""
+
+    group, one = "/shape_fields", "network"
+
+    def __init__(self, tree: xr.DataTree, selection: Mapping[str, Sequence[str]]) -> None:
+        self.tree, self.fields = tree, _group(tree, self.group).load()
+        stored = {"shape": "shape_name", "load": "load_name", "definition": "definition"}
+        known = {name: self.fields[variable].values.astype(str).tolist() for name, variable in stored.items()}
+        for name, wanted in selection.items():
+            if name not in known:
+                raise RequestError(f"--select {name}: networks of shapes are told apart by {', '.join(known)}")
+            for label in wanted:
+                if label not in known[name]:
+                    there = nearest(label, dict.fromkeys(known[name]))
+                    raise RequestError(f"--select {name}={label}: no such label; {there}")
+        self.cases = list(zip(known["shape"], known["load"]))
+        found = [
+            dict(zip(known, (*self.cases[self.fields.case.values.tolist().index(one["case"])], one["definition"])))
+            for one in _solved(self.fields, ("case", "definition"))
+        ]
+        self.labels = [one for one in found if all(one[name] in wanted for name, wanted in selection.items())]
+
+    def named(self, labels: Mapping[str, str | float], between: str = ", ") -> str:
+        """Labels of a network in words."""
+        return between.join(map(str, labels.values()))
+
+    def write(self, path: Path, labels: Mapping[str, str | float]) -> None:
+        """Write a network."""
+        one = self.fields.isel(case=self.cases.index((str(labels["shape"]), str(labels["load"]))))
+        one = one.sel(definition=labels["definition"])
+        about = {name: str(one[f"{name}_name"].values) for name in ("material", "kinematics", "mesh_type")}
+        size = float(one.case_mesh_size)
+        numbers = {"mesh_size": size}
+        here = self.tree["shapes"].to_dataset().sel({**labels, **about}).sel(mesh_size=size, method="nearest")
+        for quantity in here["quantity"].values.tolist():
+            for name in ("value", "reference_value", "error"):
+                number = float(here[name].sel(quantity=quantity)) if name in here else np.nan
+                if np.isfinite(number):
+                    numbers[f"{name}_of_{quantity}"] = number
+        units = {"force": "N", "mesh_size": "m", "value": "SI", "error": "1"}
+        _write_network(self.tree, path, reading.network(one), numbers, {**labels, **about}, units)
 
 
 def selected(text: Sequence[str]) -> dict[str, list[str]]:

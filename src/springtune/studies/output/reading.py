@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 
     from .dataset import Label
 
+LARGE_ARRAY = 2**20
+"""Larger arrays, in bytes, are read on demand."""
+
 SPRING_NODES, CELL_NODES = "spring_nodes", "cell_nodes"
 
 REMEDY = "give the dataset.nc of a study, or run the study again"
@@ -74,12 +77,12 @@ def open(path: str | os.PathLike[str]) -> "xarray.DataTree":
         raise FileNotFoundError(
             f"{path}: there is no such dataset; run the study, or give its results/<study>/dataset.nc"
         )
-    check_links(file)
-    from .lazy import opened
+    texts = check_links(file)
+    from .dataset import opened
 
     try:
         with bounded(MOST_HELD):
-            tree = opened(file, most_of(file))
+            tree = opened(file, most_of(file), texts)
     except Exception as error:  # of a damaged file the libraries raise whatever they trip over
         raise ValueError(f"{file}: cannot be read ({_said(error)}); {REMEDY}") from None
     if "springtune_version" not in tree.attrs:
@@ -91,8 +94,6 @@ def open(path: str | os.PathLike[str]) -> "xarray.DataTree":
 @contextmanager
 def lazily(path: str | os.PathLike[str]) -> "Iterator[xarray.DataTree]":
     """Context of a dataset with small arrays in memory and large ones read on demand."""
-    from .lazy import LARGE_ARRAY
-
     with open(path) as tree:
         for node in tree.subtree:
             for array in node.variables.values():
@@ -128,58 +129,62 @@ def check_opens(path: str | os.PathLike[str]) -> None:
         raise ValueError(f"{path}: is damaged (the library of netCDF ends by {name} on it); {REMEDY}")
 
 
-def check_links(path: Path) -> None:
-    """Refuse files on which netCDF would crash, hang or read other files, by looking with HDF5 alone.
+def check_links(path: Path) -> set[str]:
+    """Refuse files on which netCDF would crash, hang or read other files; return names of large arrays of texts.
 
-    The attributes that link arrays and dimensions may be damaged or changed by another program.
+    HDF5 alone looks at them. The attributes that link arrays and dimensions may be damaged or changed by another
+    program.
     """
     import h5py
 
-    found: list[str] = []
+    linked = {
+        b"DIMENSION_LIST": (h5py.h5t.VLEN, True),
+        b"_Netcdf4Coordinates": (h5py.h5t.INTEGER, True),
+        b"_Netcdf4Dimid": (h5py.h5t.INTEGER, False),
+        b"CLASS": (h5py.h5t.STRING, False),
+    }
+    wrong: list[str] = []
+    texts: set[str] = set()
     held = 0
 
-    def look(name: bytes) -> None:
+    def look(name: bytes, one: "h5py.h5d.DatasetID") -> None:
         nonlocal held
-        one = h5py.h5o.open(file.id, name)
-        if not isinstance(one, h5py.h5d.DatasetID):
-            return
+        kind, stored = one.get_type(), one.get_create_plist()
+        size = math.prod(one.shape) * int(kind.get_size())
+        if kind.get_class() == h5py.h5t.STRING and size > LARGE_ARRAY:
+            texts.add(name.decode().rpartition("/")[2])
         if not h5py.Dataset(one).attrs.get("NAME", b"").startswith(BARE_DIMENSION):
-            held += _held(one)
-        rank = one.rank
-        for attribute, kind, shape in (
-            (b"DIMENSION_LIST", h5py.h5t.VLEN, (rank,)),
-            (b"_Netcdf4Coordinates", h5py.h5t.INTEGER, (rank,)),
-            (b"_Netcdf4Dimid", h5py.h5t.INTEGER, ()),
-            (b"CLASS", h5py.h5t.STRING, ()),
-        ):
+            chunk = stored.get_chunk() if stored.get_layout() == h5py.h5d.CHUNKED else ()
+            held += max(size, math.prod(chunk) * int(kind.get_size()))
+        for attribute, (expected, of_dimensions) in linked.items():
             if h5py.h5a.exists(one, attribute):
-                held_there = h5py.h5a.open(one, attribute)
-                if held_there.get_type().get_class() != kind or held_there.shape != shape:
-                    found.append(f"{attribute.decode()} of {name.decode(errors='replace')}")
+                found = h5py.h5a.open(one, attribute)
+                shape = (one.rank,) if of_dimensions else ()
+                if found.get_type().get_class() != expected or found.shape != shape:
+                    wrong.append(f"{attribute.decode()} of {name.decode(errors='replace')}")
 
     try:
         with guarded(path), bounded(MOST_HELD):
-            check_alone(path)
-            with h5py.File(path) as file:
-                h5py.h5o.visit(file.id, look)
+            check_alone(path, look)
     except OSError as error:
         raise ValueError(f"{path}: cannot be read ({_said(error)}); {REMEDY}") from None
-    if found:
+    if wrong:
         raise ValueError(
-            f"{path}: is damaged, or changed by another program ({found[0]} is none of netCDF's); {REMEDY}"
+            f"{path}: is damaged, or changed by another program ({wrong[0]} is none of netCDF's); {REMEDY}"
         )
     if held > most_of(path):
         said = f"it says that it holds {held / 1e9:.3g} GB in {path.stat().st_size / 1e6:.3g} MB"
         raise ValueError(f"{path}: is damaged ({said}); {REMEDY}")
+    return texts
 
 
-def _held(one: "h5py.h5d.DatasetID") -> int:
-    """Bytes of an array, or of its largest chunk if that is more."""
+def attributes(path: Path) -> dict[str, str]:
+    """Texts of the attributes of a dataset, without xarray."""
     import h5py
 
-    stored = one.get_create_plist()
-    chunk = stored.get_chunk() if stored.get_layout() == h5py.h5d.CHUNKED else ()
-    return max(math.prod(one.shape), math.prod(chunk)) * int(one.get_type().get_size())
+    check_links(path)
+    with h5py.File(path) as file:  # which gives ASCII as bytes
+        return {str(name): text.decode() if isinstance(text, bytes) else str(text) for name, text in file.attrs.items()}
 
 
 def most_of(path: Path) -> float:
@@ -303,6 +308,15 @@ def _field(data: "xarray.DataTree", labels: "dict[str, Label]") -> "xarray.Datas
             listed = ", ".join(map(repr, known)) or "none"
             raise ValueError(f"fields are not kept of {name} {asked[name]!r}; they are of {listed}")
         found = found.assign_coords({name: kept}).drop_vars(f"{OF_FIELDS}{name}")
+    found = network(found)
+    found.attrs["Conventions"] = "CF-1.11 UGRID-1.0"
+    return found
+
+
+def network(found: "xarray.Dataset") -> "xarray.Dataset":
+    """Leave out particles, springs and cells that one network of a group lacks."""
+    import numpy as np
+
     for name, dimension in (("x", "particle"), (SPRING_NODES, "spring"), (CELL_NODES, "cell")):
         there = found[name].notnull().values.reshape(found.sizes[dimension], -1).any(axis=1)
         found = found.isel({dimension: np.flatnonzero(there)})
@@ -311,6 +325,5 @@ def _field(data: "xarray.DataTree", labels: "dict[str, Label]") -> "xarray.Datas
     for name in (SPRING_NODES, CELL_NODES):
         connectivity = found[name].fillna(-1).astype("int32")
         connectivity.encoding = {"_FillValue": np.int32(-1), "dtype": "int32"}
-        found[name] = connectivity.assign_attrs(fields[name].attrs)
-    found.attrs["Conventions"] = "CF-1.11 UGRID-1.0"
+        found[name] = connectivity.assign_attrs(found[name].attrs)
     return found

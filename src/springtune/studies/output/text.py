@@ -1,11 +1,17 @@
-"""Text for a terminal."""
+"""Texts of numbers, labels and tables: for a terminal, CSV files and Markdown."""
 
+import csv
+import io
+import math
 import re
-from collections.abc import Collection, Iterable, Mapping
-from typing import SupportsFloat
+from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, SupportsFloat
 
 from springtune.problem.parameters import SWEPT, with_unit
 from springtune.safe_io.escapes import shown
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def paragraphs(parts: Iterable[Iterable[str]]) -> str:
@@ -75,9 +81,64 @@ def cell_text(labels: Mapping[str, object], units: Mapping[str, str]) -> str:
     return ", ".join(label_text(name, label, units.get(name, "1")) for name, label in labels.items())
 
 
+def place_text(data: "xr.Dataset", dims: Iterable[Hashable], place: Iterable[int]) -> str:
+    """Labels of a cell of a dataset for readers, by its place along each dimension."""
+    pairs = [(str(name), data[name] if name in data.coords else None, int(at)) for name, at in zip(dims, place)]
+    units = {name: str(axis.attrs.get("units", "1")) for name, axis, _ in pairs if axis is not None}
+    return cell_text({name: at if axis is None else axis.values[at] for name, axis, at in pairs}, units)
+
+
 NUMBER = re.compile(r"[+-]?[0-9][0-9.]*(e[+-]?[0-9]+)?")
 
 
 def without_numbers(text: str) -> str:
     """Replace numbers, so that messages that differ only in them are equal."""
     return NUMBER.sub("#", text)
+
+
+# -- tables ------------------------------------------------------------------------------------------------------------
+
+
+def csv_text(rows: Sequence[Mapping[str, object]]) -> str:
+    """Rows as CSV; missing numbers are empty."""
+    text = io.StringIO()
+    columns = list(dict.fromkeys(name for row in rows for name in row))
+    writer = csv.DictWriter(text, columns, lineterminator="\n")
+    writer.writeheader()
+    for row in rows:
+        writer.writerow({name: _cell(value) for name, value in row.items()})
+    return text.getvalue()
+
+
+def _cell(value: object) -> object:
+    if not isinstance(value, float):
+        return value
+    return "" if math.isnan(value) else f"{value:.8g}"
+
+
+def markdown_table(heads: list[str], rows: Iterable[list[str]]) -> list[str]:
+    """Markdown lines: first column left, others right."""
+    lines = [heads, ["---", *["---:"] * (len(heads) - 1)], *rows]
+    return [f"| {' | '.join(line)} |" for line in lines]
+
+
+def decimals(values: Iterable[float], digits: int = 4, most: int = 8) -> int | None:
+    """Decimals that show so many significant digits of a column; NaN is a missing number.
+
+    The largest number has all of them, the smallest nonzero one at most one fewer.
+    """
+    sizes = [abs(value) for value in values if math.isfinite(value) and value]
+    if not sizes:
+        return 0
+    high, low = (math.floor(math.log10(size)) for size in (max(sizes), min(sizes)))
+    found = max(digits - 1 - high, digits - 2 - low, 0)
+    return found if found <= most and high + found < digits + 4 and high < 9 else None
+
+
+def number(value: float, places: int | None, sign: bool = False) -> str:
+    """Format a number by `decimals`; "–" if missing."""
+    if not math.isfinite(value):
+        return "–"
+    text = f"{value:{'+' if sign else ''}{'.4g' if places is None else f'.{places}f'}}"
+    text = text.lstrip("-+") if not float(text) else text  # zero has no sign
+    return text.replace("-", "−")

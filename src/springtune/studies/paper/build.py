@@ -1,8 +1,9 @@
 """Build a paper: numbers, tables, figures, then the PDF."""
 
 import os
+import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,7 +14,7 @@ from ..runs import records
 from . import PaperError
 
 if TYPE_CHECKING:
-    from .datasets import Dataset
+    from .numbers import Dataset
 
 MAIN = "main.typ"
 
@@ -25,10 +26,9 @@ def run(source: str | Path, folder: str | Path, output: str | Path, *paths: str 
     _check_texts(source)
     # Here, so that what is wrong with the source is told at once.
     from . import figures, numbers
-    from .datasets import read
 
     declared, printed = numbers.load(source / "numbers.yaml"), numbers.load(source / "printed.yaml")
-    datasets = read(paths)
+    datasets = numbers.read(paths)
     content = {
         "numbers": numbers.numbers(declared.get("numbers", {}), printed, datasets),
         "tables": {
@@ -74,8 +74,6 @@ def check_typst() -> None:
 
 
 def _check_texts(source: Path) -> None:
-    from .typed import typed_numbers
-
     if not (source / MAIN).is_file():
         raise PaperError(f"{source / MAIN}: there is no such file; give the folder of a paper's source")
     found = [
@@ -93,6 +91,59 @@ def _labels(datasets: Mapping[str, "Dataset"]) -> list[str]:
     found = {str(label) for one in datasets.values() for name in ("beam", "definition", "mesh_type", "material")
              if name in one.tree.coords for label in one.tree.coords[name].values}  # fmt: skip
     return sorted(found)
+
+
+# -- numbers typed into the text ---------------------------------------------------------------------------------------
+
+FUNCTIONS = ("beam", "drawing", "has", "n", "named", "range", "tabular", "v")
+"""Template functions whose arguments are names or layout."""
+
+_BLANKED = (
+    re.compile(r"/\*.*?\*/", re.DOTALL),
+    re.compile(r"(?<!:)//[^\n]*"),
+    re.compile(r"^#(?:import|include|set|show)\b[^\n]*", re.MULTILINE),
+    re.compile(rf"#?\b(?:{'|'.join(FUNCTIONS)})\([^()\[\]]*\)"),
+    re.compile(r"\b(?:columns|width|height|gap|above|below|size|breakable|placement):\s*[\w.%()+, ]+(?=[,)\n])"),
+    re.compile(r"@[\w-]+(?:\[[^\]]*\])?"),
+    re.compile(r"<[\w-]+>"),
+    re.compile(r"https?://\S+"),
+)
+_REFERENCE = re.compile(
+    r"\b(?:[Tt]ables?|[Ff]igures?|[Ee]quations?|[Ss]ections?)[\s~]+\d+(?:\.\d+)*(?:(?:,|[\s~]+to|[\s~]+and|–|-)[\s~]*\d+(?:\.\d+)*)*"
+)
+_NAME = re.compile(r"\b[23]-?D\b|(?<=[A-Za-z_])\d+\w*")
+_FORMULA = re.compile(r"\$[^$]*\$")
+_STRUCTURE = re.compile(r"(?<![\d.,])\d(?![\d.,]*\d)")
+_NUMBER = re.compile(r"\d[\d.,]*(?:\s*%|\s*[a-zA-Zµ°]+\b)?")
+
+
+def _blank(found: re.Match[str]) -> str:
+    """Replace a match by empty lines."""
+    return re.sub(r"[^\n]", " ", found.group())
+
+
+def typed_numbers(text: str) -> Iterator[tuple[int, str]]:
+    r"""Yield numbers typed into Typst text in place of dataset values, with their lines.
+
+    Digits are allowed in names (``2-D``, ``P1``, ``@tab-1``), after *Table*, *Figure*, *Equation* and *section*, and in
+    arguments of `FUNCTIONS`. Formulas may hold one-digit integers, as :math:`2 k / \sqrt 3`.
+
+    Examples
+    --------
+    >>> list(typed_numbers("The error is 3.4 %, see Table 1."))
+    [(1, '3.4 %')]
+    >>> list(typed_numbers('The error is #n("worst"), see @tab-1; $k = sqrt(3)/2 E t$ in 2-D.'))
+    []
+    >>> list(typed_numbers("As a formula: $k = 0.866 E t$."))
+    [(1, '0.866 E')]
+    """
+    for pattern in _BLANKED:
+        text = pattern.sub(_blank, text)
+    text = _FORMULA.sub(lambda formula: _STRUCTURE.sub(_blank, formula.group()), text)
+    for pattern in (_REFERENCE, _NAME):
+        text = pattern.sub(_blank, text)
+    for found in _NUMBER.finditer(text):
+        yield text.count("\n", 0, found.start()) + 1, found.group().strip()
 
 
 if __name__ == "__main__":

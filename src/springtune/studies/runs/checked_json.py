@@ -1,13 +1,54 @@
-"""JSON notes between jobs, with a checksum; a damaged note reads as missing."""
+"""Hashes, and JSON notes between jobs with a checksum: a damaged note reads as missing."""
 
 import hashlib
 import json
+import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from springtune.safe_io import atomic
 
-from .damage import DamagedError
+_ENCODER = json.JSONEncoder(sort_keys=True, separators=(",", ":"))
+
+
+def hash_of(*parts: Any) -> str:
+    """Hash values, independent of the order of keys.
+
+    Examples
+    --------
+    >>> hash_of({"a": 1.0, "b": [2]}) == hash_of({"b": [2], "a": 1.0})
+    True
+    """
+    return hashlib.sha256(_ENCODER.encode(parts).encode()).hexdigest()[:24]
+
+
+ASIDE = ".damaged"
+
+
+class DamagedError(Exception):
+    """A stored file is damaged or missing."""
+
+    def __init__(self, path: str | Path, why: str, whole: bool = False) -> None:
+        super().__init__(f"{path}: {why}")
+        self.path, self.whole = Path(path), whole
+
+
+def rename(path: Path) -> Path:
+    """Rename a damaged file so that it is kept."""
+    aside = path.with_name(path.name + ASIDE)
+    with suppress(FileNotFoundError):  # another job was quicker
+        path.replace(aside)
+    return aside
+
+
+def set_aside(error: DamagedError) -> None:
+    """Rename a damaged file and report it; a whole file that lacks results keeps its name."""
+    told = "computed again"
+    if error.path.exists() and not error.whole:
+        told = f"set aside as {rename(error.path).name}, and computed again"
+    print(f"{error}; {told}", file=sys.stderr)
+
 
 PREFIX, BETWEEN, SUFFIX = b'{"seal": "', b'",\n"content": ', b"\n}\n"
 

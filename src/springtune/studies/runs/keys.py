@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from springtune.mesh import MESH_TYPES
 
 from . import dependencies
-from .hashing import hash_of
+from .checked_json import hash_of
 
 if TYPE_CHECKING:
     from springtune.problem.geometry import Beam

@@ -9,7 +9,7 @@ from springtune.safe_io.atomic import UNFINISHED
 
 from ..config.kind import FORMATS
 from . import plan, rerun
-from .damage import ASIDE
+from .checked_json import ASIDE
 
 if TYPE_CHECKING:
     from ..config.model import Study

@@ -19,7 +19,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from springtune.mechanics.contact import Body, Contact, ContactError, Obstacle
-from springtune.mechanics.follower import FollowerPressure
+from springtune.mechanics.network import FollowerPressure
 from springtune.mesh import MESH_TYPES, Mesh
 from springtune.problem.geometry import Strip, Trapezoid
 from springtune.problem.materials import material_of

@@ -8,7 +8,7 @@ import numpy as np
 from springtune.safe_io.atomic import write_text
 
 from ...output.dataset import STATUS, Filler, Group
-from ...output.tables import csv_text
+from ...output.text import csv_text
 from ...runs import store
 from .batches import crossings, refine, value_key
 from .kind import file_key

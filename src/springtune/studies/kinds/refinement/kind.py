@@ -30,7 +30,7 @@ from ...config.fields import (
 from ...config.kind import Kind
 from ...config.messages import refuse, show
 from ...config.sections import Section
-from ...runs.hashing import hash_of
+from ...runs.checked_json import hash_of
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key, stage_key
 from ...runs.stages import Task, stage
 from .batches import Rule

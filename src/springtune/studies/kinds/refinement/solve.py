@@ -16,8 +16,7 @@ from springtune.problem.geometry import Beam
 from springtune.problem.loads import LOAD_KINDS
 from springtune.problem.materials import material_of
 from springtune.problem.status import Status
-from springtune.reference.limits import beyond_linear
-from springtune.reference.similarity import unit_problem, unit_scales
+from springtune.reference.answers import beyond_linear, unit_problem, unit_scales
 from springtune.reference.small_strain import ReferenceNotConvergedError, solve_unit
 from springtune.scene.meshes import make_mesh
 from springtune.scene.sheet import Sheet

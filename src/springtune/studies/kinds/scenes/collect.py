@@ -10,12 +10,10 @@ from springtune.problem.compare import deformation_error
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import Rubber
 from springtune.problem.status import Status
-from springtune.reference.field import interpolate, outline
-from springtune.reference.limits import objection
+from springtune.reference.answers import interpolate, objection, outline
 from springtune.springs.lattice import predicted_stiffness
 
-from ...config.model import Reference
-from ...config.shown import keeps_fields
+from ...config.model import Reference, keeps_fields
 from ...output.dataset import NO_NODE, Filler
 from ...output.selection import OF_FIELDS
 from ...runs import checked_json, store

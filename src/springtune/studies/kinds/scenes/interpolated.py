@@ -7,11 +7,10 @@ from math import ceil, floor, log, log10
 from typing import TYPE_CHECKING
 
 from springtune.problem.loads import LOADS
-from springtune.reference.similarity import unit_problem
+from springtune.reference.answers import unit_problem
 from springtune.springs import DEFINITIONS
 
-from ...config.remembered import once_a_study
-from ...config.shown import keeps_fields, shown
+from ...config.model import keeps_fields, once_a_study, shown
 
 if TYPE_CHECKING:
     from springtune.problem.geometry import Beam

@@ -6,9 +6,7 @@ from typing import TYPE_CHECKING
 from springtune.problem.loads import LOADS
 
 from ...config.kind import Output, distinct
-from ...config.model import swept_value
-from ...config.remembered import once_a_study
-from ...config.shown import shown
+from ...config.model import once_a_study, shown, swept_value
 
 if TYPE_CHECKING:
     from ...config.model import CurveSpec, SceneSpec, Study

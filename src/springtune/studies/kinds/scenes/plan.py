@@ -8,12 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from springtune.problem.loads import LOADS
-from springtune.reference.similarity import unit_problem, unit_scales
+from springtune.reference.answers import unit_problem, unit_scales
 
 from ...config.kind import Stage
-from ...config.remembered import once_a_study
-from ...config.shown import shown
-from ...runs.hashing import hash_of
+from ...config.model import once_a_study, shown
+from ...runs.checked_json import hash_of
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key, stage_key
 from ...runs.stages import Task, products, stage
 from . import stored

@@ -11,7 +11,7 @@ import numpy as np
 
 from springtune.problem.loads import LOAD_KINDS
 from springtune.problem.status import Status
-from springtune.reference.limits import objection
+from springtune.reference.answers import objection
 from springtune.scene.curve import ending, follow, meeting
 from springtune.scene.sheet import Sheet
 

@@ -10,7 +10,7 @@ from springtune.problem.boundary import FACE_POSITIONS
 from springtune.problem.loads import LOAD_KINDS
 from springtune.problem.materials import material_of
 from springtune.problem.status import Status
-from springtune.reference.field import field_error, interpolate
+from springtune.reference.answers import field_error, interpolate
 from springtune.scene.sheet import Sheet, definition_of
 from springtune.springs import DEFINITIONS, DefinitionError
 

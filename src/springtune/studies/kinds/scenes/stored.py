@@ -13,9 +13,8 @@ from springtune.mesh import Mesh, read_mesh, write_mesh
 from springtune.mesh.groups import GroupedMesh
 
 from ...runs import checked_json, store
-from ...runs.damage import DamagedError, set_aside
+from ...runs.checked_json import DamagedError, hash_of, set_aside
 from ...runs.driver import RefusedError
-from ...runs.hashing import hash_of
 from ...runs.records import checksum
 
 # -- meshes ------------------------------------------------------------------------------------------------------------

@@ -3,7 +3,7 @@
 from math import prod
 
 from springtune.problem.loads import LOADS
-from springtune.reference.similarity import unit_problem
+from springtune.reference.answers import unit_problem
 from springtune.springs import DEFINITIONS
 
 from ...config.model import SceneSpec, Study

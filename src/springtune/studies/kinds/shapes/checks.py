@@ -62,8 +62,8 @@ def _check_file(name, shape, path, problems):
     if file.stat().st_size > READ_AT_ONCE:
         return
     # Here, since few studies have files, and reading one takes scipy.
-    from springtune.mesh.group_files import read_shape
-    from springtune.problem.cases import check_case
+    from springtune.mesh.formats import read_shape
+    from springtune.problem.boundary import check_case
 
     try:
         grouped = read_shape(file, shape.unit)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from springtune.problem.compare import deformation_error
-from springtune.reference.limits import beyond_linear
+from springtune.reference.answers import beyond_linear
 
 from ...output.dataset import Filler
 from ...runs import store

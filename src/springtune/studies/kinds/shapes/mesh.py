@@ -2,7 +2,7 @@
 
 from functools import partial
 
-from springtune.mesh.group_files import read_shape
+from springtune.mesh.formats import read_shape
 from springtune.mesh.outlines import mesh_shape
 
 from ..scenes import mesh

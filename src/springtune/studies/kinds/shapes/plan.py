@@ -6,7 +6,7 @@ from operator import attrgetter
 from typing import TYPE_CHECKING
 
 from ...runs import driver
-from ...runs.hashing import hash_of
+from ...runs.checked_json import hash_of
 from ...runs.keys import definition_key, material_key, mesh_type_key, stage_key
 from ...runs.stages import Task, stage
 from ..scenes.plan import file_source, mesh_stage, on_meshes, parameters, particles_in, stage_on_meshes

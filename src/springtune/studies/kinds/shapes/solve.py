@@ -4,12 +4,12 @@ import time
 
 import numpy as np
 
-from springtune.problem.cases import check_case
+from springtune.problem.boundary import check_case
 from springtune.problem.status import Status
 from springtune.scene.single import Scene
 from springtune.springs import DefinitionError
 
-from ...runs.hashing import hash_of
+from ...runs.checked_json import hash_of
 from ..scenes import stored
 from .task_values import ONE_LOAD, by_key, materials_of, shape_of
 

@@ -58,9 +58,7 @@ SHAPE_FIELDS = declared(
             f"{name}_name": ("1", name.replace("_", " "), "") for name in (*CASE_AXES, "kinematics", "mesh_type")
         }
         | {"case_mesh_size": ("m", "asked length of an edge; 0 where the mesh is that of a file")},
-        ("case", "definition", "particle"): {
-            name: (*row, np.float32(np.nan)) for name, row in shared.DISPLACEMENT_ROWS.items()
-        },
+        ("case", "definition", "particle"): SEVEN_DIGITS,
         ("case", "definition", "spring"): shared.SPRING_FORCE_ROW,
         ("case", "outline_point"): {
             "outline_round": ("1", "number of the round that a point is of, from 0", -1),

@@ -1,6 +1,6 @@
 """What the page to browse shows of shapes."""
 
-from ...output.views import Plot, View
+from ...output.browse import Plot, View
 
 VIEWS = (
     View(

@@ -4,6 +4,7 @@ import base64
 import hashlib
 import json
 import os
+import sys
 import zlib
 from collections.abc import Iterable
 from dataclasses import asdict
@@ -16,11 +17,13 @@ import jinja2
 from markupsafe import Markup
 
 from springtune.registry import imported
+from springtune.safe_io.atomic import write_text
 from springtune.safe_io.inputs import bounded
 
 from ...config.kind import modules
+from ...runs import records
 from ..reading import REMEDY, check_links, guarded, most_of
-from ..views import View
+from . import View
 from .payload import packed
 
 SCRIPTS = ("payload", "words", "charts", "table", "cells", "shape", "explorer", "main")
@@ -93,3 +96,14 @@ def _library() -> dict[str, str]:
 
 def _hash(script: str) -> str:
     return f"'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}'"
+
+
+def main(dataset: str, output: str, record: str, digest: str, *files: str) -> None:
+    """Write the page of a dataset, and the record of it."""
+    read = records.checksum(dataset)
+    write_text(output, page(dataset, files))
+    records.write(record, digest, [output], read=read)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

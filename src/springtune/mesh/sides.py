@@ -1,6 +1,7 @@
 """Sides of an outline, straight or arcs: points, lengths and intersections."""
 
 import math
+from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -167,8 +168,6 @@ class OutlineSide:
         """Parameter at a length from the start along the side [m]."""
         if self.arc is None or self.circular:
             return length / self.length
-        from bisect import bisect_right
-
         panel = min(max(bisect_right(self._lengths, length) - 1, 0), PANELS - 1)
         parameter = (panel + 0.5) / PANELS
         for _ in range(20):
