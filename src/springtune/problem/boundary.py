@@ -329,20 +329,7 @@ def _shares(corners: np.ndarray) -> np.ndarray | None:
 
 
 def check_case(grouped: GroupedMesh, case: LoadCase) -> None:
-    """Refuse a load case whose groups a mesh lacks, or that leaves cells free to move.
-
-    Examples
-    --------
-    >>> import springtune as st
-    >>> grouped = st.mesh_shape(st.Shape.rectangle("100 mm", "40 mm", points={"corner": (0, 0)}), "10 mm")
-    >>> pull = st.LoadCase("pull", (st.Support("left", x=0),), (st.Traction("right", ("1 kN", 0)),))
-    >>> try:
-    ...     check_case(grouped, pull)
-    ... except ValueError as error:
-    ...     print(error)
-    load 'pull': its supports leave the body free to move along y; hold it
-    >>> check_case(grouped, st.LoadCase("pull", (*pull.supports, st.Support("corner", y=0)), pull.tractions))
-    """
+    """Refuse a load case whose groups a mesh lacks, or that leaves cells free to move."""
     case.check_names(grouped.sides, grouped.points, grouped.unusable)
     where = f"load {case.name!r}"
     pressed = {one.group for one in case.pressures}
