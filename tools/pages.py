@@ -4,6 +4,7 @@
 """
 
 import argparse
+import re
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,9 @@ TABLES = {
 }
 """Tables that each page shows, in the folder of all results."""
 
+LONG, KEPT = 30, 15
+"""Rows above which a table is shortened, and rows that it keeps on its page."""
+
 NOISE = 1.3
 """Ratio of seconds that runs of one program on one machine show among themselves."""
 
@@ -34,6 +38,19 @@ def put(page: Path, tables: str) -> None:
     if not begin or not end:
         raise SystemExit(f"{page}: the marks around the tables are missing; put {BEGIN.strip()} and {END.strip()}")
     write_text(page, before + BEGIN + "\n" + tables + "\n" + END + after)
+
+
+def shorten(tables: str, file: str) -> str:
+    """Keep the first rows of long tables, and leave out what has no numbers: the file of the study has all."""
+
+    def first(table: re.Match[str]) -> str:
+        head, rule, *rows = table[0].splitlines(keepends=True)
+        if len(rows) <= LONG:
+            return table[0]
+        return "".join([head, rule, *rows[:KEPT], f"\n{len(rows) - KEPT} more rows are in `results/{file}`.\n"])
+
+    numbers = re.sub(r"^### [^\n]*: what has no numbers\n.*?(?=^###|\Z)", "", tables, flags=re.MULTILINE | re.DOTALL)
+    return re.sub(r"(?:^\|.*\n)+", first, numbers, flags=re.MULTILINE)
 
 
 def benchmark(path: Path) -> xr.Dataset:
@@ -80,7 +97,7 @@ def main() -> None:
     parser.add_argument("--compare", nargs=2, type=Path, metavar=("OLD.nc", "NEW.nc"), help="datasets of benchmarks")
     if not (compared := parser.parse_args().compare):
         for page, tables in TABLES.items():
-            put(REPOSITORY / "docs" / page, (REPOSITORY / "results" / tables).read_text())
+            put(REPOSITORY / "docs" / page, shorten((REPOSITORY / "results" / tables).read_text(), tables))
         return
     lines, flagged = comparison(*map(benchmark, compared))
     print("\n".join(lines))

@@ -212,6 +212,16 @@ def test_tables_of_studies_are_put_between_the_marks_of_their_pages(tmp_path):
         pages["put"](page, "new tables\n")
 
 
+def test_long_tables_are_shortened_on_pages():
+    shorten = run_path(str(REPOSITORY / "tools/pages.py"))["shorten"]
+    rows = [f"| {row} |\n" for row in range(31)]
+    lost = "### bending: what has no numbers\n\n- `a`: why\n\n"
+    head, rest = "### One\n\n| n |\n| --- |\n", "### Two\n"
+    assert shorten("".join([head, *rows[:30], "\n", lost, rest]), "") == "".join([head, *rows[:30], "\n", rest])
+    told = "\n16 more rows are in `results/speed.md`.\n"
+    assert shorten("".join([head, *rows, "\n", rest]), "speed.md") == "".join([head, *rows[:15], told, "\n", rest])
+
+
 def test_every_picture_is_of_a_study_or_an_example():
     """`make pictures` copies what docs/figures.yaml names, and each of it is a figure that its study makes."""
     pictures = yaml.safe_load((REPOSITORY / "docs/figures.yaml").read_text())
