@@ -6,11 +6,11 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, TypeVar
 
 from ...config.model import CurveSpec, SceneSpec
-from ...runs.plan import Costs
 from .plan import particles, stem
 
 if TYPE_CHECKING:
     from ...config.model import Study
+    from ...runs.plan import Costs
     from ..division import Division, Name
 
 Asked = SceneSpec | CurveSpec
@@ -18,7 +18,7 @@ Asked = SceneSpec | CurveSpec
 Item = TypeVar("Item")
 
 
-def pieces(study: "Study", costs: Costs, division: "Division") -> "dict[Name, float]":
+def pieces(study: "Study", costs: "Costs", division: "Division") -> "dict[Name, float]":
     """Seconds of each piece: of a mesh's scenes and curves, of a part of them, or of a grid's."""
     if division.by == "grid":
         return {("grid", name): sum(_seconds(one, costs) for one in items) for name, items in _by_grid(study).items()}
@@ -94,7 +94,7 @@ def _slice(items: "Sequence[Item]", number: int, count: int) -> "Sequence[Item]"
     return items[len(items) * number // count : len(items) * (number + 1) // count]
 
 
-def _seconds(one: Asked, costs: Costs) -> float:
+def _seconds(one: Asked, costs: "Costs") -> float:
     """What a scene or a curve is expected to take."""
     count = particles(one.mesh)
     if isinstance(one, CurveSpec):
