@@ -29,7 +29,8 @@ from springtune.studies.runs.plan import plan, table_files
 from springtune.studies.runs.task_costs import TaskCosts
 from springtune.studies.runs.workload import results_of
 
-from campaigns import STUDIES, load_text
+from campaigns import load_text
+from tables import STUDIES
 
 REPOSITORY = Path(__file__).parents[2]
 COOK = STUDIES["shapes"]

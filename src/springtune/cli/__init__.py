@@ -74,9 +74,6 @@ COMMANDS = {
     ),
     "clean": Row(RESULTS, "results", "clean", "List what no study asks for any more, and remove it."),
     "schema": Row(HOUSE, "study", "schema", "Print the JSON schema of studies, or renew it and the manual."),
-    "which": Row(HOUSE, "pages", "which", "Tables of docs/which-definition.md from a dataset."),
-    "stability": Row(HOUSE, "pages", "stability", "Tables of docs/stability.md from a dataset."),
-    "bench": Row(HOUSE, "pages", "bench", "Tables of docs/speed.md from a dataset, or ratios of two benchmarks."),
 }
 """Commands by name, in the order of the help; each is imported when it is called."""
 

@@ -83,6 +83,11 @@ class Output:
         return self.plot.partition(":")[0]
 
 
+def needs(part: str, why: str) -> Callable[[Study], str]:
+    """`Output.lack` of an output that needs a part of a study."""
+    return lambda study: "" if study.parts[part] else why
+
+
 @dataclass(frozen=True)
 class Stage:
     """A stage before the dataset; each of its jobs does a bundle of tasks.
@@ -159,12 +164,14 @@ class Kind:
         From that part to the labels of its groups' dimensions.
     summary : callable, optional
         From that part to rows of `springtune scenes`: name, number and remark.
-    variables : dict of str to tuple
-        Variables of its group, see `springtune.studies.output.dataset.Group`.
+    variables, dimensions : dict
+        Variables and own dimensions of its group, see `springtune.studies.output.dataset.Group`.
+    attributes : callable, optional
+        From that part to the attributes of its group.
     stages : tuple of Stage
     outputs : tuple of Output
-    tables : callable, optional
-        From a study to the stems of its tables on the page; ``tables(tree)`` of its module ``tables`` makes them.
+    tables, tables_by : callable and str, optional
+        From a study to the stems of its tables on the page; module whose ``tables(tree)`` makes them.
     costs : dict of str to tuple
         Seconds of a task by its name in records, fixed and per unit, before any is measured.
     pieces : callable, optional
@@ -184,9 +191,12 @@ class Kind:
     axes: Callable[[Any], Mapping[str, Collection[str | float]]] = lambda part: {}
     summary: Callable[[Any], list[list[object]]] = lambda part: []
     variables: dict[str, tuple[tuple[str, ...], str, str, Any]] = field(default_factory=dict)
+    dimensions: dict[str, str | tuple[str, str]] = field(default_factory=dict)
+    attributes: Callable[[Any], Mapping[str, object]] = lambda part: {}
     stages: tuple[Stage, ...] = ()
     outputs: tuple[Output, ...] = ()
     tables: Callable[[Study], list[str]] | None = None
+    tables_by: str = "tables"
     costs: dict[str, tuple[float, float]] = field(default_factory=dict)
     pieces: Callable[[Study, Any, Any], Mapping[tuple[str | int, ...], float]] | None = None
     take: Callable[[Study, Collection[tuple[str | int, ...]]], Study] | None = None

@@ -154,7 +154,7 @@ def _present_digest(members: "Iterable[Output]", files: list[str]) -> str:
         used += filter(None, (one.module, one.write))
         if one.page:
             used += ["studies.output.page", *modules("kind")]
-            used += [f"studies.kinds.{kind.name}.tables" for kind in kinds() if kind.tables]
+            used += [f"studies.kinds.{kind.name}.{kind.tables_by}" for kind in kinds() if kind.tables]
             templates.append(records.checksum(PACKAGE / "studies/output/page.html"))
     return hash_of(files, [stage_key(name) for name in dict.fromkeys(used)], templates)
 

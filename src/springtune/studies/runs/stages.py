@@ -28,7 +28,7 @@ class Task:
     also : sequence
         Further parts of its key: keys of definitions and mesh types.
     labels : dict
-        Labels of its cell of the dataset.
+        Labels of its cell of the dataset; a label may be several.
     of : object
         Object of the study that it comes from.
     costs : sequence of tuple
@@ -45,7 +45,7 @@ class Task:
 
     values: Mapping[str, Any]
     also: Sequence[object] = ()
-    labels: Mapping[str, str | float] = field(default_factory=dict)
+    labels: Mapping[str, Any] = field(default_factory=dict)
     of: Any = None
     costs: Sequence[tuple[str, float] | tuple[str, float, float]] = ()
     name: str = ""
