@@ -132,7 +132,7 @@ def test_a_plot_draws_on_axes_and_figures_that_it_is_given(tree, plot):
     place, size = [panel.get_position().bounds for panel in given], figure.get_size_inches().tolist()
     axes = plot(tree, given if count else given[0], **selection)
     assert list(np.ravel(axes)) == list(given) and all(panel.has_data() for panel in given)
-    png_and_pdf(figure)  # nothing that cannot be drawn
+    figure.draw_without_rendering()  # nothing that cannot be drawn
     if not np.any([panel.get_aspect() != "auto" for panel in given]):
         assert [panel.get_position().bounds for panel in given] == place
     assert figure.get_size_inches().tolist() == size
