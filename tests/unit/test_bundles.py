@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from springtune.springs import DEFINITIONS
 from springtune.studies.kinds import load_study
-from springtune.studies.kinds.stability.names import EXPERIMENTS
+from springtune.studies.kinds.stability import EXPERIMENTS
 from springtune.studies.runs import checked_json, plan, records, workload
 from springtune.studies.runs.task_costs import TaskCosts
 

@@ -11,7 +11,6 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
-import xarray as xr
 import yaml
 from click.testing import CliRunner
 
@@ -120,44 +119,6 @@ def test_wrong_calls_exit_with_2():
     assert run("no-such-command").exit_code == 2
     assert run("predict").exit_code == 2 and "Missing option '--beam'" in run("predict").stderr
     assert run("scenes", "--no-such-option").exit_code == 2
-
-
-@pytest.mark.parametrize("command", ["which", "stability", "bench"])
-def test_a_missing_dataset_is_told_with_what_to_run(tmp_path, command):
-    for path in (tmp_path / "none.nc", tmp_path):
-        result = run(command, path)
-        assert result.exit_code == 1 and len(result.stderr.splitlines()) == 1
-        assert f"{path}: there is no such dataset; run config/" in result.stderr
-    (tmp_path / "text.nc").write_text("no dataset")
-    result = run(command, tmp_path / "text.nc")
-    assert result.exit_code == 1 and "text.nc: cannot be read" in result.stderr and "run config/" in result.stderr
-
-
-class TestBench:
-    def test_dataset_without_a_benchmark_is_refused(self, tmp_path):
-        xr.DataTree.from_dict({"/": xr.Dataset(attrs={"springtune_version": "1"})}).to_netcdf(
-            tmp_path / "old.nc", engine="h5netcdf"
-        )
-        result = run("bench", tmp_path / "old.nc", "--compare", tmp_path / "old.nc")
-        assert result.exit_code == 1 and "has no group /benchmark; run config/benchmark.yaml" in result.stderr
-        assert "none.nc" in run("bench", tmp_path / "none.nc").stderr
-
-    def test_ratios_of_two_benchmarks(self, tmp_path):
-        dims, coordinates = (
-            ("scene", "approach", "mesh_size"),
-            {"scene": ["a"], "approach": ["x", "y", "z"], "mesh_size": [1.0]},
-        )
-        for name, second in (("old", 0.1), ("new", 0.3)):
-            seconds = [[[0.1], [second], [0.1]]]
-            data = xr.Dataset(
-                {"seconds": (dims, seconds), "seconds_spread": (dims, 0.0 * np.array(seconds))}, coordinates
-            )
-            xr.DataTree.from_dict({"/": xr.Dataset(attrs={"springtune_version": "1"}), "/benchmark": data}).to_netcdf(
-                tmp_path / f"{name}.nc", engine="h5netcdf"
-            )
-        assert run("bench", tmp_path / "old.nc", "--compare", tmp_path / "old.nc").exit_code == 0
-        result = run("bench", tmp_path / "new.nc", "--compare", tmp_path / "old.nc")
-        assert result.exit_code == 1 and "  3.00  y  slower" in result.stdout
 
 
 class TestScenes:

@@ -9,7 +9,7 @@ from click.testing import CliRunner
 
 import springtune as st
 from springtune.cli import main
-from springtune.studies.kinds.benchmark.collect import BENCHMARK
+from springtune.studies.kinds.benchmark.kind import VARIABLES
 from springtune.studies.kinds.scenes.variables import ROOT, SENSITIVITY
 from springtune.studies.output import dataset
 from springtune.studies.output.comparison import Tolerance, compare
@@ -97,10 +97,8 @@ class TestSame:
         assert not found.different and not found.attributes
 
     def test_nothing_that_a_benchmark_measures_is_compared(self):
-        measured = {
-            name for name, (_, units, *_) in BENCHMARK.variables.items() if units in ("s", "s-1", "byte", "byte s-1")
-        }
-        before = xr.Dataset({name: ((), 1.0) for name in BENCHMARK.variables})
+        measured = {name for name, (_, units, *_) in VARIABLES.items() if units in ("s", "s-1", "byte", "byte s-1")}
+        before = xr.Dataset({name: ((), 1.0) for name in VARIABLES})
         after = before.assign({name: ((), 2.0) for name in measured})
         assert {"seconds", "spring_updates", "copy_bandwidth"} <= measured
         assert not compare(*(xr.DataTree.from_dict({"/benchmark": one}) for one in (before, after))).different

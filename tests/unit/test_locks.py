@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 from springtune.cli import main
-from springtune.safe_io.processes import this_host
+from springtune.safe_io.atomic import this_host
 from springtune.studies.runs import checked_json, locks
 
 from tables import STUDIES

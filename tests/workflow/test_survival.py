@@ -15,7 +15,7 @@ import pytest
 import xarray as xr
 
 import springtune
-from springtune.safe_io.processes import this_host
+from springtune.safe_io.atomic import this_host
 from springtune.studies.runs import checked_json, store
 
 from campaigns import Campaign
