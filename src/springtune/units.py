@@ -94,19 +94,7 @@ class UnitError(ValueError):
 
 
 def parse(text: str, kind: str) -> float:
-    """Return the number in SI units of a quantity.
-
-    Examples
-    --------
-    >>> parse("200 mm", "length")
-    0.2
-    >>> parse("170e6 N/m", "stiffness")
-    170000000.0
-    >>> parse("200 mm", "force")
-    Traceback (most recent call last):
-    ...
-    springtune.units.UnitError: '200 mm' is a length; give a force such as '400 kN'
-    """
+    """Return the number in SI units of a quantity."""
     wanted = QUANTITY_KINDS[kind]
     if len(text) > LONGEST_QUANTITY:
         text = f"{text[:57]}..."
@@ -118,7 +106,8 @@ def parse(text: str, kind: str) -> float:
     number, unit = found.groups()
     if not unit:
         raise UnitError(f"'{text}' has no unit; {remedy}")
-    known = _measure(_spelling(unit))
+    spelling = _spelling(unit)
+    known = _KNOWN.get(spelling) or _ask_pint(spelling)
     if known is None:
         near = get_close_matches(unit, COMMON[kind], n=1, cutoff=0.5)
         meant = f", did you mean '{near[0]}'?" if near else ";"
@@ -145,11 +134,6 @@ def _spelling(unit: str) -> str:
 def _article(kind: str) -> str:
     article = "an" if kind[0] in "aeiou" else "a"
     return f"{article} {kind}" if kind in QUANTITY_KINDS else kind
-
-
-def _measure(unit: str) -> tuple[str, Decimal] | None:
-    """Return kind and size in SI units of a unit; None if unknown."""
-    return _KNOWN.get(unit) or _ask_pint(unit)
 
 
 @cache

@@ -12,11 +12,11 @@ from springtune.mesh import MESH_TYPES, ROW_HEIGHT, Mesh, lattice, signed_areas
 from springtune.problem.geometry import Beam
 from springtune.problem.materials import Material, Rubber
 from springtune.springs import DEFINITIONS, DefinitionError, Springs, definition
-from springtune.springs.adjoint import springs as adjoint
 from springtune.springs.base import not_negative
 from springtune.springs.fitting import least_squares
 from springtune.springs.identification import Misfit, patch_cases
 from springtune.springs.lattice import predicted_stiffness
+from springtune.springs.searched import adjoint
 from springtune.studies.runs import driver, store
 from springtune.studies.runs.task_costs import TaskCosts
 

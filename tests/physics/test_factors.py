@@ -9,9 +9,16 @@ from hypothesis import strategies as st
 from scipy.sparse import csc_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-from springtune.linalg.factors import Analysis, SingularError, SuperLUFactor, factorize, factorize_pinned
+from springtune.linalg.factors import (
+    Analysis,
+    SingularError,
+    SuperLUFactor,
+    factorize,
+    factorize_pinned,
+    nested_dissection,
+    spread,
+)
 from springtune.linalg.multigrid import IndefiniteError, Multigrid, bilinear
-from springtune.linalg.ordering import nested_dissection, spread
 from springtune.mechanics.arc_length import follow
 from springtune.mechanics.network import PINNED, FollowerPressure, Network, successor
 from springtune.mechanics.series import trace

@@ -15,6 +15,7 @@ from springtune.studies.output import dataset
 from springtune.studies.output.comparison import Tolerance, compare
 
 import synthetic
+from tables import refused_calls
 
 AXES = {
     "beam": ("200x40", "100x20"),
@@ -282,24 +283,7 @@ class TestCommand:
         for pair in (("one", "other"), ("results/one", "config/other.yaml"), ("results/one/dataset.nc", "other")):
             assert run("diff", *pair).exit_code == 0
 
-    @pytest.mark.parametrize(
-        ("arguments", "said"),
-        [
-            (("none", "small"), "none: there is no such dataset; run the study, or give a dataset.nc"),
-            (("small", "text.nc"), "text.nc: cannot be read"),
-            (("small", "plain.nc"), "plain.nc: is not a dataset of springtune; give the dataset.nc of a study"),
-            (("small", "small", "--group", "curves"), "--group curves: neither has it; known: /, /sensitivity"),
-            (
-                ("small", "small", "--ignore", "displacment"),
-                "--ignore displacment: neither has it; did you mean 'displac",
-            ),
-            (("small", "small", "--ignore", "status", "--ignore", "none_*"), "--ignore none_*: neither has it"),
-            (("small", "small", "--relative", "one"), "'one' is no tolerance; give a number such as 1e-6"),
-            (("small", "small", "--absolute", "-1"), "'-1' is no tolerance"),
-            (("small", "small", "--relative", "nan"), "'nan' is no tolerance"),
-            (("small", "twice.nc"), "dimension 'beam' has the label 200x40 twice"),
-        ],
-    )
+    @pytest.mark.parametrize(("arguments", "said"), refused_calls("diff"))
     def test_trouble_is_2_and_one_line(self, arguments, said, troubled, monkeypatch):
         monkeypatch.chdir(troubled)
         result = run("diff", *arguments)

@@ -14,7 +14,7 @@ from springtune.studies.runs import dependencies as code
 from springtune.studies.runs import driver, store
 from springtune.studies.runs.task_costs import TaskCosts
 
-from campaigns import STUDIES
+from tables import STUDIES
 
 
 def test_experiments_are_one_a_definition_or_one_in_all(load):

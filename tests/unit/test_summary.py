@@ -26,6 +26,8 @@ from springtune.studies.output.dataset import Filler
 from springtune.studies.runs import checked_json, plan, records, rerun, workload
 from springtune.studies.runs.dependencies import CODE_FILE, Code
 
+from tables import STUDIES
+
 AXES = {
     "beam": ("100x20", "80x10"),
     "mesh_type": ("free",),
@@ -124,14 +126,7 @@ class TestText:
         assert [line.partition(",")[0].strip() for line in named] == ["beam-a", "beam-j", "beam-b", "and 7 more"]
 
 
-STUDY = """
-title: Two definitions
-beams: {80x10: {length: 80 mm, height: 10 mm}}
-materials: {steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}}
-grids:
-  one: {beam: 80x10, mesh_type: structured, mesh_size: [2 mm, 5 mm], material: steel, load: traction, force: 1 kN,
-        definition: [lattice, patch]}
-"""
+STUDY = STUDIES["summary"]
 
 
 @pytest.fixture
@@ -256,7 +251,7 @@ class TestEnding:
         study, made, names = planned
         since = time.time() - 100
         for name in names:
-            count = len(workload.keys_of(made.jobs[name].content))
+            count = len(workload.results_of(made.jobs[name].content))
             records.write(made.record(name), "digest", [], work={"linear": [count, 1.0, 1.0]})
             moment = since + (50 if name.startswith(new) else -50)
             os.utime(made.record(name), (moment, moment))

@@ -25,8 +25,8 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from ..mesh import corner_angles, signed_areas
-from .simulation import Net, Simulation, about, commented, load_in_words, numbers, simulate
-from .terms import Terms
+from .simulation import Simulation, about, commented, load_in_words, numbers, simulate
+from .terms import Net, Terms
 
 VERSIONS = (3, 4)
 """Versions of MuJoCo that files are written for; the last one where none is asked for."""

@@ -15,7 +15,7 @@ the quadratic form of its second derivative at rest.
 import inspect
 import sys
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +26,7 @@ from ..mechanics.dynamics import masses
 from ..mechanics.energies import AngleEnergy, AreaEnergy, BiquadraticEnergy, Energy, NeoHookeEnergy, YeohEnergy
 from ..mechanics.integrators import IMPLICIT, INTEGRATORS
 from ..mesh import Mesh, corner_angles, signed_areas
-from ..mesh.cells import no_cells, rows_of
+from ..mesh.cells import rows_of
 from ..problem.compare import quantity_errors
 from ..problem.geometry import Beam
 from ..problem.loads import LOADS, LoadKind
@@ -35,12 +35,12 @@ from ..problem.quantities import positive
 from ..problem.status import Status
 from ..scene.meshes import A_BEAM, A_MATERIAL, A_MESH, check_filled, is_a
 from ..scene.motion import stable_steps
-from ..scene.sheet import AnyDefinition, OwnDefinition, Sheet, check_stiffness, definition_of, named
+from ..scene.sheet import AnyDefinition, Sheet, check_stiffness, definition_of, named
 from ..scene.single import Scene
 from ..scene.statements import ShapeStatement
 from ..springs import Definition, DefinitionError, Springs
-from .formats import ARRAYS, Content, read, write
-from .terms import Terms
+from .formats import read, write
+from .terms import Net, Terms
 
 UNITS = {
     "points": "m",
@@ -77,7 +77,7 @@ NOT_COMPUTED = "not computed"
 
 
 @dataclass(frozen=True, eq=False)
-class SpringNet:
+class SpringNet(Net):
     """A network of springs as plain arrays, in SI units.
 
     Attributes
@@ -125,19 +125,6 @@ class SpringNet:
     True
     """
 
-    points: np.ndarray
-    springs: np.ndarray
-    rest_lengths: np.ndarray
-    stiffness: np.ndarray
-    energies: tuple[Terms, ...]
-    masses: np.ndarray | None
-    thickness: float
-    held: np.ndarray
-    forces: np.ndarray
-    header: dict[str, Any]
-    triangles: np.ndarray = field(default_factory=lambda: no_cells(3))
-    quads: np.ndarray = field(default_factory=lambda: no_cells(4))
-
     @classmethod
     def from_scene(
         cls, scene: Scene, mesh_name: str = "", *, springs: Springs | None = None, errors: bool = True
@@ -165,36 +152,28 @@ class SpringNet:
             If the definition cannot live on the mesh or with the material.
         """
         springs = scene.springs if springs is None else springs
-        held, inertia, about = scene.held, scene.statement.masses(), scene.statement
-        parts = _parts(scene.sheet, springs, inertia, held, about.forces(scene.sheet, springs))
-        header = _header(scene.definition, scene.sheet, about.materials, springs, inertia, held, mesh_name)
-        if isinstance(about, ShapeStatement):
-            load = {
-                "name": scene.load,
-                "scale": about.scale,
-                "kinematics": scene.kinematics,
-                "follower": about.loading.follower is not None,
-                "prescribed": about.loading.given is not None,
-            }
-            header |= {"shape": about.body, "load": load}
-            if errors:
-                header |= {"expected_error": _errors_on_shape(scene), "expected_error_means": MEANING_ON_SHAPES}
-            return cls(**parts, header=header)
-        load = {
+        about, forces = scene.statement, scene.statement.forces(scene.sheet, springs)
+        parts = _parts(scene.definition, scene.sheet, about.materials, springs, about.masses(), mesh_name, scene.held)
+        header = parts["header"]
+        scale = about.scale if isinstance(about, ShapeStatement) else None
+        header["load"] = {
             "name": scene.load,
-            "force": scene.force,
+            **({"force": about.force} if scale is None else {"scale": scale}),
             "kinematics": scene.kinematics,
-            "follower": scene.follower,
+            "follower": about.loading.follower is not None,
+            **({} if scale is None else {"prescribed": about.loading.given is not None}),
         }
-        header |= {"beam": _beam(scene.beam), "load": load}
-        if errors:
+        header |= {"beam": _beam(scene.beam)} if scale is None else {"shape": about.body}
+        if errors and scale is not None:
+            header |= {"expected_error": _errors_on_shape(scene), "expected_error_means": MEANING_ON_SHAPES}
+        elif errors:
             from ..prediction import CASES  # here, since finite elements take half a second to import
 
             loads = tuple(dict.fromkeys((*CASES, scene.load)))
             header["expected_error"] = _expected_errors(
                 scene.sheet, scene.definition, springs, scene.beam, scene.material, loads
             )
-        return cls(**parts, header=header)
+        return cls(**(parts | {"forces": forces}))
 
     @classmethod
     def from_mesh(
@@ -260,7 +239,8 @@ class SpringNet:
             with named(chosen):
                 springs = sheet.derive(chosen, material, given)[0]
         inertia = None if material.density is None else masses(mesh, material.density, sheet.thickness)
-        header = _header(chosen, sheet, [material], springs, inertia, None, mesh_name)
+        parts = _parts(chosen, sheet, [material], springs, inertia, mesh_name)
+        header = parts["header"]
         if beam is None:
             header["expected_error"] = f"{NOT_COMPUTED}: the mesh is of no beam"
         else:
@@ -270,8 +250,7 @@ class SpringNet:
 
                 said = check_loads(CASES if loads is None else loads)
                 header["expected_error"] = _expected_errors(sheet, chosen, springs, beam, material, said)
-        none = np.zeros(mesh.points.shape)
-        return cls(**_parts(sheet, springs, inertia, none.astype(bool), none), header=header)
+        return cls(**parts)
 
     def write(self, path: str | Path, *, mujoco: int | None = None) -> list[Path]:
         """Write the net in the format that the ending of a name says; files appear whole or not at all.
@@ -304,7 +283,7 @@ class SpringNet:
                 f"load {load['name']!r}: prescribes displacements, and a file of springs has forces and directions "
                 "that are held; take a load of forces, or give SpringNet.from_mesh the mesh and the scene's springs"
             )
-        return write(path, content_of(self), mujoco)
+        return write(path, self, mujoco)
 
     @classmethod
     def read(cls, path: str | Path) -> "SpringNet":
@@ -324,25 +303,11 @@ class SpringNet:
         ValueError
             If there is no such file, or it is not as `write` writes it.
         """
-        arrays, energies, header = read(path)
-        parts: dict[str, Any] = {"masses": None} | arrays
-        return cls(**parts, energies=energies, thickness=header["thickness"], header=header)
-
-
-def content_of(net: SpringNet) -> Content:
-    """What the files of a net hold."""
-    arrays = {name: getattr(net, name) for name in ARRAYS if getattr(net, name) is not None}
-    return Content(arrays, net.energies, net.header | {"thickness": float(net.thickness)})
+        return cls(**vars(read(path)))
 
 
 def terms(energy: Energy, reference: float) -> Terms:
-    """Energy of a network as plain arrays.
-
-    Parameters
-    ----------
-    reference : float
-        Reference stiffness that its moduli are over [N/m].
-    """
+    """Energy of a network as plain arrays; its moduli are over `reference` [N/m]."""
     points, corners = energy.points, energy.corners
     values: dict[str, np.ndarray]
     if isinstance(energy, AreaEnergy):
@@ -372,26 +337,6 @@ def terms(energy: Energy, reference: float) -> Terms:
     raise DefinitionError(
         f"energy {type(energy).__name__} cannot be written out; use those of springtune.mechanics.energies"
     )
-
-
-def _parts(
-    sheet: Sheet, springs: Springs, inertia: np.ndarray | None, held: np.ndarray, forces: np.ndarray
-) -> dict[str, Any]:
-    """Arrays of a net."""
-    mesh = sheet.mesh
-    return {
-        "points": mesh.points,
-        "springs": mesh.edges,
-        "rest_lengths": mesh.edge_lengths,
-        "stiffness": springs.reference * springs.relative,
-        "energies": _merged([terms(_everywhere(energy, mesh), springs.reference) for energy in springs.energies]),
-        "masses": inertia,
-        "thickness": sheet.thickness,
-        "held": held,
-        "forces": forces,
-        "triangles": mesh.triangles,
-        "quads": mesh.quads,
-    }
 
 
 def _everywhere(energy: Energy, mesh: Mesh) -> Energy:
@@ -426,25 +371,19 @@ def _merged(given: list[Terms]) -> tuple[Terms, ...]:
     return tuple(found.values())
 
 
-def _header(
-    definition: Definition | OwnDefinition,
+def _parts(
+    definition: Definition,
     sheet: Sheet,
     materials: Sequence[AnyMaterial],
     springs: Springs,
     inertia: np.ndarray | None,
-    held: np.ndarray | None,
     mesh_name: str,
+    held: np.ndarray | None = None,
 ) -> dict[str, Any]:
-    """What a net says of itself, but for what a scene adds."""
+    """Arrays and header of a net without a load."""
     mesh, (formula, source) = sheet.mesh, described(definition)
     material, *others = ({name: getattr(one, name, None) for name in CONSTANTS_SAID} for one in materials)
-    counts = {
-        "particles": len(mesh.points),
-        "springs": len(mesh.edges),
-        "triangles": len(mesh.triangles),
-        "quads": len(mesh.quads),
-    }
-    return {
+    header = {
         "made_by": f"springtune {__version__}",
         "definition": definition.name,
         "formula": formula,
@@ -456,7 +395,13 @@ def _header(
         "beam": None,
         "material": material,
         **({"other_materials": {one["name"]: one for one in others}} if others else {}),
-        "mesh": ({"name": mesh_name} if mesh_name else {}) | counts,
+        "mesh": {
+            **({"name": mesh_name} if mesh_name else {}),
+            "particles": len(mesh.points),
+            "springs": len(mesh.edges),
+            "triangles": len(mesh.triangles),
+            "quads": len(mesh.quads),
+        },
         "load": None,
         "expected_error": f"{NOT_COMPUTED}: not asked for",
         "expected_error_means": MEANING,
@@ -465,13 +410,27 @@ def _header(
         "units": UNITS
         | {"reference_stiffness": "N/m", "lateral_stress": "axial stress", "young_modulus": "Pa", "density": "kg/m3"},
     }
+    return {
+        "points": mesh.points,
+        "springs": mesh.edges,
+        "rest_lengths": mesh.edge_lengths,
+        "stiffness": springs.reference * springs.relative,
+        "energies": _merged([terms(_everywhere(energy, mesh), springs.reference) for energy in springs.energies]),
+        "masses": inertia,
+        "thickness": sheet.thickness,
+        "held": np.zeros(mesh.points.shape, dtype=bool) if held is None else held,
+        "forces": np.zeros(mesh.points.shape),
+        "header": header,
+        "triangles": mesh.triangles,
+        "quads": mesh.quads,
+    }
 
 
 def _beam(beam: Beam) -> dict[str, Any]:
     return {"name": beam.name, "length": beam.length, "height": beam.height, "thickness": beam.thickness}
 
 
-def described(definition: Definition | OwnDefinition) -> tuple[str, str]:
+def described(definition: Definition) -> tuple[str, str]:
     """Formula of a definition in words, and where it comes from."""
     function = inspect.unwrap(definition.function)
     own = inspect.getdoc(function) or ""
@@ -483,7 +442,7 @@ def described(definition: Definition | OwnDefinition) -> tuple[str, str]:
 
 def _expected_errors(
     sheet: Sheet,
-    definition: Definition | OwnDefinition,
+    definition: Definition,
     springs: Springs,
     beam: Beam,
     material: Material,

@@ -23,18 +23,10 @@ def write_vtu(
     numbers: Mapping[str, float] | None = None,
     comment: str = "",
 ) -> None:
-    """Write points and cells with their data; the file appears whole or not at all.
+    """Write points [m] and cells with their data; the file appears whole or not at all.
 
-    Parameters
-    ----------
-    points : ndarray of float, shape (n_points, 2)
-        [m]
-    cells : mapping of int to ndarray of int, shape (n, corners)
-        Particles of the cells by number of corners: 2 are lines, and are drawn as such.
-    point_data : mapping of str to ndarray, shape (n_points,) or (n_points, 2)
-        Vectors get a third component of zero, as ParaView wants them.
-    cell_data : mapping of str to mapping of int to ndarray
-        By name, and by the corners of the cells that have it; NaN on the others.
+    `cells` are particles by number of corners, 2 for lines. `cell_data` is by name and number of corners, NaN on cells
+    without it. Vectors get a third component of zero for ParaView.
     """
     import meshio
 
@@ -91,14 +83,9 @@ Add = Callable[..., None]
 def series(path: str | Path) -> Iterator[Add]:
     """Context in which a collection of files is written, which ParaView opens as one that changes in time.
 
-    ``swing.pvd`` names ``swing/swing_0000.vtu`` and so on; all are written or none is, and those that a collection of
-    that name had before, and has no more, are removed.
-
-    Yields
-    ------
-    callable
-        ``add(time, write, name="")``: time of a piece [s], or whatever takes its place; what writes it, told a path;
-        and a name in the place of a number.
+    ``swing.pvd`` names ``swing/swing_0000.vtu`` and so on; all are written or none, and files of an older collection of
+    that name are removed. It yields ``add(time, write, name="")``: the time of a piece [s], the function that writes it
+    to a path, and a name in the place of a number.
     """
     path = Path(path)
     folder, before = path.with_suffix(""), pieces_of(path)[1:]

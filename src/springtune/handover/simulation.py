@@ -15,7 +15,7 @@ from ..mechanics.network import Network
 from ..mechanics.statics import SingularError, StaticProblem
 from ..mesh import Mesh
 from ..problem.status import Status
-from .terms import Terms
+from .terms import Net
 
 STEP_SHARE = 0.8
 """Step that is written, over the largest stable one at rest, in equilibrium and where the net swings to on its way:
@@ -31,30 +31,13 @@ WORDS = {
 """What energies besides springs are of, by their kind."""
 
 
-@dataclass(frozen=True, eq=False)
-class Net:
-    """A network as plain arrays; the attributes are those of `springtune.SpringNet`, the header with the thickness."""
-
-    points: np.ndarray
-    springs: np.ndarray
-    rest_lengths: np.ndarray
-    stiffness: np.ndarray
-    held: np.ndarray
-    forces: np.ndarray
-    triangles: np.ndarray
-    quads: np.ndarray
-    energies: tuple[Terms, ...]
-    header: Mapping[str, Any]
-    masses: np.ndarray | None = None
-
-
 class EquilibriumWarning(UserWarning):
     """What is written has no equilibrium to come to, or one that is far away."""
 
 
 @dataclass(frozen=True)
 class Simulation:
-    """How a net is to be moved, and where it should come to.
+    """How a net moves in a simulator, and its equilibrium.
 
     Attributes
     ----------
@@ -65,16 +48,14 @@ class Simulation:
     largest_step : float
         Largest stable step of explicit schemes about rest, undamped [s].
     step : float
-        Step that stays stable while the net moves [s]: `STEP_SHARE` of it, or less where its way makes it stiffer.
-    frequency : float
-        Lowest frequency [rad/s]; 0 without a load.
-    loaded_frequency : float
-        Lowest frequency that the load excites [rad/s]; 0 without a load.
+        Step that stays stable in motion [s]: `STEP_SHARE` of the largest one, or less where the net stiffens.
+    frequency, loaded_frequency : float
+        Lowest frequency, and the lowest one that the load excites [rad/s]; 0 without a load.
     mass_damping : float
-        Damping over mass [1/s], critical for the loaded frequency, or as much less as lets no mode be later at rest
-        than the lowest one under its own critical damping: under small loads it is that.
+        Damping over mass [1/s], critical for the loaded frequency, or less, so that no mode comes to rest later than
+        the lowest one under its own critical damping.
     displacements : ndarray of float, shape (n_points, 2), or None
-        Equilibrium under the load [m]; None where there is none that is stable.
+        Stable equilibrium under the load [m]; None without one.
     """
 
     masses: np.ndarray
@@ -89,13 +70,10 @@ class Simulation:
 
 
 def simulate(net: Net, program: str, laws: Iterable[str] = ()) -> Simulation:
-    """What a simulator is told of a net besides its springs.
+    """Masses, damping, step and equilibrium of a net for a simulator.
 
-    Notes
-    -----
-    Frequencies are those at rest, see `springtune.mechanics.dynamics.Motion`; the equilibrium is that of springs which
-    keep their length law, as simulators have them. A mode of frequency w under a damping over mass c > 2 w comes to
-    rest with the rate c/2 - sqrt(c^2/4 - w^2), which is the lowest frequency w1 for c = w1 + w^2/w1.
+    Frequencies are at rest; the springs keep their length law. A mode of frequency w under a damping over mass c > 2 w
+    comes to rest with the rate c/2 - sqrt(c^2/4 - w^2), which is the lowest frequency w1 for c = w1 + w^2/w1.
     """
     _check(net, program, laws)
     assert net.masses is not None

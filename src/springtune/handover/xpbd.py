@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from .simulation import Net, simulate
+from .simulation import simulate
+from .terms import Net
 
 CONTENT = {
     "points": "particles at rest [m]",

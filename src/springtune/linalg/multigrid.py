@@ -242,15 +242,6 @@ def bilinear(points: np.ndarray, places: np.ndarray, spacing: float) -> tuple[cs
 
     `points` (n_points, 2) [m]; `places` (unknowns,) is twice the particle's number, plus 1 for y. The matrix is
     (unknowns, 2 n_nodes), x and y of each node in turn; nodes (n_nodes, 2) [m] have particles near by.
-
-    Examples
-    --------
-    >>> points = np.array([[0.0, 0.0], [0.25, 0.0], [1.0, 1.0]])
-    >>> prolong, nodes = bilinear(points, np.array([2, 5]), 1.0)
-    >>> prolong.toarray(), nodes.tolist()
-    (array([[0.75, 0.  , 0.  , 0.  , 0.25, 0.  , 0.  , 0.  ],
-           [0.  , 0.  , 0.  , 0.  , 0.  , 0.  , 0.  , 1.  ]], dtype=float32),
-    [[0.0, 0.0], [0.0, 1.0], [1.0, 0.0], [1.0, 1.0]])
     """
     lowest, extent = points.min(axis=0), np.ptp(points, axis=0)
     cells = np.maximum(1, np.round(extent / spacing)).astype(np.int64)

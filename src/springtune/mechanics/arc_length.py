@@ -43,27 +43,6 @@ def follow(
     Riks' method: each point is sought in the plane across the last tangent, with the exact tangent in every Newton
     step (E. Riks, Int. J. Solids Structures 15:529, 1979). `increment` is the first and largest increment and `limit`
     the largest displacement, norms over all unknowns [m].
-
-    Examples
-    --------
-    A shallow arch of two springs from (-1, 0) over (0, .1) to (1, 0) snaps through under a load on its top; a third
-    spring, without stiffness, closes the triangle:
-
-    >>> from springtune.mesh.cells import Mesh
-    >>> mesh = Mesh(np.array([[-1.0, 0.0], [1.0, 0.0], [0.0, 0.1]]), np.array([[0, 1, 2]]))
-    >>> held = np.array([[True, True], [True, True], [True, False]])
-    >>> network = Network(mesh, held, (mesh.edges != [0, 1]).any(axis=1).astype(float))
-    >>> problem = StaticProblem(network, np.array([[0.0, 0.0], [0.0, 0.0], [0.0, 1.0]]))
-    >>> path = follow(problem, -1e-2, increment=0.002, limit=0.1)
-    >>> float(abs(path.loads).max().round(6)), int(path.negative_pivots.max())
-    (0.000383, 1)
-
-    The largest load is known: the springs, once of length L, are then of length l, the cube root of L.
-
-    >>> L = 1.01**0.5
-    >>> l = L ** (1 / 3)
-    >>> round(2 * (l**2 - 1) ** 0.5 * (L / l - 1), 6)
-    0.000383
     """
     network, direction = problem.network, None
     point = Point(np.zeros(network.unknowns), 0.0, 0, 0)

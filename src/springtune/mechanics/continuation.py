@@ -1,12 +1,11 @@
 """Points of an equilibrium path, one after the other by arc length."""
 
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
-from ..linalg.factors import Factor, SingularError
-from .network import Network
-from .newton import TOLERANCE
+from ..linalg.factors import SingularError
+from .newton import TOLERANCE, LoadedNetwork
 
 BEYOND = 0.25
 """First increment beyond the last load step, over that step."""
@@ -26,33 +25,8 @@ NEARLY = 1e-3
 MOST_BEHIND = 60
 """Most points behind a limit point in search of a stable one that carries the load."""
 
-FEW, MANY = 3, 8
-"""Newton steps of a point of a path at or below which the next increment grows, and beyond which it is halved."""
-
-
-class Continued(Protocol):
-    """Problem with an equilibrium path, such as `springtune.mechanics.statics.StaticProblem`."""
-
-    network: Network
-    load_norm: float
-
-    def load_at(self, displacements: np.ndarray) -> np.ndarray:
-        """Load pattern at displacements."""
-
-    def rate(self, displacements: np.ndarray) -> np.ndarray:
-        """As `load_at`, with the forces of growing prescribed displacements."""
-
-    def moved(self, s: float, displacements: np.ndarray) -> np.ndarray:
-        """Displacements with those prescribed at a load inserted."""
-
-    def factorize_tangent(self, s: float, displacements: np.ndarray) -> Factor:
-        """Factor of the tangent of resistance less load."""
-
-    def holds(self, s: float, displacements: np.ndarray) -> bool:
-        """Whether displacements, in equilibrium or not, have a tangent without negative eigenvalues."""
-
-    def stability(self, s: float, displacements: np.ndarray, factor: Factor) -> tuple[int, bool]:
-        """Negative eigenvalues of the tangent, and whether the equilibrium flutters."""
+FEW, MANY, MOST_OF_POINT = 3, 8, 12
+"""Newton steps of a point: up to which the next increment grows, beyond which it is halved, and most of them."""
 
 
 class Point(NamedTuple):
@@ -65,7 +39,7 @@ class Point(NamedTuple):
 
 
 def next_point(
-    problem: Continued, s: float, last: Point, direction: np.ndarray | None, length: float, shortest: float
+    problem: LoadedNetwork, s: float, last: Point, direction: np.ndarray | None, length: float, shortest: float
 ) -> tuple[Point | None, float]:
     """Return the next point, or None, and its increment's length [m], halved while Newton's method fails.
 
@@ -87,11 +61,11 @@ def next_point(
     return None, length
 
 
-def _correct(problem: Continued, last: Point, du: np.ndarray, ds: float, scale: float, most: int = 12) -> Point | None:
+def _correct(problem: LoadedNetwork, last: Point, du: np.ndarray, ds: float, scale: float) -> Point | None:
     """Newton's method in the plane across an increment; None where it does not converge."""
     network, across = problem.network, du
     u, at = last.u + du, last.load + ds
-    for step in range(1, most + 1):
+    for step in range(1, MOST_OF_POINT + 1):
         displacements = problem.moved(at, network.expand(u))
         load = problem.load_at(displacements)
         with np.errstate(over="ignore", invalid="ignore"):
@@ -111,17 +85,11 @@ def _correct(problem: Continued, last: Point, du: np.ndarray, ds: float, scale: 
 class Continuation(NamedTuple):
     """Path beyond an equilibrium.
 
-    Attributes
-    ----------
-    limit : float
-        Largest load before the path turns back with one more negative eigenvalue [m], or NaN.
-    lost : float
-        First load at which the path was unstable before it turns back [m], or NaN.
-    end : Point or None
-        Stable point at or beyond the target, the last below it before a limit point, or the one behind it that
-        regains the load.
-    inverts : bool
-        Whether a cell inverts before the path turns back or reaches the target.
+    - `limit`: Largest load before the path turns back with one more negative eigenvalue [m], or NaN.
+    - `lost`: First load at which the path was unstable before it turns back [m], or NaN.
+    - `end`: Stable point at or beyond the target, the last below it before a limit point, or the one behind it that
+      regains the load.
+    - `inverts`: Whether a cell inverts before the path turns back or reaches the target.
     """
 
     limit: float
@@ -131,28 +99,13 @@ class Continuation(NamedTuple):
 
 
 def continued(
-    problem: Continued, load: float, last: np.ndarray, before: np.ndarray, target: float, farthest: float = 0.0
+    problem: LoadedNetwork, load: float, last: np.ndarray, before: np.ndarray, target: float, farthest: float = 0.0
 ) -> Continuation:
     """Follow a path by arc length from an equilibrium to a load, or to the limit point where it turns back.
 
     The equilibrium is at `load` with displacements `last`; `before` is one shortly before. Loads are over the
     reference stiffness [m]. `farthest` is the increment behind a limit point, norm of all displacements [m]; 0 stops
     there.
-
-    Examples
-    --------
-    The arch of `springtune.mechanics.arc_length.follow`, from equilibria at 90 and 95 % of its largest load on:
-
-    >>> from springtune.mechanics.network import Network
-    >>> from springtune.mechanics.statics import StaticProblem
-    >>> from springtune.mesh.cells import Mesh
-    >>> mesh = Mesh(np.array([[-1.0, 0.0], [1.0, 0.0], [0.0, 0.1]]), np.array([[0, 1, 2]]))
-    >>> held = np.array([[True, True], [True, True], [True, False]])
-    >>> network = Network(mesh, held, (mesh.edges != [0, 1]).any(axis=1).astype(float))
-    >>> problem = StaticProblem(network, np.array([[0.0, 0.0], [0.0, 0.0], [0.0, 1.0]]))
-    >>> before, last = (problem.nonlinear(-share * 3.83e-4).displacements for share in (0.9, 0.95))
-    >>> print(f"{continued(problem, -0.95 * 3.83e-4, last, before, -5e-4).limit:.3g}")
-    -0.000383
     """
     network, limit, lost = problem.network, np.nan, np.nan
     direction = network.reduce(last - before)

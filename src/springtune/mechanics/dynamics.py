@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import csc_array, diags_array, sparray
+from scipy.sparse import diags_array, sparray
 from scipy.sparse.linalg import eigsh
 
 from ..linalg.factors import SingularError
@@ -26,7 +26,7 @@ from .integrators import EXPLICIT, IMPLICIT, INTEGRATORS, LAGGED, PRECISIONS, Ba
 from .network import Network
 from .newton import TOLERANCE
 from .statics import StaticProblem
-from .stepping import make_stepper
+from .stepping import Moving, make_stepper
 
 CHECK = 64
 """Steps between checks of an explicit run; a check costs about two steps, one for rest some twenty."""
@@ -44,55 +44,18 @@ def masses(mesh: Mesh, density: float, thickness: float) -> np.ndarray:
     return density * thickness * mesh.particle_areas
 
 
-def centre(mesh: Mesh, masses: np.ndarray) -> np.ndarray:
-    """Centre of mass [m], shape (2,), of masses [kg] of shape (n_points,)."""
-    return masses @ mesh.points / masses.sum()
-
-
-def rayleigh(ratios: tuple[float, float], frequencies: tuple[float, float]) -> tuple[float, float]:
-    r"""Return Rayleigh's alpha [1/s] and beta [s] for given damping ratios at two angular frequencies [rad/s].
-
-    .. math:: \xi(\omega) = \frac{\alpha}{2 \omega} + \frac{\beta \omega}{2}
-
-    Examples
-    --------
-    >>> alpha, beta = rayleigh((0.02, 0.02), (10.0, 30.0))
-    >>> round(alpha, 6), round(beta, 6)
-    (0.3, 0.001)
-    """
-    (first, second), (low, high) = ratios, frequencies
-    if low == high:
-        raise ValueError(f"two damping targets at one frequency, {low:g} rad/s; give two frequencies")
-    alpha, beta = np.linalg.solve([[0.5 / low, 0.5 * low], [0.5 / high, 0.5 * high]], [first, second])
-    if alpha < 0 or beta < 0:
-        raise ValueError(
-            f"ratios {first:g} and {second:g} at {low:g} and {high:g} rad/s need negative damping (alpha = {alpha:.3g} "
-            f"1/s, beta = {beta:.3g} s); give ratios nearer to each other or frequencies farther apart"
-        )
-    return float(alpha), float(beta)
-
-
 @dataclass(frozen=True)
 class Run:
     """Result of a run.
 
-    Attributes
-    ----------
-    displacements, velocities : ndarray of float, shape (n_points, 2)
-        Final state [m], [m/s].
-    status : str
-        ``"rest"`` (stable), ``"unstable"`` (at rest on an unstable equilibrium), ``"moving"`` (all steps done),
-        ``"diverged"`` or ``"inverted"``.
-    message : str
-        What went wrong and what to do; else empty.
-    time : float
-        [s]
-    residual : float
-        Final out-of-balance force over the load [1]; without a load, over the reference stiffness [m].
-    step_bound : float
-        Step [s] that is safe by `Motion.particle_bound`; infinite for implicit schemes.
-    samples : ndarray of float, shape (n, 4)
-        Time [s], and energy [m2] and momentum [m s] over the reference stiffness, if asked for.
+    - `displacements`, `velocities` (n_points, 2): Final state [m], [m/s].
+    - `status`: ``"rest"`` (stable), ``"unstable"`` (at rest on an unstable equilibrium), ``"moving"`` (all steps
+      done), ``"diverged"`` or ``"inverted"``.
+    - `message`: What went wrong and what to do; else empty.
+    - `time`: [s]
+    - `residual`: Final out-of-balance force over the load [1]; without a load, over the reference stiffness [m].
+    - `step_bound`: Step [s] that is safe by `Motion.particle_bound`; infinite for implicit schemes.
+    - `samples` (n, 4): Time [s], and energy [m2] and momentum [m s] over the reference stiffness, if asked for.
     """
 
     displacements: np.ndarray
@@ -106,76 +69,15 @@ class Run:
     samples: np.ndarray
 
 
-class Motion:
+class Motion(Moving):
     """Network with masses, dampers and a load.
 
     `inertia` (n_points,) is mass over reference stiffness [s2] and `load` (n_points, 2) force over it [m].
     `mass_damping` is alpha [1/s]. `dampers` (n_springs,) is damping along each spring over the reference stiffness
     [s]; ``beta * network.stiffness`` is Rayleigh damping by stiffness.
-
-    Examples
-    --------
-    A mass of 1 on a spring of stiffness 1: explicit steps up to 2 are stable, and the period is two pi.
-
-    >>> mesh = Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 1.0]]), np.array([[0, 1, 2]]))
-    >>> held = np.array([[True, True], [False, True], [True, True]])
-    >>> network = Network(mesh, held, (mesh.edges == [0, 1]).all(axis=1).astype(float))
-    >>> motion = Motion(network, np.ones(3), linear=True)
-    >>> round(motion.step_limit("central-difference"), 9)
-    2.0
-    >>> start = np.array([[0.0, 0.0], [0.1, 0.0], [0.0, 0.0]])
-    >>> found = motion.run("central-difference", 2 * np.pi / 1000, 1000, start)
-    >>> found.displacements[1].round(6), found.status
-    (array([0.1, 0. ]), 'moving')
     """
 
-    def __init__(
-        self,
-        network: Network,
-        inertia: np.ndarray,
-        load: np.ndarray | None = None,
-        mass_damping: float = 0.0,
-        dampers: np.ndarray | None = None,
-        linear: bool = False,
-    ) -> None:
-        self.network, self.linear = network, linear
-        self.load = np.zeros(network.held.shape) if load is None else load
-        self.mass_damping, self.dampers = mass_damping, dampers
-        self.inertia = np.repeat(np.asarray(inertia, dtype=float)[:, None], 2, axis=1)
-        bad = int((~(self.inertia > 0) & ~network.held).any(axis=1).sum())
-        if bad:
-            raise ValueError(f"{bad} particles can move and have no mass; remove particles without cells from the mesh")
-        if mass_damping < 0 or (dampers is not None and (dampers < 0).any()):
-            raise ValueError("a damping is negative, and a run would gain energy; give 0 or more")
-
     # -- before a run -----------------------------------------------------------------------------------------------
-
-    @cached_property
-    def mass(self) -> np.ndarray:
-        """Inertia of each unknown [s2], shape (unknowns,)."""
-        return self.network.reduce(self.inertia)
-
-    @cached_property
-    def stiffness_matrix(self) -> csc_array:
-        """Tangent at rest [1]."""
-        return self.network.tangent()
-
-    @cached_property
-    def damper_matrix(self) -> csc_array | None:
-        """Matrix of the dampers along springs at rest [s]; None without any."""
-        if self.dampers is None:
-            return None
-        return Network(self.network.mesh, self.network.held, self.dampers, like=self.network).tangent()
-
-    def damper_tangent(self, displacements: np.ndarray) -> csc_array | None:
-        """Derivative of the dampers' forces by the velocities [s], the springs turned by displacements [m]; or None."""
-        if self.dampers is None or self.linear:
-            return self.damper_matrix
-        along = self.network.rest_vectors + self.network.stretch(displacements)
-        along = along / np.linalg.norm(along, axis=1)[:, None]
-        apart = np.concatenate([along, -along], axis=1)
-        matrices = self.dampers[:, None, None] * apart[:, :, None] * apart[:, None, :]
-        return self.network.stiffness_of(self.network.mesh.edges, matrices)
 
     @cached_property
     def particle_bound(self) -> float:
@@ -252,12 +154,6 @@ class Motion:
 
     # -- mechanics --------------------------------------------------------------------------------------------------
 
-    def missing(self, displacements: np.ndarray) -> np.ndarray:
-        """Load less resistance [m], shape (unknowns,)."""
-        resist = self.network.linear_resistance if self.linear else self.network.resistance
-        with np.errstate(over="ignore", invalid="ignore"):
-            return self.network.reduce(self.load) - resist(displacements)
-
     def energy(self, displacements: np.ndarray, velocities: np.ndarray) -> float:
         """Kinetic energy, plus that of the network, less the work of the load, over the reference stiffness [m2]."""
         kinetic = 0.5 * float((self.inertia * velocities**2).sum())
@@ -306,14 +202,17 @@ class Motion:
         if name in IMPLICIT and (precision, threads) != ("float64", 1):
             raise ValueError(f"'{name}' takes its steps in double precision and one thread; give neither")
         stepper = make_stepper(self, integrator, step, precision, threads)
-        stepper.begin(*self._beginning(start, velocities))
+        shape = self.network.held.shape
+        v = np.zeros(shape) if velocities is None else np.array(velocities, dtype=float)
+        v[self.network.held] = 0.0
+        stepper.begin(np.zeros(shape) if start is None else np.array(start, dtype=float), v)
         pace = sample or (CHECK if name in EXPLICIT else 1)
         samples: list[list[float]] = []
         done = 0
         with closing(stepper):
             while True:
                 u, v = stepper.state(exact=bool(sample) or rest is not None or done >= steps)
-                end = self._end(stepper.failed, u, v, name, step, done)
+                end = self._bad_end(stepper.failed, u, v, name, step, done)
                 if end is not None:
                     u, v = stepper.state()
                     break
@@ -321,11 +220,9 @@ class Motion:
                     samples.append([done * step, self.energy(u, v), *(self.inertia * v).sum(axis=0)])
                     if watch is not None:
                         watch(done * step, u, v)
-                if rest is not None and done and self._at_rest(u, v, rest):
-                    end = self._rest_end(u, name, done)
-                    break
-                if done >= steps:
-                    end = self._moving_end(u, rest, steps)
+                at_rest = rest is not None and done > 0 and self._at_rest(u, v, rest)
+                if at_rest or done >= steps:
+                    end = self._good_end(u, name, done, at_rest, rest)
                     break
                 count = min(pace, steps - done)
                 stepper.advance(count)
@@ -333,14 +230,7 @@ class Motion:
         sampled = np.array(samples).reshape(-1, 4)
         return Run(u, v, *end, done, done * step, self.residual(u), self.step_bound(name), sampled)
 
-    def _beginning(self, start: np.ndarray | None, velocities: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
-        shape = self.network.held.shape
-        u = np.zeros(shape) if start is None else np.array(start, dtype=float)
-        v = np.zeros(shape) if velocities is None else np.array(velocities, dtype=float)
-        v[self.network.held] = 0.0
-        return u, v
-
-    def _end(
+    def _bad_end(
         self, failed: str, u: np.ndarray, v: np.ndarray, integrator: str, step: float, done: int
     ) -> tuple[str, str] | None:
         """Status and message of a failed run; None if it may go on."""
@@ -356,27 +246,21 @@ class Motion:
         """Displacement beyond which a run has left its model [m]."""
         return BLOWN_UP * np.ptp(self.network.mesh.points, axis=0).max()
 
-    def _rest_end(self, u: np.ndarray, integrator: str, done: int) -> tuple[str, str]:
-        """Status and message of a run that came to rest."""
+    def _good_end(
+        self, u: np.ndarray, integrator: str, done: int, at_rest: bool, rest: float | None
+    ) -> tuple[str, str]:
+        """Status and message of a run that came to rest, or took its last step."""
         if self.network.inverted(u):
-            return self._inverted_end(done)
-        status, message = self.judge_rest(u)
-        if status == "unstable" and integrator == "backward-euler":
-            message += ", in smaller steps, since large ones stay where they would otherwise be driven away"
-        return status, message
-
-    def _moving_end(self, u: np.ndarray, rest: float | None, steps: int) -> tuple[str, str]:
-        """Status and message after the last step of a run."""
-        if self.network.inverted(u):
-            return self._inverted_end(steps)
+            return "inverted", f"triangles are inverted after {done} steps; use less load or smaller steps"
+        if at_rest:
+            status, message = self.judge_rest(u)
+            if status == "unstable" and integrator == "backward-euler":
+                message += ", in smaller steps, since large ones stay where they would otherwise be driven away"
+            return status, message
         if rest is None:
             return "moving", ""
         residual = self.residual(u)
-        return "moving", f"not at rest after {steps} steps, residual {residual:.1e}; take more steps or other damping"
-
-    @staticmethod
-    def _inverted_end(done: int) -> tuple[str, str]:
-        return "inverted", f"triangles are inverted after {done} steps; use less load or smaller steps"
+        return "moving", f"not at rest after {done} steps, residual {residual:.1e}; take more steps or other damping"
 
     def _at_rest(self, u: np.ndarray, v: np.ndarray, rest: float) -> bool:
         if self.residual(u) > rest:

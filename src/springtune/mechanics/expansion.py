@@ -31,18 +31,6 @@ class Expansion:
 
     `load` (unknowns,) is the pattern [1]; `s` [m] and `displacements` (None at rest) are the point. Displacements are
     ``sum_n coefficients[n] sigma^n``, shape (order + 1, n_points, 2), and loads ``sum_n loads[n] sigma^n`` [m].
-
-    Examples
-    --------
-    A spring of length 1 with a stiffness of 1 is straight: its displacement is the load itself.
-
-    >>> from springtune.mesh.cells import Mesh
-    >>> mesh = Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 1.0]]), np.array([[0, 1, 2]]))
-    >>> held = np.array([[True, True], [False, True], [True, True]])
-    >>> network = Network(mesh, held, (mesh.edges == [0, 1]).all(axis=1).astype(float))
-    >>> series = Expansion(network, np.ones(1), 0.0, None, network.rest_factor, order=3)
-    >>> series.predict(0.1)[1].round(12)
-    array([0.1, 0. ])
     """
 
     def __init__(

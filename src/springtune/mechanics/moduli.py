@@ -17,38 +17,25 @@ percent.
 """
 
 from functools import cached_property
-from typing import Protocol
+from typing import Any
 
 import numpy as np
 
 from ..linalg.factors import SingularError
 from ..mesh.cells import Mesh, MeshError
 from ..mesh.sheets import connected
-from .energies import Energy
 from .network import Network
 
 EVEN = 1e-6
 """Tolerance of a strip's length over its extent [1]: coordinates from files have few digits."""
 
 
-class Elastic(Protocol):
-    """Springs as a patch test needs them; `springtune.springs.Springs` fits.
+Elastic = Any
+"""Springs as patch tests need them, such as `springtune.springs.Springs`.
 
-    `relative` (n_springs,) is stiffness over the reference stiffness [1]; `lateral` is the pull on the faces over the
-    axial stress [1], or 0.
-    """
-
-    @property
-    def relative(self) -> np.ndarray:
-        """Stiffness over the reference stiffness [1]."""
-
-    @property
-    def energies(self) -> tuple[Energy, ...]:
-        """Energies besides the springs'."""
-
-    @property
-    def lateral(self) -> float:
-        """Pull on the faces over the axial stress [1]."""
+`relative` (n_springs,) is stiffness over the reference stiffness [1], `energies` are those besides the springs', and
+`lateral` is the pull on the faces over the axial stress [1], or 0.
+"""
 
 
 def ends(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
@@ -86,17 +73,6 @@ def strip_fault(mesh: Mesh) -> str:
 
     The mesh must be a strip without holes: straight lower and upper faces, and one length at every height. Staggered
     ends are fine.
-
-    Examples
-    --------
-    A plate with a hole:
-
-    >>> from springtune.mesh import Mesh, right
-    >>> whole = right(0.1, 0.04, 5e-3)
-    >>> middles = whole.points[whole.triangles].mean(axis=1)
-    >>> ring = (abs(middles - [0.05, 0.02]) > 0.01).any(axis=1)
-    >>> strip_fault(whole), strip_fault(Mesh(whole.points, whole.triangles[ring]))[:35]
-    ('', 'its outline is no single line aroun')
     """
     outline = mesh.edges[mesh.on_outline]
     x, y = mesh.points.T
@@ -260,17 +236,6 @@ def affine_stiffness(mesh: Mesh, springs: Elastic) -> np.ndarray:
 
     For springs ``C_ijkl t = 1/A sum k L^2 n_i n_j n_k n_l``, with C12 = C66; an upper bound of `outline_stiffness` in
     its shape and unit, which a lattice attains.
-
-    Examples
-    --------
-    The equilateral lattice, each spring the mean of two triangles: ``9/8, 3/8, 3/8`` of E t:
-
-    >>> from types import SimpleNamespace
-    >>> from springtune.mesh import lattice
-    >>> mesh = lattice(12, 8)
-    >>> springs = SimpleNamespace(relative=0.5 * mesh.cells_per_edge, energies=(), lateral=0.0)
-    >>> abs(affine_stiffness(mesh, springs) * 3**0.5 / 2).round(6).tolist()
-    [[1.125, 0.375, 0.0], [0.375, 1.125, 0.0], [0.0, 0.0, 0.375]]
     """
     network = Network(mesh, np.ones(mesh.points.shape, dtype=bool), springs.relative, springs.energies)
     fields = unit_fields(mesh)
@@ -318,22 +283,6 @@ def outline_stiffness(mesh: Mesh, springs: Elastic) -> np.ndarray:
     Shape (3, 3), times the thickness over the reference stiffness [1]; Voigt: xx, yy, shear angle xy. A continuum has
     the same even strain inside, so the test is exact on any mesh. No test of the same mesh is stiffer (Hill's
     bounds), and none is softer than `outline_compliance`.
-
-    Examples
-    --------
-    The triangular lattice: E / (1 - nu^2), nu E / (1 - nu^2) and G of E = 2 / sqrt(3), nu = 1/3, on an L:
-
-    >>> from types import SimpleNamespace
-    >>> from springtune.mesh import Mesh, lattice
-    >>> whole = lattice(12, 8)
-    >>> middles = whole.points[whole.triangles].mean(axis=1)
-    >>> used, corners = np.unique(whole.triangles[(middles < [6, 4]).any(axis=1)], return_inverse=True)
-    >>> mesh = Mesh(whole.points[used], corners.reshape(-1, 3))
-    >>> springs = SimpleNamespace(relative=0.5 * mesh.cells_per_edge, energies=(), lateral=0.0)
-    >>> outline_stiffness(mesh, springs).round(6) + 0.0
-    array([[1.299038, 0.433013, 0.      ],
-           [0.433013, 1.299038, 0.      ],
-           [0.      , 0.      , 0.433013]])
     """
     return PatchTest(mesh).stiffness(springs)
 

@@ -38,13 +38,7 @@ PINNED = 5_000
 
 
 def successor(solver: str | None, unknowns: int, symmetric: bool, cholesky: bool = CHOLESKY) -> str | None:
-    """Return the solver that takes over if conjugate gradients with multigrid do not converge.
-
-    Examples
-    --------
-    >>> [successor(None, 500_000, symmetric, cholesky=True) for symmetric in (True, False)]
-    ['Cholesky', 'SuperLU']
-    """
+    """Return the solver that takes over if conjugate gradients with multigrid do not converge."""
     first, most = ("Cholesky", FACTORIZED) if symmetric and cholesky else ("SuperLU", LARGEST)
     return first if solver is None and unknowns <= most else None
 

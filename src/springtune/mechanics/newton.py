@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import NamedTuple, Protocol
+from functools import cached_property, lru_cache
+from typing import NamedTuple
 
 import numpy as np
+from scipy.sparse.linalg import LinearOperator, eigs
 
 from ..linalg.factors import Factor, SingularError
-from .network import Network
+from .network import FollowerPressure, Network
 
 TOLERANCE = 1e-10
 """Residual of an equilibrium, relative to the load; slender beams reach it only within rounding, see `CORRECTION`."""
@@ -32,6 +33,12 @@ WATCHED = 4
 LONGEST_STEP = 0.5
 """Largest change of a spring's vector over its length in a watched step."""
 
+MODES = 24
+"""Eigenvalues nearest to zero that tell whether an equilibrium under a follower pressure is stable."""
+
+MERGED = 1e-6
+"""Imaginary part of an eigenvalue over its size beyond which two modes have merged: they flutter."""
+
 KEEP_TANGENT = 0.03
 """Largest factor on the residual in a step for which the tangent is reused."""
 
@@ -40,24 +47,15 @@ KEEP_TANGENT = 0.03
 class Equilibrium:
     """Result of a solve.
 
-    Attributes
-    ----------
-    displacements : ndarray of float, shape (n_points, 2)
-        Displacements [m]; of the last iterate if it did not converge.
-    residual : float
-        Norm of the out-of-balance force over that of the load [1].
-    factor : Factor or None
-        Factorized tangent; at the solution if it converged.
-    error_estimate : float
-        Estimated relative error of the displacements [1], or NaN.
-    unstable_share, limit_share : float
-        Shares of the load at which the path is unstable, and at which it turns back [1], or NaN.
-    load_share : float
-        Largest share of the load with a good equilibrium [1]; 1 if it converged.
-    last : ndarray of float, shape (n_points, 2), or None
-        Displacements at that share, if below 1.
-    snapped : bool
-        Whether the path regains the load in a stable equilibrium behind the limit point.
+    - `displacements` (n_points, 2): Displacements [m]; of the last iterate if it did not converge.
+    - `residual`: Norm of the out-of-balance force over that of the load [1].
+    - `factor`: Factorized tangent; at the solution if it converged.
+    - `error_estimate`: Estimated relative error of the displacements [1], or NaN.
+    - `unstable_share`, `limit_share`: Shares of the load at which the path is unstable, and at which it turns back
+      [1], or NaN.
+    - `load_share`: Largest share of the load with a good equilibrium [1]; 1 if it converged.
+    - `last` (n_points, 2), or None: Displacements at that share, if below 1.
+    - `snapped`: Whether the path regains the load in a stable equilibrium behind the limit point.
     """
 
     displacements: np.ndarray
@@ -86,21 +84,123 @@ class Iterate(NamedTuple):
     residual: float
 
 
-class Balance(Protocol):
-    """Problem to solve, such as `springtune.mechanics.statics.StaticProblem`."""
+class LoadedNetwork:
+    """Network under a load pattern, see `springtune.mechanics.statics.StaticProblem`."""
 
-    network: Network
-    load: np.ndarray
-    load_norm: float
+    def __init__(
+        self,
+        network: Network,
+        pattern: np.ndarray,
+        follower: FollowerPressure | None = None,
+        *,
+        dead: np.ndarray | None = None,
+        given: np.ndarray | None = None,
+    ) -> None:
+        self.network = network
+        self.follower = follower
+        self.given = given
+        self.load = network.reduce(pattern)
+        self.load_norm = float(np.linalg.norm(self.load))
+        self._dead = None if dead is None or follower is None else network.reduce(dead)
+        if given is not None:
+            # A first scale, to refine the linear solution, whose own forces are the final one.
+            self.load_norm += float(np.linalg.norm(network.linear_resistance(given)))
+            forces = np.where(network.held, network.linear_forces(self.slope), 0.0)
+            self.load_norm = float(np.hypot(np.linalg.norm(self.load), np.linalg.norm(forces))) or self.load_norm
+
+    @property
+    def rest_factor(self) -> Factor:
+        """Tangent factorized at rest, shared by all loads of the network."""
+        return self.network.rest_factor
+
+    @cached_property
+    def _slope(self) -> tuple[np.ndarray, float, float]:
+        """The linear network's displacements over ``s``, the residual [1] and the estimated error of them [1]."""
+
+        def balance(slope: np.ndarray) -> tuple[np.ndarray, float]:
+            missing = self.load - self.network.linear_resistance(slope)
+            return missing, norm(missing) / self.load_norm
+
+        if self.given is None:
+            first = self.network.expand(self.rest_factor.solve(self.load))
+        else:
+            pull = self.load - self.network.linear_resistance(self.given)
+            first = self.given + self.network.expand(self.rest_factor.solve(pull))
+        here, error = refine(self.network, Iterate(first, *balance(first)), self.rest_factor, balance, linear=True)
+        return here.displacements, here.residual, error
+
+    @property
+    def slope(self) -> np.ndarray:
+        """Displacements of the linear network over ``s`` [1], shape (n_points, 2)."""
+        return self._slope[0]
+
+    def stability(self, s: float, displacements: np.ndarray, factor: Factor) -> tuple[int, bool]:
+        """Return the number of negative pivots of an equilibrium's tangent, and whether it is singular."""
+        if self.follower is None or factor is self.rest_factor:
+            return factor.negative_pivots, False
+        modes = self.modes(s, displacements, factor)
+        merged = np.abs(modes.imag) > MERGED * np.abs(modes)
+        return int((modes.real < 0)[~merged].sum()), bool(merged.any())
+
+    def modes(self, s: float, displacements: np.ndarray, factor: Factor) -> np.ndarray:
+        """Return the eigenvalues nearest to zero of the tangent over the masses, under a follower pressure.
+
+        This tangent is not symmetric: an eigenvalue may pass zero (buckling), or two may merge and leave the real
+        axis (flutter; Beck's column: M. Beck, Z. angew. Math. Phys. 3:225, 1952). Masses are those of a uniform
+        sheet, without damping, which can lower the critical load. The complex values are squared frequencies over
+        stiffness and mass of the whole sheet; at most `MODES`.
+        """
+        network = self.network
+        mass = network.reduce(np.repeat(network.mesh.particle_areas[:, None], 2, axis=1)) / network.mesh.area
+        if len(mass) <= 4 * MODES:
+            tangent = network.tangent(displacements, self._follower_at(s))
+            values = np.linalg.eigvals(tangent.toarray() / mass[:, None])
+            return values[np.argsort(abs(values))][:MODES]
+        # The largest eigenvalues of the inverse.
+        inverse = LinearOperator((len(mass),) * 2, lambda right: factor.solve(mass * right.ravel()), dtype=float)
+        start = np.random.default_rng(0).standard_normal(len(mass))
+        return 1.0 / eigs(inverse, MODES, v0=start, return_eigenvectors=False)
+
+    def holds(self, s: float, displacements: np.ndarray) -> bool:
+        """Return whether no cell is inverted and the symmetric part of the tangent is positive definite."""
+        return not self.network.inverted(displacements) and self.network.is_stable(displacements, self._follower_at(s))
 
     def balance(self, s: float, displacements: np.ndarray) -> tuple[np.ndarray, float]:
-        """Load less resistance, and its norm over that of the load."""
+        """Return load less resistance [m], shape (unknowns,), and its norm over that of the load [1]."""
+        missing = s * self.load_at(displacements) - self.network.resistance(displacements)
+        return missing, norm(missing) / (abs(s) * self.load_norm)
 
-    def factorize_tangent(self, s: float, displacements: np.ndarray) -> Factor:
-        """Factor of the tangent of resistance less load."""
+    def load_at(self, displacements: np.ndarray) -> np.ndarray:
+        """Load pattern at displacements [m] of shape (n_points, 2), a follower's turned with them: [1], (unknowns,)."""
+        if self.follower is None:
+            return self.load
+        turned = self.network.reduce(self.follower.forces(displacements))
+        return turned if self._dead is None else self._dead + turned
+
+    @cached_property
+    def _free(self) -> Network:
+        """The network without held directions."""
+        network, none = self.network, np.zeros(self.network.held.shape, dtype=bool)
+        return Network(network.mesh, none, network.stiffness, network.energies)
+
+    def rate(self, displacements: np.ndarray) -> np.ndarray:
+        """Load that is missing for a growth of ``s`` by one, prescribed displacements included: [1], (unknowns,)."""
+        load = self.load_at(displacements)
+        if self.given is None:
+            return load
+        pull = self._free.tangent(displacements) @ self.given.ravel()
+        return load - self.network.reduce(pull.reshape(self.given.shape))
 
     def moved(self, s: float, displacements: np.ndarray) -> np.ndarray:
-        """Displacements with the prescribed ones inserted."""
+        """Displacements [m], shape (n_points, 2), with those prescribed at ``s`` inserted."""
+        return displacements if self.given is None else np.where(self.network.held, s * self.given, displacements)
+
+    def factorize_tangent(self, s: float, displacements: np.ndarray) -> Factor:
+        """Factorize the tangent of resistance less load, see `Network.factorize_tangent`."""
+        return self.network.factorize_tangent(displacements, self._follower_at(s))
+
+    def _follower_at(self, s: float) -> tuple[float, FollowerPressure] | None:
+        return None if self.follower is None else (s, self.follower)
 
 
 class Newton:
@@ -114,7 +214,7 @@ class Newton:
 
     def __init__(
         self,
-        problem: Balance,
+        problem: LoadedNetwork,
         s: float,
         max_factorizations: int = MAX_FACTORIZATIONS,
         keep_tangent: float = KEEP_TANGENT,

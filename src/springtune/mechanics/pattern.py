@@ -7,8 +7,7 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import bsr_array, csc_array, csr_array
 
-from ..linalg.factors import Analysis
-from ..linalg.ordering import nested_dissection, spread
+from ..linalg.factors import Analysis, nested_dissection, spread
 from ..mesh.cells import DIAGONALS, SIDES, Mesh
 from .energies import Energy
 

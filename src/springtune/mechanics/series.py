@@ -60,21 +60,6 @@ def trace(problem: StaticProblem, weights: np.ndarray, targets: np.ndarray) -> t
         NaN where the path from rest reaches no equilibrium.
     stable : ndarray of bool, shape (n,)
         Whether the path from rest reaches the load and is stable up to there.
-
-    Examples
-    --------
-    A strip of triangles under a pull at its end: twice the load gives a little less than twice the displacement.
-
-    >>> from springtune.mechanics.network import Network
-    >>> from springtune.mesh import MESH_TYPES
-    >>> mesh = MESH_TYPES["structured"](0.1, 0.02, 5e-3)
-    >>> x = mesh.points[:, 0]
-    >>> held = np.repeat((x <= x.min())[:, None], 2, axis=1)
-    >>> pulled = np.stack([(x >= x.max()) / (x >= x.max()).sum(), 0 * x], axis=1)
-    >>> problem = StaticProblem(Network(mesh, held, np.ones(len(mesh.edges))), pulled)
-    >>> values, stable = trace(problem, pulled, np.array([1e-4, 2e-4]))
-    >>> bool(stable.all()), float((values[1] / values[0]).round(4))
-    (True, 1.9998)
     """
     path = StablePath(problem, weights, targets)
     return path.values, path.stable
@@ -132,10 +117,11 @@ class StablePath:
     def value(self, s: float) -> float:
         """Return the weighted displacement [m] at a load [m] on the stable path, or NaN beyond it."""
         load = abs(s)
-        series = self._series_of(load)
-        if series is None:
+        if not self._serves(load):
             return self._reach(load)
-        return float(series.measure(self.weights, np.array([s]))[0][0]) if self._is_stable(load) else np.nan
+        if not self._is_stable(load):
+            return np.nan
+        return float(self._series_of(load).measure(self.weights, np.array([s]))[0][0])
 
     # -- series of the load -----------------------------------------------------------------------------------------
 
@@ -184,9 +170,13 @@ class StablePath:
             number -= 1 + number // 8
         return 0, None
 
-    def _series_of(self, load: float) -> Expansion | None:
-        """The series that serves a load; None where none does."""
-        return next((series for series, last in self._series if load <= last), None)
+    def _serves(self, load: float) -> bool:
+        """Whether a series serves a load."""
+        return bool(self._series) and load <= self._series[-1][1]
+
+    def _series_of(self, load: float) -> Expansion:
+        """The first series that serves a load."""
+        return next(series for series, last in self._series if load <= last)
 
     def _point(self, series: Expansion, s: float, value: float) -> _Point | None:
         """The point at a load that a series predicts; None where there is none."""
@@ -240,7 +230,6 @@ class StablePath:
     def _stable_at(self, load: float) -> bool:
         """Whether the point that a series of the load predicts is stable."""
         series = self._series_of(load)
-        assert series is not None
         return self.problem.network.is_stable(series.at(self._sign * load - series.s)[1])
 
     def _is_stable(self, load: float) -> bool:
@@ -273,7 +262,6 @@ class StablePath:
         for place in np.flatnonzero(doubtful):
             s = loads[place]
             series = self._series_of(abs(s))
-            assert series is not None
             guess = series.at(s - series.s)[1]
             point = self._corrected(s, values[place], guess, self._far.factor, True)
             if not point.error <= CURVE_TOLERANCE:

@@ -11,15 +11,12 @@ from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse.linalg import LinearOperator, eigs
 
-from ..linalg.factors import Factor
 from ..linalg.factors import SingularError as SingularError
 from ..problem.status import Status
 from .continuation import continued
 from .expansion import Expansion
-from .network import FollowerPressure, Network
-from .newton import KEEP_TANGENT, MAX_FACTORIZATIONS, Equilibrium, Iterate, Newton, norm, refine, uncertainty
+from .newton import KEEP_TANGENT, MAX_FACTORIZATIONS, Equilibrium, LoadedNetwork, Newton, uncertainty
 
 FAR = 0.15
 """Stretch of a spring beyond which an equilibrium is sought along the path from rest."""
@@ -52,12 +49,6 @@ load's. Of 153 snaps of arches the smallest values are 0.35 and 0.05.
 WAY = 8
 """Increments of a path behind a limit point, over the straight way from there to a stable equilibrium."""
 
-MODES = 24
-"""Eigenvalues nearest to zero that tell whether an equilibrium under a follower pressure is stable."""
-
-MERGED = 1e-6
-"""Imaginary part of an eigenvalue over its size beyond which two modes have merged: they flutter."""
-
 HIGH_ORDER = 16
 """Order of a series if the default order fails."""
 
@@ -65,7 +56,7 @@ START_ORDER = 3
 """Orders of the series that starts Newton's method: together they cost half of a factorization."""
 
 
-class StaticProblem:
+class StaticProblem(LoadedNetwork):
     """Network under a load pattern.
 
     `pattern` (n_points, 2) are forces [1], scaled by ``s``; `dead` is its part that does not follow the deformation.
@@ -87,53 +78,6 @@ class StaticProblem:
     (array([0.1, 0. ]), True, (0, False))
     """
 
-    def __init__(
-        self,
-        network: Network,
-        pattern: np.ndarray,
-        follower: FollowerPressure | None = None,
-        *,
-        dead: np.ndarray | None = None,
-        given: np.ndarray | None = None,
-    ) -> None:
-        self.network = network
-        self.follower = follower
-        self.given = given
-        self.load = network.reduce(pattern)
-        self.load_norm = float(np.linalg.norm(self.load))
-        self._dead = None if dead is None or follower is None else network.reduce(dead)
-        if given is not None:
-            # A first scale, to refine the linear solution, whose own forces are the final one.
-            self.load_norm += float(np.linalg.norm(network.linear_resistance(given)))
-            forces = np.where(network.held, network.linear_forces(self.slope), 0.0)
-            self.load_norm = float(np.hypot(np.linalg.norm(self.load), np.linalg.norm(forces))) or self.load_norm
-
-    @property
-    def rest_factor(self) -> Factor:
-        """Tangent factorized at rest, shared by all loads of the network."""
-        return self.network.rest_factor
-
-    @cached_property
-    def _slope(self) -> tuple[np.ndarray, float, float]:
-        """The linear network's displacements over ``s``, the residual [1] and the estimated error of them [1]."""
-
-        def balance(slope: np.ndarray) -> tuple[np.ndarray, float]:
-            missing = self.load - self.network.linear_resistance(slope)
-            return missing, norm(missing) / self.load_norm
-
-        if self.given is None:
-            first = self.network.expand(self.rest_factor.solve(self.load))
-        else:
-            pull = self.load - self.network.linear_resistance(self.given)
-            first = self.given + self.network.expand(self.rest_factor.solve(pull))
-        here, error = refine(self.network, Iterate(first, *balance(first)), self.rest_factor, balance, linear=True)
-        return here.displacements, here.residual, error
-
-    @property
-    def slope(self) -> np.ndarray:
-        """Displacements of the linear network over ``s`` [1], shape (n_points, 2)."""
-        return self._slope[0]
-
     @cached_property
     def start(self) -> Expansion:
         """Short series about rest: where Newton's method starts."""
@@ -154,33 +98,6 @@ class StaticProblem:
         slope, residual, error = self._slope
         reason = uncertainty(error)
         return Equilibrium(s * slope, not reason, 1, residual, self.rest_factor, reason, error)
-
-    def stability(self, s: float, displacements: np.ndarray, factor: Factor) -> tuple[int, bool]:
-        """Return the number of negative pivots of an equilibrium's tangent, and whether it is singular."""
-        if self.follower is None or factor is self.rest_factor:
-            return factor.negative_pivots, False
-        modes = self.modes(s, displacements, factor)
-        merged = np.abs(modes.imag) > MERGED * np.abs(modes)
-        return int((modes.real < 0)[~merged].sum()), bool(merged.any())
-
-    def modes(self, s: float, displacements: np.ndarray, factor: Factor) -> np.ndarray:
-        """Return the eigenvalues nearest to zero of the tangent over the masses, under a follower pressure.
-
-        This tangent is not symmetric: an eigenvalue may pass zero (buckling), or two may merge and leave the real
-        axis (flutter; Beck's column: M. Beck, Z. angew. Math. Phys. 3:225, 1952). Masses are those of a uniform
-        sheet, without damping, which can lower the critical load. The complex values are squared frequencies over
-        stiffness and mass of the whole sheet; at most `MODES`.
-        """
-        network = self.network
-        mass = network.reduce(np.repeat(network.mesh.particle_areas[:, None], 2, axis=1)) / network.mesh.area
-        if len(mass) <= 4 * MODES:
-            tangent = network.tangent(displacements, self._follower_at(s))
-            values = np.linalg.eigvals(tangent.toarray() / mass[:, None])
-            return values[np.argsort(abs(values))][:MODES]
-        # The largest eigenvalues of the inverse.
-        inverse = LinearOperator((len(mass),) * 2, lambda right: factor.solve(mass * right.ravel()), dtype=float)
-        start = np.random.default_rng(0).standard_normal(len(mass))
-        return 1.0 / eigs(inverse, MODES, v0=start, return_eigenvectors=False)
 
     def judge(self, s: float, found: Equilibrium) -> tuple[Status, str, float]:
         """Return status, message and negative pivots of an equilibrium; NaN pivots if it has no regular tangent."""
@@ -275,10 +192,6 @@ class StaticProblem:
                 return True
         return self.holds(half, middle)
 
-    def holds(self, s: float, displacements: np.ndarray) -> bool:
-        """Return whether no cell is inverted and the symmetric part of the tangent is positive definite."""
-        return not self.network.inverted(displacements) and self.network.is_stable(displacements, self._follower_at(s))
-
     def _unstable(self, s: float, found: Equilibrium) -> bool:
         """Return whether a path leaves an equilibrium; flutter does not count."""
         assert found.factor is not None  # of what converged
@@ -286,43 +199,6 @@ class StaticProblem:
             return self.stability(s, found.displacements, found.factor)[0] > 0
         except SingularError:
             return True
-
-    def balance(self, s: float, displacements: np.ndarray) -> tuple[np.ndarray, float]:
-        """Return load less resistance [m], shape (unknowns,), and its norm over that of the load [1]."""
-        missing = s * self.load_at(displacements) - self.network.resistance(displacements)
-        return missing, norm(missing) / (abs(s) * self.load_norm)
-
-    def load_at(self, displacements: np.ndarray) -> np.ndarray:
-        """Load pattern at displacements [m] of shape (n_points, 2), a follower's turned with them: [1], (unknowns,)."""
-        if self.follower is None:
-            return self.load
-        turned = self.network.reduce(self.follower.forces(displacements))
-        return turned if self._dead is None else self._dead + turned
-
-    @cached_property
-    def _free(self) -> Network:
-        """The network without held directions."""
-        network, none = self.network, np.zeros(self.network.held.shape, dtype=bool)
-        return Network(network.mesh, none, network.stiffness, network.energies)
-
-    def rate(self, displacements: np.ndarray) -> np.ndarray:
-        """Load that is missing for a growth of ``s`` by one, prescribed displacements included: [1], (unknowns,)."""
-        load = self.load_at(displacements)
-        if self.given is None:
-            return load
-        pull = self._free.tangent(displacements) @ self.given.ravel()
-        return load - self.network.reduce(pull.reshape(self.given.shape))
-
-    def moved(self, s: float, displacements: np.ndarray) -> np.ndarray:
-        """Displacements [m], shape (n_points, 2), with those prescribed at ``s`` inserted."""
-        return displacements if self.given is None else np.where(self.network.held, s * self.given, displacements)
-
-    def factorize_tangent(self, s: float, displacements: np.ndarray) -> Factor:
-        """Factorize the tangent of resistance less load, see `Network.factorize_tangent`."""
-        return self.network.factorize_tangent(displacements, self._follower_at(s))
-
-    def _follower_at(self, s: float) -> tuple[float, FollowerPressure] | None:
-        return None if self.follower is None else (s, self.follower)
 
     def newton(
         self,

@@ -6,14 +6,12 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import cached_property, partial
-from typing import Protocol
 
 import numpy as np
 from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import cg
 
-from ..linalg.factors import Factor, factorize
-from ..linalg.ordering import narrow
+from ..linalg.factors import Factor, factorize, narrow
 from .integrators import EXPLICIT, LAGGED, BackwardEuler
 from .network import Network
 
@@ -30,33 +28,71 @@ DEEPEST_PASS = 8
 """Steps of a pass at most: with more, threads wait longer for each other at its ends, and save nothing."""
 
 
-class Moving(Protocol):
-    """Problem that moves, such as `springtune.mechanics.dynamics.Motion`."""
+class Moving:
+    """Network with masses, dampers and a load, see `springtune.mechanics.dynamics.Motion`."""
 
-    network: Network
-    linear: bool
-    load: np.ndarray
-    inertia: np.ndarray
-    mass_damping: float
-    dampers: np.ndarray | None
+    def __init__(
+        self,
+        network: Network,
+        inertia: np.ndarray,
+        load: np.ndarray | None = None,
+        mass_damping: float = 0.0,
+        dampers: np.ndarray | None = None,
+        linear: bool = False,
+    ) -> None:
+        self.network, self.linear = network, linear
+        self.load = np.zeros(network.held.shape) if load is None else load
+        self.mass_damping, self.dampers = mass_damping, dampers
+        self.inertia = np.repeat(np.asarray(inertia, dtype=float)[:, None], 2, axis=1)
+        bad = int((~(self.inertia > 0) & ~network.held).any(axis=1).sum())
+        if bad:
+            raise ValueError(f"{bad} particles can move and have no mass; remove particles without cells from the mesh")
+        if mass_damping < 0 or (dampers is not None and (dampers < 0).any()):
+            raise ValueError("a damping is negative, and a run would gain energy; give 0 or more")
 
-    @property
+    @cached_property
     def mass(self) -> np.ndarray:
         """Inertia of each unknown [s2], shape (unknowns,)."""
+        return self.network.reduce(self.inertia)
 
-    @property
+    @cached_property
     def stiffness_matrix(self) -> csc_array:
         """Tangent at rest [1]."""
+        return self.network.tangent()
 
-    @property
+    @cached_property
     def damper_matrix(self) -> csc_array | None:
         """Matrix of the dampers along springs at rest [s]; None without any."""
+        if self.dampers is None:
+            return None
+        return Network(self.network.mesh, self.network.held, self.dampers, like=self.network).tangent()
 
     def damper_tangent(self, displacements: np.ndarray) -> csc_array | None:
-        """Derivative of the dampers' forces by the velocities [s]; or None."""
+        """Derivative of the dampers' forces by the velocities [s], the springs turned by displacements [m]; or None."""
+        if self.dampers is None or self.linear:
+            return self.damper_matrix
+        along = self.network.rest_vectors + self.network.stretch(displacements)
+        along = along / np.linalg.norm(along, axis=1)[:, None]
+        apart = np.concatenate([along, -along], axis=1)
+        matrices = self.dampers[:, None, None] * apart[:, :, None] * apart[:, None, :]
+        return self.network.stiffness_of(self.network.mesh.edges, matrices)
+
+    def damper_forces(self, u: np.ndarray, v: np.ndarray) -> np.ndarray | float:
+        """Forces of the dampers along springs [m], shape (unknowns,)."""
+        network = self.network
+        if self.dampers is None:
+            return 0.0
+        if self.linear:
+            return self.damper_matrix @ network.reduce(v)
+        along = network.rest_vectors + network.stretch(u)
+        rate = np.einsum("ij,ij->i", along, network.stretch(v)) / np.einsum("ij,ij->i", along, along)
+        return -network.gather((self.dampers * rate)[:, None] * along)
 
     def missing(self, displacements: np.ndarray) -> np.ndarray:
         """Load less resistance [m], shape (unknowns,)."""
+        resist = self.network.linear_resistance if self.linear else self.network.resistance
+        with np.errstate(over="ignore", invalid="ignore"):
+            return self.network.reduce(self.load) - resist(displacements)
 
 
 def make_stepper(
@@ -195,7 +231,7 @@ class ExplicitSteps(Stepper):
 
     def _acceleration(self, u: np.ndarray, v: np.ndarray) -> np.ndarray:
         motion = self.motion
-        force = motion.network.expand(motion.missing(u) - _damper_forces(motion, u, v))
+        force = motion.network.expand(motion.missing(u) - motion.damper_forces(u, v))
         return force * self.inverse - motion.mass_damping * v
 
     def advance(self, steps: int) -> None:
@@ -257,7 +293,7 @@ class ExplicitSteps(Stepper):
         with np.errstate(over="ignore", invalid="ignore"):
             for _ in range(steps):
                 at, speed = u.astype(float), v.astype(float)
-                missing = motion.missing(at) - _damper_forces(motion, at, speed)
+                missing = motion.missing(at) - motion.damper_forces(at, speed)
                 v *= self._keep
                 v += self._gain * motion.network.expand(missing)
                 u += step * v
@@ -287,18 +323,6 @@ def passes_of(pointers: np.ndarray, bandwidth: int, of_row: int, of_entry: int, 
 def _deepest(each: float, bandwidth: int) -> int:
     """Steps of a pass whose rows, of so many bytes each, find room in a cache."""
     return int(np.clip((CACHE / each - ROWS_AT_ONCE) / bandwidth, 1, DEEPEST_PASS))
-
-
-def _damper_forces(motion: Moving, u: np.ndarray, v: np.ndarray) -> np.ndarray | float:
-    """Forces of the dampers along springs, shape (unknowns,)."""
-    if motion.dampers is None:
-        return 0.0
-    network = motion.network
-    if motion.linear:
-        return motion.damper_matrix @ network.reduce(v)
-    along = network.rest_vectors + network.stretch(u)
-    rate = np.einsum("ij,ij->i", along, network.stretch(v)) / np.einsum("ij,ij->i", along, along)
-    return -network.gather((motion.dampers * rate)[:, None] * along)
 
 
 class BackwardEulerSteps(Stepper):
@@ -367,7 +391,7 @@ class MidpointSteps(Stepper):
         for _ in range(40):
             at = self.u + 0.5 * h * network.expand(middle)
             missing = motion.missing(at) - inertia * (middle - v) - damping * middle
-            missing -= _damper_forces(motion, at, network.expand(middle))
+            missing -= motion.damper_forces(at, network.expand(middle))
             with np.errstate(over="ignore", invalid="ignore"):
                 size = float(np.linalg.norm(missing))
                 scale = float(np.linalg.norm(inertia * v)) + float(np.linalg.norm(motion.missing(self.u))) + self._load

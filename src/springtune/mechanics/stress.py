@@ -67,10 +67,6 @@ def particle_stresses(
         values.append(stresses[count][kept])
         middles.append(mesh.points[cells[kept]].mean(axis=1))
     cells, value, middle = np.concatenate(corners), np.concatenate(values), np.concatenate(middles)
-    return _recovered(mesh, cells, value, middle)
-
-
-def _recovered(mesh: Mesh, cells: np.ndarray, value: np.ndarray, middle: np.ndarray) -> np.ndarray:
     count, size = len(mesh.points), np.sqrt(mesh.area / len(cells))
     cell, corner = np.nonzero(cells >= 0)
     particle = cells[cell, corner]

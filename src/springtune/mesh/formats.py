@@ -1,8 +1,6 @@
 """Mesh files: VTU, as meshio and ParaView open them, and whatever else meshio reads."""
 
 import io
-import os
-import platform
 import warnings
 from collections import defaultdict
 from collections.abc import Iterator
@@ -13,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..registry import NAME, NAME_RULE
+from ..safe_io.atomic import check_folder, replacing
 from ..safe_io.inputs import BeyondBound, DataElsewhere, bounded, check_alone, fault
 from .cells import Mesh, MeshError, no_cells, signed_areas
 from .groups import GroupedMesh
@@ -67,6 +66,7 @@ def write_mesh(path: str | Path, mesh: Mesh | GroupedMesh) -> None:
     ending = Path(path).suffix
     if ending not in kinds:
         raise MeshError(f"{path}: is not to end in '{ending}'; give a name that ends in {' or '.join(kinds)}")
+    check_folder(path)
     import meshio
 
     grouped = mesh if isinstance(mesh, GroupedMesh) else GroupedMesh(mesh)
@@ -92,15 +92,11 @@ def write_mesh(path: str | Path, mesh: Mesh | GroupedMesh) -> None:
         blocks.append(("vertex", np.array([[number]]), [point]))
     points = np.concatenate([mesh.points, np.reshape(places, (-1, 2))])
     points = np.column_stack([points, np.zeros(len(points))])
-    unfinished = f"{path}.{os.getpid()}@{platform.node().replace('.', '-')}.unfinished"
     data, fields = (_vtu_marks if ending == ".vtu" else _gmsh_tags)(path, blocks)
-    try:
-        cells = [(kind, corners) for kind, corners, _ in blocks]
-        meshio.Mesh(points, cells, cell_data=data, field_data=fields).write(unfinished, file_format=kinds[ending])
-        os.replace(unfinished, path)
-    except BaseException:
-        Path(unfinished).unlink(missing_ok=True)
-        raise
+    cells = [(kind, corners) for kind, corners, _ in blocks]
+    content = meshio.Mesh(points, cells, cell_data=data, field_data=fields)
+    with replacing(path) as unfinished:
+        content.write(unfinished, file_format=kinds[ending])
 
 
 def _vtu_marks(
@@ -434,14 +430,12 @@ class _Groups:
                 values = np.asarray(values)
                 if values.ndim != 1 or values.dtype.kind not in "iub" or blocks[number].type not in CELL_DIMENSIONS:
                     continue
-                if key == PHYSICAL:
+                if key in (PHYSICAL, PART_NUMBERS):
                     for tag in np.unique(values[values != 0]).tolist():
-                        name = tags.get((tag, CELL_DIMENSIONS[blocks[number].type]), str(tag))
-                        if name not in named:
+                        group = tag, CELL_DIMENSIONS[blocks[number].type]
+                        name = tags.get(group, str(tag)) if key == PHYSICAL else str(tag)
+                        if name not in named or key == PART_NUMBERS:
                             yield name, number, np.flatnonzero(values == tag)
-                elif key == PART_NUMBERS:
-                    for tag in np.unique(values[values != 0]).tolist():
-                        yield str(tag), number, np.flatnonzero(values == tag)
                 elif ":" not in key and self._marks(key, arrays):
                     yield key, number, np.flatnonzero(values)
 

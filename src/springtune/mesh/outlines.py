@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from .cells import Mesh, MeshError, signed_areas
+from .free import FITTING, triangulate, upright
 from .groups import GroupedMesh
 from .rows import ROW_HEIGHT
 from .sheets import nearer
@@ -232,44 +233,37 @@ def _netgen(
     what: str,
 ) -> _Made:
     """Triangulation inside stretches, by netgen's advancing front."""
-    from netgen.geom2d import SplineGeometry  # here, since only a mesh of this type should pay for it
-    from netgen.meshing import NgException
-    from scipy.spatial import cKDTree
+    from scipy.spatial import cKDTree  # here, since studies are read without scipy
 
     # Lengths in units of the edge: netgen's own tolerances are absolute.
     unit = sizes[""]
-    outline = SplineGeometry()
     pairs = [(stretch.side.at(stretch.low), stretch.side.at(stretch.high)) for stretch in stretches]
     pairs += [(start, end) for start, end, _ in lines]
-    numbers: dict[Point, int] = {}
-    for point in (point for pair in pairs for point in pair):
-        if point not in numbers:
-            x, y = (np.array(point) - origin) / unit
-            numbers[point] = outline.AppendPoint(x, y, maxh=fine.get(point, unit) / unit)
+    numbers = {point: number for number, point in enumerate(dict.fromkeys(point for pair in pairs for point in pair))}
     joined = [(numbers[start], numbers[end]) for start, end in pairs]
     domains = [(stretch.inner, stretch.outer) for stretch in stretches] + [(region, region) for _, _, region in lines]
-    for number, ((start, end), (inner, outer)) in enumerate(zip(joined, domains)):
-        outline.Append(["line", start, end], leftdomain=inner, rightdomain=outer, bc=number + 1)
-    for number, region in enumerate(regions):
-        if region and region in sizes:
-            outline.SetDomainMaxH(number + 1, sizes[region] / unit)
-    try:
-        made = outline.GenerateMesh(maxh=1.0 + 1e-9, grading=GRADING, segmentsperedge=EDGES_A_LINE)
-    except NgException as error:
-        raise MeshError(f"netgen cannot mesh {what} at {unit:g} m: {error}; give another size") from None
-    points = np.array([point.p for point in made.Points()])[:, :2]
-    elements = made.Elements2D()
-    triangles = np.array([[vertex.nr - 1 for vertex in element.vertices] for element in elements], dtype=np.int64)
-    found = np.array([element.index for element in elements], dtype=np.int64)
+    made = triangulate(
+        (np.array(list(numbers)) - origin) / unit,
+        [(*ends, *sides) for ends, sides in zip(joined, domains)],
+        f"{what} at {unit:g} m",
+        "give another size",
+        sizes=[fine.get(point, unit) / unit for point in numbers],
+        region_sizes={
+            number: sizes[region] / unit for number, region in enumerate(regions, 1) if region and region in sizes
+        },
+        maxh=FITTING,
+        grading=GRADING,
+        segmentsperedge=EDGES_A_LINE,
+    )
+    points, triangles = made.points, made.triangles
     given = (np.array(list(numbers)) - origin) / unit
     # Where two are near each other, netgen numbers them otherwise.
     away, order = cKDTree(points).query(given)
     if not len(triangles) or away.max() > 1e-9 * np.abs(given).max() or len(np.unique(order)) < len(order):
         raise MeshError(f"netgen cannot mesh {what} at {unit:g} m: points are too near each other; give another size")
     pieces: dict[int, list[tuple[int, int]]] = defaultdict(list)
-    for element in made.Elements1D():
-        first, second = (vertex.nr - 1 for vertex in element.points)
-        pieces[element.index - 1].append((first, second))
+    for line, first, second in made.pieces:
+        pieces[line].append((first, second))
     chains, divided = [], {}
     corner = dict(zip(numbers.values(), order.tolist()))
     for number in range(len(stretches)):
@@ -289,7 +283,7 @@ def _netgen(
         stretch = stretches[number]
         for i, share in zip(chains[number][1:], shares):
             placed[i] = stretch.side.at(stretch.low + share * (stretch.high - stretch.low))
-    return _Made(placed, triangles, found, chains, divided)
+    return _Made(placed, triangles, made.regions, chains, divided)
 
 
 def _upright(made: _Made, stretches: Sequence[_Stretch], what: str) -> np.ndarray:
@@ -301,7 +295,7 @@ def _upright(made: _Made, stretches: Sequence[_Stretch], what: str) -> np.ndarra
     within = 0.5 * float((ends[:, 0, 0] * ends[:, 1, 1] - ends[:, 1, 0] * ends[:, 0, 1]) @ senses)
     if abs(np.abs(areas).sum() - within) > 1e-9 * within:
         raise MeshError(f"netgen does not fill {what}; give another size")
-    return np.where((areas < 0)[:, None], made.triangles[:, ::-1], made.triangles)
+    return upright(made.points, made.triangles)
 
 
 def _grouped(shape: Outlined, made: _Made, stretches: Sequence[_Stretch], regions: Sequence[str | None]) -> GroupedMesh:

@@ -48,13 +48,7 @@ def _isosceles_counts(length: float, height: float, size: float, poisson_ratio: 
 
 
 def row_height(size: float, poisson_ratio: float) -> float:
-    """Return the height [m] of a row of isosceles triangles of base `size` [m] that sets Poisson's ratio.
-
-    Examples
-    --------
-    >>> row_height(2e-3, 0.25)
-    0.002
-    """
+    """Return the height [m] of a row of isosceles triangles of base `size` [m] that sets Poisson's ratio."""
     return size / (2 * math.sqrt(poisson_ratio))
 
 

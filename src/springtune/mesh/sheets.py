@@ -21,17 +21,6 @@ def sheet_fault(mesh: Mesh) -> str:
 
     Cells must be convex and meet in entire edges, at most two in each, without overlaps. Rounds of the outline must
     not touch themselves or each other: no slits, hanging points, or cells that meet only in a point.
-
-    Examples
-    --------
-    Two triangles that meet in a point:
-
-    >>> import numpy as np
-    >>> points = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [-1.0, 0.0], [-1.0, -1.0]])
-    >>> sheet_fault(Mesh(points, np.array([[0, 1, 2]])))
-    ''
-    >>> sheet_fault(Mesh(points, np.array([[0, 1, 2], [0, 3, 4]])))
-    'cells hang together in a point alone, at (0, 0) mm; join them by an edge, or part them'
     """
     fault = not_convex(mesh)
     if fault:

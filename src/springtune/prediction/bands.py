@@ -34,22 +34,12 @@ def extrapolate(
     *,
     loads: Iterable[str] = CASES,
 ) -> tuple[list[Choice], list[float]]:
-    """Choices for a mesh that is too large to solve: bands from coarser meshes of its type.
+    """Choices for a mesh size [m] too large to solve, as bands from coarser meshes, and the sizes of these meshes [m].
 
-    What a network gets wrong depends on the shape of its cells, which are stretched to fit the beam, and changes about
-    in proportion to the mesh size or to a higher power of it. So a band holds what meshes give whose sizes cover an
-    octave, chosen for cells that are stretched a little more and a little less than those asked for, and what a
-    straight line through these gives; its width is added at either end, a twentieth of an error at least.
-
-    Parameters
-    ----------
-    size : float
-        Length of an edge [m].
-
-    Returns
-    -------
-    sizes : list of float
-        Mesh sizes that were solved [m].
+    The error of a network depends on the shape of its cells, which are stretched to fit the beam. It changes about in
+    proportion to the mesh size or to a higher power of it. A band holds the errors on meshes whose sizes cover an
+    octave, with cells that are stretched a little more and a little less than those asked for, and what a straight line
+    through them gives. Its width is added at either end, a twentieth of an error at least.
     """
     check_beam(beam)
     finest = sqrt(beam.length * beam.height / most)

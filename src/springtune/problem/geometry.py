@@ -2,9 +2,8 @@
 
 import warnings
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-from .quantities import positive
+from .quantities import Number, positive, put
 
 
 class AssumptionWarning(UserWarning):
@@ -51,24 +50,18 @@ class Beam:
     Beam(length=0.2, height=0.04, thickness=0.001, name='200x40')
     """
 
-    length: float
-    height: float
-    thickness: float = 1e-3
+    length: Number
+    height: Number
+    thickness: Number = 1e-3
     name: str = ""
-
-    if TYPE_CHECKING:  # what it takes, where what it holds are numbers
-
-        def __init__(
-            self, length: float | str, height: float | str, thickness: float | str = 1e-3, name: str = ""
-        ) -> None: ...
 
     def __post_init__(self) -> None:
         for side in ("length", "height", "thickness"):
-            object.__setattr__(self, side, positive(getattr(self, side), "length", side))
+            put(self, **{side: positive(getattr(self, side), "length", side)})
         if not isinstance(self.name, str):
             raise ValueError(f"name: {self.name!r} is not a text; give one such as '200x40', or none")
         if not self.name:
-            object.__setattr__(self, "name", f"{1e3 * self.length:g}x{1e3 * self.height:g}")
+            put(self, name=f"{1e3 * self.length:g}x{1e3 * self.height:g}")
         warn_of_thickness(self.thickness, (self.length, self.height), f"beam {self.name!r}")
 
     @property

@@ -19,12 +19,11 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from numbers import Real
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
-from .quantities import positive, quantity
+import numpy as np
 
-if TYPE_CHECKING:
-    import numpy as np
+from .quantities import Number, positive, put, quantity
 
 
 @dataclass(frozen=True)
@@ -60,28 +59,15 @@ class Material:
     Material(young_modulus=210000000000.0, poisson_ratio=0.3, density=7850.0, name='steel')
     """
 
-    young_modulus: float
+    young_modulus: Number
     poisson_ratio: float
-    density: float | None = None
+    density: Number | None = None
     name: str = "material"
     isotropic: ClassVar[bool] = True
 
-    if TYPE_CHECKING:  # what it takes, where what it holds are numbers
-
-        def __init__(
-            self,
-            young_modulus: float | str,
-            poisson_ratio: float,
-            density: float | str | None = None,
-            name: str = "material",
-        ) -> None: ...
-
     def __post_init__(self) -> None:
-        _check_name(self.name)
-        set_ = object.__setattr__  # of a frozen class
-        set_(self, "young_modulus", positive(self.young_modulus, "stress", "Young's modulus"))
-        if self.density is not None:
-            set_(self, "density", positive(self.density, "density", "density"))
+        _check_label(self)
+        put(self, young_modulus=positive(self.young_modulus, "stress", "Young's modulus"))
         if not (isinstance(self.poisson_ratio, Real) and -1 < self.poisson_ratio <= 0.5):
             raise ValueError(
                 f"Poisson's ratio of {self.name!r} is {self.poisson_ratio!r}: isotropic materials have -1 < nu <= 0.5; "
@@ -98,8 +84,6 @@ class Material:
         >>> (st.Material("210 GPa", 0.3).plane_stress / 1e9).round(2).tolist()
         [[230.77, 69.23, 0.0], [69.23, 230.77, 0.0], [0.0, 0.0, 80.77]]
         """
-        import numpy as np  # here: making a material needs none
-
         modulus, nu = self.young_modulus, self.poisson_ratio
         diagonal, coupling, shear = modulus / (1 - nu**2), modulus * nu / (1 - nu**2), modulus / (2 * (1 + nu))
         return np.array([[diagonal, coupling, 0.0], [coupling, diagonal, 0.0], [0.0, 0.0, shear]])
@@ -167,7 +151,7 @@ class Rubber(Material):
         coefficients: Sequence[float],
         largest: float = math.inf,
         test_errors: Sequence[tuple[str, float]] = (),
-        density: float | str | None = None,
+        density: Number | None = None,
         name: str = "rubber",
     ) -> None:
         given = list(coefficients)
@@ -175,14 +159,9 @@ class Rubber(Material):
             raise ValueError(
                 f"coefficients: {coefficients!r} is no law of rubber; give 1 to {MOST_TERMS} numbers in Pa"
             )
-        set_ = object.__setattr__  # of a frozen class
-        set_(self, "coefficients", tuple(map(float, given)))
-        set_(self, "young_modulus", 6 * self.coefficients[0])
-        set_(self, "poisson_ratio", 0.5)
-        set_(self, "largest", float(largest))
-        set_(self, "test_errors", tuple((_known_test(test), float(error)) for test, error in test_errors))
-        set_(self, "density", density)
-        set_(self, "name", name)
+        errors = tuple((_known_test(test), float(error)) for test, error in test_errors)
+        put(self, coefficients=tuple(map(float, given)), largest=float(largest), test_errors=errors)
+        put(self, young_modulus=6 * self.coefficients[0], poisson_ratio=0.5, density=density, name=name)
         self.__post_init__()
 
     @property
@@ -224,8 +203,6 @@ class Rubber(Material):
         >>> [round(float(st.Rubber.excess(test, 2.0)), 3) for test in ("uniaxial", "equibiaxial", "pure shear")]
         [2.0, 5.062, 2.25]
         """
-        import numpy as np  # here: making a material needs none
-
         q = np.asarray(stretch, float)
         other = {"uniaxial": q**-0.5, "equibiaxial": q, "pure shear": np.ones_like(q)}[_known_test(test)]
         return np.asarray(q**2 + other**2 + (q * other) ** -2 - 3)
@@ -257,8 +234,6 @@ class Rubber(Material):
         >>> [round(float(rubber.stress(test, 1 + 1e-6)), 3) for test in ("uniaxial", "equibiaxial", "pure shear")]
         [1.0, 2.0, 1.333]
         """
-        import numpy as np  # here: making a material needs none
-
         q, excess = np.asarray(stretch, float), self.excess(test, stretch)
         slope = np.zeros(q.shape)
         for n, c in enumerate(self.coefficients, 1):
@@ -305,38 +280,21 @@ class AnisotropicMaterial:
     [[9.0, 1.5, 0.0], [1.5, 4.0, 0.0], [0.0, 0.0, 2.0]]
     """
 
-    C11: float
-    C22: float
-    C12: float
-    C66: float
-    C16: float = 0.0
-    C26: float = 0.0
-    density: float | None = None
+    C11: Number
+    C22: Number
+    C12: Number
+    C66: Number
+    C16: Number = 0.0
+    C26: Number = 0.0
+    density: Number | None = None
     name: str = "material"
     isotropic: ClassVar[bool] = False
 
-    if TYPE_CHECKING:  # what it takes, where what it holds are numbers
-
-        def __init__(
-            self,
-            C11: float | str,
-            C22: float | str,
-            C12: float | str,
-            C66: float | str,
-            C16: float | str = 0.0,
-            C26: float | str = 0.0,
-            density: float | str | None = None,
-            name: str = "material",
-        ) -> None: ...
-
     def __post_init__(self) -> None:
-        _check_name(self.name)
-        set_ = object.__setattr__  # of a frozen class
+        _check_label(self)
         for constant in CONSTANTS:
             read = positive if constant in ("C11", "C22", "C66") else quantity
-            set_(self, constant, read(getattr(self, constant), "stress", constant))
-        if self.density is not None:
-            set_(self, "density", positive(self.density, "density", "density"))
+            put(self, **{constant: read(getattr(self, constant), "stress", constant)})
         fault = indefinite(self.C11, self.C22, self.C12, self.C66, self.C16, self.C26)
         if fault:
             raise ValueError(f"material {self.name!r}: {fault}")
@@ -344,12 +302,12 @@ class AnisotropicMaterial:
     @classmethod
     def orthotropic(
         cls,
-        young_modulus_x: float | str,
-        young_modulus_y: float | str,
+        young_modulus_x: Number,
+        young_modulus_y: Number,
         poisson_ratio_xy: float,
-        shear_modulus: float | str,
-        angle: float | str = 0.0,
-        density: float | str | None = None,
+        shear_modulus: Number,
+        angle: Number = 0.0,
+        density: Number | None = None,
         name: str = "material",
     ) -> AnisotropicMaterial:
         """Make a material with two axes, such as a ply of fibres, from engineering constants.
@@ -407,8 +365,8 @@ class AnisotropicMaterial:
     @classmethod
     def laminate(
         cls,
-        plies: Sequence[tuple[AnyMaterial, float | str, float | str]],
-        density: float | str | None = None,
+        plies: Sequence[tuple[AnyMaterial, Number, Number]],
+        density: Number | None = None,
         name: str = "laminate",
     ) -> AnisotropicMaterial:
         """Make one sheet of bonded plies: the mean of their stiffnesses by thickness.
@@ -445,8 +403,6 @@ class AnisotropicMaterial:
         >>> [f"{one.young_modulus_x / 1e9:.1f} GPa, {one.poisson_ratio_xy:.3f}" for one in constants]
         ['54.1 GPa, 0.311', '54.1 GPa, 0.311', '54.1 GPa, 0.311']
         """
-        import numpy as np  # here: making a material needs none
-
         parts: list[tuple[AnyMaterial, np.ndarray, float]] = []
         for number, ply in enumerate(plies):
             if not (isinstance(ply, tuple | list) and len(ply) == 3 and isinstance(ply[0], ANY_MATERIAL)):
@@ -463,9 +419,7 @@ class AnisotropicMaterial:
         return cls.of(np.sum([part / total * turned for _, turned, part in parts], axis=0), density, name)
 
     @classmethod
-    def of(
-        cls, stiffness: np.ndarray, density: float | str | None = None, name: str = "material"
-    ) -> AnisotropicMaterial:
+    def of(cls, stiffness: np.ndarray, density: Number | None = None, name: str = "material") -> AnisotropicMaterial:
         """Make a material from a stiffness in plane stress.
 
         Parameters
@@ -491,8 +445,6 @@ class AnisotropicMaterial:
         >>> st.AnisotropicMaterial.of(st.Material("1 MPa", 0.0).plane_stress).C66
         500000.0
         """
-        import numpy as np  # here: making a material needs none
-
         given = np.asarray(stiffness, dtype=float)
         if given.shape != (3, 3) or not np.allclose(given, given.T, rtol=1e-9, atol=1e-12 * np.abs(given).max()):
             raise ValueError(f"stiffness: {stiffness!r} is no symmetric array of shape (3, 3); give one in Pa")
@@ -509,13 +461,11 @@ class AnisotropicMaterial:
         >>> st.AnisotropicMaterial(3.0, 2.0, 0.5, 1.0, C16=0.1).plane_stress.tolist()
         [[3.0, 0.5, 0.1], [0.5, 2.0, 0.0], [0.1, 0.0, 1.0]]
         """
-        import numpy as np  # here: making a material needs none
-
         return np.array(
             [[self.C11, self.C12, self.C16], [self.C12, self.C22, self.C26], [self.C16, self.C26, self.C66]]
         )
 
-    def rotated(self, angle: float | str) -> AnisotropicMaterial:
+    def rotated(self, angle: Number) -> AnisotropicMaterial:
         """Return the material, turned counter-clockwise in the sheet.
 
         Parameters
@@ -544,7 +494,7 @@ class AnisotropicMaterial:
         turned = rotated(self.plane_stress, quantity(angle, "angle", "angle"))
         return AnisotropicMaterial.of(turned, self.density, self.name)
 
-    def constants_at(self, angle: float | str = 0.0) -> EngineeringConstants:
+    def constants_at(self, angle: Number = 0.0) -> EngineeringConstants:
         """Return the engineering constants along turned axes, as of a coupon cut out at that angle.
 
         Parameters
@@ -588,16 +538,12 @@ ANY_MATERIAL = (Material, AnisotropicMaterial)
 class EngineeringConstants(NamedTuple):
     """Engineering constants of a sheet along two axes, as coupons show them.
 
-    Attributes
-    ----------
-    young_modulus_x, young_modulus_y : float
-        Young's modulus along each axis [Pa].
-    poisson_ratio_xy : float
-        Contraction along the second axis over extension along the first, pulled along the first [1].
-    shear_modulus : float
-        [Pa]
-    shear_by_x : float
-        Shear angle over extension along the first axis, pulled along it [1]; none along axes of the material.
+    - `young_modulus_x`, `young_modulus_y`: Young's modulus along each axis [Pa].
+    - `poisson_ratio_xy`: Contraction along the second axis over extension along the first, pulled along the first
+      [1].
+    - `shear_modulus`: [Pa]
+    - `shear_by_x`: Shear angle over extension along the first axis, pulled along it [1]; none along axes of the
+      material.
     """
 
     young_modulus_x: float
@@ -608,33 +554,14 @@ class EngineeringConstants(NamedTuple):
 
 
 def engineering_constants(stiffness: np.ndarray, angle: float = 0.0) -> EngineeringConstants:
-    """Return engineering constants of a stiffness in plane stress (3, 3) [Pa], along axes turned by `angle` [rad].
-
-    Examples
-    --------
-    >>> found = engineering_constants(Material(1.0, 0.25).plane_stress, 0.3)
-    >>> [round(one, 9) for one in found[:4]]
-    [1.0, 1.0, 0.25, 0.4]
-    """
-    import numpy as np  # here: making a material needs none
-
+    """Return engineering constants of a stiffness in plane stress (3, 3) [Pa], along axes turned by `angle` [rad]."""
     compliance = np.linalg.inv(rotated(stiffness, -angle) if angle else stiffness)
     (along, coupled, sheared), across, shear = compliance[0].tolist(), float(compliance[1, 1]), float(compliance[2, 2])
     return EngineeringConstants(1 / along, 1 / across, -coupled / along, 1 / shear, sheared / along)
 
 
 def rotated(stiffness: np.ndarray, angle: float) -> np.ndarray:
-    """Return a stiffness in plane stress (3, 3) turned counter-clockwise by `angle` [rad].
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> along = np.diag([1.0, 0.0, 0.0])  # fibres along x
-    >>> rotated(along, np.pi / 4).round(6).tolist()
-    [[0.25, 0.25, 0.25], [0.25, 0.25, 0.25], [0.25, 0.25, 0.25]]
-    """
-    import numpy as np  # here: making a material needs none
-
+    """Return a stiffness in plane stress (3, 3) turned counter-clockwise by `angle` [rad]."""
     c, s = math.cos(angle), math.sin(angle)
     # Strains along the turned axes of strains along x and y; the energy is the same.
     strains = np.array([[c * c, s * s, c * s], [s * s, c * c, -c * s], [-2 * c * s, 2 * c * s, c * c - s * s]])
@@ -643,15 +570,7 @@ def rotated(stiffness: np.ndarray, angle: float) -> np.ndarray:
 
 
 def indefinite(c11: float, c22: float, c12: float, c66: float, c16: float = 0.0, c26: float = 0.0) -> str:
-    """Return why constants in plane stress [Pa] are not positive definite, with the bound, or an empty string.
-
-    Examples
-    --------
-    >>> indefinite(9e9, 4e9, 7e9, 2e9)
-    'C12 is 7e+09 Pa, and its size must be below sqrt(C11 C22) = 6e+09 Pa, or some strain takes no work; correct it'
-    >>> indefinite(9e9, 4e9, 1.5e9, 2e9)
-    ''
-    """
+    """Return why constants in plane stress [Pa] are not positive definite, with the bound, or an empty string."""
     bound = math.sqrt(c11) * math.sqrt(c22)
     why = "or some strain takes no work; correct"
     if not abs(c12) < bound:
@@ -670,16 +589,7 @@ def indefinite(c11: float, c22: float, c12: float, c66: float, c16: float = 0.0,
 
 
 def material_of(fields: Mapping[str, Any]) -> AnyMaterial:
-    """Return the material of its fields, as `dataclasses.asdict` gives them.
-
-    Examples
-    --------
-    >>> from dataclasses import asdict
-    >>> steel, board = Material(210e9, 0.3), AnisotropicMaterial(9e9, 4e9, 1.5e9, 2e9)
-    >>> rubber = Rubber([2e5, -1e3], largest=40.0)
-    >>> [material_of(asdict(one)) == one for one in (steel, board, rubber)]
-    [True, True, True]
-    """
+    """Return the material of its fields, as `dataclasses.asdict` gives them."""
     if "coefficients" in fields:
         return Rubber(**{key: value for key, value in fields.items() if key not in ("young_modulus", "poisson_ratio")})
     return Material(**fields) if "young_modulus" in fields else AnisotropicMaterial(**fields)
@@ -709,6 +619,9 @@ def _known_test(test: str) -> str:
     return test
 
 
-def _check_name(name: object) -> None:
-    if not isinstance(name, str):
-        raise ValueError(f"name: {name!r} is not a text; give one such as 'steel', or none")
+def _check_label(material: AnyMaterial) -> None:
+    """Refuse a name that is not a text; read the density."""
+    if not isinstance(material.name, str):
+        raise ValueError(f"name: {material.name!r} is not a text; give one such as 'steel', or none")
+    if material.density is not None:
+        put(material, density=positive(material.density, "density", "density"))

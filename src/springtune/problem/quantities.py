@@ -3,16 +3,14 @@
 import math
 from collections.abc import Iterable
 from difflib import get_close_matches
+from typing import Any
+
+Number = float | Any
+"""A number in SI units, for which a text with its unit may be given as well."""
 
 
 def quantity(value: float | str, kind: str, name: str) -> float:
-    """Return the number in SI units of a text with its unit, or of a number in SI units.
-
-    Examples
-    --------
-    >>> quantity("200 mm", "length", "length"), quantity(0.2, "length", "length")
-    (0.2, 0.2)
-    """
+    """Return the number in SI units of a text with its unit, or of a number in SI units."""
     if isinstance(value, str):
         from ..units import UnitError, parse  # here, since a study's numbers are in SI units
 
@@ -39,6 +37,12 @@ def positive(value: float | str, kind: str, name: str) -> float:
     return number
 
 
+def put(frozen: object, **values: object) -> None:
+    """Set fields of a frozen dataclass as it is made."""
+    for name, value in values.items():
+        object.__setattr__(frozen, name, value)
+
+
 LEAST, MOST = 1e-40, 1e40
 """Quantities between which products of several stay numbers [SI units]; forces are what they are."""
 
@@ -62,13 +66,7 @@ MOST_WORDS = 50
 
 
 def nearest(word: str, words: Iterable[str]) -> str:
-    """Return ``did you mean ...?`` if one of the words is near, and all of them.
-
-    Examples
-    --------
-    >>> nearest("latticce", ["lattice", "uniform"])
-    "did you mean 'lattice'? known: lattice, uniform"
-    """
+    """Return ``did you mean ...?`` if one of the words is near, and all of them."""
     words = list(words)
     near = get_close_matches(word, words, n=1, cutoff=0.6) if len(word) <= LONGEST_WORD else []
     hint = f"did you mean '{near[0]}'? " if near else ""

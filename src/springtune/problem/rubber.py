@@ -8,7 +8,7 @@ import numpy as np
 
 from ..safe_io.inputs import LARGEST_CSV, read
 from .materials import MOST_TERMS, RUBBER_TESTS, Rubber
-from .quantities import positive
+from .quantities import Number, positive
 
 LEAST_SHARE = 0.05
 """Share of the largest stress below which errors are relative to it: small stresses are read off coarsely."""
@@ -63,15 +63,7 @@ class TensileTest:
 
     @classmethod
     def read(cls, path: str | Path) -> "TensileTest":
-        """Read a CSV file of stretch and nominal stress, with the unit in the column's head.
-
-        Examples
-        --------
-        >>> from springtune.problem.rubber import TensileTest
-        >>> test = TensileTest.read("config/treloar/uniaxial.csv")
-        >>> len(test.stretch), float(test.stretch.max())
-        (24, 7.6)
-        """
+        """Read a CSV file of stretch and nominal stress, with the unit in the column's head."""
         try:
             lines = read(path, LARGEST_CSV).decode("utf-8-sig").splitlines()
         except ValueError as error:
@@ -139,7 +131,7 @@ def fit_rubber(
     equibiaxial: TensileTest | str | Path | None = None,
     pure_shear: TensileTest | str | Path | None = None,
     terms: int = MOST_TERMS,
-    density: float | str | None = None,
+    density: Number | None = None,
     name: str = "rubber",
 ) -> Rubber:
     """Fit Yeoh's law to a uniaxial test, and compare it with other tests.

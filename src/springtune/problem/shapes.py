@@ -17,15 +17,15 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..mesh.sides import OutlineSide, Point, Round, enclosed, extent, in_mm, meeting, turned, winds_about
 from ..registry import NAME, NAME_RULE
 from .geometry import beam_label, warn_of_thickness
-from .quantities import nearest, positive, quantity
+from .quantities import Number, nearest, positive, put, quantity
 
-Place = tuple[float | str, float | str]
-"""Coordinates [m], or texts with their unit."""
+Place = tuple[Number, Number]
+"""Coordinates [m]."""
 
 ON_SIDE = 1e-6
 """Distance from a side at which a named point is put on it, over the extent of the shape: coordinates are rounded."""
@@ -88,18 +88,14 @@ class Segment:
     Segment(start=(0.02, 0.0), centre=None, group='lower')
     """
 
-    start: Point
-    centre: Point | None = None
+    start: Place
+    centre: Place | None = None
     group: str = ""
 
-    if TYPE_CHECKING:  # what it takes, where what it holds are numbers
-
-        def __init__(self, start: Place, centre: Place | None = None, group: str = "") -> None: ...
-
     def __post_init__(self) -> None:
-        object.__setattr__(self, "start", _place(self.start, "start of a segment"))
+        put(self, start=_place(self.start, "start of a segment"))
         if self.centre is not None:
-            object.__setattr__(self, "centre", _place(self.centre, "centre of a segment"))
+            put(self, centre=_place(self.centre, "centre of a segment"))
         _named(self.group, "group of a segment", empty=True)
 
 
@@ -147,7 +143,7 @@ class Hole:
     part: str = ""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "outline", _all_of(self.outline, Segment, "outline of a hole"))
+        put(self, outline=_all_of(self.outline, Segment, "outline of a hole"))
         _named(self.part, "part of a hole", empty=True)
         what = f"part {self.part!r}" if self.part else "hole"
         _round(self.outline, what)
@@ -159,7 +155,7 @@ class Hole:
             )
 
     @classmethod
-    def circle(cls, centre: Place, radius: float | str, group: str | None = None, part: str = "") -> "Hole":
+    def circle(cls, centre: Place, radius: Number, group: str | None = None, part: str = "") -> "Hole":
         """Make a circle of four arcs.
 
         Parameters
@@ -189,8 +185,8 @@ class Hole:
     def ellipse(
         cls,
         centre: Place,
-        across: float | str,
-        along: float | str,
+        across: Number,
+        along: Number,
         group: str | None = None,
         part: str = "",
     ) -> "Hole":
@@ -249,19 +245,15 @@ class Support:
     """
 
     group: str
-    x: float | None = None
-    y: float | None = None
-
-    if TYPE_CHECKING:
-
-        def __init__(self, group: str, x: float | str | None = None, y: float | str | None = None) -> None: ...
+    x: Number | None = None
+    y: Number | None = None
 
     def __post_init__(self) -> None:
         _named(self.group, "group of a support")
         for axis in ("x", "y"):
             if getattr(self, axis) is not None:
                 value = quantity(getattr(self, axis), "length", f"support on {self.group!r}, {axis}")
-                object.__setattr__(self, axis, value)
+                put(self, **{axis: value})
         if self.x is None and self.y is None:
             raise ValueError(f"support on {self.group!r}: holds neither x nor y; give x=0, y=0 or both")
 
@@ -290,16 +282,12 @@ class Traction:
     """
 
     group: str
-    force: tuple[float, float]
-
-    if TYPE_CHECKING:
-
-        def __init__(self, group: str, force: tuple[float | str, float | str]) -> None: ...
+    force: tuple[Number, Number]
 
     def __post_init__(self) -> None:
         _named(self.group, "group of a traction")
         force = _vector(self.force, "force", f"traction on {self.group!r}, force", "('4 kN', 0)")
-        object.__setattr__(self, "force", force)
+        put(self, force=force)
 
 
 @dataclass(frozen=True)
@@ -328,21 +316,17 @@ class Pressure:
     """
 
     group: str
-    pressure: float
+    pressure: Number
     follower: bool = False
-
-    if TYPE_CHECKING:
-
-        def __init__(self, group: str, pressure: float | str, follower: bool = False) -> None: ...
 
     def __post_init__(self) -> None:
         _named(self.group, "group of a pressure")
-        object.__setattr__(self, "pressure", quantity(self.pressure, "stress", f"pressure on {self.group!r}"))
+        put(self, pressure=quantity(self.pressure, "stress", f"pressure on {self.group!r}"))
         if not isinstance(self.follower, bool):
             raise ValueError(f"pressure on {self.group!r}, follower: {self.follower!r}; give True or False")
 
 
-COMPONENTS = {
+COMPONENTS: dict[str, tuple[str, ...]] = {
     "displacement": ("x", "y"),
     "reaction": ("x", "y"),
     "stress": ("xx", "yy", "xy"),
@@ -389,27 +373,15 @@ class Quantity:
     kind: str
     of: str = ""
     component: str = ""
-    expected: float | None = None
+    expected: Number | None = None
     source: str = ""
-
-    if TYPE_CHECKING:
-
-        def __init__(
-            self,
-            name: str,
-            kind: str,
-            of: str = "",
-            component: str = "",
-            expected: float | str | None = None,
-            source: str = "",
-        ) -> None: ...
 
     def __post_init__(self) -> None:
         _named(self.name, "quantity")
         what = f"quantity {self.name!r}"
         if self.kind not in COMPONENTS:
             raise ValueError(f"{what}: unknown kind {self.kind!r}; {nearest(str(self.kind), COMPONENTS)}")
-        components: tuple[str, ...] = COMPONENTS[self.kind]
+        components = COMPONENTS[self.kind]
         if components:
             _named(self.of, f"{what}, of")
             if self.component not in components:
@@ -420,7 +392,7 @@ class Quantity:
             kind = {"displacement": "length", "reaction": "force", "stress": "stress"}.get(self.kind)
             if kind is None and isinstance(self.expected, str):
                 raise ValueError(f"{what}, expected: {self.expected!r}; give a number in SI units")
-            object.__setattr__(self, "expected", quantity(self.expected, kind or "length", f"{what}, expected"))
+            put(self, expected=quantity(self.expected, kind or "length", f"{what}, expected"))
         if not isinstance(self.source, str):
             raise ValueError(f"{what}, source: {self.source!r} is not a text; give one")
 
@@ -467,20 +439,16 @@ class LoadCase:
     def __post_init__(self) -> None:
         _named(self.name, "load")
         what = f"load {self.name!r}"
-        for name, kind in (
-            ("supports", Support),
-            ("tractions", Traction),
-            ("pressures", Pressure),
-            ("quantities", Quantity),
-        ):
-            object.__setattr__(self, name, _all_of(getattr(self, name), kind, f"{what}, {name}"))
+        kinds = {"supports": Support, "tractions": Traction, "pressures": Pressure, "quantities": Quantity}
+        for name, kind in kinds.items():
+            put(self, **{name: _all_of(getattr(self, name), kind, f"{what}, {name}")})
         try:
             gravity = tuple(float(one) for one in self.gravity)
         except (TypeError, ValueError):
             gravity = ()
         if len(gravity) != 2 or not all(map(math.isfinite, gravity)):
             raise ValueError(f"{what}, gravity: {self.gravity!r}; give x and y such as (0, -9.81), in m/s2")
-        object.__setattr__(self, "gravity", gravity)
+        put(self, gravity=gravity)
         if not self.supports:
             raise ValueError(f"{what}: has no supports, so nothing keeps the body in its place; add some")
         for axis in ("x", "y"):
@@ -600,37 +568,23 @@ class Shape:
     """
 
     name: str
-    thickness: float
-    outline: tuple[Segment, ...] = ()
-    holes: tuple[Hole, ...] = ()
-    points: Mapping[str, Point] = field(default_factory=dict)
+    thickness: Number
+    outline: Sequence[Segment] = ()
+    holes: Sequence[Hole] = ()
+    points: Mapping[str, Place] = field(default_factory=dict)
     loads: Mapping[str, LoadCase] = field(default_factory=dict)
     file: str = ""
-    unit: float = 1.0
-
-    if TYPE_CHECKING:
-
-        def __init__(
-            self,
-            name: str,
-            thickness: float | str,
-            outline: Iterable[Segment] = (),
-            holes: Iterable[Hole] = (),
-            points: Mapping[str, Place] = ...,
-            loads: Mapping[str, LoadCase] = ...,
-            file: str = "",
-            unit: float | str = 1.0,
-        ) -> None: ...
+    unit: Number = 1.0
 
     def __post_init__(self) -> None:
         _named(self.name, "shape")
         what = f"shape {self.name!r}"
-        object.__setattr__(self, "thickness", positive(self.thickness, "length", f"{what}, thickness"))
-        object.__setattr__(self, "unit", positive(self.unit, "length", f"{what}, unit"))
-        object.__setattr__(self, "outline", _all_of(self.outline, Segment, f"{what}, outline"))
-        object.__setattr__(self, "holes", _all_of(self.holes, Hole, f"{what}, holes"))
+        put(self, thickness=positive(self.thickness, "length", f"{what}, thickness"))
+        put(self, unit=positive(self.unit, "length", f"{what}, unit"))
+        put(self, outline=_all_of(self.outline, Segment, f"{what}, outline"))
+        put(self, holes=_all_of(self.holes, Hole, f"{what}, holes"))
         points = {name: _place(point, f"{what}, point {name!r}") for name, point in dict(self.points).items()}
-        object.__setattr__(self, "points", points)
+        put(self, points=points)
         for name, load in dict(self.loads).items():
             _all_of([load], LoadCase, f"{what}, loads")
             if name != load.name:
@@ -646,7 +600,7 @@ class Shape:
             return
         try:
             self._check_rounds()
-            object.__setattr__(self, "points", {name: self._placed(name, point) for name, point in points.items()})
+            put(self, points={name: self._placed(name, point) for name, point in points.items()})
             for load in self.loads.values():
                 load.check_names(self.groups, self.points)
         except ValueError as error:
@@ -686,7 +640,7 @@ class Shape:
                 raise ValueError(f"{inside[0]}: is inside {other_what}, where nothing is; remove one of them")
         if enclosed(sides) < 0:
             back = tuple(Segment(one.start, one.centre, one.group) for one in turned(sides))
-            object.__setattr__(self, "outline", back)
+            put(self, outline=back)
         names = set(self.groups) & set(self.points)
         if names:
             raise ValueError(f"{sorted(names)[0]!r} names a point and sides; rename one of them")
@@ -823,9 +777,9 @@ class Shape:
     @classmethod
     def rectangle(
         cls,
-        length: float | str,
-        height: float | str,
-        thickness: float | str = 1e-3,
+        length: Number,
+        height: Number,
+        thickness: Number = 1e-3,
         name: str = "",
         holes: Iterable[Hole] = (),
         points: Mapping[str, Place] | None = None,

@@ -54,7 +54,7 @@ def side_weights(points: np.ndarray, normal: int, along: int, value: float, quad
     return weights / weights.sum()
 
 
-def _deck(
+def solve(
     points: np.ndarray,
     elements: np.ndarray,
     kind: str,
@@ -62,9 +62,13 @@ def _deck(
     thickness: float,
     load: np.ndarray,
     held: np.ndarray,
-    finite: bool,
-) -> str:
-    """Input of the program, see `solve`."""
+    finite: bool = False,
+) -> np.ndarray:
+    """Return displacements [m] by plane stress at small strain, or neo-Hookean ones at finite strain.
+
+    `points` (n_points, 2) [m], `elements` (n_elements, 3 or 8), `thickness` [m], `load` (n_points, 2) [N], `held`
+    (n_points, 2).
+    """
 
     def lines(rows: Iterable[Iterable[object]]) -> str:
         return "\n".join(", ".join(map(str, row)) for row in rows)
@@ -76,7 +80,7 @@ def _deck(
         law = f"*HYPERELASTIC, NEO HOOKE\n{modulus / (4 * (1 + nu)):.12e}, {6 * (1 - 2 * nu) / modulus:.12e}"
     increments = "0.1, 1.\n" if finite else ""
     clamps = [(n + 1, axis + 1, axis + 1) for n, axis in np.argwhere(held)]
-    return f"""*NODE, NSET=ALL
+    deck = f"""*NODE, NSET=ALL
 {lines((n + 1, repr(float(x)), repr(float(y)), 0.0) for n, (x, y) in enumerate(points))}
 *ELEMENT, TYPE={kind}, ELSET=SHEET
 {lines((e + 1, *(nodes + 1).tolist()) for e, nodes in enumerate(elements))}
@@ -94,25 +98,7 @@ def _deck(
 U
 *END STEP
 """
-
-
-def solve(
-    points: np.ndarray,
-    elements: np.ndarray,
-    kind: str,
-    material: Material,
-    thickness: float,
-    load: np.ndarray,
-    held: np.ndarray,
-    finite: bool = False,
-) -> np.ndarray:
-    """Return displacements [m] by plane stress at small strain, or neo-Hookean ones at finite strain.
-
-    `points` (n_points, 2) [m], `elements` (n_elements, 3 or 8), `thickness` [m], `load` (n_points, 2) [N], `held`
-    (n_points, 2).
-    """
     with tempfile.TemporaryDirectory() as folder:
-        deck = _deck(points, elements, kind, material, thickness, load, held, finite)
         Path(folder, "job.inp").write_text(deck)
         done = subprocess.run([PROGRAM, "job"], cwd=folder, capture_output=True, text=True)
         answer = Path(folder, "job.dat")

@@ -17,7 +17,8 @@ from itertools import combinations
 import numpy as np
 from scipy import spatial
 
-from ..mesh.cells import MeshError, signed_areas
+from ..mesh.cells import signed_areas
+from ..mesh.free import triangulate, upright
 from ..mesh.groups import GroupedMesh
 from ..mesh.sides import OutlineSide, Point
 from ..problem.shapes import Shape
@@ -333,35 +334,22 @@ def outline_mesh(
 
 def _triangulated(name: str, pieces: list[_Piece], names: tuple[str, ...], extent: float) -> CoarseMesh:
     """Triangles between pieces of outlines."""
-    from netgen.geom2d import SplineGeometry  # here, since only a shape should pay for it
-    from netgen.meshing import NgException
-
     ends = np.array([piece.at(np.array([0.0, 1.0])) for piece in pieces])
     # Lengths about 1: netgen's own tolerances are absolute.
     scale, origin = FEWEST_ALONG / extent, ends.min(axis=(0, 1))
-    geometry = SplineGeometry()
     keys, places = np.unique(np.round((ends.reshape(-1, 2) - origin) * scale * 1e8), axis=0, return_inverse=True)
     given = np.empty((len(keys), 2))
     given[places.ravel()] = ends.reshape(-1, 2)
-    numbers = [geometry.AppendPoint(*((point - origin) * scale)) for point in given]
-    for i, (piece, (start, end)) in enumerate(zip(pieces, places.reshape(-1, 2))):
-        line = ["line", numbers[start], numbers[end]]
-        geometry.Append(line, leftdomain=piece.left, rightdomain=piece.right, bc=i + 1)
-    try:
-        made = geometry.GenerateMesh(maxh=1.0, grading=0.5)
-    except NgException as error:
-        raise MeshError(f"netgen cannot mesh {name!r}: {error}; look for sides that meet or touch") from None
-    points = np.array([point.p for point in made.Points()])[:, :2] / scale + origin
-    triangles = np.array([[vertex.nr - 1 for vertex in element.vertices] for element in made.Elements2D()])
-    parts = np.array([element.index - 1 for element in made.Elements2D()])
-    inverted = signed_areas(points, triangles) < 0
-    triangles[inverted] = triangles[inverted][:, ::-1]
+    lines = [(int(i), int(j), one.left, one.right) for one, (i, j) in zip(pieces, places.reshape(-1, 2))]
+    remedy = "look for sides that meet or touch"
+    made = triangulate((given - origin) * scale, lines, repr(name), remedy, maxh=1.0, grading=0.5)
+    points = made.points / scale + origin
+    triangles, parts = upright(points, made.triangles), made.regions - 1
 
     sides = {}
     exact = points.copy()
-    for element in made.Elements1D():
-        piece, (start, end) = pieces[element.index - 1], ends[element.index - 1]
-        first, second = sorted(vertex.nr - 1 for vertex in element.vertices)
+    for line, *corners in made.pieces:
+        piece, (start, end), (first, second) = pieces[line], ends[line], sorted(corners)
         shares = (points[[first, second]] - start) @ (end - start) / ((end - start) @ (end - start))
         shares[np.abs(shares) < 1e-7] = 0.0
         shares[np.abs(shares - 1) < 1e-7] = 1.0

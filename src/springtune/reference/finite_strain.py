@@ -16,9 +16,8 @@ corners, and the load grows in steps if needed.
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import csc_array, csr_array
@@ -69,21 +68,14 @@ class FiniteStrainError(ReferenceNotConvergedError):
 class FiniteStrainSolution:
     """Displacements of a beam at finite strain.
 
-    Attributes
-    ----------
-    displacement : float
-        Displacement of the load, see `springtune.problem.loads` [m].
-    mean_displacement : float
-        Mean displacement of the loaded side along the force [m].
-    error_estimate : float
-        Relative difference to the coarser mesh, several times the error, plus the errors of Newton's method and
-        rounding. Under pressure twice the larger one of the middle and the mean.
-    positions, profile : ndarray of float, shape (n,)
-        Places on the loaded side over its length [1], ascending, and displacements there along the force [m].
-    x, y : ndarray of float, shape (n_x,) and (n_y,)
-        Grid of the field at rest [m], denser near the corners.
-    displacements : ndarray of float, shape (n_x, n_y, 2)
-        Displacements on the grid [m].
+    - `displacement`: Displacement of the load, see `springtune.problem.loads` [m].
+    - `mean_displacement`: Mean displacement of the loaded side along the force [m].
+    - `error_estimate`: Relative difference to the coarser mesh, several times the error, plus the errors of
+      Newton's method and rounding. Under pressure twice the larger one of the middle and the mean.
+    - `positions`, `profile` (n,): Places on the loaded side over its length [1], ascending, and displacements there
+      along the force [m].
+    - `x`, `y` (n_x,) and (n_y,): Grid of the field at rest [m], denser near the corners.
+    - `displacements` (n_x, n_y, 2): Displacements on the grid [m].
     """
 
     displacement: float
@@ -127,41 +119,21 @@ def _solve(
     name = f"{beam.name}, {material.name}"
     coarse, fine = (sheet.solve(stress, name, watched) for sheet, watched in zip(sheets, (True, False)))
     # The finer mesh may have snapped where the coarser one has not.
-    if not abs(coarse.mean - fine.mean) <= SAME_PATH * abs(fine.mean):
+    if not abs(coarse.mean_displacement - fine.mean_displacement) <= SAME_PATH * abs(fine.mean_displacement):
         fine = sheets[1].solve(stress, name)
     # Lengths are over half the height.
-    scale = beam.height / 2
-    return FiniteStrainSolution(
-        displacement=scale * fine.displacement,
-        mean_displacement=scale * fine.mean,
-        error_estimate=_change(coarse, fine, kind) + fine.rounding,
-        positions=fine.positions,
-        profile=scale * fine.profile,
-        x=scale * fine.x,
-        y=scale * fine.y,
-        displacements=scale * fine.displacements,
-    )
+    lengths = ("displacement", "mean_displacement", "profile", "x", "y", "displacements")
+    scaled = {name: beam.height / 2 * getattr(fine, name) for name in lengths}
+    return replace(fine, error_estimate=_change(coarse, fine, kind) + fine.error_estimate, **scaled)
 
 
-def _change(coarse: "_Solved", fine: "_Solved", kind: LoadKind) -> float:
+def _change(coarse: FiniteStrainSolution, fine: FiniteStrainSolution, kind: LoadKind) -> float:
     """Relative change from a mesh to a finer one, an estimate of the error that is left."""
-    middle, mean = (float(abs(one / other - 1)) for one, other in zip(coarse[:2], fine[:2]))
+    middle = float(abs(coarse.displacement / fine.displacement - 1))
+    mean = float(abs(coarse.mean_displacement / fine.mean_displacement - 1))
     # The middle of a pressed side changes its sign of error with the beam's shape: by chance it agrees on both meshes.
     # Twice: near such a chance the larger of the two came to 0.55 times the error, of 300 loads and shapes.
     return 2 * max(middle, mean) if kind.pressed else middle
-
-
-class _Solved(NamedTuple):
-    """As `FiniteStrainSolution`, over half the height, and the relative error that rounding leaves."""
-
-    displacement: float
-    mean: float
-    positions: np.ndarray
-    profile: np.ndarray
-    x: np.ndarray
-    y: np.ndarray
-    displacements: np.ndarray
-    rounding: float
 
 
 class _Sheet:
@@ -203,8 +175,11 @@ class _Sheet:
         self.component, self.nodes = component, nodes[order]
         self.places = places[self.nodes, 1 - axis]
 
-    def solve(self, stress: float, name: str, watched: bool = True) -> _Solved:
-        """Equilibrium under the whole load, reached in steps, which are watched for snaps."""
+    def solve(self, stress: float, name: str, watched: bool = True) -> FiniteStrainSolution:
+        """Equilibrium under the whole load, reached in steps, which are watched for snaps.
+
+        Lengths are over half the height; its error estimate is what rounding leaves.
+        """
         path, step = [(0.0, np.zeros(self.load.shape))], 1.0
         while path[-1][0] < 1:
             done = path[-1][0]
@@ -229,7 +204,7 @@ class _Sheet:
             positions = np.concatenate([self.places, whole - self.places[-2::-1]]) / whole
             profile = np.concatenate([profile, profile[-2::-1]])
         displacement = float(np.interp(0.5, positions, profile)) if self.kind.pressed else mean
-        return _Solved(displacement, mean, positions, profile, *self._field(moved), uncertain)
+        return FiniteStrainSolution(displacement, mean, uncertain, positions, profile, *self._field(moved))
 
     def _joined(self, path: list[tuple[float, np.ndarray]], share: float, moved: np.ndarray, stress: float) -> bool:
         """Whether no snap lies between a stable equilibrium and the last one: the middle is stable, too."""

@@ -77,18 +77,12 @@ class Answers:
 class Interpolant:
     """Answers of the unit problems of one kind of load over a box of aspect ratios and Poisson's ratios.
 
-    Attributes
-    ----------
-    aspect_range, nu_range : tuple of float
-        First and last aspect ratio and Poisson's ratio [1].
-    values : ndarray of float, shape (4, n_aspect, n_nu)
-        At the nodes, last to first, in the order of `NAMES`: logarithms of displacement and mean displacement, of 1
-        plus rotation over strain (rotation can be zero), and of the strain.
-    error_estimate : float
-        Bound on the relative error of each displacement [1]: `SAFETY` times the largest difference at the checks, and
-        the largest error estimate of the solves.
-    solves : int
-        Number of unit problems solved, with checks.
+    - `aspect_range`, `nu_range`: First and last aspect ratio and Poisson's ratio [1].
+    - `values` (4, n_aspect, n_nu): At the nodes, last to first, in the order of `NAMES`: logarithms of displacement
+      and mean displacement, of 1 plus rotation over strain (rotation can be zero), and of the strain.
+    - `error_estimate`: Bound on the relative error of each displacement [1]: `SAFETY` times the largest difference
+      at the checks, and the largest error estimate of the solves.
+    - `solves`: Number of unit problems solved, with checks.
     """
 
     kind: LoadKind
@@ -112,14 +106,6 @@ class Interpolant:
 
         `aspect_range` and `nu_range` (-1 < nu <= 0.5) are first and last values [1], equal for a function of the
         other alone; `tolerance` is the largest accepted relative error estimate [1].
-
-        Examples
-        --------
-        >>> from springtune.problem.loads import AXIAL
-        >>> found = Interpolant.build(AXIAL, (4, 6), (0.3, 0.35))
-        >>> answers = found.evaluate([4.5, 5], 0.3)
-        >>> (2 * np.array([4.5, 5]) - answers.displacement).round(3)  # what the clamp takes off the bar's
-        array([0.024, 0.024])
         """
         (first, last), (least, largest) = aspect_range, nu_range
         if not 0 < first <= last < np.inf:
@@ -151,14 +137,8 @@ class Interpolant:
 
     def arrays(self) -> dict[str, Any]:
         """Numbers and arrays that `from_arrays` takes, such as a file holds."""
-        return {
-            "kind": self.kind.name,
-            "aspect_range": np.array(self.aspect_range),
-            "nu_range": np.array(self.nu_range),
-            "values": self.values,
-            "error_estimate": self.error_estimate,
-            "solves": self.solves,
-        }
+        ranges = {name: np.array(getattr(self, name)) for name in ("aspect_range", "nu_range")}
+        return vars(self) | ranges | {"kind": self.kind.name}
 
     @classmethod
     def from_arrays(cls, kind: LoadKind, arrays: Mapping[str, Any]) -> Self:
@@ -168,23 +148,21 @@ class Interpolant:
         return cls(kind, (first, last), (least, largest), np.asarray(arrays["values"]), error_estimate, solves)
 
 
+@dataclass
 class _Box:
     """Solves and results for an interpolant over a box."""
 
-    def __init__(
-        self,
-        kind: LoadKind,
-        aspect_range: tuple[float, float],
-        nu_range: tuple[float, float],
-        tolerance: float,
-        most: int | None,
-        solve: Solver,
-    ) -> None:
-        self.kind, self.aspect_range, self.nu_range = kind, aspect_range, nu_range
-        self.tolerance, self.most, self.solver = tolerance, most, solve
+    kind: LoadKind
+    aspect_range: tuple[float, float]
+    nu_range: tuple[float, float]
+    tolerance: float
+    most: int | None
+    solver: Solver
+
+    def __post_init__(self) -> None:
         #: Answers in the order of `NAMES`, and error estimates, by place in the box: from -1 to 1 along each axis.
         self.solved: dict[tuple[float, float], tuple[np.ndarray, float]] = {}
-        self.counts = [3 if last > first else 1 for first, last in (aspect_range, nu_range)]
+        self.counts = [3 if last > first else 1 for first, last in (self.aspect_range, self.nu_range)]
 
     def certified(self) -> tuple[np.ndarray, float]:
         """Values at the nodes and the error estimate."""

@@ -49,19 +49,14 @@ Field = Callable[[np.ndarray, np.ndarray], np.ndarray]
 class ShapeReference:
     """Converged displacements of a shape under a load case.
 
-    Attributes
-    ----------
-    values : dict of str to float
-        Quantities of interest, in SI units; exactly zero if less than ten times their error bound, as by symmetry.
-    error_estimates : dict of str to float
-        Relative error bounds [1]: over the value, or over a thousandth of the body's largest value of its kind if
-        that is larger.
-    energy : float
-        Strain energy [J].
-    rotation, strain : float
-        Rotation [rad] and strain [1] that limit its use, see `springtune.reference.answers`.
-    negligible : tuple of str
-        Quantities below a thousandth of the largest of their kind, whose relative errors are meaningless.
+    - `values`: Quantities of interest, in SI units; exactly zero if less than ten times their error bound, as by
+      symmetry.
+    - `error_estimates`: Relative error bounds [1]: over the value, or over a thousandth of the body's largest value
+      of its kind if that is larger.
+    - `energy`: Strain energy [J].
+    - `rotation`, `strain`: Rotation [rad] and strain [1] that limit its use, see `springtune.reference.answers`.
+    - `negligible`: Quantities below a thousandth of the largest of their kind, whose relative errors are
+      meaningless.
     """
 
     values: dict[str, float]
@@ -272,9 +267,8 @@ class _Problem:
         else:
             raise MeshError(f"triangles of {shape.name!r} fold along its arcs; look for sides that nearly touch")
 
-        missing = [name for name in self.mesh.names if name not in materials]
-        present = {self.mesh.names[part] for part in np.unique(self.mesh.parts)}
-        if missing := [name for name in missing if name in present]:
+        present = [self.mesh.names[part] for part in np.unique(self.mesh.parts)]
+        if missing := [name for name in present if name not in materials]:
             raise ValueError(
                 f"parts without a material: {', '.join(repr(name) for name in missing)}; there are materials of "
                 f"{', '.join(repr(name) for name in materials)}"
@@ -282,23 +276,14 @@ class _Problem:
         absent = np.zeros((3, 3))
         self.stiffness = np.array([materials[n].plane_stress if n in present else absent for n in self.mesh.names])
         self.density = np.zeros(len(self.mesh.names))
-        if any(load.gravity):
-            for i, name in enumerate(self.mesh.names):
-                if name in present:
-                    density = materials[name].density
-                    if density is None:
-                        raise ValueError(f"material {materials[name].name!r} has no density; gravity needs one")
-                    self.density[i] = density
+        for name in present if any(load.gravity) else ():
+            density = materials[name].density
+            if density is None:
+                raise ValueError(f"material {materials[name].name!r} has no density; gravity needs one")
+            self.density[self.mesh.names.index(name)] = density
 
         groups = {group for side in self.mesh.sides.values() for group in side.groups}
-        on_sides = [*held, *(t.group for t in load.tractions), *(p.group for p in load.pressures)]
-        for group in [*on_sides, *(q.of for q in load.quantities if q.of)]:
-            if group not in groups and group not in self.points:
-                known = ", ".join(repr(name) for name in sorted(groups | set(self.points)))
-                raise ValueError(f"load {load.name!r}: group {group!r} is not there; shape {shape.name!r} has {known}")
-        for pressure in load.pressures:
-            if pressure.group not in groups:
-                raise ValueError(f"load {load.name!r}: a pressure needs sides, and {pressure.group!r} is a point")
+        load.check_names(sorted(groups), sorted(self.points))
 
         loads: dict[str, list[object]] = {}
         for number, traction in enumerate(load.tractions):
@@ -344,15 +329,13 @@ class _Problem:
         self.kinds = {quantity.name: quantity.kind for quantity in load.quantities} | {"": "energy"}
         self._quantities = {quantity.name: quantity for quantity in load.quantities}
         for quantity in load.quantities:
-            self._check(quantity, groups)
+            self._check(quantity)
         self._graded = self.mesh.copy()
         self._graded.isolate(self._rough)
         self._layers = 0
 
-    def _check(self, quantity: Quantity, groups: set[str]) -> None:
+    def _check(self, quantity: Quantity) -> None:
         name, kind, of = quantity.name, quantity.kind, quantity.of
-        if kind in ("stress",) and of not in self.points:
-            raise ValueError(f"quantity {name!r}: stress is that of a point, and {of!r} is a group of sides")
         corner = self.corners.get(self.mesh.named.get(of, -1)) if kind == "stress" else None
         if corner and corner.infinite:
             remedy = "ask for it beside the corner"
@@ -369,12 +352,6 @@ class _Problem:
                     f"quantity {name!r}: {of!r} is where parts of different materials meet, and the stress has a jump "
                     "there: ask for it on one side"
                 )
-        if kind == "reaction":
-            axis = "xy".index(quantity.component)
-            if not any(
-                support.group == of and (support.x, support.y)[axis] is not None for support in self.load.supports
-            ):
-                raise ValueError(f"quantity {name!r}: no support holds {of!r} along {quantity.component}")
         infinite = {"displacement": "the displacement", "stress": "the stress"}.get(kind)
         if infinite:
             for point in self.loaded_points if of in self.points else ():
@@ -812,21 +789,22 @@ class _Level:
 
     def displacements(self, points: np.ndarray) -> np.ndarray:
         """Displacements at points [m], shape (n, 2)."""
-        points = np.asarray(points, dtype=float)
-        result = np.empty((len(points), 2))
-        for rows in np.array_split(np.arange(len(points)), max(1, len(points) // 4000)):
-            found, local = self._located(points[rows])
-            values, _ = shape_functions(self.space.degree, local)
-            result[rows] = np.einsum("pi,pic->pc", values, self.field[self.space.numbers[found]])
-        return result
+        return self._in_chunks(points, self._displacements)
 
     def stresses(self, points: np.ndarray) -> np.ndarray:
         """Stresses at points [Pa], shape (n, 3)."""
+        return self._in_chunks(points, self._stresses)
+
+    def _in_chunks(self, points: np.ndarray, value: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> np.ndarray:
+        """Values at points, some thousand at a time: what locates them takes memory."""
         points = np.asarray(points, dtype=float)
-        result = np.empty((len(points), 3))
-        for rows in np.array_split(np.arange(len(points)), max(1, len(points) // 4000)):
-            result[rows] = self._stresses(*self._located(points[rows]))
-        return result
+        chunks = np.array_split(points, max(1, len(points) // 4000))
+        return np.concatenate([value(*self._located(chunk)) for chunk in chunks])
+
+    def _displacements(self, found: np.ndarray, local: np.ndarray) -> np.ndarray:
+        """Displacements in triangles at reference coordinates [m], shape (n, 2)."""
+        values, _ = shape_functions(self.space.degree, local)
+        return np.einsum("pi,pic->pc", values, self.field[self.space.numbers[found]])
 
     def _stresses(self, found: np.ndarray, local: np.ndarray) -> np.ndarray:
         """Stresses in triangles at reference coordinates [Pa], shape (n, 3)."""

@@ -77,22 +77,13 @@ class ReferenceNotConvergedError(RuntimeError):
 class ReferenceSolution:
     """Converged displacements of a beam.
 
-    Attributes
-    ----------
-    displacement : float
-        Mean displacement of the loaded side along the force [m]; of a pressed side, its middle's.
-    mean_displacement : float
-        Mean displacement of the loaded side along the force [m].
-    error_estimate : float
-        Bound on the relative error of `displacement` [1].
-    x, y : ndarray of float, shape (n_x,) and (n_y,)
-        Grid of the field [m], denser near the outline.
-    displacements : ndarray of float, shape (n_x, n_y, 2)
-        Displacements on the grid [m].
-    rotation, strain : float
-        Rotation [rad] and strain [1] that limit its use, see `springtune.reference.answers`.
-    unknowns : int
-        Unknowns of the finest level, for the solved half.
+    - `displacement`: Mean displacement of the loaded side along the force [m]; of a pressed side, its middle's.
+    - `mean_displacement`: Mean displacement of the loaded side along the force [m].
+    - `error_estimate`: Bound on the relative error of `displacement` [1].
+    - `x`, `y` (n_x,) and (n_y,): Grid of the field [m], denser near the outline.
+    - `displacements` (n_x, n_y, 2): Displacements on the grid [m].
+    - `rotation`, `strain`: Rotation [rad] and strain [1] that limit its use, see `springtune.reference.answers`.
+    - `unknowns`: Unknowns of the finest level, for the solved half.
     """
 
     displacement: float

@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all."""
+"""Files that appear whole or not at all, and whether the processes that write them live."""
 
 import json
 import os
@@ -8,8 +8,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
-
-from .processes import lives
 
 UNFINISHED = ".unfinished"
 """Ending of the name of a file that is being written, after its own and who writes it, `writer`."""
@@ -62,15 +60,6 @@ def remove_unfinished(folder: str | Path, below: bool = True) -> None:
     """Remove files in a folder that killed writers left; those of running processes stay.
 
     On another machine a process counts as running if it wrote within the last hour.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     write_text(Path(folder) / "note.txt.99999999.unfinished", "half of")
-    ...     remove_unfinished(folder)
-    ...     list(Path(folder).iterdir())
-    []
     """
     for path in (Path(folder).rglob if below else Path(folder).glob)(f"*{UNFINISHED}"):
         with suppress(FileNotFoundError):  # just finished, or another run was quicker
@@ -93,16 +82,7 @@ def write_bytes(path: str | Path, content: bytes) -> None:
 
 
 def write_text(path: str | Path, text: str) -> None:
-    """Write UTF-8 text atomically; create missing folders.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     write_text(Path(folder) / "deep/note.txt", "all of it")
-    ...     (Path(folder) / "deep/note.txt").read_text()
-    'all of it'
-    """
+    """Write UTF-8 text atomically; create missing folders."""
     write_bytes(path, text.encode())
 
 
@@ -118,3 +98,30 @@ def write_json(path: str | Path, content: Any) -> None:
     {'seconds': 0.25}
     """
     write_text(path, json.dumps(content, indent=1) + "\n")
+
+
+SAME_START = 2.0
+"""Tolerance [s] of a process's start time, since the clock may be set."""
+
+
+def this_host() -> str:
+    """Return the name of the machine or container in which process ids are valid."""
+    try:
+        return f"{platform.node()} {os.readlink('/proc/self/ns/pid')}"
+    except OSError:
+        return platform.node()
+
+
+def lives(pid: int, start: float | None = None) -> bool:
+    """Return whether a process runs."""
+    import psutil  # here: hardly ever is there something to ask
+
+    try:
+        process = psutil.Process(pid)
+        if start is not None and abs(process.create_time() - start) >= SAME_START:
+            return False
+        return process.status() != psutil.STATUS_ZOMBIE
+    except (OverflowError, ValueError, psutil.NoSuchProcess):
+        return False
+    except psutil.AccessDenied:
+        return True

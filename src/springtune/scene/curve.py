@@ -30,30 +30,14 @@ LEAST_RATIO = 1e-9
 
 
 def follow(sheet: Sheet, kind: LoadKind, kinematics: str, loads: np.ndarray) -> LinearPath | StablePath:
-    """Equilibrium path of springs of one stiffness, as far as loads need it.
-
-    Parameters
-    ----------
-    loads : ndarray of float, shape (n,)
-        Force over stiffness, all of one sign [m].
-    """
+    """Equilibrium path of springs of one stiffness, as far as `loads` need it: force over stiffness [m], one sign."""
     problem = sheet.problem(kind, Springs(1.0, uniform(sheet.mesh)))
     return (LinearPath if kinematics == "linear" else StablePath)(problem, sheet.measured(kind), loads)
 
 
 def meeting(path: LinearPath | StablePath, force: float, stiffness: np.ndarray, displacement: np.ndarray,
             stable: np.ndarray, reference: float, objection: str) -> Best:  # fmt: skip
-    """Stiffness at which a curve meets its reference.
-
-    Parameters
-    ----------
-    force : float
-        [N]
-    stiffness, displacement, stable : ndarray, shape (n,)
-        The curve [N/m, m], and whether its equilibria are stable.
-    reference : float
-        Displacement of the reference [m].
-    """
+    """Stiffness at which a curve of displacements [m] over stiffnesses [N/m] meets its reference [m]; force in N."""
     if objection:
         return Best(np.nan, Status.FAILED, f"{objection}; take a smaller force or linear kinematics")
     best = best_stiffness(stiffness, displacement, stable, reference, lambda stiffness: path.value(force / stiffness))

@@ -237,7 +237,7 @@ class Scene:
         >>> scene.displacement_of(0.01 * scene.mesh.points).__round__(12)
         0.002
         """
-        return self.statement.displacement(self.sheet, displacements)
+        return self.statement.displacement(displacements)
 
     @property
     def held(self) -> np.ndarray:
@@ -251,7 +251,7 @@ class Scene:
         >>> scene.held.sum().item()
         20
         """
-        return self.statement.held(self.sheet)
+        return self.statement.loading.held
 
     @property
     def forces(self) -> np.ndarray:
@@ -275,7 +275,7 @@ class Scene:
     @property
     def problem(self) -> StaticProblem:
         """Network under the pattern of the load."""
-        return self.statement.problem(self.sheet, self.springs)
+        return self.sheet.problem(self.statement.loading, self.springs)
 
     def solve(self) -> "Result":
         """Equilibrium under the force.
@@ -301,20 +301,15 @@ class Scene:
         >>> print(f"{result.status}: {1e3 * result.displacement:.4f} mm")
         solved: 0.3780 mm
         """
-        begin = time.perf_counter()
+        begin, derived = time.perf_counter(), None
         try:
             springs, derived = self._derived
-        except SingularError as error:  # of the patch test that scales springs
-            seconds = time.perf_counter() - begin
-            return Result(self, None, Status.FAILED, str(error), np.nan, np.nan, 0.0, seconds, self.statement.none())
-        begin = time.perf_counter()
-        try:
+            begin = time.perf_counter()
             solution = self.statement.solve(self.sheet, springs)
-        except SingularError as error:
+        except SingularError as error:  # of the network, or of the patch test that scales springs
             seconds = time.perf_counter() - begin
-            return Result(
-                self, None, Status.FAILED, str(error), np.nan, np.nan, seconds, derived, self.statement.none()
-            )
+            times = (0.0, seconds) if derived is None else (seconds, derived)
+            return Result(self, None, Status.FAILED, str(error), np.nan, np.nan, *times, self.statement.none())
         return Result(
             self,
             solution.equilibrium,
@@ -324,7 +319,7 @@ class Scene:
             solution.displacement,
             time.perf_counter() - begin,
             derived,
-            self.statement.values(self.sheet, springs, solution),
+            self.statement.values(springs, solution),
         )
 
     @property

@@ -10,13 +10,6 @@ def least_squares(products: np.ndarray, wanted: np.ndarray) -> np.ndarray:
 
     `products` (n_cells, n_springs, n_springs) are scalar products of unit springs' effects, `wanted` (n_cells,
     n_springs) those with the wanted effect.
-
-    Examples
-    --------
-    The second spring would be negative; the first one alone is best at another value:
-
-    >>> least_squares(np.array([[[1.0, 0.5], [0.5, 1.0]]]), np.array([[1.0, 0.2]])).tolist()
-    [[1.0, 0.0]]
     """
     pairs = wanted.shape[1]
     # All sets of springs that may be other than zero are few: the best one with no negative stiffness is the answer.

@@ -8,6 +8,7 @@ Unknowns are logarithms of the stiffnesses, from a tenth to ten times those of `
 anisotropic material those of `springtune.springs.energy_fit`, with a tenth of their mean in place of zeros.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -16,7 +17,7 @@ import numpy as np
 from ..mesh import Mesh, MeshError
 from ..problem.materials import AnyMaterial, Material
 from . import energy_fit, lattice
-from .base import DefinitionError, membrane_stiffness
+from .base import DefinitionError, Springs, membrane_stiffness
 
 SPAN = 10.0
 """Largest factor between a spring and where its search starts [1]."""
@@ -34,17 +35,24 @@ class Case:
     displacements: np.ndarray
 
 
+def tested_body(mesh: Mesh) -> np.ndarray:
+    """Directions to hold of the free body of a patch test, shape (n_points, 2); refuse a mesh of several parts."""
+    from ..mechanics.moduli import free_body  # here: see `springtune.springs`
+
+    try:
+        return free_body(mesh)
+    except MeshError as error:
+        raise DefinitionError(f"{error}; or take 'van-gelder', which needs no test") from None
+
+
 def patch_cases(mesh: Mesh, material: AnyMaterial, thickness: float) -> list[Case]:
     """Return tension along x and y and shear of the free mesh under even tractions; exact displacements are known.
 
     `thickness` is in m.
     """
-    from ..mechanics.moduli import free_body, outline_forces  # here: see `springtune.springs`
+    from ..mechanics.moduli import outline_forces  # here: see `springtune.springs`
 
-    try:
-        free_body(mesh)
-    except MeshError as error:
-        raise DefinitionError(f"{error}; or take 'van-gelder', which needs no test") from None
+    tested_body(mesh)
     x, y = mesh.points.T
     corner = _first_least(x + y)
     held = np.zeros(mesh.points.shape, dtype=bool)
@@ -104,6 +112,15 @@ class Misfit:
         for case in cases:
             self.groups.setdefault(case.held.tobytes(), []).append(case)
         self.patterns = {name: Network(mesh, group[0].held, self.start) for name, group in self.groups.items()}
+
+    @property
+    def bounds(self) -> list[tuple[float, float]]:
+        """Least and largest logarithm of each spring."""
+        return [(-math.log(SPAN), math.log(SPAN))] * len(self.start)
+
+    def springs(self, logarithms: np.ndarray) -> Springs:
+        """Springs of logarithms that a search found."""
+        return Springs(self.reference, self.start * np.exp(logarithms), evaluations=self.evaluations)
 
     def __call__(self, logarithms: np.ndarray) -> float:
         """Misfit at natural logarithms of the stiffnesses over their start, shape (n_edges,)."""

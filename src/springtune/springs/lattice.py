@@ -21,7 +21,7 @@ from ..mesh import Mesh
 from ..problem.geometry import Beam
 from ..problem.loads import LOADS
 from ..problem.materials import Material
-from .base import Springs, definition, not_negative, rectangles_only
+from .base import Springs, definition, from_rectangles, not_negative, rectangles_only
 
 COEFFICIENT = math.sqrt(3) / 2
 """Stiffness of an edge inside over E t [1]."""
@@ -38,16 +38,12 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
 
 def half_weight(mesh: Mesh) -> np.ndarray:
     """Stiffness of each edge over that of an edge inside an equilateral lattice [1], shape (n_edges,)."""
-    parts = {}
-    if len(mesh.triangles):
-        parts[3] = np.full((len(mesh.triangles), 3), 0.5)
-    if len(mesh.quads):
-        along, across = rectangles_only(mesh)
-        scale = 3 / (16 * COEFFICIENT * along * across)
-        first, second = (not_negative(scale * (3 * b**2 - a**2)) for a, b in ((along, across), (across, along)))
-        diagonal = scale * (along**2 + across**2)
-        parts[4] = np.stack([first, second, first, second, diagonal, diagonal], axis=1)
-    return mesh.sum_to_edges(parts)
+    if not len(mesh.quads):
+        return mesh.sum_to_edges({3: np.full((len(mesh.triangles), 3), 0.5)})
+    along, across = rectangles_only(mesh)
+    scale = 3 / (16 * COEFFICIENT * along * across)
+    first, second = (not_negative(scale * (3 * b**2 - a**2)) for a, b in ((along, across), (across, along)))
+    return from_rectangles(mesh, first, second, scale * (along**2 + across**2))
 
 
 def uniform(mesh: Mesh) -> np.ndarray:

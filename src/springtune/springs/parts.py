@@ -13,7 +13,7 @@ with equal materials they give nearly what one material gives.
 
 from collections.abc import Mapping
 from dataclasses import fields, replace
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -35,37 +35,8 @@ CELL_FIELDS = "points", "corners"
 """Fields of an energy that say where its cells are."""
 
 
-class Derives(Protocol):
-    """Interface of a definition, the package's or the user's own."""
-
-    @property
-    def uniform(self) -> bool:
-        """Whether all springs have one stiffness."""
-
-    @property
-    def uniaxial(self) -> bool:
-        """Whether it supports only loads along a beam."""
-
-    @property
-    def needs(self) -> str:
-        """Its fourth argument, or an empty string."""
-
-    def springs(self, mesh: Mesh, material: AnyMaterial, thickness: float, given: object = None) -> Springs:
-        """Springs of a mesh."""
-
-
 def cells_of_parts(grouped: GroupedMesh) -> dict[str, dict[int, np.ndarray]]:
-    """Return the cells of each part, the main one included, by part and number of corners; empty parts are left out.
-
-    Examples
-    --------
-    >>> from springtune.mesh import right
-    >>> mesh = right(0.02, 0.01, 5e-3)
-    >>> left = mesh.points[mesh.triangles, 0].max(axis=1) < 0.011
-    >>> found = cells_of_parts(GroupedMesh(mesh, parts={"left": {3: left}}))
-    >>> {name: int(cells[3].sum()) for name, cells in found.items()}
-    {'': 8, 'left': 8}
-    """
+    """Return the cells of each part, the main one included, by part and number of corners; empty parts are left out."""
     rest = {count: np.ones(len(corners), dtype=bool) for count, corners in grouped.mesh.cells.items()}
     found: dict[str, dict[int, np.ndarray]] = {MAIN_PART: rest}
     for name, chosen in grouped.parts.items():
@@ -102,7 +73,7 @@ def check_materials(grouped: GroupedMesh, materials: Mapping[str, AnyMaterial]) 
 
 
 def derive_by_parts(
-    definition: Derives,
+    definition: Any,
     grouped: GroupedMesh,
     materials: Mapping[str, AnyMaterial],
     thickness: float,
@@ -110,26 +81,7 @@ def derive_by_parts(
 ) -> Springs:
     """Return the springs of a body with parts of several materials; `thickness` in m.
 
-    Examples
-    --------
-    A strip of steel beside one of aluminium; a spring between them has half of each:
-
-    >>> from springtune.mesh import right
-    >>> from springtune.problem.materials import Material
-    >>> from springtune.springs import DEFINITIONS
-    >>> mesh = right(0.02, 0.01, 5e-3)
-    >>> upper = mesh.points[mesh.triangles, 1].min(axis=1) > 4e-3
-    >>> body = GroupedMesh(mesh, parts={"upper": {3: upper}})
-    >>> materials = {"": Material(70e9, 0.33), "upper": Material(210e9, 0.3)}
-    >>> springs = derive_by_parts(DEFINITIONS["van-gelder"], body, materials, 1e-3)
-    >>> middles = mesh.points[mesh.edges].mean(axis=1)[:, 1]
-    >>> level = abs(np.diff(mesh.points[mesh.edges, 1])[:, 0]) < 1e-9
-    >>> for y in (0.0, 5e-3, 0.01):
-    ...     here = (springs.reference * springs.relative)[level & (abs(middles - y) < 1e-9)]
-    ...     print(f"{1e3 * y:g} mm: {here[0] / 1e6:.1f} MN/m")
-    0 mm: 35.0 MN/m
-    5 mm: 140.0 MN/m
-    10 mm: 105.0 MN/m
+    `definition` is one of the package or the user's own.
     """
     check_materials(grouped, materials)
     mesh, parts = grouped.mesh, cells_of_parts(grouped)

@@ -34,10 +34,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..mesh import Mesh, MeshError
+from ..mesh import Mesh
 from ..problem.materials import Material
 from . import van_gelder
-from .base import DefinitionError, Springs, definition, triangles_only
+from .base import Springs, definition, triangles_only
+from .identification import tested_body
 
 NU = 1 / 3
 """Poisson's ratio of springs alone [1]."""
@@ -64,14 +65,10 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
 
     Raises DefinitionError on quadrilaterals and on meshes of several parts.
     """
-    from ..mechanics.moduli import free_body  # here: see `springtune.springs`
-    from ..mechanics.network import Network
+    from ..mechanics.network import Network  # here: see `springtune.springs`
 
     triangles_only(mesh)
-    try:
-        held = free_body(mesh)
-    except MeshError as error:
-        raise DefinitionError(f"{error}; or take 'van-gelder', which needs no test") from None
+    held = tested_body(mesh)
     start = van_gelder.springs(mesh, material, thickness).relative
     forces = outline_tests(mesh)
     first, second = np.triu_indices(len(forces))

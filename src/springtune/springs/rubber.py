@@ -26,14 +26,6 @@ class SpringLaw:
 
     A spring of stretch s pulls with ``sum_p a_p (s - s^-p)`` per cross-section of its rows, p of `LAW_POWERS`.
     `coefficients` are a_p [Pa]; `largest` is the largest stretch in the fitted data [1], below `FLAT`.
-
-    Examples
-    --------
-    >>> import springtune as st
-    >>> from springtune.springs.rubber import SpringLaw
-    >>> rubber, springs = (fitted("config/treloar/uniaxial.csv") for fitted in (st.fit_rubber, SpringLaw.fitted))
-    >>> [f"{float(law.stress('equibiaxial', 1.1)) / 1e6:.2f} MPa" for law in (rubber, springs)]
-    ['0.16 MPa', '0.17 MPa']
     """
 
     coefficients: tuple[float, ...]

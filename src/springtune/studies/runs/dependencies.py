@@ -178,7 +178,7 @@ PACKAGE = Path(__file__).parents[2]
 NOT_COUNTED = {
     ("studies/output/browse/page.py", "h5py"): "numbers come out of a dataset as they went in, or not at all",
     ("safe_io/inputs.py", "h5py"): "it refuses files, and reads none of their numbers",
-    ("safe_io/processes.py", "psutil"): "it says which processes live",
+    ("safe_io/atomic.py", "psutil"): "it says which processes live",
     ("studies/runs/store.py", "h5py"): "numbers come out of a file as they went in, or not at all",
     ("studies/output/dataset.py", "h5py"): "texts go into a dataset as they are",
     ("studies/output/reading.py", "h5py"): "it looks at a dataset's links before netCDF opens it",

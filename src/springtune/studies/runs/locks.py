@@ -14,7 +14,7 @@ from collections.abc import Collection, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-from springtune.safe_io.processes import lives, this_host
+from springtune.safe_io.atomic import lives, this_host
 
 from . import checked_json
 from .run_tasks import TASKS

@@ -214,7 +214,6 @@ def _code(case):
 
 
 CASE = ("scene", "approach", "mesh_size")
-OF_SCENE = ("scene",)
 SOLVER_AXES = ("linear_solver", "mesh_size")
 EXPLICIT_AXES = ("mesh_size", "thread_count", "precision")
 
@@ -249,10 +248,10 @@ VARIABLES = {
         nan,
     ),
     "cost_exponent": (("scene", "approach"), "1", "exponent of the seconds in the unknowns, from 3000 on", nan),
-    "reference_displacement": (OF_SCENE, "m", "displacement of the converged reference", nan),
-    "reference_error_estimate": (OF_SCENE, "1", "estimated relative error of the reference", nan),
-    "reference_seconds": (OF_SCENE, "s", "time of the reference", nan),
-    "machine_load": (OF_SCENE, "1", "load of the machine at the start, processes", nan),
+    "reference_displacement": (("scene",), "m", "displacement of the converged reference", nan),
+    "reference_error_estimate": (("scene",), "1", "estimated relative error of the reference", nan),
+    "reference_seconds": (("scene",), "s", "time of the reference", nan),
+    "machine_load": (("scene",), "1", "load of the machine at the start, processes", nan),
     "solver_seconds": (SOLVER_AXES, "s", "time from a matrix to a solution, its sparsity analysed", nan),
     "solver_again_seconds": (SOLVER_AXES, "s", "time of the next matrix of that sparsity", nan),
     "solver_status": (SOLVER_AXES, "1", "what became of the linear system", 0),

@@ -24,7 +24,7 @@ OF_REFERENCES = ("sample", "load")
 OF_NETWORKS = ("sample", "load", "definition")
 
 REFERENCE_BOUND = "bound on the relative error of the reference, that of its interpolation included"
-APPLIES = "whether a reference of small strain applies to the network: not where it turns or strains too far for it"
+HOW_FAR = "whether a reference of small strain applies to the network: not where it turns or strains too far for it"
 
 SAMPLES = Group(
     "/samples",
@@ -36,7 +36,7 @@ SAMPLES = Group(
         "message": (OF_NETWORKS, "1", "why the scene is not solved", ""),
         "reference_displacement": (OF_REFERENCES, "m", "displacement of the loaded side, finite elements", np.nan),
         "reference_error_estimate": (OF_REFERENCES, "1", REFERENCE_BOUND, np.nan),
-        "reference_applies": (OF_REFERENCES, "1", APPLIES, np.int8(0)),
+        "reference_applies": (OF_REFERENCES, "1", HOW_FAR, np.int8(0)),
         "reference_message": (("load",), "1", "why there is no reference", ""),
         "best_stiffness": (OF_REFERENCES, "N/m", "uniform stiffness without a deformation error", np.nan),
         "particles": (("sample",), "1", "number of particles", 0),

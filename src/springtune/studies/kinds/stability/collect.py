@@ -34,12 +34,7 @@ STABILITY = Group(
         "dt_limit_measured": (SCHEME, "s", "largest step that does not grow noise, by bisection of runs", np.nan),
         "dt_particle_bound": (("definition", "mesh_size"), "s", "safe step from each particle's springs alone", np.nan),
         "omega_max": (("definition", "mesh_size"), "rad/s", "highest frequency at rest", np.nan),
-        "behaviour": (
-            ("integrator", "step_ratio", "map_damping_ratio"),
-            "1",
-            "what a run makes of noise",
-            -1,
-        ),
+        "behaviour": (("integrator", "step_ratio", "map_damping_ratio"), "1", "what a run makes of noise", -1),
         "step_ratio_predicted": (
             ("integrator", "map_damping_ratio"),
             "1",
