@@ -425,7 +425,7 @@ def _as_words(values: np.ndarray, words: Mapping[int, str]) -> np.ndarray:
     """Flags as words, empty where nothing was requested."""
     known, back = np.unique(values, return_inverse=True)
     said = [words.get(int(one), NOT_REQUESTED).replace(NOT_REQUESTED, "") for one in known]
-    return np.array(said, dtype=object)[back.reshape(values.shape)]
+    return np.array(said, dtype=object)[back.ravel()].reshape(values.shape)
 
 
 def _asked(data: xr.Dataset, root: xr.Dataset) -> xr.DataArray | None:
