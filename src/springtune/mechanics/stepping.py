@@ -1,4 +1,4 @@
-"""Time steps of a network in motion: one class for each kind of integrator."""
+"""Networks in motion and their time steps: one class for each kind of integrator."""
 
 from __future__ import annotations
 
