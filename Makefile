@@ -115,9 +115,10 @@ site: $(VENV)/.test results/quick/dataset.nc
 results/quick/dataset.nc: | $(VENV)/.run
 	snakemake --configfile config/quick.yaml
 
-# The pictures of the pages, from their studies; the benchmark among them takes minutes.
+# The pictures and tables of the pages, from their studies; the benchmark among them takes minutes.
 pictures: $(VENV)/.run
 	python tools/pictures.py
+	python tools/pages.py
 
 # The tables of a million particles in docs/speed.md, measured on this machine; some minutes and 3 GB.
 million: $(VENV)/.run

@@ -12,6 +12,7 @@ include: "workflow/rules/internals.smk"
 if not NOTED:
 
     include: "workflow/rules/common.smk"
+    include: "workflow/rules/hooks.smk"
     include: "workflow/rules/scenes.smk"
     include: "workflow/rules/shapes.smk"
     include: "workflow/rules/moduli.smk"
@@ -36,11 +37,11 @@ if not NOTED:
         message:
             f"{RESULTS} is complete"
         input:
-            # Stages before the dataset, too: what they store is made again where it is missing.
+            # Stages, too, so that missing stored results are made again.
             STORED,
             rules.collect.output,
             OUTPUTS.values(),
-            str(RESULTS / rerun.PAGE),  # plain: the report is to name the rule that made it
+            str(RESULTS / rerun.PAGE),  # no report(): the report names the rule that made it
 
     if "storage" in config or {"publish", "fetch"} & {*WORDS}:
 
@@ -50,7 +51,7 @@ if not NOTED:
         begin()
 
     onsuccess:
-        tell_end("ending")
+        log_end("ending")
 
     onerror:
-        tell_end("broken")
+        log_end("broken")

@@ -1,7 +1,7 @@
-"""Buckling: the critical load of a slender column, clamped at one end, against Euler's pi^2 E I / (4 L^2).
+"""Buckling: the critical load of a slender clamped column, against Euler's pi^2 E I / (4 L^2).
 
-Below the critical load the straight network is stable; above it the tangent has a negative pivot, and the equilibrium
-that Newton's method finds all the same is called unstable.
+Below the critical load the straight network is stable. Above it Newton's method still finds an equilibrium. The tangent
+has a negative pivot there, so the result is called unstable.
 """
 
 import math
@@ -10,7 +10,7 @@ import springtune as st
 
 
 def main():
-    """Critical load over Euler's."""
+    """Return the critical load over Euler's."""
     beam, steel = st.Beam("100 mm", "4 mm"), st.Material("210 GPa", 0.3)
     mesh = st.make_mesh(beam, "structured", "0.25 mm")
     euler = math.pi**2 * steel.young_modulus * beam.thickness * beam.height**3 / 12 / (4 * beam.length**2)

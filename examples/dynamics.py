@@ -1,7 +1,7 @@
 """Dynamics: the largest stable time step, known before a run, and the lowest frequency of a pulled bar.
 
-A step just above 2/omega_max makes noise grow until the run diverges; one just below does not. A bar that is clamped at
-one end vibrates along itself with sqrt(E/rho) / (4 L).
+A run diverges with a step just above 2/omega_max, and not just below. A bar clamped at one end vibrates along its axis
+with sqrt(E/rho) / (4 L).
 """
 
 import math
@@ -10,7 +10,7 @@ import springtune as st
 
 
 def main():
-    """Lowest frequency that the load excites [Hz]."""
+    """Return the lowest frequency that the load excites [Hz]."""
     beam, steel = st.Beam("100 mm", "5 mm"), st.Material("210 GPa", 0.3, density="7850 kg/m^3")
     mesh = st.make_mesh(beam, "structured", "1 mm")
     motion = st.Scene(beam, mesh, steel, "traction", "1 kN", definition="delingette").motion()

@@ -1,8 +1,8 @@
-"""A sheet whose fibres lie aslant: pulled along x it shears, too.
+"""Oblique fibres: a sheet that is pulled along x also shears.
 
-Rollers and a point leave it in uniform strain, which follows from the sheet's compliance. Springs with coupling
-(`delingette`) are linear triangles of any six constants, and find it on any mesh. With a hole there is no closed form:
-errors are against the finite-element reference, and definitions for isotropic sheets refuse.
+Rollers and a point leave it in uniform strain, known from the sheet's compliance. `delingette` (linear triangles) takes
+any six constants and finds it on any mesh. With a hole, errors are against the finite-element reference.
+Definitions for isotropic sheets refuse the material.
 """
 
 import matplotlib.pyplot as plt
@@ -12,7 +12,7 @@ import springtune as st
 
 
 def main():
-    """Displacement of the end over F L S11 / (H t)."""
+    """Return the displacement of the end over F L S11 / (H t)."""
     ply = st.AnisotropicMaterial.orthotropic("12 GPa", "4 GPa", 0.3, "2 GPa", angle="30 deg", name="ply")
     force, length, height, thickness = 1e3, 0.1, 0.04, 1e-3
     pull = st.LoadCase(

@@ -9,7 +9,7 @@ import springtune as st
 
 
 def main():
-    """Displacement of the network [m]."""
+    """Return the displacement of the network [m]."""
     beam, steel = st.Beam("200 mm", "40 mm", thickness="1 mm"), st.Material("210 GPa", 0.3)
     mesh = st.make_mesh(beam, "structured", "2 mm")
     scene = st.Scene(beam, mesh, steel, "traction", "400 kN", definition="patch")

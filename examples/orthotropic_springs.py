@@ -1,8 +1,8 @@
-"""Orthotropic sheets of springs alone: which there are, and how far the others are off.
+"""Orthotropic sheets of springs alone: which are exact, and how large the error of the others is.
 
-Springs obey Cauchy's relation C12 = C66, whatever their stiffness. A sheet with C12 = C66 is exact on rows of triangles
-of height a/2 sqrt(C22/C12), and on rectangles of a ratio that suits it; other sheets get the springs that are nearest
-in energy. The error is the largest one of the energy of any even strain, for sheets with C12 C66 = C11 C22 / 9.
+Springs obey Cauchy's relation C12 = C66, whatever their stiffness. Sheets with C12 = C66 are exact on rows of triangles
+of height a/2 sqrt(C22/C12), and on rectangles of a suitable ratio. Other sheets get the springs that are nearest in
+energy. The error is the largest one of the energy of any even strain, for sheets with C12 C66 = C11 C22 / 9.
 """
 
 import matplotlib.pyplot as plt
@@ -18,12 +18,12 @@ SQUARES, ROWS = braced(0.02, 0.02, 0.01), lattice(2, 2)
 
 
 def own_rows(material):
-    """Rows of the height that C12 = C66 would need, their geometric mean in the place of both."""
+    """Rows made for a material: C12 and C66 are replaced by their geometric mean."""
     return lattice(2, 2, row_height=0.5 * np.sqrt(material.C22 / np.sqrt(material.C12 * material.C66)))
 
 
 def error(mesh, material):
-    """Largest error of the energy of a strain [1]."""
+    """Return the largest relative error of the energy of an even strain [1]."""
     springs = FIT.springs(mesh, material, 1.0)
     network = affine_stiffness(mesh, springs) * springs.reference
     values, vectors = np.linalg.eigh(material.plane_stress)
@@ -32,12 +32,12 @@ def error(mesh, material):
 
 
 def sheet(ratio, cauchy):
-    """Sheet of a ratio E_x / E_y and a ratio C12 / C66."""
+    """Return a sheet of given ratios E_x / E_y and C12 / C66."""
     return st.AnisotropicMaterial(ratio**0.5, ratio**-0.5, cauchy**0.5 / 3, cauchy**-0.5 / 3)
 
 
 def main():
-    """C12 over C66 of the springs nearest to a board."""
+    """Return C12 over C66 of the springs nearest to a board."""
     ratios, cauchy = np.geomspace(1, 20, 17), np.geomspace(1 / 4, 4, 17)
     figure, panels = plt.subplots(1, 3, figsize=(7.16, 2.6), sharey=True, layout="constrained")
     titles = "squares with both diagonals", "rows of equilateral triangles", "rows made for the sheet"

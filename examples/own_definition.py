@@ -1,7 +1,7 @@
-"""A definition of one's own: every spring gets E t, the first guess of many, and what it makes of Young's modulus.
+"""A definition of one's own: every spring gets E t, and the error of Young's modulus that follows.
 
-An equilateral network of springs k has E t = 2 k / sqrt(3); springs of full stiffness on the outline, too, make a strip
-of height H stiffer by 1 + sqrt(3)/2 a/H. So the guess is off by 2/sqrt(3) (1 + sqrt(3)/2 a/H) - 1: a quarter here.
+An equilateral network of springs k has E t = 2 k / sqrt(3). Outline springs of full stiffness make a strip of height H
+stiffer by 1 + sqrt(3)/2 a/H. So the error is 2/sqrt(3) (1 + sqrt(3)/2 a/H) - 1: a quarter here.
 """
 
 import math
@@ -12,12 +12,12 @@ import springtune as st
 
 
 def guess(mesh, material, thickness):
-    """Every spring gets E t, whatever its place and length."""
+    """Return E t for every spring."""
     return st.Springs(material.young_modulus * thickness, np.ones(len(mesh.edges)))
 
 
 def main():
-    """Error of Young's modulus."""
+    """Return the error of Young's modulus."""
     # Ten rows of exactly equilateral triangles.
     beam, steel = st.Beam(0.2, 10 * 0.002 * math.sqrt(3) / 2), st.Material("210 GPa", 0.3)
     mesh = st.make_mesh(beam, "structured", "2 mm")

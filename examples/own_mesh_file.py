@@ -1,7 +1,7 @@
 """A mesh of one's own: a graded mesh of triangles, written and read by meshio.
 
-At Poisson's ratio 0 a clamped end holds nothing back, and a pulled bar elongates by F L / (E H t) exactly. Springs with
-coupling (`delingette`) are linear triangles, which reproduce that on any mesh.
+At Poisson's ratio 0 the clamp does not hold the bar across, and it elongates by exactly F L / (E H t). `delingette`
+(linear triangles) reproduces that on any mesh.
 """
 
 import tempfile
@@ -15,7 +15,7 @@ import springtune as st
 
 
 def graded_mesh(length, height):
-    """Points and triangles of a box whose columns narrow towards its right end."""
+    """Return a mesh of a box whose columns narrow towards the right end."""
     x, y = np.meshgrid(length * np.linspace(0, 1, 21) ** 0.7, height * np.linspace(0, 1, 5))
     corner = (np.arange(4)[:, None] * 21 + np.arange(20)).ravel()  # lower left one of each rectangle
     triangles = np.concatenate(
@@ -25,7 +25,7 @@ def graded_mesh(length, height):
 
 
 def main():
-    """Displacement over F L / (E H t)."""
+    """Return the displacement over F L / (E H t)."""
     beam, cork = st.Beam("100 mm", "20 mm"), st.Material("20 MPa", 0.0)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "graded.vtu"

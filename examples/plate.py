@@ -1,7 +1,7 @@
 """A plate with a hole: displacement, and the stress at the rim of the hole.
 
-The hole is a fifth of the plate's width. The stress beside it is 3.13 times that in the plate far away: Howland's
-solution, by the polynomial of Peterson's "Stress Concentration Factors".
+The hole is a fifth of the plate's width. The stress beside it is 3.13 times the far stress: Howland's solution, by the
+polynomial of Peterson's "Stress Concentration Factors".
 """
 
 import matplotlib.pyplot as plt
@@ -10,7 +10,7 @@ import springtune as st
 
 
 def main():
-    """Stress at the rim of the hole over the stress far from it."""
+    """Return the stress at the rim of the hole over the far stress."""
     force, width, thickness = 20e3, 0.1, 1e-3
     pull = st.LoadCase(
         "pull",

@@ -1,7 +1,7 @@
-"""Poisson's ratio: a network of springs alone has 1/3, whatever the material's; springs with coupling have any.
+"""Poisson's ratio: a network of springs alone has 1/3; springs with coupling have the material's.
 
-Central springs obey Cauchy's relation C1122 = C1212, so that an isotropic network in the plane has 1/3. (The last
-digits printed are of the rows' zigzag ends.) `delingette` couples the sides of each triangle.
+Central springs obey Cauchy's relation C1122 = C1212, so an isotropic plane network has 1/3. (The last printed digits
+come from the zigzag ends of the rows.) `delingette` couples the sides of each triangle.
 """
 
 import math
@@ -10,8 +10,8 @@ import springtune as st
 
 
 def main():
-    """Poisson's ratio of springs alone."""
-    # Ten rows of exactly equilateral triangles: others are isotropic only nearly.
+    """Return Poisson's ratio of springs alone."""
+    # Ten rows of exactly equilateral triangles: only these are exactly isotropic.
     beam = st.Beam(0.2, 10 * 0.002 * math.sqrt(3) / 2)
     mesh = st.make_mesh(beam, "structured", "2 mm")
     for ratio in (0.0, 0.3, 0.49):

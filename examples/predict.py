@@ -1,14 +1,13 @@
-"""Which definition to use on one mesh: every choice solved under three loads, the best one first.
+"""Which definition to use on one mesh: every choice is solved under three loads; the best one comes first.
 
-The patch test of the mesh measures E and Poisson's ratio of each; springs of `lattice` inside the mesh have
-sqrt(3)/2 E t by closed form.
+A patch test of the mesh measures E and Poisson's ratio of each. Inner springs of `lattice` have sqrt(3)/2 E t.
 """
 
 import springtune as st
 
 
 def main():
-    """Stiffness of the springs inside, definition `lattice` [N/m]."""
+    """Return the stiffness of inner springs of `lattice` [N/m]."""
     beam, steel = st.Beam("100 mm", "20 mm"), st.Material("210 GPa", 0.3)
     choices = st.predict(beam, st.make_mesh(beam, "structured", "2 mm"), steel)
     for choice in choices:

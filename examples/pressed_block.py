@@ -1,15 +1,15 @@
 """A pressed block: why the paper's stiffness seems to depend on the load (its section 4.1).
 
-Rubber, fixed on one long face and pressed on the other, is held sideways: there Poisson's ratio counts. Springs alone
-have their own, springs with coupling (`delingette`) the material's. The paper's finite elements press the middle of the
-face down by 3.14 mm.
+A rubber block is fixed on one long face and pressed on the other. It cannot widen, so Poisson's ratio matters. Springs
+alone have the mesh's, springs with coupling (`delingette`) the material's. The paper's finite elements move the middle
+of the face by 3.14 mm.
 """
 
 import springtune as st
 
 
 def main():
-    """Displacement of the middle of the face, springs with coupling [m]."""
+    """Return the displacement of the middle of the face with `delingette` [m]."""
     block, rubber = st.Beam("200 mm", "40 mm"), st.Material("1 MPa", 0.5)
     mesh = st.make_mesh(block, "structured", "2 mm")
     for definition in ("patch", "delingette"):

@@ -12,7 +12,7 @@ import springtune as st
 
 
 def main(path="results/quick/dataset.nc", figure=None):
-    """Displacement of the reference [m]."""
+    """Return the displacement of the reference [m]."""
     labels = {"beam": "100x20", "mesh_type": "structured", "material": "steel", "load": "traction"}
     with st.open(path) as tree:
         scenes = tree.to_dataset().sel(kinematics="nonlinear", **labels)

@@ -1,7 +1,7 @@
 """Rubber at any stretch: Treloar's three tests beside the laws that are fitted to the first of them.
 
-Yeoh's law and neo-Hooke's, its first term, are areas and springs of zero rest length on every triangle; springs alone
-end where an equilateral lattice lies flat, at a stretch of 2, and are fitted up to 1.9.
+Yeoh's law, and neo-Hooke's as its first term, are areas and springs of zero rest length on every triangle. Springs
+alone reach a stretch of 2, where an equilateral lattice lies flat. They are fitted up to 1.9.
 """
 
 from pathlib import Path
@@ -24,7 +24,7 @@ TITLES = {
 
 
 def main():
-    """Stress of springs alone in equibiaxial tension over that in uniaxial tension, at the same stretch."""
+    """Return the equibiaxial over the uniaxial stress of springs alone, at the same stretch."""
     data = {test: TensileTest.read(TRELOAR / f"{test.replace(' ', '-')}.csv") for test in RUBBER_TESTS}
     laws = {
         "Yeoh's law": st.fit_rubber(data["uniaxial"]),

@@ -1,7 +1,7 @@
 """A sensitivity curve: which uniform stiffness gives a beam its displacement.
 
 Springs on the outline belong to one triangle, not two, and make the beam too stiff. So the best stiffness is below
-sqrt(3)/2 E t, by 1 + sqrt(3)/2 a/H, as the closed form has it. The paper found 170e6 N/m by hand, for all mesh sizes.
+sqrt(3)/2 E t, by 1 + sqrt(3)/2 a/H. The paper found 170e6 N/m by hand, for all mesh sizes.
 """
 
 import matplotlib.pyplot as plt
@@ -10,7 +10,7 @@ import springtune as st
 
 
 def main():
-    """Best stiffness [N/m]."""
+    """Return the best stiffness [N/m]."""
     beam, steel = st.Beam("200 mm", "30 mm"), st.Material("210 GPa", 0.3)
     mesh = st.make_mesh(beam, "structured", "5 mm")
     scene = st.Scene(beam, mesh, steel, "traction", "300 kN", definition="uniform")

@@ -1,4 +1,4 @@
-"""A shape of a mesh file: a quarter of a ring from Gmsh's format, its groups by name, pressed from inside.
+"""A shape from a mesh file: a quarter of a ring in Gmsh's format, with named groups, under inner pressure.
 
 Lame's solution: the inner rim moves outwards by p a / E ((b^2 + a^2) / (b^2 - a^2) + nu).
 """
@@ -13,7 +13,7 @@ from springtune.mesh import write_mesh
 
 
 def mesher(path, inner, outer):
-    """A mesh file such as any mesher writes, here of a quarter of a ring."""
+    """Write a mesh file of a quarter of a ring, as a mesher does."""
     corners = [((inner, 0), None, "lower"), ((outer, 0), (0, 0), "outer"), ((0, outer), None, "left")]
     sides = [st.Segment(*corner) for corner in [*corners, ((0, inner), (0, 0), "inner")]]
     ring = st.Shape("ring", 1e-3, sides, points={"rim": (inner, 0)})
@@ -21,7 +21,7 @@ def mesher(path, inner, outer):
 
 
 def main():
-    """Displacement of the rim over Lame's."""
+    """Return the displacement of the rim over Lame's."""
     inner, outer, pressure, steel = 0.02, 0.04, 10e6, st.Material("210 GPa", 0.3, name="steel")
     press = st.LoadCase(
         "press",

@@ -1,7 +1,7 @@
 """Rubber at twice its length: springs and areas of definition `neo-hooke`.
 
-A sheet of incompressible neo-Hooke rubber that is stretched to l times its length, free to become narrower and thinner,
-carries mu (l - 1/l^2) on each area that it had at first. `neo-hooke` is that law on each triangle.
+An incompressible neo-Hookean sheet at stretch l, free to become narrower and thinner, carries mu (l - 1/l^2) per area
+at rest. `neo-hooke` is that law on each triangle.
 """
 
 import matplotlib.pyplot as plt
@@ -10,7 +10,7 @@ import springtune as st
 
 
 def main():
-    """Stretch under the force that is to double the length."""
+    """Return the stretch under the force that should double the length."""
     rubber = st.Material("1.2 MPa", 0.5, name="rubber")
     length, height, thickness, stretch = 0.1, 0.02, 1e-3, 2.0
     shear = rubber.young_modulus / 3

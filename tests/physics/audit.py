@@ -415,7 +415,7 @@ def audit_snap(scene, path=True):
     share = body.follow(guess, judge=judge)[1]
     verdict.force = force = float(guess * (share or 1e-3) * scene.level)
     loading = Loading(("arch",), held, pattern, given, pressure)
-    problem = Sheet(mesh, arch.thickness).stated(replace_scale(loading, force), springs)
+    problem = Sheet(mesh, arch.thickness).problem(replace_scale(loading, force), springs)
     found = solved(problem, 1 / springs.reference, "nonlinear", lambda moved: 0.0)
     verdict.status, verdict.message = str(found.status), found.message
     result = {"displacements": found.equilibrium.displacements}

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from runpy import run_path
 
 import numpy as np
 import pytest
@@ -24,12 +25,11 @@ from springtune.problem.status import Status
 from springtune.reference import calculix
 from springtune.reference.small_strain import solve_small_strain
 from springtune.springs.lattice import half_weight
-from springtune.studies.kinds.benchmark import measure as benchmark
+from springtune.studies.kinds.benchmark import OTHER_APPROACHES, approach_names
+from springtune.studies.kinds.benchmark import solve as benchmark
 from springtune.studies.kinds.benchmark.approaches import APPROACHES
-from springtune.studies.kinds.benchmark.collect import BENCHMARK
-from springtune.studies.kinds.benchmark.measure import LoadedBeam
-from springtune.studies.kinds.benchmark.names import OTHER_APPROACHES, approach_names
-from springtune.studies.kinds.benchmark.tables import comparison
+from springtune.studies.kinds.benchmark.kind import VARIABLES
+from springtune.studies.kinds.benchmark.solve import LoadedBeam
 
 BEAM = Beam(0.1, 0.02, 1e-3, "100x20")
 SCENES = {
@@ -107,10 +107,10 @@ def test_a_case_has_the_shapes_of_the_dataset_and_what_was_asked_for():
     )
     wanted = (2e-3, 5e-3, 1e-2)
     finest = asked(wanted, approaches, lattice_structured=1e-2)
-    found = benchmark.run(SCENES["traction"], approaches, wanted, finest, 30.0)
+    found = benchmark.measure(SCENES["traction"], approaches, wanted, finest, 30.0)
     sizes = {"scene": 1, "approach": len(approaches), "mesh_size": 3}
     for name, values in found.items():
-        assert np.shape(values) == tuple(sizes[one] for one in BENCHMARK.variables[name][0] if one != "scene"), name
+        assert np.shape(values) == tuple(sizes[one] for one in VARIABLES[name][0] if one != "scene"), name
     assert np.isfinite(found["seconds"][1]).all() and np.isfinite(found["seconds"][0]).tolist() == [False, False, True]
     assert found["status"][0].tolist() == [Status.NOT_REQUESTED, Status.NOT_REQUESTED, Status.SOLVED]
     assert not found["message"].any() and (found["peak_memory"][1] >= 0).all()
@@ -121,10 +121,10 @@ def test_a_case_has_the_shapes_of_the_dataset_and_what_was_asked_for():
 
 def test_what_is_run_does_not_depend_on_the_machine(monkeypatch):
     approaches, sizes = ("lattice/structured", "linear-triangles"), (5e-3, 1e-2)
-    quick = benchmark.run(SCENES["traction"], approaches, sizes, asked(sizes, approaches), 30.0)
+    quick = benchmark.measure(SCENES["traction"], approaches, sizes, asked(sizes, approaches), 30.0)
     clock = time.perf_counter
     monkeypatch.setattr(time, "perf_counter", lambda: 1e4 * clock())  # all takes ten thousand times as long
-    slow = benchmark.run(SCENES["traction"], approaches, sizes, asked(sizes, approaches), 30.0)
+    slow = benchmark.measure(SCENES["traction"], approaches, sizes, asked(sizes, approaches), 30.0)
     assert (slow["seconds"] > 1.0).all() and (slow["status"] == quick["status"]).all()
     assert (quick["status"] == Status.SOLVED).all() and (slow["error"] == quick["error"]).all()
 
@@ -152,7 +152,7 @@ def test_what_a_machine_cannot_do_is_a_hole_that_says_so(number, message, monkey
     approaches, sizes = ("relaxation", "linear-triangles"), (2e-3, 4e-3, 5e-3, 1e-2)
     monkeypatch.setitem(APPROACHES, "relaxation", ended_by(number, below=4.5e-3))
     second = Beam(0.06, 0.015, 1e-3, "60x15")
-    found = benchmark.run(SCENES["traction"], approaches, sizes, asked(sizes, approaches), 30.0, second)
+    found = benchmark.measure(SCENES["traction"], approaches, sizes, asked(sizes, approaches), 30.0, second)
     assert found["status"][0].tolist() == [Status.FAILED, Status.FAILED, Status.SOLVED, Status.SOLVED]
     assert message in found["message"][0, 1]
     assert found["message"][0, 0].startswith("not run: at 4 mm it was ")
@@ -205,8 +205,8 @@ def test_errors_are_checked_on_a_second_beam():
     second = Beam(0.06, 0.015, 1e-3, "60x15")
     approaches, sizes = ("lattice/structured", "linear-triangles"), (2e-3, 5e-3)
     finest = asked(sizes, approaches)
-    found = benchmark.run(SCENES["block"], approaches, sizes, finest, 30.0, second_beam=second)
-    there = benchmark.run(replace(SCENES["block"], beam=second), approaches, sizes, finest, 30.0)
+    found = benchmark.measure(SCENES["block"], approaches, sizes, finest, 30.0, second_beam=second)
+    there = benchmark.measure(replace(SCENES["block"], beam=second), approaches, sizes, finest, 30.0)
     assert found["second_error"] == pytest.approx(there["error"], rel=1e-9)
     assert np.isnan(found["assured_error"][:, 0]).all()  # nothing finer was run
     both = np.abs([found["error"], found["second_error"]])
@@ -223,20 +223,36 @@ def test_an_error_that_crosses_zero_or_stays_has_no_order():
 
 
 def test_a_case_that_fails_is_stored_with_its_message():
-    found = benchmark.run(SCENES["traction"], ("van-gelder/braced",), (5e-3,), (5e-3,), 30.0)
+    found = benchmark.measure(SCENES["traction"], ("van-gelder/braced",), (5e-3,), (5e-3,), 30.0)
     assert found["status"][0, 0] == Status.FAILED and found["message"][0, 0]
 
 
-def test_comparison_flags_what_became_slower():
-    values = np.full((1, 3, 2), 0.1)
+def test_comparison_flags_what_became_slower(tmp_path, monkeypatch, capsys):
+    pages = run_path("tools/pages.py")
+    dimensions, values = ("scene", "approach", "mesh_size"), np.full((1, 3, 2), 0.1)
     coordinates = {"scene": ["a"], "approach": ["x", "y", "z"], "mesh_size": [1e-3, 2e-3]}
-    old = xr.Dataset({"seconds": (("scene", "approach", "mesh_size"), values),
-                      "seconds_spread": (("scene", "approach", "mesh_size"), 0.01 * values)}, coordinates)  # fmt: skip
+    old = xr.Dataset({"seconds": (dimensions, values), "seconds_spread": (dimensions, 0.01 * values)}, coordinates)
     new = 2.0 * old  # a machine half as fast
-    assert comparison(old, new)[1] == 0
+    assert pages["comparison"](old, new)[1] == 0
     new["seconds"][0, 1] *= 2
-    lines, flagged = comparison(old, new)
+    lines, flagged = pages["comparison"](old, new)
     assert flagged == 1 and any("y" in line and "slower" in line for line in lines)
+    root = xr.Dataset(attrs={"springtune_version": "1"})
+    for name, groups in {"old": {"/benchmark": old}, "new": {"/benchmark": new}, "without": {}}.items():
+        xr.DataTree.from_dict({"/": root, **groups}).to_netcdf(tmp_path / f"{name}.nc", engine="h5netcdf")
+
+    def compare(*names):
+        monkeypatch.setattr(sys, "argv", ["pages.py", "--compare", *(str(tmp_path / f"{name}.nc") for name in names)])
+        pages["main"]()
+
+    compare("old", "old")
+    with pytest.raises(SystemExit, match="1"):
+        compare("old", "new")
+    assert "  2.00  y  slower" in capsys.readouterr().out
+    with pytest.raises(SystemExit, match="without.nc: has no group /benchmark; run config/benchmark.yaml"):
+        compare("without", "old")
+    with pytest.raises(SystemExit, match="none.nc.*; run config/benchmark.yaml"):
+        compare("none", "old")
 
 
 # -- what makes it fast ------------------------------------------------------------------------------------------------

@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from springtune.mechanics.network import Network
-from springtune.mechanics.statics import FAR, MODES, FollowerPressure, StaticProblem
+from springtune.mechanics.network import FollowerPressure, Network
+from springtune.mechanics.newton import MODES
+from springtune.mechanics.statics import FAR, StaticProblem
 from springtune.mesh import MESH_TYPES
 from springtune.problem.boundary import held, loaded_edges, measured, weights
 from springtune.problem.geometry import Beam

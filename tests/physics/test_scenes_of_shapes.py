@@ -227,7 +227,9 @@ class TestEquilibrium:
         if kinematics == "nonlinear":
             loading = scene.statement.loading
             acting = loading.dead + loading.follower.forces(moved)
-        total = acting + scene.statement.reactions(scene.springs, solution)
+        total = acting + scene.statement.reactions(
+            scene.springs, solution.problem.network, solution.equilibrium.displacements
+        )
         place = grouped.mesh.points + (moved if kinematics == "nonlinear" else 0.0)
         size = np.abs(acting).sum()
         np.testing.assert_allclose(total.sum(axis=0), 0.0, atol=1e-9 * size)

@@ -19,6 +19,8 @@ from springtune.mechanics.integrators import EXPLICIT, IMPLICIT
 from springtune.studies.kinds.scenes.solve import solved
 from springtune.studies.kinds.scenes.stored import packed, unpacked
 
+from tables import refused_calls
+
 STEEL = st.Material("210 GPa", 0.3, density="7850 kg/m^3", name="steel")
 AS_STIFF = st.Rubber([35e9, -5e9, 1e9], density="7850 kg/m^3")
 BEAM = st.Beam("100 mm", "20 mm", thickness="2 mm")
@@ -578,35 +580,7 @@ class TestCommand:
         net = st.SpringNet.read(tmp_path / "net.json")
         assert net.header["mesh"]["name"] == "own.vtu" and net.header["material"]["young_modulus"] == 1e6
 
-    REFUSED = {
-        "unknown ending": (("--out", "net.stl"), "'.stl' is no format of springs; give a name ending in .csv"),
-        "an ending alone": (
-            ("--out", ".csv"),
-            "--out: '.csv' is an ending alone; give a name before it",
-        ),
-        "constants beside a material": (("--young", "3 GPa"), "--young: '3 GPa' is beside --material steel, which has"),
-        "no stiffness": (("--definition", "paper"), "--stiffness: definition 'paper' needs a uniform one; give"),
-        "stiffness for none": (("--stiffness", "3 N/m"), "--stiffness: '3 N/m' is not used"),
-        "triangles": (("--definition", "baudet"), "--definition 'baudet': needs rectangles"),
-        "unknown definition": (("--definition", "latice"), "--definition: 'latice' is unknown; did you mean 'lattice'"),
-        "unknown load": (("--load", "pull", "--force", "1 N"), "--load: 'pull' is unknown"),
-        "no force": (("--load", "traction"), "--force: missing"),
-        "no load": (("--force", "1 N"), "--force: '1 N' is of no load"),
-        "a length": (("--load", "traction", "--force", "3 mm"), "--force: '3 mm' is a length; give a force such as"),
-        "density": (("--density", "3"), "--density: '3' has no unit"),
-        "size": (("--size", "1e-9 mm"), "--size: '1e-9 mm'"),
-        "mesh": (("--mesh", "none.msh"), "--mesh: 'none.msh' is neither a mesh type nor a file"),
-        "no folder": (("--out", "none/net.csv"), "none/net.csv: folder none does not exist; make it first"),
-        "not a folder": (("--out", "file/net.csv"), "--out: file/net.csv: "),
-        "a folder": (("--out", "folder.json"), "--out: folder.json: Is a directory"),
-        "a folder for tables": (("--out", "folder.csv"), "--out: folder.csv: Is a directory"),
-        "uniaxial": (
-            ("--mesh", "braced", "--definition", "baudet-corrected", "--load", "shear", "--force", "1 N"),
-            "--definition: 'baudet-corrected' is not for 'shear'",
-        ),
-    }
-
-    @pytest.mark.parametrize(("options", "said"), REFUSED.values(), ids=REFUSED)
+    @pytest.mark.parametrize(("options", "said"), refused_calls("springs"))
     def test_refuses_in_a_line_and_writes_nothing(self, options, said, tmp_path, monkeypatch):
         monkeypatch.chdir(tmp_path)
         (tmp_path / "file").write_text("no folder")

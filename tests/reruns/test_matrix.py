@@ -70,7 +70,7 @@ def fresh(tmp_path_factory, complete):
 @pytest.mark.parametrize("changed", STUDY, indirect=True)
 def test_exactly_these_jobs_are_to_run(changed):
     run = driver.Run(changed.cores)
-    assert {run.called(name) for name in run.due()} == set(changed.jobs.split())
+    assert {run.called(name) for name in run.due()} == changed.jobs
 
 
 @pytest.mark.parametrize("changed", STORED, indirect=True)
@@ -96,7 +96,7 @@ def test_a_dataset_has_the_files_that_are_there(changed):
     files = {name: hashlib.sha256(Path(name).read_bytes()).hexdigest() for name in json.loads(found["inputs"])}
     assert json.loads(found["inputs"]) == files and {"small.yaml", "printed.csv", "own.inp"} <= files.keys()
     assert found["config_sha256"] == files["small.yaml"]
-    assert jobs == set(changed.jobs.split()) and solved == {}
+    assert jobs == changed.jobs and solved == {}
 
 
 @pytest.mark.slow
@@ -115,19 +115,22 @@ def test_exactly_these_results_are_computed_and_the_dataset_is_that_of_a_fresh_r
 def package(tmp_path_factory):
     """A copy of the package, to be edited."""
     folder = tmp_path_factory.mktemp("package") / "springtune"
-    shutil.copytree(Path(springtune.__file__).parent, folder, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(Path(springtune.__file__).parent, folder)  # with what is compiled, and its times
     return folder
 
 
 @pytest.fixture
 def edited(package, request):
     """The copy with an edit, and what it changes."""
-    place, change, jobs, solved = CODE[request.param]
+    place, change, row = CODE[request.param]
     path = package / place
     before = path.read_text()
-    assert not change or change[0] in before
-    path.write_text(before.replace(*change, 1) if change else f"{before}\nEDITED = True\n")
-    yield package.parent, set(jobs.split()), solved
+    if change is None:
+        path.write_text(f"{before}\nEDITED = True\n")
+    elif change:
+        assert change[0] in before
+        path.write_text(before.replace(*change, 1))
+    yield package.parent, row.jobs, row.solved
     path.write_text(before)
 
 
@@ -162,7 +165,7 @@ def test_an_edit_runs_what_it_concerns(edited, complete):
 @pytest.mark.slow
 @pytest.mark.parametrize("distribution", VERSIONS)
 def test_another_version_of_a_package_computes_again_what_it_computes(distribution, complete, tmp_path, monkeypatch):
-    version, (jobs, solved) = importlib.metadata.version, VERSIONS[distribution]
+    version, row = importlib.metadata.version, VERSIONS[distribution]
     caches = [
         keys.installed,
         keys.code_key,
@@ -184,4 +187,4 @@ def test_another_version_of_a_package_computes_again_what_it_computes(distributi
     finally:
         for cache in caches:
             cache.cache_clear()
-    assert found == (set(jobs.split()), solved) and left == []
+    assert found == (row.jobs, row.solved) and left == []

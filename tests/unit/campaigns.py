@@ -3,26 +3,14 @@
 from pathlib import Path
 
 import pytest
-import yaml
 
 from springtune.studies.config.messages import StudyError
 from springtune.studies.kinds import collect, load_study
 from springtune.studies.kinds.scenes import plan as scenes
-from springtune.studies.output import present
+from springtune.studies.output import present, reading
 from springtune.studies.output.browse import page as browse
 from springtune.studies.runs import rerun, run_tasks
 from springtune.studies.runs.plan import plan
-
-STUDIES = yaml.safe_load((Path(__file__).parent / "studies.yaml").read_text())
-
-
-def study_text(names, *changes):
-    """Text of a study, or of several in one file, in which some texts stand in place of others."""
-    text = "".join(STUDIES[name] for name in names.split())
-    for old, new in changes:
-        assert old in text, old
-        text = text.replace(old, new, 1)
-    return text
 
 
 def load_text(folder, text, name="study.yaml"):
@@ -83,6 +71,11 @@ class Campaign:
         for name in names:
             self.do(name)
         return names
+
+    def collected(self):
+        """The dataset, when all that it is made of has run."""
+        self.finish(rerun.COLLECT)
+        return reading.open(self.folder)
 
     def do(self, name):
         """A job, by the function that its rule calls."""

@@ -15,6 +15,8 @@ from springtune.studies.output import expected
 from springtune.studies.output.comparison import Tolerance, compare
 from test_diff import CURVE, SCENE, made, written
 
+from tables import refused_calls
+
 FILE = "config/expected/small.yaml"
 
 
@@ -254,24 +256,7 @@ class TestRefusals:
         store(made())
         assert run("accept", "--check").exit_code == 1  # what is solved now is to be accepted, too
 
-    @pytest.mark.parametrize(
-        ("arguments", "code", "said"),
-        [
-            (("accept",), 2, "name the results to accept: springtune accept results/mine"),
-            (("accept", "none"), 1, "none: there is no such dataset; run the study"),
-            (("accept", "small", "--variables", "displacment"), 2, "there is none; did you mean 'displacement'?"),
-            (("accept", "small", "--variables", "message"), 2, "--variables message: is a text; only numbers"),
-            (("accept", "small", "--relative", "x"), 2, "'x' is no tolerance"),
-            (("accept", "small", "--to", "kept.csv"), 1, "kept.csv: '.csv' is no form of expected values"),
-            (("accept", "empty"), 1, "there is nothing to accept"),
-            (("accept", FILE), 1, "holds accepted values; give the results of a study"),
-            (("accept", "--check", "empty"), 2, "config/expected/empty.yaml: there are no expected values; "),
-            (("accept", "--check", "--relative", "1"), 2, "--check takes variables and tolerances from the file"),
-            (("diff", "small", FILE), 2, "holds accepted values; give them first, and then results"),
-            (("diff", FILE, "small", "--relative", "1"), 2, "has its own tolerances; leave --relative"),
-            (("diff", "config/none.yaml", "small"), 2, "config/none.yaml: there is no such dataset"),
-        ],
-    )
+    @pytest.mark.parametrize(("arguments", "code", "said"), refused_calls("accept"))
     def test_bad_calls_are_one_line(self, here, arguments, code, said):
         result = run(*arguments)
         assert result.exit_code == code and said in result.stderr, result.output

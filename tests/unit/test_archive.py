@@ -33,21 +33,13 @@ from springtune.studies.output.comparison import Tolerance, compare
 from springtune.studies.runs import checked_json, provenance
 
 from campaigns import Campaign
+from tables import STUDIES
 
 REPOSITORY = Path(__file__).parents[2]
 
 HOST, PERSON = "a-host-of-its-own", "0000-0002-1825-0097"
 
-STUDY = """
-title: One <script>network</script> of `a file's` [mesh](javascript:x)
-beams: {20x10: {length: 20 mm, height: 10 mm}}
-materials: {steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}}
-mesh_files: {plate: [{file: plate mesh.vtu, beam: 20x10, mesh_size: 5 mm}]}
-outputs: [tables]
-grids:
-  one: {rows: forces.csv, beam: 20x10, mesh_type: plate, mesh_size: 5 mm, material: steel, load: traction,
-        definition: lattice, sensitivity: false}
-"""
+STUDY = STUDIES["archive"]
 
 CITATION = f"""
 cff-version: 1.2.0

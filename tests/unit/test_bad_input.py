@@ -31,16 +31,11 @@ from springtune.safe_io.inputs import virtual_memory
 from springtune.studies.output import reading
 from springtune.studies.output.browse.page import page
 
+from tables import STUDIES
+
 BEAM, STEEL = st.Beam("100 mm", "20 mm"), st.Material("210 GPa", 0.3)
 
-SMALL = """
-title: small
-beams: {a: {length: 200 mm, height: 30 mm}}
-materials: {steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}}
-grids:
-  g: {mesh_type: structured, mesh_size: 5 mm, material: steel, load: traction, force: 1 kN, definition: lattice,
-      beam: a}
-"""
+SMALL = "\n" + STUDIES["bad_input_small"]  # of a file, lines are told from 2 on
 
 
 def sizes(count):

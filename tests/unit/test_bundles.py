@@ -9,9 +9,11 @@ from hypothesis import strategies as st
 
 from springtune.springs import DEFINITIONS
 from springtune.studies.kinds import load_study
-from springtune.studies.kinds.stability.names import EXPERIMENTS
+from springtune.studies.kinds.stability import EXPERIMENTS
 from springtune.studies.runs import checked_json, plan, records, workload
 from springtune.studies.runs.task_costs import TaskCosts
+
+from tables import STUDIES
 
 USUAL = plan.usual_costs()
 
@@ -94,15 +96,7 @@ def test_memory_follows_the_largest_job_of_a_stage_and_forgets_slowly(tmp_path):
     assert run(solve_0=3e9) == {"solve": 3e9, "mesh": 1e9}
 
 
-STUDY = """
-title: Bundles of a study
-beams: {small: {length: 50 mm, height: 20 mm}}
-materials: {steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}}
-outputs: [size]
-grids:
-  one: {beam: small, mesh_type: [structured, right], mesh_size: [10 mm, 8 mm, 5 mm], material: steel, load: traction,
-        force: 20 kN, definition: lattice, kinematics: linear, sensitivity: false}
-"""
+STUDY = STUDIES["bundles"]
 
 
 @pytest.fixture

@@ -11,7 +11,6 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
-import xarray as xr
 import yaml
 from click.testing import CliRunner
 
@@ -33,6 +32,8 @@ from springtune.springs import DEFINITIONS
 from springtune.studies.config.kind import kinds
 from springtune.studies.config.sections import sections, study_model
 from springtune.studies.kinds import load_study
+
+from tables import STUDIES, refused_calls
 
 CONFIG = Path(__file__).parents[2] / "config"
 RENEW = "run `springtune schema --write`"
@@ -58,27 +59,7 @@ def completed(words, number):
 class TestThickBodies:
     """Plane stress is an assumption about thin sheets: a beam 1 km thick was taken without a word."""
 
-    STUDY = """\
-title: Thick
-materials: {steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}}
-beams: {block: {length: 60 mm, height: 12 mm, thickness: 1 km}, sheet: {length: 60 mm, height: 12 mm}}
-shapes:
-  plate:
-    thickness: 20 mm
-    outline: [{from: [0, 0]}, {from: [60 mm, 0], group: right}, {from: [60 mm, 12 mm]}, {from: [0, 12 mm], group: left}]
-    loads: {pull: {supports: {left: fixed}, forces: {right: [1 N, 0]}, quantities: {end: {displacement: x, of: right}}}}
-grids:
-  one: {beam: [block, sheet], mesh_type: right, mesh_size: 4 mm, material: steel, load: traction,
-        force: {block: 1 N, sheet: 1 N}, definition: patch}
-  two: {beam: sheet, mesh_type: right, mesh_size: 4 mm, material: steel, load: traction, force: 1 N, definition: patch,
-        thickness: [1 mm, 15 mm]}
-shape_grids: {one: {shape: plate, mesh_size: 4 mm, material: steel, definition: patch}}
-refine:
-  thicker: {parameter: thickness, from: 1 mm, to: 30 mm, tolerance: 1 %, beam: sheet, mesh_type: right, mesh_size: 4 mm,
-            material: steel, load: traction, force: 1 N, definition: patch}
-samples: {size: 8, mesh_type: right, load: traction, definition: patch, parameters: {length: 60 mm, height: 12 mm,
-          thickness: {from: 1 mm, to: 13 mm}, mesh_size: 4 mm, young_modulus: 210 GPa, poisson_ratio: 0.3, force: 1 N}}
-"""
+    STUDY = STUDIES["cli_thickbodies"]
 
     def test_a_study_says_each(self, tmp_path):
         path = tmp_path / "thick.yaml"
@@ -138,44 +119,6 @@ def test_wrong_calls_exit_with_2():
     assert run("no-such-command").exit_code == 2
     assert run("predict").exit_code == 2 and "Missing option '--beam'" in run("predict").stderr
     assert run("scenes", "--no-such-option").exit_code == 2
-
-
-@pytest.mark.parametrize("command", ["which", "stability", "bench"])
-def test_a_missing_dataset_is_told_with_what_to_run(tmp_path, command):
-    for path in (tmp_path / "none.nc", tmp_path):
-        result = run(command, path)
-        assert result.exit_code == 1 and len(result.stderr.splitlines()) == 1
-        assert f"{path}: there is no such dataset; run config/" in result.stderr
-    (tmp_path / "text.nc").write_text("no dataset")
-    result = run(command, tmp_path / "text.nc")
-    assert result.exit_code == 1 and "text.nc: cannot be read" in result.stderr and "run config/" in result.stderr
-
-
-class TestBench:
-    def test_dataset_without_a_benchmark_is_refused(self, tmp_path):
-        xr.DataTree.from_dict({"/": xr.Dataset(attrs={"springtune_version": "1"})}).to_netcdf(
-            tmp_path / "old.nc", engine="h5netcdf"
-        )
-        result = run("bench", tmp_path / "old.nc", "--compare", tmp_path / "old.nc")
-        assert result.exit_code == 1 and "has no group /benchmark; run config/benchmark.yaml" in result.stderr
-        assert "none.nc" in run("bench", tmp_path / "none.nc").stderr
-
-    def test_ratios_of_two_benchmarks(self, tmp_path):
-        dims, coordinates = (
-            ("scene", "approach", "mesh_size"),
-            {"scene": ["a"], "approach": ["x", "y", "z"], "mesh_size": [1.0]},
-        )
-        for name, second in (("old", 0.1), ("new", 0.3)):
-            seconds = [[[0.1], [second], [0.1]]]
-            data = xr.Dataset(
-                {"seconds": (dims, seconds), "seconds_spread": (dims, 0.0 * np.array(seconds))}, coordinates
-            )
-            xr.DataTree.from_dict({"/": xr.Dataset(attrs={"springtune_version": "1"}), "/benchmark": data}).to_netcdf(
-                tmp_path / f"{name}.nc", engine="h5netcdf"
-            )
-        assert run("bench", tmp_path / "old.nc", "--compare", tmp_path / "old.nc").exit_code == 0
-        result = run("bench", tmp_path / "new.nc", "--compare", tmp_path / "old.nc")
-        assert result.exit_code == 1 and "  3.00  y  slower" in result.stdout
 
 
 class TestScenes:
@@ -408,27 +351,7 @@ class TestPredict:
         assert "recommended: area" in result.stdout and "own.vtu" in result.stdout
         assert "K_A = 658.3 MPa" in result.stdout  # E (3 nu - 1) / (2 (1 - nu^2))
 
-    @pytest.mark.parametrize(
-        ("arguments", "message"),
-        [
-            (("--beam", "100", "--material", "steel", "--size", "5 mm"), "--beam: '100' is not length x height; give"),
-            ((*STEEL,), "--size: missing; give the length of an edge"),
-            ((*STEEL, "--size", "5"), "--size: '5' has no unit; give a length"),
-            ((*STEEL, "--size", "30 mm"), "--size: '30 mm' is larger than beam '100x20'; give at most"),
-            ((*STEEL, "--size", "0 mm"), "--size: '0 mm' is not above zero"),
-            ((*STEEL, "--size", "5 mm", "--mesh", "fre"), "--mesh: 'fre' is neither a mesh type nor a file; known:"),
-            (("--beam", "100x20", "--size", "5 mm"), "--material: none; give one of steel, rubber"),
-            (("--beam", "100x20", "--size", "5 mm", "--material", "stel"), "--material: unknown material 'stel'"),
-            (
-                (*OWN, "--young", "3 GPa", "--poisson", "0.7"),
-                "--poisson: '0.7' is out of range",
-            ),
-            (
-                (*OWN, "--young", "3 N", "--poisson", "0.3"),
-                "--young: '3 N' is a force; give a stress",
-            ),
-        ],
-    )
+    @pytest.mark.parametrize(("arguments", "message"), refused_calls("predict"))
     def test_refusals_are_one_line(self, arguments, message):
         result = run("predict", *arguments)
         assert result.exit_code == 2
@@ -565,34 +488,7 @@ class TestPredictAMesh:
         assert result.exit_code == 1 and not target.exists()
         assert result.stderr == "--write: no mesh keeps 3 %, so nothing is written; allow a larger error\n"
 
-    @pytest.mark.parametrize(
-        ("arguments", "message"),
-        [
-            (("--error", "1"), "--error: '1' is no error above 0 and below 100 %; give one such as '1 %'"),
-            (("--error", "1e-9 %"), "--error: '1e-9 %' is below the error estimate of the reference; give at least "),
-            (("--error", "1 %", "--size", "5 mm"), "--size: '5 mm' is what --error finds; leave one of them out"),
-            (("--error", "1 %", "--mesh", "fre"), "--mesh: 'fre' is no mesh type; known: structured, free"),
-            (("--error", "1 %", "--mesh", "own.msh"), "--mesh: 'own.msh' is a file, and --error finds sizes of mesh"),
-            (("--size", "5 mm", "--loads", "pull"), "--loads: 'pull' cannot be predicted; known: traction"),
-            (("--size", "5 mm", "--loads", "follower-pressure"), "--loads: 'follower-pressure' cannot be predicted; "),
-            (("--size", "5 mm", "--loads", ","), "--loads: none; give some of traction, compression, bending, shear"),
-            (("--size", "5 mm", "--write", "net.txt"), "--write: net.txt: '.txt' is no format of springs; give a name"),
-            (
-                ("--size", "5 mm", "--write", ".csv"),
-                "--write: '.csv' is an ending alone; give a name before it",
-            ),
-            (
-                ("--size", "5 mm", "--young", "3 GPa", "--poisson", "0.3"),
-                "--young: '3 GPa' is beside --material steel",
-            ),
-            (
-                ("--size", "5 mm", "--poisson", "0.3"),
-                "--poisson: '0.3' is beside --material steel",
-            ),
-            (("--size", "5 mm", "--write", "none/net.csv"), "--write: none/net.csv: folder none does not exist; make"),
-            (("--size", "5 mm", "--density", "7850"), "--density: '7850' has no unit; give a density such as"),
-        ],
-    )
+    @pytest.mark.parametrize(("arguments", "message"), refused_calls("predict, a mesh"))
     def test_refusals_are_one_line(self, arguments, message, tmp_path, monkeypatch):
         monkeypatch.chdir(tmp_path)
         (tmp_path / "own.msh").write_text("")

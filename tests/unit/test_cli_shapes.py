@@ -11,48 +11,11 @@ import springtune as st
 from springtune.cli import main
 from springtune.mesh import write_mesh
 
+from tables import STUDIES, refused_calls
+
 SHAPES = Path(__file__).parents[2] / "config/shapes.yaml"
 
-STUDY = """
-title: Shapes for the command line
-materials:
-  steel: {young_modulus: 210 GPa, poisson_ratio: 0.3, density: 7850 kg/m^3}
-  third: {young_modulus: 1 MPa, poisson_ratio: 0.3333333333333333}
-shapes:
-  plate:
-    outline:
-      - {from: [0, 0], group: lower}
-      - {from: [40 mm, 0], group: right}
-      - {from: [40 mm, 20 mm], group: upper}
-      - {from: [0, 20 mm], group: left}
-    holes: [{circle: {centre: [20 mm, 10 mm], radius: 4 mm}, group: hole}]
-    refined: {hole: 0.5}
-    loads:
-      pull:
-        supports: {left: fixed}
-        forces: {right: [10 N, 0]}
-        quantities: {end: {displacement: x, of: right}, corner: {displacement: x, at: corner}}
-      push:
-        supports: {left: fixed}
-        pressures: {hole: {pressure: 1 MPa, follower: true}}
-        quantities: {end: {displacement: x, of: right}}
-      move:
-        supports: {left: fixed, right: {x: 0.1 mm}}
-        quantities: {force: {reaction: x, of: right}}
-    points: {corner: [0, 0]}
-  own:
-    file: own.msh
-    loads:
-      pull:
-        supports: {left: fixed}
-        forces: {right: [10 N, 0]}
-        quantities: {end: {displacement: x, of: right}}
-  other: {outline: [{from: [0, 0]}, {from: [1 mm, 0]}, {from: [1 mm, 1 mm]}], loads: {none: {supports: {a: fixed},
-    gravity: [1 m/s^2, 0], quantities: {work: energy}}}, points: {a: [0, 0], b: [1 mm, 0]}}
-shape_grids:
-  one: {shape: plate, mesh_size: 4 mm, material: steel, load: pull, definition: lattice}
-  two: {shape: own, material: [steel, third], definition: lattice}
-"""
+STUDY = STUDIES["cli_shapes"]
 
 
 def run(*arguments):
@@ -236,29 +199,8 @@ class TestError:
             st.find_mesh(st.Beam("40 mm", "20 mm"), study.material("steel"), "1 %", load="pull")
 
 
-REFUSALS = [
-    (("--shape", "study.yaml:plat"), "has no shape 'plat'; did you mean 'plate'? known: plate, own, other"),
-    (("--shape", "study.yaml"), "names no shape; give such as study.yaml:<name>; known: plate, own, other"),
-    (("--shape", "none.yaml:plate"), "there is no study none.yaml; give one such as config/shapes.yaml:cook"),
-    (("--shape", "own.msh"), "is no study, which has the supports and loads; write one with 'file: own.msh'"),
-    (("--shape", "study.yaml:plate"), "--load: missing; shape 'plate' has pull, push, move; give one"),
-    (("--shape", "study.yaml:plate", "--load", "pul"), "has no load 'pul'; did you mean 'pull'? known: pull, push"),
-    (("--shape", "study.yaml:plate", "--load", "pull"), "--size: missing; give the length of an edge such as '2 mm'"),
-    (("--shape", "study.yaml:own"), "--material: missing; the study has steel, third for shape 'own'; give one"),
-    ((*OWN, "--size", "2 mm"), "--size: '2 mm' is beside the mesh of own.msh; leave --size out"),
-    ((*PLATE, "--material", "stel"), "--material: 'stel' is unknown; did you mean 'steel'? known: steel, third"),
-    ((*PLATE, "--density", "1 kg/m^3"), "--density: '1 kg/m^3' is beside material 'steel', which has its own"),
-    ((*PLATE[:-1], "30 mm"), "--size: '30 mm' is larger than shape 'plate'; give at most 20 mm"),
-    ((*PLATE[:-1], "1e-5 mm"), "--size: '1e-05 mm': refined 'hole': 5e-09 is less than"),
-    ((*PLATE, "--beam", "20x10"), "--beam: '20x10' is beside --shape study.yaml:plate, give one of the two"),
-    ((*PLATE, "--mesh", "free"), "--mesh: 'free' is beside --shape study.yaml:plate, whose mesh is made at --size"),
-    ((*PLATE, "--young", "1 MPa"), "whose materials are those of its study; give one of them by --material"),
-    ((*PLATE, "--thickness", "2 mm"), "which has the one of its study; leave it out"),
-]
-
-
 @pytest.mark.parametrize("command", [("predict",), ("springs", "--out", "net.csv")], ids=lambda one: one[0])
-@pytest.mark.parametrize(("arguments", "message"), REFUSALS, ids=[" ".join(one) for one, _ in REFUSALS])
+@pytest.mark.parametrize(("arguments", "message"), refused_calls("shapes"))
 def test_refusals_are_one_line(command, arguments, message, here):
     before = sorted(here.iterdir())
     result = run(*command, *arguments)
@@ -266,21 +208,7 @@ def test_refusals_are_one_line(command, arguments, message, here):
     assert len(result.stderr.splitlines()) == 1 and sorted(here.iterdir()) == before
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (("predict", *PLATE, "--loads", "bending"), "--loads: 'bending' is beside --shape study.yaml:plate, whose"),
-        (("predict", "--beam", "20x10", "--size", "5 mm", "--material", "steel", "--load", "pull"),
-         "--load: 'pull' is of shapes alone; give --shape, or leave it out"),
-        (("springs", *PLATE, "--force", "1 N", "--out", "net.csv"), "whose loads have their sizes; give --scale"),
-        (("springs", *PLATE, "--scale", "0", "--out", "net.csv"), "--scale: 0.0 is no factor; give a finite number"),
-        (("springs", *PLATE, "--definition", "latice", "--out", "net.csv"), "--definition: 'latice' is unknown; did"),
-        (("springs", "--shape", "study.yaml:plate", "--load", "move", "--size", "4 mm", "--out", "net.csv"),
-         "--load: 'move' of shape 'plate' moves a support, and files of springs have forces"),
-        (("springs", "--beam", "20x10", "--size", "5 mm", "--material", "steel", "--scale", "2", "--out", "net.csv"),
-         "--scale: '2.0' is of shapes alone; give --shape, or leave it out"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("arguments", "message"), refused_calls("shapes, one command"))
 def test_refusals_of_one_command(arguments, message, here):
     before = sorted(here.iterdir())
     result = run(*arguments)

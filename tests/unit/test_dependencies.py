@@ -4,8 +4,10 @@ import ast
 import importlib.metadata
 import inspect
 import sys
+from pathlib import Path
 
 import pytest
+import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -15,82 +17,15 @@ from springtune.studies.runs import checked_json, dependencies, keys
 from springtune.studies.runs.dependencies import read
 from springtune.studies.runs.plan import stages
 
-MODULE = '''\
-"""What it is for."""
-
-import numpy as np
-
-SIZE = 3
-"""What the number means."""
-
-
-def area(points, weight=2.0, *, exact=False):
-    """Area of a polygon.
-
-    Parameters are not repeated.
-    """
-    x, y = np.asarray(points).T  # coordinates
-    if exact and len(x) > SIZE:
-        raise ValueError(f"too many: {len(x):>{SIZE}d} {'of them'}")
-    return weight * sum(a * b for a, b in zip(x, np.roll(y, 1)))
-
-
-class Body:
-    """A body."""
-
-    mass: float = 1.0
-
-    def weight(self):
-        """Its weight."""
-        return 9.81 * self.mass
-'''
-
-FOR_READERS = {
-    "docstring of the module": ('"""What it is for."""', '"""What it is for, and more."""'),
-    "docstring of a function": ("Area of a polygon.", "The area of any polygon."),
-    "docstring of a number": ('"""What the number means."""\n', ""),
-    "no docstring of a method": ('        """Its weight."""\n', ""),
-    "comment": ("  # coordinates", "  # x and y"),
-    "new comment": ("import numpy", "# Arrays.\nimport numpy"),
-    "quotes": ("\"too many: {len(x):>{SIZE}d} {'of them'}\"", "'too many: {len(x):>{SIZE}d} {\"of them\"}'"),
-    "broken line": ("weight * sum(", "weight * sum(\n        "),
-    "brackets": ("exact and len(x) > SIZE", "(exact and (len(x) > SIZE))"),
-    "last comma": ("*, exact=False)", "*, exact=False,)"),
-    "spelling of a number": ("2.0", "2.00e0"),
-    "pass": ('        """Its weight."""', '        """Its weight."""\n        pass'),
-    "for type checkers": ("import numpy", "if TYPE_CHECKING:\n    from numpy import ndarray\nimport numpy"),
-}
-
-COMPUTED = {
-    "number": ("2.0", "2.5"),
-    "type of a number": ("SIZE = 3", "SIZE = 3.0"),
-    "operator": ("a * b", "a + b"),
-    "comparison": ("> SIZE", ">= SIZE"),
-    "name": ("np.roll(y, 1)", "np.roll(x, 1)"),
-    "attribute": ("np.roll", "np.flip"),
-    "order": ("a, b in zip", "b, a in zip"),
-    "text": ("too many: ", "many: "),
-    "format": (">{SIZE}d", ">{SIZE}x"),
-    "default": ("exact=False", "exact=True"),
-    "keyword alone": (", *, exact", ", exact"),
-    "new statement": ("SIZE = 3\n", "SIZE = 3\nOTHER = 4\n"),
-    "removed statement": ("SIZE = 3\n", ""),
-    "statement moved": ("    mass: float = 1.0\n\n", ""),
-    "import": ("import numpy as np", "import scipy as np"),
-    "not for type checkers": ("import numpy", "if True:\n    from numpy import ndarray\nimport numpy"),
-    "other than for type checkers": ("SIZE = 3\n", "if TYPE_CHECKING:\n    pass\nelse:\n    SIZE = 4\n"),
-    "precedence": ("9.81 * self.mass", "(9.81 * self).mass"),
-    "name of a function": ("def weight", "def mass"),
-    "decorator": ("    def weight", "    @property\n    def weight"),
-    "async": ("    def weight", "    async def weight"),
-}
+TABLES = yaml.safe_load(Path(__file__).with_name("code_changes.yaml").read_text())
+MODULE, TREE = TABLES["module"], TABLES["package"]
 
 
 def digest_of(text):
     return read(text).digest
 
 
-@pytest.mark.parametrize("change", FOR_READERS.values(), ids=FOR_READERS)
+@pytest.mark.parametrize("change", TABLES["for_readers"].values(), ids=TABLES["for_readers"])
 def test_what_is_for_readers_is_not_in_a_digest(change):
     assert change[0] in MODULE
     changed = MODULE.replace(*change)
@@ -98,7 +33,7 @@ def test_what_is_for_readers_is_not_in_a_digest(change):
     assert changed != MODULE and digest_of(changed) == digest_of(MODULE)
 
 
-@pytest.mark.parametrize("change", COMPUTED.values(), ids=COMPUTED)
+@pytest.mark.parametrize("change", TABLES["computed"].values(), ids=TABLES["computed"])
 def test_every_change_of_code_is_in_a_digest(change):
     assert change[0] in MODULE
     changed = MODULE.replace(*change)
@@ -169,48 +104,10 @@ def package(tmp_path):
     return closure
 
 
-TREE = {
-    "a": "",
-    "b": "import scipy\n",
-    "room__in___init__": "from .c import one\nfrom .d import two, three as third\n\n__all__ = ['one', 'two']\n",
-    "room__in_c": "import pyamg\none = 1\n",
-    "room__in_d": "import cvxopt\ntwo = 2\nthree = 3\n",
-    "lively__in___init__": "from ..b import x\nSIZE = 1\n",
-    "lively__in_e": "",
-}
-
-IMPORTS = {
-    "nothing": ("x = 1", set(), set()),
-    "absolute": ("import springtune.b", {"b"}, {"scipy"}),
-    "relative": ("from .b import x", {"b"}, {"scipy"}),
-    "relative, a module": ("from . import b", {"b"}, {"scipy"}),
-    "two levels": ("from .room import e", {"room/__init__", "room/c", "room/d"}, {"pyamg", "cvxopt"}),
-    "star": ("from .b import *", {"b"}, {"scipy"}),
-    "star of a face": ("from .room import *", {"room/__init__", "room/c", "room/d"}, {"pyamg", "cvxopt"}),
-    "a name of a face": ("from .room import one", {"room/c"}, {"pyamg"}),
-    "a renamed name of a face": ("from .room import third", {"room/d"}, {"cvxopt"}),
-    "a module below a face": ("from .room import d", {"room/d"}, {"cvxopt"}),
-    "a face as a whole": ("import springtune.room", {"room/__init__", "room/c", "room/d"}, {"pyamg", "cvxopt"}),
-    "a module below what is no face": ("from .lively import e", {"lively/__init__", "lively/e", "b"}, {"scipy"}),
-    "conditional": ("if x:\n    from .b import x\nelse:\n    import numba", {"b"}, {"scipy", "numba"}),
-    "tried": ("try:\n    import numba\nexcept ImportError:\n    from . import b", {"b"}, {"scipy", "numba"}),
-    "in a function": ("def f():\n    from .b import x\n    import skfem.helpers", {"b"}, {"scipy", "skfem"}),
-    "in a method": ("class A:\n    def f(self):\n        with x:\n            import h5py", set(), {"h5py"}),
-    "in a case": ("match x:\n    case 1:\n        import h5py", set(), {"h5py"}),
-    "of submodules": ("from scipy.sparse.linalg import splu\nimport numpy.linalg", set(), {"scipy", "numpy"}),
-    "standard library": ("import os.path, json\nfrom __future__ import annotations", set(), set()),
-    "for type checkers": ("if TYPE_CHECKING:\n    from .b import x\n    import matplotlib", set(), set()),
-    "for type checkers, by typing": ("if typing.TYPE_CHECKING:\n    import matplotlib", set(), set()),
-    "else than for type checkers": ("if TYPE_CHECKING:\n    import pandas\nelse:\n    import numba", set(), {"numba"}),
-    "by its name as a text": ("from importlib import import_module\nimport_module('springtune.b')", set(), set()),
-    "in a circle": ("from .a import x", set(), set()),
-}
-
-
-@pytest.mark.parametrize(("text", "files", "packages"), IMPORTS.values(), ids=IMPORTS)
+@pytest.mark.parametrize(("text", "files", "packages"), TABLES["imports"].values(), ids=TABLES["imports"])
 def test_imports_that_can_run_are_followed(package, text, files, packages):
     found = package("a", **TREE | {"a": text})
-    assert found[:2] == ({"a.py", *(f"{name}.py" for name in files)}, packages)
+    assert found[:2] == ({"a.py", *(f"{name}.py" for name in files.split())}, set(packages.split()))
 
 
 @pytest.mark.parametrize("changed", ["a", "b", "room__in_c"])

@@ -9,12 +9,13 @@ from click.testing import CliRunner
 
 import springtune as st
 from springtune.cli import main
-from springtune.studies.kinds.benchmark.collect import BENCHMARK
+from springtune.studies.kinds.benchmark.kind import VARIABLES
 from springtune.studies.kinds.scenes.variables import ROOT, SENSITIVITY
 from springtune.studies.output import dataset
 from springtune.studies.output.comparison import Tolerance, compare
 
 import synthetic
+from tables import refused_calls
 
 AXES = {
     "beam": ("200x40", "100x20"),
@@ -96,10 +97,8 @@ class TestSame:
         assert not found.different and not found.attributes
 
     def test_nothing_that_a_benchmark_measures_is_compared(self):
-        measured = {
-            name for name, (_, units, *_) in BENCHMARK.variables.items() if units in ("s", "s-1", "byte", "byte s-1")
-        }
-        before = xr.Dataset({name: ((), 1.0) for name in BENCHMARK.variables})
+        measured = {name for name, (_, units, *_) in VARIABLES.items() if units in ("s", "s-1", "byte", "byte s-1")}
+        before = xr.Dataset({name: ((), 1.0) for name in VARIABLES})
         after = before.assign({name: ((), 2.0) for name in measured})
         assert {"seconds", "spring_updates", "copy_bandwidth"} <= measured
         assert not compare(*(xr.DataTree.from_dict({"/benchmark": one}) for one in (before, after))).different
@@ -284,24 +283,7 @@ class TestCommand:
         for pair in (("one", "other"), ("results/one", "config/other.yaml"), ("results/one/dataset.nc", "other")):
             assert run("diff", *pair).exit_code == 0
 
-    @pytest.mark.parametrize(
-        ("arguments", "said"),
-        [
-            (("none", "small"), "none: there is no such dataset; run the study, or give a dataset.nc"),
-            (("small", "text.nc"), "text.nc: cannot be read"),
-            (("small", "plain.nc"), "plain.nc: is not a dataset of springtune; give the dataset.nc of a study"),
-            (("small", "small", "--group", "curves"), "--group curves: neither has it; known: /, /sensitivity"),
-            (
-                ("small", "small", "--ignore", "displacment"),
-                "--ignore displacment: neither has it; did you mean 'displac",
-            ),
-            (("small", "small", "--ignore", "status", "--ignore", "none_*"), "--ignore none_*: neither has it"),
-            (("small", "small", "--relative", "one"), "'one' is no tolerance; give a number such as 1e-6"),
-            (("small", "small", "--absolute", "-1"), "'-1' is no tolerance"),
-            (("small", "small", "--relative", "nan"), "'nan' is no tolerance"),
-            (("small", "twice.nc"), "dimension 'beam' has the label 200x40 twice"),
-        ],
-    )
+    @pytest.mark.parametrize(("arguments", "said"), refused_calls("diff"))
     def test_trouble_is_2_and_one_line(self, arguments, said, troubled, monkeypatch):
         monkeypatch.chdir(troubled)
         result = run("diff", *arguments)

@@ -5,6 +5,7 @@ import re
 import shutil
 from contextlib import redirect_stdout
 from pathlib import Path
+from runpy import run_path
 
 import matplotlib
 import numpy as np
@@ -195,6 +196,30 @@ def test_every_module_of_the_rooms_shown_is_on_the_site():
     rooms = {room for room, _ in listed}
     assert rooms
     assert listed == {(room, path.stem) for room in rooms for path in (package / room).glob("[a-z]*.py")}
+
+
+def test_tables_of_studies_are_put_between_the_marks_of_their_pages(tmp_path):
+    pages = run_path(str(REPOSITORY / "tools/pages.py"))
+    for name in pages["TABLES"]:
+        text, page = (REPOSITORY / "docs" / name).read_text(), tmp_path / name
+        page.write_text(text)
+        pages["put"](page, "new tables\n")
+        begin, end = text.index(pages["BEGIN"]), text.index(pages["END"], text.index(pages["BEGIN"]))
+        kept = page.read_text()
+        assert kept == f"{text[:begin]}{pages['BEGIN']}\nnew tables\n\n{text[end:]}"
+    page.write_text("no marks")
+    with pytest.raises(SystemExit, match="the marks around the tables are missing"):
+        pages["put"](page, "new tables\n")
+
+
+def test_long_tables_are_shortened_on_pages():
+    shorten = run_path(str(REPOSITORY / "tools/pages.py"))["shorten"]
+    rows = [f"| {row} |\n" for row in range(31)]
+    lost = "### bending: what has no numbers\n\n- `a`: why\n\n"
+    head, rest = "### One\n\n| n |\n| --- |\n", "### Two\n"
+    assert shorten("".join([head, *rows[:30], "\n", lost, rest]), "") == "".join([head, *rows[:30], "\n", rest])
+    told = "\n16 more rows are in `results/speed.md`.\n"
+    assert shorten("".join([head, *rows, "\n", rest]), "speed.md") == "".join([head, *rows[:15], told, "\n", rest])
 
 
 def test_every_picture_is_of_a_study_or_an_example():

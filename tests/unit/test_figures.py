@@ -31,7 +31,7 @@ from springtune.studies.kinds.moduli.figures import (
     plot_moduli,
 )
 from springtune.studies.kinds.refinement.figures import plot_refinement
-from springtune.studies.kinds.scenes import figures
+from springtune.studies.kinds.scenes import errors, figures
 from springtune.studies.kinds.scenes.errors import plot_size
 from springtune.studies.kinds.scenes.figures import (
     NETWORK_LINE,
@@ -412,7 +412,7 @@ def test_both_formats_show_the_same_and_are_the_same_again():
 def test_an_edit_of_one_kinds_figures_redraws_no_other_kind():
     def drawers(output):
         files = {*modules("studies.output.present"), *modules(output.module)}
-        return {Path(path).parent.name for path in files if Path(path).name in ("figures.py", "sweeps.py")}
+        return {Path(path).parent.name for path in files if Path(path).name in ("figures.py", "errors.py")}
 
     kinds = {output.name: drawers(output) for output in outputs().values() if output.plot}
     assert kinds["sensitivity"] == kinds["block"] == {"scenes"} and kinds["definitions"] == {"moduli"}
@@ -423,9 +423,9 @@ def test_a_study_of_linear_kinematics_alone_has_its_figures(tree):
     """Each says that it is linear; its files are those that the study declares."""
     root, curves = (tree[name].to_dataset().sel(kinematics=["linear"]) for name in ("/", "sensitivity"))
     linear = xr.DataTree.from_dict({"/": root, "/sensitivity": curves})
-    for name in ("sensitivity", "size"):
-        found = list(getattr(figures, name)(linear))
-        assert [stem for stem, _, _ in found] == [stem for stem, _, _ in getattr(figures, name)(tree)]
+    for of_tree in (figures.sensitivity, errors.size):
+        found = list(of_tree(linear))
+        assert [stem for stem, _, _ in found] == [stem for stem, _, _ in of_tree(tree)]
         for _, plot, selection in found:
             assert selection["kinematics"] == "linear"
             drawn_on = np.ravel(plot(linear, **selection))[0].figure

@@ -17,17 +17,9 @@ from springtune.studies.kinds import load_study
 from springtune.studies.output.selection import at, last_swept
 
 from campaigns import Campaign
+from tables import STUDIES
 
-HEAD = """\
-title: A study
-beams:
-  long: {length: 200 mm, height: 30 mm}
-  short: {length: 100 mm, height: 20 mm, thickness: 2 mm}
-materials:
-  steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}
-grids:
-  one:
-"""
+HEAD = STUDIES["grids_head"]
 GRID = {
     "beam": "long",
     "mesh_type": "structured",
@@ -253,15 +245,6 @@ class TestSwept:
         assert len({study.name_of(scene) for scene in study.scenes}) == 64
 
 
-def run(path):
-    """Dataset of a study, all its jobs done in this process."""
-    campaign = Campaign(path)
-    campaign.plan.write()
-    for name in campaign.jobs:
-        campaign.do(name)
-    return springtune.open(campaign.folder)
-
-
 @pytest.fixture(scope="module")
 def swept(tmp_path_factory):
     """A study that sweeps everything, and the same cells one by one."""
@@ -292,9 +275,9 @@ def swept(tmp_path_factory):
         (folder / f"one{number}.yaml").write_text(head.replace("grids:", "outputs: tables\ngrids:") + lines)
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
-        trees = run("all.yaml"), {number: run(f"one{number}.yaml") for number in alone}
-    yield *trees, alone
-    for tree in (trees[0], *trees[1].values()):
+        trees = [Campaign(f"{name}.yaml").collected() for name in ("all", *(f"one{number}" for number in alone))]
+    yield trees[0], dict(zip(alone, trees[1:])), alone
+    for tree in trees:
         tree.close()
 
 
@@ -337,6 +320,7 @@ def test_a_stiffer_network_gives_way_as_one_under_less_force(swept):
 
 def test_figures_show_the_last_values_and_say_which(swept):
     tree, _, _ = swept
+    assert springtune.plot_sensitivity(tree)
     (panel,) = springtune.plot_size(tree)
     title = panel.get_title(loc="left").replace("\n", " ").replace("\u00a0", " ")
     assert title == "long (200 x 30 mm), 125 N, thickness 3 mm, E = 2 GPa, nu = 0.5"
@@ -413,7 +397,7 @@ def test_the_beam_that_calibrates_has_its_thickness_from_its_own_curves(here):
     path = of_grids(
         here, "thick", [calibrating, other], definitions={"calibrated": {"beam": "60x20", "load": "bending"}}
     )
-    with run(path) as tree:
+    with Campaign(path).collected() as tree:
         root = tree.to_dataset().sel(definition="calibrated").squeeze(drop=True)
         bending, traction = (
             root.sel(load="bending", thickness=1e-3),
@@ -429,7 +413,8 @@ def test_who_needs_a_field_has_it_whoever_asks_first(here):
     many = {"load": "compression", "force": "1 kN", "definition": "uniform", "mesh_size": "10 mm"}
     many |= {"poisson_ratio": {"from": "0.01", "to": "0.49", "points": "49"}}
     fitted = {"load": "traction", "force": "1 kN", "definition": ["annealed", "lattice"], "mesh_size": "10 mm"}
-    with run(of_grids(here, "fields", [many, fitted | {"poisson_ratio": ["0.2", "0.3"]}])) as tree:
+    study = of_grids(here, "fields", [many, fitted | {"poisson_ratio": ["0.2", "0.3"]}])
+    with Campaign(study).collected() as tree:
         root = tree.to_dataset().squeeze(drop=True)
         asked = root.where(root.status != 0)
         assert int((root.status > 1).sum()) == 0
@@ -468,7 +453,8 @@ def test_what_is_zipped_with_the_mesh_size_is_shown_on_its_own_meshes(here):
         "zip": ["mesh_size", "force"],
     }
     path = of_grids(here, "zipped", [grid], outputs=["deformed", "size", "sweep"])
-    with run(path) as tree:
+    Campaign(path).finish()
+    with springtune.open("results/zipped") as tree:
         assert np.isfinite(tree["fields"].displacement_x.values).any()
         (panel,) = springtune.plot_size(tree, kinematics="linear")
         errors = tree.deformation_error.squeeze(drop=True)
@@ -497,7 +483,8 @@ def test_fields_of_a_sweep_say_of_which_values_they_are(here):
     grid = {"load": ["traction", "bending"], "force": ["1 kN", "2 kN"], "thickness": ["1 mm", "2 mm"]}
     grid |= {"mesh_size": "10 mm"}
     coarse = grid | {"load": "traction", "mesh_size": "20 mm", "force": "1 kN"}
-    with run(of_grids(here, "said", [grid, coarse], outputs=["deformed", "paraview"])) as tree:
+    Campaign(of_grids(here, "said", [grid, coarse], outputs=["deformed", "paraview"])).finish()
+    with springtune.open("results/said") as tree:
         fields = tree["fields"].to_dataset()[["shown_force", "shown_thickness"]].squeeze(drop=True)
         # Each load has its coarsest mesh, and the last values there.
         assert fields.shown_force.sel(load=["traction", "bending"]).values.tolist() == [1e3, 2e3]

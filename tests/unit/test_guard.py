@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from springtune.studies.runs.task_costs import LOST, TaskCosts, Watch, guarded
+from springtune.studies.runs.task_costs import BEYOND_LIMITS, TaskCosts, Watch, run_limited
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits are the kernel's, and another one's differ")
 
@@ -51,7 +51,7 @@ class Job:
         self.store(key, why)
 
     def __call__(self):
-        guarded(self.run, self.watch, self.lose)
+        run_limited(self.run, self.watch, self.lose)
         return {path.name: path.read_text() for path in self.folder.iterdir()}
 
 
@@ -63,7 +63,7 @@ def test_a_task_that_does_not_end_is_lost_and_the_others_are_done(tmp_path):
     found = Job(tmp_path, {"a": lambda: 1, "endless": spin, "b": lambda: 2}, seconds=0.2)()
     assert (found["a"], found["b"]) == ("1", "2")
     assert found["endless"].startswith("not done within 0.2 s; at most 0.2 s and 4 GB for each (`limits`")
-    assert LOST in found["work"]
+    assert BEYOND_LIMITS in found["work"]
 
 
 def test_waiting_is_no_work(tmp_path):
@@ -111,7 +111,7 @@ def test_a_task_that_is_stopped_by_somebody_is_no_hole(tmp_path):
 def test_a_crash_outside_of_tasks_ends_the_job(tmp_path):
     watch = Watch({"seconds": 60.0, "memory": 4e9})
     with pytest.raises(SystemExit):
-        guarded(crash, watch, lambda key, why: pytest.fail(key))
+        run_limited(crash, watch, lambda key, why: pytest.fail(key))
 
 
 @pytest.mark.parametrize("error", [SystemExit("the message"), SystemExit(3), TypeError("broken")], ids=repr)
@@ -120,7 +120,7 @@ def test_errors_end_the_job(tmp_path, capfd, error):
         raise error
 
     with pytest.raises(SystemExit) as caught:
-        guarded(fail, Watch({"seconds": 60.0, "memory": 4e9}), lambda key, why: pytest.fail(key))
+        run_limited(fail, Watch({"seconds": 60.0, "memory": 4e9}), lambda key, why: pytest.fail(key))
     assert caught.value.code == (3 if error.args == (3,) else 1)
     assert all(str(word) in capfd.readouterr().err for word in error.args if isinstance(word, str))
 
@@ -128,13 +128,13 @@ def test_errors_end_the_job(tmp_path, capfd, error):
 SLEEPER = """
 import sys, time
 from pathlib import Path
-from springtune.studies.runs.task_costs import Watch, guarded
+from springtune.studies.runs.task_costs import Watch, run_limited
 
 def sleep():
     Path(sys.argv[1]).write_text(str(__import__("os").getpid()))
     time.sleep(600)
 
-guarded(sleep, Watch({"seconds": 60.0, "memory": 4e9}), print)
+run_limited(sleep, Watch({"seconds": 60.0, "memory": 4e9}), print)
 """
 
 

@@ -13,16 +13,11 @@ from springtune.cli import main
 from springtune.safe_io.atomic import this_host
 from springtune.studies.runs import checked_json, locks
 
+from tables import STUDIES
+
 STUDY = Path("results/mine")
 
-SMALL = """
-title: A study
-beams: {small: {length: 50 mm, height: 20 mm}}
-materials: {steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}}
-grids:
-  one: {beam: small, mesh_type: structured, mesh_size: 10 mm, material: steel, load: traction, force: 20 kN,
-        definition: lattice}
-"""
+SMALL = STUDIES["locks_small"]
 
 
 @pytest.fixture(autouse=True)

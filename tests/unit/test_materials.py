@@ -18,7 +18,7 @@ from springtune.studies.config.sections import study_model
 from springtune.studies.runs.checked_json import hash_of
 from springtune.studies.runs.keys import beam_key, material_key
 
-from campaigns import STUDIES
+from tables import STUDIES
 
 REPOSITORY = Path(__file__).parents[2]
 

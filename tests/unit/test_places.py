@@ -22,6 +22,8 @@ from springtune.problem.materials import Material
 from springtune.springs import DEFINITIONS, Springs, definition
 from springtune.studies.runs import dependencies
 
+from tables import STUDIES
+
 STEEL = Material(name="steel", young_modulus=210e9, poisson_ratio=0.3)
 
 CONTRIBUTING = (Path(__file__).parents[2] / "CONTRIBUTING.md").read_text()
@@ -40,24 +42,7 @@ def outside_package(place):
     return text.replace("from .", f"from {package}.")
 
 
-STUDY = """\
-title: One place
-beams:
-  100x20: {length: 100 mm, height: 20 mm}
-materials:
-  steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}
-outputs: [size]
-grids:
-  all:
-    beam: 100x20
-    mesh_type: [MESH_TYPE, structured]
-    mesh_size: 5 mm
-    material: steel
-    load: traction
-    force: 20 kN
-    definition: [DEFINITION, uniform]
-    sensitivity: false
-"""
+STUDY = STUDIES["places"]
 
 REGISTRIES = {"DEFINITIONS": DEFINITIONS, "MESH_TYPES": MESH_TYPES}
 

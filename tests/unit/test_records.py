@@ -112,12 +112,12 @@ class TestStore:
             keeper["two"] = {"displacement": 1 / 0}
         assert store.stored(tmp_path / "results.h5") == {"one"}
 
-    def test_files_from_before_there_were_checksums_hold_nothing(self, tmp_path, capsys):
+    def test_files_without_checksum_are_set_aside(self, tmp_path, capsys):
         path = tmp_path / "results.h5"
         with h5py.File(path, "w") as file:
             file["scalars"] = "{}"
-        assert store.stored(path) == set() and path.exists()
-        assert capsys.readouterr().err == ""
+        assert store.stored(path) == set() and not path.exists()
+        assert "it is no file of results; set aside as results.h5.damaged" in capsys.readouterr().err
         store.add(path, {"one": self.RESULT})
         assert store.stored(path) == {"one"}
 

@@ -16,7 +16,8 @@ from springtune.studies.runs import driver, store
 from springtune.studies.runs.plan import plan
 from springtune.studies.runs.task_costs import TaskCosts
 
-from campaigns import STUDIES, load_text, study_text
+from campaigns import load_text
+from tables import STUDIES, study_text
 
 
 @pytest.fixture

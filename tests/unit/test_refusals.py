@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from campaigns import refusal, study_text
+from campaigns import refusal
+from tables import study_text
 
 HERE = Path(__file__).parent
 REFUSED = {

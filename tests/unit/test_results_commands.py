@@ -25,6 +25,8 @@ from springtune.studies.output import dataset, present
 from springtune.studies.runs import checked_json, locks
 from springtune.studies.runs.orphans import orphans
 
+from tables import STUDIES, refused_calls
+
 AXES = {
     "beam": ("200x40", "100x20"),
     "mesh_type": ("structured", "free"),
@@ -383,24 +385,7 @@ class TestExport:
             assert "load" not in net.displacement_x.dims
         refused(run("export", tmp_path, "--to", tmp_path / "no.nc"), "--group fields")
 
-    @pytest.mark.parametrize(
-        ("arguments", "said"),
-        [
-            (("--to", "x.xlsx"), ("'.xlsx' is no format", ".csv, .parquet, .zarr")),
-            (("--to", "x.csv", "--group", "sensitivty"), ("group 'sensitivty'", "did you mean 'sensitivity'?")),
-            (("--to", "x.csv", "--variables", "displacment"), ("variable 'displacment'", "'displacement'?")),
-            (("--to", "x.csv", "--select", "beam=20x40"), ("beam=20x40: no such label", "known: 200x40, 100x20")),
-            (
-                ("--to", "x.csv", "--select", "mesh_size=3 mm"),
-                ("mesh_size=3 mm: no such label; known: 0.002, 0.005 m",),
-            ),
-            (("--to", "x.csv", "--select", "mesh_size=3 kN"), ("'3 kN' is a force; give a length",)),
-            (("--to", "x.csv", "--select", "bean=a"), ("--select bean: no dimension", "did you mean 'beam'?")),
-            (("--to", "x.csv", "--select", "beam"), ("'beam' is no dimension=label",)),
-            (("--to", "x.zarr", "--variables", "status"), ("Zarr takes the whole dataset",)),
-            (("--to", "nowhere/deeper/x.csv"), ("folder nowhere/deeper does not exist; make it first",)),
-        ],
-    )
+    @pytest.mark.parametrize(("arguments", "said"), refused_calls("export"))
     def test_refusals_name_what_there_is_and_leave_nothing(self, path, tmp_path, monkeypatch, arguments, said):
         monkeypatch.chdir(tmp_path)
         # What is asked for in a wrong way is told apart from what cannot be written.
@@ -434,15 +419,7 @@ class TestField:
             st.field(without)
 
 
-STUDY = """
-title: Two sizes
-beams: {b: {length: 20 mm, height: 10 mm}}
-materials: {m: {young_modulus: 1 GPa, poisson_ratio: 0.3}}
-grids:
-  g: {beam: b, mesh_type: right, mesh_size: [5 mm, SIZE], material: m, load: LOAD, force: 1 N, definition: lattice,
-      sensitivity: false}
-outputs: [size, tables]
-"""
+STUDY = STUDIES["results_commands"]
 
 
 class TestClean:

@@ -17,7 +17,8 @@ from springtune.studies.kinds.scenes.errors import like_with_like
 from springtune.studies.runs.keys import material_key
 from springtune.studies.runs.provenance import inputs
 
-from campaigns import STUDIES, Campaign, load_text
+from campaigns import Campaign, load_text
+from tables import STUDIES
 
 TRELOAR = Path(__file__).parents[2] / "config/treloar"
 
@@ -77,12 +78,7 @@ def test_a_task_has_the_material():
 
 def test_networks_are_compared_with_the_law_of_their_material(here):
     study()
-    campaign = Campaign("rubber.yaml")
-    campaign.plan.write()
-    for name in campaign.jobs:
-        if name in campaign.plan.jobs or name == "collect":
-            campaign.do(name)
-    tree = st.open(campaign.folder)
+    tree = Campaign("rubber.yaml").collected()
     finite, root = tree["finite_strain"].to_dataset().squeeze(), tree.to_dataset().squeeze()
     own = {"tested": "yeoh-plane-stress", "plain": "neo-hooke-plane-stress"}
     for material, reference in own.items():
@@ -117,11 +113,6 @@ grids:
     pages = {}
     for name, force in (("far", "3 N"), ("near", "0.03 N")):
         study(head + grid.replace("FORCE", force), f"{name}.yaml")
-        campaign = Campaign(f"{name}.yaml")
-        campaign.plan.write()
-        for job in campaign.jobs:
-            if job in campaign.plan.jobs or job == "collect":
-                campaign.do(job)
-        pages[name] = decision(st.open(campaign.folder))
+        pages[name] = decision(Campaign(f"{name}.yaml").collected())
     assert "Beyond small strain" not in pages["near"] and "`delingette`" in pages["near"]
     assert "Beyond small strain, where errors hold more" in pages["far"] and "tested, traction" in pages["far"]

@@ -24,13 +24,13 @@ from springtune.studies.kinds.samples import designs, interpolate, solve
 from springtune.studies.kinds.samples.designs import DESIGNS, blocks
 from springtune.studies.kinds.samples.figures import plot_effects, plot_sobol
 from springtune.studies.kinds.samples.indices import main_effect, sobol_indices
-from springtune.studies.kinds.samples.plan import MOST_SOLVED
+from springtune.studies.kinds.samples.kind import MOST_SOLVED
 from springtune.studies.runs import store
 from springtune.studies.runs.orphans import orphans
 from springtune.studies.runs.stages import products
 from springtune.studies.runs.task_costs import TaskCosts
 
-import campaigns
+import tables
 from campaigns import Campaign, load_text
 
 LENGTHS, SIZES, RATIOS = "{from: 80 mm, to: 160 mm}", "{from: 10 mm, to: 15 mm}", "{from: 0, to: 0.4}"
@@ -39,7 +39,7 @@ MODULI = "{from: 1 GPa, to: 100 GPa, distribution: log-uniform}"
 
 
 def study_text(*replaced, outputs="tables"):
-    return campaigns.study_text("samples", *replaced, ("[tables]", f"[{outputs}]"))
+    return tables.study_text("samples", *replaced, ("[tables]", f"[{outputs}]"))
 
 
 @pytest.fixture(scope="module")

@@ -26,26 +26,11 @@ from springtune.studies.runs import checked_json, records, store
 from springtune.studies.runs.plan import plan
 
 from campaigns import Campaign
+from tables import STUDIES, refused_calls
 
 CONFIG = Path(__file__).parents[2] / "config"
 
-STUDY = """
-title: A study for several sites
-beams: {small: {length: 50 mm, height: 10 mm}, thick: {length: 50 mm, height: 10 mm, thickness: 2 mm}}
-materials:
-  steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}
-  rubber: {young_modulus: 1 MPa, poisson_ratio: 0.5}
-definitions: {calibrated: {beam: small, load: traction}}
-sensitivity: {points: 5}
-outputs: [tables, deformed]
-grids:
-  pulled:
-    {beam: [small, thick], mesh_type: [structured, right], mesh_size: 5 mm, material: [steel, rubber], load: traction,
-     force: 0.1 N, definition: [calibrated, lattice]}
-  again:
-    {beam: small, mesh_type: structured, mesh_size: [5 mm, 2.5 mm], material: steel, load: [traction, bending],
-     force: 0.1 N, definition: [lattice, area], sensitivity: false, moduli: true}
-"""
+STUDY = STUDIES["split"]
 """Scenes that two grids ask for, a mesh that two beams share, stiffness from scenes of another part, whole fields."""
 
 
@@ -199,17 +184,7 @@ def test_files_that_a_study_names_go_with_its_parts(study):
     assert once(parts, "scenes") == ({*load_study(study).scenes}, True)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["config/many.yaml", "--into", "999"], "scenes or other tasks cannot be 999 parts; ask for at most"),
-        (["config/many.yaml", "--into", "9", "--by", "grid"], "3 grids and sections cannot be 9 parts"),
-        (["config/none.yaml", "--into", "2"], "config/none.yaml: cannot be read"),
-        (["config/other.yaml", "--into", "2"], "config/other-1-of-2.yaml: is another study"),
-        (["config/many-1-of-2.yaml", "--into", "2"], "is part 1 of 2 of a study already; split the whole one"),
-        ([f"config/{'a' * 56}.yaml", "--into", "2"], "cannot name a part; rename the study"),
-    ],
-)
+@pytest.mark.parametrize(("arguments", "message"), refused_calls("split"))
 def test_a_study_that_cannot_be_split_is_told(study, arguments, message):
     assert run("split", study, "--into", 2).exit_code == 0
     for name in ("other", "other-1-of-2", "a" * 56):

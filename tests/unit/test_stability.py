@@ -6,15 +6,15 @@ import pytest
 from springtune.mechanics.integrators import BEHAVIOURS
 from springtune.problem.geometry import Beam
 from springtune.problem.materials import Material
-from springtune.studies.kinds.stability import experiments as stability
+from springtune.studies.kinds.stability import AXES, EXPERIMENTS, ONCE
+from springtune.studies.kinds.stability import solve as stability
 from springtune.studies.kinds.stability.collect import STABILITY
-from springtune.studies.kinds.stability.names import AXES, EXPERIMENTS, ONCE
 from springtune.studies.output.dataset import DIMENSIONS
 from springtune.studies.runs import dependencies as code
 from springtune.studies.runs import driver, store
 from springtune.studies.runs.task_costs import TaskCosts
 
-from campaigns import STUDIES
+from tables import STUDIES
 
 
 def test_experiments_are_one_a_definition_or_one_in_all(load):
@@ -45,7 +45,7 @@ def test_results_have_the_shapes_of_the_dataset(name):
     setup = stability.Setup(
         Beam(0.06, 0.02, 1e-3, "b"), Material(210e9, 0.3, 7850.0, "steel"), 2e4, "lattice", "structured", (5e-3,)
     )
-    for variable, values in stability.run(name, setup).items():
+    for variable, values in stability.RUN[name](setup).items():
         dimensions = [one for one in STABILITY.variables[variable][0] if one not in ("definition", "mesh_size")]
         assert np.shape(values) == tuple(len(AXES[one]) for one in dimensions), variable
 
@@ -58,7 +58,7 @@ def test_a_failing_experiment_is_stored_with_its_message(tmp_path):
     tasks = [{"key": "one", "name": "contrast"} | setup]
     content = {"folder": str(tmp_path), "files": [{"name": "one", "tasks": tasks}]}
     driver.run("studies.kinds.stability.solve", content, TaskCosts())
-    assert store.read(tmp_path / "one.h5", ["one"])["one"]["failure"]
+    assert store.read(tmp_path / "one.h5", ["one"])["one"]["experiment_message"]
 
 
 def test_static_stages_know_no_dynamics():

@@ -21,7 +21,7 @@ from springtune.studies.config.model import CurveSpec, MeshSpec, Reference, Scen
 from springtune.studies.kinds import load_study
 from springtune.studies.kinds.moduli.kind import Measurement
 
-from campaigns import STUDIES, study_text
+from tables import STUDIES, study_text
 
 CONFIG = Path(__file__).parents[2] / "config"
 LATTICE = math.sqrt(3) / 2

@@ -19,12 +19,14 @@ from snakemake_logger_plugin_springtune import LogHandler
 from snakemake_logger_plugin_springtune.display import Display
 from springtune.problem.status import Status
 from springtune.studies.kinds import load_study
-from springtune.studies.kinds.scenes.plan import by_mesh
+from springtune.studies.kinds.scenes.plan import curves_by_mesh
 from springtune.studies.kinds.scenes.variables import ROOT, SENSITIVITY
 from springtune.studies.output import summary
 from springtune.studies.output.dataset import Filler
 from springtune.studies.runs import checked_json, plan, records, rerun, workload
 from springtune.studies.runs.dependencies import CODE_FILE, Code
+
+from tables import STUDIES
 
 AXES = {
     "beam": ("100x20", "80x10"),
@@ -124,14 +126,7 @@ class TestText:
         assert [line.partition(",")[0].strip() for line in named] == ["beam-a", "beam-j", "beam-b", "and 7 more"]
 
 
-STUDY = """
-title: Two definitions
-beams: {80x10: {length: 80 mm, height: 10 mm}}
-materials: {steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}}
-grids:
-  one: {beam: 80x10, mesh_type: structured, mesh_size: [2 mm, 5 mm], material: steel, load: traction, force: 1 kN,
-        definition: [lattice, patch]}
-"""
+STUDY = STUDIES["summary"]
 
 
 @pytest.fixture
@@ -174,7 +169,7 @@ def test_planning_adds_no_mesh_to_those_that_have_curves(tmp_path):
     (tmp_path / "some.yaml").write_text(STUDY + other)
     study = load_study(tmp_path / "some.yaml")
     plan.plan(study, tmp_path / "results/some", 1)
-    groups = by_mesh(study.curves)
+    groups = curves_by_mesh(study)
     assert len(groups) == 2 < len(study.meshes) and all(groups.values())
 
 
@@ -256,7 +251,7 @@ class TestEnding:
         study, made, names = planned
         since = time.time() - 100
         for name in names:
-            count = len(workload.keys_of(made.jobs[name].content))
+            count = len(workload.results_of(made.jobs[name].content))
             records.write(made.record(name), "digest", [], work={"linear": [count, 1.0, 1.0]})
             moment = since + (50 if name.startswith(new) else -50)
             os.utime(made.record(name), (moment, moment))

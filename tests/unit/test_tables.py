@@ -8,9 +8,10 @@ import xarray as xr
 
 from springtune.problem.compare import assured
 from springtune.studies.kinds.benchmark import tables as benchmark
-from springtune.studies.kinds.benchmark.collect import BENCHMARK
+from springtune.studies.kinds.benchmark.kind import KIND as BENCHMARK
+from springtune.studies.kinds.collect import group_of
 from springtune.studies.kinds.moduli import tables as definitions
-from springtune.studies.kinds.moduli.collect import MODULI
+from springtune.studies.kinds.moduli.kind import KIND as MODULI
 from springtune.studies.kinds.scenes.variables import ROOT
 from springtune.studies.kinds.stability import tables as stability
 from springtune.studies.kinds.stability.collect import STABILITY
@@ -62,7 +63,7 @@ def compared():
     root["deformation_error"].loc[place], root["status"].loc[place] = 0.5, 1
     # More scenes of the first beam, so that its tables are printed.
     root["status"].loc[{"beam": "100x20", "mesh_type": "structured", "definition": "area"}] = 1
-    moduli = MODULI.empty(axes)
+    moduli = group_of(MODULI).empty(axes)
     for size in SIZES:
         place = {"definition": "area", "mesh_size": size}
         moduli["young_modulus_error"].loc[place] = size / 1e-3 / 100  # 1 % at 1 mm
@@ -143,7 +144,7 @@ def timed(errors, second, seconds=(0.08, 0.02, 0.004, 0.001)):
     """Group of a benchmark of made-up errors, from the finest mesh size to the coarsest, approach by approach."""
     axes = {"scene": ("traction",), "approach": tuple(errors), "mesh_size": SIZES_RUN, "linear_solver": ("SuperLU",),
             "curve_count": (1,), "thread_count": (1, 2), "precision": ("float64", "float32")}  # fmt: skip
-    data = BENCHMARK.empty(axes)
+    data = group_of(BENCHMARK).empty(axes)
     data["machine_load"].values[:] = 0.0
     data["error"].values[0], data["second_error"].values[0] = list(errors.values()), list(second.values())
     data["seconds"].values[:] = np.where(np.isfinite(data.error), seconds, np.nan)

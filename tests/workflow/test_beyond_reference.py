@@ -12,32 +12,9 @@ from springtune.studies.output import page
 from springtune.studies.runs import store
 
 from campaigns import Campaign
+from tables import STUDIES
 
-STUDY = """
-title: A beam that bends too far
-beams:
-  slender: {length: 200 mm, height: 10 mm}
-  other: {length: 100 mm, height: 10 mm}
-materials:
-  soft: {young_modulus: 1 MPa, poisson_ratio: 0.3}
-definitions:
-  calibrated: {beam: slender, load: bending}
-sensitivity: {from: 0.3, to: 3}
-outputs: tables
-further_references: [neo-hooke-plane-stress, neo-hooke-plane-strain]
-grids:
-  # F L^2 / (E I) = 1: the end turns by .5 rad in small strain.
-  bent: &bent
-    beam: slender
-    mesh_type: structured
-    mesh_size: 2 mm
-    material: soft
-    load: bending
-    force: 2.0833 mN
-    definition: [lattice, delingette, calibrated]
-    kinematics: [nonlinear, linear]
-  other: {<<: *bent, beam: other, definition: lattice, sensitivity: false}
-"""
+STUDY = STUDIES["beyond_reference"]
 
 
 @pytest.fixture(scope="module")

@@ -12,55 +12,9 @@ from springtune.studies.runs import checked_json, driver, store
 from springtune.studies.runs.plan import plan
 from springtune.studies.runs.task_costs import TaskCosts
 
-STUDY = """
-title: Many scenes of few meshes
-beams: {small: {length: 50 mm, height: 10 mm}, other: {length: 40 mm, height: 10 mm},
-        strip: {length: 60 mm, height: 10 mm}}
-materials:
-  steel: {young_modulus: 210 GPa, poisson_ratio: 0.3, density: 7850 kg/m^3}
-  rubber: {young_modulus: 1 MPa, poisson_ratio: 0.5}
-definitions: {calibrated: {beam: small, load: traction}}
-outputs: [definitions, deformed]
-laying:
-  strip: strip
-  trapezoid: {lower_base: 60 mm, upper_base: 30 mm, height: 10 mm}
-  material: rubber
-  support: steel
-  definition: area
-  mesh_size: 10 mm
-  reference_size: 10 mm
-  pressure: 0.001 MPa
-stability: {beam: strip, material: steel, force: 1 kN, definition: delingette, mesh_size: 3 mm, experiment: contrast}
-grids:
-  # Rubber is bent far and pressed beyond buckling: paths of many steps, indefinite tangents.
-  far:
-    beam: small
-    mesh_type: [structured, braced]
-    mesh_size: 5 mm
-    material: [rubber, steel]
-    load: [compression, bending, shear]
-    force: 1 N
-    definition: [calibrated, lattice, area]
-    kinematics: [nonlinear, linear]
-    moduli: true
-  near:
-    beam: small
-    mesh_type: [structured, braced, free]
-    mesh_size: [5 mm, 2.5 mm]
-    material: [rubber, steel]
-    load: traction
-    force: 0.2 N
-    definition: [calibrated, lattice, patch]
-    kinematics: [nonlinear, linear]
-  face:
-    beam: other
-    mesh_type: structured
-    mesh_size: 5 mm
-    material: rubber
-    load: [pressure, follower-pressure]
-    pressure: 0.0005 MPa
-    definition: [lattice, uniform]
-"""
+from tables import STUDIES
+
+STUDY = STUDIES["company"]
 
 TIMES = ("seconds",)
 """Ends of the names of what is another one in every run."""

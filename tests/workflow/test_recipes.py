@@ -24,9 +24,7 @@ RECIPES = {
 def repository(tmp_path_factory):
     """A copy of what a study runs on."""
     folder, source = tmp_path_factory.mktemp("repository"), Path(__file__).parents[2]
-    ignored = shutil.ignore_patterns("__pycache__")
-    shutil.copytree(source / "src", folder / "src", ignore=ignored)
-    for name in ("workflow", "profiles"):
+    for name in ("src", "workflow", "profiles"):
         shutil.copytree(source / name, folder / name)
     (folder / "config").mkdir()
     shutil.copy(source / "Snakefile", folder)

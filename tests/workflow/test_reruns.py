@@ -1,4 +1,7 @@
-"""What runs again when a study or a file changes, and what a study that cannot be solved leaves behind."""
+"""What runs again when a study or a file changes, and what a study that cannot be solved leaves behind.
+
+Mostly by the study's jobs in this process, which tests/reruns finds to be those that Snakemake runs.
+"""
 
 import contextlib
 
@@ -15,23 +18,9 @@ from springtune.studies.kinds import load_study
 from springtune.studies.runs import checked_json
 
 from campaigns import Campaign
+from tables import STUDIES
 
-STUDY = """
-title: Reruns
-beams: {{small: {{length: 50 mm, height: 20 mm}}}}
-materials: {{steel: {{young_modulus: 210 GPa, poisson_ratio: 0.3}}}}
-definitions:
-  paper: {{stiffness: [{{mesh_type: structured, material: steel, value: 170e6 N/m}}]}}
-grids:
-  one:
-    beam: small
-    mesh_type: structured
-    mesh_size: [{sizes}]
-    material: steel
-    load: {load}
-    force: {force}
-    definition: [paper, lattice]
-"""
+STUDY = STUDIES["reruns"]
 
 
 def study(sizes="10 mm, 5 mm", load="traction", force="20 kN"):
@@ -47,21 +36,22 @@ def dataset(run, name):
 def grown(run):
     """A study of two mesh sizes, run up to its dataset."""
     run.write("grow.yaml", study())
-    code, output = run.snakemake("grow.yaml", "--until", "collect")
-    assert code == 0, output
+    with contextlib.chdir(run.folder):
+        Campaign("grow.yaml").finish("collect")
     return run
 
 
-def test_only_what_is_new_is_computed(grown):
+def test_only_what_is_new_is_computed(grown, monkeypatch):
     run = grown
+    monkeypatch.chdir(run.folder)
     stored = "results/grow/[mcs]*s/*_*mm.*"
     before = run.times(stored)
     assert len(before) == 2 * 4  # mesh and notes, curves, solutions
 
     run.write("grow.yaml", study("10 mm, 5 mm, 4 mm"))
-    code, output = run.snakemake("grow.yaml", "--until", "collect")
-    assert code == 0, output
-    assert "solve 2 of 6" in output and "the others were stored before" in output
+    campaign = Campaign("grow.yaml")
+    work = [checked_json.read(campaign.jobs[name].record).get("work", {}) for name in campaign.finish("collect")]
+    assert sum(one["nonlinear"][0] for one in work if "nonlinear" in one) == 2
     after = run.times(stored)
     assert {name: after[name] for name in before} == before
     assert len(after) == 3 * 4
@@ -69,8 +59,7 @@ def test_only_what_is_new_is_computed(grown):
 
     # Back to the old grid: nothing is solved, and the removed size is gone from the dataset.
     run.write("grow.yaml", study())
-    code, output = run.snakemake("grow.yaml", "--until", "collect")
-    assert code == 0, output
+    Campaign("grow.yaml").finish("collect")
     assert run.times(stored) == after
     assert dataset(run, "grow").mesh_size.values.tolist() == [5e-3, 10e-3]
 
@@ -88,8 +77,7 @@ def test_what_a_removed_value_left_is_removed_on_request(grown, monkeypatch):
     size = {name for name in removed if "4mm" in name}
     assert size == {name.removeprefix("results/grow/") for name in before if "4mm" in name} and len(size) == 4
     assert {name.partition("/")[0] for name in removed - size} <= {"tasks", "done", "logs", "benchmarks"}
-    code, output = grown.snakemake("grow.yaml", "--until", "collect")
-    assert code == 0 and "\nmesh " not in output and "solve " not in output, output
+    assert not [name for name in Campaign("grow.yaml").finish("collect") if name.startswith(("mesh", "solve"))]
     changed = {name for name, time in grown.times(every).items() if after.get(name) != time}
     assert not {name for name in changed if name.endswith((".h5", ".vtu"))}, changed
 
@@ -105,7 +93,7 @@ def test_a_deleted_result_is_made_again(grown):
 def test_a_force_that_cannot_be_carried_is_a_marked_hole(run):
     run.write("heavy.yaml", study("5 mm", "compression", "100 MN"))
     with contextlib.chdir(run.folder):
-        Campaign("heavy.yaml").finish()
+        Campaign("heavy.yaml").finish("collect")
     # By name, in what a run shows at its end.
     told = (run.folder / "results/heavy/summary.txt").read_text()
     assert "scenes, not converged: 2 of 2\n  small, structured, 5 mm, steel, compression, paper, nonlinear: " in told
@@ -117,7 +105,6 @@ def test_a_force_that_cannot_be_carried_is_a_marked_hole(run):
 
 
 def test_a_mesh_of_ones_own_is_solved_again_when_its_file_changes(run, monkeypatch):
-    """By its jobs in this process, which tests/reruns finds to be those that Snakemake runs."""
     monkeypatch.chdir(run.folder)
     mesh = MESH_TYPES["free"](0.05, 0.02, 5e-3)
     path = run.folder / "own.inp"

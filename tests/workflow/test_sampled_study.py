@@ -3,26 +3,9 @@
 import pytest
 import xarray as xr
 
-STUDY = """
-title: A small sample
-beams: {{beam: {{length: 100 mm, height: 40 mm}}}}
-materials: {{steel: {{young_modulus: 210 GPa, poisson_ratio: 0.3}}}}
-outputs: tables
-samples:
-  size: {size}
-  load: traction
-  definition: lattice
-  parameters:
-    length: {{from: 100 mm, to: 104 mm}}
-    height: 40 mm
-    mesh_size: {{from: 10 mm, to: 20 mm}}
-    young_modulus: 1 GPa
-    poisson_ratio: 0.3
-    force: {{from: 1 N, to: 2 N}}
-grids:
-  one: {{beam: beam, mesh_type: structured, mesh_size: 20 mm, material: steel, load: traction, force: 1 kN,
-        definition: lattice, kinematics: linear, sensitivity: false}}
-"""
+from tables import STUDIES
+
+STUDY = STUDIES["sampled_study"]
 
 
 # Its jobs are doubled in one process by tests/unit/test_samples.py; the quick study has a sample through Snakemake.

@@ -19,24 +19,9 @@ from springtune.safe_io.atomic import this_host
 from springtune.studies.runs import checked_json, store
 
 from campaigns import Campaign
+from tables import STUDIES
 
-STUDY = """
-title: Survival
-beams: {small: {length: 50 mm, height: 20 mm}}
-materials: {steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}}
-outputs: [size]
-grids:
-  one:
-    beam: small
-    mesh_type: structured
-    mesh_size: [10 mm, 5 mm]
-    material: steel
-    load: [traction, compression]
-    force: 20 kN
-    definition: [lattice, delingette]
-    kinematics: linear
-    sensitivity: false
-"""
+STUDY = STUDIES["survival"]
 
 
 def everything(folder):
@@ -56,21 +41,16 @@ def finished(run):
     return run
 
 
-@pytest.mark.parametrize(
-    "arguments", [["-n"], ["--summary"], ["--list-changes", "params"], ["--rulegraph"]], ids=lambda one: one[0]
-)
-def test_who_only_looks_changes_nothing(finished, arguments):
+LOOKS = ["-n", *(pytest.param(one, marks=pytest.mark.slow) for one in ("--summary", "--list-changes", "--rulegraph"))]
+
+
+@pytest.mark.parametrize("option", LOOKS)
+def test_who_only_looks_changes_nothing(finished, option):
+    """All of them read the Snakefile, and Snakemake does the rest."""
     before = everything(finished.folder)
-    code, output = finished.snakemake("survival.yaml", *arguments)
+    code, output = finished.snakemake("survival.yaml", option, *(["params"] if option == "--list-changes" else []))
     assert code == 0, output
     assert everything(finished.folder) == before
-
-
-def test_a_plan_of_what_was_never_run_is_made_without_writing(run):
-    run.write("never.yaml", STUDY)
-    code, output = run.snakemake("never.yaml", "-n")
-    assert code == 0 and re.search(r"solve +\d\n", output), output
-    assert not (run.folder / "results/never").exists()
 
 
 def test_the_lock_of_a_run_that_was_killed_is_removed_with_a_word(finished):
@@ -79,13 +59,8 @@ def test_the_lock_of_a_run_that_was_killed_is_removed_with_a_word(finished):
     locks.mkdir(exist_ok=True)
     (locks / "0.output.lock").write_text(f"{finished.folder}/results/survival/dataset.nc\n")
     (finished.folder / "results/survival/index.html").unlink()
-    note = {
-        "host": this_host(),
-        "pid": 2**22 + 1,
-        "start": 1.0,
-        "command": "snakemake",
-        "folders": ["results/survival"],
-    }
+    note = {"host": this_host(), "pid": 2**22 + 1, "start": 1.0, "command": "snakemake",
+            "folders": ["results/survival"]}  # fmt: skip
     checked_json.write(finished.folder / ".snakemake/springtune/of_a_test.json", note)
     code, output = finished.springtune("survival.yaml")
     assert code == 0 and "was killed and left its lock; the lock is removed" in output, output

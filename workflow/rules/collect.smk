@@ -1,4 +1,4 @@
-"""The dataset: everything that the stages stored, compared with its references."""
+"""The dataset: the results of all stages, compared with their references."""
 
 
 rule collect:
@@ -13,11 +13,11 @@ rule collect:
         ),
         done=JOBS["collect"].record,
     params:
-        # As it is: braces in it are no wildcards.
+        # A function, so that braces in the path are not wildcards.
         config=lambda wildcards: str(CONFIG),
         folder=lambda wildcards, output: str(Path(output.dataset).parent),
         digest=JOBS["collect"].digest,
-        untold=rerun.untold(RESULTS, UNTOLD),
+        untold=rerun.untold(RESULTS, LEFT_EMPTY),
     resources:
         runtime=minutes(rerun.COLLECT),
         mem_mb=megabytes(rerun.COLLECT),

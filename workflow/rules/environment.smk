@@ -1,4 +1,4 @@
-"""What jobs find in their environment, wherever they run."""
+"""The environment of jobs, and the path of the study."""
 
 import os
 import sys
@@ -11,31 +11,29 @@ from springtune.studies.runs import workload
 from springtune.studies.runs.run_tasks import STATE, source_state
 
 BEGUN = time.time()
-"""When this run began [s since the epoch]: what is newer was made by it."""
+"""Start of this run [s since the epoch]; newer files are its products."""
 
-# One thread a process: the solvers are sequential, and cores are Snakemake's to share out.
+# One thread a process: solvers are sequential, and Snakemake shares out the cores.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
-# Memory that a solve gives back is memory that the next one takes: glibc is not to return it to the system between
-# them, which costs a third of the seconds of a solve.
+# Keep freed memory in the process: returning it to the system between solves costs a third of their time.
 os.environ.setdefault("MALLOC_MMAP_THRESHOLD_", str(2**25))
 os.environ.setdefault("MALLOC_TRIM_THRESHOLD_", str(2**29))
 os.environ.setdefault("MALLOC_TOP_PAD_", str(2**25))
 
-# A file is written by one process, under a name of its own, before others can see it: locks of HDF5 protect nothing,
-# and where a shared filesystem has none, HDF5 would open no file.
+# HDF5 cannot open files on shared filesystems without locks. It needs none: files are renamed when complete.
 os.environ.setdefault("HDF5_USE_FILE_LOCKING", "FALSE")
 
 # Jobs run on the Python that runs Snakemake, whether its environment is activated or not.
 os.environ |= {"PATH": os.pathsep.join([str(Path(sys.executable).parent), *os.get_exec_path()])}
 
-# What a run begins with is what its jobs are to work by.
+# Jobs refuse to run if the source was edited since the run began.
 os.environ.setdefault(STATE, source_state())
 
 
 def chosen_config():
-    """The study that --configfile names, or the paper's; one that is read for the paper is told by it."""
+    """The study of --configfile or of the paper; `config["study"]` in studies that the paper reads."""
     if "study" in config:
         return Path(config["study"])
     named = [str(path) for path in workflow.configfiles]

@@ -1,8 +1,8 @@
-"""Stages of study kinds that have no file of rules here, such as one's own: a rule each, as `mesh` in scenes.smk."""
+"""Stages of study kinds without a file of rules, such as your own: one rule each, like `mesh` in scenes.smk."""
 
 
 def has_rule(name):
-    """Whether a rule stands in one of the files before."""
+    """Whether an earlier file has a rule of that name."""
     try:
         return bool(getattr(rules, name))
     except (AttributeError, WorkflowError):

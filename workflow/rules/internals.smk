@@ -1,22 +1,22 @@
-"""All that the workflow uses of Snakemake beyond what it documents; each is a comfort, without which a run still works.
+"""Undocumented parts of Snakemake, all in this file. A run works without each of them.
 
-`make test-versions` runs this with the oldest and the newest Snakemake.
+`make test-versions` runs this file with the oldest and the newest Snakemake.
 """
 
 import sys
 
 WORDS = sys.argv[1:]
-"""Words of the command: Snakemake knows its targets after the Snakefile is read, and some cost seconds to prepare."""
+"""Words of the command. Snakemake has its targets only after reading the Snakefile, and some cost seconds to prepare."""
 
 IS_CHILD = not getattr(workflow, "is_main_process", True)
-"""Whether a run has started this process for one of its jobs."""
+"""Whether this process is a job of a run."""
 
 NODES = getattr(workflow.resource_settings, "nodes", None)
-"""Jobs side by side on other machines; None where all run on this one."""
+"""Number of parallel jobs on other machines; None without a cluster."""
 
 
 def jobs_to_run():
-    """Jobs that this run is about to do; none where Snakemake does not say."""
+    """Jobs of this run; an empty list if Snakemake does not tell."""
     try:
         return [
             {
@@ -24,7 +24,7 @@ def jobs_to_run():
                 "rule": job.rule.name,
                 "wildcards": dict(job.wildcards_dict),
                 "outputs": list(map(str, job.output)),
-                # With wildcards: what the child calls in its turn is named by them.
+                # With wildcards, which name the jobs that a child starts.
                 "output": list(map(str, job.rule.output)),
                 "log": list(map(str, job.rule.log)),
                 "benchmark": str(job.rule.benchmark),
@@ -38,7 +38,7 @@ def jobs_to_run():
 
 
 def noted_job():
-    """The one job that a cluster starts this process for, as its run noted it: no study is read and planned for it."""
+    """The job of this process on a cluster, from the notes of its run, so that no study is read and planned."""
     if not IS_CHILD or "--target-jobs" not in WORDS:
         return None
     try:
@@ -63,7 +63,7 @@ if NOTED:
         output:
             NOTED["output"],
         params:
-            # As it is: braces in it are no wildcards.
+            # A function, so that braces in the command are not wildcards.
             command=lambda wildcards: NOTED["command"],
         threads: NOTED["threads"]
         log:

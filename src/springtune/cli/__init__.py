@@ -18,7 +18,7 @@ from ..safe_io.escapes import UNSEEN, shown
 
 
 def examples(*lines: str) -> str:
-    r"""Epilog of a command that shows how it is called.
+    r"""Epilog of a command with examples.
 
     Examples
     --------
@@ -29,22 +29,22 @@ def examples(*lines: str) -> str:
 
 
 def studies_here(context: click.Context, parameter: click.Parameter, begun: str) -> list[CompletionItem]:
-    """Studies in ``config/``, or files where something else is begun."""
+    """Complete studies in ``config/``, or other files."""
     found = [path.as_posix() for path in sorted(Path("config").glob("*.yaml"))]
     chosen = [CompletionItem(path) for path in found if path.startswith(begun)]
     return chosen or [CompletionItem(begun, type="file")]
 
 
 def mesh_types(context: click.Context, parameter: click.Parameter, begun: str) -> list[CompletionItem]:
-    """Mesh types, or files where something else is begun."""
-    from ..mesh import MESH_TYPES  # here: it is not needed but to complete them
+    """Complete mesh types, or files."""
+    from ..mesh import MESH_TYPES  # here: only completion needs it
 
     chosen = [CompletionItem(name) for name in MESH_TYPES if name.startswith(begun)]
     return chosen or [CompletionItem(begun, type="file")]
 
 
 class Row(NamedTuple):
-    """A command: where its function is, and under which heading of the help it stands."""
+    """A command: its heading in the help, module, function and meaning."""
 
     heading: str
     module: str
@@ -74,11 +74,8 @@ COMMANDS = {
     ),
     "clean": Row(RESULTS, "results", "clean", "List what no study asks for any more, and remove it."),
     "schema": Row(HOUSE, "study", "schema", "Print the JSON schema of studies, or renew it and the manual."),
-    "which": Row(HOUSE, "pages", "which", "Tables of docs/which-definition.md from a dataset."),
-    "stability": Row(HOUSE, "pages", "stability", "Tables of docs/stability.md from a dataset."),
-    "bench": Row(HOUSE, "pages", "bench", "Tables of docs/speed.md from a dataset, or ratios of two benchmarks."),
 }
-"""Commands by name, in the order of the help; none is imported before it is called."""
+"""Commands by name, in the order of the help; each is imported when it is called."""
 
 
 SAID = f"{__name__}.said"
@@ -86,11 +83,11 @@ SAID = f"{__name__}.said"
 
 
 COMPLETION = "_SPRINGTUNE_COMPLETE"
-"""Variable by which a shell asks click for completions."""
+"""Environment variable by which a shell asks click for completions."""
 
 
 class Shown(io.TextIOBase):
-    """Stream on which control characters but line breaks and tabs are shown, whoever prints them."""
+    """Stream that escapes all control characters except line breaks and tabs."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
@@ -102,11 +99,11 @@ class Shown(io.TextIOBase):
 
     @property
     def errors(self) -> str | None:  # type: ignore[override]
-        """What becomes of characters that it has not."""
+        """Error handling of the encoding."""
         return self._stream.errors
 
     def write(self, text: str) -> int:
-        """Write a text, and say how long it is."""
+        """Write a text, and return its length."""
         self._stream.write(UNSEEN.sub(lambda one: one[0] if one[0] in "\n\t" else shown(one[0]), text))
         return len(text)
 
@@ -124,7 +121,7 @@ class Shown(io.TextIOBase):
 
 
 class Commands(click.Group):
-    """Group whose commands are imported when they are called, and that sends no control character to a terminal."""
+    """Group that imports commands when they are called, and sends no control characters to a terminal."""
 
     def main(self, *arguments: Any, **keywords: Any) -> Any:
         """Run a command."""
@@ -138,7 +135,7 @@ class Commands(click.Group):
         return list(COMMANDS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """The command of that name; None where there is none."""
+        """Command of a name; None if there is none."""
         if cmd_name not in COMMANDS:
             return None
         row = COMMANDS[cmd_name]
@@ -184,6 +181,6 @@ def main() -> None:
 
 @main.result_callback()
 def warn(*_: Any, **__: Any) -> None:
-    """Say what breaks an assumption of the model below an answer; a refusal says enough."""
+    """Print warnings of broken assumptions of the model below an answer."""
     for line in click.get_current_context().meta[SAID]:
         click.echo(line, err=True)

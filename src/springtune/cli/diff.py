@@ -1,4 +1,4 @@
-"""What changed from one dataset to another, and what is accepted as right."""
+"""Compare datasets, and keep accepted values."""
 
 import json
 import math
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from ..studies.output.comparison import Change, Comparison, GroupChanges
 
 ROWS = 20
-"""Rows of a table that are shown."""
+"""Rows of a table."""
 
 DIFFERENT, TROUBLE = 1, 2
 """Exit codes, as those of diff."""
@@ -33,7 +33,7 @@ class Trouble(click.ClickException):
 
 
 def tolerance(context: click.Context, parameter: click.Parameter, given: str | None) -> float | None:
-    """A tolerance of its text: a finite number, not below zero."""
+    """Read a tolerance: a finite number, not below zero."""
     if given is None:
         return None
     try:
@@ -115,7 +115,7 @@ def diff(
 
 @contextmanager
 def opened(path: Path) -> "Iterator[xr.DataTree]":
-    """Open a dataset, or expected values, in a context."""
+    """Context of an open dataset, or of accepted values."""
     from ..studies.output import expected, reading
 
     if path.suffix == ".yaml":
@@ -132,7 +132,7 @@ def opened(path: Path) -> "Iterator[xr.DataTree]":
 def comparison_text(
     found: "Comparison", paths: Sequence[Path], sides: Sequence[str], most: int | None = ROWS, config: bool = False
 ) -> str:
-    """What changed, as text."""
+    """Comparison as text."""
     width = max(map(len, sides)) + 1
     head = [f"{f'{side}:':{width}} {path}" for side, path in zip(sides, paths)]
     parts = [[*head, _summary(found, sides)]]
@@ -147,7 +147,7 @@ def comparison_text(
 
 
 def _summary(found: "Comparison", sides: Sequence[str]) -> str:
-    """One line on all."""
+    """Summary in one line."""
     said = [f"group {path} only {side}" for side, own in zip(sides, found.alone) for path in own]
     for number, side in enumerate(sides):
         for group in found.groups:
@@ -168,7 +168,7 @@ def _summary(found: "Comparison", sides: Sequence[str]) -> str:
 
 
 def _of_group(group: "GroupChanges", sides: Sequence[str], most: int | None) -> Iterator[list[str]]:
-    """Paragraphs on labels, cells, variables and statuses of a group."""
+    """Paragraphs on the labels, cells, variables and statuses of a group."""
     what = "scenes" if group.name == "/" else f"cells of {group.name}"
     lines = []
     for name, both in group.labels.items():
@@ -212,7 +212,7 @@ def _place(group: "GroupChanges", labels: "Mapping[str, str | float]") -> str:
 
 
 def _changes(found: "Comparison", changes: "list[Change]", sides: Sequence[str], most: int | None) -> list[str]:
-    """What changed of which variables, and the largest changes."""
+    """Number of changes by variable, and the largest changes."""
     head = ["  variable", "cells", "changed", "largest change"]
     counts = [
         [f"  {_name(group.name, one.name)}", one.compared, one.changed, _largest(one.rows)]
@@ -237,12 +237,12 @@ def _changes(found: "Comparison", changes: "list[Change]", sides: Sequence[str],
 
 
 def _largest(rows: "list[Change]") -> str:
-    """The largest change that is a number, if any is among the rows."""
+    """Largest change, preferably a number."""
     return _difference(next((row for row in rows if math.isfinite(row.difference)), rows[0]))
 
 
 def _told(found: "Comparison", config: bool) -> list[str]:
-    """Attributes that differ, and what of the studies' files."""
+    """Differences of attributes and of the studies' files."""
     lines = ["told, and no difference of results"]
     rows = [[f"  {name}", f"{_short(old)} -> {_short(new)}"] for name, (old, new) in found.attributes.items()]
     lines += aligned(rows, 0).splitlines()
@@ -256,7 +256,7 @@ def _told(found: "Comparison", config: bool) -> list[str]:
 
 
 LONGEST_ATTRIBUTE = 60
-"""Most characters of an attribute that are shown."""
+"""Most characters of an attribute."""
 
 
 def _short(text: str) -> str:
@@ -269,7 +269,7 @@ def _name(group: str, variable: str) -> str:
 
 
 def _telling(group: "GroupChanges", labels: "dict[str, str | float]") -> "dict[str, str | float]":
-    """Labels of dimensions that leave a choice."""
+    """Labels of dimensions with several labels."""
     return {name: label for name, label in labels.items() if len(group.axes[name].labels) > 1}
 
 
@@ -280,7 +280,7 @@ def _value(value: float | str) -> str:
 
 
 def _difference(row: "Change") -> str:
-    """Difference with its unit, and how much of the number before it is."""
+    """Difference with unit, and as a share of the former number."""
     number = row.difference
     if not math.isfinite(number):
         return "gone" if row.after == "" or row.after != row.after else "new" if row.before != row.before else ""
@@ -294,7 +294,7 @@ def _difference(row: "Change") -> str:
 
 
 def as_dict(found: "Comparison", paths: Sequence[Path], config: bool = False) -> dict[str, object]:
-    """A comparison as JSON has it."""
+    """Comparison as a dict for JSON."""
     return {
         "different": found.different,
         "before": str(paths[0]),
@@ -341,7 +341,7 @@ def _row_dict(row: "Change") -> dict[str, object]:
 EXPECTED_FOLDER = CONFIG_FOLDER / "expected"
 
 LISTED_UNSOLVED = 10
-"""Scenes without solution that are listed by name."""
+"""Unsolved scenes that are listed by name."""
 
 
 @click.command(
@@ -395,7 +395,7 @@ def accept(
     try:
         _accept(dataset_path(results), target, names, relative, absolute, unsolved)
     except (OSError, ValueError) as error:
-        if str(error).startswith("--"):  # an option names what is not there
+        if str(error).startswith("--"):  # an option names something missing
             raise WrongCall(shown(error)) from None
         raise click.ClickException(shown(error)) from None
 
@@ -435,13 +435,13 @@ def _accept(
 
 
 def _usual_target(study: str) -> Path:
-    """Where the expected values of a study are, or will be."""
+    """File of the accepted values of a study."""
     found = [EXPECTED_FOLDER / f"{study}{ending}" for ending in (".yaml", ".nc")]
     return next((path for path in found if path.exists()), found[0])
 
 
 def _names(tree: "xr.DataTree") -> list[str]:
-    """Names of the variables of expected values."""
+    """Names of accepted variables."""
     from ..studies.output.comparison import OF_CELLS, variable_name
 
     nodes = [(node.path, str(name)) for node in tree.subtree for name in node.data_vars]
@@ -449,7 +449,7 @@ def _names(tree: "xr.DataTree") -> list[str]:
 
 
 def _count(tree: "xr.DataTree") -> str:
-    """How many scenes and other cells."""
+    """Number of scenes and other cells in words."""
     from ..studies.output.expected import cells
 
     counts = cells(tree).items()
@@ -457,7 +457,7 @@ def _count(tree: "xr.DataTree") -> str:
 
 
 def _tell_unsolved(holes: list[tuple[str, str, str, str]]) -> None:
-    """Say which cells are not solved."""
+    """Print the unsolved cells."""
     click.echo(f"{len(holes)} are not solved:", err=True)
     for group, place, status, why in holes[:LISTED_UNSOLVED]:
         head = "" if group == "/" else f"{group}: "
@@ -467,7 +467,7 @@ def _tell_unsolved(holes: list[tuple[str, str, str, str]]) -> None:
 
 
 def _check(results: str | None, target: Path | None, every: bool) -> None:
-    """Compare, and exit as diff does."""
+    """Compare with accepted values, and exit as diff does."""
     from ..studies.output import comparison, expected, reading
 
     try:

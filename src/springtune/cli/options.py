@@ -1,4 +1,4 @@
-"""What several commands share: beams, shapes, meshes and materials of options, folders of studies, limits."""
+"""Options that commands share: beams, shapes, meshes, materials, folders of studies, limits."""
 
 import os
 import re
@@ -25,27 +25,27 @@ if TYPE_CHECKING:
     from ..studies.kinds.shapes.expand import Shapes
 
 SAID_FROM = 1_000_000
-"""Particles from which on it is said that a mesh is being made: it takes seconds."""
+"""Number of particles above which a message says that the mesh is being made, which takes seconds."""
 
 WRONG, FAILED = 2, 1
-"""Exit codes: an option is wrong, and what it asks for cannot be had."""
+"""Exit codes: an option is wrong; the request cannot be met."""
 
 
 class WrongCall(click.ClickException):
-    """A command was called in a wrong way."""
+    """A command was called with wrong options."""
 
     exit_code = WRONG
 
 
 class Unmet(ValueError):
-    """What is asked for cannot be had, though the options are right."""
+    """The options are right, but the request cannot be met."""
 
 
 @contextmanager
 def refusals(option: str, target: Path | None, named: Callable[[str], str] = str) -> Iterator[None]:
-    """Context in which what is wrong is said in one line, and the exit code is 2 where that begins with an option.
+    """Context that prints an error in one line; the exit code is 2 if the line begins with an option.
 
-    `option` is the one of the file to be written, `target`; `named` puts options in the place of arguments in messages.
+    `option` is the one of the written file, `target`. `named` replaces arguments in messages by options.
     """
     try:
         yield
@@ -62,7 +62,7 @@ def refusals(option: str, target: Path | None, named: Callable[[str], str] = str
 
 
 def check_target(option: str, target: Path) -> None:
-    """Refuse a name whose ending is no format of springs, or whose folder is not there; ValueError names the option."""
+    """Refuse a file of unknown ending or in a missing folder; ValueError names the option."""
     from ..handover import formats
 
     try:
@@ -79,7 +79,7 @@ MATERIALS = {"steel": ("210 GPa", "0.3"), "rubber": ("1 MPa", "0.5")}
 
 
 def asked_quantity(option: str, text: str, kind: str) -> float:
-    """Quantity above zero of an option, in SI units; ValueError names the option."""
+    """Value of an option in SI units, above zero; ValueError names the option."""
     from ..problem.quantities import quantity
 
     number = quantity(text, kind, option)
@@ -145,7 +145,7 @@ def is_made(mesh_type: str) -> bool:
 
 
 def asked_size(beam: "Beam", mesh_type: str, size: str | None) -> float:
-    """Length of an edge [m] of a mesh that is made; refused before anything is, where it would be too large."""
+    """Length of an edge [m]; ValueError if the mesh would be too large."""
     from ..mesh import MESH_TYPES
 
     if size is None:
@@ -158,7 +158,7 @@ def asked_size(beam: "Beam", mesh_type: str, size: str | None) -> float:
 
 
 def asked_mesh(beam: "Beam", mesh_type: str, edge: float | None, unit: str) -> "Mesh":
-    """Mesh of a type with edges of a length [m], or of the file of that name where there is no length."""
+    """Mesh of a type with edges of a length [m]; without length the mesh of a file."""
     from ..mesh import MESH_TYPES, read_beam_mesh
 
     if edge is not None:
@@ -171,10 +171,10 @@ def asked_mesh(beam: "Beam", mesh_type: str, edge: float | None, unit: str) -> "
 
 
 NAMED_SHAPE = "config/shapes.yaml:cook"
-"""How a shape is named, for messages."""
+"""Example of a shape's name, for messages."""
 
 MESH_SIZE = re.compile("^mesh size: [^ ]+ ")
-"""How messages of a mesh size begin."""
+"""Begin of messages on a mesh size."""
 
 OF_BEAMS = {
     "beam": "give one of the two",
@@ -186,17 +186,11 @@ OF_BEAMS = {
     "loads": "whose loads are those of its study; give one of them by --load",
     "force": "whose loads have their sizes; give --scale, such as 0.5, or leave it out",
 }
-"""Options that are of beams alone, by parameter, and what to do about them beside a shape."""
+"""Options of beams alone, by parameter, and the remedy if they are given beside a shape."""
 
 
 def check_kind(shape: str | None, beam: str | None, of_shapes: tuple[str, ...]) -> None:
-    """Refuse a call that names neither a beam nor a shape, or gives options of the other one.
-
-    Parameters
-    ----------
-    of_shapes : tuple of str
-        Parameters that are of shapes alone.
-    """
+    """Refuse a call without beam and shape, or with options of the other one; `of_shapes` are parameters of shapes."""
     context = click.get_current_context()
     if shape is None and beam is None:
         raise click.UsageError(f"Missing option '--beam' such as 200x40, or '--shape' such as {NAMED_SHAPE}.", context)
@@ -220,16 +214,7 @@ def check_kind(shape: str | None, beam: str | None, of_shapes: tuple[str, ...]) 
 
 @dataclass(frozen=True)
 class AskedShape:
-    """A shape of a study, and what is asked of it.
-
-    Attributes
-    ----------
-    part : Shapes
-        What the study has of shapes.
-    shape : Shape
-    size : float or None
-        Length of an edge [m]; None where the mesh is that of a file.
-    """
+    """A shape of a study with a load, materials and a length of an edge [m], None for a mesh file."""
 
     part: "Shapes"
     shape: "Shape"
@@ -239,16 +224,16 @@ class AskedShape:
 
     @property
     def size_text(self) -> str:
-        """The size as the option takes it."""
+        """Size as the option takes it."""
         return f"{1e3 * (self.size or 0.0):.12g} mm"
 
     @property
     def mesh_name(self) -> str:
-        """What the mesh is called."""
+        """Name of the mesh."""
         return Path(self.shape.file).name if self.size is None else f"free {self.size_text}"
 
     def mesh(self) -> "GroupedMesh":
-        """The mesh, finer where the study says so."""
+        """Mesh, refined as the study says."""
         from ..mesh.formats import read_shape  # here, since studies are read without scipy
         from ..mesh.outlines import mesh_shape
 
@@ -266,14 +251,9 @@ class AskedShape:
 def asked_shape(
     text: str, load: str | None, material: str | None, density: str | None, size: str | None, *, sized: bool = True
 ) -> AskedShape:
-    """Shape of a study of an option such as ``config/shapes.yaml:cook``.
+    """Shape of an option such as ``config/shapes.yaml:cook``.
 
-    Parameters
-    ----------
-    load, material, density, size : str or None
-        Of the options; a load or material may be left out where the study has but one for the shape.
-    sized : bool, optional
-        Whether a shape of an outline needs a size.
+    Load and material may be None if the study has only one for the shape. `sized`: an outline needs a size.
     """
     study, part, shape = _shape(text)
     if load is None and len(shape.loads) > 1:
@@ -299,7 +279,7 @@ def asked_shape(
 
 
 def _shape(text: str) -> "tuple[Study, Shapes, Shape]":
-    """Study, what it has of shapes, and the shape."""
+    """Study, its part of shapes, and the shape."""
     from ..problem.quantities import nearest
     from ..studies.kinds import load_study
 
@@ -328,7 +308,7 @@ def _shape(text: str) -> "tuple[Study, Shapes, Shape]":
 def _materials(
     study: "Study", part: "Shapes", shape: "Shape", name: str | None, density: str | None
 ) -> "dict[str, AnyMaterial]":
-    """Materials by part, that of the main one by the option."""
+    """Materials by part; the option names the main one."""
     if name is None:
         used = {one.material for one in part.scenes if one.shape == shape.name} or set(study.materials)
         if len(used) > 1:
@@ -444,7 +424,7 @@ DATASET = "dataset.nc"
 
 
 def studies(given: Path | None) -> "Iterator[tuple[Study, Path]]":
-    """Studies with the folders of their results."""
+    """Studies and the folders of their results."""
     from ..studies.kinds import load_study
     from ..studies.runs.locks import LockedError, check_claim, claimed
 
@@ -473,7 +453,7 @@ def studies(given: Path | None) -> "Iterator[tuple[Study, Path]]":
 
 
 def idle(folder: Path) -> None:
-    """Refuse to remove anything under a run."""
+    """Refuse a folder that a run uses."""
     from ..studies.runs.locks import LockedError, check_idle
 
     try:
@@ -483,7 +463,7 @@ def idle(folder: Path) -> None:
 
 
 def dataset_path(given: str) -> Path:
-    """Dataset of what a command is given."""
+    """Path of the dataset of a study, folder or file."""
     from ..studies.runs.locks import check_claim
 
     path = Path(given)

@@ -1,4 +1,4 @@
-"""What `springtune predict` says: as text, and as JSON."""
+"""Text and JSON of `springtune predict`."""
 
 import json
 import math
@@ -252,7 +252,7 @@ def search_json(subject: Subject, search: "MeshSearch", springs_alone: bool = Fa
 
 
 def recommended(choices: "Sequence[Choice]") -> tuple[str | None, str | None]:
-    """The first definition without a failure, and the first one that has springs alone; None where there is none."""
+    """The best definition, and the best with springs alone; None if there is none."""
     solved = [choice for choice in choices if choice.worst < math.inf]
     plain = [choice for choice in solved if not choice.energies]
     return (solved[0].definition if solved else None), (plain[0].definition if plain else None)
@@ -270,14 +270,14 @@ def size_text(size: float) -> str:
 
 
 KINEMATICS_TEXT = "with linear kinematics (small strain), against the converged reference of small strain"
-"""How errors are measured."""
+"""Kinematics and reference of the errors."""
 
 ABOVE = "above zero where too soft"
-"""What the sign of an error means, where displacements are positive."""
+"""Meaning of the sign of an error for positive displacements."""
 
 
 def _signs(loads: Sequence[str]) -> str:
-    """What the sign of an error means, (network - reference) / |reference|."""
+    """Meaning of the sign of (network - reference) / |reference|."""
     from ..problem.loads import LOADS
 
     against = [load for load in loads if LOADS[load].sign < 0]
@@ -303,7 +303,7 @@ def _order(one: "MeshChoice | None") -> tuple[bool, int]:
 
 
 def _nearest(search: "MeshSearch", mesh_type: str, springs_alone: bool) -> str:
-    """Why there is none: what came nearest to it."""
+    """Reason why no mesh was found, and the nearest one."""
     from ..prediction.choices import NEED_ENERGIES, as_sure_as, in_order
     from ..prediction.search import SPRINGS_ALONE
 
@@ -337,7 +337,7 @@ def _json(content: dict[str, Any]) -> str:
         if isinstance(value, dict):
             return {name: plain(one) for name, one in value.items()}
         if isinstance(value, list | tuple):
-            # A band whose bounds are not there is not there.
+            # A band with a missing bound is missing.
             numbers = [plain(one) for one in value]
             return None if isinstance(value, tuple) and None in numbers else numbers
         return None if isinstance(value, float) and not math.isfinite(value) else value
@@ -346,7 +346,7 @@ def _json(content: dict[str, Any]) -> str:
 
 
 def _missing(choice: "Choice", part: str) -> str:
-    """Word for a number that is not there."""
+    """Word for a missing number."""
     if "springs" in choice.failures:
         return "refused"
     reason = choice.failures.get(part) or choice.failures.get("patch test")
@@ -354,7 +354,7 @@ def _missing(choice: "Choice", part: str) -> str:
 
 
 def _bounds(value: "Number", form: Callable[[float], str], missing: str) -> str:
-    """A number, or the two of a band."""
+    """A number, or the bounds of a band, as text."""
     numbers = value if isinstance(value, tuple) else (value,)
     texts = [missing if number != number else form(number) for number in numbers]
     return texts[0] if len(set(texts)) == 1 else " to ".join(texts)
@@ -365,6 +365,6 @@ def _three_decimals(value: float) -> str:
 
 
 def _percent(value: float) -> str:
-    """An error with two decimals below 10 %, and three digits above."""
+    """Error with two decimals below 10 %, otherwise three digits."""
     value = 100 * value
     return f"{round(value, 2) + 0.0:+.2f} %" if abs(value) < 10 else f"{value:+.3g} %"

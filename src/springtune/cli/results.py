@@ -1,4 +1,4 @@
-"""Commands of results: show, export, browse, check, remove and archive them."""
+"""Commands for results: info, export, clean, verify, browse and archive."""
 
 import json
 import tempfile
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from ..studies.config.model import Study
 
 REASONS = 5
-"""Reasons of a status that are told."""
+"""Most reasons that are listed for a status."""
 
 
 @click.command(epilog=examples("springtune info results/paper"))
@@ -46,7 +46,7 @@ def info(path: Path) -> None:
 
 
 def info_text(tree: "xr.DataTree", path: Path) -> str:
-    """What a dataset holds, as text."""
+    """Content of a dataset as text."""
     parts = [_head(tree, path)]
     ends = [line for node in tree.subtree for line in _ends(node)]
     parts += [["how it ended", *ends]] if ends else []
@@ -63,7 +63,7 @@ def _head(tree: "xr.DataTree", path: Path) -> list[str]:
 
 
 def _ends(node: "xr.DataTree") -> Iterator[str]:
-    """Lines on how many cells of a group came to which status, and why not all are solved."""
+    """Lines with the number of cells by status, and the reasons of those not solved."""
     data = node.to_dataset()
     for name in (str(name) for name in data.data_vars if str(name).rpartition("_")[2] == "status"):
         status = data[name]
@@ -86,7 +86,7 @@ def _ends(node: "xr.DataTree") -> Iterator[str]:
 
 
 def _reasons(status: str, texts: list[str]) -> Iterator[str]:
-    """Lines on the reasons of a status: those that differ in numbers alone are one, told by its first."""
+    """Lines with the reasons of a status; reasons that differ only in numbers count as one."""
     alike = defaultdict(list)
     for text in texts:
         alike[without_numbers(text)].append(text)
@@ -104,7 +104,7 @@ def _path(node: "xr.DataTree", name: str) -> str:
 
 
 def _errors(tree: "xr.DataTree") -> list[str]:
-    """Median and worst error of each definition, and where the worst one is."""
+    """Median and worst error of each definition, with the cell of the worst."""
     root = tree.to_dataset()
     if "deformation_error" not in root or "definition" not in root.deformation_error.dims:
         return []
@@ -140,7 +140,7 @@ def _errors(tree: "xr.DataTree") -> list[str]:
 def _groups(tree: "xr.DataTree") -> list[str]:
     rows = []
     for node in tree.subtree:
-        sizes = node.to_dataset().drop_vars(node.coords).sizes  # what its own variables have
+        sizes = node.to_dataset().drop_vars(node.coords).sizes  # without inherited dimensions
         rows.append(
             [f"  {node.path}", len(node.data_vars), ", ".join(f"{name} {size}" for name, size in sizes.items())]
         )
@@ -218,7 +218,7 @@ def export(path: Path, target: Path, group: str, variables: str, pairs: tuple[st
 
 
 LISTED = 12
-"""Files of a folder that are listed by name."""
+"""Most files that are listed by folder."""
 
 
 @click.command(epilog=examples("springtune clean config/paper.yaml", "springtune clean results/paper --remove"))
@@ -262,7 +262,7 @@ def clean(study: Path | None, remove: bool) -> None:
     for folder, paths in found.items():
         for path in paths:
             path.unlink(missing_ok=True)
-        for parent in sorted({path.parent for path in paths} - {folder}, reverse=True):  # what is deeper comes first
+        for parent in sorted({path.parent for path in paths} - {folder}, reverse=True):  # deepest first
             if not any(parent.iterdir()):
                 parent.rmdir()
     click.echo(f"removed {count} files, {bytes_text(total)}")
@@ -329,7 +329,7 @@ def verify(
 
 
 def _verified(study: "Study", folder: Path, scenes: int, seed: int, set_aside: bool) -> int:
-    """Tell of a study; the number of its faults."""
+    """Verify a study, and return the number of faults."""
     place = folder.parent.parent
     if place.resolve() != Path.cwd():
         raise click.ClickException(f"{folder}: files are named from where the study was run; call it there: cd {place}")
@@ -398,7 +398,7 @@ def browse(dataset: Path, port: int, no_open: bool) -> None:
             click.echo(f"{server.address}\nCtrl-C ends it.")
             if no_open:
                 server.serve_forever()
-            # By way of a file that only its owner can read: what a browser is called with, all users of a machine see.
+            # All users of the machine see a browser's arguments, so the address goes through a private file.
             with tempfile.TemporaryDirectory(prefix="springtune-") as folder:
                 way = Path(folder, "browse.html")
                 way.write_text(f'<meta http-equiv="refresh" content="0; url={server.address}">')
@@ -472,7 +472,7 @@ def archive(
 
 
 def _tell_contents(found: "Contents") -> None:
-    """Say what is packed, and what somebody should know who computes it again."""
+    """Print what is packed, and what matters for computing it again."""
     from ..studies.archive.contents import DIFF, FOLDERS
 
     click.echo(f"{found.folder}: packing {len(found.files)} files, {_size(found.size)}")
@@ -503,11 +503,11 @@ def _size(count: int) -> str:
 
 
 TOLD = 20
-"""Most files that are told with a fault."""
+"""Most faulty files that are listed."""
 
 
 def verified(path: Path, again: bool, fresh: bool) -> bool:
-    """Tell of an archive."""
+    """Verify an archive; return whether it is sound, and reproduced if requested."""
     from ..studies.archive.reproduction import ReproductionError, check, reproduce
 
     try:
@@ -546,7 +546,7 @@ def _tell_checked(found: "Checked") -> None:
 
 
 def _compared(made: "Reproduced") -> bool:
-    """Tell of two datasets; whether they are the same, as far as they can be."""
+    """Print the comparison of two datasets; return whether they agree to rounding."""
     for name, (before, after) in made.others.items():
         click.echo(shown(f"  {name}: {before} in the archive, {after} here"))
     from ..studies.output.comparison import RELATIVE

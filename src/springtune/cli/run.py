@@ -1,4 +1,4 @@
-"""Run a study: the one front door, which says what is wrong with it before Snakemake starts."""
+"""Run a study: check it, find outdated and damaged results, and call Snakemake."""
 
 import os
 import signal
@@ -18,16 +18,16 @@ if TYPE_CHECKING:
     from ..studies.config.model import Study
 
 USUAL_STUDY = "config/paper.yaml"
-"""Study that is run where none is named."""
+"""Default study."""
 
 NOT_SOLVED = 3
-"""Exit code of a strict run of which scenes are not solved."""
+"""Exit code of a strict run with unsolved scenes."""
 
 WORKFLOW = ("Snakefile", "workflow/rules/common.smk")
-"""Files by which a checkout is known."""
+"""Files that every checkout has."""
 
 NAMED_BY = "SPRINGTUNE_WORKFLOW"
-"""Environment variable that names a checkout whose workflow runs in the current folder, as that of a container does."""
+"""Environment variable with the checkout whose workflow runs in the current folder, as in a container."""
 
 
 @click.command(
@@ -132,20 +132,20 @@ LOOKING = {
     "--list-params-changes", "--list-rules", "--list-target-rules", "--list-targets", "--list-untracked", "--lp",
     "--lt", "--lu", "--report", "--rulegraph", "--summary", "--unlock", "-D", "-S", "-l", "-n", "-np",
 }  # fmt: skip
-"""Options of Snakemake by which nothing is computed."""
+"""Options of Snakemake that compute nothing."""
 
 
 def _computes(options: list[str]) -> bool:
-    """Whether Snakemake computes anything by these options."""
+    """Return whether Snakemake computes anything with these options."""
     return not any(one.partition("=")[0] in LOOKING for one in options)
 
 
 HOW = {"--cores": 1, "-c": 1, "--jobs": 1, "-j": 1, "--quiet": 0, "-q": 0, "--keep-going": 0, "-k": 0}
-"""Options that say how a run goes and not what it makes, with the number of their values."""
+"""Options that do not change what a run makes, with their numbers of values."""
 
 
 def _asks_for_all(options: list[str]) -> bool:
-    """Whether everything of a study is asked for, and nothing is forced."""
+    """Return whether the options request the whole study and force nothing."""
     rest = options
     while rest and rest[0].partition("=")[0] in HOW:
         rest = rest[1 + (HOW[rest[0]] if "=" not in rest[0] else 0) :]
@@ -153,7 +153,7 @@ def _asks_for_all(options: list[str]) -> bool:
 
 
 def _plans(options: list[str]) -> bool:
-    """Whether Snakemake says what it would do."""
+    """Return whether the run is a dry run."""
     return not {"-n", "-np", "--dry-run", "--dryrun"}.isdisjoint(options)
 
 
@@ -162,7 +162,7 @@ def _results(study: "Study") -> Path:
 
 
 def _read_for_paper(config: Path, study: "Study") -> "list[Study]":
-    """Studies that the paper reads besides one, as the rule `paper` finds them."""
+    """Other studies that the paper reads, as the rule `paper` finds them."""
     from ..studies.kinds import load_study
     from ..studies.runs.rerun import PAPER_STUDIES
 
@@ -171,7 +171,7 @@ def _read_for_paper(config: Path, study: "Study") -> "list[Study]":
 
 
 def _unlock(studies: "list[Study]", command: list[str]) -> None:
-    """Remove the lock of a run that was killed; refuse a study that another process computes, and a full disk."""
+    """Remove the lock of a killed run; refuse a study under computation, a read-only folder and a full disk."""
     from ..studies.runs import locks
 
     here = Path.cwd()
@@ -194,7 +194,7 @@ def _unlock(studies: "list[Study]", command: list[str]) -> None:
 
 
 def _made_missing(studies: "list[Study]", chosen: dict[str, bool], remove: bool = True) -> bool:
-    """Remove the records of jobs that Snakemake may not know to be outdated; return whether there is nothing to do."""
+    """Remove the records of outdated jobs, so that Snakemake runs them; return whether there is nothing to do."""
     from ..studies.runs import rerun
 
     done = True
@@ -210,7 +210,7 @@ def _made_missing(studies: "list[Study]", chosen: dict[str, bool], remove: bool 
 
 
 def _strictly(strict: bool, study: "Study") -> int:
-    """Exit code of a run that made everything."""
+    """Exit code of a complete run."""
     holes = _unsolved(_results(study) / "dataset.nc") if strict else 0
     if holes:
         click.echo(f"--strict: {holes} scenes are not solved", err=True)
@@ -218,18 +218,18 @@ def _strictly(strict: bool, study: "Study") -> int:
 
 
 SLURM = "snakemake_executor_plugin_slurm"
-"""Package of the plugin; without it Snakemake would only say that it does not know the profile's words."""
+"""Package of the plugin; without it Snakemake only reports unknown options of the profile."""
 
 
 def _wants_slurm(options: list[str]) -> bool:
-    """Whether the options name the profile for Slurm."""
+    """Return whether the options name the profile for Slurm."""
     named = [two for one, two in zip(options, options[1:]) if one == "--workflow-profile"]
     named += [one.partition("=")[2] for one in options if one.startswith("--workflow-profile=")]
     return any(Path(one).name == "slurm" for one in named)
 
 
 NO_VALUE = {"", "-n", "--dry-run", "--dryrun", "-F", "--forceall", "-f", "--force", "-p", "--printshellcmds", "-k"}
-"""What stands before an argument that is none of an option: nothing, or options that have none."""
+"""Words after which an argument is not the value of an option: options without value, or none."""
 
 
 def _is_study(argument: str) -> bool:
@@ -237,29 +237,29 @@ def _is_study(argument: str) -> bool:
 
 
 def _meant(path: Path) -> str:
-    """Which study was probably meant, where there is none at a path."""
+    """Suggestion of an existing study for a missing one, or an empty string."""
     near = Path("config") / f"{path.stem}.yaml"
     return f"; did you mean {near}?" if not path.exists() and near != path and near.is_file() else ""
 
 
 def is_checkout(folder: Path) -> bool:
-    """Whether a folder is a checkout."""
+    """Return whether a folder is a checkout."""
     return all((folder / file).is_file() for file in WORKFLOW)
 
 
 def checkout_here() -> bool:
-    """Whether this folder is a checkout."""
+    """Return whether the current folder is a checkout."""
     return is_checkout(Path())
 
 
 def _library_checkout() -> Path | None:
-    """The checkout that the library is part of; None if it is installed without one."""
+    """Checkout of the library; None if it is installed without one."""
     folder = Path(__file__).parents[3]
     return folder if is_checkout(folder) else None
 
 
 def checkout_of_run() -> Path | None:
-    """Folder of the workflow: the one that is named, this one, or that of the library; None where there is none."""
+    """Folder of the workflow: the named one, the current one, or that of the library; None if there is none."""
     named = os.environ.get(NAMED_BY)
     if not named:
         return Path.cwd() if checkout_here() else _library_checkout()
@@ -270,7 +270,7 @@ def checkout_of_run() -> Path | None:
 
 
 def how_to_get_one(study: Path | None) -> str:
-    """What to do where the library is installed without the workflow."""
+    """Message for a library without the workflow."""
     from .. import __version__
 
     return (
@@ -282,13 +282,13 @@ def how_to_get_one(study: Path | None) -> str:
 
 
 def _snakemake() -> list[str]:
-    """How Snakemake is called on the Python that runs this program."""
+    """Command of Snakemake on this Python."""
     beside = Path(sys.executable).with_name("snakemake")
     return [str(beside)] if beside.exists() else [sys.executable, "-m", "snakemake"]
 
 
 def _called(command: list[str]) -> int:
-    """Exit code of a command; what interrupts or ends this program does so with that one, whose end is waited for."""
+    """Run a command and return its exit code; signals to this program are passed on, and its end is awaited."""
     process = subprocess.Popen(command)
     signal.signal(signal.SIGTERM, lambda number, frame: process.terminate())
     while True:
@@ -299,7 +299,7 @@ def _called(command: list[str]) -> int:
 
 
 def _unsolved(path: Path) -> int:
-    """Number of scenes of a dataset that are asked for and not solved; of one that is not there yet, none."""
+    """Number of unsolved scenes of a dataset; 0 if there is none yet."""
     import h5py
 
     from ..problem.status import Status

@@ -1,4 +1,4 @@
-"""The springs of a mesh, as files for other programs."""
+"""Write the springs of a mesh for other programs."""
 
 import re
 import warnings
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from .options import AskedShape
 
 OPTIONS = re.compile(r"^(?=(load|force|scale|definition|stiffness|density|mujoco)\b)")
-"""Beginnings of messages that name an argument, which is an option here."""
+"""Begin of messages with the name of an argument, which is an option here."""
 
 
 def _definitions() -> Iterable[str]:
@@ -155,13 +155,7 @@ def _net(
 
 
 def net_of_shape(asked: "AskedShape", definition: str, scale: float = 1.0, stiffness: str | None = None) -> "SpringNet":
-    """Springs of a shape, held and loaded as its load case says.
-
-    Parameters
-    ----------
-    scale : float, optional
-        Factor on the load [1].
-    """
+    """Springs of a shape under its load case; `scale` [1] is a factor on the load."""
     from ..handover.net import SpringNet
     from ..scene.single import Scene
 
@@ -184,7 +178,7 @@ def net_of_shape(asked: "AskedShape", definition: str, scale: float = 1.0, stiff
 
 
 def written_text(net: "SpringNet", written: "Iterable[Path]", mujoco: int | None = None) -> str:
-    """What was written, and how far off it is."""
+    """Written files and their expected errors, as text."""
     from ..handover.formats import for_mujoco
     from ..handover.mujoco import for_versions
 

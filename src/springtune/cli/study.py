@@ -1,9 +1,10 @@
-"""Commands of studies before they run: write one, list what it asks for, split and merge it, its schema."""
+"""Commands for studies: new, scenes, definitions, split, merge and schema."""
 
 import inspect
 import json
 import os
 from pathlib import Path
+from string import Template
 from typing import TYPE_CHECKING
 
 import click
@@ -17,66 +18,6 @@ from .run import checkout_here, checkout_of_run, how_to_get_one
 
 if TYPE_CHECKING:
     from pydantic.fields import FieldInfo
-
-TEMPLATE = """\
-{schema}# `springtune scenes {path}` says what this study asks for, `springtune run {path}` does it.
-# Every quantity carries its unit. Names of beams, materials and grids are yours; {manual} explains every key.
-title: "{title}"
-beams:
-  100x20: {{length: 100 mm, height: 20 mm, thickness: 1 mm}}
-materials:
-  steel: {{young_modulus: 210 GPa, poisson_ratio: 0.3}}
-grids:  # all combinations of the values of a grid are its scenes; [5 mm, 2 mm] are two values
-  pulled:
-    beam: 100x20
-    mesh_type: structured  # or {mesh_types}
-    mesh_size: 5 mm
-    material: steel
-    load: traction  # or {loads}
-    force: 20 kN
-    definition: [lattice, patch]  # rules for the stiffness of springs: `springtune definitions` lists them
-outputs: [sensitivity, deformed, tables]
-"""
-
-SHAPE_TEMPLATE = """\
-{schema}# `springtune scenes {path}` says what this study asks for, `springtune run {path}` does it.
-# Every quantity carries its unit. Names of shapes, groups, loads, quantities, materials and grids are yours;
-# {manual} explains every key.
-title: "{title}"
-materials:
-  steel: {{young_modulus: 210 GPa, poisson_ratio: 0.3}}
-shapes:
-  plate:
-    thickness: 1 mm
-    outline:  # sides from corner to corner, counter-clockwise, each of a group; with a `centre` it is an arc
-      - {{from: [0, 0], group: lower}}
-      - {{from: [100 mm, 0], group: right}}
-      - {{from: [100 mm, 40 mm], group: upper}}
-      - {{from: [0, 40 mm], group: left}}
-    holes: [{{circle: {{centre: [50 mm, 20 mm], radius: 8 mm}}, group: hole}}]
-    # file: plate.msh  # a mesh file, with groups of its own, in the place of outline, holes, points and refined
-    points: {{top: [50 mm, 28 mm]}}  # particles of every mesh, to be held, loaded or asked for
-    refined: {{hole: 0.5}}  # edges there, over the mesh size
-    loads:
-      pull:
-        supports: {{left: fixed}}  # or displacements by group or point: {{x: 0 mm}} leaves y free
-        forces: {{right: [4 kN, 0]}}  # along x and y, spread over the group
-        # pressures: {{hole: 1 MPa}}  # towards the body; gravity: [0, -9.81 m/s^2] needs densities
-        quantities:  # what is asked; errors are theirs
-          stretch: {{displacement: x, of: right}}
-          peak: {{stress: xx, at: top}}
-shape_grids:  # all combinations of the values of a grid are its scenes; [8 mm, 4 mm] are two values
-  plate:
-    shape: plate
-    mesh_size: [8 mm, 4 mm]
-    material: steel
-    definition: [lattice, patch]  # rules for the stiffness of springs: `springtune definitions` lists them
-    kinematics: linear  # small strain; nonlinear: springs keep their length law
-outputs: [shapes, tables]
-"""
-
-LOADS_BY_FORCE = ("compression", "bending", "shear")
-"""Loads that a person is told of first; all take a force."""
 
 
 @click.command(
@@ -92,8 +33,6 @@ def new(study: str, shape: bool) -> None:
     STUDY is its name, or the path of its file. A name alone becomes config/<name>.yaml in a checkout, and <name>.yaml
     elsewhere. What is there already is never overwritten.
     """
-    from ..safe_io.atomic import write_text
-
     path = _path(study)
     if not NAME.fullmatch(path.stem):
         raise WrongCall(f"'{path.stem}' cannot name a study; {NAME_RULE}")
@@ -102,7 +41,7 @@ def new(study: str, shape: bool) -> None:
     if not path.parent.is_dir():
         raise click.ClickException(f"{path.parent}: there is no such folder; make it, or name another")
     try:
-        write_text(path, template_text(path, SHAPE_TEMPLATE if shape else TEMPLATE))
+        write_text(path, template_text(path, "shape" if shape else "beam"))
     except OSError as error:
         raise click.ClickException(
             f"{path}: cannot be written: {error.strerror or error}; name another place"
@@ -117,7 +56,7 @@ def new(study: str, shape: bool) -> None:
 
 
 def _path(given: str) -> Path:
-    """Where a study is to be."""
+    """Path of a new study."""
     path = Path(given)
     if path.suffix not in (".yaml", ".yml"):
         if not path.name:
@@ -127,24 +66,23 @@ def _path(given: str) -> Path:
     return path
 
 
-def template_text(path: Path, template: str = TEMPLATE) -> str:
-    """Text of a study to begin with."""
+def template_text(path: Path, body: str) -> str:
+    """Text of a new study of a beam or of a shape."""
     from ..mesh import MESH_TYPES
 
     schema = _beside(path, SCHEMA)
     words = path.stem.replace("-", " ").replace("_", " ").strip() or path.stem
-    return template.format(
-        schema=f"# yaml-language-server: $schema={schema}\n" if schema else "",
-        manual="config/README.md",
+    template = Template(Path(__file__).with_name(f"study_of_a_{body}.yaml").read_text())
+    text = template.substitute(
         path=path.as_posix(),
         title=words[0].upper() + words[1:],
         mesh_types=", ".join(name for name in MESH_TYPES if name.isalpha() and name != "structured"),
-        loads=", ".join(LOADS_BY_FORCE),
     )
+    return f"# yaml-language-server: $schema={schema}\n{text}" if schema else text
 
 
 def _beside(path: Path, name: str) -> str | None:
-    """A file of the checkout's config, as seen from a study; None where there is none."""
+    """Path of a file in the checkout's config, relative to a study; None if there is none."""
     checkout = checkout_of_run()
     file = checkout / CONFIG_FOLDER / name if checkout else None
     if file is None or not file.is_file():
@@ -195,7 +133,7 @@ def definitions() -> None:
 
 
 BY = ("mesh", "grid")
-"""What may stay together: as `springtune.studies.config.sections.DEALT_BY`, which help does not wait for."""
+"""As `springtune.studies.config.sections.DEALT_BY`, without its import."""
 
 MOST_PARTS = 1000
 """As `springtune.studies.config.sections.MOST_PARTS`."""
@@ -308,7 +246,7 @@ def schema(write: bool, folder: Path) -> None:
 
 
 def schema_text() -> str:
-    """JSON schema of studies, as the file holds it."""
+    """JSON schema of studies as text."""
     from ..studies.config.kind import kinds
     from ..studies.config.sections import json_schema, study_model
 
@@ -316,7 +254,7 @@ def schema_text() -> str:
 
 
 def manual_text(frame: str) -> str:
-    """Manual of studies: the hand-written text around the generated tables stays."""
+    """Manual of studies with new tables; the text around them stays."""
     before, begin, rest = frame.partition(BEGIN)
     _, end, after = rest.partition(END)
     if not begin or not end:

@@ -6,6 +6,7 @@ import json
 import warnings
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack, redirect_stderr, redirect_stdout
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,23 +18,36 @@ from ..safe_io.atomic import check_folder, replacing, write_text
 from ..safe_io.inputs import DataElsewhere, check_alone
 from .mujoco import mjcf
 from .paraview import comment_of, write_vtu
-from .simulation import Net
 from .sofa import sofa_python, sofa_xml
-from .terms import OF_CORNERS, VALUES, Terms
+from .terms import OF_CORNERS, VALUES, Net, Terms
 from .xpbd import xpbd
 
+
+class Array(NamedTuple):
+    """An array of a net: type, titles of its columns in a table, and unit."""
+
+    kind: type
+    titles: tuple[str, ...]
+    unit: str = ""
+
+    @property
+    def columns(self) -> int:
+        """Columns, 0 for an array of one dimension."""
+        return len(self.titles) if len(self.titles) > 1 else 0
+
+
 ARRAYS = {
-    "points": (float, 2, "m"),
-    "masses": (float, 0, "kg"),
-    "held": (bool, 2, ""),
-    "forces": (float, 2, "N"),
-    "springs": (np.int64, 2, ""),
-    "rest_lengths": (float, 0, "m"),
-    "stiffness": (float, 0, "N/m"),
-    "triangles": (np.int64, 3, ""),
-    "quads": (np.int64, 4, ""),
+    "points": Array(float, ("x", "y"), "m"),
+    "masses": Array(float, ("mass",), "kg"),
+    "held": Array(bool, ("held_x", "held_y")),
+    "forces": Array(float, ("force_x", "force_y"), "N"),
+    "springs": Array(np.int64, ("first", "second")),
+    "rest_lengths": Array(float, ("rest_length",), "m"),
+    "stiffness": Array(float, ("stiffness",), "N/m"),
+    "triangles": Array(np.int64, ("a", "b", "c")),
+    "quads": Array(np.int64, ("a", "b", "c", "d")),
 }
-"""Arrays of a net: type, columns, of which 0 is none, and unit."""
+"""Arrays of a net."""
 
 CELL_ARRAYS = {3: "triangles", 4: "quads"}
 """Arrays that cells stand in, by their corners."""
@@ -42,22 +56,12 @@ COUNTED = {"particles": "points", "springs": "springs", "triangles": "triangles"
 """Arrays by what the header of a net calls their lengths."""
 
 
-class Content(NamedTuple):
-    """What a file of a net holds.
-
-    Attributes
-    ----------
-    arrays : dict of str to ndarray
-        By the names of `ARRAYS`; those that a net does not have are left out.
-    """
-
-    arrays: dict[str, np.ndarray]
-    energies: tuple[Terms, ...]
-    header: dict[str, Any]
+Read = tuple[dict[str, np.ndarray], Iterable[Terms], dict[str, Any]]
+"""Content of a file: arrays by the names of `ARRAYS`, energies and header."""
 
 
-def write(path: str | Path, content: Content, mujoco: int | None = None) -> list[Path]:
-    """Write the content of a net in the format that the ending of a name says; files appear whole or not at all."""
+def write(path: str | Path, net: Net, mujoco: int | None = None) -> list[Path]:
+    """Write a net in the format of a name's ending; files appear whole or not at all."""
     path = Path(path)
     check_target(path)
     form = _format_of(path)
@@ -67,22 +71,22 @@ def write(path: str | Path, content: Content, mujoco: int | None = None) -> list
                 f"mujoco: {mujoco!r} is of no use to {path.name}; leave it out, or give a name ending in .xml or .mjcf"
             )
         form = _for_simulator("MuJoCo", partial(mjcf, version=mujoco))
-    return form.write(path, content)
+    return form.write(path, replace(net, header=net.header | {"thickness": float(net.thickness)}))
 
 
-def read(path: str | Path) -> Content:
-    """Read the content of a net."""
+def read(path: str | Path) -> Net:
+    """Read a net."""
     path = Path(path)
     form = _format_of(path)
     if not path.is_file():
         raise ValueError(f"{path}: there is no such file; give one that was written by springtune")
     told = io.StringIO()
     try:
-        # meshio tells people of what it trips over, and exits.
+        # meshio prints its errors, and exits.
         with redirect_stdout(told), redirect_stderr(told), warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            return _checked(form.read(path))
-    except (Exception, SystemExit) as error:  # of a damaged file the libraries raise whatever they trip over
+            return _checked(*form.read(path))
+    except (Exception, SystemExit) as error:  # libraries raise many kinds of errors for a damaged file
         if isinstance(error, DataElsewhere) or (isinstance(error, OSError) and error.errno is not None):
             raise
         said = " ".join(str(error).split())[:LONGEST_SAID] or type(error).__name__
@@ -96,25 +100,26 @@ def check_target(path: str | Path) -> None:
 
 
 def for_mujoco(path: Path) -> bool:
-    """Whether the ending of a name is that of a model for MuJoCo."""
+    """Whether the ending of a name is one for MuJoCo."""
     return _format_of(path) is _MUJOCO
 
 
-def _checked(content: Content) -> Content:
-    """Content whose arrays fit each other."""
-    arrays = content.arrays
-    for name, (kind, columns, _) in ARRAYS.items():
+def _checked(arrays: dict[str, np.ndarray], energies: Iterable[Terms], header: dict[str, Any]) -> Net:
+    """Net whose arrays fit each other."""
+    energies = tuple(energies)
+    for name, about in ARRAYS.items():
         if name in arrays:
-            arrays[name] = array = np.ascontiguousarray(arrays[name], dtype=kind)
-            if array.ndim != (2 if columns else 1) or (columns and array.shape[1] != columns):
+            array: np.ndarray = np.ascontiguousarray(arrays[name], dtype=about.kind)
+            arrays[name] = array
+            if array.shape[1:] != ((about.columns,) if about.columns else ()) or not array.ndim:
                 raise ValueError(f"{name} have the shape {array.shape}")
         elif name != "masses":
             raise ValueError(f"it has no {name}")
-    numbers = [array for name, array in arrays.items() if ARRAYS[name][0] is float]
-    numbers += [values for terms in content.energies for values in terms.values.values()]
+    numbers = [array for name, array in arrays.items() if ARRAYS[name].kind is float]
+    numbers += [values for terms in energies for values in terms.values.values()]
     if not all(np.isfinite(array).all() for array in numbers):
         raise ValueError("some of its numbers are not finite")
-    for terms in content.energies:
+    for terms in energies:
         if any(len(values) != len(terms.cells) for values in terms.values.values()):
             raise ValueError(f"{terms.kind} terms are not as many as cells")
     count = len(arrays["points"])
@@ -128,16 +133,22 @@ def _checked(content: Content) -> Content:
     for name in ("springs", "triangles", "quads"):
         if len(arrays[name]) and not (0 <= arrays[name].min() and arrays[name].max() < count):
             raise ValueError(f"{name} of particles that it does not have")
-    if not isinstance(content.header.get("thickness"), float):
+    if not isinstance(header.get("thickness"), float):
         raise ValueError("its header has no thickness")
-    for said, length in _counts(content.header).items():
+    for said, length in _counts(header).items():
         if len(arrays[COUNTED[said]]) != length:
             raise ValueError(f"{len(arrays[COUNTED[said]])} {said}, and its header says {length}")
-    return content
+    parts: dict[str, Any] = {"masses": None} | arrays
+    return Net(**parts, energies=energies, thickness=header["thickness"], header=header)
+
+
+def arrays_of(net: Net) -> dict[str, np.ndarray]:
+    """Arrays that a net has, by the names of `ARRAYS`."""
+    return {name: getattr(net, name) for name in ARRAYS if getattr(net, name) is not None}
 
 
 def _counts(header: Mapping[str, Any]) -> dict[str, Any]:
-    """How many particles, springs and cells a header says that a net has; a header of one's own may not say it."""
+    """Numbers of particles, springs and cells by the header; a user's own header may lack them."""
     mesh = header.get("mesh")
     return {name: mesh[name] for name in COUNTED if name in mesh} if isinstance(mesh, dict) else {}
 
@@ -174,29 +185,16 @@ PARTICLE_COLUMNS = ("points", "masses", "held", "forces")
 SPRING_COLUMNS = ("springs", "rest_lengths", "stiffness")
 """Arrays that stand beside each other in a table."""
 
-TITLES = {
-    "points": ("x", "y"),
-    "masses": ("mass",),
-    "held": ("held_x", "held_y"),
-    "forces": ("force_x", "force_y"),
-    "springs": ("first", "second"),
-    "rest_lengths": ("rest_length",),
-    "stiffness": ("stiffness",),
-    "triangles": ("a", "b", "c"),
-    "quads": ("a", "b", "c", "d"),
-}
-"""Names of the columns of each array."""
-
 
 def companions(path: Path) -> dict[str, Path]:
-    """Tables beside that of the springs, ``net.particles.csv`` and so on, by what they hold."""
+    """Tables beside the table of springs, such as ``net.particles.csv``, by their content."""
     return {name: path.with_name(f"{path.stem}.{name}{path.suffix}") for name in ("particles", *CELL_ARRAYS.values())}
 
 
-def _write_csv(path: Path, content: Content) -> list[Path]:
-    arrays, others = content.arrays, companions(path)
+def _write_csv(path: Path, net: Net) -> list[Path]:
+    arrays, others = arrays_of(net), companions(path)
     tables = {others["particles"]: _table(arrays, PARTICLE_COLUMNS)}
-    terms = _by_corners(content.energies)
+    terms = _by_corners(net.energies)
     for count, name in CELL_ARRAYS.items():
         if len(arrays[name]):
             tables[others[name]] = _table(arrays, (name,)) | _corner_columns(terms.get(count, {}), count)
@@ -206,14 +204,14 @@ def _write_csv(path: Path, content: Content) -> list[Path]:
         for count, name in CELL_ARRAYS.items()
         if others[name] in tables
     ]
-    said += [f"# {line}" for line in _header_lines(content.header)]
+    said += [f"# {line}" for line in _header_lines(net.header)]
     texts = {other: _csv_text(table) for other, table in tables.items()}
     texts[path] = "\n".join([*said, ""]) + _csv_text(_table(arrays, SPRING_COLUMNS))
-    with ExitStack() as unfinished:  # the last one is the first to get its name: where it cannot, none does
+    with ExitStack() as unfinished:  # the last one gets its name first: if that fails, none gets one
         for one, text in texts.items():
             unfinished.enter_context(replacing(one)).write_text(text, encoding="utf-8")
     for other in set(others.values()) - set(tables):
-        other.unlink(missing_ok=True)  # of another net, written before
+        other.unlink(missing_ok=True)  # left by another net
     return [path, *tables]
 
 
@@ -223,9 +221,11 @@ def _table(arrays: Mapping[str, np.ndarray], names: Iterable[str]) -> dict[str, 
     for name in names:
         if name not in arrays:
             continue
-        unit = f" [{ARRAYS[name][2]}]" if ARRAYS[name][2] else ""
+        unit = f" [{ARRAYS[name].unit}]" if ARRAYS[name].unit else ""
         values = arrays[name].astype(int) if arrays[name].dtype == bool else arrays[name]
-        table |= {f"{title}{unit}": column for title, column in zip(TITLES[name], values.reshape(len(values), -1).T)}
+        table |= {
+            f"{title}{unit}": column for title, column in zip(ARRAYS[name].titles, values.reshape(len(values), -1).T)
+        }
     return table
 
 
@@ -248,7 +248,7 @@ def _csv_text(table: Mapping[str, np.ndarray]) -> str:
     return text.getvalue()
 
 
-def _read_csv(path: Path) -> Content:
+def _read_csv(path: Path) -> Read:
     lines = path.read_text(encoding="utf-8").splitlines()
     header = _header_of(line[2:] for line in lines if line.startswith("#"))
     others = companions(path)
@@ -265,13 +265,13 @@ def _read_csv(path: Path) -> Content:
     energies: list[Terms] = []
     for place, table in tables.items():
         for name in of_table[place]:
-            titles, columns = TITLES[name], ARRAYS[name][1]
-            if titles[0] in table:
-                found = np.array([[float(text) for text in table[title]] for title in titles]).T
-                arrays[name] = (found if columns else found[:, 0]).astype(ARRAYS[name][0])
+            about = ARRAYS[name]
+            if about.titles[0] in table:
+                found = np.array([[float(text) for text in table[title]] for title in about.titles]).T
+                arrays[name] = (found if about.columns else found[:, 0]).astype(about.kind)
         if place in CELL_ARRAYS.values():
-            energies += _terms(arrays[place], _joined(table, len(TITLES[place])))
-    return Content(arrays, tuple(energies), header)
+            energies += _terms(arrays[place], _joined(table, ARRAYS[place].columns))
+    return arrays, energies, header
 
 
 def _csv_table(lines: Iterable[str]) -> dict[str, tuple[str, ...]]:
@@ -328,11 +328,12 @@ def _header_of(lines: Iterable[str]) -> dict[str, Any]:
 # -- JSON ----------------------------------------------------------------------------------------------------------
 
 
-def as_json(content: Content) -> dict[str, Any]:
-    """Content of a net as JSON has it: lists, numbers, texts."""
+def as_json(net: Net) -> dict[str, Any]:
+    """Net as JSON has it: lists, numbers, texts."""
     return {
-        "header": content.header,
-        **{name: content.arrays[name].tolist() if name in content.arrays else None for name in ARRAYS},
+        "header": net.header,
+        **dict.fromkeys(ARRAYS),
+        **{name: array.tolist() for name, array in arrays_of(net).items()},
         "energies": [
             {
                 "kind": terms.kind,
@@ -341,23 +342,23 @@ def as_json(content: Content) -> dict[str, Any]:
                 "units": terms.units,
                 "values": {name: values.tolist() for name, values in terms.values.items()},
             }
-            for terms in content.energies
+            for terms in net.energies
         ],
     }
 
 
-def _write_json(path: Path, content: Content) -> list[Path]:
+def _write_json(path: Path, net: Net) -> list[Path]:
     # An array a line: rows of their own would make most of the file blanks.
-    parts = [f" {json.dumps(key)}: {json.dumps(value)}" for key, value in as_json(content).items()]
+    parts = [f" {json.dumps(key)}: {json.dumps(value)}" for key, value in as_json(net).items()]
     write_text(path, "{\n" + ",\n".join(parts) + "\n}\n")
     return [path]
 
 
-def _read_json(path: Path) -> Content:
+def _read_json(path: Path) -> Read:
     found = json.loads(path.read_text(encoding="utf-8"))
-    arrays = {
-        name: np.array(found[name], dtype=kind).reshape((-1, columns) if columns else -1)
-        for name, (kind, columns, _) in ARRAYS.items()
+    arrays: dict[str, np.ndarray] = {
+        name: np.array(found[name], dtype=one.kind).reshape((-1, one.columns) if one.columns else -1)
+        for name, one in ARRAYS.items()
         if found[name] is not None
     }
     energies = tuple(
@@ -368,7 +369,7 @@ def _read_json(path: Path) -> Content:
         )
         for one in found["energies"]
     )
-    return Content(arrays, energies, found["header"])
+    return arrays, energies, found["header"]
 
 
 # -- VTU -----------------------------------------------------------------------------------------------------------
@@ -378,31 +379,25 @@ LINE_NAMES = {"rest_lengths": "rest_length", "stiffness": "stiffness"}
 """Names of arrays in ParaView."""
 
 
-def _write_vtu(path: Path, content: Content) -> list[Path]:
-    write_vtu_with(path, content, {}, {})
+def _write_vtu(path: Path, net: Net) -> list[Path]:
+    write_vtu_with(path, net, {}, {})
     return [path]
 
 
 def write_vtu_with(
     path: str | Path,
-    content: Content,
+    net: Net,
     of_particles: Mapping[str, np.ndarray],
     of_springs: Mapping[str, np.ndarray],
     numbers: Mapping[str, float] | None = None,
 ) -> None:
-    """Write the content of a net, and more data of its particles and springs, for ParaView.
-
-    Parameters
-    ----------
-    of_particles : mapping of str to ndarray, shape (n_points,) or (n_points, 2)
-    of_springs : mapping of str to ndarray of float, shape (n_springs,)
-    """
-    arrays = content.arrays
+    """Write a net for ParaView, with more data of its particles, (n_points,) or (n_points, 2), and of its springs."""
+    arrays = arrays_of(net)
     data = {new: arrays[old] for old, new in POINT_NAMES.items() if old in arrays}
     data["held"] = data["held"].astype(np.int8)
     cell_data = {new: {2: arrays[old]} for old, new in LINE_NAMES.items()}
     cell_data |= {name: {2: values} for name, values in of_springs.items()}
-    for count, columns in _by_corners(content.energies).items():
+    for count, columns in _by_corners(net.energies).items():
         for name, values in columns.items():
             cell_data.setdefault(name, {})[count] = values
     write_vtu(
@@ -411,13 +406,13 @@ def write_vtu_with(
         {2: arrays["springs"], 3: arrays["triangles"], 4: arrays["quads"]},
         data | dict(of_particles),
         cell_data,
-        _numbers(content.header) | dict(numbers or {}),
-        json.dumps(content.header, indent=1),
+        _numbers(net.header) | dict(numbers or {}),
+        json.dumps(net.header, indent=1),
     )
 
 
 def _numbers(header: Mapping[str, Any]) -> dict[str, float]:
-    """Numbers of a header that one looks for in ParaView."""
+    """Numbers of a header for ParaView."""
     found = {"thickness": header["thickness"]}
     for group in ("expected_error", "largest_stable_step"):
         values = header.get(group)
@@ -426,7 +421,7 @@ def _numbers(header: Mapping[str, Any]) -> dict[str, float]:
     return found
 
 
-def _read_vtu(path: Path) -> Content:
+def _read_vtu(path: Path) -> Read:
     import meshio
 
     grid = meshio.read(path)
@@ -445,23 +440,22 @@ def _read_vtu(path: Path) -> Content:
         columns = {name: parts[blocks[count]] for name, parts in grid.cell_data.items()}
         there = {name: values for name, values in columns.items() if not np.isnan(values).all()}
         energies += _terms(arrays[CELL_ARRAYS[count]], there)
-    return Content(arrays, tuple(energies), json.loads(comment_of(path)))
+    return arrays, energies, json.loads(comment_of(path))
 
 
 # -- HDF5 ----------------------------------------------------------------------------------------------------------
 
 
-def _write_h5(path: Path, content: Content) -> list[Path]:
+def _write_h5(path: Path, net: Net) -> list[Path]:
     import h5py
 
     with replacing(path) as unfinished, h5py.File(unfinished, "w", track_order=True) as file:
-        _put_header(file.create_group("header", track_order=True), content.header)
-        for name, (_, _, unit) in ARRAYS.items():
-            if name in content.arrays:
-                made = file.create_dataset(name, data=content.arrays[name])
-                if unit:
-                    made.attrs["units"] = unit
-        for number, terms in enumerate(content.energies):
+        _put_header(file.create_group("header", track_order=True), net.header)
+        for name, array in arrays_of(net).items():
+            made = file.create_dataset(name, data=array)
+            if ARRAYS[name].unit:
+                made.attrs["units"] = ARRAYS[name].unit
+        for number, terms in enumerate(net.energies):
             group = file.create_group(f"energies/{number}", track_order=True)
             group.attrs.update(
                 {"kind": terms.kind, "formula": terms.formula, "cells": f"/{CELL_ARRAYS[terms.cells.shape[1]]}"}
@@ -495,7 +489,7 @@ def _header_in(group: Any) -> dict[str, Any]:
     return header
 
 
-def _read_h5(path: Path) -> Content:
+def _read_h5(path: Path) -> Read:
     import h5py
 
     check_alone(path)
@@ -510,7 +504,7 @@ def _read_h5(path: Path) -> Content:
             )
             for group in groups
         )
-        return Content(arrays, energies, _header_in(file["header"]))
+        return arrays, energies, _header_in(file["header"])
 
 
 # -- simulators ----------------------------------------------------------------------------------------------------
@@ -519,11 +513,11 @@ def _read_h5(path: Path) -> Content:
 def _for_simulator(program: str, text: Callable[[Net], str]) -> "_Format":
     """Format of a simulator, which is not read."""
 
-    def write_it(path: Path, content: Content) -> list[Path]:
-        write_text(path, text(Net(**content.arrays, energies=content.energies, header=content.header)))
+    def write_it(path: Path, net: Net) -> list[Path]:
+        write_text(path, text(net))
         return [path]
 
-    def refuse(path: Path) -> Content:
+    def refuse(path: Path) -> Read:
         raise ValueError(f"it is for {program}; read the springs from .json, .h5, .csv or .vtu")
 
     return _Format(write_it, refuse)
@@ -532,8 +526,8 @@ def _for_simulator(program: str, text: Callable[[Net], str]) -> "_Format":
 class _Format(NamedTuple):
     """How a net is written in a format, and read."""
 
-    write: Callable[[Path, Content], list[Path]]
-    read: Callable[[Path], Content]
+    write: Callable[[Path, Net], list[Path]]
+    read: Callable[[Path], Read]
 
 
 _FORMATS = {

@@ -15,7 +15,7 @@ the quadratic form of its second derivative at rest.
 import inspect
 import sys
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +26,7 @@ from ..mechanics.dynamics import masses
 from ..mechanics.energies import AngleEnergy, AreaEnergy, BiquadraticEnergy, Energy, NeoHookeEnergy, YeohEnergy
 from ..mechanics.integrators import IMPLICIT, INTEGRATORS
 from ..mesh import Mesh, corner_angles, signed_areas
-from ..mesh.cells import no_cells, rows_of
+from ..mesh.cells import rows_of
 from ..problem.compare import quantity_errors
 from ..problem.geometry import Beam
 from ..problem.loads import LOADS, LoadKind
@@ -35,12 +35,12 @@ from ..problem.quantities import positive
 from ..problem.status import Status
 from ..scene.meshes import A_BEAM, A_MATERIAL, A_MESH, check_filled, is_a
 from ..scene.motion import stable_steps
-from ..scene.sheet import AnyDefinition, OwnDefinition, Sheet, check_stiffness, definition_of, named
+from ..scene.sheet import AnyDefinition, Sheet, check_stiffness, definition_of, named
 from ..scene.single import Scene
 from ..scene.statements import ShapeStatement
 from ..springs import Definition, DefinitionError, Springs
-from .formats import ARRAYS, Content, read, write
-from .terms import Terms
+from .formats import read, write
+from .terms import Net, Terms
 
 UNITS = {
     "points": "m",
@@ -59,25 +59,25 @@ MEANING = (
     "(network - reference) / |reference| of the displacement along the force, tension positive: above zero where the "
     "springs are too soft, under compression and pressure below; linear kinematics, small strain"
 )
-"""What an expected error is."""
+"""Meaning of an expected error."""
 
 MEANING_ON_SHAPES = (
     "(network - reference) / |reference| of each quantity that the load case asks for; linear kinematics, small strain"
 )
-"""What an expected error is on a shape."""
+"""Meaning of an expected error on a shape."""
 
 CONSTANTS_SAID = ("name", "young_modulus", "poisson_ratio", "density")
-"""What a header says of a material."""
+"""Constants of a material in a header."""
 
 STEP_MEANING = "about rest, undamped; springs that stiffen, and damping that lags, narrow it"
-"""What a largest stable step is."""
+"""Meaning of a largest stable step."""
 
 NOT_COMPUTED = "not computed"
-"""How a text begins that stands in the place of a number."""
+"""First words of a text in the place of a number."""
 
 
 @dataclass(frozen=True, eq=False)
-class SpringNet:
+class SpringNet(Net):
     """A network of springs as plain arrays, in SI units.
 
     Attributes
@@ -91,7 +91,7 @@ class SpringNet:
     stiffness : ndarray of float, shape (n_springs,)
         [N/m]; 0 for edges that a definition gives no spring, as where the law of all springs is part of `energies`.
     energies : tuple of Terms
-        What there is besides springs; empty for springs alone.
+        Energies besides springs; empty for springs alone.
     masses : ndarray of float, shape (n_points,), or None
         Of particles [kg]; None where the material has no density.
     thickness : float
@@ -125,19 +125,6 @@ class SpringNet:
     True
     """
 
-    points: np.ndarray
-    springs: np.ndarray
-    rest_lengths: np.ndarray
-    stiffness: np.ndarray
-    energies: tuple[Terms, ...]
-    masses: np.ndarray | None
-    thickness: float
-    held: np.ndarray
-    forces: np.ndarray
-    header: dict[str, Any]
-    triangles: np.ndarray = field(default_factory=lambda: no_cells(3))
-    quads: np.ndarray = field(default_factory=lambda: no_cells(4))
-
     @classmethod
     def from_scene(
         cls, scene: Scene, mesh_name: str = "", *, springs: Springs | None = None, errors: bool = True
@@ -162,39 +149,31 @@ class SpringNet:
         Raises
         ------
         DefinitionError
-            If the definition cannot live on the mesh or with the material.
+            If the definition does not support the mesh or the material.
         """
         springs = scene.springs if springs is None else springs
-        held, inertia, about = scene.held, scene.statement.masses(), scene.statement
-        parts = _parts(scene.sheet, springs, inertia, held, about.forces(scene.sheet, springs))
-        header = _header(scene.definition, scene.sheet, about.materials, springs, inertia, held, mesh_name)
-        if isinstance(about, ShapeStatement):
-            load = {
-                "name": scene.load,
-                "scale": about.scale,
-                "kinematics": scene.kinematics,
-                "follower": about.loading.follower is not None,
-                "prescribed": about.loading.given is not None,
-            }
-            header |= {"shape": about.body, "load": load}
-            if errors:
-                header |= {"expected_error": _errors_on_shape(scene), "expected_error_means": MEANING_ON_SHAPES}
-            return cls(**parts, header=header)
-        load = {
+        about, forces = scene.statement, scene.statement.forces(scene.sheet, springs)
+        parts = _parts(scene.definition, scene.sheet, about.materials, springs, about.masses(), mesh_name, scene.held)
+        header = parts["header"]
+        scale = about.scale if isinstance(about, ShapeStatement) else None
+        header["load"] = {
             "name": scene.load,
-            "force": scene.force,
+            **({"force": about.force} if scale is None else {"scale": scale}),
             "kinematics": scene.kinematics,
-            "follower": scene.follower,
+            "follower": about.loading.follower is not None,
+            **({} if scale is None else {"prescribed": about.loading.given is not None}),
         }
-        header |= {"beam": _beam(scene.beam), "load": load}
-        if errors:
+        header |= {"beam": _beam(scene.beam)} if scale is None else {"shape": about.body}
+        if errors and scale is not None:
+            header |= {"expected_error": _errors_on_shape(scene), "expected_error_means": MEANING_ON_SHAPES}
+        elif errors:
             from ..prediction import CASES  # here, since finite elements take half a second to import
 
             loads = tuple(dict.fromkeys((*CASES, scene.load)))
             header["expected_error"] = _expected_errors(
                 scene.sheet, scene.definition, springs, scene.beam, scene.material, loads
             )
-        return cls(**parts, header=header)
+        return cls(**(parts | {"forces": forces}))
 
     @classmethod
     def from_mesh(
@@ -224,9 +203,9 @@ class SpringNet:
         beam : Beam, optional
             That the mesh fills: with it the header says the expected errors.
         stiffness : float or str, optional
-            Uniform stiffness [N/m], for definitions that are told one.
+            Uniform stiffness [N/m], for definitions that need one.
         springs : Springs, optional
-            In the place of those that the definition gives.
+            In the place of the definition's.
         mesh_name, errors : optional
             As of `from_scene`.
         loads : iterable of str, optional
@@ -243,7 +222,7 @@ class SpringNet:
             If an argument is unknown or out of its range, the mesh does not fill the beam, or loads are given without
             a beam.
         DefinitionError
-            If the definition cannot live on the mesh or with the material, or is not told what it needs.
+            If the definition does not support the mesh or the material, or lacks what it needs.
         """
         is_a(mesh, Mesh, "mesh", A_MESH)
         is_a(material, Material, "material", A_MATERIAL)
@@ -260,7 +239,8 @@ class SpringNet:
             with named(chosen):
                 springs = sheet.derive(chosen, material, given)[0]
         inertia = None if material.density is None else masses(mesh, material.density, sheet.thickness)
-        header = _header(chosen, sheet, [material], springs, inertia, None, mesh_name)
+        parts = _parts(chosen, sheet, [material], springs, inertia, mesh_name)
+        header = parts["header"]
         if beam is None:
             header["expected_error"] = f"{NOT_COMPUTED}: the mesh is of no beam"
         else:
@@ -270,8 +250,7 @@ class SpringNet:
 
                 said = check_loads(CASES if loads is None else loads)
                 header["expected_error"] = _expected_errors(sheet, chosen, springs, beam, material, said)
-        none = np.zeros(mesh.points.shape)
-        return cls(**_parts(sheet, springs, inertia, none.astype(bool), none), header=header)
+        return cls(**parts)
 
     def write(self, path: str | Path, *, mujoco: int | None = None) -> list[Path]:
         """Write the net in the format that the ending of a name says; files appear whole or not at all.
@@ -304,7 +283,7 @@ class SpringNet:
                 f"load {load['name']!r}: prescribes displacements, and a file of springs has forces and directions "
                 "that are held; take a load of forces, or give SpringNet.from_mesh the mesh and the scene's springs"
             )
-        return write(path, content_of(self), mujoco)
+        return write(path, self, mujoco)
 
     @classmethod
     def read(cls, path: str | Path) -> "SpringNet":
@@ -324,25 +303,11 @@ class SpringNet:
         ValueError
             If there is no such file, or it is not as `write` writes it.
         """
-        arrays, energies, header = read(path)
-        parts: dict[str, Any] = {"masses": None} | arrays
-        return cls(**parts, energies=energies, thickness=header["thickness"], header=header)
-
-
-def content_of(net: SpringNet) -> Content:
-    """What the files of a net hold."""
-    arrays = {name: getattr(net, name) for name in ARRAYS if getattr(net, name) is not None}
-    return Content(arrays, net.energies, net.header | {"thickness": float(net.thickness)})
+        return cls(**vars(read(path)))
 
 
 def terms(energy: Energy, reference: float) -> Terms:
-    """Energy of a network as plain arrays.
-
-    Parameters
-    ----------
-    reference : float
-        Reference stiffness that its moduli are over [N/m].
-    """
+    """Energy of a network as plain arrays; its moduli are over `reference` [N/m]."""
     points, corners = energy.points, energy.corners
     values: dict[str, np.ndarray]
     if isinstance(energy, AreaEnergy):
@@ -374,28 +339,8 @@ def terms(energy: Energy, reference: float) -> Terms:
     )
 
 
-def _parts(
-    sheet: Sheet, springs: Springs, inertia: np.ndarray | None, held: np.ndarray, forces: np.ndarray
-) -> dict[str, Any]:
-    """Arrays of a net."""
-    mesh = sheet.mesh
-    return {
-        "points": mesh.points,
-        "springs": mesh.edges,
-        "rest_lengths": mesh.edge_lengths,
-        "stiffness": springs.reference * springs.relative,
-        "energies": _merged([terms(_everywhere(energy, mesh), springs.reference) for energy in springs.energies]),
-        "masses": inertia,
-        "thickness": sheet.thickness,
-        "held": held,
-        "forces": forces,
-        "triangles": mesh.triangles,
-        "quads": mesh.quads,
-    }
-
-
 def _everywhere(energy: Energy, mesh: Mesh) -> Energy:
-    """An energy of some cells as one of all with as many corners, the others' moduli zero: files have all cells."""
+    """Extend an energy to all cells with as many corners, by moduli of zero: files have all cells."""
     if type(energy) not in (AngleEnergy, AreaEnergy, BiquadraticEnergy, NeoHookeEnergy, YeohEnergy):
         return energy  # which `terms` refuses
     cells = mesh.cells[energy.corners.shape[1]]
@@ -426,25 +371,19 @@ def _merged(given: list[Terms]) -> tuple[Terms, ...]:
     return tuple(found.values())
 
 
-def _header(
-    definition: Definition | OwnDefinition,
+def _parts(
+    definition: Definition,
     sheet: Sheet,
     materials: Sequence[AnyMaterial],
     springs: Springs,
     inertia: np.ndarray | None,
-    held: np.ndarray | None,
     mesh_name: str,
+    held: np.ndarray | None = None,
 ) -> dict[str, Any]:
-    """What a net says of itself, but for what a scene adds."""
+    """Arrays and header of a net without a load."""
     mesh, (formula, source) = sheet.mesh, described(definition)
     material, *others = ({name: getattr(one, name, None) for name in CONSTANTS_SAID} for one in materials)
-    counts = {
-        "particles": len(mesh.points),
-        "springs": len(mesh.edges),
-        "triangles": len(mesh.triangles),
-        "quads": len(mesh.quads),
-    }
-    return {
+    header = {
         "made_by": f"springtune {__version__}",
         "definition": definition.name,
         "formula": formula,
@@ -456,7 +395,13 @@ def _header(
         "beam": None,
         "material": material,
         **({"other_materials": {one["name"]: one for one in others}} if others else {}),
-        "mesh": ({"name": mesh_name} if mesh_name else {}) | counts,
+        "mesh": {
+            **({"name": mesh_name} if mesh_name else {}),
+            "particles": len(mesh.points),
+            "springs": len(mesh.edges),
+            "triangles": len(mesh.triangles),
+            "quads": len(mesh.quads),
+        },
         "load": None,
         "expected_error": f"{NOT_COMPUTED}: not asked for",
         "expected_error_means": MEANING,
@@ -465,13 +410,27 @@ def _header(
         "units": UNITS
         | {"reference_stiffness": "N/m", "lateral_stress": "axial stress", "young_modulus": "Pa", "density": "kg/m3"},
     }
+    return {
+        "points": mesh.points,
+        "springs": mesh.edges,
+        "rest_lengths": mesh.edge_lengths,
+        "stiffness": springs.reference * springs.relative,
+        "energies": _merged([terms(_everywhere(energy, mesh), springs.reference) for energy in springs.energies]),
+        "masses": inertia,
+        "thickness": sheet.thickness,
+        "held": np.zeros(mesh.points.shape, dtype=bool) if held is None else held,
+        "forces": np.zeros(mesh.points.shape),
+        "header": header,
+        "triangles": mesh.triangles,
+        "quads": mesh.quads,
+    }
 
 
 def _beam(beam: Beam) -> dict[str, Any]:
     return {"name": beam.name, "length": beam.length, "height": beam.height, "thickness": beam.thickness}
 
 
-def described(definition: Definition | OwnDefinition) -> tuple[str, str]:
+def described(definition: Definition) -> tuple[str, str]:
     """Formula of a definition in words, and where it comes from."""
     function = inspect.unwrap(definition.function)
     own = inspect.getdoc(function) or ""
@@ -483,13 +442,13 @@ def described(definition: Definition | OwnDefinition) -> tuple[str, str]:
 
 def _expected_errors(
     sheet: Sheet,
-    definition: Definition | OwnDefinition,
+    definition: Definition,
     springs: Springs,
     beam: Beam,
     material: Material,
     loads: Sequence[str],
 ) -> dict[str, float | str]:
-    """Error of the displacement by load, linear kinematics against the reference of small strain; or why none."""
+    """Error by load, linear kinematics against the reference of small strain; or why it is not computed."""
     # Here, since finite elements take half a second to import.
     from ..prediction.choices import PREDICTED, SOLVED, displacement_of, error_of, references
 
@@ -499,7 +458,7 @@ def _expected_errors(
         return dict.fromkeys(loads, why)
     refused = f"{NOT_COMPUTED}: definition '{definition.name}' is not for this load"
     solved = [name for name in loads if LOADS[name].kind.uniaxial or not definition.uniaxial]
-    # To linear kinematics a load that turns with its side is the one that does not.
+    # In linear kinematics a load that turns with its side equals the one that does not.
     steady = {name: name if name in PREDICTED else _steady(name) for name in solved}
     known = references(beam, material, steady.values()) if solved else {}
     displacements: dict[LoadKind, float | str] = {}
@@ -517,12 +476,12 @@ def _expected_errors(
 
 
 def _steady(load: str) -> str:
-    """The load that differs from one in that it does not turn with its side."""
+    """The same load with a fixed direction."""
     return next(name for name, one in LOADS.items() if one == replace(LOADS[load], follower=False))
 
 
 def _errors_on_shape(scene: Scene) -> dict[str, float | str]:
-    """Error of each quantity of a load case, linear kinematics against the reference of small strain; or why none."""
+    """Error by quantity, linear kinematics against the reference of small strain; or why it is not computed."""
     # Here, since finite elements take half a second to import.
     from ..prediction import ReferenceNotConvergedError
     from ..prediction.choices import SOLVED, shape_references
@@ -566,7 +525,7 @@ def _stable_steps(
     inertia: np.ndarray | None,
     held: np.ndarray | None,
 ) -> dict[str, float | str] | str:
-    """Largest stable step of each integrator, undamped [s], or that any is stable; or why there is none."""
+    """Largest stable step of each integrator, undamped [s], or "unlimited"; or why it is not computed."""
     if inertia is None:
         lacking = next(one.name for one in materials if one.density is None)
         return f"{NOT_COMPUTED}: material '{lacking}' has no density"

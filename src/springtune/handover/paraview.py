@@ -23,18 +23,10 @@ def write_vtu(
     numbers: Mapping[str, float] | None = None,
     comment: str = "",
 ) -> None:
-    """Write points and cells with their data; the file appears whole or not at all.
+    """Write points [m] and cells with their data; the file appears whole or not at all.
 
-    Parameters
-    ----------
-    points : ndarray of float, shape (n_points, 2)
-        [m]
-    cells : mapping of int to ndarray of int, shape (n, corners)
-        Particles of the cells by number of corners: 2 are lines, and are drawn as such.
-    point_data : mapping of str to ndarray, shape (n_points,) or (n_points, 2)
-        Vectors get a third component of zero, as ParaView wants them.
-    cell_data : mapping of str to mapping of int to ndarray
-        By name, and by the corners of the cells that have it; NaN on the others.
+    `cells` are particles by number of corners, 2 for lines. `cell_data` is by name and number of corners, NaN on cells
+    without it. Vectors get a third component of zero for ParaView.
     """
     import meshio
 
@@ -81,7 +73,7 @@ def comment_of(path: str | Path) -> str:
 
 
 MOST_PIECES = 10_000
-"""Most files of a collection: ParaView and file systems take no more gladly."""
+"""Most files of a collection: more are slow in ParaView and file systems."""
 
 Add = Callable[..., None]
 """Adds a piece to a collection: its time, what writes it to a file of a given name, and a name where it has one."""
@@ -91,14 +83,9 @@ Add = Callable[..., None]
 def series(path: str | Path) -> Iterator[Add]:
     """Context in which a collection of files is written, which ParaView opens as one that changes in time.
 
-    ``swing.pvd`` names ``swing/swing_0000.vtu`` and so on; all are written or none is, and those that a collection of
-    that name had before, and has no more, are removed.
-
-    Yields
-    ------
-    callable
-        ``add(time, write, name="")``: time of a piece [s], or whatever takes its place; what writes it, told a path;
-        and a name in the place of a number.
+    ``swing.pvd`` names ``swing/swing_0000.vtu`` and so on; all are written or none, and files of an older collection of
+    that name are removed. It yields ``add(time, write, name="")``: the time of a piece [s], the function that writes it
+    to a path, and a name in the place of a number.
     """
     path = Path(path)
     folder, before = path.with_suffix(""), pieces_of(path)[1:]
@@ -131,7 +118,7 @@ def series(path: str | Path) -> Iterator[Add]:
         for piece in {*pieces, *finished} - set(before):
             piece.unlink(missing_ok=True)
         if made:
-            with suppress(OSError):  # where it is not empty: the cause is what is to be told
+            with suppress(OSError):  # not empty: the first error is the one to raise
                 folder.rmdir()
         raise
     for old in set(before) - set(finished):
@@ -148,5 +135,5 @@ def pieces_of(path: str | Path) -> list[Path]:
         return []
     folder = path.with_suffix("")
     named = re.findall(r' file="([^"]*)"', path.read_text(encoding="utf-8", errors="replace"))
-    mine = re.compile(rf"{re.escape(folder.name)}/([^/]*\.vtu)")  # another program's collection may name anything
+    mine = re.compile(rf"{re.escape(folder.name)}/([^/]*\.vtu)")  # other programs' collections may name any file
     return [path, *(folder / found.group(1) for name in named if (found := mine.fullmatch(unescape(name))))]

@@ -1,4 +1,4 @@
-"""What simulators need besides springs: masses, a damping, a step that is stable, and where it all should come to."""
+"""What simulators need besides springs: masses, damping, a stable step, and the equilibrium to expect."""
 
 import warnings
 from collections.abc import Iterable, Mapping
@@ -15,11 +15,11 @@ from ..mechanics.network import Network
 from ..mechanics.statics import SingularError, StaticProblem
 from ..mesh import Mesh
 from ..problem.status import Status
-from .terms import Terms
+from .terms import Net
 
 STEP_SHARE = 0.8
-"""Step that is written, over the largest stable one at rest, in equilibrium and where the net swings to on its way:
-fronts of waves stretch springs further."""
+"""Written step over the largest stable one, at rest, in equilibrium and as far as the net swings: fronts of waves
+stretch springs further."""
 
 WORDS = {
     "area": "areas",
@@ -28,33 +28,16 @@ WORDS = {
     "incompressible": "rubber",
     "compressible": "rubber",
 }
-"""What energies besides springs are of, by their kind."""
-
-
-@dataclass(frozen=True, eq=False)
-class Net:
-    """A network as plain arrays; the attributes are those of `springtune.SpringNet`, the header with the thickness."""
-
-    points: np.ndarray
-    springs: np.ndarray
-    rest_lengths: np.ndarray
-    stiffness: np.ndarray
-    held: np.ndarray
-    forces: np.ndarray
-    triangles: np.ndarray
-    quads: np.ndarray
-    energies: tuple[Terms, ...]
-    header: Mapping[str, Any]
-    masses: np.ndarray | None = None
+"""Words for energies besides springs, by kind."""
 
 
 class EquilibriumWarning(UserWarning):
-    """What is written has no equilibrium to come to, or one that is far away."""
+    """Warning of a net without an equilibrium, or with one that is far away."""
 
 
 @dataclass(frozen=True)
 class Simulation:
-    """How a net is to be moved, and where it should come to.
+    """How a net moves in a simulator, and its equilibrium.
 
     Attributes
     ----------
@@ -65,16 +48,14 @@ class Simulation:
     largest_step : float
         Largest stable step of explicit schemes about rest, undamped [s].
     step : float
-        Step that stays stable while the net moves [s]: `STEP_SHARE` of it, or less where its way makes it stiffer.
-    frequency : float
-        Lowest frequency [rad/s]; 0 without a load.
-    loaded_frequency : float
-        Lowest frequency that the load excites [rad/s]; 0 without a load.
+        Step that stays stable in motion [s]: `STEP_SHARE` of the largest one, or less where the net stiffens.
+    frequency, loaded_frequency : float
+        Lowest frequency, and the lowest one that the load excites [rad/s]; 0 without a load.
     mass_damping : float
-        Damping over mass [1/s], critical for the loaded frequency, or as much less as lets no mode be later at rest
-        than the lowest one under its own critical damping: under small loads it is that.
+        Damping over mass [1/s], critical for the loaded frequency, or less, so that no mode comes to rest later than
+        the lowest one under its own critical damping.
     displacements : ndarray of float, shape (n_points, 2), or None
-        Equilibrium under the load [m]; None where there is none that is stable.
+        Stable equilibrium under the load [m]; None without one.
     """
 
     masses: np.ndarray
@@ -89,13 +70,10 @@ class Simulation:
 
 
 def simulate(net: Net, program: str, laws: Iterable[str] = ()) -> Simulation:
-    """What a simulator is told of a net besides its springs.
+    """Masses, damping, step and equilibrium of a net for a simulator.
 
-    Notes
-    -----
-    Frequencies are those at rest, see `springtune.mechanics.dynamics.Motion`; the equilibrium is that of springs which
-    keep their length law, as simulators have them. A mode of frequency w under a damping over mass c > 2 w comes to
-    rest with the rate c/2 - sqrt(c^2/4 - w^2), which is the lowest frequency w1 for c = w1 + w^2/w1.
+    Frequencies are at rest; the springs keep their length law. A mode of frequency w under a damping over mass c > 2 w
+    comes to rest with the rate c/2 - sqrt(c^2/4 - w^2), which is the lowest frequency w1 for c = w1 + w^2/w1.
     """
     _check(net, program, laws)
     assert net.masses is not None
@@ -136,7 +114,7 @@ def simulate(net: Net, program: str, laws: Iterable[str] = ()) -> Simulation:
 
 
 def _warn(net: Net, displacements: np.ndarray | None, why: str) -> None:
-    """Say aloud what a file says of its equilibrium only where somebody looks for it."""
+    """Warn of a missing equilibrium, or of one that is far away."""
     if displacements is None:
         smaller = "force" if net.header.get("beam") else "scale"
         said = f"no equilibrium was found, so the file has none: {why}; give a smaller {smaller}"
@@ -183,7 +161,7 @@ def _lowest_frequency(motion: Motion, displacements: np.ndarray | None = None) -
 
 
 def _check(net: Net, program: str, laws: Iterable[str]) -> None:
-    """Refuse what no file for a simulator can hold."""
+    """Refuse a net that a simulator cannot represent."""
     name = net.header["definition"]
     lacking = [WORDS[terms.kind] for terms in net.energies if terms.kind not in laws]
     if lacking:
@@ -231,7 +209,7 @@ def _network(net: Net, reference: float) -> Network:
 
 
 def about(net: Net, simulation: Simulation, integrator: str) -> list[str]:
-    """Lines that say in a file what it is of: definition, material, load, expected errors, and its step."""
+    """Lines of comment: definition, material, load, expected errors and step."""
     header = net.header
     material, load, errors = header["material"], header.get("load"), header.get("expected_error")
     constants = ""
@@ -271,7 +249,7 @@ def about(net: Net, simulation: Simulation, integrator: str) -> list[str]:
 
 
 def numbers(values: np.ndarray) -> str:
-    """Numbers of an array one after the other, each as short as it can be read back exactly."""
+    """Numbers of an array in a row, each in the shortest text that is read back exactly."""
     return " ".join(map(repr, values.ravel().tolist()))
 
 

@@ -12,7 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .simulation import Net, Simulation, about, commented, numbers, simulate
+from .simulation import Simulation, about, commented, numbers, simulate
+from .terms import Net
 
 PERIOD = 50
 """Steps of the slowest period that the load excites: backward Euler damps it by 6 % of the critical damping."""
@@ -43,15 +44,7 @@ class Component(NamedTuple):
 
 
 class SofaScene(NamedTuple):
-    """What a scene has, in the order in which SOFA is to make it.
-
-    Attributes
-    ----------
-    step : float
-        [s]
-    root, sheet, predicted : list of Component
-        Of the three nodes; the sheet's first two are the integrator, whose class goes by the version, and its solver.
-    """
+    """Nodes of a scene in SOFA's order; the first two components of `sheet` are integrator and solver; step in s."""
 
     step: float
     about: list[str]
@@ -129,10 +122,7 @@ def add_integrator(root, sheet):
 
 
 def sofa_python(net: Net) -> str:
-    """Scene of a net for SOFA v24.06 and later with SofaPython3, in Python.
-
-    Parameters and errors as of `sofa_xml`.
-    """
+    """Scene of a net for SOFA v24.06 and later with SofaPython3, in Python; errors as of `sofa_xml`."""
     scene = _scene(net)
     said = "\n".join(f"# {line}" for line in scene.about)
     entries = {

@@ -1,8 +1,11 @@
-"""Energies besides springs, as plain arrays."""
+"""A network as plain arrays, and the energies besides its springs."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
+
+from ..mesh.cells import no_cells
 
 FORMULAS = {
     "area": "W = 1/2 modulus (A - rest_area)^2 / rest_area of each cell, A its area",
@@ -40,15 +43,11 @@ OF_CORNERS = ("rest_angle", "rest_length", "tensile", "coupling", "rest_weight")
 
 @dataclass(frozen=True, eq=False)
 class Terms:
-    """Energies of one kind, besides the springs': a row for each cell.
+    """Energies of one kind besides the springs: a row for each cell.
 
-    Attributes
-    ----------
-    cells : ndarray of int, shape (n_cells, n_corners)
-        Particles of each cell, counter-clockwise: all triangles of a net, or all of its quadrilaterals.
-    values : dict of str to ndarray of float, shape (n_cells,) or (n_cells, n_corners)
-        By the names of `VALUES`; those of sides are of the side opposite each corner, and `coupling` of the two
-        sides that meet in it.
+    `cells` (n_cells, n_corners) are particles, counter-clockwise: all triangles of a net, or all of its quadrilaterals.
+    `values`, by the names of `VALUES`, have shape (n_cells,) or (n_cells, n_corners). Values of sides are of the side
+    opposite to each corner, and `coupling` of the two sides that meet in it.
     """
 
     kind: str
@@ -64,3 +63,21 @@ class Terms:
     def units(self) -> dict[str, str]:
         """Unit of each of the values."""
         return VALUES[self.kind]
+
+
+@dataclass(frozen=True, eq=False)
+class Net:
+    """A network as plain arrays; `springtune.SpringNet` has what they are."""
+
+    points: np.ndarray
+    springs: np.ndarray
+    rest_lengths: np.ndarray
+    stiffness: np.ndarray
+    energies: tuple[Terms, ...]
+    masses: np.ndarray | None
+    thickness: float
+    held: np.ndarray
+    forces: np.ndarray
+    header: dict[str, Any]
+    triangles: np.ndarray = field(default_factory=lambda: no_cells(3))
+    quads: np.ndarray = field(default_factory=lambda: no_cells(4))

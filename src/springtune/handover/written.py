@@ -13,7 +13,7 @@ from ..safe_io.atomic import check_folder
 from ..scene.single import Result, Scene
 from ..springs import Springs
 from .formats import check_target, write_vtu_with
-from .net import NOT_COMPUTED, SpringNet, content_of
+from .net import NOT_COMPUTED, SpringNet
 from .paraview import MOST_PIECES, pieces_of, series
 
 FRAMES = 50
@@ -92,18 +92,18 @@ class _Frames:
 
     def __init__(self, scene: Scene, compared: bool = True) -> None:
         self.scene = scene
-        self.content = content_of(SpringNet.from_scene(scene, errors=False))
+        self.net = SpringNet.from_scene(scene, errors=False)
         self.reference: np.ndarray | None = None
         if not compared:
             return
         try:
             reference = scene.reference()
         except ReferenceNotConvergedError as error:
-            self.content.header["reference"] = f"{NOT_COMPUTED}: {error}"
+            self.net.header["reference"] = f"{NOT_COMPUTED}: {error}"
         else:
             self.reference = reference.at(scene.mesh.points)
             strain = "finite" if scene.finite_strain and not scene.objection else "small"
-            self.content.header["reference"] = scene.objection or f"finite elements, {strain} strain, converged"
+            self.net.header["reference"] = scene.objection or f"finite elements, {strain} strain, converged"
 
     def write(
         self,
@@ -125,4 +125,4 @@ class _Frames:
             of_particles |= {"reference_displacement": expected, "error": displacements - expected}
         forces = scene.springs.reference * scene.network.spring_forces(displacements, linear)
         numbers = {"displacement_of_the_load": scene.displacement_of(displacements)}
-        write_vtu_with(path, self.content, of_particles, {"force": forces}, numbers)
+        write_vtu_with(path, self.net, of_particles, {"force": forces}, numbers)

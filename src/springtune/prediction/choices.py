@@ -4,7 +4,8 @@ Every definition worth a choice is solved on the mesh itself under some loads an
 of small strain; a patch test between rollers measures Young's modulus and Poisson's ratio of the network.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf, nan
 from typing import Any, NamedTuple, TypeVar, cast
@@ -24,9 +25,10 @@ from ..problem.quantities import nearest
 from ..problem.shapes import Shape
 from ..problem.status import Status
 from ..reference.small_strain import ReferenceNotConvergedError, ReferenceSolution, solve_small_strain
-from ..scene.meshes import A_BEAM, A_MATERIAL, A_MESH, check_filled, is_a
+from ..scene.meshes import A_BEAM, A_MATERIAL, A_MESH, is_a
+from ..scene.motion import stable_steps
 from ..scene.sheet import Sheet
-from ..scene.statements import ShapeStatement
+from ..scene.statements import BeamStatement, ShapeStatement, Statement
 from ..springs import DEFINITIONS, DefinitionError, Springs
 
 PREDICTED = tuple(name for name, load in LOADS.items() if not load.follower)
@@ -37,8 +39,7 @@ CASES = ("traction", "bending", "shear")
 """Loads that are predicted where none are named."""
 
 SHORTEST_SIDE, LONGEST_SIDE, MOST_SLENDER = 1e-9, 1e7, 1e4
-"""Sides [m] and aspect ratio beyond which a beam is taken for an error of units: atoms are next, the Earth is no
-larger, and more slender beams are beyond what the references of bending resolve."""
+"""Limits of a beam's sides [m] and aspect ratio: beyond them the unit is likely wrong, or bending has no reference."""
 
 ON_TRIANGLES = ("patch", "lattice", "van-gelder", "oriented", "delingette", "area", "patch-area")
 """Definitions that are tried on triangles, springs alone first: of all that need no tuning, those that are the best one
@@ -54,14 +55,14 @@ NEED_ENERGIES = ("delingette", "area", "patch-area", "orthotropic")
 """Those of them that need more than springs."""
 
 ALIKE = 1e-5
-"""Difference of stiffnesses, relative, below which they are one: they are shown with five digits."""
+"""Relative difference below which stiffnesses count as equal: five digits are shown."""
 
 SOLVED, SOLVED_FROM_FILE = 20_000, 100_000
 """Particles up to which a mesh is solved, in some three seconds; up to which one from a file is, in some twenty."""
 
 
 ROUNDED = 1e-9
-"""Error that rounding makes up to, at most [1]: references of closed form are surer than networks are solved."""
+"""Largest error by rounding [1]; references of closed form have a smaller estimate."""
 
 _T = TypeVar("_T")
 
@@ -69,24 +70,18 @@ Number = float | tuple[float, float]
 """A number, or the two bounds of a band."""
 
 References = dict[str, ReferenceSolution | str]
-"""References of 1 N by load, or why there is none."""
+"""References of 1 N by load, or why one is missing."""
 
 
 class QuantityReference(NamedTuple):
-    """What a quantity of interest of a shape is.
-
-    Attributes
-    ----------
-    error_estimate : float
-        Relative [1].
-    """
+    """A quantity of interest of a shape by finite elements, and its relative error estimate [1]."""
 
     value: float
     error_estimate: float
 
 
 ShapeReferences = dict[str, QuantityReference | str]
-"""References by quantity of interest, or why there is none."""
+"""References by quantity of interest, or why one is missing."""
 
 
 @dataclass(frozen=True)
@@ -102,21 +97,21 @@ class Choice:
     inside, outline : float
         Stiffness of the sides of cells inside and on the outline [N/m]; NaN where they differ from one to the next.
     extra : str
-        What there is besides these springs.
+        Energies, diagonals and scale besides these springs, in words.
     energies : bool
-        Whether a simulator needs more than springs for it.
+        Whether it needs more than springs.
     errors : dict of str to float
         Deformation error by load, of a shape by quantity, linear kinematics against the reference of small strain,
         (network - reference) / abs(reference) [1]: above zero where the network is too soft, but below under
-        compression and pressure, whose displacements are negative. NaN where there is none, because of the reference or
-        for the reason in `failures`, and of a quantity that is next to nothing beside others of its kind.
+        compression and pressure, whose displacements are negative. NaN without a reference, for
+        the reason in `failures`, and of a quantity that is negligible beside others of its kind.
     young_modulus_error : float
         Young's modulus along x between rollers over the material's, less one [1].
     poisson_ratio : float
         Poisson's ratio there [1].
     failures : dict of str to str
-        What has no number on this mesh, a load, the ``"patch test"`` or the ``"springs"`` themselves, and why: the
-        network is unstable or singular at rest, or too ill-conditioned, or the definition refuses the mesh.
+        Why numbers are missing, by load, ``"patch test"`` or ``"springs"``: the network is unstable, singular or
+        ill-conditioned at rest, or the definition does not support the mesh.
 
     Examples
     --------
@@ -153,7 +148,7 @@ class Choice:
 
 
 def check_beam(beam: Beam) -> None:
-    """Refuse a beam that is none: larger than any, smaller than atoms, or more slender than its references resolve."""
+    """Refuse a beam of absurd size, or too slender for its references."""
     is_a(beam, Beam, "beam", A_BEAM)
     sides = {"long": beam.length, "high": beam.height, "thick": beam.thickness}
     for word, side in sides.items():
@@ -226,19 +221,18 @@ def predict(
     list of Choice
         Of `ON_TRIANGLES`, `ON_QUADS` or `ANISOTROPIC`, the same springs once; those that fail come last. Errors that
         differ by less than the reference's error estimate are equal: springs alone come first, then names. On a shape
-        their errors are by quantity of interest, and moduli are none, since a patch test between rollers is one of
-        strips.
+        errors are by quantity of interest, and moduli are NaN: a patch test between rollers needs a strip.
 
     Raises
     ------
     ValueError
-        If an argument is none, the mesh does not fill the beam, or a load cannot be predicted.
+        If an argument is wrong, the mesh does not fill the beam, or a load cannot be predicted.
     DefinitionError
-        If none of them can live on the mesh.
+        If no definition supports the mesh.
 
     Notes
     -----
-    Each number is that of a scene of the same beam, mesh, material, load and definition, solved with linear kinematics.
+    Each number equals that of a scene of the same beam, mesh, material, load and definition in linear kinematics.
 
     Examples
     --------
@@ -269,35 +263,47 @@ def predict(
     delingette -0.8 %
     patch-area -2.3 %
     """
+    statements: Sequence[Statement]
+    wanted: References | ShapeReferences
     if isinstance(beam, Shape):
-        return _on_shape(beam, mesh, material, cast("ShapeReferences | None", known), load)
-    if load is not None:
-        raise ValueError(f"load: {load!r} is of shapes alone; give loads for a beam")
-    check_beam(beam)
-    is_a(mesh, Mesh, "mesh", A_MESH)
-    is_a(material, Material, "material", A_MATERIAL)
-    assert isinstance(mesh, Mesh) and isinstance(material, Material)  # as type checkers are told
-    check_filled(mesh, beam)
-    loads = check_loads(loads)
-    missing = [load for load in loads if known is not None and not (isinstance(known, dict) and load in known)]
-    if missing:
-        raise ValueError(
-            f"known: has no references of {', '.join(missing)}; give what springtune.prediction.references returns"
-        )
-    known = references(beam, material, loads) if known is None else cast(References, known)
-    tried = TriedMesh(mesh, beam, material, {load: known[load] for load in loads})
-    choices = [tried.choice(name) for name in tried.names]
-    choices += [tried.failed(name) for name in tried.failures]
+        statement = ShapeStatement(beam, mesh, material, only_load(beam, load), 1.0, "linear")
+        statements = [statement]
+        known = wanted = shape_references(statement) if known is None else cast(ShapeReferences, known)
+    else:
+        if load is not None:
+            raise ValueError(f"load: {load!r} is of shapes alone; give loads for a beam")
+        check_beam(beam)
+        statements = under_loads = beam_statements(beam, mesh, material, loads)
+        named = [one.load for one in under_loads]
+        missing = [load for load in named if known is not None and not (isinstance(known, dict) and load in known)]
+        if missing:
+            raise ValueError(
+                f"known: has no references of {', '.join(missing)}; give what springtune.prediction.references returns"
+            )
+        known = references(beam, under_loads[0].material, named) if known is None else known
+        wanted = {load: cast(References, known)[load] for load in named}
+    tried = Trial(statements, wanted)
     if not tried.names and all("springs" in found for found in tried.failures.values()):
         raise DefinitionError("; ".join(f"{name}: {found['springs']}" for name, found in tried.failures.items()))
-    return best_first(choices, known)
+    return best_first([tried.choice(name) for name in (*tried.names, *tried.failures)], known)
+
+
+def beam_statements(
+    beam: Beam,
+    mesh: Mesh | GroupedMesh,
+    material: AnyMaterial | Mapping[str, AnyMaterial],
+    loads: Iterable[str] = CASES,
+) -> list[BeamStatement]:
+    """Statements of 1 N in linear kinematics, one for each load."""
+    is_a(mesh, Mesh, "mesh", A_MESH)
+    is_a(material, Material, "material", A_MATERIAL)
+    return [BeamStatement(beam, mesh, material, load, 1.0, "linear") for load in check_loads(loads)]
 
 
 def best_first(choices: Iterable[Choice], known: References | ShapeReferences) -> list[Choice]:
-    """Choices of a mesh, the best one by its worst error first.
+    """Choices of a mesh, the least worst error first.
 
-    Errors that differ by less than the references are sure of are equal. Of these come springs alone first, then names
-    in the order of the alphabet.
+    Errors that differ by less than the error estimates count as equal: then springs alone come first, then names.
     """
     return in_order(choices, lambda one: one.worst, lambda one: (one.energies, one.definition), as_sure_as(known))
 
@@ -320,24 +326,6 @@ def in_order(
     return found
 
 
-def _on_shape(
-    shape: Shape,
-    mesh: Mesh | GroupedMesh,
-    material: AnyMaterial | Mapping[str, AnyMaterial],
-    known: ShapeReferences | None,
-    load: str | None,
-) -> list[Choice]:
-    """As `predict`, of a shape."""
-    statement = ShapeStatement(shape, mesh, material, only_load(shape, load), 1.0, "linear")
-    known = shape_references(statement) if known is None else known
-    tried = TriedShape(statement, known)
-    choices = [tried.choice(name) for name in tried.names]
-    choices += [tried.failed(name) for name in tried.failures]
-    if not tried.names and all("springs" in found for found in tried.failures.values()):
-        raise DefinitionError("; ".join(f"{name}: {found['springs']}" for name, found in tried.failures.items()))
-    return best_first(choices, known)
-
-
 def only_load(shape: Shape, load: str | None) -> str:
     """Load case of a shape, its only one where none is named."""
     if load is not None:
@@ -353,7 +341,7 @@ def only_load(shape: Shape, load: str | None) -> str:
 def shape_references(statement: ShapeStatement) -> ShapeReferences:
     """References of the quantities of interest of a shape under a load case.
 
-    One that has none, such as the stress at a corner, does not cost the others theirs.
+    A quantity without a reference, such as the stress at a corner, leaves the others theirs.
     """
     from ..reference.shapes import solve_each  # here, since finite elements take half a second to import
 
@@ -371,79 +359,8 @@ def shape_references(statement: ShapeStatement) -> ShapeReferences:
     return {one.name: found[one.name] for one in case.quantities}
 
 
-class TriedShape:
-    """A mesh of a shape on which definitions are solved under a load case; the same springs once.
-
-    Parameters
-    ----------
-    known : dict
-        What `shape_references` gave.
-    """
-
-    def __init__(self, statement: ShapeStatement, known: ShapeReferences, among: Iterable[str] | None = None) -> None:
-        self.statement, self.known = statement, known
-        self._sheet = Sheet(statement.mesh, statement.thickness, networks=1)
-        self._values: dict[str, dict[str, float] | str] = {}
-        self._springs, self.same, self.failures = _distinct(
-            statement.mesh,
-            lambda name: statement.springs(self._sheet, DEFINITIONS[name], None)[0],
-            all(one.isotropic for one in statement.materials),
-            among,
-        )
-        self.names = list(self._springs)
-
-    def springs(self, name: str) -> Springs:
-        """As of `TriedMesh`."""
-        return self._springs[name]
-
-    def error(self, name: str, quantity: str) -> float | str:
-        """Error of a definition in a quantity [1]; NaN where that has no reference, why the network has no values."""
-        if name not in self._values:
-            self._values[name] = self._solved(self._springs[name])
-        values, known = self._values[name], self.known[quantity]
-        if isinstance(values, str):
-            return values
-        if isinstance(known, str):
-            return nan
-        return quantity_errors({quantity: values[quantity]}, {quantity: known.value})[quantity]
-
-    def _solved(self, springs: Springs) -> dict[str, float] | str:
-        try:
-            found = self.statement.solve(self._sheet, springs)
-        except SingularError as error:
-            return f"unstable: {error}"
-        if found.status is not Status.SOLVED:
-            return found.message
-        return self.statement.values(self._sheet, springs, found)
-
-    def choice(self, name: str) -> Choice:
-        """As of `TriedMesh`, of one load case."""
-        springs, materials = self._springs[name], self.statement.materials
-        found = {quantity: self.error(name, quantity) for quantity in self.known}
-        why = next((error for error in found.values() if isinstance(error, str)), "")
-        return Choice(
-            name,
-            *in_words(self._sheet, materials[0] if len(materials) == 1 else None, name, springs),
-            bool(springs.energies),
-            errors={quantity: nan if isinstance(error, str) else error for quantity, error in found.items()},
-            young_modulus_error=nan,
-            poisson_ratio=nan,
-            failures={self.statement.load: why} if why else {},
-        )
-
-    def failed(self, name: str) -> Choice:
-        """As of `TriedMesh`."""
-        return _failed(name, self.known, self.failures[name])
-
-
 def displacement_of(sheet: Sheet, springs: Springs, kind: LoadKind) -> float | str:
-    """Displacement of a load for a force of the springs' reference stiffness times a metre, linear kinematics.
-
-    Returns
-    -------
-    float or str
-        [1]; or why there is none.
-    """
+    """Displacement [1] under the springs' reference stiffness times 1 m, linear kinematics; or why it is missing."""
     try:
         found = sheet.solve(kind, springs, springs.reference, "linear")
     except SingularError as error:
@@ -452,13 +369,7 @@ def displacement_of(sheet: Sheet, springs: Springs, kind: LoadKind) -> float | s
 
 
 def error_of(displacement: float | str, springs: Springs, load: str, known: ReferenceSolution | str) -> float | str:
-    """Error of springs under a load: what `Choice.errors` has, and the header of a `springtune.SpringNet`.
-
-    Returns
-    -------
-    float or str
-        [1]; NaN where there is no reference; why the network has no displacement.
-    """
+    """Error under a load [1], NaN without a reference; or why the network has no displacement."""
     if isinstance(displacement, str):
         return displacement
     if isinstance(known, str):
@@ -466,112 +377,135 @@ def error_of(displacement: float | str, springs: Springs, load: str, known: Refe
     return float(LOADS[load].sign * (displacement / (springs.reference * known.displacement) - 1))
 
 
-class TriedMesh:
-    """A mesh on which definitions are solved; networks that differ in their reference stiffness alone once.
+class Trial:
+    """Definitions solved on a mesh, under loads of a beam or a load case of a shape; equal springs once.
 
-    Attributes
-    ----------
-    names : list of str
-        Definitions that give springs here, those of the same springs once.
-    same : dict of str to str
-        By definition that gives springs the one of `names` whose springs they are.
-    failures : dict of str to dict of str to str
-        By definition that gives none: as `Choice.failures`.
+    `statements` are of one mesh, in linear kinematics; `known` are references by load of a beam or by quantity of a
+    shape; `among` restricts the definitions. `names` are the definitions with springs, equal springs once; `same` has
+    the one of `names` for each definition with springs; `failures` are as of `Choice`, for each definition without.
     """
 
     def __init__(
-        self, mesh: Mesh, beam: Beam, material: Material, known: References, among: Iterable[str] | None = None
+        self,
+        statements: Sequence[Statement],
+        known: References | ShapeReferences,
+        among: Iterable[str] | None = None,
     ) -> None:
-        self.mesh, self.beam, self.material, self.known = mesh, beam, material, known
+        self.statements, self.known, first = statements, known, statements[0]
+        self.mesh, self.materials, self.thickness = first.mesh, first.materials, first.thickness
         # Loads that hold the same follow each other.
-        self._sheet = Sheet(mesh, beam.thickness, networks=1)
-        self._test = PatchTest(mesh)
+        self._sheet = Sheet(self.mesh, self.thickness, networks=1)
         self._displacements: dict[tuple[LoadKind, tuple[bytes, ...]], float | str] = {}
+        self._errors: dict[str, dict[str, float | str]] = {}
         self._moduli: dict[tuple[bytes, ...], tuple[float, float] | str] = {}
-        self._springs, self.same, self.failures = _distinct(
-            mesh, lambda name: self._sheet.derive(name, material)[0], among=among
-        )
+        self._test = PatchTest(self.mesh) if isinstance(first, BeamStatement) else None
+        self._springs: dict[str, Springs] = {}
+        self.same: dict[str, str] = {}
+        self.failures: dict[str, dict[str, str]] = {}
+        found: dict[tuple[object, ...], str] = {}  # definition by its springs
+        quads, isotropic = len(self.mesh.quads) > 0, all(one.isotropic for one in self.materials)
+        usual: tuple[str, ...] = ON_QUADS if quads else ON_TRIANGLES
+        for name in usual if isotropic else ANISOTROPIC[4 if quads else 3]:
+            if among is not None and name not in among:
+                continue
+            try:
+                springs = first.springs(self._sheet, DEFINITIONS[name], None)[0]
+            except DefinitionError as error:
+                self.failures[name] = {"springs": str(error)}
+            except SingularError as error:
+                self.failures[name] = {"patch test": f"unstable: {error}"}
+            else:
+                # Some are the same network: at nu = 1/3 no energy is left, on rectangles no scalar.
+                label = f"{springs.reference:.9g}", *key_of(springs)
+                self.same[name] = found.setdefault(label, name)
+                if self.same[name] == name:
+                    self._springs[name] = springs
         self.names = list(self._springs)
 
-    def springs(self, name: str) -> Springs:
-        """Springs of a definition."""
-        return self._springs[name]
+    def errors(self, name: str) -> dict[str, float | str]:
+        """Errors of a definition [1] by load or quantity; NaN without a reference, or why the network fails."""
+        if name not in self._errors:
+            springs = self._springs[name]
+            found = [self._errors_under(statement, springs) for statement in self.statements]
+            self._errors[name] = {label: error for one in found for label, error in one.items()}
+        return self._errors[name]
 
-    def error(self, name: str, load: str) -> float | str:
-        """Error of a definition under a load [1]; NaN where that has no reference; why the network has none."""
-        springs, kind = self._springs[name], LOADS[load].kind
-        key = kind, key_of(springs)
-        if key not in self._displacements:
-            self._displacements[key] = displacement_of(self._sheet, springs, kind)
-        return error_of(self._displacements[key], springs, load, self.known[load])
+    def _errors_under(self, statement: Statement, springs: Springs) -> dict[str, float | str]:
+        load = statement.load
+        if isinstance(statement, BeamStatement):
+            key = statement.kind, key_of(springs)
+            if key not in self._displacements:
+                self._displacements[key] = displacement_of(self._sheet, springs, statement.kind)
+            return {load: error_of(self._displacements[key], springs, load, cast(References, self.known)[load])}
+        why, values = "", statement.none()
+        try:
+            found = statement.solve(self._sheet, springs)
+        except SingularError as error:
+            why = f"unstable: {error}"
+        else:
+            why = "" if found.status is Status.SOLVED else found.message
+            values = values if why else statement.values(springs, found)
+        known = cast(ShapeReferences, self.known)
+        if why:
+            return dict.fromkeys(known, why)
+        wanted = {name: one.value for name, one in known.items() if not isinstance(one, str)}
+        return dict(quantity_errors({name: values[name] for name in known}, wanted))
 
     def choice(self, name: str) -> Choice:
-        """What a definition is worth."""
-        springs = self._springs[name]
-        found = {load: self.error(name, load) for load in self.known}
-        errors: dict[str, Number] = {load: nan if isinstance(error, str) else error for load, error in found.items()}
-        failures = {load: error for load, error in found.items() if isinstance(error, str)}
+        """Choice of a definition that was tried; one without springs has NaN for all numbers."""
+        if name in self.failures:
+            errors: dict[str, Number] = dict.fromkeys(self.known, nan)
+            return Choice(name, nan, nan, "", name in NEED_ENERGIES, errors, nan, nan, self.failures[name])
+        springs, found = self._springs[name], self.errors(name)
+        failures = {label: error for label, error in found.items() if isinstance(error, str)}
+        if failures and self._test is None:
+            failures = {self.statements[0].load: next(iter(failures.values()))}
+        young = poisson = nan
+        if self._test is not None:
+            moduli = self._axial_moduli(springs)
+            if isinstance(moduli, str):
+                failures["patch test"] = moduli
+            else:
+                material = cast(Material, self.materials[0])
+                young = float(moduli[0] * springs.reference / (material.young_modulus * self.thickness)) - 1
+                poisson = float(moduli[1])
+        return Choice(
+            name,
+            *in_words(self._sheet, self.materials[0] if len(self.materials) == 1 else None, name, springs),
+            bool(springs.energies),
+            errors={label: nan if isinstance(error, str) else error for label, error in found.items()},
+            young_modulus_error=young,
+            poisson_ratio=poisson,
+            failures=failures,
+        )
+
+    def _axial_moduli(self, springs: Springs) -> tuple[float, float] | str:
+        """Young's modulus over the reference stiffness and Poisson's ratio between rollers; or why they are missing."""
+        assert self._test is not None
         key = key_of(springs)
         if key not in self._moduli:
             try:
                 self._moduli[key] = self._test.axial(springs)
             except SingularError as error:
                 self._moduli[key] = f"unstable: {error}"
-        moduli = self._moduli[key]
-        if isinstance(moduli, str):
-            failures["patch test"] = moduli
-            moduli = nan, nan
-        young = moduli[0] * springs.reference / (self.material.young_modulus * self.beam.thickness)
-        return Choice(
-            name,
-            *in_words(self._sheet, self.material, name, springs),
-            bool(springs.energies),
-            errors=errors,
-            young_modulus_error=float(young) - 1,
-            poisson_ratio=float(moduli[1]),
-            failures=failures,
-        )
+        return self._moduli[key]
 
-    def failed(self, name: str) -> Choice:
-        """Choice of a definition that gives no springs here."""
-        return _failed(name, self.known, self.failures[name])
-
-
-def _distinct(
-    mesh: Mesh, derive: Callable[[str], Springs], isotropic: bool = True, among: Iterable[str] | None = None
-) -> tuple[dict[str, Springs], dict[str, str], dict[str, dict[str, str]]]:
-    """Springs of the definitions that are tried on a mesh, each once; by definition whose they are; and failures."""
-    found: dict[str, Springs] = {}
-    same: dict[str, str] = {}
-    failures: dict[str, dict[str, str]] = {}
-    first: dict[tuple[object, ...], str] = {}  # of each springs
-    quads = len(mesh.quads) > 0
-    usual: tuple[str, ...] = ON_QUADS if quads else ON_TRIANGLES
-    for name in usual if isotropic else ANISOTROPIC[4 if quads else 3]:
-        if among is not None and name not in among:
-            continue
-        try:
-            springs = derive(name)
-        except DefinitionError as error:
-            failures[name] = {"springs": str(error)}
-        except SingularError as error:
-            failures[name] = {"patch test": f"unstable: {error}"}
-        else:
-            # Some are the same network: at nu = 1/3 no energy is left, on rectangles no scalar.
-            label = f"{springs.reference:.9g}", *key_of(springs)
-            same[name] = first.setdefault(label, name)
-            if same[name] == name:
-                found[name] = springs
-    return found, same, failures
-
-
-def _failed(name: str, known: Iterable[str], failures: dict[str, str]) -> Choice:
-    errors: dict[str, Number] = dict.fromkeys(known, nan)
-    return Choice(name, nan, nan, "", name in NEED_ENERGIES, errors, nan, nan, failures)
+    def cost(self, name: str) -> tuple[float, float]:
+        """Seconds of the longest static solve, and the largest stable explicit step [s], NaN where it is not found."""
+        springs, inertia, seconds = self._springs[name], self.statements[0].masses(), 0.0
+        for statement in {one.loading.key: one for one in self.statements}.values():
+            sheet = Sheet(self.mesh, self.thickness)
+            begin = time.perf_counter()
+            statement.solve(sheet, springs)
+            seconds = max(seconds, time.perf_counter() - begin)
+        if inertia is None:
+            return seconds, nan
+        steps = stable_steps(Sheet(self.mesh, self.thickness), springs, inertia, ["central-difference"])
+        return seconds, nan if isinstance(steps, str) else float(steps["central-difference"])
 
 
 def in_words(sheet: Sheet, material: AnyMaterial | None, name: str, springs: Springs) -> tuple[float, float, str]:
-    """Stiffness of sides inside and on the outline, and in words what else there is."""
+    """Stiffness of sides inside and on the outline, and the rest in words."""
     mesh = sheet.mesh
     outline, several = mesh.on_outline, mesh.cells_per_edge > 1
     inside, at_outline, diagonals = (
@@ -594,11 +528,11 @@ def in_words(sheet: Sheet, material: AnyMaterial | None, name: str, springs: Spr
 
 
 def _common(values: np.ndarray) -> float:
-    """The one that all values are, NaN where they differ."""
+    """The common value of all, NaN where they differ."""
     alike = len(values) and values.any() and np.ptp(values) <= ALIKE * np.abs(values).max()
     return float(np.median(values)) if alike else nan
 
 
 def key_of(springs: Springs) -> tuple[bytes, ...]:
-    """What tells networks apart but for their reference stiffness."""
+    """Key of a network up to its reference stiffness."""
     return springs.relative.tobytes(), *(energy.key for energy in springs.energies)

@@ -1,38 +1,29 @@
 """Which mesh keeps an error: the coarsest one of each type, found by solving.
 
 Errors do not fall evenly with the mesh size: the error of one load may pass through zero, and whole numbers of cells
-stretch a mesh now more, now less. So a mesh is not taken because it happens to keep the error. It is taken with a
-definition that keeps it there and on every finer mesh of its type that was tried, up to one with at least twice as many
-cells across the beam, two finer ones at least; and that would still keep it there if its error changed once more by as
-much as it did over the last doubling of the cells, so that it is not just passing by zero. Finer meshes are those of
-whole numbers of cells across, and some of sizes between these, whose cells are stretched to fit.
+stretch a mesh now more, now less. So one mesh that keeps the error proves nothing. A mesh counts if a definition
+keeps the error on it and on all finer meshes tried, at least two, up to one with twice as many cells across the beam.
+The last change over a doubling of the cells may happen once more, so that the error is not just passing zero. Finer
+meshes have whole numbers of cells across, and some sizes between, whose cells are stretched to fit.
 """
 
 import math
-import time
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import count, takewhile
-from typing import Any
 
 import numpy as np
 
-from ..mechanics.dynamics import masses
-from ..mesh import MESH_TYPES, Mesh
+from ..mesh import MESH_TYPES
 from ..mesh.groups import GroupedMesh
 from ..mesh.outlines import mesh_shape
 from ..problem.geometry import Beam
-from ..problem.loads import LOADS
 from ..problem.materials import AnyMaterial, Material
 from ..problem.quantities import nearest, quantity
 from ..problem.shapes import Shape
-from ..scene.meshes import A_MATERIAL, A_SHAPE, check_filled, is_a
-from ..scene.motion import stable_steps
-from ..scene.sheet import Sheet
-from ..scene.statements import ShapeStatement
-from ..springs import Springs
+from ..scene.meshes import A_MATERIAL, A_SHAPE, is_a
+from ..scene.statements import ShapeStatement, Statement
 from .bands import FEWEST_CELLS
 from .choices import (
     CASES,
@@ -43,9 +34,9 @@ from .choices import (
     Choice,
     References,
     ShapeReferences,
-    TriedMesh,
-    TriedShape,
+    Trial,
     as_sure_as,
+    beam_statements,
     check_beam,
     check_loads,
     in_order,
@@ -55,11 +46,13 @@ from .choices import (
 )
 
 ENOUGH_FINER, FEWEST_FINER = 2.0, 2
-"""Cells across the finest mesh that was tried over those of the one that is taken, and how many finer ones were, at
-least."""
+"""Cells across the finest mesh tried over those of the answer, and number of finer meshes tried, at least."""
+
+ROW_HEIGHT = math.sqrt(3) / 2
+"""Height of an equilateral triangle, over its side."""
 
 LEFT_TO_GO = 1.5
-"""What may be left of an error's way to its limit, over what is left of one in proportion to the mesh size."""
+"""Allowed rest of an error's way to its limit, over the rest of an error in proportion to the mesh size."""
 
 
 EVERY_UP_TO, STEPS_A_DOUBLING, TRIED_BETWEEN = 16, 4, 2
@@ -67,10 +60,10 @@ EVERY_UP_TO, STEPS_A_DOUBLING, TRIED_BETWEEN = 16, 4, 2
 tried between two of these, where the coarsest mesh is."""
 
 DEFINITIONS_TRIED = tuple(dict.fromkeys((*ON_TRIANGLES, *ON_QUADS)))
-"""Definitions of which some live on each mesh."""
+"""Definitions to try; each mesh supports some."""
 
 SPRINGS_ALONE = tuple(name for name in DEFINITIONS_TRIED if name not in NEED_ENERGIES)
-"""Definitions that need nothing but springs."""
+"""Definitions of springs alone."""
 
 BETWEEN_DIVISIONS = (0.98, 0.95, 0.9, 0.83, 0.7, 0.56)
 """Sizes between whole divisions that an answer is tried on, over its own."""
@@ -149,10 +142,10 @@ class MeshChoice:
         The definition, its stiffness and its errors.
     particles, springs : int
     seconds : float
-        That one static solve takes with linear kinematics, springs at hand, the longest of the loads'; measured once.
+        Time of one static solve with linear kinematics, without deriving springs, the longest of the loads.
     step_limit : float
-        Largest stable step of undamped explicit schemes about rest [s], the sheet held nowhere, which is the least of
-        all supports; NaN where the material has no density, or the eigenvalue could not be found.
+        Largest stable step of undamped explicit schemes about rest [s], the sheet held nowhere, which no
+        support lowers; NaN without a density, or if the eigenvalue is not found.
     finer : tuple of SolvedMesh
         Finer meshes that were tried, on each of which the definition keeps the error, too.
     confirmed : bool
@@ -197,18 +190,18 @@ class MeshSearch:
     Attributes
     ----------
     error : float
-        What is to be kept [1].
+        Error to keep [1].
     loads : tuple of str
-        Under which.
+        Loads that keep it.
     most : int
         Particles of the largest mesh that may be tried.
     known : dict
-        Reference of 1 N by load; of a shape that of each quantity of interest, and `loads` are those quantities.
+        Reference of 1 N by load; of a shape by quantity of interest, and `loads` are these quantities.
     by_type : dict of str to MeshChoice or None
-        By mesh type the coarsest mesh, with whatever definition keeps the error; None where none does up to `most`
-        particles. Where too few finer ones are as small, one that is not `MeshChoice.confirmed`.
+        The coarsest mesh by mesh type, with a definition that keeps the error; None if there is none up to `most`
+        particles. Without enough finer meshes it is not `MeshChoice.confirmed`.
     springs_by_type : dict of str to MeshChoice or None
-        As `by_type`, with springs alone.
+        As `by_type`, for springs alone.
     tried : tuple of SolvedMesh
         All that was solved, each type from coarse to fine.
 
@@ -235,12 +228,12 @@ class MeshSearch:
 
     @property
     def best(self) -> MeshChoice | None:
-        """The one of least particles of all types, confirmed ones first; None where none keeps the error."""
+        """The mesh with the fewest particles, confirmed ones first; None if no mesh keeps the error."""
         return self._least(self.by_type)
 
     @property
     def best_springs(self) -> MeshChoice | None:
-        """The one of least particles that has springs alone; None where none keeps the error."""
+        """The mesh with the fewest particles and springs alone; None if no mesh keeps the error."""
         return self._least(self.springs_by_type)
 
     def _least(self, found: dict[str, MeshChoice | None]) -> MeshChoice | None:
@@ -256,13 +249,7 @@ class MeshSearch:
 
 
 def asked_error(value: float | str) -> float:
-    """Error that is to be kept [1].
-
-    Examples
-    --------
-    >>> asked_error("1 %"), asked_error(0.01)
-    (0.01, 0.01)
-    """
+    """Error to keep [1], of a number or a text such as "1 %"."""
     number = math.nan
     if isinstance(value, str):
         text = value.strip()
@@ -292,13 +279,13 @@ def find_mesh(
     Parameters
     ----------
     beam : Beam or Shape
-        A shape has an outline; what is to be kept is the error of all quantities of interest of a load case.
+        A shape needs an outline; all quantities of interest of a load case keep the error.
     material : Material, AnisotropicMaterial or mapping of str to those
         Of a shape of several parts by their names.
     error : float or str
         Largest size of an error to keep, a fraction or a text such as ``"1 %"``.
     loads : iterable of str, optional
-        Loads of a beam under which it is to be kept: of traction, compression, bending, shear and pressure.
+        Loads of a beam that keep it: of traction, compression, bending, shear and pressure.
     mesh_types : sequence of str, optional
         Keys of `springtune.MESH_TYPES`, for a beam; all without. Meshes of shapes are free ones.
     load : str, optional
@@ -313,8 +300,8 @@ def find_mesh(
     Raises
     ------
     ValueError
-        If an argument is none or unknown, a load has no reference, or the error is below what the reference's own error
-        estimate allows.
+        If an argument is wrong or unknown, a load has no reference, or the error is not above
+        the error estimate of the reference.
 
     Notes
     -----
@@ -351,19 +338,74 @@ def find_mesh(
         raise ValueError(f"load: {load!r} is of shapes alone; give loads for a beam")
     check_beam(beam)
     is_a(material, Material, "material", A_MATERIAL)
-    assert isinstance(material, Material)  # as type checkers are told
-    wanted, loads = asked_error(error), check_loads(loads)
+    assert isinstance(material, Material)  # for type checkers
+    asked_error(error)
+    loads = check_loads(loads)
     names = tuple(MESH_TYPES) if mesh_types is None else _mesh_types(mesh_types)
     if not (isinstance(most, int) and most > 0):
         raise ValueError(f"most: {most!r} is no number of particles; give one such as {SOLVED}")
     known = references(beam, material, loads)
-    estimates = {}
     for load, found in known.items():
         if isinstance(found, str):
             raise ValueError(f"loads: {load!r} has no reference, so no error can be kept: {found}")
-        estimates[load] = found.error_estimate
-    _check_estimates(wanted, estimates, error)
-    searches = [_TypeSearch(name, beam, material, known, estimates, wanted, most) for name in names]
+    families = [_beam_family(beam, material, loads, name) for name in names]
+    return _searched(families, known, error, loads, most)
+
+
+def find_shape_mesh(
+    shape: Shape,
+    material: AnyMaterial | Mapping[str, AnyMaterial],
+    error: float | str,
+    *,
+    load: str | None = None,
+    make: Callable[[float], GroupedMesh] | None = None,
+    most: int = SOLVED,
+) -> MeshSearch:
+    """As `find_mesh`, of a shape: all quantities of a load case keep the error.
+
+    `make` makes a mesh of a size [m]; `springtune.mesh_shape` by default.
+    """
+    is_a(shape, Shape, "shape", A_SHAPE)
+    if shape.file:
+        raise ValueError(
+            f"shape {shape.name!r}: has the mesh of its file, so there is none to be found; give an outline, or files "
+            "of finer meshes"
+        )
+    asked_error(error)
+    (left, low), (right, top) = shape.extent
+    side, load = min(right - left, top - low), only_load(shape, load)
+
+    def statement(size: float) -> ShapeStatement:
+        return ShapeStatement(shape, make(size) if make else mesh_shape(shape, size), material, load, 1.0, "linear")
+
+    known = shape_references(statement(side / 4))
+    for name, one in known.items():
+        if isinstance(one, str) or not one.value:
+            why = one if isinstance(one, str) else "it is zero"
+            raise ValueError(
+                f"load {load!r}: {name!r} has no reference, so no error of it can be kept: {why}; take it "
+                "out of the quantities"
+            )
+    family = _Family(
+        "free", side, side, lambda size: shape.area / (ROW_HEIGHT * size**2), lambda size: [statement(size)]
+    )
+    return _searched([family], known, error, tuple(known), most)
+
+
+def _searched(
+    families: "Sequence[_Family]",
+    known: References | ShapeReferences,
+    error: float | str,
+    loads: tuple[str, ...],
+    most: int,
+) -> MeshSearch:
+    """Search each family of meshes."""
+    wanted = asked_error(error)
+    estimates = {name: one.error_estimate for name, one in known.items() if not isinstance(one, str)}
+    if wanted <= max(estimates.values()):
+        least = f"{200 * max(estimates.values()):.1g} %"
+        raise ValueError(f"error: {error!r} is below the error estimate of the reference; give at least {least}")
+    searches = [_Search(family, known, estimates, wanted, most) for family in families]
     for search in searches:
         search.climb()
     return MeshSearch(
@@ -374,6 +416,36 @@ def find_mesh(
         {search.name: search.found(springs_alone=False) for search in searches},
         {search.name: search.found(springs_alone=True) for search in searches},
         tuple(one for search in searches for one in search.solved()),
+    )
+
+
+@dataclass(frozen=True)
+class _Family:
+    """Meshes of a body that differ in their size.
+
+    `side` is the smaller side of the body [m], which no mesh size exceeds; `one_cell` the mesh size of one cell across
+    it. From a mesh size [m] come about how many `particles`, `statements` on the mesh, and the `stretch` of its cells,
+    if it depends on the size.
+    """
+
+    name: str
+    side: float
+    one_cell: float
+    particles: Callable[[float], float]
+    statements: Callable[[float], Sequence[Statement]]
+    stretch: Callable[[float], float] | None = None
+
+
+def _beam_family(beam: Beam, material: Material, loads: tuple[str, ...], name: str) -> _Family:
+    """Meshes of a beam, of one type."""
+    box, make = (beam.length, beam.height), MESH_TYPES[name]
+    return _Family(
+        name,
+        min(box),
+        beam.height / make.row_height if beam.height <= beam.length else beam.length,
+        partial(make.particles, *box),
+        lambda size: beam_statements(beam, make(*box, size), material, loads),
+        partial(make.stretch, *box),
     )
 
 
@@ -395,42 +467,28 @@ def _cells(rung: int) -> int:
     return rung + 1 if beyond <= 0 else math.ceil(EVERY_UP_TO * 2 ** (beyond / STEPS_A_DOUBLING))
 
 
-def _number(error: float | str) -> float:
-    return math.nan if isinstance(error, str) else error
-
-
-class _Search(ABC):
-    """Meshes of one type, by the number of cells across; each solved once."""
+class _Search:
+    """Meshes of a family, by the number of cells across; each solved once."""
 
     def __init__(
-        self, name: str, known: Mapping[str, Any], estimates: dict[str, float], error: float, most: int
+        self,
+        family: _Family,
+        known: References | ShapeReferences,
+        estimates: dict[str, float],
+        error: float,
+        most: int,
     ) -> None:
-        self.name, self.known, self.error, self._estimates, self._most = name, known, error, estimates, most
+        self.family, self.name, self.known, self.error = family, family.name, known, error
+        self._estimates, self._most = estimates, most
         self._tried: dict[float, SolvedMesh] = {}  # by cells across
         self._first: dict[bytes, float] = {}  # cells across the first of equal meshes, by its points
         self._same: dict[float, float] = {}  # and by those across each of them
         self._found: dict[tuple[int, str], MeshChoice] = {}
         self._finest = next(cells for cells in map(_cells, count()) if self._particles(cells) > most)
 
-    @abstractmethod
-    def _exact(self, cells: float) -> tuple[float, float]:
-        """Mesh size of so many cells across, and the smaller side, which no mesh size exceeds [m]."""
-
-    @abstractmethod
     def _particles(self, cells: int) -> float:
-        """Particles of such a mesh, about."""
-
-    @abstractmethod
-    def _mesh(self, size: float) -> Mesh:
-        """The mesh of a size."""
-
-    @abstractmethod
-    def _trial(self, mesh: Mesh, names: Sequence[str]) -> "TriedMesh | TriedShape":
-        """Some definitions on it."""
-
-    @abstractmethod
-    def _cost(self, mesh: Mesh, springs: Springs) -> tuple[float, float]:
-        """Seconds of the longest static solve of some loads, and the largest stable explicit step [s]."""
+        """Particles of a mesh of so many cells across, about."""
+        return self.family.particles(self.size(cells))
 
     def climb(self) -> None:
         """Try meshes from coarse to fine until both questions are answered, or no larger one may be."""
@@ -468,29 +526,32 @@ class _Search(ABC):
             FINER[4::5] if cells < FEWEST_CELLS else ()
         )  # errors are irregular on so few cells
         sizes = (*(size * part for part in parts), *self._stretched(size))
-        found = (round(self._exact(1)[0] / one, ACROSS_DECIMALS) for one in sizes)
+        found = (round(self.family.one_cell / one, ACROSS_DECIMALS) for one in sizes)
         return [int(one) if one == int(one) else one for one in found]
 
     def _stretched(self, size: float) -> list[float]:
         """Sizes down to half of one whose cells are stretched most."""
-        return []
+        if self.family.stretch is None:
+            return []
+        sizes = [size * part for part in FINER]
+        # Stretches that differ by rounding are one.
+        stretch = np.round([self.family.stretch(one) for one in sizes], 9)
+        return [sizes[np.argmin(stretch)], sizes[np.argmax(stretch)]]
 
     def size(self, cells: float) -> float:
         """Mesh size [m] of so many cells across the smaller side, rounded up."""
-        exact, side = self._exact(cells)
-        exact *= 1e3
+        exact = self.family.one_cell / cells * 1e3
         digit = 10.0 ** (math.floor(math.log10(exact)) + 1 - SIZE_DIGITS)
         # By its text, as the option of a command has it; what is a hair above a digit is that digit.
-        return min(
-            side, quantity(f"{math.ceil(exact / digit * (1 - 1e-9)) * digit:.{SIZE_DIGITS}g} mm", "length", "size")
-        )
+        text = f"{math.ceil(exact / digit * (1 - 1e-9)) * digit:.{SIZE_DIGITS}g} mm"
+        return min(self.family.side, quantity(text, "length", "size"))
 
     def solved(self) -> list[SolvedMesh]:
         """All that was tried, from coarse to fine."""
         return [self._tried[cells] for cells in sorted(self._tried)]
 
     def found(self, springs_alone: bool) -> MeshChoice | None:
-        """The coarsest mesh that is taken, and what it costs; None where there is none."""
+        """The coarsest mesh that counts, with its cost; None without one."""
         sure = self._start(springs_alone) if self._holds(springs_alone) else None
         start = sure or self._start(springs_alone, confirmed=False)
         if start is None:
@@ -499,8 +560,7 @@ class _Search(ABC):
         one = self._tried[cells]
         name = in_order(names, one.worst, lambda name: (name in NEED_ENERGIES, name), as_sure_as(self.known))[0]
         if (cells, name) not in self._found:
-            mesh = self._mesh(one.size)
-            tried = self._trial(mesh, [name])
+            tried = Trial(self.family.statements(one.size), self.known, [name])
             self._found[cells, name] = MeshChoice(
                 self.name,
                 one.size,
@@ -508,7 +568,7 @@ class _Search(ABC):
                 tried.choice(name),
                 one.particles,
                 one.springs,
-                *self._cost(mesh, tried.springs(name)),
+                *tried.cost(name),
                 tuple(finer for finer in self.solved() if finer.cells > cells and name in finer.errors),
                 sure is not None,
             )
@@ -519,12 +579,12 @@ class _Search(ABC):
         if self._particles(cells) > self._most:
             return False
         size = self.size(cells)
-        mesh = self._mesh(size)
-        particles = len(mesh.points)
+        statements = self.family.statements(size)
+        particles = len(statements[0].mesh.points)
         whole = [(other, one.particles) for other, one in self._tried.items() if other == int(other)]
         # A mesh of its own has more particles than coarser ones and fewer than finer ones.
         if all((particles > count) == (cells > other) for other, count in whole):
-            self._solve(cells, size, mesh, names)
+            self._solve(cells, size, statements, names)
         return True
 
     def _check(self, cells: float, names: Sequence[str]) -> bool:
@@ -533,21 +593,22 @@ class _Search(ABC):
         if cells in self._tried and all(name in self._tried[cells].errors for name in names):
             return False
         size = self.size(cells)
-        mesh = self._mesh(size)
-        same = self._same[cells] = self._first.setdefault(mesh.points.tobytes(), cells)
+        statements = self.family.statements(size)
+        same = self._same[cells] = self._first.setdefault(statements[0].mesh.points.tobytes(), cells)
         if same != cells:
             return self._check(same, names)
-        self._solve(cells, size, mesh, names)
+        self._solve(cells, size, statements, names)
         return True
 
-    def _solve(self, cells: float, size: float, mesh: Mesh, names: Sequence[str]) -> None:
-        """Solve definitions on a mesh, those that were solved on it before no more."""
+    def _solve(self, cells: float, size: float, statements: Sequence[Statement], names: Sequence[str]) -> None:
+        """Solve the definitions that were not solved on a mesh before."""
+        mesh = statements[0].mesh
         self._first.setdefault(mesh.points.tobytes(), cells)
         errors = dict(self._tried[cells].errors) if cells in self._tried else {}
-        tried = self._trial(mesh, [name for name in names if name not in errors])
-        errors |= {
-            name: {load: _number(tried.error(same, load)) for load in self.known} for name, same in tried.same.items()
-        }
+        tried = Trial(statements, self.known, [name for name in names if name not in errors])
+        for name, same in tried.same.items():
+            found = tried.errors(same)
+            errors[name] = {load: math.nan if isinstance(one, str) else one for load, one in found.items()}
         errors |= {name: dict.fromkeys(self.known, math.nan) for name in tried.failures}
         self._tried[cells] = SolvedMesh(self.name, size, cells, len(mesh.points), len(mesh.edges), errors)
 
@@ -562,10 +623,10 @@ class _Search(ABC):
         return [cells for cells in whole if name in self._tried[cells].errors]
 
     def _promising(self, name: str) -> bool:
-        """Whether a definition may keep the error on the finest mesh, as far as the last ones tell.
+        """Whether a definition may keep the error on the finest mesh, by its last errors.
 
-        An error that changes in proportion to the mesh size changes from n cells to m by the 1 - n/m of what it changed
-        by from n/2 to n, and by less if in proportion to a higher power.
+        An error in proportion to the mesh size changes from n cells to m by 1 - n/m of its change from n/2 to n, and by
+        less if in proportion to a higher power.
         """
         on = self._on(name)
         doubling = self._doubling(name)
@@ -620,169 +681,3 @@ class _Search(ABC):
                 names = [name for name in names if self._keeps(name, cells)]
                 if not names:
                     return
-
-
-class _TypeSearch(_Search):
-    """Meshes of a beam, of one type."""
-
-    def __init__(
-        self,
-        name: str,
-        beam: Beam,
-        material: Material,
-        known: References,
-        estimates: dict[str, float],
-        error: float,
-        most: int,
-    ) -> None:
-        self.beam, self.material, self._type, self._references = beam, material, MESH_TYPES[name], known
-        super().__init__(name, known, estimates, error, most)
-
-    def _exact(self, cells: float) -> tuple[float, float]:
-        length, height = self.beam.length, self.beam.height
-        return (height / self._type.row_height if height <= length else length) / cells, min(length, height)
-
-    def _particles(self, cells: int) -> float:
-        return self._type.particles(self.beam.length, self.beam.height, self.size(cells))
-
-    def _stretched(self, size: float) -> list[float]:
-        sizes = [size * part for part in FINER]
-        # Stretches that differ by rounding are one.
-        stretch = np.round([self._type.stretch(self.beam.length, self.beam.height, one) for one in sizes], 9)
-        return [sizes[np.argmin(stretch)], sizes[np.argmax(stretch)]]
-
-    def _mesh(self, size: float) -> Mesh:
-        mesh = self._type(self.beam.length, self.beam.height, size)
-        check_filled(mesh, self.beam)
-        return mesh
-
-    def _trial(self, mesh: Mesh, names: Sequence[str]) -> TriedMesh:
-        return TriedMesh(mesh, self.beam, self.material, self._references, names)
-
-    def _cost(self, mesh: Mesh, springs: Springs) -> tuple[float, float]:
-        seconds, thickness, density = 0.0, self.beam.thickness, self.material.density
-        for kind in {LOADS[load].kind: None for load in self.known}:
-            sheet = Sheet(mesh, thickness)
-            begin = time.perf_counter()
-            sheet.solve(kind, springs, springs.reference, "linear")
-            seconds = max(seconds, time.perf_counter() - begin)
-        if density is None:
-            return seconds, math.nan
-        return seconds, _step(Sheet(mesh, thickness), springs, masses(mesh, density, thickness))
-
-
-def _step(sheet: Sheet, springs: Springs, inertia: np.ndarray) -> float:
-    """Largest stable explicit step [s]; NaN where its eigenvalue is not found."""
-    steps = stable_steps(sheet, springs, inertia, ["central-difference"])
-    return math.nan if isinstance(steps, str) else float(steps["central-difference"])
-
-
-class _ShapeSearch(_Search):
-    """Meshes of a shape under a load case."""
-
-    def __init__(
-        self,
-        shape: Shape,
-        materials: AnyMaterial | Mapping[str, AnyMaterial],
-        load: str,
-        make: Callable[[float], GroupedMesh],
-        error: float | str,
-        most: int,
-    ) -> None:
-        self.shape, self.materials, self.load, self._make = shape, materials, load, make
-        (left, low), (right, top) = shape.extent
-        self._side = min(right - left, top - low)
-        self._statements: dict[int, ShapeStatement] = {}
-        self._references = shape_references(self._statement(make(self._side / 4)))
-        estimates = {}
-        for name, one in self._references.items():
-            if isinstance(one, str) or not one.value:
-                why = one if isinstance(one, str) else "it is zero"
-                raise ValueError(f"load {load!r}: {name!r} has no reference, so no error of it can be kept: {why}; "
-                                 "take it out of the quantities")  # fmt: skip
-            estimates[name] = one.error_estimate
-        _check_estimates(asked_error(error), estimates, error)
-        super().__init__("free", self._references, estimates, asked_error(error), most)
-
-    def _statement(self, grouped: GroupedMesh) -> ShapeStatement:
-        found = ShapeStatement(self.shape, grouped, self.materials, self.load, 1.0, "linear")
-        self._statements = {id(grouped.mesh): found}
-        return found
-
-    def _exact(self, cells: float) -> tuple[float, float]:
-        return self._side / cells, self._side
-
-    def _particles(self, cells: int) -> float:
-        return self.shape.area / (ROW_HEIGHT * self.size(cells) ** 2)
-
-    def _mesh(self, size: float) -> Mesh:
-        return self._statement(self._make(size)).mesh
-
-    def _trial(self, mesh: Mesh, names: Sequence[str]) -> TriedShape:
-        return TriedShape(self._statements[id(mesh)], self._references, names)
-
-    def _cost(self, mesh: Mesh, springs: Springs) -> tuple[float, float]:
-        statement = self._statements[id(mesh)]
-        begin = time.perf_counter()
-        statement.solve(Sheet(mesh, statement.thickness), springs)
-        seconds, inertia = time.perf_counter() - begin, statement.masses()
-        if inertia is None:
-            return seconds, math.nan
-        return seconds, _step(Sheet(mesh, statement.thickness), springs, inertia)
-
-
-ROW_HEIGHT = math.sqrt(3) / 2
-"""Height of an equilateral triangle, over its side."""
-
-
-def find_shape_mesh(
-    shape: Shape,
-    material: AnyMaterial | Mapping[str, AnyMaterial],
-    error: float | str,
-    *,
-    load: str | None = None,
-    make: Callable[[float], GroupedMesh] | None = None,
-    most: int = SOLVED,
-) -> MeshSearch:
-    """Coarsest mesh of a shape on which a definition keeps an error of all quantities of a load case, as `find_mesh`.
-
-    Parameters
-    ----------
-    load : str, optional
-        Of the shape; its only one without.
-    make : callable, optional
-        From a mesh size [m] to a mesh; `springtune.mesh_shape` of the shape without.
-
-    Examples
-    --------
-    >>> import springtune as st
-    >>> study = st.load_study("config/shapes.yaml")
-    >>> best = st.find_mesh(study.shape("cook"), study.material("third"), "2 %", load="shear").best
-    >>> best.confirmed, best.choice.worst <= 0.02
-    (True, True)
-    """
-    is_a(shape, Shape, "shape", A_SHAPE)
-    if shape.file:
-        raise ValueError(
-            f"shape {shape.name!r}: has the mesh of its file, so there is none to be found; give an outline, or files "
-            "of finer meshes"
-        )
-    wanted, load = asked_error(error), only_load(shape, load)
-    search = _ShapeSearch(shape, material, load, make or partial(mesh_shape, shape), error, most)
-    search.climb()
-    return MeshSearch(
-        wanted,
-        tuple(search.known),
-        most,
-        dict(search.known),
-        {search.name: search.found(springs_alone=False)},
-        {search.name: search.found(springs_alone=True)},
-        tuple(search.solved()),
-    )
-
-
-def _check_estimates(wanted: float, estimates: Mapping[str, float], error: float | str) -> None:
-    """Refuse an error that references cannot tell."""
-    if wanted <= max(estimates.values()):
-        least = f"{200 * max(estimates.values()):.1g} %"
-        raise ValueError(f"error: {error!r} is below the error estimate of the reference; give at least {least}")

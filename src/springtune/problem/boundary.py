@@ -61,12 +61,17 @@ def measured(mesh: Mesh, kind: LoadKind) -> np.ndarray:
 
     The mean over the loaded side; for pressure its middle, interpolated along its edge.
     """
+    return displacement_weights(loaded_box(mesh, kind), kind.case.quantities[0])
+
+
+def loaded_box(mesh: Mesh, kind: LoadKind) -> GroupedMesh:
+    """Mesh of a box with the groups that a kind of load measures: its loaded side, or the middle of a pressed one."""
     if not kind.pressed:
-        return weights(mesh, kind)
+        return box(mesh, [kind.loaded])
     middle = np.zeros(2)
     middle[kind.normal] = kind.loaded.place(*mesh.points.max(axis=0))
     middle[kind.along] = 0.5 * (mesh.points[:, kind.along].min() + mesh.points[:, kind.along].max())
-    return displacement_weights(GroupedMesh(mesh, points={MIDDLE: middle}), kind.case.quantities[0])
+    return GroupedMesh(mesh, points={MIDDLE: middle})
 
 
 def supported(grouped: GroupedMesh, case: LoadCase) -> tuple[np.ndarray, np.ndarray]:

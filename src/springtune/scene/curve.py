@@ -26,34 +26,18 @@ RATIOS = tuple(COEFFICIENT * np.linspace(0.4, 1.6, 61))
 
 
 LEAST_RATIO = 1e-9
-"""Ratio above which stiffnesses have to be, and below one over which [1]."""
+"""Least ratio of a stiffness; the largest is one over it [1]."""
 
 
 def follow(sheet: Sheet, kind: LoadKind, kinematics: str, loads: np.ndarray) -> LinearPath | StablePath:
-    """Equilibrium path of springs of one stiffness, as far as loads need it.
-
-    Parameters
-    ----------
-    loads : ndarray of float, shape (n,)
-        Force over stiffness, all of one sign [m].
-    """
+    """Equilibrium path of springs of one stiffness, as far as `loads` need it: force over stiffness [m], one sign."""
     problem = sheet.problem(kind, Springs(1.0, uniform(sheet.mesh)))
     return (LinearPath if kinematics == "linear" else StablePath)(problem, sheet.measured(kind), loads)
 
 
 def meeting(path: LinearPath | StablePath, force: float, stiffness: np.ndarray, displacement: np.ndarray,
             stable: np.ndarray, reference: float, objection: str) -> Best:  # fmt: skip
-    """Stiffness at which a curve meets its reference.
-
-    Parameters
-    ----------
-    force : float
-        [N]
-    stiffness, displacement, stable : ndarray, shape (n,)
-        The curve [N/m, m], and whether its equilibria are stable.
-    reference : float
-        Displacement of the reference [m].
-    """
+    """Stiffness at which a curve of displacements [m] over stiffnesses [N/m] meets its reference [m]; force in N."""
     if objection:
         return Best(np.nan, Status.FAILED, f"{objection}; take a smaller force or linear kinematics")
     best = best_stiffness(stiffness, displacement, stable, reference, lambda stiffness: path.value(force / stiffness))
@@ -93,12 +77,12 @@ class Curve:
     stable : ndarray of bool, shape (n,)
         Whether the path from rest gets there and is stable all the way.
     message : str
-        Why it is not; empty where all are stable.
+        Why some are not stable; empty where all are.
     best_stiffness : float
-        Where a stable equilibrium has no error [N/m]; NaN where there is none.
+        Stiffness of the stable equilibrium without error [N/m]; NaN without one.
     best_status : Status
     best_message : str
-        Why there is none.
+        Why `best_stiffness` is NaN.
     predicted_stiffness : float
         By closed form [N/m], of rows of equilateral triangles, see `springtune.springs.lattice.predicted_stiffness`;
         NaN for loads that have none.
@@ -160,7 +144,7 @@ def sensitivity(scene: "Scene", stiffness_ratios: ArrayLike | None = None) -> Cu
     Parameters
     ----------
     scene : Scene
-        Its definition plays no part; a force that follows its side, in nonlinear kinematics, has no curve.
+        Its definition is not used; a force that follows its side, in nonlinear kinematics, has no curve.
     stiffness_ratios : array_like of float, optional
         Stiffnesses over E t [1], above zero; 61 from 0.4 to 1.6 times sqrt(3)/2 without.
 

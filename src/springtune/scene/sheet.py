@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
+from math import inf
 from typing import Any, TypeVar
 
 import numpy as np
@@ -25,78 +26,34 @@ from ..springs import DEFINITIONS, Definition, DefinitionError, Springs
 from ..springs.identification import Case, patch_cases
 
 NETWORKS = 6
-"""Factorized networks of a mesh that are kept: scenes come in an order in which few are enough."""
+"""Factorized networks of a mesh that are kept; few are enough for scenes in order."""
 
 
-@dataclass(frozen=True)
-class OwnDefinition:
-    """A function of one's own in the place of a definition of `springtune.springs.DEFINITIONS`.
-
-    Attributes
-    ----------
-    function : callable
-        (mesh, material, thickness) -> Springs.
-    """
-
-    function: Callable[..., Springs]
-    uniform: bool = False
-    uniaxial: bool = False
-    needs: str = ""
-    finite_strain: bool = False
-
-    @property
-    def name(self) -> str:
-        """What it is called in messages."""
-        return getattr(self.function, "__name__", type(self.function).__name__)
-
-    def springs(self, mesh: Mesh, material: AnyMaterial, thickness: float, given: object = None) -> Springs:
-        """Springs of a mesh, checked."""
-        found = self.function(mesh, material, thickness)
-        if not isinstance(found, Springs):
-            raise DefinitionError(f"returns {type(found).__name__}; return springtune.Springs(reference, relative)")
-        if np.shape(found.relative) != (len(mesh.edges),) or not found.reference > 0:
-            raise DefinitionError(
-                f"returns {np.shape(found.relative)} stiffnesses over {found.reference!r} N/m; return one for each of "
-                f"the {len(mesh.edges)} edges of the mesh, over a reference stiffness above zero"
-            )
-        return found
-
-
-AnyDefinition = str | Definition | OwnDefinition | Callable[..., Springs]
-"""Definition by its name, or a function of one's own."""
+AnyDefinition = str | Definition | Callable[..., Springs]
+"""Definition, its name, or a function (mesh, material, thickness) -> Springs."""
 
 Entry = TypeVar("Entry")
 
 
-def definition_of(definition: AnyDefinition) -> Definition | OwnDefinition:
-    """Definition by its name, or of a function of one's own.
-
-    Parameters
-    ----------
-    definition : str, Definition or callable
-        Key of `springtune.springs.DEFINITIONS`, or (mesh, material, thickness) -> Springs.
-
-    Examples
-    --------
-    >>> definition_of("lattice").name
-    'lattice'
-    """
-    if isinstance(definition, Definition | OwnDefinition):
+def definition_of(definition: AnyDefinition) -> Definition:
+    """Definition by its name, or of a function (mesh, material, thickness) -> Springs."""
+    if isinstance(definition, Definition):
         return definition
     if callable(definition):
-        return OwnDefinition(definition)
+        name = getattr(definition, "__name__", type(definition).__name__)
+        return Definition(name, definition, inf, False, (3, 4), False, "", True, False)
     return chosen(DEFINITIONS, definition, "definition")
 
 
 def chosen(known: Mapping[str, Entry], name: object, what: str) -> Entry:
-    """Entry of a mapping, or an error that says what there is."""
+    """Entry of a mapping, or an error that lists the known names."""
     if isinstance(name, str) and name in known:
         return known[name]
     raise ValueError(f"{what}: {name!r} is unknown; {nearest(str(name), known)}")
 
 
-def check_stiffness(definition: Definition | OwnDefinition, stiffness: object) -> None:
-    """Refuse a definition that lacks the uniform stiffness that it is told, or has one that it does not use."""
+def check_stiffness(definition: Definition, stiffness: object) -> None:
+    """Refuse a definition without the uniform stiffness that it needs, or with one that it does not use."""
     if (definition.needs == "stiffness") == (stiffness is not None):
         return
     if stiffness is None:
@@ -110,8 +67,8 @@ def check_stiffness(definition: Definition | OwnDefinition, stiffness: object) -
 
 
 @contextmanager
-def named(definition: Definition | OwnDefinition) -> Iterator[None]:
-    """Context in which a definition that refuses a mesh or material is named."""
+def named(definition: Definition) -> Iterator[None]:
+    """Context that adds the name of a definition to its errors."""
     try:
         yield
     except DefinitionError as error:
@@ -120,20 +77,10 @@ def named(definition: Definition | OwnDefinition) -> Iterator[None]:
 
 @dataclass(frozen=True, eq=False)
 class Loading:
-    """What a load does to the particles of a mesh.
+    """What a load of factor 1 does to the particles of a mesh; arrays have shape (n_points, 2).
 
-    Attributes
-    ----------
-    held : ndarray of bool, shape (n_points, 2)
-        Directions that cannot move, or move as they are told.
-    pattern : ndarray of float, shape (n_points, 2)
-        Forces at rest for a factor of 1 [N].
-    given : ndarray of float, shape (n_points, 2), or None
-        Prescribed displacements for a factor of 1 [m]; None where there are none.
-    follower : FollowerPressure or None
-        Forces that turn with their sides for a factor of 1 [N].
-    dead : ndarray of float, shape (n_points, 2), or None
-        The pattern without those; None where they are all of it, or none.
+    `held` directions are fixed or moved by `given` [m]. `pattern` are the forces at rest [N], of which `dead` keep
+    their direction and `follower` turns with its sides; `dead` is None where the pattern is all of one sort.
     """
 
     key: tuple[object, ...]
@@ -144,18 +91,19 @@ class Loading:
     dead: np.ndarray | None = None
 
 
+def box_loading(mesh: Mesh, kind: LoadKind, follower: bool = False) -> Loading:
+    """Load of 1 N on a box; with `follower` it turns with its side."""
+    turning = FollowerPressure.of_side(mesh, *loaded_edges(mesh, kind)) if follower else None
+    return Loading((kind, follower), held(mesh, kind), weights(mesh, kind), follower=turning)
+
+
 @dataclass(frozen=True)
 class Solution:
     """An equilibrium of a network, judged.
 
-    Attributes
-    ----------
-    load : float
-        Force over the reference stiffness [m].
-    negative_pivots : int or float
-        Negative eigenvalues of the tangent; NaN where there is no equilibrium, or the tangent is singular.
-    displacement : float
-        Of the load [m], or the first quantity of a load case; NaN where there is no equilibrium.
+    `load` is the factor of the loading over the reference stiffness. `displacement` is that of the load [m], or the
+    first quantity of a load case. `negative_pivots` counts negative eigenvalues of the tangent. Both are NaN without
+    equilibrium.
     """
 
     problem: StaticProblem
@@ -170,15 +118,7 @@ class Solution:
 def solved(
     problem: StaticProblem, load: float, kinematics: str, displacement: Callable[[np.ndarray], float]
 ) -> Solution:
-    """Equilibrium of a problem, judged.
-
-    Parameters
-    ----------
-    load : float
-        Force over the reference stiffness [m].
-    displacement : callable
-        What is read from displacements of the particles [m], shape (n_points, 2).
-    """
+    """Equilibrium of a problem, judged; `displacement` reads its value from displacements [m], (n_points, 2)."""
     found = problem.linear(load) if kinematics == "linear" else problem.nonlinear(load)
     status, message, pivots = problem.judge(load, found)
     value = displacement(found.displacements) if found.converged else np.nan
@@ -186,25 +126,19 @@ def solved(
 
 
 class Sheet:
-    """A meshed sheet on which scenes are solved.
+    """A meshed sheet of a thickness [m], on which scenes are solved.
 
     Networks that differ in their reference stiffness alone are assembled and factorized once; networks with the same
     directions held share their numbering of unknowns; the springs derived last are kept for further loads.
 
-    Parameters
-    ----------
-    thickness : float
-        Of the sheet [m].
-
     Attributes
     ----------
-    held, weights, measured : callable
-        Of a kind of load, see `springtune.problem.boundary`: directions held, pattern of the forces, and weights of the
-        displacements that make its displacement; each computed once.
+    held, weights, measured, loading : callable
+        Of a kind of load, see `springtune.problem.boundary`; each computed once.
     deriving : float
-        Seconds that deriving springs has taken so far.
+        Seconds spent on deriving springs so far.
     references : dict
-        Those of load cases of a shape that have been solved.
+        Solved references of load cases of a shape.
 
     Examples
     --------
@@ -223,6 +157,7 @@ class Sheet:
         self.held = cache(lambda kind: held(mesh, kind))
         self.weights = cache(lambda kind: weights(mesh, kind))
         self.measured = cache(lambda kind: measured(mesh, kind))
+        self.loading = cache(lambda kind, follower=False: box_loading(mesh, kind, follower))
         self.references: dict[tuple[object, ...], Any] = {}
         self._most = networks
         self._derived: tuple[tuple[object, ...], Springs, float] | None = None
@@ -233,78 +168,47 @@ class Sheet:
     def derive(
         self,
         definition: AnyDefinition,
-        material: AnyMaterial,
+        material: AnyMaterial | Mapping[str, AnyMaterial],
         stiffness: float | None = None,
-        case: tuple[LoadKind, float, np.ndarray | None] | None = None,
+        case: tuple[LoadKind | Loading, float, np.ndarray | None] | None = None,
+        grouped: GroupedMesh | None = None,
     ) -> tuple[Springs, float]:
-        """Springs of a definition.
+        """Springs of a definition, and the seconds that deriving them took; the last ones are kept.
 
-        Parameters
-        ----------
-        stiffness : float, optional
-            Uniform stiffness [N/m], for definitions that are told one.
-        case : tuple of LoadKind, float and ndarray, optional
-            For definitions that are told cases: load, force [N] and displacements for 1 N that the network should have
-            [m/N], shape (n_points, 2), or None where there are none; even tension and shear of the mesh itself without.
+        A mapping has the materials by part of `grouped`. `case`, for definitions that are fitted to cases, is the load,
+        its factor and the wanted displacements for a factor of 1, or None if there are none; by default the definition
+        is fitted to even tension and shear of the mesh itself.
         """
         definition = definition_of(definition)
-        key: tuple[object, ...] = definition, material, stiffness
+        by_part = material if isinstance(material, Mapping) else {"": material}
+        first, *others = by_part.values()
         given: float | list[Case] | None = stiffness
-        if definition.needs == "cases":
-            given = patch_cases(self.mesh, material, self.thickness) if case is None else self._cases(*case)
-            key += case[:2] if case else ()
+        key: tuple[object, ...] = definition, tuple(by_part.items()), grouped if others else None, stiffness
+        if definition.needs == "cases" and case is None:
+            given = patch_cases(self.mesh, first, self.thickness)
+        elif definition.needs == "cases" and case is not None:
+            loading, factor, field = self._loading(case[0]), *case[1:]
+            if field is None:
+                raise DefinitionError("needs the reference's displacements, and there are none")
+            given = [Case(loading.held, factor * loading.pattern, factor * field)]
+            key += loading.key, factor
         elif definition.needs == "stiffness" and stiffness is None:
             raise DefinitionError("needs a uniform stiffness, and there is none; give one in N/m")
-        return self._once(key, lambda: definition.springs(self.mesh, material, self.thickness, given))
-
-    def derive_on_shape(
-        self,
-        definition: Definition | OwnDefinition,
-        materials: Mapping[str, AnyMaterial],
-        grouped: GroupedMesh,
-        stiffness: float | None = None,
-        cases: list[Case] | None = None,
-        case_key: tuple[object, ...] = (),
-    ) -> tuple[Springs, float]:
-        """As `derive`, of a body of any outline and of one material or more.
-
-        Parameters
-        ----------
-        stiffness : float, optional
-            Uniform stiffness [N/m], for definitions that are told one.
-        """
-        given = cases if definition.needs == "cases" else stiffness
-        key = definition, grouped, tuple(materials.items()), stiffness, case_key if definition.needs == "cases" else ()
-        if len(materials) == 1:
-            (material,) = materials.values()
-            return self._once(key, lambda: definition.springs(self.mesh, material, self.thickness, given))
-        from ..springs.parts import derive_by_parts  # here: most bodies are of one material
-
-        return self._once(key, lambda: derive_by_parts(definition, grouped, materials, self.thickness, given))
-
-    def _once(self, key: tuple[object, ...], make: Callable[[], Springs]) -> tuple[Springs, float]:
-        """Springs, and the seconds that deriving them took: the last ones are kept."""
         if self._derived is None or self._derived[0] != key:
             begin = time.perf_counter()
-            springs = make()
+            if others and grouped is not None:
+                from ..springs.parts import derive_by_parts  # here: most bodies are of one material
+
+                springs = derive_by_parts(definition, grouped, by_part, self.thickness, given)
+            else:
+                springs = definition.springs(self.mesh, first, self.thickness, given)
             seconds = time.perf_counter() - begin
             self.deriving += seconds
             self._derived = key, springs, seconds
         return self._derived[1], self._derived[2]
 
-    def _cases(self, kind: LoadKind, force: float, field: np.ndarray | None) -> list[Case]:
-        if field is None:
-            raise DefinitionError("needs the reference's displacements, and there are none")
-        return [Case(self.held(kind), force * self.weights(kind), force * field)]
-
     def network(self, directions: np.ndarray, springs: Springs) -> Network:
-        """Network of springs, some of its directions held.
-
-        Parameters
-        ----------
-        directions : ndarray of bool, shape (n_points, 2)
-            True where a particle cannot move in x or y.
-        """
+        """Network of springs that is held in some `directions`, shape (n_points, 2)."""
         return self._known(directions, springs)[0]
 
     def _known(
@@ -322,44 +226,35 @@ class Sheet:
             self._patterns.setdefault(directions.tobytes(), network)
         while len(self._networks) >= self._most:
             self._networks.pop(next(iter(self._networks)))
-        self._networks[name] = network, problems  # the last one used is the last one to go
+        self._networks[name] = network, problems  # the last one used is dropped last
         return network, problems
 
-    def pattern(self, kind: LoadKind, springs: Springs) -> np.ndarray:
-        """Forces of a load of 1, those that go with the springs included [1], shape (n_points, 2)."""
-        pattern = self.weights(kind)
+    def _loading(self, load: LoadKind | Loading, follower: bool = False) -> Loading:
+        return load if isinstance(load, Loading) else self.loading(load, follower)
+
+    def pattern(self, load: LoadKind | Loading, springs: Springs) -> np.ndarray:
+        """Forces of a load for a factor of 1, those that go with the springs included, shape (n_points, 2)."""
+        pattern = self._loading(load).pattern
         if springs.lateral:
             pattern = pattern + springs.lateral / np.ptp(self.mesh.points[:, 1]) * lateral_forces(self.mesh)
         return pattern
 
-    def problem(self, kind: LoadKind, springs: Springs, follower: bool = False) -> StaticProblem:
-        """Static problem of springs under a load."""
-        network, problems = self._known(self.held(kind), springs)
-        label = (kind, springs.lateral, follower)
-        if label not in problems:
-            turning = FollowerPressure.of_side(self.mesh, *loaded_edges(self.mesh, kind)) if follower else None
-            problems[label] = StaticProblem(network, self.pattern(kind, springs), turning)
-        return problems[label]
-
-    def stated(self, loading: Loading, springs: Springs) -> StaticProblem:
-        """Static problem of springs under any loading; at ``s = 1 / springs.reference`` it is the whole load."""
+    def problem(self, load: LoadKind | Loading, springs: Springs, follower: bool = False) -> StaticProblem:
+        """Static problem of springs under a load; its factor is over the reference stiffness."""
+        loading = self._loading(load, follower)
         network, problems = self._known(loading.held, springs)
-        label = loading.key, None if loading.given is None else springs.reference
+        label = loading.key, springs.lateral, None if loading.given is None else springs.reference
         if label not in problems:
             given = None if loading.given is None else springs.reference * loading.given
-            problems[label] = StaticProblem(network, loading.pattern, loading.follower, dead=loading.dead, given=given)
+            problems[label] = StaticProblem(
+                network, self.pattern(loading, springs), loading.follower, dead=loading.dead, given=given
+            )
         return problems[label]
 
     def solve(
         self, kind: LoadKind, springs: Springs, force: float, kinematics: str, follower: bool = False
     ) -> Solution:
-        """Equilibrium of springs under a force, judged.
-
-        Parameters
-        ----------
-        force : float
-            With its sign [N].
-        """
+        """Equilibrium of springs under a force with its sign [N], judged."""
         problem = self.problem(kind, springs, follower)
         return solved(problem, force / springs.reference, kinematics, lambda moved: self.displacement(kind, moved))
 

@@ -1,18 +1,18 @@
-"""What a scene is of: a beam under a force, or a shape under a load case.
+"""The problem of a scene: a beam under a force, or a shape under a load case.
 
-Either says how a mesh is held and loaded, what is read from its displacements, and what the reference is.
+A statement has supports and forces on a mesh, the quantities of interest, and the reference.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache, partial
 from numbers import Real
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from ..mechanics.network import FollowerPressure
-from ..mechanics.statics import StaticProblem
+from ..mechanics.network import FollowerPressure, Network
 from ..mesh import Mesh
 from ..mesh.groups import GroupedMesh
 from ..problem.boundary import (
@@ -21,6 +21,7 @@ from ..problem.boundary import (
     displacement_weights,
     followed,
     forces,
+    loaded_box,
     part_names,
     particle_masses,
     reaction_weights,
@@ -33,32 +34,156 @@ from ..problem.quantities import positive
 from ..problem.shapes import LoadCase, Quantity, Shape
 from ..reference.answers import beyond_linear
 from ..springs import Definition, DefinitionError, Springs
-from ..springs.identification import Case
-from .meshes import A_BEAM, A_MATERIAL, A_MESH, A_SHAPE, check_filled, is_a
-from .shape_meshes import check_meshed
-from .sheet import Loading, OwnDefinition, Sheet, Solution, chosen, solved
+from .meshes import A_BEAM, A_MATERIAL, A_MESH, A_SHAPE, check_filled, check_meshed, is_a
+from .sheet import Loading, Sheet, Solution, box_loading, chosen, solved
 
 if TYPE_CHECKING:
     from ..reference.finite_strain import FiniteStrainSolution
     from ..reference.shapes import ShapeReference
     from ..reference.small_strain import ReferenceSolution
 
+    AnyReference = ReferenceSolution | FiniteStrainSolution | ShapeReference
+
 A_GROUPED_MESH = "springtune.mesh_shape(shape, '5 mm')"
 """How a mesh with groups is made, for messages."""
 
 
-class BeamStatement:
-    """A beam under a load.
+class Statement(ABC):
+    """A body under a load: what is held and loaded, what is read, and the reference.
 
-    Attributes
-    ----------
-    force : float
-        With the sign that its load gives it [N].
+    `force` is the factor of `loading`: the force on a beam with its sign [N], 1 of a shape. `size` is the size of the
+    load: the force [N], or the scale of a load case [1].
     """
 
     body: str
     label: str
-    named_materials: str
+    load: str
+    force: float
+    size: float
+    kinematics: str
+    thickness: float
+    grouped: GroupedMesh
+    case: LoadCase
+    loading: Loading
+    by_part: Mapping[str, AnyMaterial]
+
+    @property
+    def mesh(self) -> Mesh:
+        """Mesh of the body."""
+        return self.grouped.mesh
+
+    @property
+    def materials(self) -> list[AnyMaterial]:
+        """Materials of the parts, each once."""
+        return list(dict.fromkeys(self.by_part.values()))
+
+    @property
+    def named_materials(self) -> str:
+        """Names of the materials."""
+        return ", ".join(dict.fromkeys(one.name for one in self.materials))
+
+    @abstractmethod
+    def check(self, definition: Definition) -> None:
+        """Refuse a definition that is not for the body or the load."""
+
+    @abstractmethod
+    def reference(self, sheet: Sheet, finite_strain: bool = False) -> "AnyReference":
+        """Converged finite-element solution, in small strain or of the material's law at finite strain."""
+
+    @abstractmethod
+    def reference_values(self, sheet: Sheet, finite_strain: bool = False) -> dict[str, float]:
+        """Quantities of interest of the reference; NaN of those that it lacks."""
+
+    @abstractmethod
+    def _unit_field(self, sheet: Sheet) -> np.ndarray:
+        """Displacements of the reference at the particles for a factor of 1, shape (n_points, 2)."""
+
+    def objection(self, sheet: Sheet, finite_strain: bool = False) -> str:
+        """Why the small-strain reference does not apply to networks of nonlinear kinematics; empty if it does."""
+        found = cast("ReferenceSolution | ShapeReference", self.reference(sheet))
+        return beyond_linear(found.rotation, found.strain)
+
+    def springs(self, sheet: Sheet, definition: Definition, stiffness: float | None) -> tuple[Springs, float]:
+        """Springs of a definition, and the seconds that deriving them took."""
+        case = (self.loading, self.force, self._unit_field(sheet)) if definition.needs == "cases" else None
+        return sheet.derive(definition, self.by_part, stiffness, case, self.grouped)
+
+    def forces(self, sheet: Sheet, springs: Springs) -> np.ndarray:
+        """Forces on the particles at rest [N], shape (n_points, 2)."""
+        return self.force * sheet.pattern(self.loading, springs)
+
+    def masses(self) -> np.ndarray | None:
+        """Masses of the particles [kg], shape (n_points,); None without a density."""
+        densities = {name: one.density for name, one in self.by_part.items()}
+        return None if None in densities.values() else particle_masses(self.grouped, self.thickness, densities)
+
+    def factor(self, springs: Springs) -> float:
+        """Factor of the loading over the reference stiffness."""
+        return self.force / springs.reference
+
+    def solve(self, sheet: Sheet, springs: Springs) -> Solution:
+        """Equilibrium, judged; its displacement is the first quantity of interest."""
+        problem, first = sheet.problem(self.loading, springs), self.case.quantities[0]
+        return solved(
+            problem,
+            self.factor(springs),
+            self.kinematics,
+            lambda moved: self._value(first, springs, problem.network, moved),
+        )
+
+    def displacement(self, displacements: np.ndarray) -> float:
+        """First displacement among the quantities [m]; NaN where there is none."""
+        for one in self.case.quantities:
+            if one.kind == "displacement":
+                return float(np.tensordot(displacements, displacement_weights(self.grouped, one), axes=2))
+        return np.nan
+
+    def none(self) -> dict[str, float]:
+        """Quantities of interest without an equilibrium: NaN."""
+        return dict.fromkeys((one.name for one in self.case.quantities), np.nan)
+
+    def values(self, springs: Springs, solution: Solution) -> dict[str, float]:
+        """Quantities of interest by name, in SI units; NaN without an equilibrium."""
+        if not solution.equilibrium.converged:
+            return self.none()
+        first, *others = self.case.quantities
+        network, moved = solution.problem.network, solution.equilibrium.displacements
+        rest = {one.name: self._value(one, springs, network, moved) for one in others}
+        return {first.name: solution.displacement} | rest
+
+    def _value(self, one: Quantity, springs: Springs, network: Network, moved: np.ndarray) -> float:
+        """Quantity of interest at displacements [m], in SI units."""
+        linear = self.kinematics == "linear"
+        if one.kind == "displacement":
+            return float(np.tensordot(moved, displacement_weights(self.grouped, one), axes=2))
+        if one.kind == "area":
+            return _growth(self.mesh, moved, linear)
+        if one.kind == "energy":
+            if linear:
+                return float(0.5 * springs.reference * np.tensordot(moved, network.linear_forces(moved), axes=2))
+            return springs.reference * network.energy(moved)
+        if one.kind == "reaction":
+            weights = reaction_weights(self.grouped, self.case, one)
+            return float(np.tensordot(self.reactions(springs, network, moved), weights, axes=2))
+        from ..mechanics.stress import cell_stresses, particle_stresses  # here: few ask for stress
+
+        corners, cell, shares = cell_at(self.grouped, one.of)
+        stresses, names = cell_stresses(network, moved, linear), part_names(self.grouped)
+        same = {count: labels == names[corners][cell] for count, labels in names.items()}
+        found = shares @ particle_stresses(self.mesh, stresses, same)[self.mesh.cells[corners][cell]]
+        return float(found[("xx", "yy", "xy").index(one.component)] * springs.reference / self.thickness)
+
+    def reactions(self, springs: Springs, network: Network, moved: np.ndarray) -> np.ndarray:
+        """Forces of the supports on the particles [N], shape (n_points, 2); zero in free directions."""
+        resistance = network.linear_forces(moved) if self.kinematics == "linear" else network.forces(moved)
+        load, turning = self.loading.pattern, self.loading.follower
+        if turning is not None and self.loading.dead is not None:
+            load = self.loading.dead + turning.forces(moved)
+        return np.where(self.loading.held, springs.reference * resistance - load, 0.0)
+
+
+class BeamStatement(Statement):
+    """A beam under a load: a shape with four named sides, under a force on one of them."""
 
     def __init__(
         self,
@@ -72,77 +197,31 @@ class BeamStatement:
         is_a(beam, Beam, "beam", A_BEAM)
         is_a(mesh, Mesh, "mesh", A_MESH)
         is_a(material, Material, "material", A_MATERIAL)
-        assert isinstance(mesh, Mesh) and isinstance(material, Material)  # as type checkers are told
+        assert isinstance(mesh, Mesh) and isinstance(material, Material)  # for type checkers
         check_filled(mesh, beam)
         about = chosen(LOADS, load, "load")
         if force is None:
             raise ValueError("force: none; give the size of the force on the beam such as '400 kN'")
-        self.beam, self.mesh, self.material, self.load, self.kind = beam, mesh, material, load, about.kind
-        self.force = about.sign * positive(force, "force", "force")
-        self.thickness = beam.thickness
+        self.size = positive(force, "force", "force")
+        self.force = about.sign * self.size
+        self.beam, self.material, self.load, self.kind, self.case = beam, material, load, about.kind, about.kind.case
         self.kinematics, self.follower = kinematics, about.follower and kinematics == "nonlinear"
-        self.body, self.label = beam.label, f"{load} of {abs(self.force):g} N"
-        self.named_materials, self.materials = material.name, [material]
+        self.body, self.label, self.thickness = beam.label, f"{load} of {self.size:g} N", beam.thickness
+        self.by_part = {"": material}
+        self.grouped = loaded_box(mesh, self.kind)
+        self.loading = box_loading(mesh, self.kind, self.follower)
 
-    def check(self, definition: Definition | OwnDefinition) -> None:
+    def check(self, definition: Definition) -> None:
         """Refuse a definition that is not for the load."""
         if definition.uniaxial and not self.kind.uniaxial:
             raise ValueError(
                 f"definition: {definition.name!r} is not for {self.load!r}; take it for traction or compression"
             )
 
-    def springs(
-        self, sheet: Sheet, definition: Definition | OwnDefinition, stiffness: float | None
-    ) -> tuple[Springs, float]:
-        """Springs of a definition, and the seconds that deriving them took."""
-        case = None
-        if definition.needs == "cases":
-            field = unit_reference(self.beam, self.material, self.kind, 1.0).at(self.mesh.points)
-            case = self.kind, self.force, field
-        return sheet.derive(definition, self.material, stiffness, case)
-
-    def held(self, sheet: Sheet) -> np.ndarray:
-        """Directions that are held, shape (n_points, 2)."""
-        return sheet.held(self.kind)
-
-    def forces(self, sheet: Sheet, springs: Springs) -> np.ndarray:
-        """Forces on the particles at rest [N], shape (n_points, 2)."""
-        return self.force * sheet.pattern(self.kind, springs)
-
     def masses(self) -> np.ndarray | None:
         """Masses of the particles [kg], shape (n_points,); None without a density."""
         density = self.material.density
         return None if density is None else density * self.thickness * self.mesh.particle_areas
-
-    def problem(self, sheet: Sheet, springs: Springs) -> StaticProblem:
-        """Network under the pattern of the load."""
-        return sheet.problem(self.kind, springs, self.follower)
-
-    def factor(self, springs: Springs) -> float:
-        """Load of the problem [m]: force over the reference stiffness."""
-        return self.force / springs.reference
-
-    def solve(self, sheet: Sheet, springs: Springs) -> Solution:
-        """Equilibrium, judged."""
-        return sheet.solve(self.kind, springs, self.force, self.kinematics, self.follower)
-
-    def displacement(self, sheet: Sheet, displacements: np.ndarray) -> float:
-        """Displacement of the load [m]."""
-        return sheet.displacement(self.kind, displacements)
-
-    def values(self, sheet: Sheet, springs: Springs, solution: Solution) -> dict[str, float]:
-        """Quantities of interest by name."""
-        return {"displacement": solution.displacement}
-
-    @property
-    def size(self) -> float:
-        """Size of the load [N]."""
-        return abs(self.force)
-
-    @staticmethod
-    def none() -> dict[str, float]:
-        """Quantities of interest where there are none."""
-        return {"displacement": np.nan}
 
     def reference(self, sheet: Sheet, finite_strain: bool = False) -> "ReferenceSolution | FiniteStrainSolution":
         """Converged finite-element solution, in small strain or of the material's law at finite strain."""
@@ -151,35 +230,21 @@ class BeamStatement:
         return unit_reference(self.beam, self.material, self.kind, self.force)
 
     def reference_values(self, sheet: Sheet, finite_strain: bool = False) -> dict[str, float]:
-        """Quantities of interest of the reference."""
+        """Displacement of the reference [m]."""
         return {"displacement": self.reference(sheet, finite_strain).displacement}
 
     def objection(self, sheet: Sheet, finite_strain: bool = False) -> str:
-        """Why the reference does not apply to networks of nonlinear kinematics; empty where it does."""
-        if finite_strain:
-            return ""
-        found = unit_reference(self.beam, self.material, self.kind, self.force)
-        return beyond_linear(found.rotation, found.strain)
+        """Why the reference does not apply to networks of nonlinear kinematics; empty if it does."""
+        return "" if finite_strain else super().objection(sheet)
+
+    def _unit_field(self, sheet: Sheet) -> np.ndarray:
+        return unit_reference(self.beam, self.material, self.kind, 1.0).at(self.mesh.points)
 
 
-class ShapeStatement:
-    """A shape under a load case.
+class ShapeStatement(Statement):
+    """A shape under one of its load cases, times `scale` [1]."""
 
-    Parameters
-    ----------
-    load : str
-        Key of the shape's loads.
-    scale : float
-        Factor on all that the load case prescribes [1].
-    """
-
-    load: str
-    kinematics: str
     scale: float
-    body: str
-    label: str
-    named_materials: str
-    loading: Loading
 
     def __init__(
         self,
@@ -197,16 +262,16 @@ class ShapeStatement:
                 f"{A_GROUPED_MESH}"
             )
         is_a(grouped, GroupedMesh, "mesh", A_GROUPED_MESH)
-        self.shape, self.grouped, self.mesh, self.thickness = shape, grouped, grouped.mesh, shape.thickness
+        self.shape, self.grouped, self.thickness = shape, grouped, shape.thickness
         self.by_part = _materials(material, grouped)
         check_meshed(shape, grouped, self.by_part)
         if shape.file:
             warn_of_thickness(shape.thickness, np.ptp(self.mesh.points, axis=0), f"shape {shape.name!r}")
-        self.materials = list(dict.fromkeys(self.by_part.values()))
         if isinstance(scale, bool) or not (isinstance(scale, Real) and np.isfinite(scale) and scale):
             raise ValueError(f"scale: {scale!r} is no factor; give a finite number that is not zero")
-        self.load, self.scale = load, float(scale)
-        self.case: LoadCase = scaled(chosen(shape.loads, load, "load"), self.scale)
+        self.load, self.scale, self.force = load, float(scale), 1.0
+        self.size = abs(self.scale)
+        self.case = scaled(chosen(shape.loads, load, "load"), self.scale)
         if not self.case.quantities:
             raise ValueError(
                 f"load {load!r}: asks for nothing; give it quantities, of which the first one stands for all"
@@ -214,7 +279,6 @@ class ShapeStatement:
         self.kinematics = kinematics
         factor = "" if self.scale == 1 else f" times {self.scale:g}"
         self.body, self.label = shape.name, f"{load}{factor}"
-        self.named_materials = ", ".join(dict.fromkeys(one.name for one in self.materials))
         self.loading = self._loading()
         for one in self.case.quantities:
             self._check(one)
@@ -261,7 +325,7 @@ class ShapeStatement:
                     "stress has a jump there; ask for it on one side"
                 )
 
-    def check(self, definition: Definition | OwnDefinition) -> None:
+    def check(self, definition: Definition) -> None:
         """Refuse a definition that is for beams alone."""
         if definition.uniaxial:
             raise ValueError(
@@ -274,111 +338,19 @@ class ShapeStatement:
                 "prescribes displacements; choose another definition, or a load of forces"
             )
 
-    def springs(
-        self, sheet: Sheet, definition: Definition | OwnDefinition, stiffness: float | None
-    ) -> tuple[Springs, float]:
+    def springs(self, sheet: Sheet, definition: Definition, stiffness: float | None) -> tuple[Springs, float]:
         """Springs of a definition, and the seconds that deriving them took."""
-        given: list[Case] | None = None
-        if definition.needs == "cases":
-            field = self.reference(sheet).at(self.mesh.points)
-            given = [Case(self.loading.held, self.loading.pattern, field)]
-        springs, seconds = sheet.derive_on_shape(
-            definition, self.by_part, self.grouped, stiffness, given, self.loading.key
-        )
+        springs, seconds = super().springs(sheet, definition, stiffness)
         if springs.lateral:
             raise DefinitionError(
                 "needs a stress on the long faces of a beam, and a shape has none; choose another definition"
             )
         return springs, seconds
 
-    def held(self, sheet: Sheet) -> np.ndarray:
-        """Directions that are held, shape (n_points, 2)."""
-        return self.loading.held
-
-    def forces(self, sheet: Sheet, springs: Springs) -> np.ndarray:
-        """Forces on the particles at rest [N], shape (n_points, 2)."""
-        return self.loading.pattern
-
-    def masses(self) -> np.ndarray | None:
-        """Masses of the particles [kg], shape (n_points,); None without a density."""
-        densities = {name: one.density for name, one in self.by_part.items()}
-        return None if None in densities.values() else particle_masses(self.grouped, self.thickness, densities)
-
-    def problem(self, sheet: Sheet, springs: Springs) -> StaticProblem:
-        """Network under the load."""
-        return sheet.stated(self.loading, springs)
-
-    def factor(self, springs: Springs) -> float:
-        """Load of the problem [m/N]: one over the reference stiffness, since its pattern is in N."""
-        return 1.0 / springs.reference
-
-    def solve(self, sheet: Sheet, springs: Springs) -> Solution:
-        """Equilibrium, judged."""
-        problem, factor = self.problem(sheet, springs), self.factor(springs)
-        found = solved(problem, factor, self.kinematics, lambda moved: np.nan)
-        if not found.equilibrium.converged:
-            return found
-        first = self._value(self.case.quantities[0], springs, found)
-        return replace(found, displacement=first)
-
-    def displacement(self, sheet: Sheet, displacements: np.ndarray) -> float:
-        """First displacement among the quantities [m]; NaN where there is none."""
-        for one in self.case.quantities:
-            if one.kind == "displacement":
-                return float(np.tensordot(displacements, displacement_weights(self.grouped, one), axes=2))
-        return np.nan
-
-    def values(self, sheet: Sheet, springs: Springs, solution: Solution) -> dict[str, float]:
-        """Quantities of interest by name, in SI units; NaN without an equilibrium."""
-        if not solution.equilibrium.converged:
-            return self.none()
-        first, *others = self.case.quantities
-        return {first.name: solution.displacement} | {one.name: self._value(one, springs, solution) for one in others}
-
-    def _value(self, one: Quantity, springs: Springs, solution: Solution) -> float:
-        network, moved = solution.problem.network, solution.equilibrium.displacements
-        linear = self.kinematics == "linear"
-        if one.kind == "displacement":
-            return float(np.tensordot(moved, displacement_weights(self.grouped, one), axes=2))
-        if one.kind == "area":
-            return _growth(self.mesh, moved, linear)
-        if one.kind == "energy":
-            if linear:
-                return float(0.5 * springs.reference * np.tensordot(moved, network.linear_forces(moved), axes=2))
-            return springs.reference * network.energy(moved)
-        if one.kind == "reaction":
-            weights = reaction_weights(self.grouped, self.case, one)
-            return float(np.tensordot(self.reactions(springs, solution), weights, axes=2))
-        from ..mechanics.stress import cell_stresses, particle_stresses  # here: few ask for stress
-
-        corners, cell, shares = cell_at(self.grouped, one.of)
-        stresses, names = cell_stresses(network, moved, linear), part_names(self.grouped)
-        same = {count: labels == names[corners][cell] for count, labels in names.items()}
-        found = shares @ particle_stresses(self.mesh, stresses, same)[self.mesh.cells[corners][cell]]
-        return float(found[("xx", "yy", "xy").index(one.component)] * springs.reference / self.thickness)
-
-    def reactions(self, springs: Springs, solution: Solution) -> np.ndarray:
-        """Forces of the supports on the particles [N], shape (n_points, 2); zero in free directions."""
-        network, moved = solution.problem.network, solution.equilibrium.displacements
-        resistance = network.linear_forces(moved) if self.kinematics == "linear" else network.forces(moved)
-        load, turning = self.loading.pattern, self.loading.follower
-        if turning is not None and self.loading.dead is not None:
-            load = self.loading.dead + turning.forces(moved)
-        return np.where(self.loading.held, springs.reference * resistance - load, 0.0)
-
-    @property
-    def size(self) -> float:
-        """Size of the load: of a load case the factor on it [1]."""
-        return abs(self.scale)
-
-    def none(self) -> dict[str, float]:
-        """Quantities of interest where there are none."""
-        return dict.fromkeys((one.name for one in self.case.quantities), np.nan)
-
     def reference(self, sheet: Sheet, finite_strain: bool = False) -> "ShapeReference":
         """Converged finite-element solution, once for all scenes of a sheet; of shapes there is small strain alone."""
         case = self.shape.loads[self.load]
-        # The shape is kept with it: what is no longer there leaves its number to others.
+        # The shape is kept too, so that its id is not used again.
         key = id(self.shape), self.grouped, case, tuple(self.by_part.items())
         if (key, 1.0) not in sheet.references:
             from ..reference.shapes import solve_shape  # here, since finite elements take half a second to import
@@ -391,18 +363,12 @@ class ShapeStatement:
         return found
 
     def reference_values(self, sheet: Sheet, finite_strain: bool = False) -> dict[str, float]:
-        """Quantities of interest of the reference; NaN where that is none of what is asked for."""
+        """Quantities of interest of the reference; NaN where the reference does not apply."""
         values = dict(self.reference(sheet).values)
         return dict.fromkeys(values, np.nan) if finite_strain and self.objection(sheet) else values
 
-    def objection(self, sheet: Sheet, finite_strain: bool = False) -> str:
-        """Why the reference does not apply to networks of nonlinear kinematics; empty where it does."""
-        found = self.reference(sheet)
-        return beyond_linear(found.rotation, found.strain)
-
-
-Statement = BeamStatement | ShapeStatement
-"""What a scene is of."""
+    def _unit_field(self, sheet: Sheet) -> np.ndarray:
+        return self.reference(sheet).at(self.mesh.points)
 
 
 def scaled(case: LoadCase, scale: float) -> LoadCase:
@@ -475,13 +441,7 @@ def _solve_finite(
 
 
 def unit_reference(beam: Beam, material: Material, kind: LoadKind, force: float) -> "ReferenceSolution":
-    """Reference under a force, solved once for all beams, materials and forces that differ by factors.
-
-    Parameters
-    ----------
-    force : float
-        [N]
-    """
+    """Reference under a force [N], solved once for all beams, materials and forces that differ by factors."""
     from ..reference.answers import unit_problem, unit_scales
 
     length, displacement = unit_scales(beam, material, kind)

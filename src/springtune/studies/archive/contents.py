@@ -7,7 +7,7 @@ import platform
 import shutil
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from filecmp import cmp
+from filecmp import cmpfiles
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 
@@ -15,7 +15,7 @@ from springtune.safe_io.atomic import write_text
 from springtune.safe_io.escapes import markdown
 
 from ..output.browse import page as browse
-from ..output.reading import check_links
+from ..output.reading import attributes
 from ..runs import provenance, records, rerun
 from ..runs.dependencies import OURS, PACKAGE
 from ..runs.keys import installed
@@ -54,7 +54,7 @@ CHECKOUT_FILES = (
 """Required files of a checkout."""
 
 FOLDERS = {
-    "src": (".css", ".html", ".js", ".py", ".pyi", ".typed"),
+    "src": (".css", ".html", ".js", ".py", ".pyi", ".typed", ".yaml"),
     "workflow": (".csl", "README.md", ".rst", ".smk", ".typ", ".yaml", ".yml"),
     "requirements": (".in", ".txt"),
 }
@@ -174,7 +174,7 @@ def gather(
     packed = {name: _of_file(name, path) for name, path in paths.items()}
     packed |= {f"{CODE}/{name}": of_text(f"{CODE}/{name}", text) for name, text in code.texts.items()}
     dataset, page = (f"{OF_RESULTS}/{study.name}/{name}" for name in (rerun.DATASET, rerun.PAGE))
-    packed[dataset], attributes, host = _without(packed[dataset], {"host", *untold}, scratch)
+    packed[dataset], told, host = _without(packed[dataset], {"host", *untold}, scratch)
     if packed[dataset].sha256 != packed[dataset].original:  # the page has the attributes of the dataset
         write_text(scratch / rerun.PAGE, browse.page(scratch / rerun.DATASET, rerun.linked(study)))
         packed[page] = _of_file(page, scratch / rerun.PAGE)
@@ -190,9 +190,9 @@ def gather(
         config=own,
         inputs=tuple(sorted(set(names.values()) - {own})),
         code=code,
-        attributes=attributes,
+        attributes=told,
         machine=machine() if tell_machine else {},
-        departures=_departures(checkout, attributes),
+        departures=_departures(checkout, told),
         untold=untold,
     )
     packed[README] = of_text(README, _readme(found))
@@ -233,13 +233,8 @@ def _other_library(packed: Path) -> str:
         for path in folder.rglob("*")
         if path.is_file() and not _is_made(path.relative_to(folder).as_posix())
     }
-    pairs = {name: [folder / name for folder in (packed, PACKAGE)] for name in sorted(names)}
-    others = (
-        name
-        for name, pair in pairs.items()
-        if not (all(one.is_file() for one in pair) and cmp(pair[0], pair[1], False))
-    )
-    return next(others, "")
+    _, others, lacking = cmpfiles(packed, PACKAGE, sorted(names), shallow=False)
+    return min(others + lacking, default="")
 
 
 def _unfinished(study: "Study", folder: Path, faults: Iterable[tuple[str, str]], stale: Iterable[str]) -> str:
@@ -395,18 +390,14 @@ def _without(dataset: Packed, names: Collection[str], scratch: Path) -> tuple[Pa
 
     assert isinstance(dataset.source, Path)
     try:
-        check_links(dataset.source)
+        found = attributes(dataset.source)
     except ValueError as error:
         raise ArchiveError(str(error)) from None
-    copy = scratch / rerun.DATASET
+    host, copy = found.get("host", ""), scratch / rerun.DATASET
     shutil.copyfile(dataset.source, copy)
     with h5py.File(copy, "a") as file:
-        attributes = {
-            str(name): value.decode() if isinstance(value, bytes) else str(value) for name, value in file.attrs.items()
-        }
-        host = attributes.get("host", "")
         for name in names:
-            text = attributes.pop(name, "")
+            text = found.pop(name, "")
             if text and file.attrs.get_id(name).dtype.kind != "S":
                 option = next(option for option, other in rerun.BLANKED.items() if other == name).replace("_", "-")
                 raise ArchiveError(
@@ -416,7 +407,7 @@ def _without(dataset: Packed, names: Collection[str], scratch: Path) -> tuple[Pa
             if text:
                 file.attrs.modify(name, np.bytes_(b"-" * len(text)))
     packed = _of_file(dataset.name, copy)
-    return Packed(packed.name, packed.source, packed.sha256, packed.size, dataset.sha256), attributes, host
+    return Packed(packed.name, packed.source, packed.sha256, packed.size, dataset.sha256), found, host
 
 
 def _elsewhere(folder: Path) -> bool:
@@ -424,12 +415,12 @@ def _elsewhere(folder: Path) -> bool:
     return any((folder / note).is_file() for note in (COMMANDS_FILE, ELSEWHERE))
 
 
-def _departures(checkout: Path, attributes: dict[str, str]) -> dict[str, tuple[str, str]]:
+def _departures(checkout: Path, told: dict[str, str]) -> dict[str, tuple[str, str]]:
     """Versions of the dataset that differ from the locked ones."""
     wanted: dict[str, str] = {}
     for lock in LOCK_FILES:
         wanted |= locked(checkout / lock)
-    used = json.loads(attributes.get("software", "{}"))
+    used = json.loads(told.get("software", "{}"))
     return {name: (wanted[name], one) for name, one in sorted(used.items()) if wanted.get(name, one) != one}
 
 

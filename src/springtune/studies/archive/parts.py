@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import h5py
 import numpy as np
 
 from springtune.registry import NAME, NAME_RULE
@@ -28,7 +27,7 @@ from ..config.model import Part
 from ..config.yaml_lines import read_yaml
 from ..kinds.division import dealt, part_of, taken
 from ..kinds.scenes.plan import scene_key
-from ..output.reading import check_links
+from ..output.reading import attributes
 from ..runs import checked_json, driver, locks, records, rerun, store
 from ..runs.checked_json import DamagedError
 from ..runs.keys import installed
@@ -160,12 +159,10 @@ def _site(study: "Study", folder: Path) -> Site:
     if not path.is_file():
         raise MergeError(f"{folder}: has no {rerun.DATASET}; run this part to its end, where it was computed")
     try:
-        check_links(path)
-        with h5py.File(path) as file:
-            attributes = {name: _text(value) for name, value in file.attrs.items()}
+        found = attributes(path)
     except (OSError, ValueError) as error:
         raise MergeError(f"{error}; run this part again, where it was computed") from None
-    text = attributes.get("config", "")
+    text = found.get("config", "")
     if not is_part(text):
         raise MergeError(f"{folder}: is not of a part of a study; give the results of what `springtune split` wrote")
     if digest_of(whole_text(text)) != digest_of(study.text):
@@ -175,13 +172,8 @@ def _site(study: "Study", folder: Path) -> Site:
         )
     said = read_yaml(text, str(path))[0]["part"]
     part = Part(int(said["number"]), int(said["of"]), said["by"], said["study"])
-    name = attributes["study"]
-    return Site(folder, part_of(replace(study, name=name, part=part)), attributes)
-
-
-def _text(attribute: Any) -> str:
-    """Text of an attribute; HDF5 gives ASCII as bytes."""
-    return attribute.decode() if isinstance(attribute, bytes) else str(attribute)
+    name = found["study"]
+    return Site(folder, part_of(replace(study, name=name, part=part)), found)
 
 
 def _difference(one: str, other: str) -> str:

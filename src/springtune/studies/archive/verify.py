@@ -8,15 +8,13 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from springtune.problem.status import Status
 from springtune.safe_io import atomic
 
 from ..config.kind import kinds
 from ..config.model import SceneSpec
 from ..kinds import load_study
-from ..kinds.scenes.division import of_scenes
+from ..kinds.scenes.plan import of_scenes
 from ..kinds.shapes.plan import of_shape_scenes
 from ..output import reading
 from ..output.summary import SCENES
@@ -44,6 +42,9 @@ COMPARED = {
 
 SAME_SOFTWARE, OTHER_SOFTWARE = 1e-12, 1e-6
 """Tolerances for the same software and for other versions; equilibria converge to 1e-10 of the load."""
+
+FINEST = 1e-18
+"""Tolerance with which scenes are compared, so that every difference is seen."""
 
 
 def _is_whole(path: Path) -> bool:
@@ -193,15 +194,14 @@ def _compared(
     numbers: tuple[str, ...],
     limit: float,
 ) -> Again:
-    cells = [data.sel({name: label for name, label in labels.items() if name in data.dims}) for data in (before, after)]
-    differences = [0.0]
-    for number in numbers:
-        for old, new in zip(*(np.ravel(cell[number]).tolist() for cell in cells), strict=True):
-            if np.isnan(old) != np.isnan(new):
-                differences.append(np.inf)
-            elif old != new and not np.isnan(old):
-                # An error that is small is a difference of large numbers.
-                size = 1.0 if number.endswith("error") else max(abs(old), abs(new))
-                differences.append(abs(new - old) / size)
-    old_status, new_status = (str(Status(int(cell.status))) for cell in cells)
-    return Again(name, old_status, new_status, max(differences), limit)
+    import xarray as xr
+
+    from ..output.comparison import Tolerance, compare
+
+    one, other = (
+        data[[*numbers, "status"]].sel({name: label for name, label in labels.items() if name in data.dims}, drop=True)
+        for data in (before.drop_attrs(deep=False), after.drop_attrs(deep=False))
+    )
+    found = compare(xr.DataTree(one), xr.DataTree(other), Tolerance(FINEST))
+    difference = FINEST * max((row.excess for row in found.changes), default=0.0)
+    return Again(name, str(Status(int(one.status))), str(Status(int(other.status))), difference, limit)

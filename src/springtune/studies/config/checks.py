@@ -30,10 +30,14 @@ FEWER = "give shorter lists, or split the study into several"
 MORE_SCENES = f"or allow more by 'springtune run --max-scenes', or by {MOST_SCENES_VARIABLE} in the environment"
 
 
-def check_known(problems: Problems, path: Sequence[Key], what: str, name: str, names: Iterable[str]) -> None:
-    """Check that the study declares a name."""
+def check_known(
+    problems: Problems, path: Sequence[Key], what: str, name: str, names: Iterable[str], section: str = ""
+) -> None:
+    """Check that the study declares a name; in a section of the name's kind, unless another one is given."""
     if name not in names:
-        problems.add(path, f"unknown {what} '{name}'; {nearest(name, names)}; or declare it under {what}s")
+        problems.add(
+            path, f"unknown {what} '{name}'; {nearest(name, names)}; or declare it under {section or f'{what}s'}"
+        )
 
 
 def check_beam_material(problems: Problems, path: Sequence[Key], name: str, config: StudyConfig) -> None:
@@ -58,9 +62,7 @@ def check_names(config: StudyConfig, problems: Problems) -> None:
             check_known(problems, ("mesh_files", name, number, "beam"), "beam", one.beam, config.beams)
     for name, grid in config.grids.items():
         for mesh_type in grid.mesh_type:
-            if mesh_type not in mesh_types:
-                message = f"unknown mesh type '{mesh_type}'; {nearest(mesh_type, mesh_types)}"
-                problems.add(("grids", name, "mesh_type"), f"{message}; or declare it under mesh_files")
+            check_known(problems, ("grids", name, "mesh_type"), "mesh type", mesh_type, mesh_types, "mesh_files")
         for beam in grid.beam:
             check_known(problems, ("grids", name, "beam"), "beam", beam, config.beams)
         for material in grid.material:
@@ -79,10 +81,7 @@ def check_names(config: StudyConfig, problems: Problems) -> None:
     for number, row in enumerate(paper.stiffness if paper else ()):
         path = ("definitions", "paper", "stiffness", number)
         check_known(problems, (*path, "material"), "material", row.material, config.materials)
-        if row.mesh_type not in mesh_types:
-            problems.add(
-                (*path, "mesh_type"), f"unknown mesh type '{row.mesh_type}'; {nearest(row.mesh_type, mesh_types)}"
-            )
+        check_known(problems, (*path, "mesh_type"), "mesh type", row.mesh_type, mesh_types, "mesh_files")
         if (row.mesh_type, row.material) in seen:
             problems.add(path, f"a second stiffness for {row.mesh_type} meshes of {row.material}; remove one")
         seen.add((row.mesh_type, row.material))
@@ -154,11 +153,17 @@ def check_particles(
     problems: Problems, path: Sequence[Key], sizes: Iterable[float], length: float, height: float
 ) -> None:
     """Refuse mesh sizes that give too many particles."""
-    size = min(sizes)
+    if refusal := _too_many(min(sizes), length, height):
+        problems.add(path, f"{_in_mm(min(sizes))} gives {refusal}")
+
+
+def _too_many(size: float, length: float, height: float) -> str:
+    """Return how many particles a mesh has beyond the limit, and the remedy, or an empty string."""
     particles = length * height / (COEFFICIENT * size**2) if size**2 else math.inf
-    if particles > MOST_MESHED:
-        least = f"{1.05e3 * math.sqrt(length * height / COEFFICIENT / MOST_MESHED):.2g} mm"
-        problems.add(path, f"{1e3 * size:g} mm gives {particles:.0e} particles; give {least} or more")
+    if particles <= MOST_MESHED:
+        return ""
+    least = 1.05e3 * math.sqrt(length * height / COEFFICIENT / MOST_MESHED)
+    return f"{particles:.0e} particles; give {least:.2g} mm or more"
 
 
 def check_cells(config: StudyConfig, lists: dict[str, set[Any]], curves: bool, problems: Problems) -> None:
@@ -232,10 +237,8 @@ def check_meshes(config: StudyConfig, content: dict[str, Any], grids: Iterable[G
                 if size > min(length, height):
                     side = _in_mm(min(length, height))
                     problems.add(path, f"{shown} is larger than beam '{beam}'; give at most its smaller side, {side}")
-                elif length * height / (COEFFICIENT * size**2) > MOST_MESHED:
-                    particles = f"{length * height / (COEFFICIENT * size**2):.0e}"
-                    least = f"{1.05e3 * math.sqrt(length * height / COEFFICIENT / MOST_MESHED):.2g} mm"
-                    problems.add(path, f"{shown} gives beam '{beam}' {particles} particles; give {least} or more")
+                elif refusal := _too_many(size, length, height):
+                    problems.add(path, f"{shown} gives beam '{beam}' {refusal}")
 
 
 def _in_mm(length: float) -> str:

@@ -53,7 +53,7 @@ def with_rows(content: Any, folder: Path, problems: Problems) -> Any:
     for name, grid in grids.items():
         rows = grid.get("rows") if isinstance(grid, dict) else None
         if not isinstance(rows, str) or not rows.strip():
-            continue  # as any other value that is none
+            continue  # validation refuses it
         columns = _columns(name, folder / rows, problems)
         for key in columns:
             if grid.get(key) is not None:

@@ -142,7 +142,7 @@ def _order(ranks: Ranks) -> Callable[[MeshSpec | SceneSpec | CurveSpec | Referen
 
 
 def swept(config: StudyConfig) -> tuple[str, ...]:
-    """Parameters that are dimensions: those listed in a grid, and a force with several values."""
+    """Parameters that are dimensions: the ones given in a grid, and a force with several values."""
     found = {name for grid in config.grids.values() for name in SWEPT if name != "force" and getattr(grid, name)}
     several = [values for grid in config.grids.values() for values in (grid.force or {}).values()]
     several += [grid.pressure for grid in config.grids.values() if grid.pressure]
@@ -172,7 +172,7 @@ class _Bodies:
         if key not in self._materials:
             own = {name: one[name] for name in ("young_modulus", "poisson_ratio") if name in one}
             material = only_isotropic(self._declared.materials[key[0]], "put the sheet under 'shapes'")
-            # Moduli of rubber are those of its law: who asks for others is told so.
+            # Rubber keeps the moduli of its law; `expand` refuses others.
             self._materials[key] = material if isinstance(material, Rubber) else replace(material, **own)
         return self._materials[key]
 

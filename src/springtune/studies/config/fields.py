@@ -49,38 +49,24 @@ class Scalar:
         return self.read(value)
 
 
-def quantity(kind: str, negative: str = "give a size above zero") -> Scalar:
-    """Annotation of a quantity above zero, of a key of `springtune.units.QUANTITY_KINDS`."""
-    example = units.QUANTITY_KINDS[kind].example
+def quantity(kind: str, negative: str = "give a size above zero", signed: bool = False) -> Scalar:
+    """Annotation of a quantity, a key of `springtune.units.QUANTITY_KINDS`; above zero unless `signed`."""
+    about = units.QUANTITY_KINDS[kind]
 
     def read(value: str) -> float:
         try:
             number = units.parse(value, kind)
         except units.UnitError as error:
             raise refuse(str(error)) from None
-        if not number > 0:
-            raise refuse(f"{show(value)} is not above zero; {negative}, such as '{example}'")
-        if beyond(number, kind):
-            raise refuse(f"{show(value)} is beyond all measure; give {units.QUANTITY_KINDS[kind].words}")
+        if not number > 0 and not signed:
+            raise refuse(f"{show(value)} is not above zero; {negative}, such as '{about.example}'")
+        if not signed and beyond(number, kind):
+            raise refuse(f"{show(value)} is beyond all measure; give {about.words}")
         return number
 
-    schema = {"type": "string", "pattern": r"^\s*\+?[0-9.]+([eE][+-]?[0-9]+)?\s*[^0-9\s].*$", "examples": [example]}
-    return Scalar(read, schema, units.QUANTITY_KINDS[kind].words)
-
-
-def signed(kind: str) -> Scalar:
-    """Annotation of a quantity of either sign, of a key of `springtune.units.QUANTITY_KINDS`."""
-    words = units.QUANTITY_KINDS[kind].words
-
-    def read(value: str) -> float:
-        try:
-            return units.parse(value, kind)
-        except units.UnitError as error:
-            raise refuse(str(error)) from None
-
-    pattern = r"^\s*[+-]?[0-9.]+([eE][+-]?[0-9]+)?\s*[^0-9\s].*$"
-    schema = {"type": "string", "pattern": pattern, "examples": [units.QUANTITY_KINDS[kind].example]}
-    return Scalar(read, schema, words)
+    sign = "[+-]" if signed else r"\+"
+    pattern = rf"^\s*{sign}?[0-9.]+([eE][+-]?[0-9]+)?\s*[^0-9\s].*$"
+    return Scalar(read, {"type": "string", "pattern": pattern, "examples": [about.example]}, about.words)
 
 
 def number(words: str, low: float, high: float, *, above: bool = False, whole: bool = False) -> Scalar:
@@ -136,8 +122,8 @@ Force = Annotated[float, quantity("force", "the load's name carries the sign: gi
 Stiffness = Annotated[float, quantity("stiffness")]
 Stress = Annotated[float, quantity("stress")]
 Density = Annotated[float, quantity("density")]
-Angle = Annotated[float, signed("angle")]
-SignedStress = Annotated[float, signed("stress")]
+Angle = Annotated[float, quantity("angle", signed=True)]
+SignedStress = Annotated[float, quantity("stress", signed=True)]
 OrthotropicRatio = Annotated[float, number("a number such as 0.3", -100, 100)]
 PoissonRatio = Annotated[float, number("a number from 0 to 0.5, such as 0.3", 0, 0.5)]
 Ratio = Annotated[float, number("a number above 0", 0, math.inf, above=True)]
@@ -165,14 +151,21 @@ BeamName = Annotated[str, Scalar(str, {"type": "string"}, "the name of a beam")]
 MaterialName = Annotated[str, Scalar(str, {"type": "string"}, "the name of a material")]
 
 
-class OneOrMore:
+class Wrapped:
+    """Annotation whose `_read` checks the form of a value before pydantic reads its items."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_wrap_validator_function(self._read, handler(source))
+
+    def _read(self, value: object, handler: core_schema.ValidatorFunctionWrapHandler) -> Any:
+        raise NotImplementedError
+
+
+class OneOrMore(Wrapped):
     """Annotation of a non-empty list without duplicates; a single value is a list of one."""
 
     def __init__(self, repeats: bool = False) -> None:
         self.repeats = repeats
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.no_info_wrap_validator_function(self._read, handler(source))
 
     def __get_pydantic_json_schema__(self, schema: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         array = handler(schema["schema"]) | {"minItems": 1} | ({} if self.repeats else {"uniqueItems": True})
@@ -301,15 +294,12 @@ class PerBeam:
         return handler(value)
 
 
-class Named:
+class Named(Wrapped):
     """Annotation of a non-empty mapping whose names may become file names."""
 
     def __init__(self, what: str, for_files: bool = True) -> None:
         self.what, self.for_files = what, for_files
         self.words = f"a section for each {what}, by name; see below"
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.no_info_wrap_validator_function(self._read, handler(source))
 
     def __get_pydantic_json_schema__(self, schema: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         described = handler(schema["schema"]) | {"minProperties": 1}
@@ -364,20 +354,16 @@ class Groups:
         return groups
 
 
-class Sections:
+class Sections(Wrapped):
     """Annotation of a list of sections; a single one is a list of one."""
 
     words = "a section, or a list of sections; see below"
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.no_info_wrap_validator_function(self._read, handler(source))
 
     def __get_pydantic_json_schema__(self, schema: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         array = handler(schema["schema"])
         return {"anyOf": [array["items"], array]}
 
-    @staticmethod
-    def _read(value: object, handler: core_schema.ValidatorFunctionWrapHandler) -> Any:
+    def _read(self, value: object, handler: core_schema.ValidatorFunctionWrapHandler) -> Any:
         listed = [value] if isinstance(value, dict) else value
         if not isinstance(listed, list) or not all(isinstance(one, dict) for one in listed):
             raise refuse(

@@ -1,4 +1,4 @@
-"""What a study kind is: all that study, plan, collect, drawing, tables and the rules loop over."""
+"""Declaration of a study kind, for the study, the plan, the dataset, figures, tables and the rules."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _PACKAGES = Path(__file__).parents[1] / "kinds"
 _FIRST = ("scenes", "moduli", "laying", "stability", "benchmark", "samples", "refinement", "shapes")
 
 KINDS = _FIRST + tuple(sorted({path.parent.name for path in _PACKAGES.glob("*/kind.py")} - {*_FIRST}))
-"""Packages of the study kinds, in the order of the dataset's groups: these first, then any other."""
+"""Packages of the study kinds, in the order of the dataset's groups; other kinds come last."""
 
 
 FORMATS = ("png", "pdf")
@@ -29,35 +29,34 @@ FORMATS = ("png", "pdf")
 
 @dataclass(frozen=True)
 class Output:
-    """Figures and tables that are made from a dataset where a study asks for them under ``outputs``.
+    """Figures and tables of a dataset that a study may request under ``outputs``.
 
     Attributes
     ----------
     name : str
-        As a study writes it.
+        Name in a study.
     meaning : str
-        What it is, for the manual.
+        Description for the manual.
     figures : callable, optional
-        Of a study: labels that each figure selects, a dict, by the stem of its files.
+        From a study to the selected labels of each figure, by the stem of its files.
     collect : str
-        Module with ``groups(study, folder)``: groups of the dataset that this output alone needs; from the package on.
+        Module with ``groups(study, folder)``, the groups of the dataset for this output; a name within the package.
     plot : str
-        ``"module:function"`` of what draws the figures, from the package on: a function from a dataset's tree to
-        triples of the stem, the function that plots and its selection.
+        ``"module:function"`` that yields the figures of a dataset's tree: stem, plotting function and selection.
     job : str
-        Name of the job that makes it; outputs that share it are made by one process. By default its own name.
+        Name of the job that makes it, by default its own; outputs may share a job.
     tables : callable, optional
-        Of a study: names of the files of its tables.
+        From a study to the file names of its tables.
     write : str
-        Module with ``write(tree, folder)``, which writes them, and may write more that they name; from the package on.
+        Module with ``write(tree, folder)``, which writes the tables and files that they name.
     into : str
-        Folder of these files, in the study's.
+        Folder of the tables, within the study's folder.
     page : bool
-        Whether it is the page of all tables, `springtune.studies.output.page`.
+        Whether it is the page of all tables, see `springtune.studies.output.page`.
     lack : callable, optional
-        Of a study: what it would need for this output and has not, with the remedy; empty where it has all.
+        From a study to what it lacks for this output, with the remedy; an empty string if nothing.
     usual : bool
-        Whether it is made where a study does not say what.
+        Whether it is made by default.
     """
 
     name: str
@@ -80,16 +79,21 @@ class Output:
 
     @property
     def module(self) -> str:
-        """Module that draws the figures, from the package on."""
+        """Module that draws the figures."""
         return self.plot.partition(":")[0]
+
+
+def needs(part: str, why: str) -> Callable[[Study], str]:
+    """`Output.lack` of an output that needs a part of a study."""
+    return lambda study: "" if study.parts[part] else why
 
 
 @dataclass(frozen=True)
 class Stage:
-    """A stage before the dataset: jobs that each work off a bundle of tasks.
+    """A stage before the dataset; each of its jobs does a bundle of tasks.
 
-    Its module says what one task is, see `springtune.studies.runs.driver`. Most stages follow from their tasks, see
-    `springtune.studies.runs.stages`.
+    Its module defines one task, see `springtune.studies.runs.driver`. Most stages are made by
+    `springtune.studies.runs.stages.stage` from their tasks.
 
     Attributes
     ----------
@@ -98,25 +102,25 @@ class Stage:
     module : str
         From the package on.
     message : str
-        What a job does.
+        Description of a job.
     content : callable
-        Of a study, its folder and the values of a bundle's members: content of the task file; nothing where there is
-        nothing to do.
+        From a study, its folder and the values of a bundle's members to the content of the task file; empty without
+        tasks.
     products : callable
-        Of that content: files that a job makes besides its record.
+        From that content to the files that a job makes besides its record.
     members : callable, optional
-        Of a study and a machine's `springtune.studies.runs.plan.Costs`: by name, the seconds that it takes and a
-        value. Not of a stage that works on the bundles of another one.
+        From a study and `springtune.studies.runs.plan.Costs` to expected seconds and a value by name; None for a
+        stage with the bundles of another one.
     like : str
-        Stage whose bundles it works on.
+        Stage whose bundles it shares.
     same, every : tuple of str
-        Stages that it waits for: for the job of the same bundle, and for all jobs.
+        Stages that it needs: the job of the same bundle, or all jobs.
     alone : bool
-        Whether a job has a single member and the machine to itself, since other jobs would be in its seconds.
+        Whether a job has one member and the whole machine, so that its seconds can be measured.
     folder : str
-        Folder of its files in the study's.
+        Folder of its files, within the study's folder.
     tasks : callable, optional
-        Of a study: its tasks, of a stage that follows from these.
+        From a study to the tasks, for a stage made from tasks.
     """
 
     name: str
@@ -137,42 +141,44 @@ class Stage:
 class Kind:
     """A study kind.
 
-    Its package has a module ``kind`` with ``KIND``, which imports neither scipy, xarray nor matplotlib. ``variables``
-    say what its group of the dataset has, where each task has a cell of it; else a module ``collect`` has
-    ``groups(study, folder)``: groups of the dataset by name. A module ``outputs`` with ``OUTPUTS``, which imports no
-    pydantic, saves time where figures are drawn.
+    Its package has a module ``kind`` with ``KIND``, which imports neither scipy, xarray nor matplotlib. If each task
+    has a cell of the group in the dataset, ``variables`` declare the group; otherwise ``groups(study, folder)`` of a
+    module ``collect`` returns groups by name. A module ``outputs`` with ``OUTPUTS``, without pydantic, makes drawing
+    faster.
 
     Attributes
     ----------
     name : str
-        Name of its package, and of its part of a study, `Study.parts`.
+        Name of its package and of its part of a study in `Study.parts`.
     study_fields, grid_fields : dict of str to tuple
-        Keys that it adds to a study and to its grids: type and pydantic's field.
+        Keys that it adds to a study and to grids, with type and pydantic field.
     alone : tuple of str
-        Those keys of a study in the place of which it may have neither beams nor grids.
+        Those of its keys that a study may have instead of beams and grids.
     files : callable, optional
-        Of its part of a study: files that it is made from besides.
+        From its part of a study to further input files.
     check : callable, optional
-        Of a config and a `springtune.studies.config.messages.Problems`: adds what is wrong with its values.
+        Adds the mistakes of a config to `springtune.studies.config.messages.Problems`.
     expand : callable, optional
-        Of a config and `springtune.studies.config.expand.Declared`: its part of a study; nothing where it has none.
+        From a config and `springtune.studies.config.expand.Declared` to its part of a study, empty if unused.
     axes : callable, optional
-        Of that part: labels of the dimensions of its groups.
+        From that part to the labels of its groups' dimensions.
     summary : callable, optional
-        Of that part: rows of what `springtune scenes` prints, each a name, a number and a remark.
-    variables : dict of str to tuple
-        Variables of its group, see `springtune.studies.output.dataset.Group`.
+        From that part to rows of `springtune scenes`: name, number and remark.
+    variables, dimensions : dict
+        Variables and own dimensions of its group, see `springtune.studies.output.dataset.Group`.
+    attributes : callable, optional
+        From that part to the attributes of its group.
     stages : tuple of Stage
     outputs : tuple of Output
-    tables : callable, optional
-        Of a study: stems of its tables on the page of all tables; ``tables(tree)`` in its module ``tables`` makes them.
+    tables, tables_by : callable and str, optional
+        From a study to the stems of its tables on the page; module whose ``tables(tree)`` makes them.
     costs : dict of str to tuple
-        Seconds of a task by its name in records, in any case and per unit, before any was measured.
+        Seconds of a task by its name in records, fixed and per unit, before any is measured.
     pieces : callable, optional
-        Of a study, `springtune.studies.runs.plan.Costs` and a `springtune.studies.kinds.division.Division`: seconds
-        of each piece that a part of a study may have of it, by name. A kind without is in one part as a whole.
+        From a study, `springtune.studies.runs.plan.Costs` and `springtune.studies.kinds.division.Division` to the
+        seconds of each piece that `springtune split` may deal out. A kind without pieces stays in one part.
     take : callable, optional
-        Of a study and names of pieces: the study with these alone.
+        From a study and names of pieces to the study with only these.
     """
 
     name: str
@@ -185,9 +191,12 @@ class Kind:
     axes: Callable[[Any], Mapping[str, Collection[str | float]]] = lambda part: {}
     summary: Callable[[Any], list[list[object]]] = lambda part: []
     variables: dict[str, tuple[tuple[str, ...], str, str, Any]] = field(default_factory=dict)
+    dimensions: dict[str, str | tuple[str, str]] = field(default_factory=dict)
+    attributes: Callable[[Any], Mapping[str, object]] = lambda part: {}
     stages: tuple[Stage, ...] = ()
     outputs: tuple[Output, ...] = ()
     tables: Callable[[Study], list[str]] | None = None
+    tables_by: str = "tables"
     costs: dict[str, tuple[float, float]] = field(default_factory=dict)
     pieces: Callable[[Study, Any, Any], Mapping[tuple[str | int, ...], float]] | None = None
     take: Callable[[Study, Collection[tuple[str | int, ...]]], Study] | None = None
@@ -199,26 +208,12 @@ class Kind:
 
 
 def stem(name: str, selection: Mapping[str, str]) -> str:
-    """Stem of the files of a figure that has one for each selection."""
+    """Stem of the files of a figure with a selection."""
     return "_".join([name, *selection.values()])
 
 
 def distinct(name: str, labels: Iterable[str], cells: Iterable[Mapping[str, str]]) -> dict[str, dict[str, str]]:
-    """Distinct selections of a study's cells, in order, by stem.
-
-    Parameters
-    ----------
-    name : str
-        First part of the stem.
-    labels : tuple of str
-        Dimensions that a figure selects.
-    cells : iterable of dict
-        Labels of each cell that the study has.
-
-    Returns
-    -------
-    dict of str to dict
-    """
+    """Distinct selections of the dimensions `labels` among a study's cells, in order, by stem."""
     chosen = [{label: cell[label] for label in labels} for cell in cells]
     return {stem(name, one): one for one in chosen}
 
@@ -232,24 +227,13 @@ def modules(*names: str) -> list[str]:
 
 @cache
 def kinds() -> tuple[Kind, ...]:
-    """All study kinds.
-
-    Returns
-    -------
-    tuple of Kind
-    """
+    """All study kinds."""
     return tuple(imported(f"studies.kinds.{name}.kind:KIND") for name in KINDS)
 
 
 @cache
 def outputs() -> dict[str, Output]:
-    """What is made from a dataset, of all study kinds.
-
-    Returns
-    -------
-    dict of str to Output
-        By name.
-    """
+    """Outputs of all study kinds, by name."""
     apart = {name.split(".")[2]: imported(f"{name}:OUTPUTS") for name in modules("outputs")}
     found = (apart[name] if name in apart else imported(f"studies.kinds.{name}.kind:KIND").outputs for name in KINDS)
     return {output.name: output for outputs in found for output in outputs}

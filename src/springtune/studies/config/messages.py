@@ -62,7 +62,7 @@ class Problems:
     def add(self, path: Iterable[Key], message: str, line: int = 0) -> None:
         """Add a problem."""
         path = tuple(path)
-        # What is missing has no line of its own; that of what should hold it helps.
+        # A missing key has no line, so the line of its section is used.
         above = (path[:size] for size in range(len(path), 0, -1))
         line = line or next((self._lines[keys] for keys in above if keys in self._lines), 0)
         place = self._places.get(path) or (f"{self._file}:{line}" if line else self._file)

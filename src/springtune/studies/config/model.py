@@ -66,12 +66,12 @@ class SceneSpec:
 
     @cached_property
     def _hash(self) -> int:
-        # Of the material what tells most apart: hashing all of it takes longer than the rest.
+        # Only the main properties of the material: hashing all of it takes longer than the rest.
         body = self.mesh, self.material.name, self.material.young_modulus, self.material.poisson_ratio
         return hash((body, self.load, self.force, self.definition, self.kinematics, self.stiffness_scale))
 
     def __hash__(self) -> int:
-        # As a mesh's.
+        # As for meshes.
         return self._hash
 
 
@@ -145,7 +145,7 @@ class Study:
     mesh_files : dict
         `MeshSpec` of meshes from files by (mesh type, beam's name, mesh size).
     parts : dict
-        What further study kinds ask for, by their names; nothing where the study does not have them.
+        Parts of study kinds by their names; empty if the study does not use a kind.
     limits : dict
         ``seconds`` of the processor and ``memory`` [byte] that one task may take.
     stiffness_ratios : tuple of float
@@ -157,12 +157,12 @@ class Study:
     axes : dict of str to tuple
         Labels of each dimension of the dataset: texts, for ``mesh_size`` numbers [m].
     swept : tuple of str
-        Of `springtune.problem.parameters.SWEPT`: those that are dimensions, too, their labels numbers.
+        Parameters of `springtune.problem.parameters.SWEPT` that are dimensions; their labels are numbers.
     test_files : tuple of Path
-        Of the tests of rubber that materials are fitted to or compared with.
+        Files of the tests that rubber is fitted to or compared with.
     part : Part or None
-        Which part of a study this is. Its scenes, curves, meshes, references and `parts` are its own; grids, axes and
-        all else are those of the whole study.
+        Part of a study. It has its own scenes, curves, meshes, references and `parts`; everything else, such as grids
+        and axes, is of the whole study.
     """
 
     name: str
@@ -274,7 +274,7 @@ def once_a_study(*names: str) -> Callable[[Callable[[Study], Answer]], Callable[
     """Cache a function of a study while the named parts are the same objects."""
 
     def decorate(function: Callable[[Study], Answer]) -> Callable[[Study], Answer]:
-        # Parts by their places in memory, and the parts themselves, so that no other objects come to be there.
+        # Cache by id(): hashing 10,000 scenes is slow. The parts are kept, so that no new object gets their id.
         known: list[tuple[list[int], Answer, list[Any]]] = []
 
         @wraps(function)

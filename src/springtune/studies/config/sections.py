@@ -58,11 +58,11 @@ MOST_PARTS = 1000
 """Most parts that a study is split into."""
 
 PLAUSIBLE = 20.0
-"""A stated stiffness farther than this factor from sqrt(3)/2 E t is taken for an error of units."""
+"""Factor on sqrt(3)/2 E t beyond which a stated stiffness counts as an error of units."""
 
 
 def expected_value(field: FieldInfo) -> str:
-    """Words for what a field of a section expects, e.g. ``a length such as '200 mm'``."""
+    """Expected value of a field in words, such as ``a length such as '200 mm'``."""
     # A field that may be absent has its notes one level deeper.
     for annotation, notes in ((field.annotation, field.metadata), *map(_parts, get_args(field.annotation))):
         for note in notes:
@@ -76,7 +76,7 @@ def expected_value(field: FieldInfo) -> str:
 
 
 def _parts(annotation: Any) -> tuple[Any, tuple[Any, ...]]:
-    """What an `Annotated` annotates, and its notes; none of what is no such."""
+    """Type and notes of an `Annotated`; any other annotation has no notes."""
     if get_origin(annotation) is not Annotated:
         return annotation, ()
     inside, *notes = get_args(annotation)
@@ -105,7 +105,7 @@ class Section(BaseModel):
 
     @classmethod
     def _needed(cls, given: Mapping[str, object]) -> dict[str, str]:
-        """Keys that have to be given beside those that are, and what else would do."""
+        """Required keys, each with a remedy besides giving it."""
         names = {field.alias or name: field for name, field in cls.model_fields.items()}
         return {name: "" for name, field in names.items() if field.is_required()}
 
@@ -135,11 +135,11 @@ MATERIAL_FORMS = (
     ("stiffness",),
     ("uniaxial_test",),
 )
-"""Keys that say what a material is: those of one form go together, and no other's with them."""
+"""Keys of the four forms of a material; a material has the keys of one form."""
 
 
 OF_A_TEST = ("terms", "equibiaxial_test", "pure_shear_test")
-"""Keys that only a material with a test has."""
+"""Keys that need a `uniaxial_test`."""
 
 
 def _one_form(schema: dict[str, Any]) -> None:
@@ -150,44 +150,44 @@ class MaterialConfig(Section):
     """A material, in one of four forms.
 
     Isotropic: `young_modulus` and `poisson_ratio`. Orthotropic, such as a ply of fibres: `young_modulus_x`,
-    `young_modulus_y`, `poisson_ratio_xy` and `shear_modulus` along its own axes, turned by `angle`, or a laminate of
-    such plies. Of any anisotropy: `stiffness`. Rubber: `uniaxial_test`, to which Yeoh's law is fitted; what knows
-    small strain alone takes the law's initial modulus, and nu = 0.5. Beams are of isotropic ones or of rubber.
+    `young_modulus_y`, `poisson_ratio_xy` and `shear_modulus` along its own axes, which `angle` turns; several angles
+    make a laminate. Any anisotropy: `stiffness`. Rubber: `uniaxial_test`, to which Yeoh's law is fitted; in small
+    strain it has the initial modulus of that law and nu = 0.5. Beams need an isotropic material or rubber.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, json_schema_extra=_one_form)
 
     young_modulus: Stress | None = Field(None, description="Young's modulus E.")
     poisson_ratio: PoissonRatio | None = Field(
-        None, description="Poisson's ratio nu; 0.5 is legal, since sheets are in plane stress."
+        None, description="Poisson's ratio nu; 0.5 is allowed, since sheets are in plane stress."
     )
     young_modulus_x: Stress | None = Field(None, description="Young's modulus along the fibres.")
     young_modulus_y: Stress | None = Field(None, description="Young's modulus across the fibres.")
     poisson_ratio_xy: OrthotropicRatio | None = Field(
-        None, description="Contraction across over extension along the fibres, pulled along them."
+        None, description="Contraction across the fibres over extension along them, when pulled along them."
     )
     shear_modulus: Stress | None = Field(None, description="Shear modulus along and across the fibres.")
     angle: Annotated[list[Angle], OneOrMore(repeats=True)] | None = Field(
         None,
-        description="By which the fibres are turned from the x axis, counter-clockwise; not at all without. Several "
-        "are the plies of a laminate, of one thickness and symmetric stacking.",
+        description="Angle of the fibres from the x axis, counter-clockwise; 0 by default. Several angles are the "
+        "plies of a laminate of equal thicknesses and symmetric stacking.",
     )
-    stiffness: StiffnessConfig | None = Field(None, description="Its constants in plane stress.")
+    stiffness: StiffnessConfig | None = Field(None, description="Elastic constants in plane stress.")
     uniaxial_test: FileName | None = Field(
         None,
-        description="CSV file of a uniaxial test of rubber, its path relative to the study's folder: stretch and "
-        "nominal stress under a head such as `stretch,nominal stress [MPa]`. Definition `yeoh` has its law.",
+        description="CSV file of a uniaxial test of rubber, relative to the study's folder: stretch and nominal stress "
+        "under a head such as `stretch,nominal stress [MPa]`. Definition `yeoh` uses the fitted law.",
     )
     terms: Terms | None = Field(
-        None, description="Terms of the law that is fitted to the test; 3 without, with 1 it is neo-Hooke's."
+        None, description="Number of terms of the fitted law; 3 by default, 1 is the neo-Hookean law."
     )
     equibiaxial_test: FileName | None = Field(
-        None, description="Such a file of an equibiaxial test, which the law is compared with."
+        None, description="CSV file of an equibiaxial test, to compare the fitted law with."
     )
     pure_shear_test: FileName | None = Field(
-        None, description="Such a file of a test in pure shear, which the law is compared with."
+        None, description="CSV file of a pure-shear test, to compare the fitted law with."
     )
-    density: Density | None = Field(None, description="Density rho; for dynamics, statics need none.")
+    density: Density | None = Field(None, description="Density rho; needed for dynamics and gravity, not for statics.")
 
     @model_validator(mode="after")
     def _whole(self) -> Self:
@@ -214,7 +214,7 @@ class MaterialConfig(Section):
         return self
 
     def material(self, name: str, folder: Path = Path()) -> AnyMaterial:
-        """The material; the names of its files are seen from a folder. ValueError where a file is no test."""
+        """The material; its files are relative to a folder. Raises ValueError for a file that is not a test."""
         if self.uniaxial_test is not None:
             from springtune.problem.rubber import fit_rubber  # here: few studies need it
 
@@ -239,20 +239,20 @@ class MaterialConfig(Section):
 
 
 class StatedStiffness(Section):
-    """One stated stiffness."""
+    """A stated stiffness of one mesh type and material."""
 
-    mesh_type: MeshType = Field(description="Mesh type that it is for.")
-    material: MaterialName = Field(description="Material that it is for.")
+    mesh_type: MeshType = Field(description="Mesh type.")
+    material: MaterialName = Field(description="Material.")
     value: Stiffness = Field(
-        description=f"Stiffness of every spring; refused if farther than a factor of {PLAUSIBLE:g} from sqrt(3)/2 E t."
+        description=f"Stiffness of every spring; refused beyond a factor of {PLAUSIBLE:g} from sqrt(3)/2 E t."
     )
 
 
 class PaperConfig(Section):
-    """Parameters of the definition `paper`: stiffnesses that are stated, not derived."""
+    """Parameters of the definition `paper`: stated stiffnesses."""
 
     stiffness: list[StatedStiffness] = Field(
-        description="One entry for each mesh type and material that a grid uses with `paper`.", min_length=1
+        description="One entry for each mesh type and material of the grids with `paper`.", min_length=1
     )
 
     @model_validator(mode="before")
@@ -268,8 +268,8 @@ class PaperConfig(Section):
 class CalibratedConfig(Section):
     """Parameters of the definition `calibrated`.
 
-    Its stiffness is found per mesh type, material and kinematics: the mean over the mesh sizes of the best stiffness of
-    this study's own sensitivity curves of one beam and load.
+    For each mesh type, material and kinematics, the stiffness is the mean of the best stiffnesses of the study's
+    sensitivity curves of one beam and load, over all mesh sizes.
     """
 
     beam: BeamName = Field(description="Beam whose curves calibrate.")
@@ -277,16 +277,16 @@ class CalibratedConfig(Section):
 
 
 class DefinitionsConfig(Section):
-    """Parameters of those definitions that have any; `springtune definitions` lists all definitions."""
+    """Parameters of the two definitions that need some; `springtune definitions` lists all definitions."""
 
-    paper: PaperConfig | None = Field(None, description="Table of stiffnesses; needed where a grid uses `paper`.")
+    paper: PaperConfig | None = Field(None, description="Stated stiffnesses; needed if a grid uses `paper`.")
     calibrated: CalibratedConfig | None = Field(
-        None, description="Where the stiffness is calibrated; needed where a grid uses `calibrated`."
+        None, description="Beam and load to calibrate on; needed if a grid uses `calibrated`."
     )
 
 
 class SensitivityConfig(Section):
-    """Uniform stiffnesses of every sensitivity curve, equally spaced, in units of sqrt(3)/2 E t."""
+    """Equally spaced stiffnesses of every sensitivity curve, as multiples of sqrt(3)/2 E t."""
 
     start: Ratio = Field("0.4", validate_default=True, alias="from", description="Smallest stiffness.")
     stop: Ratio = Field("1.6", validate_default=True, alias="to", description="Largest stiffness.")
@@ -294,23 +294,23 @@ class SensitivityConfig(Section):
 
 
 class LimitsConfig(Section):
-    """What one scene may take, or one mesh, curve, reference or other task: one beyond it is a hole, the others go on.
+    """Limits of one task: a scene, a mesh, a curve or a reference. A task beyond them fails, and the others go on.
 
-    Results do not depend on limits; where they change, what went beyond them is computed again, and nothing else.
+    Results do not depend on limits. After a change of limits only the tasks that went beyond them are computed again.
     """
 
     seconds: LimitSeconds = Field(
-        "3600", validate_default=True, description="Seconds of the processor, which a busy machine does not change."
+        "3600", validate_default=True, description="Processor time, which does not depend on other load of the machine."
     )
-    memory: Memory = Field("8 GB", validate_default=True, description="Memory on top of what the job has.")
+    memory: Memory = Field("8 GB", validate_default=True, description="Memory in addition to that of the idle job.")
 
 
 class MeshFileConfig(Section):
-    """One mesh from a file, of a format that meshio reads; it fills its beam and its lower left corner is anywhere."""
+    """A mesh from a file that meshio reads. It fills its beam; its lower left corner may be anywhere."""
 
-    file: FileName = Field(description="The file, its path relative to the study's folder.")
-    beam: BeamName = Field(description="Beam that it meshes.")
-    mesh_size: Length = Field(description="Length of an edge that it goes by in grids and in the dataset.")
+    file: FileName = Field(description="The file, relative to the study's folder.")
+    beam: BeamName = Field(description="Beam that the mesh fills.")
+    mesh_size: Length = Field(description="Length of an edge, which names the mesh in grids and in the dataset.")
     unit: Length = Field("1 m", validate_default=True, description="Unit of the coordinates in the file.")
 
 
@@ -329,11 +329,11 @@ GRID_PARAMETERS = (
     "definition",
     "kinematics",
 )
-"""Parameters of a grid: its keys whose values are combined."""
+"""Keys of a grid whose values are combined."""
 
 
 class ExcludeConfig(Section):
-    """Combinations that a grid leaves out: those that have one of the values given, of every parameter given."""
+    """Combinations that a grid leaves out: those with one of the given values of every given parameter."""
 
     beam: Annotated[list[BeamName], OneOrMore()] | None = Field(None, description="Beams.")
     mesh_type: Annotated[list[MeshType], OneOrMore()] | None = Field(None, description="Mesh types.")
@@ -357,21 +357,21 @@ class ExcludeConfig(Section):
 
 
 def _rows_may_give(schema: dict[str, Any]) -> None:
-    """What a grid needs may come from its file of rows, and a value may stand twice where it is zipped."""
+    """Required keys may come from a file of rows, and zipped values may repeat."""
     schema["anyOf"] = [{"required": schema.pop("required")}, {"required": ["rows"]}]
     once = {name: {"uniqueItems": True} for name in GRID_PARAMETERS}
     schema |= {"if": {"not": {"required": ["zip"]}}, "then": {"properties": once}}
 
 
 class GridConfig(Section):
-    """A product of parameters: every combination of the values listed is a scene.
+    """A product of parameters: every combination of the listed values is a scene.
 
-    A single value stands for a list of one. A scene that two grids ask for is solved once. Numbers may be a range, both
-    ends included: `{from: 1 mm, to: 5 mm, points: 9}`, with `spacing: logarithmic` where they are to grow by a factor.
+    A single value is a list of one. A scene of two grids is solved once. Numbers may be a range with both ends
+    included: `{from: 1 mm, to: 5 mm, points: 9}`; with `spacing: logarithmic` the values grow by a constant factor.
 
-    What a grid says of `thickness`, `young_modulus`, `poisson_ratio` or `stiffness_scale`, and a force that has several
-    values, is a dimension of the dataset, beside `beam`, `mesh_type`, `mesh_size`, `material`, `load`, `definition` and
-    `kinematics`.
+    The dimensions of the dataset are `beam`, `mesh_type`, `mesh_size`, `material`, `load`, `definition` and
+    `kinematics`. A grid that gives `thickness`, `young_modulus`, `poisson_ratio`, `stiffness_scale` or several forces
+    adds these as dimensions.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, json_schema_extra=_rows_may_give)
@@ -381,28 +381,27 @@ class GridConfig(Section):
         description="A name under `mesh_files`, or one of these. "
         + " ".join(f"`{name}`: {one.summary}." for name, one in MESH_TYPES.items())
     )
-    mesh_size: Lengths = Field(description="Lengths of an edge; at most the smaller side of each beam.")
+    mesh_size: Lengths = Field(description="Lengths of an edge, at most the smaller side of each beam.")
     material: Annotated[list[MaterialName], OneOrMore(repeats=True)] = Field(description="Materials, by name.")
     load: Annotated[list[Load], OneOrMore(repeats=True)] = Field(
-        description="`traction`, `compression`: along x on the right end, `bending`: along y there, the left end "
-        "clamped; `shear`: along x on the upper side, which stays level, the lower side clamped; `pressure`, "
-        "`follower-pressure`: down on the upper side, the lower side clamped. Spread evenly."
+        description="With the left end clamped, `traction` and `compression` act along x on the right end, `bending` "
+        "along y. With the lower side clamped, `shear` acts along x on the upper side, which stays level, and "
+        "`pressure` and `follower-pressure` act down on it. All are spread evenly."
     )
     force: Annotated[dict[str, Forces], PerBeam()] | None = Field(
         None,
-        description="Magnitude of the force: one for all beams, or one for each. The load's name carries the sign. "
-        "Several make the force a dimension; where no grid has several, a beam, material and load have the same force "
-        "in all grids.",
+        description="Magnitude of the force, for all beams or for each; the load gives its sign. Several values make "
+        "the force a dimension. Otherwise a beam, material and load have the same force in all grids.",
     )
     pressure: Stresses | None = Field(
         None,
-        description="Pressure on the upper side, in place of `force`; for loads `pressure` and `follower-pressure`.",
+        description="Pressure on the upper side instead of `force`, for the loads `pressure` and `follower-pressure`.",
     )
-    thickness: Lengths | None = Field(None, description="Thicknesses, in place of the beams' own.")
-    young_modulus: Stresses | None = Field(None, description="Young's moduli, in place of the materials' own.")
-    poisson_ratio: PoissonRatios | None = Field(None, description="Poisson's ratios, in place of the materials' own.")
+    thickness: Lengths | None = Field(None, description="Thicknesses instead of the beams' own.")
+    young_modulus: Stresses | None = Field(None, description="Young's moduli instead of the materials' own.")
+    poisson_ratio: PoissonRatios | None = Field(None, description="Poisson's ratios instead of the materials' own.")
     stiffness_scale: Ratios | None = Field(
-        None, description="Factors on all stiffnesses that a definition gives, its energies' included."
+        None, description="Factors on all stiffnesses of a definition, including its energies."
     )
 
     @model_validator(mode="after")
@@ -419,38 +418,38 @@ class GridConfig(Section):
         return self
 
     definition: Annotated[list[DefinitionName], OneOrMore(repeats=True)] = Field(
-        description="Rules that give every spring its stiffness; `springtune definitions` explains them."
+        description="Rules for the stiffness of every spring; `springtune definitions` lists them."
     )
     kinematics: Annotated[list[Kinematics], OneOrMore(repeats=True)] = Field(
         "nonlinear",
         validate_default=True,
-        description="Whether springs keep their length law or their tangent at rest.",
+        description="`nonlinear`: springs keep their length law. `linear`: they keep their tangent at rest.",
     )
     zip: Annotated[list[list[str]], Groups(GRID_PARAMETERS)] = Field(
         [],
-        description="Parameters that go together, such as `[mesh_size, force]`: the first value of one with the first "
-        "of the other, and so on, in place of all with all. A list of such lists for several groups.",
+        description="Parameters whose values are paired instead of combined, such as `[mesh_size, force]`: the first "
+        "with the first, and so on. Give a list of such lists for several groups.",
     )
     exclude: Annotated[list[ExcludeConfig], Sections()] = Field(
         [],
-        description="Combinations that are left out, such as `{mesh_type: free, mesh_size: 1 mm}`; a list for several.",
+        description="Combinations to leave out, such as `{mesh_type: free, mesh_size: 1 mm}`; a list for several.",
     )
     rows: FileName | None = Field(
         None,
-        description="CSV file of combinations, its path relative to the study's folder: a column a parameter, named as "
-        "its key, a row a combination. A unit stands beside each number (`5 mm`), or in the head (`mesh_size [mm]`). "
-        "What the file has not is combined with each row.",
+        description="CSV file of combinations, relative to the study's folder: one column for each parameter, named as "
+        "its key, and one row for each combination. Units stand beside the numbers (`5 mm`) or in the head "
+        "(`mesh_size [mm]`). Other parameters of the grid are combined with each row.",
     )
     sensitivity: Flag = Field(
         "true",
         validate_default=True,
-        description="Whether each mesh, material, load and kinematics also gets a sensitivity curve. "
-        "Curves that `calibrated` needs are made in any case.",
+        description="Whether each mesh, material, load and kinematics gets a sensitivity curve. "
+        "Curves that `calibrated` needs are always computed.",
     )
 
 
 DEALT_BY = ("mesh", "grid")
-"""What stays together where a study is split."""
+"""What a split of a study keeps together."""
 
 
 PartNumber = Annotated[int, number("a whole number from 1, such as 2", 1, MOST_PARTS, whole=True)]
@@ -459,17 +458,17 @@ DealtBy = Annotated[str, one_of("way to split", DEALT_BY)]
 
 
 class PartConfig(Section):
-    """Which part of a study this file asks for; `springtune split` writes it, and nobody by hand."""
+    """The part of the study that this file requests; written by `springtune split`, not by hand."""
 
-    number: PartNumber = Field(description="Which one of the parts.")
+    number: PartNumber = Field(description="Number of the part.")
     of: PartCount = Field(description="Number of parts.")
     by: DealtBy = Field(
         "mesh",
         validate_default=True,
-        description="What stays together: the scenes of a `mesh`, but of one that alone is more than a part, or those "
-        "of a `grid`.",
+        description="What a part keeps together: the scenes of a `mesh`, unless they are more than a part, or of a "
+        "`grid`.",
     )
-    study: Text = Field(description="SHA-256 of the whole study: of what stands above this section's comment.")
+    study: Text = Field(description="SHA-256 of the whole study, which stands above the comment of this section.")
 
     @model_validator(mode="after")
     def _among_them(self) -> Self:
@@ -481,37 +480,37 @@ class PartConfig(Section):
 class StudyConfig(Section):
     """A study."""
 
-    title: Text = Field(description="What the study is, in one line.")
-    beams: Annotated[dict[str, BeamConfig], Named("beam")] = Field({}, description="Beams; needed by grids.")
+    title: Text = Field(description="Title of the study, one line.")
+    beams: Annotated[dict[str, BeamConfig], Named("beam")] = Field({}, description="Beams; grids need them.")
     materials: Annotated[dict[str, MaterialConfig], Named("material")] = Field(description="Materials.")
     definitions: DefinitionsConfig = Field(
-        default_factory=DefinitionsConfig, description="Parameters of the definitions that have any."
+        default_factory=DefinitionsConfig, description="Parameters of the definitions `paper` and `calibrated`."
     )
     sensitivity: SensitivityConfig = Field(
         default_factory=SensitivityConfig, description="Range of stiffness of the sensitivity curves."
     )
     mesh_files: Annotated[dict[str, list[MeshFileConfig]], Named("mesh type")] | None = Field(
-        None, description="Mesh types of your own: for each a list of files, one for each beam and mesh size."
+        None, description="Your own mesh types: for each a list of files, one for each beam and mesh size."
     )
     outputs: list[str] = Field([], validate_default=False)
     further_references: Annotated[list[FurtherReference], OneOrMore()] = Field(
         [],
-        description="References at finite strain besides the small-strain one, for every beam, material and load: in "
-        "the group `/finite_strain` with the networks' errors, and under pressure in `/block`, too. They take seconds "
-        "each. An incompressible material has none in plane strain. A material with a `uniaxial_test` has "
-        "'yeoh-plane-stress', of the law that is fitted to it, and no other has.",
+        description="References at finite strain for every beam, material and load, besides the one of small strain. "
+        "The group `/finite_strain` has them and the networks' errors; under pressure `/block` has them, too. Each "
+        "takes seconds. Incompressible materials have none in plane strain. 'yeoh-plane-stress' needs a material with "
+        "a `uniaxial_test` and uses its fitted law.",
     )
-    limits: LimitsConfig = Field(default_factory=LimitsConfig, description="What one scene may take.")
+    limits: LimitsConfig = Field(default_factory=LimitsConfig, description="Limits of one task.")
     printed: FileName | None = Field(
-        None, description="CSV file of printed values to compare with, its path relative to the study's folder."
+        None, description="CSV file of printed values to compare with, relative to the study's folder."
     )
     grids: dict[str, GridConfig] = Field({})
     part: PartConfig | None = Field(
-        None, description="Which part of the study above is asked for; as `springtune split` writes it."
+        None, description="The part that this file requests; written by `springtune split`."
     )
 
     alone: ClassVar[dict[str, tuple[str, ...]]] = {}
-    """Keys of study kinds in the place of which a study may have neither beams nor grids, and what goes with each."""
+    """Keys of study kinds that a study may have instead of beams and grids, and the other keys that each needs."""
 
     @classmethod
     def _needed(cls, given: Mapping[str, object]) -> dict[str, str]:
@@ -528,12 +527,12 @@ class StudyConfig(Section):
 
 
 def _beams_or(alone: Iterable[str]) -> dict[str, Any]:
-    """What the schema of a study says besides: which keys it has without beams and grids."""
+    """JSON schema of the keys that replace beams and grids."""
     return {"anyOf": [{"required": ["beams", "grids"]}, *({"required": [name]} for name in alone)]}
 
 
 class Later(NamedTuple):
-    """Type of a field that is imported for studies that have it: sections cost milliseconds each."""
+    """Type of a field, imported only for studies that use the field: each section costs milliseconds."""
 
     module: str
     name: str
@@ -545,7 +544,6 @@ class Later(NamedTuple):
 
 def study_model(kinds: Sequence[Kind], given: Container[object] | None = None) -> type[StudyConfig]:
     """Model of a study: `StudyConfig` and the keys that study kinds add to it and to its grids."""
-    # Of each field its type and pydantic's description.
     grid_fields: dict[str, Any] = {}
     study_fields: dict[str, Any] = {}
     outputs: list[Output] = []
@@ -566,13 +564,13 @@ def study_model(kinds: Sequence[Kind], given: Container[object] | None = None) -
         Field(
             [output.name for output in outputs if output.usual],
             validate_default=False,
-            description=f"What is made from the dataset: {meanings}. "
-            "Figures of scenes are of nonlinear kinematics where a grid has them, else of linear ones.",
+            description=f"Figures and tables of the dataset: {meanings}. "
+            "Figures of scenes show nonlinear kinematics if a grid has them, otherwise linear ones.",
         ),
     )
     study_fields["grids"] = (
         Annotated[dict[str, grid], Named("grid", for_files=False)],
-        Field({}, description="Grids: what is to be computed."),
+        Field({}, description="Grids of scenes to compute."),
     )
     model = create_model("StudyConfig", __base__=StudyConfig, **study_fields)
     model.__doc__ = StudyConfig.__doc__
@@ -595,7 +593,7 @@ def sections(model: type[Section], place: str = "") -> dict[str, type[Section]]:
 
 
 def _models(annotation: object, ending: str = "") -> Iterator[tuple[type[Section], str]]:
-    """Sections inside an annotation, and what follows the key to lead to them."""
+    """Sections inside an annotation, and what follows the key in their place."""
     if isinstance(annotation, type) and issubclass(annotation, Section):
         yield annotation, ending
     origin = get_origin(annotation)

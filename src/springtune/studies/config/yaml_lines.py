@@ -83,7 +83,7 @@ _TOO_DEEP = "not a study: nested too deeply; see config/README.md for what it ma
 
 def _check_size(root: yaml.Node, file: str) -> None:
     """Refuse content that grows too large when aliases are expanded, without expanding it."""
-    sizes: dict[int, tuple[int, int]] = {}  # of each node: values and levels; none while it is counted
+    sizes: dict[int, tuple[int, int]] = {}  # values and levels of each node; empty while it is counted
 
     def count(node: yaml.Node) -> tuple[int, int]:
         known = sizes.get(id(node))

@@ -54,13 +54,26 @@ def main(config: str, folder: str, output: str, record: str, digest: str, *untol
     records.write(record, digest, made, untold=list(untold))
 
 
+def group_of(kind: "Kind") -> dataset.Group:
+    """Group of a kind whose tasks have cells of it."""
+    return dataset.Group(f"/{kind.name}", kind.variables, kind.dimensions)
+
+
 def _of_tasks(kind: "Kind", study: "Study", folder: Path) -> dict[str, xr.Dataset]:
-    """Group of a kind whose tasks have a cell each."""
-    group = dataset.Group(f"/{kind.name}", kind.variables)
+    """Group of a kind whose tasks have cells of it."""
+    group = group_of(kind)
     found = dataset.Filler(group.empty(study.axes))
+    found.data.attrs = dict(kind.attributes(study.parts[kind.name]))
+    used = {dimension for dimensions, *_ in kind.variables.values() for dimension in dimensions}
     for stage in kind.stages:
-        for task, result in results(stage, study, folder):
-            found.put(result, **task.labels)
+        assert stage.tasks
+        labels = next(iter(stage.tasks(study))).labels
+        if used <= {name for name, label in labels.items() if not isinstance(label, list)}:  # a cell a task
+            for task, result in results(stage, study, folder):
+                found.put(result, **task.labels)
+        else:
+            for task, result in results(stage, study, folder, kind.variables):
+                found.put_arrays(result, task.labels)
     return {group.name: found.data}
 
 

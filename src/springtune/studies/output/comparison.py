@@ -179,28 +179,23 @@ def compare(
     [('stiffness', '100x20', 2.0)]
     """
     nodes = [{node.path: node.to_dataset() for node in tree.subtree} for tree in with_swept([before, after])]
-    held = sorted({variable for own in nodes for data in own.values() for variable in map(str, data.variables)})
+    held = sorted({str(name) for side in nodes for data in side.values() for name in data.variables})
     for pattern in ignored:
         if not any(fnmatchcase(name, pattern) for name in held):
             raise ValueError(f"--ignore {pattern}: neither has it; {nearest(pattern, held)}")
-    if groups:
-        wanted = {"/" + name.strip("/") for name in groups}
-        for name in sorted(wanted - set(nodes[0]) - set(nodes[1])):
-            known = sorted(set(nodes[0]) | set(nodes[1]))
-            raise ValueError(f"--group {name.strip('/')}: neither has it; known: {', '.join(known)}")
-        chosen = [{path: data for path, data in own.items() if path in wanted} for own in nodes]
-    else:
-        chosen = [*nodes]
-    if part:
-        chosen[1] = {path: data for path, data in chosen[1].items() if path in chosen[0]}
-    shared = [path for path in chosen[0] if path in chosen[1]]
+    known = sorted({*nodes[0], *nodes[1]})
+    wanted = {"/" + name.strip("/") for name in groups} or {*known}
+    for name in sorted(wanted - {*known}):
+        raise ValueError(f"--group {name.strip('/')}: neither has it; known: {', '.join(known)}")
+    sides = [[path for path in side if path in wanted] for side in nodes]
     alone = (
-        [path for path in chosen[0] if path not in chosen[1]],
-        [path for path in chosen[1] if path not in chosen[0]],
+        [path for path in sides[0] if path not in sides[1]],
+        [path for path in sides[1] if path not in sides[0] and not part],
     )
     roots = (nodes[0]["/"], nodes[1]["/"])
     own = own or {}
     how = _How(tolerance or own.get("", Tolerance()), own, (*MEASURED, *ignored), most, part, block)
+    shared = [path for path in sides[0] if path in sides[1]]
     found = [_Group(path, (nodes[0][path], nodes[1][path]), roots, how).compared() for path in shared]
     kept = {name: text for name, text in after.attrs.items() if not part or name in before.attrs}
     attributes, config = _attributes(before.attrs, kept)
@@ -238,7 +233,6 @@ class _Group:
         self.axes = {name: axis(name, pair) for name in dict.fromkeys(str(one) for own in pair for one in own.sizes)}
         self.cell_dimensions = cell_dimensions(pair, roots)
         self.asked = [_asked(data, root) for data, root in zip(pair, roots)]
-        self.reduced: dict[tuple[object, ...], np.ndarray] = {}
 
     def compared(self) -> GroupChanges:
         found = GroupChanges(self.path, self.axes)
@@ -312,75 +306,72 @@ class _Group:
         return a, b
 
     def _variable(self, name: str) -> VariableChanges:
-        a, b = self._arrays(name)
-        names = sorted(map(str, a.dims), key=lambda one: one not in self.cell_dimensions)  # cells first, then points
+        pair = self._arrays(name)
+        names = sorted(map(str, pair[0].dims), key=lambda one: one not in self.cell_dimensions)  # cells, then points
         cells = sum(one in self.cell_dimensions for one in names)
-        common = {one: self.axes[one].common() for one in names}
-        if not all(len(places[0]) for places in common.values()):
+        common = [self.axes[one].common() for one in names]
+        if not all(len(among) for among, *_ in common):
             return VariableChanges(name, 0, 0, [])
-        kind = _Kind(a, b, self.how.own.get(variable_name(self.path, name), self.how.tolerance))
-        shape = [len(common[one][0]) for one in names]
+        kind = Values(*pair, self.how.own.get(variable_name(self.path, name), self.how.tolerance))
+        tolerances = self.pair[0].get(OF_CELLS)
+        tolerances = tolerances if tolerances is not None and set(tolerances.dims) <= set(names) else None
+        asked = [None if mask is None else mask.any(set(mask.dims) - set(names)) for mask in self.asked]
         compared = changed = 0
         rows: list[Change] = []
-        for block in _blocks(shape, cells, a.dtype.itemsize, self.how.block):
-            places = [common[one] if at != block[0] else tuple(p[block[1]] for p in common[one])
-                      for at, one in enumerate(names)]  # fmt: skip
-            values = [_values(array, names, [own[1 + side] for own in places]) for side, array in enumerate((a, b))]
-            asked = [self._asked_of(side, names, [own[1 + side] for own in places]) for side in (0, 1)]
-            further = self._further(names, [own[1] for own in places])
-            excess, there = kind.excess(values[0], values[1], asked[0], asked[1], cells, further)
+        shape = [len(among) for among, *_ in common]
+        for axis_number, part in _blocks(shape, cells, max(8, pair[0].dtype.itemsize), self.how.block):
+            among, *places = (
+                zip(*(tuple(one[part] for one in own) if at == axis_number else own for at, own in enumerate(common)))
+                if common
+                else ((), (), ())
+            )
+            values = [_values(array, names, own) for array, own in zip(pair, places)]
+            excess, there = kind.excess(
+                values,
+                [_over(mask, names, own, True) for mask, own in zip(asked, places)],
+                cells,
+                _over(tolerances, names, places[0], np.nan),
+            )
             flat = excess.reshape(*excess.shape[:cells], -1)
-            worst = flat.argmax(axis=-1)
-            largest = np.take_along_axis(flat, worst[..., None], axis=-1)[..., 0]
+            worst, largest = flat.argmax(axis=-1), flat.max(axis=-1)
             compared += int(there.reshape(flat.shape).any(axis=-1).sum())
             beyond = np.argwhere(largest > 1.0)
             changed += len(beyond)
-            sizes = largest[tuple(beyond.T)] if cells else np.atleast_1d(largest[largest > 1.0])
-            order = np.argsort(-sizes, kind="stable")[: self.how.most]
-            for at in beyond[order]:
-                point = np.unravel_index(int(worst[tuple(at)]), excess.shape[cells:]) if names[cells:] else ()
+            order = np.argsort(-largest[largest > 1.0], kind="stable")[: self.how.most]
+            for at in map(tuple, beyond[order]):
+                point = np.unravel_index(int(worst[at]), excess.shape[cells:]) if names[cells:] else ()
                 where = (*at, *point)
-                among = [int(own[0][index]) for own, index in zip(places, where)]
-                said = (kind.said(0, values[0][tuple(where)]), kind.said(1, values[1][tuple(where)]))
+                label = [int(own[index]) for own, index in zip(among, where)]
                 rows.append(
                     Change(
                         self.path,
                         name,
-                        self._labels(names[:cells], among[:cells]),
-                        self._labels(names[cells:], among[cells:]),
-                        *said,
+                        self._labels(names[:cells], label[:cells]),
+                        self._labels(names[cells:], label[cells:]),
+                        kind.said(0, values[0][where]),
+                        kind.said(1, values[1][where]),
                         kind.units,
-                        float(largest[tuple(at)]),
-                    )  # fmt: skip
+                        float(largest[at]),
+                    )
                 )
         rows.sort(key=lambda row: -row.excess)
         return VariableChanges(name, compared, changed, rows[: self.how.most])
 
-    def _further(self, names: Sequence[str], places: Sequence[np.ndarray]) -> np.ndarray:
-        """Relative tolerances of cells, broadcastable to a variable; NaN if unset."""
-        if OF_CELLS not in self.pair[0].data_vars or not set(self.pair[0][OF_CELLS].dims) <= set(names):
-            return np.full([1] * len(names), np.nan)
-        array = self.pair[0][OF_CELLS]
-        shared = [name for name in names if name in array.dims]
-        chosen = array.transpose(*shared).values[np.ix_(*(own for name, own in zip(names, places) if name in shared))]
-        return chosen[tuple(slice(None) if name in shared else np.newaxis for name in names)]
 
-    def _asked_of(self, side: int, names: Sequence[str], places: Sequence[np.ndarray]) -> np.ndarray:
-        """Requested cells of a variable, broadcastable to it."""
-        mask = self.asked[side]
-        shared = [name for name in names if mask is not None and name in mask.dims]
-        if mask is None or not shared:
-            return np.ones([1] * len(names), dtype=bool)
-        key = (side, *shared)
-        if key not in self.reduced:
-            others = [name for name in mask.dims if name not in shared]
-            self.reduced[key] = mask.any(others).transpose(*shared).values
-        chosen = self.reduced[key][np.ix_(*(own for name, own in zip(names, places) if name in shared))]
-        return chosen[tuple(slice(None) if name in shared else np.newaxis for name in names)]
+def _over(
+    array: xr.DataArray | None, names: Sequence[str], places: Sequence[np.ndarray], default: object
+) -> np.ndarray:
+    """Values of cells at chosen places, broadcastable to a variable with these dimensions; `default` without any."""
+    shared = [name for name in names if array is not None and name in array.dims]
+    if array is None or not shared:
+        return np.full([1] * len(names), default)
+    chosen = array.transpose(*shared).values[np.ix_(*(own for name, own in zip(names, places) if name in shared))]
+    found: np.ndarray = chosen[tuple(slice(None) if name in shared else np.newaxis for name in names)]
+    return found
 
 
-class _Kind:
-    """Comparison of numbers, flags or texts."""
+class Values:
+    """Comparison of two variables with numbers, flags or texts."""
 
     def __init__(self, a: xr.DataArray, b: xr.DataArray, tolerance: Tolerance) -> None:
         self.units = str(a.attrs.get("units", b.attrs.get("units", "1")))
@@ -394,64 +385,55 @@ class _Kind:
             return self.words[side].get(int(value), "")
         return str(value) if self.text else float(value)
 
+    def missing(self, side: int, values: np.ndarray) -> np.ndarray:
+        """Return where values are missing, or flags say that nothing was requested."""
+        if self.words is not None:
+            values = _as_words(values, self.words[side])
+        return values == "" if values.dtype.kind in "OUS" else np.isnan(values)
+
     def excess(
-        self, a: np.ndarray, b: np.ndarray, asked_a: np.ndarray, asked_b: np.ndarray, cells: int, further: np.ndarray
+        self, values: Sequence[np.ndarray], asked: Sequence[np.ndarray], cells: int, tolerances: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Difference over tolerance in the values' shape, and where it is defined."""
-        if self.words is not None:
-            return self._of_flags(a, b, asked_a, asked_b)
-        missing = [one == "" for one in (a, b)] if self.text else [np.isnan(one) for one in (a, b)]
-        unmatched = (missing[0] & ~missing[1] & asked_a) | (missing[1] & ~missing[0] & asked_b)
+        text = self.text or self.words is not None
+        a, b = values if self.words is None else map(_as_words, values, self.words)
+        missing = [self.missing(side, one) for side, one in enumerate(values)]
+        unmatched = (missing[0] & ~missing[1] & asked[0]) | (missing[1] & ~missing[0] & asked[1])
         both = ~missing[0] & ~missing[1]
-        there = both | unmatched
         excess = np.where(unmatched, np.inf, 0.0)
-        if self.text:
-            for at in np.argwhere(both & (a != b)):
-                excess[tuple(at)] = self._of_texts(str(a[tuple(at)]), str(b[tuple(at)]))
-            return excess, there
+        if text:
+            for at in map(tuple, np.argwhere(both & (a != b))):
+                excess[at] = self._of_texts(str(a[at]), str(b[at]))
+            return excess, both | unmatched
         with np.errstate(invalid="ignore", over="ignore"):
             difference = np.abs(b - a)
             size = np.maximum(np.abs(a), np.abs(b))
         points = tuple(range(cells, a.ndim))
         if points:
             size = np.where(both & np.isfinite(size), size, 0.0).max(axis=points, keepdims=True)
-        relative = np.where(np.isnan(further), self.tolerance.relative, further)
+        relative = np.where(np.isnan(tolerances), self.tolerance.relative, tolerances)
         dimensionless = self.units in ("", "1")
         least = relative if self.tolerance.absolute is None and dimensionless else self.tolerance.absolute or 0.0
         allowed = np.maximum(relative * size, least)
         with np.errstate(invalid="ignore", divide="ignore"):
             ratio = np.where(allowed > 0, difference / allowed, np.inf)
         ratio = np.where(np.isfinite(ratio), ratio, np.inf)
-        excess = np.where(both & (a != b), ratio, excess)
-        return excess, there
-
-    def _of_flags(
-        self, a: np.ndarray, b: np.ndarray, asked_a: np.ndarray, asked_b: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        assert self.words is not None
-        known = {word: number for number, word in enumerate({*self.words[0].values(), *self.words[1].values()})}
-        known[NOT_REQUESTED] = -1
-        told = []
-        for own, words in zip((a, b), self.words):
-            values, back = np.unique(own, return_inverse=True)
-            told.append(
-                np.array([known.get(words.get(int(one), NOT_REQUESTED), -1) for one in values])[back.reshape(own.shape)]
-            )
-        absent = [one < 0 for one in told]
-        there = (~absent[0] & ~absent[1]) | (absent[0] & ~absent[1] & asked_a) | (absent[1] & ~absent[0] & asked_b)
-        return np.where(there & (told[0] != told[1]), np.inf, 0.0), there
+        return np.where(both & (a != b), ratio, excess), both | unmatched
 
     def _of_texts(self, a: str, b: str) -> float:
         """Difference over tolerance of texts that differ only in numbers."""
-        if without_numbers(a) != without_numbers(b):
+        allowed = self.tolerance.relative
+        if without_numbers(a) != without_numbers(b) or not allowed:
             return float("inf")
         pairs = zip((float(one[0]) for one in NUMBER.finditer(a)), (float(one[0]) for one in NUMBER.finditer(b)))
-        allowed = self.tolerance.relative
-        return (
-            max((abs(y - x) / (allowed * max(abs(x), abs(y))) for x, y in pairs if x != y), default=0.0)
-            if allowed
-            else float("inf")
-        )
+        return max((abs(y - x) / (allowed * max(abs(x), abs(y))) for x, y in pairs if x != y), default=0.0)
+
+
+def _as_words(values: np.ndarray, words: Mapping[int, str]) -> np.ndarray:
+    """Flags as words, empty where nothing was requested."""
+    known, back = np.unique(values, return_inverse=True)
+    said = [words.get(int(one), NOT_REQUESTED).replace(NOT_REQUESTED, "") for one in known]
+    return np.array(said, dtype=object)[back.reshape(values.shape)]
 
 
 def _asked(data: xr.Dataset, root: xr.Dataset) -> xr.DataArray | None:

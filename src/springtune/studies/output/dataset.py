@@ -125,6 +125,12 @@ class Filler:
             place = tuple(places[dimension][cells] for dimension in dimensions if dimension in places)
             array[place] = np.array(found, dtype=array.dtype)
 
+    def put_arrays(self, values: Mapping[str, object], labels: Mapping[str, Label | Sequence[Label]]) -> None:
+        """Write arrays into the cells of some labels, one or several of a dimension."""
+        for name, value in values.items():
+            array = self.data[name]
+            array.loc[{dimension: labels[str(dimension)] for dimension in array.dims if dimension in labels}] = value
+
     def put_rows(self, values: Mapping[str, Sequence[float] | np.ndarray], **labels: Label) -> None:
         """Write rows or tables that may be shorter than their dimensions."""
         for name, row in values.items():

@@ -74,8 +74,7 @@ def draw_curve(ax: Axes | None, curve: "Curve") -> Axes:
     labels.settle(figure, axes, place)
     if not len(known):
         labels.say(panel, curve.message or "There is no reference, and so no error.", bare=False)
-    room = panel.get_window_extent().width / panel.figure.dpi
-    labels.note(panel, labels.wrapped("; ".join(said), room))
+    labels.note(panel, "; ".join(said))
     return panel
 
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
 from functools import reduce
 from pathlib import Path
@@ -23,7 +22,7 @@ from . import dataset, reading
 from .alignment import axis
 from .comparison import MEASURED, OF_CELLS, RELATIVE, Tolerance, cell_dimensions, variable_name
 from .dataset import flag_words, is_flagged
-from .text import NUMBER, cell_text
+from .text import NUMBER, place_text
 
 DEFAULTS = {
     "/": ("status", "displacement", "deformation_error", "stiffness"),
@@ -129,16 +128,11 @@ def unsolved(tree: xr.DataTree) -> list[tuple[str, str, str, str]]:
         if "status" not in data.data_vars:
             continue
         status = data["status"]
-        flags = status.values
-        messages = data["message"] if "message" in data and data["message"].dims == status.dims else None
-        for place in np.argwhere(
-            (flags != Status.NOT_REQUESTED) & (flags != Status.SOLVED) & np.isin(flags, [*Status])
-        ):
-            labels = {str(name): data[name].values[at] if name in data.coords else int(at)
-                      for name, at in zip(status.dims, place)}  # fmt: skip
-            units = {name: str(data[name].attrs.get("units", "1")) for name in labels if name in data.coords}
-            why = str(messages.values[tuple(place)]) if messages is not None else ""
-            found.append((node.path, cell_text(labels, units), str(Status(int(flags[tuple(place)]))), why))
+        lost = status.isin([one for one in Status if one not in (Status.NOT_REQUESTED, Status.SOLVED)])
+        messages = data["message"].values if "message" in data and data["message"].dims == status.dims else None
+        for place in map(tuple, np.argwhere(lost.values)):
+            why = "" if messages is None else str(messages[place])
+            found.append((node.path, place_text(data, status.dims, place), str(Status(int(status.values[place]))), why))
     return found
 
 
@@ -339,21 +333,6 @@ def _tolerance_text(one: Tolerance) -> str:
     return f"{{relative: {one.relative:g}" + ("}" if one.absolute is None else f", absolute: {one.absolute:g}}}")
 
 
-@dataclass(frozen=True)
-class _Table:
-    """Lines of a group with labels, units and values."""
-
-    path: str
-    by: dict[str, str]
-    along: dict[str, list[float]]
-    rows: dict[str, dict[str, str | float]]
-    values: dict[str, Any]
-
-    def axes(self) -> dict[str, list[Any]]:
-        """Labels of each dimension."""
-        return {name: [row[name] for row in self.rows.values()] for name in self.by} | self.along
-
-
 class _Yaml:
     """YAML file of expected values; faults name their place."""
 
@@ -378,15 +357,16 @@ class _Yaml:
         """Read all values."""
         if not isinstance(self.content, dict) or ACCEPTED not in self.content:
             raise ValueError(f"{self.path}: holds no expected values; {EXAMPLE}")
-        groups = [self._group(path) for path in self._mapping(self.content.get("groups"), "groups")]
+        groups = {path: self._group(path) for path in self._mapping(self.content.get("groups"), "groups")}
         # Groups of a tree have the labels of its root.
-        axes: dict[str, np.ndarray] = {}
-        for group in groups:
-            for name, labels in group.axes().items():
-                both = [*axes.get(name, []), *labels]
-                kept = list(dict.fromkeys(both)) if isinstance(both[0], str) else sorted(set(both))
-                axes[name] = np.array(kept, dtype=object if isinstance(both[0], str) else float)
-        tree = xr.DataTree.from_dict({"/": xr.Dataset()} | {group.path: self._filled(group, axes) for group in groups})
+        axes: dict[Hashable, np.ndarray] = {}
+        for data in groups.values():
+            for name, labels in data.indexes.items():
+                axes[name] = _together([*axes.get(name, []), *labels])
+        for path, data in groups.items():
+            fill = {name: 0 if name == "status" else np.nan for name in data.data_vars}
+            groups[path] = data.reindex({name: axes[name] for name in data.dims}, fill_value=fill)
+        tree = xr.DataTree.from_dict({"/": xr.Dataset()} | groups)
         tree.attrs = {
             ACCEPTED: str(self.content[ACCEPTED]),
             "springtune_version": str(self.content.get("springtune_version", "unknown")),
@@ -425,58 +405,51 @@ class _Yaml:
             )
         return found
 
-    def _group(self, path: str) -> _Table:
-        """Read the labels of a group's lines."""
+    def _group(self, path: str) -> xr.Dataset:
+        """Read a group's lines."""
         keys = ("groups", path)
         group = self._mapping(self.content["groups"][path], *keys)
         by = {name: str(unit) for name, unit in self._mapping(group.get("by", {}), *keys, "by").items()}
-        along: dict[str, list[float]] = {}
+        axes: dict[str, np.ndarray] = {}
         for name, labels in self._mapping(group.get("along", {}), *keys, "along").items():
             if not isinstance(labels, list):
                 raise self.stop("is no list of numbers", *keys, "along", name)
-            along[name] = [self._number(label, *keys, "along", name) for label in labels]
+            axes[name] = np.array([self._number(label, *keys, "along", name) for label in labels])
+            if len(set(axes[name])) != len(labels):
+                raise self.stop("has a label twice", *keys, "along", name)
+        points = [len(labels) for labels in axes.values()]
         values = self._mapping(group.get("values"), *keys, "values")
         rows = {text: self._labels(by, text, *keys, "values") for text in values}
-        return _Table(path, by, along, rows, values)
-
-    def _filled(self, group: _Table, axes: Mapping[str, np.ndarray]) -> xr.Dataset:
-        """Read the values of a group's lines."""
-        shape = [len(axes[name]) for name in group.by]
-        further = [len(axes[name]) for name in group.along]
-        places = {name: {label: at for at, label in enumerate(axes[name].tolist())} for name in group.axes()}
-        among = np.ix_(*([places[name][label] for label in labels] for name, labels in group.along.items()))
-        count = math.prod(map(len, group.along.values()))
+        axes = {name: _together([row[name] for row in rows.values()]) for name in by} | axes
+        places = {name: {label: at for at, label in enumerate(axes[name].tolist())} for name in by}
+        shape = [len(axes[name]) for name in by]
         arrays: dict[str, np.ndarray] = {}
-        for text, row in group.rows.items():
-            at = tuple(places[name][row[name]] for name in group.by)
-            for name, value in self._mapping(group.values[text], "groups", group.path, "values", text).items():
-                keys = ("groups", group.path, "values", text, name)
+        for text, row in rows.items():
+            at = tuple(places[name][label] for name, label in row.items())
+            for name, value in self._mapping(values[text], *keys, "values", text).items():
+                where = (*keys, "values", text, name)
                 if name == "status":
                     if value not in dataset.STATUS:
-                        raise self.stop(f"'{value}' is no status; known: {', '.join(dataset.STATUS)}", *keys)
+                        raise self.stop(f"'{value}' is no status; known: {', '.join(dataset.STATUS)}", *where)
                     arrays.setdefault(name, np.zeros(shape, dtype="int8"))[at] = dataset.STATUS.index(value)
                     continue
                 whole = isinstance(value, list)
-                array = arrays.setdefault(name, np.full([*shape, *further] if whole else shape, np.nan))
+                array = arrays.setdefault(name, np.full([*shape, *points] if whole else shape, np.nan))
                 if whole != (array.ndim > len(shape)):
-                    raise self.stop("is a list in one line and a number in another, or along nothing", *keys)
-                if whole and len(value) != count:
-                    raise self.stop(f"{len(value)} numbers; give {count}, one for each place along it", *keys)
-                if whole:
-                    numbers = [self._number(one, *keys) for one in value]
-                    array[at][among] = np.reshape(numbers, [len(own) for own in group.along.values()])
-                else:
-                    array[at] = self._number(value, *keys)
-        dims = (*group.by, *group.along)
-        data = xr.Dataset({name: (dims[: array.ndim], array) for name, array in arrays.items()})
-        for name in dims:
-            unit = group.by.get(name, "number")
-            units = {"mm": "m", "number": "1", "name": "1"}.get(unit, unit)
-            data.coords[name] = (name, axes[name], {"units": units})
-        if "status" in data:
+                    raise self.stop("is a list in one line and a number in another, or along nothing", *where)
+                numbers = [self._number(one, *where) for one in (value if whole else [value])]
+                if len(numbers) != array[at].size:
+                    count = array[at].size
+                    raise self.stop(f"{len(numbers)} numbers; give {count}, one for each place along it", *where)
+                array[at] = np.reshape(numbers, array[at].shape)
+        found = xr.Dataset({name: (list(axes)[: array.ndim], array) for name, array in arrays.items()})
+        for name, labels in axes.items():
+            unit = by.get(name, "number")
+            found.coords[name] = (name, labels, {"units": {"mm": "m", "number": "1", "name": "1"}.get(unit, unit)})
+        if "status" in found:
             flags = np.arange(len(dataset.STATUS), dtype="int8")
-            data["status"].attrs |= {"flag_values": flags, "flag_meanings": " ".join(dataset.STATUS)}
-        return data
+            found["status"].attrs |= {"flag_values": flags, "flag_meanings": " ".join(dataset.STATUS)}
+        return found
 
     def _labels(self, by: Mapping[str, str], text: str, *keys: str) -> dict[str, str | float]:
         """Read the labels of a line."""
@@ -494,3 +467,10 @@ class _Yaml:
             else:
                 raise self.stop(f"{name} '{word}' is no number{'' if unit == 'number' else f' in {unit}'}", *keys, text)
         return found
+
+
+def _together(labels: Sequence[Any]) -> np.ndarray:
+    """Labels of a dimension: texts in their order, numbers sorted."""
+    if labels and isinstance(labels[0], str):
+        return np.array(list(dict.fromkeys(labels)), dtype=object)
+    return np.unique(np.array(labels, dtype=float))

@@ -1,6 +1,7 @@
 """Place texts in figures: line names, notes and messages."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import cache
 from typing import Any
 
@@ -13,6 +14,7 @@ from matplotlib.font_manager import FontProperties, findfont, get_font
 from matplotlib.patches import Patch
 
 from . import style
+from .dataset import STATUS
 from .style import POINTS, SMALL, arrange
 
 End = tuple[float, float, str, str]
@@ -184,6 +186,37 @@ def settle(figure: Figure | SubFigure | None, axes: np.ndarray, place: Mapping[s
     arrange(figure, axes, **{**place, "left": left, "across": place.get("across", 0.0) + between})
 
 
+@contextmanager
+def arranged(
+    ax: Figure | SubFigure | Axes | np.ndarray | None,
+    nrows: int = 1,
+    ncols: int = 1,
+    *,
+    figsize: tuple[float, float],
+    sharey: bool = False,
+    widths: Sequence[float] | None = None,
+    across: float = 0.1,
+    **place: Any,
+) -> Iterator[tuple[np.ndarray, dict[Axes, list[End]]]]:
+    """Panels to draw on, and the ends of their lines to name; afterwards `settle` and `name_lines`.
+
+    `across` [inch] and `place` are as in `arrange`, `across` beside the texts between panels.
+    """
+    figure, axes = style.panels(ax, nrows, ncols, figsize=figsize, sharey=sharey, widths=widths)
+    margins = {"right": 0.08, "top": 0.28} | place
+    arrange(figure, axes, left=0.5, across=across + (0.0 if sharey else 0.5), **margins)
+    ends: dict[Axes, list[End]] = {}
+    yield axes, ends
+    settle(figure, axes, margins | {"across": across})
+    for panel, named in ends.items():
+        name_lines(panel, named)
+
+
+def statuses(flags: np.ndarray) -> dict[str, int]:
+    """Number of cells of each status but those that were not asked for, by its words."""
+    return {STATUS[flag].replace("_", " "): int((flags == flag).sum()) for flag in np.unique(flags[flags != 0])}
+
+
 def say(panel: Axes, text: str, bare: bool = True) -> None:
     """Write in the middle of an empty panel what is missing and why."""
     room = panel.get_window_extent().width / panel.figure.dpi
@@ -197,8 +230,9 @@ def say(panel: Axes, text: str, bare: bool = True) -> None:
 
 
 def note(panel: Axes, text: str, below: float = 0.38) -> None:
-    """Write small wrapped text `below` a panel's label [inch]."""
+    """Write small text `below` a panel's label [inch], wrapped to its width."""
     if text:
+        text = wrapped(text, panel.get_window_extent().width / panel.figure.dpi)
         panel.annotate(text, (0, 0), xycoords="axes fraction", xytext=(0, -POINTS * below), va="top", ha="left",
                        textcoords="offset points", fontsize=SMALL, color="0.25")  # fmt: skip
 

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
 
 import numpy as np
 import xarray as xr
 
 from .alignment import Axis, axis, with_swept
-from .comparison import MEASURED
-from .dataset import NOT_REQUESTED, flag_words, is_flagged, nothing
+from .comparison import MEASURED, Tolerance, Values
+from .dataset import STATUS, nothing
 from .text import cell_text, number_text
 
 SAME_VALUE = 1e-9
@@ -76,27 +76,24 @@ class _Merger:
         names = [str(tree.attrs.get("study", "")) or f"number {number}" for number, tree in enumerate(trees, 1)]
         twice = {name for name in names if names.count(name) > 1}
         self.names = [f"{name} (number {number})" if name in twice else name for number, name in enumerate(names, 1)]
-        nodes = [
-            (number, node.path, node.to_dataset()) for number, tree in enumerate(self.trees) for node in tree.subtree
-        ]
         self.held: dict[str, dict[int, xr.Dataset]] = {}
-        for number, path, data in nodes:
-            self.held.setdefault(path, {})[number] = data
-        of_roots = {str(name) for tree in self.trees for name in tree.to_dataset().coords if name in tree.sizes}
-        # Groups of a tree have the labels of its root.
+        for number, tree in enumerate(self.trees):
+            for node in tree.subtree:
+                self.held.setdefault(node.path, {})[number] = node.to_dataset()
         self.axes: dict[tuple[str, str], Axis] = {}
         self.places: dict[tuple[str, str, int], np.ndarray] = {}
-        for name in of_roots:
-            self._align(name, [(number, path, data) for number, path, data in nodes if name in data.sizes])
+        of_roots = {str(name) for tree in self.trees for name in tree.to_dataset().coords if name in tree.sizes}
         for path, held in self.held.items():
-            here = [(number, path, data) for number, data in held.items()]
             for name in dict.fromkeys(str(one) for data in held.values() for one in data.sizes):
-                if name not in of_roots:
-                    self._align(name, [one for one in here if name in one[2].sizes])
+                if (path, name) not in self.axes:
+                    # Groups of a tree have the labels of its root.
+                    self._align(name, self.held if name in of_roots else {path: held})
 
-    def _align(self, name: str, nodes: Sequence[tuple[int, str, xr.Dataset]]) -> None:
-        found = axis(name, [data for _, _, data in nodes])
-        for (number, path, _), places in zip(nodes, found.places):
+    def _align(self, name: str, groups: Mapping[str, Mapping[int, xr.Dataset]]) -> None:
+        held = {(path, number): data for path, own in groups.items() for number, data in own.items()}
+        held = {place: data for place, data in held.items() if name in data.sizes}
+        found = axis(name, [*held.values()])
+        for (path, number), places in zip(held, found.places):
             self.axes[path, name] = found
             self.places[path, name, number] = places
 
@@ -156,16 +153,16 @@ class _Merger:
         for number, array in arrays.items():
             place = np.ix_(*(self.places[path, one, number] for one in dims))
             own = array.transpose(*dims).values.astype(dtype)
-            there = ~_missing(own, array)
-            known = values[place]
+            known, of_both = values[place], Values(first, array, Tolerance(self.relative))
+            there = ~of_both.missing(1, own)
             both = there & (source[place] >= 0)
             if both.any() and not any(fnmatchcase(name, one) for one in FOUND_ANYHOW):
-                apart = both & ~self._same(known, own, str(array.attrs.get("units", "1")))
-                if apart.any():
-                    at = tuple(int(one) for one in np.argwhere(apart)[0])
-                    former = int(source[place][at])
+                excess, _ = of_both.excess((known, own), (there, there), own.ndim, np.array(np.nan))
+                if (both & (excess > 1.0)).any():
+                    at = tuple(int(one) for one in np.argwhere(both & (excess > 1.0))[0])
                     labels = {one: self.axes[path, one].labels[place[n].ravel()[at[n]]] for n, one in enumerate(dims)}
-                    self._refuse(path, name, labels, (former, number), (known[at], own[at]), array)
+                    said = (of_both.said(0, known[at]), of_both.said(1, own[at]))
+                    self._refuse(path, name, labels, (int(source[place][at]), number), said, of_both.units)
             new = there & ~both
             values[place] = np.where(new, own, known)
             source[place] = np.where(new, number, source[place])
@@ -177,30 +174,17 @@ class _Merger:
             values = values.astype(first.dtype)
         return xr.Variable(dims, values, first.attrs)
 
-    def _same(self, a: np.ndarray, b: np.ndarray, units: str) -> np.ndarray:
-        if a.dtype.kind not in "f":
-            found: np.ndarray = a == b
-            return found
-        allowed = self.relative * np.maximum(np.abs(a), np.abs(b))
-        with np.errstate(invalid="ignore"):
-            near = np.abs(a - b) <= np.maximum(allowed, self.relative if units in ("", "1") else 0.0)
-        return near | (a == b)
-
     def _refuse(
         self,
         path: str,
         name: str,
         labels: dict[str, object],
         numbers: tuple[int, int],
-        values: tuple[object, object],
-        array: xr.DataArray,
+        values: tuple[float | str, float | str],
+        units: str,
     ) -> None:
         """Raise for a cell with two values."""
-        units = str(array.attrs.get("units", "1"))
-        words = flag_words(array) if is_flagged(array) else {}
-        two = " and ".join(
-            f"{_value(value, units, words)} in {self.names[number]}" for number, value in zip(numbers, values)
-        )
+        two = " and ".join(f"{_value(value, units)} in {self.names[number]}" for number, value in zip(numbers, values))
         at = cell_text(labels, {one: self.axes[path, one].units for one in labels})
         if len(labels) == 1:
             (one,) = labels
@@ -258,20 +242,7 @@ def _full(path: str, name: str) -> str:
     return name if path == "/" else f"{path[1:]}/{name}"
 
 
-def _missing(values: np.ndarray, array: xr.DataArray) -> np.ndarray:
-    if values.dtype == object:
-        found: np.ndarray = values == ""
-        return found
-    if is_flagged(array):
-        words = flag_words(array)
-        return ~np.isin(values, [value for value, word in words.items() if word != NOT_REQUESTED])
-    return np.isnan(values)
-
-
-def _value(value: object, units: str, words: dict[int, str]) -> str:
+def _value(value: float | str, units: str) -> str:
     if isinstance(value, str):
-        return f"'{value}'"
-    if words:
-        return words.get(int(value), str(value))  # type: ignore[call-overload]
-    number = float(value)  # type: ignore[arg-type]
-    return number_text(number, units) if abs(number) < 1e6 else f"{number:.10g} {units}"
+        return value if value in STATUS else f"'{value}'"
+    return number_text(value, units) if abs(value) < 1e6 else f"{value:.10g} {units}"

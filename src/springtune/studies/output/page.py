@@ -24,7 +24,7 @@ COLUMN_UNITS = {"mm2": "mm²", "mm": "mm", "percent": "%", "points": "points", "
 
 def write(tree: xr.DataTree, folder: str | Path) -> list[str]:
     """Write a CSV file for each table, and a page with all."""
-    tables = [table for kind in kinds() if kind.tables for table in kind.module("tables").tables(tree)]
+    tables = [table for kind in kinds() if kind.tables for table in kind.module(kind.tables_by).tables(tree)]
     written = {f"{table['stem']}.csv": csv_text(table["rows"]) for table in tables}
     scenes = [_scenes(table, list(map(str, tree.kinematics.values))) for table in tables if "title" not in table]
     further = [shown(table) for table in tables if "title" in table]

@@ -178,6 +178,15 @@ def check_links(path: Path) -> set[str]:
     return texts
 
 
+def attributes(path: Path) -> dict[str, str]:
+    """Texts of the attributes of a dataset, without xarray."""
+    import h5py
+
+    check_links(path)
+    with h5py.File(path) as file:  # which gives ASCII as bytes
+        return {str(name): text.decode() if isinstance(text, bytes) else str(text) for name, text in file.attrs.items()}
+
+
 def most_of(path: Path) -> float:
     """Most bytes that a file may take in memory."""
     return max(MOST_HELD, DEFLATED * path.stat().st_size)

@@ -35,25 +35,17 @@ def group(data: xr.DataTree | xr.Dataset, name: str, alone: bool = True) -> xr.D
 def choose(present: xr.DataArray, **selection: Label | None) -> dict[str, Label | None]:
     """Labels of a figure: given ones, and those without alternative."""
     chosen = {name: label for name, label in selection.items() if name in present.dims}
-    labels = {name: present[name].values.tolist() for name in chosen}
-    there = present.values
-    for given in (True, False):
-        for name, label in chosen.items():
-            if (selection[name] is not None) is not given:
-                continue
-            axis = present.dims.index(name)
-            places = np.flatnonzero(there.any(axis=tuple(one for one in range(there.ndim) if one != axis)))
-            found = [labels[name][place] for place in places]
-            if given and label not in found:
-                raise ValueError(f"nothing has {name} {label!r}; there is {_listed(found)}")
-            if not found:
-                raise ValueError("nothing to plot: the dataset has no cell of the selection")
-            if not given and len(found) > 1:
-                raise ValueError(f"choose one {name}: {_listed(found)}")
-            chosen[name] = label if given else found[0]
-            # Of the other labels nothing is left, so that later dimensions are seen under this one.
-            kept = np.arange(there.shape[axis]) == labels[name].index(chosen[name])
-            there = there & np.expand_dims(kept, tuple(one for one in range(there.ndim) if one != axis))
+    given = [name for name, label in chosen.items() if label is not None]
+    for name in sorted(chosen, key=lambda name: name not in given):
+        found = labels_of(present, name)
+        if name in given and chosen[name] not in found:
+            raise ValueError(f"nothing has {name} {chosen[name]!r}; there is {_listed(found)}")
+        if not found:
+            raise ValueError("nothing to plot: the dataset has no cell of the selection")
+        if name not in given and len(found) > 1:
+            raise ValueError(f"choose one {name}: {_listed(found)}")
+        chosen[name] = chosen[name] if name in given else found[0]
+        present = present.sel({name: [chosen[name]]})  # later dimensions are seen under this label
     return chosen
 
 

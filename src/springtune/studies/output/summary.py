@@ -6,7 +6,7 @@ without xarray.
 
 import os
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,7 +20,7 @@ from ..runs.checked_json import ASIDE
 from ..runs.plan import Plan
 from ..runs.workload import clock, computed, results_of
 from .own_law import of_own_law
-from .text import aligned, label_text, without_numbers
+from .text import aligned, place_text, without_numbers
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -83,7 +83,7 @@ def _states(name: str, data: "xr.Dataset") -> Iterator[tuple[str, dict[Status, i
         found = {status: int((flags == status).sum()) for status in Status if status != Status.NOT_REQUESTED}
         lost: dict[Status, Cells] = {
             status: [
-                (_labels(data, variable.dims, place), str(data[message].values[tuple(place)]))
+                (place_text(data, variable.dims, place), str(data[message].values[tuple(place)]))
                 for place in np.argwhere(flags == status)
             ]
             for status, number in found.items()
@@ -100,15 +100,6 @@ def _words(status: Status) -> str:
 
 def _parts(found: Mapping[Status, int]) -> str:
     return ", ".join(f"{number} {_words(status)}" for status, number in found.items())
-
-
-def _labels(data: "xr.Dataset", dims: Sequence[object], place: Iterable[int]) -> str:
-    """Labels of a cell for readers."""
-    return ", ".join(_label(data[dim], number) for dim, number in zip(dims, place))
-
-
-def _label(axis: "xr.DataArray", number: int) -> str:
-    return label_text(str(axis.name), axis.values[number], str(axis.attrs.get("units", "1")))
 
 
 def _named(cells: Cells) -> Iterator[str]:
@@ -147,8 +138,8 @@ def _worst(root: "xr.Dataset", finite: "xr.Dataset | None" = None) -> Iterator[s
         own = np.flatnonzero(places[:, axis] == number)
         worst = own[np.argmax(abs(values[own]))]
         others = [dim for dim in errors.dims if dim != "definition"]
-        where = _labels(root, others, np.delete(places[worst], axis).tolist())
-        found.append((float(values[worst]), _label(root.definition, number), where))
+        where = place_text(root, others, np.delete(places[worst], axis).tolist())
+        found.append((float(values[worst]), str(root.definition.values[number]), where))
     found.sort(key=lambda row: -abs(row[0]))
     if found:
         number = int(counted.sum())
@@ -177,7 +168,7 @@ def _unreferenced(root: "xr.Dataset", called: str) -> Iterator[str]:
         few = scenes.any([dim for dim in scenes.dims if dim not in root.reference_message.dims])
         few = few.transpose(*root.reference_message.dims)
         messages = root.reference_message.values
-        cells = [(_labels(root, few.dims, place), str(messages[tuple(place)])) for place in np.argwhere(few.values)]
+        cells = [(place_text(root, few.dims, place), str(messages[tuple(place)])) for place in np.argwhere(few.values)]
         yield from ("", f"{called} {what}: {int(scenes.sum())} of {int(requested.sum())}", *_named(cells))
 
 
@@ -272,7 +263,7 @@ def _computed(study: "Study", plan: Plan, since: float) -> str:
         record, stage = plan.record(name), job.stage.name
         number = computed(record)
         if number is not None:
-            asked[stage] = asked.get(stage, 0) + len(results_of(job.content))
+            asked[stage] = asked.get(stage, 0) + len(set(results_of(job.content)))
             new[stage] = new.get(stage, 0) + (number if _done(record) >= since else 0)
     told = [f"{stage} {number} of {asked[stage]}" for stage, number in new.items() if number]
     if told:

@@ -4,11 +4,14 @@ import csv
 import io
 import math
 import re
-from collections.abc import Collection, Iterable, Mapping, Sequence
-from typing import SupportsFloat
+from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, SupportsFloat
 
 from springtune.problem.parameters import SWEPT, with_unit
 from springtune.safe_io.escapes import shown
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def paragraphs(parts: Iterable[Iterable[str]]) -> str:
@@ -76,6 +79,13 @@ def label_text(dimension: str, label: object, unit: str = "1") -> str:
 def cell_text(labels: Mapping[str, object], units: Mapping[str, str]) -> str:
     """Labels of a cell for readers; `units` are by dimension."""
     return ", ".join(label_text(name, label, units.get(name, "1")) for name, label in labels.items())
+
+
+def place_text(data: "xr.Dataset", dims: Iterable[Hashable], place: Iterable[int]) -> str:
+    """Labels of a cell of a dataset for readers, by its place along each dimension."""
+    pairs = [(str(name), data[name] if name in data.coords else None, int(at)) for name, at in zip(dims, place)]
+    units = {name: str(axis.attrs.get("units", "1")) for name, axis, _ in pairs if axis is not None}
+    return cell_text({name: at if axis is None else axis.values[at] for name, axis, at in pairs}, units)
 
 
 NUMBER = re.compile(r"[+-]?[0-9][0-9.]*(e[+-]?[0-9]+)?")

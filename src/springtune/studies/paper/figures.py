@@ -10,6 +10,7 @@ from contextlib import redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from springtune.safe_io import atomic
@@ -59,7 +60,6 @@ def draw(
 def _pdf(drawing: Drawing, datasets: Mapping[str, Dataset], name: str, examples: Path) -> bytes:
     import matplotlib
     import matplotlib.pyplot as plt
-    import numpy as np
 
     from ..output.style import SETTINGS
 
@@ -149,14 +149,18 @@ def sketch_block(tree: Any, part: "SubFigure", *, beam: str) -> None:
     panel.fill([0, length, length, 0], [0, 0, height, height], facecolor="0.88", edgecolor="0.3", linewidth=1.0)
     panel.fill([0, length, length, 0], [0, 0, -0.12 * height, -0.12 * height], facecolor="none", edgecolor="0.3",
                hatch="////", linewidth=0)  # fmt: skip
-    for step in range(13):
-        x = length * step / 12
-        panel.annotate("", (x, height), xytext=(x, 1.45 * height), arrowprops={"arrowstyle": "->", "color": "#b5382a"})
+    _draw_pressure(panel, 0, length, height, 1.45 * height)
     panel.plot(length / 2, height, "o", color="#14213d", clip_on=False)
     panel.text(length / 2, 0.8 * height, "displacement measured here", ha="center", va="top", fontsize=8)
     panel.set(aspect="equal", xlim=(-0.05 * length, 1.05 * length), ylim=(-0.2 * height, 1.5 * height))
     panel.set_title(f"{beam} mm, pressed on one long side")
     panel.axis("off")
+
+
+def _draw_pressure(panel: Any, left: float, length: float, low: float, high: float) -> None:
+    """Draw arrows down onto a side."""
+    for x in np.linspace(left, left + length, 13):
+        panel.annotate("", (x, low), xytext=(x, high), arrowprops={"arrowstyle": "->", "color": "#b5382a"})
 
 
 def sketch_laying(tree: Any, part: "SubFigure") -> None:
@@ -170,10 +174,7 @@ def sketch_laying(tree: Any, part: "SubFigure") -> None:
     left, low = (x.min() + x.max() - length) / 2, y.max()
     panel.fill([left, left + length, left + length, left], [low, low, low + height, low + height],
                facecolor="#e09f3e", edgecolor="0.3", linewidth=1.0)  # fmt: skip
-    for step in range(13):
-        place = left + length * step / 12
-        panel.annotate("", (place, low + height), xytext=(place, low + 2.6 * height),
-                       arrowprops={"arrowstyle": "->", "color": "#b5382a"})  # fmt: skip
+    _draw_pressure(panel, left, length, low + height, low + 2.6 * height)
     panel.text((x.min() + x.max()) / 2, y.mean(), "steel", ha="center", va="center", fontsize=8)
     panel.text(left + length, low + 0.5 * height, "  rubber", ha="left", va="center", fontsize=8)
     panel.set(aspect="equal", xlim=(-0.58 * length, 0.66 * length), ylim=(-1, low + 2.8 * height))

@@ -43,7 +43,7 @@ def rename(path: Path) -> Path:
 
 
 def set_aside(error: DamagedError) -> None:
-    """Rename a damaged file and report it; a whole file keeps its name and gets what it lacks."""
+    """Rename a damaged file and report it; a whole file that lacks results keeps its name."""
     told = "computed again"
     if error.path.exists() and not error.whole:
         told = f"set aside as {rename(error.path).name}, and computed again"

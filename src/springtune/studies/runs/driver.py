@@ -1,15 +1,15 @@
 """The loop over the tasks of a job, the same for all stages.
 
-The content of a job names the ``folder`` of its stage and its ``files``: the ``name`` of each, its ``tasks``, each with
-the ``key`` of its result, and what these share. The module of a stage says what one task is:
+The content of a job has the ``folder`` of its stage and its ``files``. A file has a ``name``, ``tasks``, and values
+that its tasks share; each task has the ``key`` of its result. The module of a stage defines:
 
 - ``solve(task)`` returns its result, with ``prepare`` ``solve(task, made)``.
-- ``prepare(file, content)`` returns what the tasks of a file share, such as their mesh, or raises `RefusedError`.
-- ``failed(task, why)`` returns the result of a task that fails. By default it has a status and a message.
-- ``parts(task, result)`` returns what is stored of a result, by key, where that is more than one part.
-- ``tasks(file, content)`` returns the tasks of a file, where their keys depend on results.
-- ``order(task)`` is what tasks are sorted by.
-- ``cost(task, made, result, seconds)`` yields what to count: a name, units and seconds. By default the task's ``cost``.
+- ``prepare(file, content)`` returns what the tasks of a file share, such as a mesh, or raises `RefusedError`.
+- ``failed(task, why)`` returns the result of a failed task; by default a status and a message.
+- ``parts(task, result)`` returns the parts of a result by key, if it is stored in several parts.
+- ``tasks(file, content)`` returns the tasks of a file, if their keys depend on other results.
+- ``order(task)`` is the sort key of tasks.
+- ``cost(task, made, result, seconds)`` yields a name, units and seconds to count; by default the task's ``cost``.
 
 All but ``solve`` are optional. A module with a loop of its own has ``run(content, costs)``, and ``gone(content, key,
 why, limits)``, which stores the failed result of a task that went beyond its limits.
@@ -31,20 +31,20 @@ if TYPE_CHECKING:
     from .task_costs import TaskCosts
 
 DRIVER = "studies.runs.driver"
-"""This module, which all keys of results depend on."""
+"""This module; the keys of all results depend on it."""
 
 REFUSED = "without mesh"
-"""Name under which tasks are counted that could not be prepared."""
+"""Name under which records count tasks that could not be prepared."""
 
 ONLY_PARTS = "fields"
-"""Name under which a task is counted of which only further parts were missing."""
+"""Name under which records count tasks with only further parts missing."""
 
 Task = Mapping[str, Any]
 Result = dict[str, Any]
 
 
 class RefusedError(Exception):
-    """Tasks cannot be prepared; ``limited`` where that went beyond the limits of another job."""
+    """Tasks cannot be prepared; ``limited`` if another job's task went beyond its limits."""
 
     def __init__(self, why: str, limited: bool = False) -> None:
         super().__init__(why)
@@ -52,13 +52,13 @@ class RefusedError(Exception):
 
 
 def run(name: str, content: dict[str, Any], costs: "TaskCosts") -> None:
-    """Do the tasks of a job whose results are not stored yet."""
+    """Do the tasks of a job whose results are missing."""
     module = imported(name)
     getattr(module, "run", partial(solve_files, module))(content, costs)
 
 
 def solve_files(module: ModuleType, content: dict[str, Any], costs: "TaskCosts") -> None:
-    """Do the tasks of the files of a job whose results are not stored yet."""
+    """Do the tasks of a job's files whose results are missing."""
     for file in content["files"]:
         _File(module, content, file, costs.limits).solve(costs)
 
@@ -70,7 +70,7 @@ def gone(name: str, content: dict[str, Any], key: str, why: str, limits: str) ->
 
 
 def gone_of_files(module: ModuleType, content: dict[str, Any], key: str, why: str, limits: str) -> bool:
-    """`gone` for the files of a job; whether it is a task of theirs."""
+    """`gone` for the files of a job; return whether one of their tasks has the key."""
     found = False
     for one in content["files"]:
         file = _File(module, content, one, limits)
@@ -92,19 +92,19 @@ class _File:
 
     @cached_property
     def present(self) -> set[str]:
-        """Keys of the results that are stored."""
+        """Keys of stored results."""
         return store.stored(self.path, self.limits)
 
     @cached_property
     def missing(self) -> list[Task]:
-        """Tasks of which a result, or a part of it, is not stored."""
+        """Tasks whose result, or a part of it, is not stored."""
         return [task for task in self.tasks if not self._all_parts(task, {}).keys() <= self.present]
 
     def _own(self, name: str, usual: Callable[..., Any] | None = None) -> Any:
         return getattr(self.module, name, usual)
 
     def failed(self, task: Task, why: str) -> Result:
-        """Result of a task that fails."""
+        """Result of a failed task."""
         usual = {"status": Status.FAILED, "message": why}
         found: Result = self._own("failed", lambda task, why: usual)(task, why)
         return found
@@ -120,12 +120,12 @@ class _File:
         return found
 
     def parts(self, task: Task, result: Result) -> dict[str, Result]:
-        """What to store of a result: numbers that are stored stay as they are."""
+        """Parts of a result to store; stored numbers stay unchanged."""
         parts = self._all_parts(task, result)
         return {key: part for key, part in parts.items() if key != task["key"] or key not in self.present}
 
     def solve(self, costs: "TaskCosts") -> None:
-        """Do the tasks that are missing."""
+        """Do the missing tasks."""
         if not self.missing:
             return
         shared: tuple[Any, ...] = ()
@@ -155,7 +155,7 @@ class _File:
                     keeper[key] = part
 
     def _prepared(self) -> Any:
-        """What tasks share, which is no dict; a dict says why there is nothing."""
+        """What tasks share; a dict with a message if it cannot be prepared."""
         try:
             return self.module.prepare(self.file, self.content)
         except RefusedError as error:
@@ -163,5 +163,5 @@ class _File:
 
 
 def _cost(task: Task, *made_and_result: object) -> list[tuple[str, float, object]]:
-    """What a task counts as: the seconds are the last argument."""
+    """Cost of a task; the last argument is its seconds."""
     return [(*task["cost"], made_and_result[-1])] if "cost" in task else []

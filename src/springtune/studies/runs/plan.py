@@ -167,7 +167,7 @@ def share_out(
     labels = (str(number) for number in range(len(load) + wanted) if str(number) not in load)
     while len(load) < wanted:
         load[next(labels)] = 0.0
-    # What is new goes to the bundles that have least, so that only those run again.
+    # New tasks go to the cheapest bundles, so that only those run again.
     count = _number(sum(costs[name] for name in new), size, start_up, cores, len(new))
     chosen = sorted(load, key=lambda label: (load[label], int(label)))[:count]
     added = dict.fromkeys(chosen, 0.0)
@@ -200,13 +200,13 @@ def _number(seconds: float, size: float, start_up: float, cores: int, most: int)
 
 
 COSTS_FILE = "costs.json"
-"""File beside the studies' folders: what tasks cost on this machine."""
+"""File beside the studies' folders: measured costs of tasks on this machine."""
 
 BUNDLES_FILE = f"{TASKS}/bundles.json"
-"""File in a study's folder: what each bundle holds."""
+"""File in a study's folder: tasks of each bundle."""
 
 LASTING = "seconds"
-"""What that file calls the seconds that a job is to last."""
+"""Key in that file: intended seconds of a job."""
 
 
 def stages() -> "tuple[Stage, ...]":
@@ -215,20 +215,20 @@ def stages() -> "tuple[Stage, ...]":
 
 
 def table_files(output: "Output", study: "Study") -> list[str]:
-    """Files of the tables of an output: where it is the page, each table of all study kinds as CSV, and the page."""
+    """Files of an output's tables; for the page, all tables as CSV and the page itself."""
     if not output.page:
         return list(output.tables(study))
     return [*(f"{stem}.csv" for kind in kinds() if kind.tables for stem in kind.tables(study)), "index.html"]
 
 
 def usual_costs() -> dict[str, tuple[float, float]]:
-    """Seconds of tasks before any was measured, see `springtune.studies.runs.plan.Costs`."""
+    """Seconds of tasks before any is measured, for `Costs`."""
     return {name: cost for kind in kinds() for name, cost in kind.costs.items()}
 
 
 @dataclass(frozen=True)
 class Tasks:
-    """What a job of a stage is to do."""
+    """Tasks of a job of a stage."""
 
     stage: "Stage"
     label: str
@@ -244,16 +244,16 @@ class Tasks:
 
 @dataclass(frozen=True)
 class Plan:
-    """What the jobs of a study's stages are to do.
+    """Jobs of a study's stages.
 
     Attributes
     ----------
     limits : dict
         Of one task, see `springtune.studies.config.model.Study`.
     bundles : dict
-        What each bundle holds, by stage and label, and the cores and the seconds of a job that they are made for.
+        Tasks of each bundle, by stage and label, and the cores and seconds of a job that bundles are made for.
     needs : dict of tuple to springtune.studies.runs.plan.Needs
-        What a job needs, by stage and label; stages that share bundles share their seconds, too.
+        Resources of a job, by stage and label; stages that share bundles share their seconds.
     """
 
     folder: Path
@@ -267,15 +267,15 @@ class Plan:
         return [job.label for job in self.jobs.values() if job.stage.name == stage]
 
     def tasks(self, name: str) -> Path:
-        """File of what a job is to do."""
+        """Note of a job's tasks."""
         return self.folder / TASKS / f"{name}.json"
 
     def record(self, name: str) -> Path:
-        """File of what a job has done."""
+        """Record of a done job."""
         return self.folder / RECORDS / f"{name}.json"
 
     def write(self) -> None:
-        """Write what jobs and later plans read; a file that says so already stays."""
+        """Write the notes that jobs and later plans read; unchanged files stay."""
         notes = {self.folder / BUNDLES_FILE: self.bundles}
         for name, job in self.jobs.items():
             notes[self.tasks(name)] = {
@@ -299,8 +299,8 @@ def plan(study: "Study", folder: Path, cores: int = 1, lasting: float | None = N
     members = {stage.name: dict(stage.members(study, costs)) for stage in stages() if stage.members}
     before = {name: known.get(name, {}) for name in members}
     kept: dict[str, dict[str, list[str]]] = {name: {} for name in members}
-    # Other machines want other bundles. What is solved stays solved, whichever bundle it is in, and a bundle that is
-    # done stays as it is, so that nothing of it runs again.
+    # Machines with more cores need other bundles. Bundles that are done stay, so that their jobs do not run again;
+    # stored results are reused in any bundle.
     if known["cores"] < cores or lasting_before != lasting:
         before, kept = kept, _done(study, folder, members, before)
     found: dict[str, Any] = {}
@@ -333,7 +333,7 @@ Members = dict[str, dict[str, tuple[float, Any]]]
 
 
 def _done(study: "Study", folder: Path, members: Members, before: dict[str, Any]) -> dict[str, Any]:
-    """Bundles whose jobs have all done what is asked for."""
+    """Bundles whose jobs have all done the current request."""
     held: dict[str, dict[str, list[str]]] = {stage: {} for stage in before}
     for stage, labels in before.items():
         for label, names in labels.items():

@@ -1,6 +1,6 @@
-"""What a run has to do: which jobs have not done what is asked for, or have made what is not there as it was.
+"""Find the jobs that a run has to do: those never done, with another request, or with damaged or missing products.
 
-Stages are planned in `springtune.studies.runs.plan`; here are the jobs after them, and what becomes of all of them.
+Jobs of stages come from `springtune.studies.runs.plan`; the jobs after them are defined here.
 """
 
 from collections.abc import Iterable, Mapping
@@ -26,17 +26,17 @@ DATASET, SUMMARY, PAGE = "dataset.nc", "summary.txt", "index.html"
 """Files that every study has."""
 
 COLLECT, BROWSE, PRESENT = "collect", "browse", "present"
-"""Jobs after the stages, by name; of those that make outputs the first part of it."""
+"""Names of jobs after the stages; jobs of outputs begin with the last one."""
 
 PAPER, PAPER_FILE = "paper", "paper.pdf"
-"""The job that sets the paper, and what it makes."""
+"""The job that typesets the paper, and its product."""
 
 PAPER_STUDIES = ("paper", "definitions", "block", "laying", "stability", "benchmark", "shapes")
 """Studies that the paper reads."""
 
 
 BLANKED = {"no_diff": "git_diff", "no_host": "host"}
-"""Attributes that a dataset leaves empty on request, by the option of a run."""
+"""Attributes that a dataset leaves empty, by the option of a run."""
 
 
 @dataclass(frozen=True)
@@ -46,11 +46,11 @@ class Job:
     Attributes
     ----------
     digest : str
-        Of all that it depends on, apart from what jobs before it make.
+        Hash of all that the job depends on, without the products of other jobs.
     reads : str
-        Job whose first product it is made from; empty for stages, whose results are known by their keys.
+        Job whose first product it reads; empty for stages, whose results are found by keys.
     inputs : tuple of str
-        Files that it is made from, where several jobs make them.
+        Files that it reads, if several jobs make them.
     """
 
     name: str
@@ -62,7 +62,7 @@ class Job:
 
 
 def output_jobs(study: "Study") -> "dict[str, list[Output]]":
-    """Outputs that a study asks for and that have files in it, by the job that makes them."""
+    """Requested outputs of a study that have files, by the job that makes them."""
     found: dict[str, list[Output]] = {}
     for one in () if study.part else outputs().values():  # figures and tables are of whole studies
         if one.name in study.outputs and output_files(one, study):
@@ -77,7 +77,7 @@ def output_files(output: "Output", study: "Study") -> list[str]:
 
 
 def linked(study: "Study") -> list[str]:
-    """Files that the page to browse links to, from the study's folder on."""
+    """Files that the page to browse links to, relative to the study's folder."""
     made = (path for members in output_jobs(study).values() for one in members for path in output_files(one, study))
     return [path for path in made if Path(path).suffix in (f".{FORMATS[0]}", ".html")]
 
@@ -105,7 +105,7 @@ def jobs(study: "Study", plan: Plan, chosen: Mapping[str, bool] | None = None) -
 
 
 def _collect_digest(study: "Study", plan: Plan) -> str:
-    """Digest of a study's dataset: of the study as it is expanded, and of the files that the dataset names."""
+    """Digest of a study's dataset: of the expanded study, its input files and the code."""
     collected = [made for made in outputs().values() if made.collect and made.name in study.outputs]
     code = [stage_key("studies.kinds.collect")]
     code += [stage_key(name) for name in modules("kind", "collect")]
@@ -119,7 +119,7 @@ def _collect_digest(study: "Study", plan: Plan) -> str:
         study.further_references,
         study.calibration,
     ]
-    # What is stored of a scene knows neither its labels nor its beam's.
+    # Stored scenes have neither their own labels nor those of their beams.
     of_scenes = [[*study.labels(scene).values(), scene.force] for scene in study.scenes]
     bodies = {scene.mesh.beam for scene in study.scenes}, {scene.material for scene in study.scenes}
     named = [sorted((_plain(one) for one in group), key=str) for group in bodies]
@@ -141,7 +141,7 @@ def _collect_digest(study: "Study", plan: Plan) -> str:
 
 
 def _plain(part: Any) -> Any:
-    """A study's part in dicts and lists."""
+    """Part of a study as dicts and lists."""
     if is_dataclass(part) and not isinstance(part, type):
         return asdict(part)
     return [_plain(one) for one in part] if isinstance(part, tuple | list) else part
@@ -154,7 +154,7 @@ def _present_digest(members: "Iterable[Output]", files: list[str]) -> str:
         used += filter(None, (one.module, one.write))
         if one.page:
             used += ["studies.output.page", *modules("kind")]
-            used += [f"studies.kinds.{kind.name}.tables" for kind in kinds() if kind.tables]
+            used += [f"studies.kinds.{kind.name}.{kind.tables_by}" for kind in kinds() if kind.tables]
             templates.append(records.checksum(PACKAGE / "studies/output/page.html"))
     return hash_of(files, [stage_key(name) for name in dict.fromkeys(used)], templates)
 
@@ -171,7 +171,7 @@ def _browse_digest(study: "Study") -> str:
 
 
 def paper_job(source: Path, datasets: "Iterable[Path]", folder: Path) -> Job:
-    """The job that sets the paper."""
+    """The job that typesets the paper."""
     texts = {path.name: records.checksum(path) for path in sorted(source.iterdir()) if path.is_file()}
     examples = sorted((source.resolve().parents[1] / "examples").glob("*.py"))
     texts |= {f"examples/{path.name}": records.checksum(path) for path in examples}
@@ -182,7 +182,7 @@ def paper_job(source: Path, datasets: "Iterable[Path]", folder: Path) -> Job:
 
 
 def fault(job: Job, found: dict[str, Job], wholly: bool = False) -> str:
-    """Why a job is to run, whatever becomes of those before it."""
+    """Return why a job must run, or an empty string; jobs before it count only by their products."""
     why = records.fault(job.record, job.digest, job.products, wholly)
     if not why and job.reads and not _is_up_to_date(job, found[job.reads]):
         return f"{found[job.reads].products[0]} is another one"
@@ -192,9 +192,9 @@ def fault(job: Job, found: dict[str, Job], wholly: bool = False) -> str:
 
 
 def outdated(study: "Study", folder: Path, chosen: Mapping[str, bool] | None = None) -> dict[Path, str] | None:
-    """Return the records of jobs that are to run again though Snakemake may not know, with the reason of each.
+    """Return the records of done jobs that must run again, with the reasons; None if a job was never done.
 
-    Snakemake compares parameters with its own notes, and no content of what was made. None where a job is not done yet.
+    Snakemake does not find these: it compares parameters with its own notes, and no content of products.
     """
     if not (folder / BUNDLES_FILE).exists():  # never run: planning 10,000 scenes takes a second
         return None
@@ -210,12 +210,12 @@ def _checksum(path: str) -> str:
 
 
 def _is_up_to_date(job: Job, before: Job) -> bool:
-    """Whether a job read what the one before it has made; that of a job that is to run is not asked for."""
+    """Return whether the recorded input checksum matches the predecessor's product, or that job must run itself."""
     read, made = checked_json.read(job.record), checked_json.read(before.record, products=dict)
     product = made and made["products"].get(before.products[0])
     return not product or read["read"] == product[2]
 
 
 def is_damage(why: str) -> bool:
-    """Whether a job is to run since a file is not as it was made: a user should know."""
+    """Return whether a reason is a damaged or missing file, which a user should know."""
     return why.endswith((records.DAMAGED, records.MISSING))

@@ -1,8 +1,8 @@
 """A job of a stage: ``python -m springtune.studies.runs.run_tasks TASKS DONE DIGEST``.
 
-What is to do is the note ``TASKS``; the module that it names does it, and ``DONE`` records what was done and made. A
-stored file that turns out to be damaged is set aside and made again, in the job that needs it. A task that goes beyond
-its limits fails, and the others are done; a program that is broken ends the job when all other tasks are done.
+The note ``TASKS`` names the tasks and the module that does them; ``DONE`` becomes the record of the job. A damaged
+stored file is set aside and made again by the job that needs it. A task beyond its limits fails, and the others are
+done. A broken program ends the job when all other tasks are done.
 """
 
 import os
@@ -19,27 +19,27 @@ from springtune.registry import imported
 
 from . import checked_json, driver, records
 from .checked_json import DamagedError, hash_of, set_aside
-from .task_costs import TaskCosts, Watch, guarded
+from .task_costs import TaskCosts, Watch, run_limited
 
 Made = TypeVar("Made")
 
 TASKS, RECORDS = "tasks", "done"
-"""Folders of a study: what each job of a stage is to do, and what each job has done."""
+"""Folders of a study: notes of jobs to do, and records of done jobs."""
 
 PACKAGE = Path(__file__).parents[2]
 
 STATE = "SPRINGTUNE_SOURCE_STATE"
-"""Variable of the environment by which a run tells its jobs the `source_state` that it began with."""
+"""Environment variable with the `source_state` at the begin of a run, for its jobs."""
 
 TRIES = 2
-"""So often a file is made again that is damaged: another job may set aside what was just made."""
+"""Times that a damaged file is made again; another job may set aside the new one."""
 
 TRACEBACKS = 3
-"""Most tracebacks of one job's log; tasks that are alike fail alike."""
+"""Most tracebacks in the log of a job; similar tasks fail alike."""
 
 
 def main(tasks: str, done: str, digest: str) -> None:
-    """Do what a note says.
+    """Do the tasks of a note.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def main(tasks: str, done: str, digest: str) -> None:
 
 
 def source_state() -> str:
-    """Sizes and times of all files of the package: results are stored under keys of the code that a run began with."""
+    """Hash of sizes and times of the package's files; keys of results are those of the code at the begin of a run."""
     states = [(str(path), path.stat()) for path in sorted(PACKAGE.rglob("*.py"))]
     return hash_of([[name, state.st_size, state.st_mtime_ns] for name, state in states])
 
@@ -70,7 +70,7 @@ def _run(note: dict[str, Any], done: str | Path, folder: Path) -> None:
     imported(note["module"])  # once for all children
     watch = Watch(note["limits"])
     costs = TaskCosts(watch)
-    guarded(
+    run_limited(
         lambda: with_repair(lambda: _do(note, done, costs), folder),
         watch,
         lambda key, why: driver.gone(note["module"], note["content"], key, why, watch.words),
@@ -88,7 +88,7 @@ def _do(note: dict[str, Any], done: str | Path, costs: TaskCosts) -> None:
 
 
 def with_repair(function: Callable[[], Made], folder: Path) -> Made:
-    """Call a function; stored files that it finds damaged are made again."""
+    """Call a function, and again after making damaged stored files again."""
     again: Counter[Path] = Counter()
     while True:
         try:
@@ -102,14 +102,14 @@ def with_repair(function: Callable[[], Made], folder: Path) -> Made:
 
 
 def _make_again(product: Path, folder: Path) -> None:
-    """Let the job that makes a file make it again."""
+    """Run the job that makes a file."""
     for path in sorted((folder / TASKS).glob("*_*.json")):
         note = checked_json.read(path)
         if note is not None and str(product) in note["products"]:
             done = folder / RECORDS / path.name
             before = done.stat() if done.exists() else None
             _run(note, done, folder)
-            if before:  # what waited for it has no reason to run again
+            if before:  # so that jobs after it need not run again
                 os.utime(done, ns=(before.st_atime_ns, before.st_mtime_ns))
             return
     raise SystemExit(f"{product}: no job makes it; call the same command again")

@@ -24,29 +24,28 @@ class Task:
     Attributes
     ----------
     values : dict
-        What ``solve`` is given, without labels: a new label computes nothing again.
+        Argument of ``solve``, without labels, so that a new label computes nothing again.
     also : sequence
-        What its key depends on besides its values and the stage's code: keys of definitions and mesh types.
+        Further parts of its key: keys of definitions and mesh types.
     labels : dict
-        Cell of the dataset that its result is for.
+        Labels of its cell of the dataset; a label may be several.
     of : object
-        What the study has that it is made from.
+        Object of the study that it comes from.
     costs : sequence of tuple
-        Name, units and, unless it is 1, number of what it is expected to cost, see
-        `springtune.studies.config.kind.Kind`.
+        Expected costs: name, units and optional count, see `springtune.studies.config.kind.Kind`.
     name : str
         Tasks of one name are in one bundle; by default a hash of its values.
     file : str
         Stem of the file of its result; by default its key.
     shared : dict
-        What all tasks of that file share.
+        Values that all tasks of that file share.
     key : str
-        Of its result; by default a hash of all that it depends on.
+        Key of its result; by default a hash of all inputs.
     """
 
     values: Mapping[str, Any]
     also: Sequence[object] = ()
-    labels: Mapping[str, str | float] = field(default_factory=dict)
+    labels: Mapping[str, Any] = field(default_factory=dict)
     of: Any = None
     costs: Sequence[tuple[str, float] | tuple[str, float, float]] = ()
     name: str = ""
@@ -59,7 +58,7 @@ class Task:
         return self.key or hash_of(self.values, stage_key(module, driver.DRIVER), self.also)
 
     def seconds(self, costs: "Costs") -> float:
-        """What it is expected to take."""
+        """Expected seconds."""
         return sum(costs.of(name, units) * (count[0] if count else 1) for name, units, *count in self.costs)
 
 

@@ -32,9 +32,6 @@ LIMITS = "limits"
 USER_BLOCK = 512
 """Length of the block before HDF5's own [bytes]."""
 
-OLD = b"\x89HDF"
-"""Start of files from before checksums."""
-
 
 def _checked(path: str | Path) -> None:
     """Compare a file with its checksum."""
@@ -60,22 +57,13 @@ def stored(path: str | Path, limits: str | None = None) -> set[str]:
     try:
         _checked(path)
     except DamagedError as error:
-        if not _is_old(path):
-            set_aside(error)
+        set_aside(error)
         return set()
     import h5py  # here: a plan reads no results
 
     with h5py.File(path) as file:
         scalars = _scalars(file)
     return {name for name, result in scalars.items() if limits is None or result.get(LIMITS, limits) == limits}
-
-
-def _is_old(path: str | Path) -> bool:
-    """Return whether a file is from before checksums."""
-    if not Path(path).is_file():
-        return False
-    with open(path, "rb") as file:
-        return file.read(len(OLD)) == OLD
 
 
 def _scalars(file: "h5py.File") -> dict[str, dict[str, Any]]:

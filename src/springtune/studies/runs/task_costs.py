@@ -17,14 +17,12 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
-from springtune.mesh import MeshError
 from springtune.safe_io.inputs import virtual_memory
-from springtune.springs import DefinitionError
 
 from .checked_json import DamagedError
 
 PLACES = 4096
-"""Most bytes of the name of a task."""
+"""Most bytes of a task's key."""
 
 STOPPED = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
 """Signals from outside; a task causes all others itself."""
@@ -41,7 +39,7 @@ class Watch:
     def __init__(self, limits: Mapping[str, float]) -> None:
         self.seconds, self.memory = limits["seconds"], limits["memory"]
         self.words = f"at most {self.seconds:g} s and {self.memory / 1e9:g} GB for each {LIMITS_TOLD}"
-        self.lost = 0
+        self.beyond = 0
         self._name = mmap.mmap(-1, PLACES)  # shared with the child
 
     @contextmanager
@@ -51,7 +49,7 @@ class Watch:
         before = resource.getrlimit(resource.RLIMIT_AS)
         used = virtual_memory()
         if used:
-            # A limit that the user, or a cluster, has set for the whole job is kept.
+            # A tighter limit that a user or a cluster set for the whole job stays.
             most = [limit for limit in before if limit != resource.RLIM_INFINITY]
             resource.setrlimit(resource.RLIMIT_AS, (min([used + int(self.memory), *most]), before[1]))
         signal.setitimer(signal.ITIMER_PROF, self.seconds)
@@ -76,8 +74,8 @@ def go_with_parent() -> None:
         ctypes.CDLL(None).prctl(PARENT_DEATH, signal.SIGKILL)
 
 
-def guarded(function: Callable[[], None], watch: Watch, lose: Callable[[str, str], None]) -> None:
-    """Run a function in a child process, again after each task that ends the child."""
+def run_limited(function: Callable[[], None], watch: Watch, store_failed: Callable[[str, str], None]) -> None:
+    """Run a function in a child process, and again after each task that ended the child."""
     while True:
         child = _begin(function)
         with _passed_on(child):
@@ -92,10 +90,10 @@ def guarded(function: Callable[[], None], watch: Watch, lose: Callable[[str, str
             hint = ": is the machine's memory short?" if number == signal.SIGKILL else ""
             print(f"stopped by {number.name}{hint}", file=sys.stderr)
             raise SystemExit(128 + number)
-        beyond = number == signal.SIGPROF
-        why = f"not done within {watch.seconds:g} s" if beyond else f"the program was ended by {number.name}"
-        lose(key, f"{why}; {watch.words}")
-        watch.lost += 1
+        too_long = number == signal.SIGPROF
+        why = f"not done within {watch.seconds:g} s" if too_long else f"the program was ended by {number.name}"
+        store_failed(key, f"{why}; {watch.words}")
+        watch.beyond += 1
 
 
 def _begin(function: Callable[[], None]) -> int:
@@ -139,9 +137,6 @@ def _passed_on(child: int) -> Iterator[None]:
             signal.signal(number, handler)
 
 
-REFUSALS = (DefinitionError, MeshError)
-
-
 def own_reason(error: Exception) -> str:
     """Return the reason of a failed task, or an empty string if the program is broken.
 
@@ -152,25 +147,28 @@ def own_reason(error: Exception) -> str:
     >>> own_reason(TypeError("unsupported operand"))
     ''
     """
-    if isinstance(error, REFUSALS):
+    from springtune.mesh import MeshError  # here: most jobs have no failed task
+    from springtune.springs import DefinitionError
+
+    if isinstance(error, DefinitionError | MeshError):
         return str(error)
     told = f"{type(error).__name__}: {error}"
     if isinstance(error, RuntimeError):
         return "" if isinstance(error, NotImplementedError | RecursionError) else told
-    # numpy's LinAlgError is a ValueError, and scipy has no name of its own for numbers that are not finite.
+    # numpy's LinAlgError is a ValueError, and so is what scipy raises for numbers that are not finite.
     named = type(error).__name__ == "LinAlgError" or "infs or NaNs" in str(error)
     return told if named or isinstance(error, ArithmeticError) else ""
 
 
 KIBI = 1024
-"""Bytes in which Linux tells the memory of a process."""
+"""Unit in which Linux reports the memory of a process [byte]."""
 
-LOST = "beyond limits"
-"""What tasks are counted as that went beyond their limits."""
+BEYOND_LIMITS = "beyond limits"
+"""Name under which records count the tasks that went beyond their limits."""
 
 
 class TaskCosts:
-    """What the tasks of a job cost, for the record that says it is done.
+    """Costs of a job's tasks, for its record.
 
     Examples
     --------
@@ -189,11 +187,11 @@ class TaskCosts:
 
     @property
     def limits(self) -> str:
-        """Limits of a task in words, which the failed result of one beyond them notes."""
+        """Limits of a task in words; the failed result of a task beyond them stores these."""
         return self.watch.words if self.watch else ""
 
     def attempt(self, key: str, function: Callable[[], Any], failed: Callable[[str], dict[str, Any]]) -> Any:
-        """Result of a task, a failed one where it fails for reasons of its own; None where the program is broken."""
+        """Return the result of a task, a failed result for a reason of the task, or None if the program is broken."""
         try:
             if self.watch is None:
                 return function()
@@ -218,13 +216,13 @@ class TaskCosts:
         sums[2] += seconds
 
     def summary(self) -> dict[str, Any]:
-        """What to write to the record."""
-        lost = self.watch.lost if self.watch else 0
-        work = dict(self.sums) | ({LOST: [lost, 0.0, 0.0]} if lost else {})
+        """Entries of the record."""
+        beyond = self.watch.beyond if self.watch else 0
+        work = dict(self.sums) | ({BEYOND_LIMITS: [beyond, 0.0, 0.0]} if beyond else {})
         return {"start_up": self.start_up, "work": work, "memory": most_memory()}
 
 
 def most_memory() -> int:
-    """Most memory that this process, or a child of it that is done, had so far [byte]."""
+    """Largest memory so far of this process or a finished child [byte]."""
     most = max(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
     return most if sys.platform == "darwin" else KIBI * most

@@ -11,8 +11,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from springtune.springs import DEFINITIONS
-
 from . import checked_json
 from .plan import COSTS_FILE, Costs, Needs, Plan, usual_costs
 from .run_tasks import TASKS
@@ -21,25 +19,25 @@ if TYPE_CHECKING:
     from ..config.model import Study
 
 READ: "list[tuple[Study, Plan]]" = []
-"""Studies that this process runs: the one that was asked for, and those that the paper reads besides."""
+"""Studies that this process runs: the requested one, and those that the paper reads."""
 
 PRESENTED = (1.5, 0.3)
-"""Seconds of a job that makes no results of scenes, before one was measured: in any case, and for each of its files."""
+"""Seconds of a job after the stages, before any is measured: fixed, and per file."""
 
 AFTER = "Dataset, figures and tables"
-"""What jobs after the stages do."""
+"""Description of the jobs after the stages."""
 
 
 @dataclass
 class Estimate:
-    """What a job has to do.
+    """Expected work of a job.
 
     Attributes
     ----------
     tasks : int
-        Its scenes, references or what else its stage works on.
+        Number of its scenes, references or other tasks.
     seconds : float
-        What it is expected to take if nothing of it is stored.
+        Expected seconds if nothing is stored yet.
     """
 
     part: str
@@ -49,49 +47,35 @@ class Estimate:
     products: list[Path] = field(default_factory=list)
 
 
-def keys_of(content: Any) -> list[str]:
-    """Keys of the results that a task file asks for, one a task.
-
-    Examples
-    --------
-    >>> sorted(keys_of({"folder": "x", "scenes": [{"key": "a", "reference": {"key": "r"}}, {"key": "b"}]}))
-    ['a', 'b']
-    """
-    if isinstance(content, dict):
-        if "key" in content:
-            return [content["key"]]
-        content = list(content.values())
-    return [key for part in content for key in keys_of(part)] if isinstance(content, list) else []
-
-
-def results_of(content: Any, name: str = "") -> set[tuple[str, str]]:
-    """Results that a task file asks for: the name of what each is stored for, such as its mesh, and its key.
+def results_of(content: Any, name: str = "") -> list[tuple[str, str]]:
+    """Results that a task file requests, one a task: the name of its file, such as its mesh, and its key.
 
     Examples
     --------
     Two meshes that are alike are two files:
 
-    >>> sorted(results_of({"meshes": [{"name": "one", "key": "a"}, {"name": "two", "key": "a"}]}))
+    >>> results_of({"meshes": [{"name": "one", "key": "a"}, {"name": "two", "key": "a", "reference": {"key": "r"}}]})
     [('one', 'a'), ('two', 'a')]
     """
     if isinstance(content, dict):
         name = content["name"] if isinstance(content.get("name"), str) else name
         if "key" in content:
-            return {(name, content["key"])}
+            return [(name, content["key"])]
         content = list(content.values())
-    parts = content if isinstance(content, list) else ()
-    return {result for part in parts for result in results_of(part, name)}
+    return [found for part in content for found in results_of(part, name)] if isinstance(content, list) else []
 
 
 def computed(done: Path) -> int | None:
-    """Number of tasks that a job computed, those left out whose results were there; None where it does not say."""
+    """Number of tasks that a job computed, without those whose results were stored; None if unknown."""
+    from springtune.springs import DEFINITIONS
+
     work = (checked_json.read(done) or {}).get("work")
-    # What definitions cost is told beside the task that they are part of.
+    # Costs of definitions are recorded besides those of their tasks.
     return None if work is None else sum(row[0] for name, row in work.items() if name not in DEFINITIONS)
 
 
 def estimates(study: "Study", plan: Plan, jobs: Iterable[tuple[int, str, int, list[str]]]) -> dict[int, Estimate]:
-    """What each job of a run has to do."""
+    """Expected work of each job of a run."""
     folder = plan.folder
     of_bundles = _of_bundles(study, plan)
     order = {stem: place for place, stem in enumerate(of_bundles)}
@@ -112,9 +96,9 @@ def _of_bundles(study: "Study", plan: Plan) -> dict[str, Estimate]:
     parts: dict[tuple[str, str], list[Estimate]] = {}
     for name, job in plan.jobs.items():
         products = [Path(path) for path in job.products]
-        found[name] = Estimate(job.stage.message, max(1, len(keys_of(job.content))), 0.0, 1, products)
+        found[name] = Estimate(job.stage.message, max(1, len(results_of(job.content))), 0.0, 1, products)
         parts.setdefault((job.stage.like or job.stage.name, job.label), []).append(found[name])
-    # Stages that share bundles share their seconds, too, as they share their tasks: what each takes is not told apart.
+    # Stages that share bundles share the bundle's seconds by their numbers of tasks.
     for place, sharing in parts.items():
         tasks = sum(estimate.tasks for estimate in sharing)
         for estimate in sharing:
@@ -123,7 +107,7 @@ def _of_bundles(study: "Study", plan: Plan) -> dict[str, Estimate]:
 
 
 def _presented(folder: Path, rule: str, outputs: list[str]) -> Estimate:
-    """Estimate of a job after the stages: what it took before, if it ran before."""
+    """Estimate of a job after the stages; its former seconds if it ran before."""
     return Estimate(
         AFTER, len(outputs), _seconds_presented(folder, rule, len(outputs)), products=list(map(Path, outputs))
     )
@@ -138,19 +122,19 @@ def _seconds_presented(folder: Path, rule: str, files: int) -> float:
 
 
 def presented_needs(folder: Path, rule: str, files: int) -> Needs:
-    """What a job asks a cluster for that makes no results of scenes."""
+    """Resources of a job after the stages."""
     return Needs(_seconds_presented(folder, rule, files))
 
 
 def told(found: dict[int, Estimate], cores: int) -> str:
-    """What a run has to do, in a line."""
+    """Expected work of a run in one line."""
     seconds = sum(estimate.seconds * min(estimate.threads, cores) for estimate in found.values()) / cores
     jobs = f"{len(found)} job{'' if len(found) == 1 else 's'}"
     return f"{jobs}, about {clock(seconds)} on {cores} core{'' if cores == 1 else 's'} if nothing is stored yet"
 
 
 def clock(seconds: float) -> str:
-    """Seconds as people read them.
+    """Readable duration.
 
     Examples
     --------
@@ -165,16 +149,16 @@ def clock(seconds: float) -> str:
 
 
 COMMANDS_FILE = f"{TASKS}/commands.json"
-"""File in a study's folder: commands of the jobs of its last run on other machines."""
+"""File in a study's folder: commands of the last run's jobs on other machines."""
 
 ON_CLUSTERS = re.compile(r"[\w@+=:,./-]*")
-"""Paths that may be part of a command for Slurm."""
+"""Paths that a command for Slurm may contain."""
 
 
 def refusal(config: Path, folder: Path, checkout: Path, python: Path, on_cluster: bool) -> str:
-    """Why no study can run with some paths.
+    """Return why a study cannot run with some paths, or an empty string.
 
-    Rules quote all that they give to a shell, so most paths are fine. What is refused is what libraries cannot have.
+    Rules quote all paths for the shell, so only paths that libraries cannot handle are refused.
 
     Examples
     --------
@@ -205,7 +189,7 @@ def remember_commands(folder: Path, jobs: Iterable[Mapping[str, Any]]) -> None:
 
 
 def recall_command(folder: Path, rule: str, wildcards: Mapping[str, str]) -> Any:
-    """What is noted of a job.
+    """Noted command of a job; None if there is none.
 
     Examples
     --------

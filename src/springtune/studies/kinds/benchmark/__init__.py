@@ -1,1 +1,42 @@
-"""Run time against error."""
+"""Run time against error: names of the approaches of the benchmark."""
+
+from collections.abc import Iterable, Sequence
+
+from springtune.mesh import MESH_TYPES
+from springtune.springs import DEFINITIONS
+
+OTHER_APPROACHES = (
+    "relaxation",
+    "backward-euler",
+    "truncated-backward-euler",
+    "linear-triangles",
+    "quadratic-triangles",
+    "tensor-mass",
+    "condensation",
+    "boundary-elements",
+    "free-form",
+    "calculix-cps3",
+    "calculix-cps8",
+)
+"""Approaches of the benchmark besides definitions, see `springtune.studies.kinds.benchmark.approaches`."""
+
+PARTS = ("meshing", "assembling", "factorizing", "solving")
+"""Parts of the seconds of a case."""
+
+CURVE_COUNTS = (1, 11, 61, 201)
+"""Numbers of stiffnesses of the benchmark's sensitivity curves."""
+
+THREAD_COUNTS = (1, 2)
+"""Numbers of threads of the benchmark's explicit steps."""
+
+
+def approach_names(definitions: Iterable[str], mesh_types: Sequence[str], others: Iterable[str]) -> tuple[str, ...]:
+    """Names of the approaches: ``definition/mesh type``, those that go together, and others."""
+    names = []
+    for name in definitions:
+        for mesh_type in mesh_types:
+            made, definition = MESH_TYPES.get(mesh_type), DEFINITIONS[name]
+            # An unknown mesh type is told elsewhere.
+            if not definition.needs and (made is None or made.corners in definition.cells):
+                names.append(f"{name}/{mesh_type}")
+    return (*names, *others)

@@ -5,6 +5,7 @@ All are linear.
 """
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -40,58 +41,55 @@ def _problem(scene, mesh, definition):
     return sheet, springs, sheet.problem(scene.kind, springs)
 
 
+def _delingette(scene, size, clock):
+    """Sheet, springs and static problem of `delingette`."""
+    mesh = _mesh(scene, size, clock)
+    with clock("assembling"):
+        return _problem(scene, mesh, "delingette")
+
+
+def _at_rest(found):
+    if found.status != "rest":
+        raise ArithmeticError(found.message)
+    return found.displacements
+
+
 def relaxation(scene, size, clock):
     """`delingette` by dynamic relaxation to 1e-8."""
-    with clock("meshing"):
-        mesh = _mesh(scene, size)
-    with clock("assembling"):
-        sheet, springs, problem = _problem(scene, mesh, "delingette")
+    sheet, springs, problem = _delingette(scene, size, clock)
     with clock("solving"):
         load = scene.force / springs.reference * sheet.weights(scene.kind)
         found = relax(problem.network, load, linear=True, tolerance=1e-8)
-    if found.status != "rest":
-        raise ArithmeticError(found.message)
-    return sheet.displacement(scene.kind, found.displacements), problem.network.unknowns
+    return sheet.displacement(scene.kind, _at_rest(found)), problem.network.unknowns
 
 
 def backward_euler(scene, size, clock, iterations=None):
-    """`delingette` in time by backward Euler, steps of 10 ms, to rest."""
-    with clock("meshing"):
-        mesh = _mesh(scene, size)
+    """`delingette` in time by backward Euler, steps of 10 ms, to rest; with iterations by conjugate gradients."""
+    sheet, springs, problem = _delingette(scene, size, clock)
     with clock("assembling"):
-        sheet, springs, problem = _problem(scene, mesh, "delingette")
         motion = motion_of(sheet, scene.kind, springs, scene.material.density, scene.force, linear=True)
     with clock("solving"):
         found = motion.run(BackwardEuler(iterations=iterations), 0.01, 500, rest=1e-6)
-    if found.status != "rest":
-        raise ArithmeticError(found.message)
-    return sheet.displacement(scene.kind, found.displacements), problem.network.unknowns
+    return sheet.displacement(scene.kind, _at_rest(found)), problem.network.unknowns
 
 
-def truncated_backward_euler(scene, size, clock):
-    """As `backward_euler`, with 25 conjugate-gradient iterations a step."""
-    return backward_euler(scene, size, clock, 25)
-
-
-def _mesh(scene, size):
-    mesh = structured(scene.beam.length, scene.beam.height, size)
-    mesh.edges  # noqa: B018  computed when first asked for
+def _mesh(scene, size, clock):
+    with clock("meshing"):
+        mesh = structured(scene.beam.length, scene.beam.height, size)
+        mesh.edges  # noqa: B018  computed when first asked for
     return mesh
 
 
-def linear_triangles(scene, size, clock):
-    """Linear triangles of scikit-fem on equilateral rows."""
-    return _triangles(scene, size, clock, 1)
+def _middle(scene, places, moved):
+    """Displacement of the middle of the loaded side, of particles at places along it [m]."""
+    order = np.argsort(places)
+    return float(np.interp(scene.kind.side_length(scene.beam) / 2, places[order], moved[order]))
 
 
-def quadratic_triangles(scene, size, clock):
-    """Quadratic triangles of scikit-fem on equilateral rows."""
-    return _triangles(scene, size, clock, 2)
-
-
-def _triangles(scene, size, clock, degree):
+def triangles(scene, size, clock, degree):
+    """Triangles of scikit-fem on equilateral rows."""
     from skfem import Basis, ElementTriP1, ElementTriP2, ElementVector, FacetBasis, LinearForm, MeshTri
-    from skfem.models.elasticity import lame_parameters, linear_elasticity
+    from skfem.models.elasticity import linear_elasticity
 
     with clock("meshing"):
         made = structured(scene.beam.length, scene.beam.height, size)
@@ -100,8 +98,7 @@ def _triangles(scene, size, clock, degree):
         element = ElementVector((ElementTriP1, ElementTriP2)[degree - 1]())
         basis = Basis(mesh, element)
         young, nu = scene.material.young_modulus, scene.material.poisson_ratio
-        lam, mu = lame_parameters(young, nu)
-        lam = young * nu / (1 - nu**2)  # plane stress
+        lam, mu = young * nu / (1 - nu**2), young / (2 * (1 + nu))  # plane stress
         matrix = linear_elasticity(lam, mu).assemble(basis) * scene.beam.thickness
         value, along, axis = scene.side
         side = FacetBasis(mesh, element, facets=mesh.facets_satisfying(lambda x: np.isclose(x[along], value)))
@@ -127,8 +124,7 @@ def tensor_mass(scene, size, clock):
 
     S. Cotin, H. Delingette, N. Ayache, Visual Computer 16:437, 2000; here in balance, by conjugate gradients.
     """
-    with clock("meshing"):
-        mesh = _mesh(scene, size)
+    mesh = _mesh(scene, size, clock)
     with clock("assembling"):
         young, nu = scene.material.young_modulus, scene.material.poisson_ratio
         lam, mu = young * nu / (1 - nu**2), young / (2 * (1 + nu))
@@ -187,10 +183,8 @@ def tensor_mass(scene, size, clock):
 
 def condensation(scene, size, clock):
     """Responses of the loaded side to unit loads, computed once (``factorizing``); a load then costs a product."""
-    with clock("meshing"):
-        mesh = _mesh(scene, size)
+    sheet, springs, problem = _delingette(scene, size, clock)
     with clock("assembling"):
-        sheet, springs, problem = _problem(scene, mesh, "delingette")
         problem.network.tangent()
     with clock("factorizing"):
         net, factor = problem.network, problem.rest_factor
@@ -267,10 +261,7 @@ def boundary_elements(scene, size, clock):
     with clock("solving"):
         moved = np.where(clamped, 0.0, solution).reshape(-1, 2)[:, axis]
         if scene.kind.pressed:
-            places = middle[loaded, scene.kind.along]
-            order = np.argsort(places)
-            half = scene.kind.side_length(scene.beam) / 2
-            displacement = float(np.interp(half, places[order], moved[loaded][order]))
+            displacement = _middle(scene, middle[loaded, scene.kind.along], moved[loaded])
         else:
             displacement = float(moved[loaded] @ lengths[loaded] / lengths[loaded].sum())
     return displacement, 2 * count
@@ -282,8 +273,7 @@ def free_form(scene, size, clock):
     T. W. Sederberg, S. R. Parry, Computer Graphics 20(4):151, 1986.
     """
     beam, young = scene.beam, scene.material.young_modulus
-    with clock("meshing"):
-        mesh = _mesh(scene, size)
+    mesh = _mesh(scene, size, clock)
     with clock("solving"):
         across, axis = scene.kind.normal, scene.kind.axis
         far, side = (beam.length, beam.height)[across], scene.kind.side_length(beam)
@@ -301,9 +291,8 @@ def free_form(scene, size, clock):
 
 def calculix_cps3(scene, size, clock):
     """CalculiX with linear triangles, the same as ours."""
-    with clock("meshing"):
-        mesh = _mesh(scene, size)
-        load = scene.force * weights(mesh, scene.kind)
+    mesh = _mesh(scene, size, clock)
+    load = scene.force * weights(mesh, scene.kind)
     with clock("solving"):
         found = calculix.solve(
             mesh.points, mesh.triangles, "CPS3", scene.material, scene.beam.thickness, load, held(mesh, scene.kind)
@@ -326,18 +315,16 @@ def calculix_cps8(scene, size, clock):
     moved = found[:, axis]
     if scene.kind.pressed:
         loaded = np.flatnonzero(shares)
-        places, half = points[loaded, scene.kind.along], scene.kind.side_length(scene.beam) / 2
-        order = np.argsort(places)
-        return float(np.interp(half, places[order], moved[loaded][order])), int((~clamp).sum())
+        return _middle(scene, points[loaded, scene.kind.along], moved[loaded]), int((~clamp).sum())
     return float(moved @ shares), int((~clamp).sum())
 
 
 APPROACHES = {
     "relaxation": relaxation,
     "backward-euler": backward_euler,
-    "truncated-backward-euler": truncated_backward_euler,
-    "linear-triangles": linear_triangles,
-    "quadratic-triangles": quadratic_triangles,
+    "truncated-backward-euler": partial(backward_euler, iterations=25),
+    "linear-triangles": partial(triangles, degree=1),
+    "quadratic-triangles": partial(triangles, degree=2),
     "tensor-mass": tensor_mass,
     "condensation": condensation,
     "boundary-elements": boundary_elements,
@@ -345,4 +332,4 @@ APPROACHES = {
     "calculix-cps3": calculix_cps3,
     "calculix-cps8": calculix_cps8,
 }
-"""Approaches besides definitions, by their names in `springtune.studies.kinds.benchmark.names`."""
+"""Approaches besides definitions, by their names in `OTHER_APPROACHES`."""

@@ -7,9 +7,8 @@ from springtune.problem.compare import unbeaten
 from springtune.problem.status import Status
 
 from ...output import labels, style
-from ...output.dataset import STATUS
 from ...output.selection import choose, group
-from .names import PARTS
+from . import PARTS
 from .outputs import figures
 
 APPROACH_FAMILIES = {
@@ -153,8 +152,7 @@ def _lost(case):
 def _statuses(case):
     """What became of the cases of a scene that have no numbers, in words."""
     flags = case.status.values if "status" in case else np.zeros(0, dtype=int)
-    found = [STATUS[flag].replace("_", " ") for flag in np.unique(flags[(flags != 0) & (flags != Status.SOLVED)])]
-    return ", ".join(found) or "none was asked for"
+    return ", ".join(labels.statuses(flags[flags != Status.SOLVED])) or "none was asked for"
 
 
 def _lines(data, panel, x, y, approaches):
@@ -211,32 +209,32 @@ def plot_benchmark_rates(data, ax=None):
     sides = {"networks": [name for name in shown if "/" in name], "others": [name for name in shown if "/" not in name]}
     sides = {side: names for side, names in sides.items() if names} or {"networks": []}
     wide = style.PAGE if len(sides) > 1 else style.COLUMN
-    figure, axes = style.panels(ax, len(scenes), len(sides), figsize=(wide, 0.3 + 2.1 * len(scenes)))
-    place = dict(left=0.62, right=0.08, bottom=0.52, top=0.25, across=0.62, down=0.78)
-    style.arrange(figure, axes, **place)
-    named_lines = []
-    for row, scene in zip(axes, scenes):
-        case = data.sel(scene=scene)
-        drawn = [_lines(case, panel, "mesh_size", "error", names) for panel, names in zip(row, sides.values())]
-        values = 100 * np.abs(case.error.sel(approach=shown).values)
-        values = values[np.isfinite(values) & (values > 0)]
-        estimate = 100 * float(case.reference_error_estimate)
-        for panel, side, ends in zip(row, sides, drawn):
-            panel.set(xlabel="Mesh size [mm]", ylabel="|Error| [%]", title=f"{scene}: {side} (order)")
-            if not ends:
-                labels.say(panel, f"No approach has an error: {_statuses(case)}.")
-                continue
-            low, high = 0.6 * min(values.min(), estimate if estimate > 0 else np.inf), 1.6 * values.max()
-            panel.set_ylim(low, high)
-            if estimate > 0:
-                panel.axhspan(low, estimate, color="0.9", zorder=0)
-                labels.note(panel, "grey: within the reference's own error")
-            style.plain(panel, "x", "y")
-            named_lines.append((panel, ends))
-    labels.settle(figure, axes, place | {"across": 0.1})
-    for panel, ends in named_lines:
-        labels.name_lines(panel, ends)
+    size, place = (wide, 0.3 + 2.1 * len(scenes)), {"bottom": 0.52, "top": 0.25, "down": 0.78}
+    with labels.arranged(ax, len(scenes), len(sides), figsize=size, **place) as (axes, ends):
+        for row, scene in zip(axes, scenes):
+            ends.update(_rates(row, data.sel(scene=scene), str(scene), sides))
     return axes
+
+
+def _rates(row, case, scene, sides):
+    """Draw the errors of one scene: ends of lines by panel."""
+    shown = [name for names in sides.values() for name in names]
+    found = {panel: _lines(case, panel, "mesh_size", "error", names) for panel, names in zip(row, sides.values())}
+    values = 100 * np.abs(case.error.sel(approach=shown).values)
+    values = values[np.isfinite(values) & (values > 0)]
+    estimate = 100 * float(case.reference_error_estimate)
+    for (panel, ends), side in zip(found.items(), sides):
+        panel.set(xlabel="Mesh size [mm]", ylabel="|Error| [%]", title=f"{scene}: {side} (order)")
+        if not ends:
+            labels.say(panel, f"No approach has an error: {_statuses(case)}.")
+            continue
+        low, high = 0.6 * min(values.min(), estimate if estimate > 0 else np.inf), 1.6 * values.max()
+        panel.set_ylim(low, high)
+        if estimate > 0:
+            panel.axhspan(low, estimate, color="0.9", zorder=0)
+            labels.note(panel, "grey: within the reference's own error")
+        style.plain(panel, "x", "y")
+    return found
 
 
 @style.styled
@@ -272,10 +270,16 @@ def plot_benchmark_costs(data, ax=None, *, scene=None):
     ['Unknowns', 'Mesh size [mm]']
     """
     data = _scene(data, scene)
-    figure, axes = style.panels(ax, ncols=2, figsize=(style.PAGE, 2.7), widths=(1.5, 1))
-    place = dict(left=0.5, right=0.08, bottom=0.4, top=0.28, across=0.55)
-    style.arrange(figure, axes, **place)
-    (left, right), shown = axes[0], named(data)
+    shown = named(data)
+    with labels.arranged(ax, ncols=2, figsize=(style.PAGE, 2.7), widths=(1.5, 1), bottom=0.4) as (axes, ends):
+        left, right = axes[0]
+        ends[left] = _costs(left, data, shown)
+        ends[right] = _parts(right, data, [name for name in shown if "/" in name])
+    return axes[0]
+
+
+def _costs(left, data, shown):
+    """Draw the seconds of approaches over unknowns: ends of the lines."""
     sizes = np.isfinite(data.seconds.sel(approach=shown)).sum("mesh_size").values
     # One size says nothing of growth.
     grown = [name for name, count in zip(shown, sizes) if count > 1] or shown
@@ -286,11 +290,7 @@ def plot_benchmark_costs(data, ax=None, *, scene=None):
         left.xaxis.set_minor_locator(NullLocator())
     else:
         labels.say(left, f"No approach was timed: {_statuses(data)}.")
-    parts = _parts(right, data, [name for name in shown if "/" in name])
-    labels.settle(figure, axes, place | {"across": 0.1})
-    labels.name_lines(left, ends)
-    labels.name_lines(right, parts)
-    return axes[0]
+    return ends
 
 
 def _parts(panel, data, approaches):
@@ -352,18 +352,15 @@ def plot_benchmark_curve(data, ax=None):
     ['solve by solve', 'one path']
     """
     data = group(data, "benchmark")
-    figure, axes = style.panels(ax, figsize=(style.COLUMN, 2.2))
-    place = dict(left=0.45, right=0.08, bottom=0.4, top=0.28)
-    style.arrange(figure, axes, **place)
-    panel, count, ends = axes[0, 0], data.curve_count.values, []
-    for number, name, label in ((1, "separate_seconds", "solve by solve"), (0, "curve_seconds", "one path")):
-        ends += labels.line(panel, count, data[name].values, style.line(number), label)
-    panel.set(**style.LOGARITHMIC, xlabel="Stiffnesses on the curve", ylabel="Seconds",
-              title="Seconds of a nonlinear sensitivity curve")  # fmt: skip
-    if ends:
-        style.plain(panel, "x", "y")
-        labels.settle(figure, axes, place)
-        labels.name_lines(panel, ends)
-    else:
-        labels.say(panel, "The benchmark has timed no curve.")
+    with labels.arranged(ax, figsize=(style.COLUMN, 2.2), bottom=0.4) as (axes, ends):
+        panel, count, found = axes[0, 0], data.curve_count.values, []
+        for number, name, label in ((1, "separate_seconds", "solve by solve"), (0, "curve_seconds", "one path")):
+            found += labels.line(panel, count, data[name].values, style.line(number), label)
+        panel.set(**style.LOGARITHMIC, xlabel="Stiffnesses on the curve", ylabel="Seconds",
+                  title="Seconds of a nonlinear sensitivity curve")  # fmt: skip
+        if found:
+            style.plain(panel, "x", "y")
+        else:
+            labels.say(panel, "The benchmark has timed no curve.")
+        ends[panel] = found
     return panel

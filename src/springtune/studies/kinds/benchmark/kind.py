@@ -1,6 +1,7 @@
 """Run time against error: a study's section ``benchmark``."""
 
 from dataclasses import asdict, dataclass
+from math import nan
 from typing import Annotated
 
 from pydantic import Field
@@ -33,7 +34,7 @@ from ...config.kind import Kind
 from ...config.sections import Section
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key
 from ...runs.stages import Task, stage
-from .names import CURVE_COUNTS, OTHER_APPROACHES, THREAD_COUNTS, approach_names
+from . import CURVE_COUNTS, OTHER_APPROACHES, THREAD_COUNTS, approach_names
 from .outputs import OUTPUTS
 
 MOST_RUNS = 100_000
@@ -197,7 +198,8 @@ def _tasks(study):
         values = asdict(case) | {"beam": beam_key(case.beam), "material": material_key(case.material, density=True)}
         del values["name"]
         values |= {"second_beam": case.second_beam and beam_key(case.second_beam), "curves": place == 0}
-        yield Task(values, _code(case), of=case, costs=[("benchmark", 0)], name=case.name)
+        labels = {"scene": case.name, "mesh_size": list(case.mesh_sizes)}
+        yield Task(values, _code(case), labels, case, [("benchmark", 0)], case.name)
 
 
 def _code(case):
@@ -211,7 +213,68 @@ def _code(case):
     return springs, meshes, program() if any(name.startswith("calculix") for name in case.approaches) else ""
 
 
-STAGE = stage("benchmark", "studies.kinds.benchmark.solve", "Timing approaches", _tasks, alone=True)
+CASE = ("scene", "approach", "mesh_size")
+SOLVER_AXES = ("linear_solver", "mesh_size")
+EXPLICIT_AXES = ("mesh_size", "thread_count", "precision")
+
+VARIABLES = {
+    "displacement": (CASE, "m", "displacement of the loaded side along the force", nan),
+    "error": (CASE, "1", "signed error of the displacement, over the reference's", nan),
+    "second_error": (CASE, "1", "signed error of the displacement on the second beam", nan),
+    "second_status": (CASE, "1", "what became of the case on the second beam", 0),
+    "second_message": (CASE, "1", "why there is no error on the second beam", ""),
+    "assured_error": (
+        CASE,
+        "1",
+        "largest absolute error of this and all finer mesh sizes that were run, on both beams",
+        nan,
+    ),
+    "seconds": (CASE, "s", "time from nothing to the displacement, median of warm runs", nan),
+    "seconds_spread": (CASE, "s", "longest less shortest of the warm runs", nan),
+    "cold_seconds": (CASE, "s", "time of the first run, imports included", nan),
+    "meshing_seconds": (CASE, "s", "time to make the mesh", nan),
+    "assembling_seconds": (CASE, "s", "time to derive parameters and assemble", nan),
+    "factorizing_seconds": (CASE, "s", "time to factorize, or of what is paid once", nan),
+    "solving_seconds": (CASE, "s", "time to solve", nan),
+    "peak_memory": (CASE, "byte", "largest memory of the process above that at its start", nan),
+    "unknowns": (CASE, "1", "number of unknowns", nan),
+    "pareto": (CASE, "1", "1 where no approach of the scene is both more accurate and faster", 0),
+    "status": (CASE, "1", "what became of the case", 0),
+    "message": (CASE, "1", "why there are no numbers", ""),
+    "error_rate": (
+        ("scene", "approach"),
+        "1",
+        "exponent of the error in the mesh size, where it falls with that and keeps its sign",
+        nan,
+    ),
+    "cost_exponent": (("scene", "approach"), "1", "exponent of the seconds in the unknowns, from 3000 on", nan),
+    "reference_displacement": (("scene",), "m", "displacement of the converged reference", nan),
+    "reference_error_estimate": (("scene",), "1", "estimated relative error of the reference", nan),
+    "reference_seconds": (("scene",), "s", "time of the reference", nan),
+    "machine_load": (("scene",), "1", "load of the machine at the start, processes", nan),
+    "solver_seconds": (SOLVER_AXES, "s", "time from a matrix to a solution, its sparsity analysed", nan),
+    "solver_again_seconds": (SOLVER_AXES, "s", "time of the next matrix of that sparsity", nan),
+    "solver_status": (SOLVER_AXES, "1", "what became of the linear system", 0),
+    "solver_message": (SOLVER_AXES, "1", "why there are no seconds", ""),
+    "curve_seconds": (("curve_count",), "s", "time of a sensitivity curve as one path, 9470 particles", nan),
+    "separate_seconds": (("curve_count",), "s", "time of as many nonlinear solves", nan),
+    "nonlinear_seconds": ((), "s", "time of one nonlinear solve there", nan),
+    "linear_seconds": ((), "s", "time of one linear solve there", nan),
+    "curve_status": ((), "1", "what became of the curves", 0),
+    "curve_message": ((), "1", "why there are no seconds of curves", ""),
+    "explicit_steps": (EXPLICIT_AXES, "s-1", "explicit steps a second of nonlinear springs", nan),
+    "spring_updates": (EXPLICIT_AXES, "s-1", "springs that these steps advance, each step counted anew", nan),
+    "explicit_bandwidth": (EXPLICIT_AXES, "byte s-1", "what these steps read and write, be it in a cache", nan),
+    "explicit_error": (
+        ("mesh_size", "precision"),
+        "1",
+        "largest difference of their displacements from those in double precision, over the largest of these",
+        nan,
+    ),
+    "explicit_status": (("mesh_size",), "1", "what became of the explicit steps", 0),
+    "explicit_message": (("mesh_size",), "1", "why there are no explicit steps", ""),
+    "copy_bandwidth": (("thread_count",), "byte s-1", "memory that a plain copy reads and writes", nan),
+}
 
 KIND = Kind(
     "benchmark",
@@ -224,6 +287,16 @@ KIND = Kind(
     check=_check,
     expand=_expand,
     axes=_axes,
-    stages=(STAGE,),
+    variables=VARIABLES,
+    dimensions={
+        "scene": "scene of the benchmark",
+        "approach": "definition / mesh type, or another approach",
+        "linear_solver": "solver of linear systems",
+        "curve_count": "number of stiffnesses of a sensitivity curve",
+        "thread_count": "number of threads of explicit steps",
+        "precision": "floating-point numbers of explicit steps",
+    },
+    attributes=lambda cases: {"second_beam": cases[-1].second_beam.name if cases[-1].second_beam else ""},
+    stages=(stage("benchmark", "studies.kinds.benchmark.solve", "Timing approaches", _tasks, alone=True),),
     outputs=OUTPUTS,
 )

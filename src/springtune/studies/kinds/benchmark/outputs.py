@@ -1,12 +1,9 @@
-"""What is made of the benchmark."""
+"""Figures and the page of the benchmark, and what the page to browse shows of it."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
-from ...config.kind import Output
-
-if TYPE_CHECKING:
-    from ...config.model import Study
+from ...config.kind import Output, needs
+from ...output.browse import Plot, View
 
 PAGE = "speed.md"
 
@@ -21,10 +18,6 @@ def figures(scenes: Sequence[object]) -> dict[str, dict[str, object]]:
     }
 
 
-def _lack(study: "Study") -> str:
-    return "" if study.parts["benchmark"] else "shows a benchmark and the study has none; add a section 'benchmark'"
-
-
 OUTPUTS = (
     Output(
         "benchmark",
@@ -33,6 +26,25 @@ OUTPUTS = (
         plot="studies.kinds.benchmark.figures:benchmark",
         tables=lambda study: [PAGE],
         write="studies.kinds.benchmark.tables",
-        lack=_lack,
+        lack=needs("benchmark", "shows a benchmark and the study has none; add a section 'benchmark'"),
     ),
 )
+
+VIEWS = (
+    View(
+        "/benchmark",
+        "Benchmark",
+        "Error against run time, from nothing to the displacement, of every approach: what is left and low is better.",
+        (
+            Plot("error over seconds", "error", "seconds", "approach", along="mesh_size", log="xy"),
+            Plot("assured error over seconds", "assured_error", "seconds", "approach", along="mesh_size", log="xy"),
+            Plot("seconds over unknowns", "seconds", "unknowns", "approach", along="mesh_size", log="xy"),
+            Plot("error over mesh size", "error", "mesh_size", "approach", log="xy"),
+            Plot("memory over unknowns", "peak_memory", "unknowns", "approach", along="mesh_size", log="xy"),
+            Plot("what became of the cases", "status", "mesh_size", "approach", "map"),
+            Plot("solvers of linear systems", "solver_seconds", "mesh_size", "linear_solver", log="xy"),
+            Plot("a curve as one path, and as many solves", "curve_seconds", "curve_count", log="xy",
+                 beside=(("curve_count", "separate_seconds", "as many separate solves"),)),
+        ),
+    ),
+)  # fmt: skip

@@ -1,12 +1,61 @@
-"""Stage `benchmark`: run time against error."""
+"""Stage `benchmark`: run time against error, of definitions on all mesh types and of other approaches.
+
+Each case runs several times in a process of its own, forked warm. The first run imports and reads what the approach
+needs, and is kept apart.
+"""
+
+import multiprocessing
+import os
+import resource
+import signal
+import statistics
+import time
+import traceback
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing, contextmanager
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from springtune.linalg import SOLVERS, factors
+from springtune.mechanics.integrators import PRECISIONS
+from springtune.mechanics.network import Network
+from springtune.mechanics.series import trace
+from springtune.mechanics.stepping import make_stepper
+from springtune.mesh import MESH_TYPES
+from springtune.problem.boundary import weights
+from springtune.problem.compare import assured, unbeaten
 from springtune.problem.geometry import Beam
-from springtune.problem.materials import material_of
+from springtune.problem.loads import LOADS
+from springtune.problem.materials import Material, material_of
 from springtune.problem.status import Status
+from springtune.reference.calculix import installed
+from springtune.reference.small_strain import solve_small_strain
+from springtune.scene.motion import motion_of
+from springtune.scene.sheet import Sheet
+from springtune.springs import DefinitionError, Springs
+from springtune.springs.lattice import COEFFICIENT, half_weight, uniform
 
-from . import measure as benchmark
+from ...runs.task_costs import go_with_parent, own_reason
+from . import CURVE_COUNTS, PARTS, THREAD_COUNTS
+from .approaches import APPROACHES, network
+
+REPETITIONS = 3
+BRIEF = 0.05
+"""Cases below these seconds are repeated twice as often."""
+
+LONG = 0.4
+"""Cases above these seconds run once."""
+
+BESIDE = 10.0
+"""Seconds of the processor that a case takes at most besides its longest run, imports and all."""
+
+UPDATES = 4_000_000
+"""Springs that an explicit run advances, each step counted anew,"""
+
+FEWEST_STEPS = 50
+"""in at least so many steps."""
+
 
 CURVE_SIZE = 1e-3
 """Mesh size of the curves whose cost is measured, on the first scene's beam [m]."""
@@ -23,11 +72,361 @@ def failed(task, why):
 
 def solve(task):
     """Errors and seconds of a scene."""
-    scene = benchmark.LoadedBeam(Beam(**task["beam"]), material_of(task["material"]), task["load"], task["force"])
+    scene = LoadedBeam(Beam(**task["beam"]), material_of(task["material"]), task["load"], task["force"])
     second = Beam(**task["second_beam"]) if task["second_beam"] else None
     most, sizes = task["most_seconds"], task["mesh_sizes"]
-    found = benchmark.run(scene, task["approaches"], sizes, task["finest"], most, second)
+    found = measure(scene, task["approaches"], sizes, task["finest"], most, second)
     if task["curves"]:
-        found |= benchmark.curves(scene, max(CURVE_SIZE, min(sizes)), most)
-        found |= benchmark.explicit(scene, sizes, most) | benchmark.solvers(scene, sizes, most)
+        found |= curves(scene, max(CURVE_SIZE, min(sizes)), most)
+        found |= explicit(scene, sizes, most) | solvers(scene, sizes, most)
     return {name: values.tolist() if name.endswith("message") else values for name, values in found.items()}
+
+
+@dataclass(frozen=True)
+class LoadedBeam:
+    """A beam under a load, see `springtune.problem.loads`."""
+
+    beam: Beam
+    material: Material
+    load: str
+    force: float
+
+    @property
+    def kind(self):
+        """Kind of the load."""
+        return LOADS[self.load].kind
+
+    @property
+    def side(self):
+        """Coordinate of the loaded side [m], axis of that coordinate, axis of the force."""
+        return self.kind.loaded.place(self.beam.length, self.beam.height), self.kind.normal, self.kind.axis
+
+
+class Clock:
+    """Seconds of each part of a run."""
+
+    def __init__(self):
+        self.seconds = dict.fromkeys(PARTS, 0.0)
+
+    @contextmanager
+    def __call__(self, part):
+        """Context whose seconds are a part's."""
+        begin = time.perf_counter()
+        yield
+        self.seconds[part] += time.perf_counter() - begin
+
+
+class Alarm:
+    """Limits of what a process does: seconds of the processor for each run, and what is left to the task of all."""
+
+    def __init__(self, most, left):
+        self.most, self.left = most, left
+
+    def set(self):
+        """Begin a run: what it takes beyond its limit ends the process, and what it starts."""
+        used = time.process_time()
+        left = max(self.left - used, 1e-3) if self.left else self.most
+        signal.setitimer(signal.ITIMER_PROF, min(self.most, left))
+        # Whole seconds; counted anew in a program that is started, whose own they are.
+        resource.setrlimit(resource.RLIMIT_CPU, (int(used + self.most) + 2, resource.getrlimit(resource.RLIMIT_CPU)[1]))
+
+
+def measure(scene, approaches, sizes, finest, most_seconds, second_beam=None):
+    """All approaches on their sizes [m], from coarse to fine, each down to its ``finest`` [m].
+
+    An approach that fails or exceeds its seconds has a status and a message, and so have its finer sizes.
+    """
+    begin = time.perf_counter()
+    reference = solve_small_strain(scene.beam, scene.material, scene.force, kind=scene.kind)
+    result = {
+        "reference_displacement": reference.displacement,
+        "reference_error_estimate": reference.error_estimate,
+        "reference_seconds": time.perf_counter() - begin,
+        "machine_load": os.getloadavg()[0],
+    }
+    names = ("displacement", "seconds", "seconds_spread", "cold_seconds", "peak_memory", "unknowns")
+    cases = _Cases((len(approaches), len(sizes)), *names, *(f"{part}_seconds" for part in PARTS))
+    meshes, beyond = {}, {}
+    for mesh_type in {approach.partition("/")[2] for approach in approaches if "/" in approach}:
+        MESH_TYPES[mesh_type](1.0, 0.5, 0.25)  # libraries are read
+    for j in reversed(range(len(sizes))):
+        for i, approach in enumerate(approaches):
+            if sizes[j] < finest[i]:
+                continue
+            if approach in beyond:
+                size, why = beyond[approach]
+                found = _failed(f"not run: at {1e3 * size:g} mm it was {why}")
+            else:
+                found = _case(scene, approach, sizes[j], meshes, most_seconds)
+            if found.get("beyond"):
+                beyond[approach] = sizes[j], found["message"]
+            cases.note(found, i, j)
+    result |= cases.numbers | cases.judged("")
+    result["error"] = (result["displacement"] - reference.displacement) / abs(reference.displacement)
+    result |= _second(scene, second_beam, approaches, sizes, cases.status == Status.SOLVED, most_seconds)
+    result["assured_error"] = assured(result["error"], result["second_error"])
+    return result | rates(result, sizes)
+
+
+class _Cases:
+    """Numbers of cases by name, their statuses and messages; cells that nobody asks for are blank."""
+
+    def __init__(self, shape, *names):
+        self.numbers = {name: np.full(shape, np.nan) for name in names}
+        self.status, self.message = np.zeros(shape, dtype=np.int8), np.full(shape, "", dtype=object)
+
+    def note(self, found, *place):
+        """Note what a process found: its numbers, or what became of it."""
+        self.status[place], self.message[place] = found.get("status", Status.SOLVED), found.get("message", "")
+        for name, values in self.numbers.items() if "status" not in found else ():
+            values[place] = found[name]
+
+    def judged(self, name):
+        """Statuses and messages, by their names in the dataset."""
+        return {f"{name}status": self.status, f"{name}message": self.message}
+
+
+def _failed(message, status=Status.FAILED):
+    return {"status": status, "message": message}
+
+
+def _limit(seconds):
+    return f"{seconds:g} s of the processor (`most_seconds` of the benchmark)"
+
+
+def _second(scene, beam, approaches, sizes, solved, most_seconds):
+    """Errors on another beam of the cases that were solved [1], and what became of them; nothing without one."""
+    cases = _Cases(solved.shape, "displacement")
+    if beam is None:
+        return cases.judged("second_") | {"second_error": cases.numbers["displacement"]}
+    scene, meshes = replace(scene, beam=beam), {}
+    reference = solve_small_strain(beam, scene.material, scene.force, kind=scene.kind).displacement
+    for i, j in np.argwhere(solved):
+        cases.note(_case(scene, approaches[i], sizes[j], meshes, most_seconds, once=True), i, j)
+    error = (cases.numbers["displacement"] / reference - 1) * np.sign(reference)
+    return cases.judged("second_") | {"second_error": error}
+
+
+def _case(scene, approach, size, meshes, most_seconds, once=False):
+    """Result of a case; the mesh of a definition is made before, and its time counted."""
+    if approach.startswith("calculix") and not installed():
+        return _failed("CalculiX (ccx) is not on this machine; install it, or ask for other approaches")
+    mesh, meshing = None, 0.0
+    if approach not in APPROACHES:
+        mesh_type = approach.partition("/")[2]
+        if (mesh_type, size) not in meshes:
+            begin = time.perf_counter()
+            made = MESH_TYPES[mesh_type](scene.beam.length, scene.beam.height, size)
+            made.edges  # noqa: B018  computed when first asked for
+            meshes[mesh_type, size] = made, time.perf_counter() - begin
+        mesh, meshing = meshes[mesh_type, size]
+    return in_process(_repeat, most_seconds, scene, approach, size, mesh, meshing, once)
+
+
+def in_process(function, most_seconds, *arguments):
+    """Result of a function in a process of its own, or `status`, `message` and whether it went `beyond` its limits."""
+    context = multiprocessing.get_context("fork")
+    receive, send = context.Pipe(duplex=False)
+    left = signal.getitimer(signal.ITIMER_PROF)[0]  # of the task's limit, which a new process does not have
+    process = context.Process(target=_child, args=(send, function, Alarm(most_seconds, left), arguments))
+    process.start()
+    send.close()
+    try:
+        found = receive.recv()
+        if isinstance(found, Exception):  # the program is broken
+            raise found
+        return found
+    except EOFError:
+        process.join()
+        if process.exitcode == -signal.SIGPROF:
+            own = not left or left > most_seconds + BESIDE
+            limits = _limit(most_seconds) if own else f"{_limit(most_seconds)}, or what is left of the study's `limits`"
+            return _failed(f"not done within {limits}") | {"beyond": True}
+        return _failed("ended: by the limits of the study, or for lack of memory") | {"beyond": True}
+    finally:
+        process.join()
+
+
+def _child(send, function, alarm, arguments):
+    go_with_parent()
+    try:
+        alarm.set()
+        send.send(function(alarm, *arguments))
+    except DefinitionError as error:
+        send.send(_failed(str(error)))
+    except MemoryError:
+        send.send(_failed("not enough memory: the limits of the study, or the machine's") | {"beyond": True})
+    except Exception as error:  # the other cases shall still be measured
+        others = resource.getrusage(resource.RUSAGE_CHILDREN)
+        why = own_reason(error)
+        if why and others.ru_utime + others.ru_stime >= alarm.most:
+            send.send(_failed(f"not done within {_limit(alarm.most)} ({why})") | {"beyond": True})
+            return
+        if not why:
+            traceback.print_exc()
+        send.send(_failed(why, Status.NOT_CONVERGED) if why else error)
+
+
+def _repeat(alarm, scene, approach, size, mesh, meshing, once):
+    """Numbers of a case, run again and again."""
+    base = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    seconds, parts = [], []
+    while True:
+        alarm.set()
+        clock, begin = Clock(), time.perf_counter()
+        if mesh is None:
+            displacement, unknowns = APPROACHES[approach](scene, size, clock)
+        else:
+            displacement, unknowns = network(scene, mesh, approach.partition("/")[0], clock)
+        seconds.append(time.perf_counter() - begin + meshing)
+        parts.append(clock.seconds | ({"meshing": meshing} if mesh is not None else {}))
+        # The first run is cold, which a long one does not feel.
+        wanted = 1 if once or seconds[0] > LONG else 1 + REPETITIONS * (2 if seconds[-1] < BRIEF else 1)
+        if len(seconds) >= wanted:
+            break
+    warm, of_warm = (seconds[1:], parts[1:]) if len(seconds) > 1 else (seconds, parts)
+    here, there = (resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    found = {f"{part}_seconds": statistics.median(one[part] for one in of_warm) for part in PARTS}
+    found |= {"displacement": displacement, "unknowns": unknowns, "seconds": statistics.median(warm)}
+    found |= {"seconds_spread": max(warm) - min(warm), "cold_seconds": seconds[0]}
+    return found | {"peak_memory": 1024.0 * max(here - base, there)}
+
+
+def rates(result, sizes):
+    """Order of the error in the mesh size, exponent of the seconds in the unknowns, and the cases that nothing beats.
+
+    An error that changes its sign, or does not fall with the mesh size, has no order.
+    """
+    count = len(result["error"])
+    rates, exponents = np.full(count, np.nan), np.full(count, np.nan)
+    for i in range(count):
+        good = np.isfinite(result["error"][i])
+        errors, signs = np.abs(result["error"][i])[good], np.sign(result["error"][i])[good]
+        if len(errors) >= 3 and np.abs(signs.sum()) == len(signs) and (np.diff(errors) > 0).all():
+            rates[i] = np.polyfit(np.log(np.asarray(sizes)[good]), np.log(errors), 1)[0]
+        large = np.isfinite(result["seconds"][i]) & (result["unknowns"][i] >= 3000)
+        if large.sum() >= 2 and np.ptp(result["unknowns"][i][large]) > 0:
+            logs = np.log(result["unknowns"][i][large]), np.log(result["seconds"][i][large])
+            exponents[i] = np.polyfit(*logs, 1)[0]
+    best = unbeaten(np.abs(result["error"]), result["seconds"]).astype(np.int8)
+    return {"error_rate": rates, "cost_exponent": exponents, "pareto": best}
+
+
+def curves(scene, size, most_seconds):
+    """Seconds of sensitivity curves, shape (n_counts,): as one path, and solve by solve."""
+    found = in_process(_curves, most_seconds, scene, size)
+    if "status" in found:
+        return {"curve_status": found["status"], "curve_message": np.array(found["message"], dtype=object)}
+    return found | {"curve_status": Status.SOLVED, "curve_message": np.array("", dtype=object)}
+
+
+def _curves(alarm, scene, size):
+    mesh = MESH_TYPES["structured"](scene.beam.length, scene.beam.height, size)
+    pattern = weights(mesh, scene.kind)
+    membrane = scene.material.young_modulus * scene.beam.thickness
+
+    def problem():
+        return Sheet(mesh, scene.beam.thickness).problem(scene.kind, Springs(1.0, uniform(mesh)))
+
+    together, force = np.zeros(len(CURVE_COUNTS)), scene.force / (COEFFICIENT * membrane)
+    for number, count in enumerate(CURVE_COUNTS):
+        loads = scene.force / (COEFFICIENT * membrane * np.linspace(0.4, 1.6, count))
+        together[number] = _median(alarm, lambda loads=loads: trace(problem(), pattern, loads))
+    one = _median(alarm, lambda: problem().nonlinear(force))
+    linear = _median(alarm, lambda: problem().linear(force))
+    apart = one * np.array(CURVE_COUNTS)
+    return {"curve_seconds": together, "separate_seconds": apart, "nonlinear_seconds": one, "linear_seconds": linear}
+
+
+def solvers(scene, sizes, most_seconds):
+    """Seconds of linear solvers, shape (n_solvers, n_sizes): from a matrix to its solution, and for the next matrix."""
+    cases = _Cases((len(SOLVERS), len(sizes)), "solver_seconds", "solver_again_seconds")
+    for j, size in enumerate(sizes):
+        mesh = MESH_TYPES["structured"](scene.beam.length, scene.beam.height, size)
+        for i, name in enumerate(SOLVERS):
+            if name == "Cholesky" and not factors.CHOLESKY:
+                found = _failed("CHOLMOD is not installed; install springtune[cholesky]")
+            else:
+                found = in_process(_solver, most_seconds, scene, mesh, name)
+            cases.note(found, i, j)
+    return cases.numbers | cases.judged("solver_")
+
+
+def _solver(alarm, scene, mesh, name):
+    seconds = []
+    coarse = MESH_TYPES["structured"](scene.beam.length, scene.beam.height, scene.beam.height / 2)
+    for one in (coarse, mesh):  # with the first one libraries are read
+        springs = Network(one, Sheet(one, 1.0).held(scene.kind), half_weight(one), solver=name)
+        matrix, right = springs.tangent(), np.ones(springs.unknowns)
+        for _ in range(2):
+            alarm.set()
+            begin = time.perf_counter()
+            springs.factorize_matrix(matrix).solve(right)
+            seconds.append(time.perf_counter() - begin)
+    return {"solver_seconds": seconds[2], "solver_again_seconds": seconds[3]}
+
+
+def explicit(scene, sizes, most_seconds, updates=UPDATES):
+    """Explicit steps a second of nonlinear springs, and the bytes that they move, beside a plain copy of memory.
+
+    A step reads each spring's ends, rest vector, length and stiffness, and four vectors of each particle, of which it
+    writes two.
+    """
+    cases, shape = _Cases(len(sizes)), (len(sizes), len(THREAD_COUNTS), len(PRECISIONS))
+    names = ("explicit_steps", "spring_updates", "explicit_bandwidth")
+    cases.numbers = {name: np.full(shape, np.nan) for name in names} | {"explicit_error": np.full(shape[::2], np.nan)}
+    for j, size in enumerate(sizes):
+        cases.note(in_process(_explicit, most_seconds, scene, size, updates), j)
+    copied = [_copied(count) for count in THREAD_COUNTS]
+    return cases.numbers | cases.judged("explicit_") | {"copy_bandwidth": np.array(copied)}
+
+
+def _explicit(alarm, scene, size, updates):
+    mesh = MESH_TYPES["structured"](scene.beam.length, scene.beam.height, size)
+    sheet = Sheet(mesh, scene.beam.thickness)
+    springs, _ = sheet.derive("lattice", scene.material)
+    motion = motion_of(sheet, scene.kind, springs, scene.material.density, scene.force)
+    step = 0.9 * motion.step_bound("central-difference")
+    steps = max(FEWEST_STEPS, round(updates / len(mesh.edges)))
+    seconds, ends = np.full((len(THREAD_COUNTS), len(PRECISIONS)), np.nan), []
+    for k, precision in enumerate(PRECISIONS):
+        for t, threads in enumerate(THREAD_COUNTS):
+            # The steps alone: what a run prepares once is soon less than they are.
+            with closing(make_stepper(motion, "central-difference", step, precision, threads)) as stepper:
+                stepper.begin(*np.zeros((2, *motion.load.shape)))
+                stepper.advance(steps)  # with the first ones threads begin
+                seconds[t, k] = _median(alarm, lambda stepper=stepper: stepper.advance(steps))
+                displacements, _ = stepper.state()
+            if not np.isfinite(displacements).all():
+                raise ArithmeticError(f"diverged with steps of {step:.3g} s")
+        ends.append(displacements)
+    rate = steps / seconds
+    bytes_of = np.array([np.dtype(precision).itemsize for precision in PRECISIONS])
+    touched = len(mesh.edges) * (8 + 4 * bytes_of) + len(mesh.points) * 12 * bytes_of
+    wrong = [np.abs(one - ends[0]).max() / np.abs(ends[0]).max() for one in ends]
+    return {
+        "explicit_steps": rate,
+        "spring_updates": rate * len(mesh.edges),
+        "explicit_bandwidth": rate * touched,
+        "explicit_error": np.array(wrong),
+    }
+
+
+def _copied(threads):
+    """Bytes a second that a plain copy by some threads reads and writes."""
+    large = np.ones((threads, 2**24 // threads))
+    other = np.zeros_like(large)
+    with ThreadPoolExecutor(threads) as pool:
+        seconds = _median(None, lambda: list(pool.map(np.copyto, other, large)))
+    return 2 * large.nbytes / seconds
+
+
+def _median(alarm, function):
+    seconds = []
+    for _ in range(REPETITIONS):
+        if alarm:
+            alarm.set()
+        begin = time.perf_counter()
+        function()
+        seconds.append(time.perf_counter() - begin)
+    return statistics.median(seconds)

@@ -10,7 +10,7 @@ from springtune.safe_io.atomic import write_text
 from springtune.safe_io.escapes import markdown
 
 from ...output.text import markdown_table
-from .names import PARTS
+from . import PARTS
 from .outputs import PAGE
 
 TARGETS = (0.01, 0.001, 0.0001)
@@ -175,36 +175,3 @@ def _explicit(data):
     told = zip(data.mesh_size.values, data.explicit_message.values)
     lost = [f"- {1e3 * size:g} mm: {markdown(word)}" for size, word in told if word]
     return lines + markdown_table(heads, rows) + (["", *lost] if lost else [])
-
-
-NOISE = 1.3
-"""Ratio of seconds that runs of one program on one machine show among themselves."""
-
-
-def comparison(old: xr.Dataset, new: xr.Dataset) -> tuple[list[str], int]:
-    """Ratios of the seconds of two benchmarks over their median, approach by approach.
-
-    Flagged are ratios beyond `NOISE` and beyond three times the spread of the runs.
-    """
-    both = {name: [label for label in old[name].values if label in new[name].values]
-            for name in ("scene", "approach", "mesh_size")}  # fmt: skip
-    old, new = old.sel(both), new.sel(both)
-    ratio = (new.seconds / old.seconds).transpose("approach", "scene", "mesh_size").values
-    if not np.isfinite(ratio).any():
-        return ["The two datasets have no case in common."], 0
-    spread = [
-        (one.seconds_spread / one.seconds).transpose("approach", "scene", "mesh_size").values for one in (old, new)
-    ]
-    middle = float(np.nanmedian(ratio))
-    lines = [f"{int(np.isfinite(ratio).sum())} cases in common, median ratio new / old {middle:.2f}."]
-    flagged = 0
-    for i, approach in enumerate(both["approach"]):
-        cells = np.isfinite(ratio[i])
-        if not cells.any():
-            continue
-        own = float(np.median(ratio[i][cells])) / middle
-        noise = max(NOISE, 1 + 3 * float(np.median(np.fmax(*(part[i][cells] for part in spread)))))
-        word = "slower" if own > noise else "faster" if own < 1 / noise else ""
-        flagged += own > noise
-        lines.append(f"{own:6.2f}  {approach}  {word}".rstrip())
-    return lines, flagged

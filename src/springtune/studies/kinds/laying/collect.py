@@ -11,8 +11,8 @@ from ...output.dataset import Filler, Group
 from ...runs.stages import results
 from .kind import STAGE
 
-LAID = ("definition", "mesh_size", "loading", "friction")
-OF_REFERENCE = ("loading", "friction")
+LAYING_WAY = ("loading", "friction")
+LAID = ("definition", "mesh_size", *LAYING_WAY)
 
 BAND = "twice its spread over three meshes of finite elements"
 
@@ -37,15 +37,15 @@ LAYING = Group(
         "message": (LAID, "1", "why the strip is not laid", ""),
         "skipped": (LAID, "1", "what the scene did not need", ""),
         **_outline("strip", (*LAID, "outline_point"), "outline of the laid strip"),
-        "reference_area": (OF_REFERENCE, "m2", "area between the strip and the floor, finite elements", np.nan),
+        "reference_area": (LAYING_WAY, "m2", "area between the strip and the floor, finite elements", np.nan),
         "reference_area_error_estimate": (
-            OF_REFERENCE, "m2", f"band of the area between strip and floor, {BAND}", np.nan,
+            LAYING_WAY, "m2", f"band of the area between strip and floor, {BAND}", np.nan,
         ),
-        "reference_elongation": (OF_REFERENCE, "1", "elongation of the lower fibre, finite elements", np.nan),
+        "reference_elongation": (LAYING_WAY, "1", "elongation of the lower fibre, finite elements", np.nan),
         "reference_elongation_error_estimate": (
-            OF_REFERENCE, "1", f"band of the elongation of the lower fibre, {BAND}", np.nan,
+            LAYING_WAY, "1", f"band of the elongation of the lower fibre, {BAND}", np.nan,
         ),
-        **_outline("reference", (*OF_REFERENCE, "outline_point"), "outline of the strip of finite elements"),
+        **_outline("reference", (*LAYING_WAY, "outline_point"), "outline of the strip of finite elements"),
         **_outline("trapezoid", ("corner",), "corners of the trapezoid"),
     },
     dimensions={"loading": "what lays the strip", "friction": "Coulomb's coefficient of friction"},
@@ -69,7 +69,7 @@ def groups(study, folder):
     for one in part.references:
         meshes[one.loading, one.friction].append(found[one])
     for labels, solved in meshes.items():
-        _reference(solved, dict(zip(OF_REFERENCE, labels)), laid)
+        _reference(solved, dict(zip(LAYING_WAY, labels)), laid)
     laid.put(dict(zip(("trapezoid_x", "trapezoid_y"), np.transpose(part.strips[0].trapezoid.corners))))
     return {LAYING.name: laid.data}
 

@@ -5,7 +5,6 @@ import numpy as np
 from springtune.safe_io.escapes import no_mathematics
 
 from ...output import labels, style
-from ...output.dataset import STATUS
 from ...output.selection import cells, choose, group, labels_of
 
 
@@ -82,7 +81,7 @@ def _row(row, laid, cell, names):
             elongation.axvspan(reference - known, reference + known, color="0.87", zorder=0)
             found = f" ± {known:.2g}"
         elongation.axvline(reference, color="0.45", linewidth=1.5)
-        _note(elongation, f"grey: finite elements {reference:.2f}{found} %".replace("-", "−"))
+        labels.note(elongation, f"grey: finite elements {reference:.2f}{found} %".replace("-", "−"))
     area.axvline(0, color="0.45", linewidth=1.5)
     for panel, name in ((area, "area_error"), (elongation, "elongation")):
         _dots(panel, laid, names, name)
@@ -90,12 +89,7 @@ def _row(row, laid, cell, names):
     elongation.set(xlabel="Elongation [%]", title="Lower fibre")
     elongation.tick_params(labelleft=False)
     if ((laid.status == 1).sum("mesh_size") > 1).any():
-        _note(area, "filled: finest mesh; hollow: coarser")
-
-
-def _note(panel, text):
-    """Write a note as wide as a panel."""
-    labels.note(panel, labels.wrapped(text, panel.get_window_extent().width / panel.figure.dpi))
+        labels.note(area, "filled: finest mesh; hollow: coarser")
 
 
 def _points(laid, name):
@@ -132,8 +126,7 @@ def _dots(panel, laid, names, variable):
         panel.plot(values[solved[1:]], np.full(len(solved[1:]), number), markerfacecolor="white", **mark)
         panel.plot(values[solved[:1]], np.full(len(solved[:1]), number), markersize=4.5, label=definition, **mark)
         if not len(solved):
-            flags = strips.status.values
-            said = ", ".join(STATUS[flag].replace("_", " ") for flag in np.unique(flags[flags != 0])) or "not asked for"
+            said = ", ".join(labels.statuses(strips.status.values)) or "not asked for"
             panel.text(0.5, number, said, transform=panel.get_yaxis_transform(), ha="center", va="center",
                        fontsize=style.SMALL, color="0.25")  # fmt: skip
     panel.set_yticks(range(len(names)), map(no_mathematics, names))

@@ -169,5 +169,6 @@ KIND = Kind(
     stages=(STAGE,),
     outputs=OUTPUTS,
     tables=lambda study: ["laying"] if study.parts["laying"] else [],
+    tables_by="outputs",
     costs={"laying": (0.0, 1.5)},
 )

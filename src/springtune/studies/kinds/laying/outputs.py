@@ -1,16 +1,14 @@
-"""The figure of laid strips, and what the page to browse shows of them."""
+"""Figure and table of laid strips, and what the page to browse shows of them."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from ...config.kind import Output
+import numpy as np
+
+from ...config.kind import Output, needs
 from ...output.browse import Plot, View
 
 if TYPE_CHECKING:
-    from ...config.model import Study
-
-
-def _lack(study: "Study") -> str:
-    return "" if study.parts["laying"] else "shows laid strips and the study has none; add a section 'laying'"
+    import xarray as xr
 
 
 OUTPUTS = (
@@ -19,7 +17,7 @@ OUTPUTS = (
         "the figure of laid strips",
         figures=lambda study: {"laying": {}},
         plot="studies.kinds.laying.figures:laying",
-        lack=_lack,
+        lack=needs("laying", "shows laid strips and the study has none; add a section 'laying'"),
     ),
 )
 
@@ -40,3 +38,34 @@ VIEWS = (
         ),
     ),
 )  # fmt: skip
+
+
+def tables(tree: "xr.DataTree") -> list[dict[str, Any]]:
+    """Tables of the page, see `springtune.studies.kinds.scenes.tables.tables`."""
+    from ...output.selection import cells  # here, since a plan does without xarray
+
+    if "laying" not in tree:
+        return []
+    laid, rows = tree["laying"].to_dataset(), []
+    for place in cells(np.isfinite(laid.area_under_strip), ("loading", "friction", "mesh_size", "definition")):
+        cell = laid.sel(place)
+        rows.append(
+            {name: place[name] for name in ("loading", "friction", "definition")}
+            | {
+                "mesh_size_mm": 1e3 * float(place["mesh_size"]),
+                "area_mm2": 1e6 * float(cell.area_under_strip),
+                "area_error_percent": 100 * float(cell.area_error),
+                "elongation_percent": 100 * float(cell.elongation),
+                "reference_elongation_percent": 100 * float(cell.reference_elongation),
+                "reference_elongation_known_to_points": 100 * float(cell.reference_elongation_error_estimate),
+                "penetration_per_mesh_size": float(cell.penetration),
+            }
+        )
+    x, y = laid.trapezoid_x.values, laid.trapezoid_y.values
+    trapezoid = 0.5e6 * abs(float(np.dot(x, np.roll(y, 1)) - np.dot(y, np.roll(x, 1))))
+    note = (
+        "Area between strip and floor and elongation of the strip's lower fibre; the reference's is known to so many "
+        "points: twice the spread of three meshes, since the trapezoid's corners catch between a strip's particles, "
+        f"where depends on the mesh. The networks' own scatter as much. The trapezoid has {trapezoid:.4g} mm²."
+    )
+    return [{"stem": "laying", "title": "Laid strips", "note": note, "rows": rows}]

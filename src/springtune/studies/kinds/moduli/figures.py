@@ -6,7 +6,7 @@ from matplotlib.ticker import NullLocator
 from springtune.safe_io.escapes import no_mathematics
 
 from ...output import labels, style
-from ...output.dataset import STATUS, most_requested
+from ...output.dataset import most_requested
 from ...output.selection import choose, group, labelled_beam, labels_of, unswept
 from .outputs import figures
 
@@ -75,8 +75,8 @@ def _room(panel):
 
 def _statuses(flags):
     """Count the cells of each status, in words."""
-    counts = {STATUS[flag].replace("_", " "): int((flags == flag).sum()) for flag in np.unique(flags[flags != 0])}
-    return ", ".join(f"{name} ({count})" for name, count in counts.items()) or "none was asked for"
+    found = labels.statuses(flags).items()
+    return ", ".join(f"{name} ({count})" for name, count in found) or "none was asked for"
 
 
 @style.styled

@@ -2,6 +2,7 @@
 
 from dataclasses import asdict, dataclass
 from itertools import product
+from math import nan
 
 from pydantic import Field
 
@@ -103,7 +104,13 @@ def _mesh_of(study, one):
     return min(found, key=lambda mesh: (mesh.beam.length, mesh.beam.height, mesh_key(mesh)))
 
 
-STAGE = stage("moduli", "studies.kinds.moduli.solve", "Measuring effective moduli", _tasks)
+PATCH = ("definition", "mesh_type", "mesh_size", "poisson_ratio")
+
+
+def _attributes(moduli):
+    box = {"patch_length": moduli.patch.length, "patch_height": moduli.patch.height}
+    return {"comment": "of the mesh that a beam of this length and height [m] gets"} | box
+
 
 KIND = Kind(
     "moduli",
@@ -128,7 +135,19 @@ KIND = Kind(
     expand=_expand,
     axes=_axes,
     summary=_summary,
-    stages=(STAGE,),
+    variables={
+        "young_modulus_error": (PATCH, "1", "error of Young's modulus along x, effective / asked - 1", nan),
+        "effective_poisson_ratio": (PATCH, "1", "effective Poisson's ratio under load along x", nan),
+        "shear_modulus_error": (PATCH, "1", "error of the shear modulus, effective / asked - 1", nan),
+        "definition_seconds": (PATCH, "s", "time to derive the springs' parameters", nan),
+        "definition_evaluations": (PATCH, "1", "solves that deriving the springs' parameters took", nan),
+        "spring_ratio": (PATCH, "1", "largest spring stiffness over the smallest", nan),
+        "status": (PATCH, "1", "what became of the patch test", 0),
+        "message": (PATCH, "1", "why there are no moduli", ""),
+    },
+    dimensions={"poisson_ratio": "Poisson's ratio that the definition is asked for"},
+    attributes=_attributes,
+    stages=(stage("moduli", "studies.kinds.moduli.solve", "Measuring effective moduli", _tasks),),
     outputs=OUTPUTS,
     costs={"moduli": (5e-4, 2e-6)},
 )

@@ -1,16 +1,9 @@
 """Figures and tables that compare definitions, and what the page to browse shows of their moduli."""
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
-from ...config.kind import Output
+from ...config.kind import Output, needs
 from ...output.browse import Plot, View
-
-if TYPE_CHECKING:
-    from ...config.model import Study
-
-PATCH = ("definition", "mesh_type", "mesh_size", "poisson_ratio")
-"""Dimensions of the moduli."""
 
 TABLES = ("definitions.csv", "moduli.csv", "which_definition.md")
 """Tables that compare definitions: of scenes, of moduli, and what to use."""
@@ -23,10 +16,6 @@ def figures(loads: Iterable[object], mesh_types: Iterable[object]) -> dict[str, 
     return found | {f"definitions_loads_{mesh_type}": {"mesh_type": mesh_type} for mesh_type in mesh_types}
 
 
-def _lack(study: "Study") -> str:
-    return "" if study.parts["moduli"] else "compares moduli and no grid has them; add 'moduli: true' to a grid"
-
-
 OUTPUTS = (
     Output(
         "definitions",
@@ -35,7 +24,7 @@ OUTPUTS = (
         plot="studies.kinds.moduli.figures:definitions",
         tables=lambda study: list(TABLES),
         write="studies.kinds.moduli.tables",
-        lack=_lack,
+        lack=needs("moduli", "compares moduli and no grid has them; add 'moduli: true' to a grid"),
     ),
 )
 

@@ -12,7 +12,7 @@ from springtune.safe_io.atomic import write_text
 from ...output.dataset import STATUS, most_requested
 from ...output.selection import unswept
 from ..scenes.variables import SCENE
-from .outputs import PATCH, TABLES
+from .outputs import TABLES
 
 SCENE_VALUES = ("deformation_error", "field_error", "definition_seconds", "definition_evaluations", "spring_ratio")
 MODULI_VALUES = ("young_modulus_error", "effective_poisson_ratio", "shear_modulus_error", "spring_ratio")
@@ -22,7 +22,7 @@ def write(tree, folder):
     """Write two CSV files and a page in Markdown."""
     root, moduli = tree.to_dataset(), tree["moduli"].to_dataset()
     scene = (*SCENE, *(str(name) for name in root.status.dims if name not in SCENE))  # what is swept, too
-    texts = (_csv(root, scene, SCENE_VALUES), _csv(moduli, PATCH, MODULI_VALUES), decision(tree))
+    texts = (_csv(root, scene, SCENE_VALUES), _csv(moduli, moduli.status.dims, MODULI_VALUES), decision(tree))
     for name, text in zip(TABLES, texts):
         write_text(Path(folder) / name, text)
     return list(TABLES)

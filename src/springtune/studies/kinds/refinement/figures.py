@@ -61,7 +61,7 @@ def plot_refinement(data, ax=None, *, refinement=None):
     labels.settle(figure, axes, place)
     for panel, name, (found, said) in zip(flat, names, ends):
         room = panel.get_window_extent().width / panel.figure.dpi
-        labels.note(panel, labels.wrapped(said, room))
+        labels.note(panel, said)
         _entitle(panel, name, labels.wrapped(str(data.scene.sel(refinement=name).item()), room))
         if found:
             labels.name_lines(panel, found)

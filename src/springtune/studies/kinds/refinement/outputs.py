@@ -1,15 +1,11 @@
 """Parameters that a refinement may vary, the figure and tables of refinements, and what the page to browse shows."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from springtune.units import UnitError, parse
 
-from ...config.kind import Output
+from ...config.kind import Output, needs
 from ...output.browse import Plot, View
-
-if TYPE_CHECKING:
-    from ...config.model import Study
 
 
 @dataclass(frozen=True)
@@ -71,10 +67,6 @@ REFINEMENT_TABLES = ("refinement.csv", "refinement_crossings.csv")
 """Tables of the values, and of where errors are zero or the tolerance."""
 
 
-def _lack(study: "Study") -> str:
-    return "" if study.parts["refinement"] else "shows refinements and the study has none; add a section 'refine'"
-
-
 OUTPUTS = (
     Output(
         "refinement",
@@ -83,7 +75,7 @@ OUTPUTS = (
         plot="studies.kinds.refinement.figures:refinement",
         tables=lambda study: REFINEMENT_TABLES,
         write="studies.kinds.refinement.collect",
-        lack=_lack,
+        lack=needs("refinement", "shows refinements and the study has none; add a section 'refine'"),
     ),
 )
 

@@ -12,12 +12,11 @@ from springtune.springs.lattice import COEFFICIENT
 
 from ...output.dataset import Group
 from ...runs import store
-from ..scenes import stored_interpolant
-from . import plan
+from ..scenes import any_reference
 from .designs import PARAMETERS, SOBOL_INDICES, blocks, roles
 from .indices import LEVEL, RESAMPLES, main_effect, sobol_indices
 from .interpolate import problem_key
-from .kind import DROP
+from .kind import DROP, MOST_SOLVED, UNIFORM, block_key, reference_key, result_key, solved_definitions
 from .outputs import QUANTITIES
 from .solve import DRAWN
 
@@ -25,7 +24,7 @@ OF_REFERENCES = ("sample", "load")
 OF_NETWORKS = ("sample", "load", "definition")
 
 REFERENCE_BOUND = "bound on the relative error of the reference, that of its interpolation included"
-APPLIES = "whether a reference of small strain applies to the network: not where it turns or strains too far for it"
+HOW_FAR = "whether a reference of small strain applies to the network: not where it turns or strains too far for it"
 
 SAMPLES = Group(
     "/samples",
@@ -37,7 +36,7 @@ SAMPLES = Group(
         "message": (OF_NETWORKS, "1", "why the scene is not solved", ""),
         "reference_displacement": (OF_REFERENCES, "m", "displacement of the loaded side, finite elements", np.nan),
         "reference_error_estimate": (OF_REFERENCES, "1", REFERENCE_BOUND, np.nan),
-        "reference_applies": (OF_REFERENCES, "1", APPLIES, np.int8(0)),
+        "reference_applies": (OF_REFERENCES, "1", HOW_FAR, np.int8(0)),
         "reference_message": (("load",), "1", "why there is no reference", ""),
         "best_stiffness": (OF_REFERENCES, "N/m", "uniform stiffness without a deformation error", np.nan),
         "particles": (("sample",), "1", "number of particles", 0),
@@ -121,12 +120,12 @@ def groups(study, folder):
 
 def _stored(sample, folder):
     """Parameters of all rows, and results by key: displacement, status, particles and messages by row."""
-    keys = {plan.result_key(sample, load, name) for load in sample.loads for name in plan.definitions(sample)}
+    keys = {result_key(sample, load, name) for load in sample.loads for name in solved_definitions(sample)}
     arrays = {key: ("displacement", "status", "particles") for key in keys}
     arrays[DRAWN] = tuple(dict.fromkeys([*sample.parameters, "mesh_size"]))
     parts, messages, before = {key: [] for key in arrays}, {key: {} for key in keys}, 0
     for ends in blocks(sample.design, sample.size):
-        path = folder / f"{plan.block_key(sample, *ends)}.h5"
+        path = folder / f"{block_key(sample, *ends)}.h5"
         read = store.read(path, sorted(arrays), sorted({name for names in arrays.values() for name in names}))
         for key, part in parts.items():
             part.append(read[key])
@@ -158,13 +157,13 @@ def _solved(sample, data, drawn, results):
     for load, name, i, j in _cells(data, sample):
         # With linear kinematics results are for a force of one sign.
         sign = LOADS[load].sign if sample.kinematics == "linear" else 1.0
-        found = results[plan.result_key(sample, load, name)]
+        found = results[result_key(sample, load, name)]
         there = np.isin(found["status"], (Status.SOLVED, Status.LINEAR_ONLY, Status.UNSTABLE))
         data.displacement.values[:, i, j] = np.where(there, sign * found["displacement"], np.nan)
         data.status.values[:, i, j] = found["status"]
         for row, text in found["messages"].items():
             data.message.values[row, i, j] = text
-        if name == plan.UNIFORM:
+        if name == UNIFORM:
             data.stiffness.values[:, i, j] = COEFFICIENT * membrane
 
 
@@ -190,14 +189,14 @@ def _referred(sample, data, drawn, folder):
 
 def _answers(sample, drawn, folder, kind, aspects):
     """Answers of the unit problem of each row, and why some are missing."""
-    key, ratios = plan.reference_key(sample, kind), drawn["poisson_ratio"]
-    interpolant, alone, _, why = stored_interpolant.read(folder, key)
+    key, ratios = reference_key(sample, kind), drawn["poisson_ratio"]
+    interpolant, alone, _, why = any_reference.read_interpolant(folder, key)
     if interpolant:
         return interpolant.evaluate(aspects, ratios), ""
-    if sample.rows > plan.MOST_SOLVED:
-        why += f"; up to {plan.MOST_SOLVED} points they would be solved one by one"
+    if sample.rows > MOST_SOLVED:
+        why += f"; up to {MOST_SOLVED} points they would be solved one by one"
     rows = [alone.get(problem_key(key, *pair), {"message": why}) for pair in zip(aspects, ratios)]
-    names = stored_interpolant.ANSWERS
+    names = any_reference.ANSWERS
     answers = SimpleNamespace(**{name: np.array([row.get(name, np.nan) for row in rows]) for name in names})
     reasons = [row["message"] for row in rows if row["message"]]
     return answers, f"{len(reasons)} of {len(rows)} points: {reasons[0]}" if reasons else ""
@@ -206,7 +205,7 @@ def _answers(sample, drawn, folder, kind, aspects):
 def _fitted(sample, data, drawn, results):
     """Put the uniform stiffness without an error: the solved one times its displacement over the reference."""
     for load, i in _loads(data, sample):
-        found = results[plan.result_key(sample, load, plan.UNIFORM)]
+        found = results[result_key(sample, load, UNIFORM)]
         membrane = drawn["young_modulus"] * drawn["thickness"]
         solved = np.where(found["status"] == Status.SOLVED, LOADS[load].sign * found["displacement"], np.nan)
         softer = solved / data.reference_displacement.values[:, i]

@@ -1,13 +1,17 @@
-"""Figures of samples, and what the page to browse shows of them."""
+"""Figures and table of samples, and what the page to browse shows of them."""
 
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from ...config.kind import Output, stem
+import numpy as np
+
+from ...config.kind import Output, needs, stem
 from ...output.browse import Plot, View
 from .designs import SOBOL_INDICES
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from ...config.model import Study
 
 QUANTITIES = {
@@ -18,8 +22,7 @@ QUANTITIES = {
 """Quantities that have indices and main effects."""
 
 
-def _lack(study: "Study") -> str:
-    return "" if study.parts["samples"] else "shows sampled scenes and the study has none; add a section 'samples'"
+_lack = needs("samples", "shows sampled scenes and the study has none; add a section 'samples'")
 
 
 def _lack_indices(study: "Study") -> str:
@@ -81,3 +84,28 @@ VIEWS = (
         (Plot("main effect", "main_effect", "parameter_value", "definition", along="bin", selection=OF_ERRORS),),
     ),
 )  # fmt: skip
+
+
+def tables(tree: "xr.DataTree") -> list[dict[str, Any]]:
+    """Tables of the page, see `springtune.studies.kinds.scenes.tables.tables`."""
+    if "sobol" not in tree:
+        return []
+    found = tree["sobol"].to_dataset()
+    rows: dict[tuple[str, ...], dict[str, Any]] = {}
+    for place in np.argwhere(found.base_samples.values > 0):
+        cell = found.isel(dict(zip(found.base_samples.dims, place)))
+        quantity, load, definition = (str(cell[name].values) for name in ("quantity", "load", "definition"))
+        definition = "" if quantity == "best_stiffness" else definition  # it is the same for all definitions
+        for parameter in found.parameter.values:
+            one = cell.sel(parameter=parameter)
+            labels = {"quantity": quantity, "load": load, "definition": definition, "parameter": parameter}
+            orders = [f"{order}_order{end}" for order in ("first", "total") for end in ("", "_low", "_high")]
+            values = {name: float(one[name]) for name in orders}
+            rows.setdefault(tuple(labels.values()), labels | values | {"base_samples": int(cell.base_samples)})
+    first, second, third = QUANTITIES.values()
+    note = (
+        f"{first.capitalize()}, {second} and {third}: shares of their variance by each parameter alone (first order) "
+        f"and in all that it takes part in (total order). Bands: {found.attrs['bands']}. "
+        f"Failures: {found.attrs['failures']}."
+    )
+    return [{"stem": "sobol", "title": "Sobol indices", "note": note, "rows": list(rows.values())}]

@@ -1,1 +1,46 @@
-"""Experiments on numerical stability."""
+"""Experiments on numerical stability: their names and the values of their own dimensions."""
+
+import numpy as np
+
+from springtune.mechanics.integrators import INTEGRATORS
+
+EXPERIMENTS = {
+    "limits": "largest stable step of the explicit schemes, predicted and measured",
+    "maps": "what noise becomes over step and damping",
+    "drift": "energy and momentum over many steps",
+    "rest": "steps to rest over damping; truncated solvers; dynamic relaxation",
+    "slivers": "triangles of down to half a degree",
+    "contrast": "stiff parts beside soft ones",
+    "poisson": "up to an incompressible material",
+    "sizes": "mesh sizes over three decades, single precision",
+    "strains": "compression and traction of up to 300 %, a follower pressure",
+    "perturbation": "particles moved at random, inverted starts",
+    "buckling": "a slender column, a shallow arch",
+}
+"""Experiments by name."""
+
+ONCE = ("maps", "drift", "rest", "contrast", "sizes")
+"""Experiments about schemes and numbers, not definitions: the first definition of a study stands for all."""
+
+AXES = {
+    "integrator": INTEGRATORS,
+    "damper": ("mass", "springs"),
+    "damping_ratio": (0.0, 0.1, 1.0),
+    "step_ratio": tuple(np.geomspace(0.1, 4.0, 25).round(4).tolist()),
+    "map_damping_ratio": tuple(np.geomspace(0.01, 3.0, 17).round(4).tolist()),
+    "sample": tuple(range(1000)),
+    "critical_ratio": (0.125, 0.25, 0.354, 0.5, 0.707, 0.85, 1.0, 1.2, 1.414, 2.0, 2.83, 4.0, 8.0),
+    "cg_iterations": (5, 25, 100, 0),
+    "implicit_steps": (10, 50, 200),
+    "sliver_angle": (30.0, 20.0, 10.0, 5.0, 2.0, 1.0, 0.5),
+    "stiffness_contrast": tuple(10.0**power for power in range(0, 17, 2)),
+    "stressed_poisson_ratio": (0.0, 0.3, 0.45, 0.49, 0.499, 0.4999, 0.5),
+    "scale": (1e-5, 1e-4, 1e-3, 1e-2),
+    "precision": ("float64", "float32"),
+    "strain_load": ("axial", "follower-pressure"),
+    "strain": (-0.6, -0.4, -0.2, -0.1, -0.05, -0.01, 0.01, 0.05, 0.1, 0.3, 0.5, 1.0, 2.0, 3.0),
+    "perturbation": (0.0, 0.05, 0.1, 0.2, 0.3, 0.4),
+    "rows": (10, 20),
+    "arch_point": tuple(range(200)),
+}
+"""Values of the experiments' own dimensions. ``cg_iterations`` 0 is a direct solver."""

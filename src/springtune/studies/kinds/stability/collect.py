@@ -4,7 +4,7 @@ import numpy as np
 
 from springtune.mechanics.integrators import BEHAVIOURS
 
-from ...output.dataset import Group
+from ...output.dataset import Filler, Group
 from ...runs.stages import results
 from .kind import STAGE
 
@@ -34,12 +34,7 @@ STABILITY = Group(
         "dt_limit_measured": (SCHEME, "s", "largest step that does not grow noise, by bisection of runs", np.nan),
         "dt_particle_bound": (("definition", "mesh_size"), "s", "safe step from each particle's springs alone", np.nan),
         "omega_max": (("definition", "mesh_size"), "rad/s", "highest frequency at rest", np.nan),
-        "behaviour": (
-            ("integrator", "step_ratio", "map_damping_ratio"),
-            "1",
-            "what a run makes of noise",
-            -1,
-        ),
+        "behaviour": (("integrator", "step_ratio", "map_damping_ratio"), "1", "what a run makes of noise", -1),
         "step_ratio_predicted": (
             ("integrator", "map_damping_ratio"),
             "1",
@@ -136,14 +131,9 @@ STABILITY = Group(
 
 def groups(study, folder):
     """Groups of a dataset, see `springtune.studies.kinds.scenes.collect.groups`."""
-    found = {task.of: result for task, result in results(STAGE, study, folder, STABILITY.variables)}
-    there = {name for result in found.values() for name in result} | {"experiment_seconds", "experiment_message"}
-    data = STABILITY.empty(study.axes, there)
-    for one, result in found.items():
-        place = {"experiment": one.name, "definition": one.definition, "mesh_size": list(one.mesh_sizes)}
-        result["experiment_seconds"] = result.pop("seconds", np.nan)
-        result["experiment_message"] = result.pop("failure", "")
-        for name, values in result.items():
-            array = data[name]
-            array.loc[{dimension: place[dimension] for dimension in array.dims if dimension in place}] = values
-    return {STABILITY.name: data}
+    found = list(results(STAGE, study, folder, STABILITY.variables))
+    names = {name for _, result in found for name in result} | {"experiment_seconds", "experiment_message"}
+    filler = Filler(STABILITY.empty(study.axes, names))
+    for task, result in found:
+        filler.put_arrays(result, task.labels)
+    return {STABILITY.name: filler.data}

@@ -8,7 +8,7 @@ from springtune.safe_io.escapes import no_mathematics
 
 from ...output import labels, style
 from ...output.dataset import STATUS
-from ...output.selection import group
+from ...output.selection import group, labels_of
 from .outputs import figures
 
 MAP_COLOURS = ("#f4f4f4", "#b5cfe3", "#d07a1f", "#4a0d1a")
@@ -33,13 +33,6 @@ def _experiment(data, name):
     if name not in done:
         raise ValueError(f"the dataset has no experiment {name!r}; it has {', '.join(map(repr, done))}")
     return data
-
-
-def _shown_definitions(data, name):
-    """Definitions that have values of a variable."""
-    values = data[name]
-    there = values.notnull().any([dimension for dimension in values.dims if dimension != "definition"])
-    return [str(label) for label in data.definition.values[there.values]]
 
 
 def _curves(panel, x, curves, logarithmic=False):
@@ -79,19 +72,23 @@ def plot_stability_limits(data, ax=None):
     ['Predicted limit [ns]', 'Mesh size [mm]']
     """
     data = _experiment(data, "limits")
-    figure, axes = style.panels(ax, ncols=2, figsize=(style.PAGE, 2.5))
-    place = dict(left=0.5, right=0.08, bottom=0.52, top=0.28, across=0.6)
-    style.arrange(figure, axes, **place)
-    (left, right), predicted = axes[0], data.dt_limit_predicted
-    names = _shown_definitions(data, "dt_limit_predicted")
+    with labels.arranged(ax, ncols=2, figsize=(style.PAGE, 2.5), bottom=0.52) as (axes, ends):
+        ends[axes[0, 1]] = _limits(data, *axes[0])
+    return axes[0]
+
+
+def _limits(data, left, right):
+    """Draw the limits of each definition; ends of the lines on the right."""
+    predicted = data.dt_limit_predicted
+    names = labels_of(data["dt_limit_predicted"].notnull(), "definition")
     left.set(xscale="log", xlabel="Predicted limit [ns]", ylabel="Measured less predicted [%]",
              title="Every explicit scheme and damping")  # fmt: skip
     right.set(**style.LOGARITHMIC, xlabel="Mesh size [mm]", ylabel="Largest stable step [ns]",
               title="Undamped; dotted: bound from each particle")  # fmt: skip
     if not names:
-        for panel in axes[0]:
+        for panel in (left, right):
             labels.say(panel, "No limit was found: no definition was solved.")
-        return axes[0]
+        return []
     left.axhspan(-1, 1, color="0.92")
     labels.note(left, "markers as on the right; grey: 1 %")
     ends, furthest = [], 1.0
@@ -111,16 +108,13 @@ def plot_stability_limits(data, ax=None):
         right.plot(1e3 * size, bound, color=look["color"], linewidth=0.8, linestyle=":", **alone)
         ends += [(1e3 * size[-1], steps[-1], name, look["color"])] if len(size) else []
     left.set_ylim(-2 * furthest, 2 * furthest)
-    sizes = 1e3 * data.mesh_size.values[np.isfinite(data.omega_max.values).any(
-        axis=data.omega_max.dims.index("definition"))]  # fmt: skip
+    sizes = 1e3 * np.array(labels_of(data.omega_max.notnull(), "mesh_size"))
     right.set_xlim(sizes.min() / 1.15, sizes.max() * 1.15)
     right.set_xticks(sizes, [f"{size:g}" for size in sizes])
     right.xaxis.set_minor_locator(NullLocator())
     style.plain(left, "x")
     style.plain(right, "y")
-    labels.settle(figure, axes, place | {"across": 0.1})
-    labels.name_lines(right, ends)
-    return axes[0]
+    return ends
 
 
 @style.styled
@@ -163,8 +157,8 @@ def plot_stability_maps(data, ax=None):
         found = data.behaviour.sel(integrator=name).values
         panel.pcolormesh(x, y, found, cmap=ListedColormap(MAP_COLOURS), vmin=-0.5, vmax=3.5, shading="nearest")
         predicted = data.step_ratio_predicted.sel(integrator=name).values
-        panel.plot(x, np.where(predicted < 100, predicted, np.nan), color="black")
-        panel.plot(x, np.where(predicted < 100, predicted, np.nan), color="white", linewidth=0.5)
+        for look in ({"color": "black"}, {"color": "white", "linewidth": 0.5}):
+            panel.plot(x, np.where(predicted < 100, predicted, np.nan), **look)
         title = name.replace("-", " ").capitalize().replace("euler", "Euler")
         panel.set(**style.LOGARITHMIC, ylim=(y.min(), y.max()))
         panel.set_title(title.replace("Central difference lagged", "Central, damping lags"), fontsize=style.SMALL)
@@ -216,10 +210,14 @@ def plot_stability_energy(data, ax=None):
     'Energy over its start'
     """
     data = _experiment(data, "drift")
-    figure, axes = style.panels(ax, figsize=(style.PAGE, 2.5))
-    place = dict(left=0.45, right=0.08, bottom=0.52, top=0.28)
-    style.arrange(figure, axes, **place)
-    panel, ends = axes[0, 0], []
+    with labels.arranged(ax, figsize=(style.PAGE, 2.5), bottom=0.52) as (axes, ends):
+        ends[axes[0, 0]] = _energy(data, axes[0, 0])
+    return axes[0, 0]
+
+
+def _energy(data, panel):
+    """Draw the energy of each integrator; ends of the lines."""
+    ends = []
     for number, name in enumerate(data.integrator.values):
         if name == "central-difference-lagged":  # without damping that is central-difference
             continue
@@ -231,12 +229,10 @@ def plot_stability_energy(data, ax=None):
               title="A beam let go from its stretch, half of the limit, no damping")  # fmt: skip
     if not ends:
         labels.say(panel, "No run has an energy.")
-        return panel
+        return ends
     labels.note(panel, "explicit integrators take 100 000 steps, implicit ones 4000")
     panel.set_ylim(0, 1.1 * max(1.0, np.nanmax(data.energy.values)))
-    labels.settle(figure, axes, place)
-    labels.name_lines(panel, ends)
-    return panel
+    return ends
 
 
 @style.styled
@@ -269,10 +265,13 @@ def plot_stability_rest(data, ax=None):
     ['Steps to rest within 0.1 %', 'Distance from the static solution']
     """
     data = _experiment(data, "rest")
-    figure, axes = style.panels(ax, ncols=2, figsize=(style.PAGE, 2.4))
-    place = dict(left=0.5, right=0.08, bottom=0.4, top=0.28, across=0.65)
-    style.arrange(figure, axes, **place)
-    left, right = axes[0]
+    with labels.arranged(ax, ncols=2, figsize=(style.PAGE, 2.4), bottom=0.4) as (axes, ends):
+        ends[axes[0, 1]] = _rest(data, *axes[0])
+    return axes[0]
+
+
+def _rest(data, left, right):
+    """Draw steps to rest, and the distance of truncated solvers: ends of the lines on the right."""
     left.set(**style.LOGARITHMIC, title="Central difference, 0.9 of the limit")
     left.set(xlabel="Damping over critical, lowest loaded mode", ylabel="Steps to rest within 0.1 %")
     if np.isfinite(data.steps_to_rest.values).any():
@@ -281,24 +280,20 @@ def plot_stability_rest(data, ax=None):
         style.plain(left, "x", "y")
     else:
         labels.say(left, "No run came to rest.")
-    there = data.truncated_error.notnull().any(["cg_iterations", "implicit_steps"]).values
+    sizes = labels_of(data.truncated_error.notnull(), "mesh_size")
     right.set(**style.LOGARITHMIC, xlabel="Steps of backward Euler", ylabel="Distance from the static solution")
-    if not there.any():
-        labels.settle(figure, axes, place | {"across": 0.1})
+    if not sizes:
         right.set_title("Truncated conjugate gradients")
         labels.say(right, "No truncated solver was run.")
-        return axes[0]
-    size = data.mesh_size.values[there][0]
-    right.set_title(f"Truncated conjugate gradients, {1e3 * size:g} mm")
-    error = np.maximum(data.truncated_error.sel(mesh_size=size), 1e-15)
+        return []
+    right.set_title(f"Truncated conjugate gradients, {1e3 * sizes[0]:g} mm")
+    error = np.maximum(data.truncated_error.sel(mesh_size=sizes[0]), 1e-15)
     names = {count: f"{count} iterations" if count else "direct" for count in data.cg_iterations.values.tolist()}
     curves = {name: error.sel(cg_iterations=count).values for count, name in names.items()}
     ends = _curves(right, data.implicit_steps.values, curves, logarithmic=True)
     style.plain(right, "x")
     right.yaxis.set_minor_locator(NullLocator())
-    labels.settle(figure, axes, place | {"across": 0.1})
-    labels.name_lines(right, ends)
-    return axes[0]
+    return ends
 
 
 @style.styled
@@ -341,7 +336,7 @@ def plot_stability_meshes(data, ax=None):
     for panel, (kind, dimension) in zip(axes, kinds.items()):
         limits = data[f"{kind}_step_limit"]
         curves = {name: (limits.sel(definition=name) / limits.sel(definition=name).isel({dimension: 0})).values
-                  for name in _shown_definitions(data, f"{kind}_step_limit")}  # fmt: skip
+                  for name in labels_of(data[f"{kind}_step_limit"].notnull(), "definition")}  # fmt: skip
         panel.set(ylabel="Stable step over the whole mesh's", ylim=(0, 1.1))
         if kind == "sliver":
             panel.set(xscale="log", xlabel="Smallest angle of one triangle [degree]", title="A sliver")
@@ -389,7 +384,7 @@ def plot_stability_strains(data, ax=None):
     'Strain of a linear sheet under the load [%]'
     """
     data = _experiment(data, "strains")
-    names = _shown_definitions(data, "strain_load_share")
+    names = labels_of(data["strain_load_share"].notnull(), "definition")
     loads, strains = data.strain_load.values, data.strain.values
     figure, axes = style.panels(
         ax, nrows=len(loads), sharex=True, figsize=(style.PAGE, 0.75 + len(loads) * (0.3 + 0.19 * max(len(names), 2)))
@@ -404,9 +399,8 @@ def plot_stability_strains(data, ax=None):
             labels.say(panel, "No definition was solved under this load.")
             continue
         here = data.sel(strain_load=load, definition=names)
-        flags = here.strain_status.transpose("definition", "strain").values
-        pivots, share, messages = (here[f"{name}"].transpose("definition", "strain").values for name in (
-            "negative_pivots", "strain_load_share", "strain_message"))  # fmt: skip
+        flags, pivots, share, messages = (here[name].transpose("definition", "strain").values for name in (
+            "strain_status", "negative_pivots", "strain_load_share", "strain_message"))  # fmt: skip
         panel.pcolormesh(flags, cmap=ListedColormap(STATUS_COLOURS), vmin=-0.5, vmax=5.5, edgecolor="white")
         seen |= {round(flag) for flag in np.unique(flags)}
         for i, j in np.ndindex(flags.shape):
@@ -459,17 +453,21 @@ def plot_stability_buckling(data, ax=None):
     ["Buckling load over Euler's, less 1 [%]", 'Force [N]']
     """
     data = _experiment(data, "buckling")
-    figure, axes = style.panels(ax, ncols=2, figsize=(style.PAGE, 2.6))
-    place = dict(left=0.45, right=0.08, bottom=0.45, top=0.28, across=0.6)
-    style.arrange(figure, axes, **place)
-    (left, right), names = axes[0], _shown_definitions(data, "buckling_load")
+    with labels.arranged(ax, ncols=2, figsize=(style.PAGE, 2.6), bottom=0.45) as (axes, ends):
+        ends[axes[0, 1]] = _buckling(data, *axes[0])
+    return axes[0]
+
+
+def _buckling(data, left, right):
+    """Draw buckling loads, and paths of arches: ends of the lines on the right."""
+    names = labels_of(data["buckling_load"].notnull(), "definition")
     left.set(ylabel="Buckling load over Euler's, less 1 [%]", title="A column twenty times as long as high")
     right.set(xlabel="Deflection of the middle [mm]", ylabel="Force [N]",
               title="A shallow arch by arc length; wide: unstable")  # fmt: skip
     if not names:
-        for panel in axes[0]:
+        for panel in (left, right):
             labels.say(panel, "No definition has a buckling load.")
-        return axes[0]
+        return []
     places, shades = np.arange(len(names)), ("#0b3c5d", "#7fb8da", "#c8ddf0")
     wide = 0.8 / data.sizes["rows"]
     for number, rows in enumerate(data.rows.values):
@@ -485,7 +483,7 @@ def plot_stability_buckling(data, ax=None):
     known = {name: arch for name, arch in arches.items() if np.isfinite(arch.arch_load.values).any()}
     if not known:
         labels.say(right, "No definition was followed along an arch.")
-        return axes[0]
+        return []
     falling = data.arch_load.where(data.arch_negative_pivots > 0).values
     top = 2.2 * np.nanmax(falling) if np.isfinite(falling).any() else np.nanmax(data.arch_load.values)
     ends = []
@@ -499,18 +497,14 @@ def plot_stability_buckling(data, ax=None):
         within = np.flatnonzero(np.isfinite(load) & (load <= top))
         ends += [(deflection[within[-1]], load[within[-1]], name, look["color"])] if len(within) else []
     right.set(ylim=(0, top), xlim=(0, 1.08 * max(end[0] for end in ends)))
-    labels.settle(figure, axes, place | {"across": 0.1})
-    labels.name_lines(right, ends)
-    return axes[0]
+    return ends
 
 
 PLOTS = {
-    "stability_limits": plot_stability_limits,
-    "stability_maps": plot_stability_maps,
-    "stability_energy": plot_stability_energy,
-    "stability_rest": plot_stability_rest,
-    "stability_meshes": plot_stability_meshes,
-    "stability_strains": plot_stability_strains,
-    "stability_buckling": plot_stability_buckling,
-}
+    plot.__name__.removeprefix("plot_"): plot
+    for plot in (
+        plot_stability_limits, plot_stability_maps, plot_stability_energy, plot_stability_rest, plot_stability_meshes,
+        plot_stability_strains, plot_stability_buckling,
+    )
+}  # fmt: skip
 """What plots each figure."""

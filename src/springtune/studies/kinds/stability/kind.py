@@ -16,7 +16,7 @@ from ...config.sections import Section
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key
 from ...runs.stages import Task, stage
 from ..division import by_task
-from .names import AXES, EXPERIMENTS, ONCE
+from . import AXES, EXPERIMENTS, ONCE
 from .outputs import OUTPUTS
 
 ExperimentName = Annotated[str, one_of("experiment", EXPERIMENTS)]
@@ -110,7 +110,8 @@ def _tasks(study):
     for one in study.parts["stability"]:
         own = {"beam": beam_key(one.beam), "material": material_key(one.material, density=True)}
         also = mesh_type_key(one.mesh_type), definition_key(one.definition)
-        yield Task(asdict(one) | own, also, of=one, costs=[(one.name, 0)])
+        labels = {"experiment": one.name, "definition": one.definition, "mesh_size": list(one.mesh_sizes)}
+        yield Task(asdict(one) | own, also, labels, one, [(one.name, 0)])
 
 
 STAGE = stage("stability", "studies.kinds.stability.solve", "Experiments on stability", _tasks)

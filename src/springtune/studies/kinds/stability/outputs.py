@@ -1,12 +1,9 @@
-"""What is made of the experiments on stability."""
+"""Figures and the page of the experiments on stability, and what the page to browse shows of them."""
 
 from collections.abc import Collection
-from typing import TYPE_CHECKING
 
-from ...config.kind import Output
-
-if TYPE_CHECKING:
-    from ...config.model import Study
+from ...config.kind import Output, needs
+from ...output.browse import Plot, View
 
 PAGE = "stability.md"
 
@@ -28,10 +25,6 @@ def figures(experiments: Collection[str]) -> dict[str, dict[str, object]]:
     return {f"stability_{name}": {} for name, needed in NEEDED.items() if needed in experiments}
 
 
-def _lack(study: "Study") -> str:
-    return "" if study.parts["stability"] else "shows experiments and the study has none; add a section 'stability'"
-
-
 OUTPUTS = (
     Output(
         "stability",
@@ -40,6 +33,33 @@ OUTPUTS = (
         plot="studies.kinds.stability.figures:stability",
         tables=lambda study: [PAGE],
         write="studies.kinds.stability.tables",
-        lack=_lack,
+        lack=needs("stability", "shows experiments and the study has none; add a section 'stability'"),
     ),
 )
+
+VIEWS = (
+    View(
+        "/stability",
+        "Stability",
+        "Experiments on time steps, damping, poor meshes, large strains and buckling.",
+        (
+            Plot("largest stable step, measured and predicted", "dt_limit_measured", "dt_limit_predicted",
+                 "definition", along="mesh_size", log="xy", selection={"integrator": "central-difference"}),
+            Plot("what a run makes of noise", "behaviour", "map_damping_ratio", "step_ratio", "map"),
+            Plot("energy of a run", "energy", "sample", "integrator"),
+            Plot("steps to rest over damping", "steps_to_rest", "critical_ratio", log="xy"),
+            Plot("truncated conjugate gradients", "truncated_error", "implicit_steps", "cg_iterations", log="xy"),
+            Plot("stable step with a sliver", "sliver_step_limit", "sliver_angle", "definition", log="xy"),
+            Plot("stable step with particles moved", "perturbed_step_limit", "perturbation", "definition"),
+            Plot("what became of large strains", "strain_status", "strain", "definition", "map"),
+            Plot("displacement at large strains", "strain_displacement", "strain", "definition"),
+            Plot("stiff and soft parts: error and its estimate", "contrast_error", "stiffness_contrast", log="xy",
+                 beside=(("stiffness_contrast", "contrast_estimate", "estimate"),)),
+            Plot("Young's modulus near nu = 0.5", "poisson_modulus_error", "stressed_poisson_ratio", "definition"),
+            Plot("single and double precision", "precision_error", "scale", "precision", log="xy"),
+            Plot("buckling load of a column", "buckling_load", "rows", "definition"),
+            Plot("path of a shallow arch", "arch_load", "arch_deflection", "definition", along="arch_point"),
+            Plot("seconds of the experiments", "experiment_seconds", "experiment", "definition", "map"),
+        ),
+    ),
+)  # fmt: skip

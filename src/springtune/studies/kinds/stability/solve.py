@@ -1,30 +1,539 @@
-"""Stage `stability`: experiments on numerical stability."""
+"""Stage `stability`: stress tests of numerical stability, whose results are the group ``/stability`` of a dataset.
+
+Each takes a `Setup` and returns arrays by the names of `STABILITY` in `collect`, over the dimensions there that are not
+``definition``; their values are `AXES`.
+"""
 
 import time
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import product
 
 import numpy as np
 
+from springtune.mechanics.arc_length import buckling as critical_load
+from springtune.mechanics.arc_length import follow
+from springtune.mechanics.dynamics import Motion, relax
+from springtune.mechanics.integrators import BEHAVIOURS, EXPLICIT, INTEGRATORS, BackwardEuler
+from springtune.mechanics.moduli import PatchTest
+from springtune.mechanics.statics import SingularError, StaticProblem
+from springtune.mesh import MESH_TYPES, Mesh, corner_angles
+from springtune.problem.boundary import weights
 from springtune.problem.geometry import Beam
-from springtune.problem.materials import material_of
+from springtune.problem.loads import AXIAL, FACE
+from springtune.problem.materials import Material, material_of
+from springtune.problem.status import Status
+from springtune.scene.motion import motion_of
+from springtune.scene.sheet import Sheet
+from springtune.springs import DefinitionError, Springs
 
-from . import experiments as stability
+from . import AXES
+
+GROWTH_STEPS = 2000
+"""Steps of each run that measures a limit."""
 
 
 def failed(task, why):
     """Result of an experiment that fails."""
-    return {"failure": why}
+    return {"experiment_message": why}
 
 
 def solve(task):
     """Result of an experiment."""
-    setup = stability.Setup(
+    setup = Setup(
         Beam(**task["beam"]), material_of(task["material"]), task["force"], task["definition"], task["mesh_type"],
         tuple(task["mesh_sizes"]),
     )  # fmt: skip
     begin = time.perf_counter()
-    found = stability.run(task["name"], setup)
+    found = {name: np.asarray(values) for name, values in RUN[task["name"]](setup).items()}
     # Texts are no arrays of a file.
-    found = {name: np.asarray(values) for name, values in found.items()}
-    texts = {name: values.tolist() for name, values in found.items() if values.dtype.kind == "O"}
-    arrays = {name: values for name, values in found.items() if name not in texts}
-    return arrays | texts | {"seconds": time.perf_counter() - begin}
+    found = {name: values.tolist() if values.dtype.kind == "O" else values for name, values in found.items()}
+    return found | {"experiment_seconds": time.perf_counter() - begin}
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What experiments share: the traction [N] and ascending edge lengths [m]."""
+
+    beam: Beam
+    material: Material
+    force: float
+    definition: str
+    mesh_type: str
+    mesh_sizes: tuple[float, ...]
+
+    @cached_property
+    def coarse(self):
+        """The coarsest of the meshes: most experiments need no finer one."""
+        return self.mesh(self.mesh_sizes[-1])
+
+    def mesh(self, size):
+        """Mesh of the beam."""
+        return MESH_TYPES[self.mesh_type](self.beam.length, self.beam.height, size)
+
+    def springs(self, mesh):
+        """Springs of the definition."""
+        return self.sheet(mesh).derive(self.definition, self.material)[0]
+
+    def plain_springs(self, mesh):
+        """As `springs`, without forces that the definition adds to a load: experiments are on the network itself."""
+        return replace(self.springs(mesh), lateral=0.0)
+
+    @cached_property
+    def _sheets(self):
+        return {}
+
+    def sheet(self, mesh):
+        """Sheet of a mesh; the last one is kept."""
+        if id(mesh) not in self._sheets:
+            self._sheets.clear()
+            self._sheets[id(mesh)] = Sheet(mesh, self.beam.thickness)  # which keeps the mesh, and so its identity
+        return self._sheets[id(mesh)]
+
+    def problem(self, mesh, kind=AXIAL, follower=False):
+        """Static problem and its reference stiffness."""
+        springs = self.plain_springs(mesh)
+        return self.sheet(mesh).problem(kind, springs, follower), springs.reference
+
+    def loaded(self, mesh):
+        """Static problem of the traction, and its load over the reference stiffness."""
+        problem, reference = self.problem(mesh)
+        return problem, self.force / reference
+
+    def motion(self, mesh, **options):
+        """The beam under its force, free of damping."""
+        options = {"linear": True} | options
+        return motion_of(
+            self.sheet(mesh), AXIAL, self.plain_springs(mesh), self.material.density, self.force, **options
+        )
+
+
+def changed(motion, **options):
+    """A motion with some of its parameters changed."""
+    kept = {"load": motion.load, "mass_damping": motion.mass_damping, "dampers": motion.dampers}
+    return Motion(motion.network, motion.inertia[:, 0], **(kept | {"linear": motion.linear} | options))
+
+
+def _blank(*axes):
+    """Array of NaN over the values of some axes, or over so many values."""
+    return np.full([len(AXES[one]) if isinstance(one, str) else one for one in axes], np.nan)
+
+
+def _displacement(found, pattern):
+    return float(np.tensordot(found.displacements, pattern, axes=2))
+
+
+def _noise(motion, size=1e-6, seed=0):
+    random = np.random.default_rng(seed).standard_normal(motion.network.held.shape)
+    return size * random * ~motion.network.held
+
+
+# -- steps in time -----------------------------------------------------------------------------------------------------
+
+
+def limits(setup):
+    """Largest stable step of every explicit scheme, predicted and measured, over mesh sizes and damping."""
+    places = setup.mesh_sizes, INTEGRATORS, AXES["damper"], AXES["damping_ratio"]
+    predicted, measured = np.full((2, *map(len, places)), np.nan)
+    omega, bound = np.zeros((2, len(setup.mesh_sizes)))
+    for i, size in enumerate(setup.mesh_sizes):
+        motion = setup.motion(setup.mesh(size), load=None)
+        omega[i], bound[i] = motion.omega_max, 2 / motion.particle_bound
+        for (j, integrator), (k, kind), (n, ratio) in product(*map(enumerate, (EXPLICIT, *places[2:]))):
+            damped = changed(motion, **_damping(motion, kind, ratio))
+            predicted[i, j, k, n] = damped.step_limit(integrator)
+            measured[i, j, k, n] = measured_limit(damped, integrator)
+    return {
+        "dt_limit_predicted": predicted,
+        "dt_limit_measured": measured,
+        "dt_particle_bound": bound,
+        "omega_max": omega,
+    }
+
+
+def _damping(motion, kind, ratio):
+    """Damping with a ratio in the highest mode, roughly where it is of springs."""
+    if kind == "mass":
+        return {"mass_damping": 2 * ratio * motion.omega_max}
+    stiffness = np.abs(motion.network.stiffness)
+    stiffness = stiffness if stiffness.any() else np.ones(len(stiffness))  # springs whose law is an energy's
+    return {"dampers": 2 * ratio / motion.omega_max * stiffness}
+
+
+def measured_limit(motion, integrator, resolution=2e-3):
+    """Largest step that does not grow noise [s], by bisection of runs; about rest, linear."""
+
+    def grows(step):
+        start = _noise(motion)
+        half = motion.run(integrator, step, GROWTH_STEPS // 2, start)
+        if half.status == "diverged":
+            return True
+        found = motion.run(integrator, step, GROWTH_STEPS // 2, half.displacements, half.velocities)
+        if found.status == "diverged":
+            return True
+        # Accelerations show the high modes, which go first.
+        early, late = (np.linalg.norm(motion.missing(one.displacements) / motion.mass) for one in (half, found))
+        return late > 3 * early
+
+    # The prediction only says where to begin: both ends are moved until they hold the limit between them.
+    low = high = motion.step_limit(integrator)
+    while grows(low := 0.98 * low):
+        pass
+    while not grows(high := 1.02 * high):
+        pass
+    while high / low > 1 + resolution:
+        middle = np.sqrt(low * high)
+        low, high = (low, middle) if grows(middle) else (middle, high)
+    return np.sqrt(low * high)
+
+
+def maps(setup):
+    """What noise becomes over step and damping, in every scheme."""
+    motion = setup.motion(setup.coarse, load=None)
+    steps, ratios = AXES["step_ratio"], AXES["map_damping_ratio"]
+    behaviour = np.zeros((len(INTEGRATORS), len(steps), len(ratios)), dtype=np.int8)
+    predicted = np.zeros((len(INTEGRATORS), len(ratios)))
+    for i, integrator in enumerate(INTEGRATORS):
+        for k, ratio in enumerate(ratios):
+            damped = changed(motion, mass_damping=2 * ratio * motion.omega_max)
+            predicted[i, k] = min(damped.step_limit(integrator) * motion.omega_max / 2, 1e3)
+            for j, step in enumerate(steps):
+                behaviour[i, j, k] = _behaviour(damped, integrator, 2 * step / motion.omega_max)
+    return {"behaviour": behaviour, "step_ratio_predicted": predicted}
+
+
+def _behaviour(motion, integrator, step):
+    start = _noise(motion)
+    count = 400 if integrator in EXPLICIT else 60
+    found = motion.run(integrator, step, count, start)
+    if found.status == "diverged":
+        return BEHAVIOURS.index("nan")
+    before, after = (np.linalg.norm(motion.missing(u) / motion.mass) for u in (start, found.displacements))
+    ratio = after / before
+    return BEHAVIOURS.index("growing" if ratio > 3 else "decaying" if ratio < 0.3 else "stable")
+
+
+def drift(setup):
+    """Energy of the undamped beam let go from a stretch, and momentum of one that floats, over many steps."""
+    motion = setup.motion(setup.coarse, linear=False)
+    if motion.network.energies:  # not compiled, and the same schemes
+        motion = changed(motion, linear=True)
+    problem, _ = setup.problem(setup.coarse)
+    pulled = (problem.linear if motion.linear else problem.nonlinear)(motion.load.sum()).displacements
+    free = changed(motion, load=np.zeros_like(motion.load))
+    step = 0.5 * free.step_limit("central-difference")
+    samples = len(AXES["sample"])
+    energies = _blank("integrator", "sample")
+    drifts, swings, lost = _blank(3, "integrator")
+    unheld = setup.sheet(setup.coarse).network(np.zeros_like(motion.network.held), setup.springs(setup.coarse))
+    floating = Motion(unheld, motion.inertia[:, 0], linear=motion.linear)
+    kick = np.random.default_rng(1).standard_normal(motion.load.shape)
+    for i, integrator in enumerate(INTEGRATORS):
+        steps = 100_000 if integrator in EXPLICIT else 4_000
+        found = free.run(integrator, step, steps, pulled, sample=max(10, steps // 10_000))
+        energy = found.samples[:, 1]
+        tenth = max(1, len(energy) // 10)
+        drifts[i] = energy[-tenth:].mean() / energy[:tenth].mean() - 1
+        swings[i] = np.ptp(energy) / energy[0]
+        places = np.linspace(0, len(energy) - 1, samples).round().astype(int)
+        energies[i] = energy[places] / energy[0]
+        momentum = floating.run(integrator, step, 500, velocities=1e-3 * kick, sample=100).samples[:, 2:]
+        size = np.abs(floating.inertia * 1e-3 * kick).sum()
+        lost[i] = np.abs(momentum - momentum[0]).max() / size
+    return {"energy_drift": drifts, "energy_swing": swings, "energy": energies, "momentum_drift": lost}
+
+
+def rest(setup):
+    """Steps to rest over damping; and how far a truncated solver of backward Euler stops from the answer."""
+    motion = setup.motion(setup.coarse)
+    omega = motion.loaded_frequency
+    step = 0.9 * motion.step_limit("central-difference")
+    counts = _blank("critical_ratio")
+    for i, ratio in enumerate(AXES["critical_ratio"]):
+        damped = changed(motion, mass_damping=2 * ratio * omega)
+        found = damped.run("central-difference", step, 100_000, rest=1e-3)
+        counts[i] = found.steps if found.status == "rest" else np.nan
+    errors = _blank(len(setup.mesh_sizes), "cg_iterations", "implicit_steps")
+    relaxed, relax_steps = _blank(2, len(setup.mesh_sizes))
+    for i, size in enumerate(setup.mesh_sizes):
+        mesh = setup.mesh(size)
+        motion = setup.motion(mesh)
+        static = setup.problem(mesh)[0].linear(motion.load.sum())
+        largest = np.abs(static.displacements).max()
+        for j, iterations in enumerate(AXES["cg_iterations"]):
+            u = v = None
+            done = 0
+            for k, steps in enumerate(AXES["implicit_steps"]):
+                found = motion.run(BackwardEuler(iterations=iterations or None), 0.01, steps - done, u, v)
+                u, v, done = found.displacements, found.velocities, steps
+                errors[i, j, k] = np.abs(u - static.displacements).max() / largest
+        found = relax(motion.network, motion.load, linear=True)
+        relaxed[i] = np.abs(found.displacements - static.displacements).max() / largest
+        relax_steps[i] = found.steps
+    return {
+        "steps_to_rest": counts,
+        "loaded_frequency": omega,
+        "truncated_error": errors,
+        "relaxation_error": relaxed,
+        "relaxation_steps": relax_steps,
+    }
+
+
+class _Equilibria:
+    """What became of equilibria over the values of some axes, and `further` numbers of each."""
+
+    def __init__(self, name, axes, *further):
+        self.name, blank = name, _blank(*axes)
+        self.values = {"status": np.zeros(blank.shape, dtype=np.int8), "message": np.full(blank.shape, "", object)}
+        self.values |= {number: blank.copy() for number in ("negative_pivots", *further)}
+
+    def __getitem__(self, name):
+        return self.values[name]
+
+    def note(self, place, status, message, pivots=np.nan):
+        """Note what became of an equilibrium."""
+        for name, value in {"status": status, "message": message, "negative_pivots": pivots}.items():
+            self.values[name][place] = value
+
+    @contextmanager
+    def judged(self, place):
+        """Context with a function that judges and notes an equilibrium, and returns it if it is good."""
+
+        def judge(problem, s, solution):
+            status, *others = problem.judge(s, solution)
+            self.note(place, status, *others)
+            return solution if status in (Status.SOLVED, Status.UNSTABLE) else None
+
+        try:
+            yield judge
+        except DefinitionError as error:
+            self.note(place, Status.FAILED, str(error))
+        except (SingularError, ArithmeticError, ValueError) as error:
+            self.note(place, Status.FAILED, f"{type(error).__name__}: {error}")
+
+    def by_name(self):
+        """Arrays by their names in the dataset."""
+        return {f"{self.name}_{name}": values for name, values in self.values.items()}
+
+
+# -- meshes and numbers ------------------------------------------------------------------------------------------------
+
+
+def slivers(setup):
+    """Step and answer of a mesh with one particle drawn towards an opposite side, down to angles of half a degree."""
+    mesh, pattern = setup.coarse, weights(setup.coarse, AXIAL)
+    whole, s = setup.loaded(mesh)
+    answer = _displacement(whole.linear(s), pattern)
+    inside = np.setdiff1d(np.arange(len(mesh.points)), mesh.edges[mesh.on_outline])
+    away = np.linalg.norm(mesh.points[inside] - mesh.points.mean(axis=0), axis=1)
+    moved = inside[np.argmax(away <= away.min() + 1e-9 * away.max())]  # of equal ones the first, not rounding's choice
+    triangle = mesh.triangles[(mesh.triangles == moved).any(axis=1)][0]
+    first, second = (mesh.points[corner] for corner in triangle if corner != moved)
+    middle, side = 0.5 * (first + second), np.linalg.norm(second - first)
+    away = mesh.points[moved] - middle
+    found = _Equilibria("sliver", ("sliver_angle",), "step_limit", "error")
+    for place, angle in enumerate(AXES["sliver_angle"]):
+        points = mesh.points.copy()
+        points[moved] = middle + away / np.linalg.norm(away) * 0.5 * side * np.tan(np.radians(angle))
+        drawn = Mesh(points, mesh.triangles)
+        assert np.degrees(corner_angles(points, drawn.triangles).min()) <= angle * (1 + 1e-9)
+        with found.judged(place) as judge:
+            problem, s = setup.loaded(drawn)
+            found["step_limit"][place] = setup.motion(drawn).step_limit("central-difference")
+            if solution := judge(problem, s, problem.linear(s)):
+                found["error"][place] = _displacement(solution, pattern) / answer - 1
+    return found.by_name()
+
+
+MOST_LOST = 1e-2
+"""Largest share of the digits that rounding may take from a factor: beyond, another solver or processor may leave none,
+neither of the estimate. The condition of a sheet's network is about its number of particles times the contrast."""
+
+
+def contrast(setup):
+    """Error of the linear solution where every other part of the beam is stiffer, against extended precision."""
+    whole, reference = setup.problem(setup.coarse)
+    network, s = whole.network, setup.force / reference
+    middle = setup.coarse.points[setup.coarse.edges].mean(axis=1)[:, 0]
+    soft = (middle / setup.beam.height + 1e-9) // 1 % 2 == 0  # what lies between two parts is the right one's
+    sure = MOST_LOST / (np.finfo(float).eps * len(setup.coarse.points))
+    base = network.stiffness if network.stiffness.any() else 0.5 * setup.coarse.cells_per_edge
+    found = _Equilibria("contrast", ("stiffness_contrast",), "error", "estimate")
+    for place, ratio in enumerate(AXES["stiffness_contrast"]):
+        stiffer = Springs(reference, base * np.where(soft, 1.0, ratio))
+        problem = setup.sheet(setup.coarse).problem(AXIAL, stiffer)
+        solution = problem.linear(s)
+        with found.judged(place) as judge:
+            judge(problem, s, solution)
+        if ratio > sure:  # the same status and message on every processor
+            why = f"ill-conditioned: rounding may leave no digit beyond a contrast of {sure:.0e}"
+            found.note(place, Status.NOT_CONVERGED, why)
+        exact = _refined(problem, s, solution.displacements)
+        found["error"][place] = np.abs(solution.displacements - exact).max() / np.abs(exact).max()
+        found["estimate"][place] = solution.error_estimate
+    return found.by_name()
+
+
+def _refined(problem, s, displacements):
+    """Linear solution by iterative refinement, residuals spring by spring in extended precision.
+
+    The assembled matrix would not do: its entries are rounded, and if ill-conditioned it is another network's.
+    """
+    network = problem.network
+    normals = network.rest_vectors.astype(np.longdouble)
+    normals /= np.sqrt((normals**2).sum(axis=1))[:, None]
+    moved, load = displacements.astype(np.longdouble), np.zeros(network.held.shape, np.longdouble)
+    load[~network.held] = s * problem.load
+    for _ in range(12):
+        missing = load.copy()
+        pulls = (network.stiffness * (normals * network.stretch(moved)).sum(axis=1))[:, None] * normals
+        np.add.at(missing, network.first, pulls)
+        np.subtract.at(missing, network.second, pulls)
+        moved = moved + network.expand(problem.rest_factor.solve(network.reduce(missing).astype(float)))
+    return moved
+
+
+def poisson(setup):
+    """Young's modulus and step limit up to an incompressible material."""
+    test, given = PatchTest(setup.coarse), setup.material
+    found = _Equilibria("poisson", ("stressed_poisson_ratio",), "modulus_error", "step_limit")
+    for place, ratio in enumerate(AXES["stressed_poisson_ratio"]):
+        # Of the modulus and density alone: rubber of a test has no other ratio than its own.
+        one = replace(setup, material=Material(given.young_modulus, ratio, given.density, given.name))
+        with found.judged(place) as judge:
+            problem, s = one.loaded(one.coarse)
+            found["step_limit"][place] = one.motion(one.coarse).step_limit("central-difference")
+            springs, membrane = one.springs(one.coarse), one.material.young_modulus * one.beam.thickness
+            found["modulus_error"][place] = test.axial(springs)[0] * springs.reference / membrane - 1
+            judge(problem, s, problem.linear(s))
+    return found.by_name()
+
+
+def sizes(setup):
+    """The same beam from micrometres to centimetres of mesh size, in double and single precision."""
+    limits, errors = _blank("scale"), _blank("scale", "precision")
+    for i, size in enumerate(AXES["scale"]):
+        ratio = size / setup.mesh_sizes[-1]
+        sides = {name: getattr(setup.beam, name) * ratio for name in ("length", "height", "thickness")}
+        beam = replace(setup.beam, **sides)
+        one = replace(setup, beam=beam, force=setup.force * ratio**2, mesh_sizes=(size,))
+        motion = one.motion(one.coarse, linear=False)
+        motion = changed(motion, mass_damping=motion.loaded_frequency)
+        static = one.problem(one.coarse)[0].nonlinear(motion.load.sum())
+        limits[i] = motion.step_limit("central-difference") / size
+        for j, kind in enumerate(AXES["precision"]):
+            found = motion.run("central-difference", 0.9 * limits[i] * size, 60_000, precision=kind)
+            wrong = np.abs(found.displacements - static.displacements).max()
+            errors[i, j] = wrong / np.abs(static.displacements).max()
+    return {"scaled_step_limit": limits, "precision_error": errors}
+
+
+# -- equilibria --------------------------------------------------------------------------------------------------------
+
+
+def strains(setup):
+    """Nonlinear equilibria under loads that would strain a linear beam by up to 300 %."""
+    mesh, membrane = setup.coarse, setup.material.young_modulus * setup.beam.thickness
+    found = _Equilibria("strain", ("strain_load", "strain"), "displacement", "load_share")
+    for i, load in enumerate(AXES["strain_load"]):
+        kind, side = (AXIAL, setup.beam.height) if load == "axial" else (FACE, setup.beam.length)
+        pattern = weights(mesh, kind)
+        for j, strain in enumerate(AXES["strain"]):
+            with found.judged((i, j)) as judge:
+                problem, reference = setup.problem(mesh, kind, load != "axial")
+                s = strain * membrane * side / reference
+                solution = problem.nonlinear(s)
+                found["load_share"][i, j] = solution.load_share
+                if judge(problem, s, solution):
+                    found["displacement"][i, j] = _displacement(solution, pattern)
+    return {"negative_pivots": found.values.pop("negative_pivots")} | found.by_name()
+
+
+def perturbation(setup):
+    """Answers of meshes whose inner particles are moved at random, and Newton's method from inverted starts."""
+    mesh, size = setup.coarse, setup.mesh_sizes[-1]
+    pattern = weights(mesh, AXIAL)
+    random = np.random.default_rng(0).uniform(-1, 1, mesh.points.shape)
+    random[np.unique(mesh.edges[mesh.on_outline])] = 0.0
+    unmoved, load = setup.loaded(mesh)
+    whole = unmoved.nonlinear(load)
+    answer = _displacement(whole, pattern) if whole.converged else np.nan
+    found = _Equilibria("perturbed", ("perturbation",), "error", "step_limit")
+    for place, share in enumerate(AXES["perturbation"]):
+        points = mesh.points + share * size * random
+        with found.judged(place) as judge:
+            if mesh.inverted(points):
+                raise DefinitionError("triangles of the mesh are inverted; move its particles less")
+            moved = Mesh(points, mesh.triangles)
+            problem, s = setup.loaded(moved)
+            found["step_limit"][place] = setup.motion(moved).step_limit("central-difference")
+            if solution := judge(problem, s, problem.nonlinear(s)):
+                found["error"][place] = _displacement(solution, pattern) / answer - 1
+    right, wrong, trials = 0, 0, 20
+    for seed in range(trials):
+        start = _noise(setup.motion(mesh), size, seed)  # an edge's length: half of the triangles are inverted
+        end = unmoved.newton(load, start, 40)
+        near = end.converged and np.abs(end.displacements - whole.displacements).max() <= 1e-6 * abs(answer)
+        right += near
+        wrong += end.converged and not near and unmoved.judge(load, end)[0] is Status.SOLVED
+    return found.by_name() | {"inverted_starts_right": right / trials, "inverted_starts_wrong": wrong / trials}
+
+
+def buckling(setup):
+    """Buckling load of a slender column, ten and twenty rows high, over Euler's; the path of a shallow arch."""
+    height = 0.05 * setup.beam.length
+    euler = np.pi**2 * setup.material.young_modulus * setup.beam.thickness * height**3 / 12
+    euler /= 4 * setup.beam.length**2
+    loads, messages = _blank("rows"), np.full(len(AXES["rows"]), "", dtype=object)
+    for i, rows in enumerate(AXES["rows"]):
+        mesh = MESH_TYPES[setup.mesh_type](setup.beam.length, height, height / rows)
+        try:
+            problem, reference = setup.problem(mesh)
+            load, messages[i] = critical_load(problem, -euler / reference)
+            loads[i] = -load * reference
+        except (DefinitionError, SingularError) as error:
+            messages[i] = str(error)
+    path, deflection, reference = _arch(setup)
+    found = {name: _blank("arch_point") for name in ("arch_load", "arch_deflection", "arch_negative_pivots")}
+    if path is not None:
+        size = min(len(AXES["arch_point"]), len(path.loads))
+        found["arch_load"][:size] = -path.loads[:size] * reference
+        found["arch_deflection"][:size] = -deflection[:size]
+        found["arch_negative_pivots"][:size] = path.negative_pivots[:size]
+    return {"buckling_load": loads, "buckling_message": messages, "euler_load": euler} | found
+
+
+def _arch(setup):
+    """Path of a shallow arch, clamped at both ends and pushed down in its middle: it snaps."""
+    length, height = setup.beam.length, 0.01 * setup.beam.length
+    flat = MESH_TYPES[setup.mesh_type](length, height, 0.4 * height)
+    rise = 0.04 * length
+    points = flat.points.copy()
+    points[:, 1] += rise * np.sin(np.pi * points[:, 0] / length)
+    mesh = Mesh(points, flat.triangles, flat.quads)
+    directions = np.zeros(points.shape, dtype=bool)
+    for end in (0.0, flat.points[:, 0].max()):
+        directions[np.abs(flat.points[:, 0] - end) <= 1e-9 * length] = True
+    away = np.hypot(flat.points[:, 0] - 0.5 * length, flat.points[:, 1] - height)
+    middle = np.argmax(away <= away.min() + 1e-9 * length)  # of equal ones the first, not rounding's choice
+    pattern = np.zeros(points.shape)
+    pattern[middle, 1] = 1.0
+    try:
+        springs = setup.springs(mesh)
+    except DefinitionError:
+        return None, None, np.nan
+    network = setup.sheet(mesh).network(directions, springs)
+    inertia = setup.material.young_modulus * setup.beam.thickness * height**3
+    s = -40 * inertia * rise / length**3 / springs.reference
+    problem = StaticProblem(network, pattern)
+    increment = 0.05 * rise * np.sqrt(network.unknowns)
+    path = follow(problem, 10 * s, increment=increment, most_points=200, limit=1.8 * rise * np.sqrt(network.unknowns))
+    return path, path.displacements[:, middle, 1], springs.reference
+
+
+RUN = {
+    one.__name__: one
+    for one in (limits, maps, drift, rest, slivers, contrast, poisson, sizes, strains, perturbation, buckling)
+}
+"""Experiments by name, see `EXPERIMENTS`."""

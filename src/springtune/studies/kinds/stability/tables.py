@@ -1,5 +1,6 @@
 """The page of the experiments on stability: tables and rules of thumb, every number from the dataset."""
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ from springtune.safe_io.atomic import write_text
 from springtune.safe_io.escapes import markdown
 
 from ...output.dataset import STATUS
+from ...output.selection import cells, labels_of
 from ...output.text import markdown_table
 from .outputs import PAGE
 
@@ -39,183 +41,167 @@ def page(tree: xr.DataTree) -> str:
     return "\n".join(parts + _scenes(tree.to_dataset()))
 
 
-def _definitions(data, name):
-    there = data[name].notnull().any([dimension for dimension in data[name].dims if dimension != "definition"])
-    return [str(label) for label in data.definition.values[there.values]]
+def _section(title, *said):
+    return [f"### {title}", "", *(line for text in said for line in (text, ""))]
 
 
-def _number(value, digits=3):
-    return "" if np.isnan(float(value)) else f"{float(value):.{digits}g}".replace("-", "−")
+def _number(value, form=".3g", scale=1.0):
+    return "" if np.isnan(float(value)) else f"{scale * float(value):{form}}".replace("-", "−")
+
+
+def _by_definition(data, variable, heads, texts):
+    """Table of a row a definition that has values of a variable; `texts` are those of its part of the dataset."""
+    names = labels_of(data[variable].notnull(), "definition")
+    rows = [[f"`{name}`", *texts(data.sel(definition=name))] for name in names]
+    return markdown_table(["definition", *heads], rows)
 
 
 def _limits(data):
     ratio = (data.dt_limit_measured / data.dt_limit_predicted).values
-    worst = 100 * np.nanmax(np.abs(ratio - 1))
-    lines = [
-        "### Largest step", "",
-        f"Over {int(np.isfinite(ratio).sum())} cases (explicit schemes, dampings, definitions, sizes) the measured "
-        f"limit is within {worst:.2f} % of the predicted one.", "",
-    ]  # fmt: skip
-    rows = []
-    for name in _definitions(data, "omega_max"):
-        for size in data.mesh_size.values[np.isfinite(data.omega_max.sel(definition=name).values)]:
-            cell = data.sel(definition=name, mesh_size=size)
-            undamped = cell.sel(integrator="central-difference", damper="mass", damping_ratio=0.0).dt_limit_predicted
-            lagged = [
-                cell.sel(integrator="central-difference-lagged", damper="mass", damping_ratio=ratio).dt_limit_predicted
-                for ratio in data.damping_ratio.values[1:]
+    worst, damped, rows = 100 * np.nanmax(np.abs(ratio - 1)), data.damping_ratio.values[1:], []
+    for place in cells(np.isfinite(data.omega_max), ("definition", "mesh_size")):
+        cell = data.sel(place).sel(damper="mass")
+        undamped = cell.sel(integrator="central-difference", damping_ratio=0.0).dt_limit_predicted
+        lagged = cell.sel(integrator="central-difference-lagged", damping_ratio=damped).dt_limit_predicted
+        rows.append(
+            [
+                f"`{place['definition']}`",
+                f"{1e3 * place['mesh_size']:g}",
+                _number(undamped, scale=1e9),
+                _number(cell.dt_particle_bound, scale=1e9),
+                *map(_number, lagged.values / float(undamped)),
             ]
-            rows.append(
-                [f"`{name}`", f"{1e3 * size:g}", _number(1e9 * undamped), _number(1e9 * cell.dt_particle_bound)]
-                + [_number(one / undamped) for one in lagged]
-            )
+        )
     heads = ["definition", "mesh [mm]", "2/ω_max [ns]", "bound from particles [ns]"]
-    heads += [f"damping {ratio:g} that lags: times" for ratio in data.damping_ratio.values[1:]]
-    return lines + markdown_table(heads, rows)
+    heads += [f"damping {ratio:g} that lags: times" for ratio in damped]
+    said = (
+        f"Over {int(np.isfinite(ratio).sum())} cases (explicit schemes, dampings, definitions, sizes) the measured "
+        f"limit is within {worst:.2f} % of the predicted one."
+    )
+    return _section("Largest step", said) + markdown_table(heads, rows)
 
 
 def _drift(data):
+    kinds = ("energy_drift", "energy_swing", "momentum_drift")
     rows = [
-        [f"`{name}`", *(_number(data[kind].sel(integrator=name), 2)
-                        for kind in ("energy_drift", "energy_swing", "momentum_drift"))]
+        [f"`{name}`", *(_number(data[kind].sel(integrator=name), ".2g") for kind in kinds)]
         for name in data.integrator.values
-    ]  # fmt: skip
-    return ["### Energy and momentum, no damping, half of the limit", ""] + markdown_table(
-        ["integrator", "drift of energy", "swing of energy", "drift of momentum"], rows
-    )
+    ]
+    heads = ["integrator", "drift of energy", "swing of energy", "drift of momentum"]
+    return _section("Energy and momentum, no damping, half of the limit") + markdown_table(heads, rows)
 
 
 def _rest(data):
-    best = float(data.critical_ratio.values[int(np.nanargmin(data.steps_to_rest.values))])
-    slowest = [float(data.steps_to_rest.values[i]) for i in (0, -1)]
-    lines = [
-        "### To rest", "",
-        f"Quickest at {best:g} of the critical damping, {np.nanmin(data.steps_to_rest.values):.0f} steps; "
-        f"{slowest[0]:.0f} at {data.critical_ratio.values[0]:g}, {slowest[1]:.0f} at "
-        f"{data.critical_ratio.values[-1]:g}.",
-        "", "Distance of backward Euler from the static solution, by iterations of its linear solver:", "",
-    ]  # fmt: skip
+    ratios, steps = data.critical_ratio.values, data.steps_to_rest.values
+    said = (
+        f"Quickest at {ratios[int(np.nanargmin(steps))]:g} of the critical damping, {np.nanmin(steps):.0f} steps; "
+        f"{steps[0]:.0f} at {ratios[0]:g}, {steps[-1]:.0f} at {ratios[-1]:g}."
+    )
     rows = []
-    for size in data.mesh_size.values[data.truncated_error.notnull().any(["cg_iterations", "implicit_steps"]).values]:
+    for size in labels_of(data.truncated_error.notnull(), "mesh_size"):
         for count in data.cg_iterations.values:
-            cells = data.truncated_error.sel(mesh_size=size, cg_iterations=count)
-            rows.append(
-                [f"{1e3 * size:g} mm", str(count) if count else "direct", *(_number(x, 2) for x in cells.values)]
-            )
-    return lines + markdown_table(["mesh", "iterations", *(f"{n} steps" for n in data.implicit_steps.values)], rows)
+            errors = data.truncated_error.sel(mesh_size=size, cg_iterations=count).values
+            solver = str(count) if count else "direct"
+            rows.append([f"{1e3 * size:g} mm", solver, *(_number(error, ".2g") for error in errors)])
+    heads = ["mesh", "iterations", *(f"{n} steps" for n in data.implicit_steps.values)]
+    distances = "Distance of backward Euler from the static solution, by iterations of its linear solver:"
+    return _section("To rest", said, distances) + markdown_table(heads, rows)
 
 
 def _contrast(data):
-    rows = [
-        [f"{contrast:.0e}", STATUS[int(data.contrast_status.sel(stiffness_contrast=contrast))],
-         _number(data.contrast_error.sel(stiffness_contrast=contrast), 2),
-         _number(data.contrast_estimate.sel(stiffness_contrast=contrast), 2)]
-        for contrast in data.stiffness_contrast.values
-    ]  # fmt: skip
-    return ["### Stiff parts beside soft ones", ""] + markdown_table(["contrast", "status", "error", "estimated"], rows)
+    rows = []
+    for contrast in data.stiffness_contrast.values:
+        cell = data.sel(stiffness_contrast=contrast)
+        errors = (_number(one, ".2g") for one in (cell.contrast_error, cell.contrast_estimate))
+        rows.append([f"{contrast:.0e}", STATUS[int(cell.contrast_status)], *errors])
+    return _section("Stiff parts beside soft ones") + markdown_table(["contrast", "status", "error", "estimated"], rows)
 
 
 def _poisson(data):
-    ratios = data.stressed_poisson_ratio.values
-    rows = [
-        [f"`{name}`", *(_number(1e9 * data.poisson_step_limit.sel(definition=name, stressed_poisson_ratio=nu))
-                        for nu in ratios)]
-        for name in _definitions(data, "poisson_step_limit")
-    ]  # fmt: skip
-    return ["### Largest step [ns] over Poisson's ratio", ""] + markdown_table(
-        ["definition", *(f"{nu:g}" for nu in ratios)], rows
-    )
+    def texts(cell):
+        return (_number(limit, scale=1e9) for limit in cell.poisson_step_limit.values)
+
+    heads = [f"{nu:g}" for nu in data.stressed_poisson_ratio.values]
+    title = "Largest step [ns] over Poisson's ratio"
+    return _section(title) + _by_definition(data, "poisson_step_limit", heads, texts)
 
 
 def _sizes(data):
-    rows = [
-        [f"{1e3 * scale:g}", _number(data.scaled_step_limit.sel(scale=scale)),
-         *(_number(data.precision_error.sel(scale=scale, precision=kind), 2) for kind in data.precision.values)]
-        for scale in data["scale"].values
-    ]  # fmt: skip
+    rows = []
+    for scale in data["scale"].values:
+        cell = data.sel(scale=scale)
+        errors = (_number(error, ".2g") for error in cell.precision_error.values)
+        rows.append([f"{1e3 * scale:g}", _number(cell.scaled_step_limit), *errors])
     heads = ["mesh [mm]", "step over mesh size [s/m]", *(f"error, {kind}" for kind in data.precision.values)]
-    return ["### Scale and precision", ""] + markdown_table(heads, rows)
+    return _section("Scale and precision") + markdown_table(heads, rows)
 
 
 def _strains(data):
-    lines = [
-        "### Large loads",
-        "",
+    lines = _section(
+        "Large loads",
         "Status, in brackets the negative pivots, or flutter, or the share of the load that is reached: beyond it the "
         "path turns back at a limit point where it is unstable, else Newton's method found nothing.",
-        "",
-    ]
+    )
+    heads = [_number(strain, "g", 100) + " %" for strain in data.strain.values]
+
+    def texts(cell, load):
+        cell = cell.sel(strain_load=load)
+        found = (cell.strain_status, cell.negative_pivots, cell.strain_load_share, cell.strain_message)
+        for flag, pivots, share, message in zip(*(one.values for one in found)):
+            note = " (flutter)" if "flutter" in message.lower() else ""
+            note = f" ({pivots:.0f})" if pivots > 0 else f" ({share:.2f})" if share < 1 else note
+            yield STATUS[int(flag)].replace("_", " ") + note
+
     for load in data.strain_load.values:
-        rows = []
-        for name in _definitions(data, "strain_load_share"):
-            cells = data.sel(definition=name, strain_load=load)
-            texts = []
-            for flag, pivots, share, message in zip(cells.strain_status.values, cells.negative_pivots.values,
-                                                    cells.strain_load_share.values,
-                                                    cells.strain_message.values):  # fmt: skip
-                note = " (flutter)" if "flutter" in message.lower() else ""
-                note = f" ({pivots:.0f})" if pivots > 0 else f" ({share:.2f})" if share < 1 else note
-                texts.append(STATUS[int(flag)].replace("_", " ") + note)
-            rows.append([f"`{name}`", *texts])
-        heads = [f"{100 * strain:g} %".replace("-", "−") for strain in data.strain.values]
-        lines += [f"{load}:", "", *markdown_table(["definition", *heads], rows), ""]
+        of_load = partial(texts, load=load)
+        lines += [f"{load}:", "", *_by_definition(data, "strain_load_share", heads, of_load), ""]
     return lines[:-1]
 
 
 def _perturbation(data):
-    shares = data.perturbation.values
-    rows = [
-        [f"`{name}`", *(f"{100 * float(value):+.2f} %".replace("-", "−") if np.isfinite(value) else "hole"
-                        for value in data.perturbed_error.sel(definition=name).values),
-         f"{100 * float(data.inverted_starts_right.sel(definition=name)):.0f} %",
-         f"{100 * float(data.inverted_starts_wrong.sel(definition=name)):.0f} %"]
-        for name in _definitions(data, "inverted_starts_right")
-    ]  # fmt: skip
-    heads = ["definition", *(f"{share:g} a" for share in shares), "inverted starts: right", "wrong"]
-    return [
-        "### Displacement with particles moved at random, and Newton's method from inverted starts",
-        "",
-    ] + markdown_table(heads, rows)
+    heads = [*(f"{share:g} a" for share in data.perturbation.values), "inverted starts: right", "wrong"]
+
+    def texts(cell):
+        yield from (_number(error, "+.2f", 100) + " %" if np.isfinite(error) else "hole" for error in
+                    cell.perturbed_error.values)  # fmt: skip
+        yield from (f"{100 * float(cell[f'inverted_starts_{end}']):.0f} %" for end in ("right", "wrong"))
+
+    title = "Displacement with particles moved at random, and Newton's method from inverted starts"
+    return _section(title) + _by_definition(data, "inverted_starts_right", heads, texts)
 
 
 def _slivers(data):
-    angles = data.sliver_angle.values
-    rows = []
-    for name in _definitions(data, "sliver_step_limit"):
-        cells = data.sel(definition=name)
-        limits = cells.sliver_step_limit.values
-        rows.append([f"`{name}`", *(_number(limit / limits[0]) for limit in limits)])
-    return ["### Largest step with a sliver, over that at 30 degrees", ""] + markdown_table(
-        ["definition", *(f"{angle:g}°" for angle in angles)], rows
-    )
+    def texts(cell):
+        return map(_number, cell.sliver_step_limit.values / cell.sliver_step_limit.values[0])
+
+    heads = [f"{angle:g}°" for angle in data.sliver_angle.values]
+    title = "Largest step with a sliver, over that at 30 degrees"
+    return _section(title) + _by_definition(data, "sliver_step_limit", heads, texts)
 
 
 def _buckling(data):
-    ratio = 100 * (data.buckling_load / data.euler_load - 1)
-    restricted = (data.buckling_message != "") & ratio.notnull()
-    rows = [
-        [f"`{name}`", *(f"{value:+.1f} %{'*' if mark else ''}".replace("-", "−") for value, mark in zip(*own))]
-        for name in _definitions(data, "buckling_load")
-        for own in [(ratio.sel(definition=name).values, restricted.sel(definition=name).values)]
-    ]
-    heads = ["definition", *(f"{count} rows" for count in data.rows.values)]
-    why = dict.fromkeys(str(one) for one in data.buckling_message.values[restricted.values])
+    data = data.assign(ratio=data.buckling_load / data.euler_load - 1)
+    data = data.assign(restricted=(data.buckling_message != "") & data.ratio.notnull())
+
+    def texts(cell):
+        marks = np.where(cell.restricted.values, "*", "")
+        return [_number(ratio, "+.1f", 100) + f" %{mark}" for ratio, mark in zip(cell.ratio.values, marks)]
+
+    heads = [f"{count} rows" for count in data.rows.values]
+    why = dict.fromkeys(str(one) for one in data.buckling_message.values[data.restricted.values])
     notes = ["", *(f"\\* {markdown(one)}" for one in why)] if why else []
-    return ["### Buckling load of a slender column over Euler's", "", *markdown_table(heads, rows), *notes]
+    title = "Buckling load of a slender column over Euler's"
+    return _section(title) + _by_definition(data, "buckling_load", heads, texts) + notes
 
 
 def _scenes(root):
     """Static scenes of the study that are not solved, and why; and how many are."""
-    flags = root.status.values
-    rows = []
-    for place in np.argwhere(flags > 1):
-        labels = {name: root[name].values[i] for name, i in zip(root.status.dims, place)}
-        cell = root.sel(labels)
-        labels["mesh_size"] = f"{1e3 * labels['mesh_size']:g} mm"
-        rows.append([", ".join(map(str, labels.values())), STATUS[int(cell.status)], markdown(cell.message.item())])
-    solved = f"{int((flags == 1).sum())} of {int((flags != 0).sum())} scenes are solved; the others:"
-    return (
-        ["### Scenes of the study", "", solved, "", *markdown_table(["scene", "status", "message"], rows), ""]
-        if rows
-        else []
-    )
+    flags, rows = root.status.values, []
+    for place in cells(root.status > 1, root.status.dims):
+        cell, size = root.sel(place), {"mesh_size": f"{1e3 * place['mesh_size']:g} mm"}
+        words = ", ".join(map(str, (place | size).values()))
+        rows.append([words, STATUS[int(cell.status)], markdown(cell.message.item())])
+    if not rows:
+        return []
+    said = f"{int((flags == 1).sum())} of {int((flags != 0).sum())} scenes are solved; the others:"
+    return [*_section("Scenes of the study", said), *markdown_table(["scene", "status", "message"], rows), ""]
