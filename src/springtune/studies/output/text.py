@@ -121,10 +121,10 @@ def markdown_section(title: str, *said: str) -> list[str]:
     return [f"### {title}", "", *(line for text in said for line in (text, ""))]
 
 
-def markdown_table(heads: list[str], rows: Iterable[list[str]]) -> list[str]:
-    """Markdown lines: first column left, others right."""
-    lines = [heads, ["---", *["---:"] * (len(heads) - 1)], *rows]
-    return [f"| {' | '.join(line)} |" for line in lines]
+def markdown_table(heads: list[str], rows: Iterable[list[str]], left: int = 1) -> list[str]:
+    """Markdown lines: the first columns left, others right."""
+    rule = ["---"] * left + ["---:"] * (len(heads) - left)
+    return [f"| {' | '.join(line)} |" for line in (heads, rule, *rows)]
 
 
 def decimals(values: Iterable[float], digits: int = 4, most: int = 8) -> int | None:

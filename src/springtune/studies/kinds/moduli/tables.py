@@ -11,6 +11,7 @@ from springtune.safe_io.atomic import write_text
 
 from ...output.dataset import STATUS, most_requested
 from ...output.selection import unswept
+from ...output.text import markdown_section, markdown_table
 from ..scenes.variables import SCENE
 from .outputs import TABLES
 
@@ -94,15 +95,14 @@ def _advice(root, materials):
                 situation = ""
     if not rows:
         return []
-    lines = [f"| what you have | usual choice | mesh type | a/H | meshes | {' | '.join(heads)} |"]
-    lines.append("|---|---|---|---|---:|" + "---:|" * len(heads))
-    lines += [f"| {' | '.join(row)} |" for row in rows]
+    heads = ["what you have", "usual choice", "mesh type", "a/H", "meshes", *heads]
+    lines = markdown_table(heads, rows, 4)
     meshes = "; ".join(
         ", ".join(f"{root.beam.values[i]} at {1e3 * root.mesh_size.values[j]:g} mm" for i, j in np.argwhere(group))
         for group in seen if group.any()
     )  # fmt: skip
     said = "Each line is the range over all meshes of the study up to its a/H and beyond that of the line before"
-    return ["### In short", "", *lines, "", f"{said}: {meshes}.", ""]
+    return [*markdown_section("In short"), *lines, "", f"{said}: {meshes}.", ""]
 
 
 def _range(errors, flags):
@@ -174,7 +174,7 @@ def _attained(root, moduli, mesh_type, beam, materials):
         seconds = float(scene.definition_seconds.max())
         cells.append(f"{1e3 * seconds:.0f} ms" if seconds >= 5e-4 else "< 1 ms")
         mark = "" if size == fine else f" ({1e3 * size:g} mm)"
-        rows.append(f"| `{name}`{mark} | {' | '.join(cells)} |")
+        rows.append([f"`{name}`{mark}", *cells])
     if not rows:
         return []
     sides = [moduli.attrs[f"patch_{part}"] for part in ("length", "height")]
@@ -182,8 +182,8 @@ def _attained(root, moduli, mesh_type, beam, materials):
     extent = " x ".join(f"{1e3 * side:g}" for side in sides) + " mm"
     of = f"beam of {extent}" if same else f"beam {beam}; moduli are of the meshes of a {extent} sheet"
     note = f"All at {1e3 * fine:g} mm (a/H = {fine / height:.3g}), but where a row says otherwise; {of}."
-    head = [f"| definition | {' | '.join(heads)} | cost |", "|---|" + "---:|" * (len(heads) + 1)]
-    return [f"### Mesh type `{mesh_type}`", "", note, "", *head, *rows, ""]
+    table = markdown_table(["definition", *heads, "cost"], rows)
+    return [*markdown_section(f"Mesh type `{mesh_type}`", note), *table, ""]
 
 
 def _paper_cells(root):
@@ -193,12 +193,7 @@ def _paper_cells(root):
     if not {name for pair in pairs for name in pair} <= known:
         return []
     errors = [root.deformation_error.sel(material=material, load=load) for material, load in pairs]
-    lines = [
-        "### The paper's cells",
-        "",
-        "| definition | mesh type | steel, median | largest | rubber, median | largest |",
-    ]
-    lines.append("|---|---|---:|---:|---:|---:|")
+    rows, heads = [], ["definition", "mesh type", "steel, median", "largest", "rubber, median", "largest"]
     for name in root.definition.values:
         for mesh_type in root.mesh_type.values:
             found = [error.sel(definition=name, mesh_type=mesh_type).values.ravel() for error in errors]
@@ -207,8 +202,8 @@ def _paper_cells(root):
                 for values in (np.concatenate(found[:2]), found[2]):
                     values = 100 * np.abs(values[np.isfinite(values)])
                     texts += [f"{np.median(values):.2f} %", f"{values.max():.2f} %"]
-                lines.append(f"| `{name}` | {mesh_type} | {' | '.join(texts)} |")
-    return [*lines, ""]
+                rows.append([f"`{name}`", mesh_type, *texts])
+    return [*markdown_section("The paper's cells"), *markdown_table(heads, rows, 2), ""]
 
 
 def _signed(value):
