@@ -402,7 +402,7 @@ class TestPredictAMesh:
         assert heads.split()[-7:] == ["traction", "bending", "shear", "static", "solve", "largest", "step"]
         assert f"Solved: {len(search.tried)} meshes of " in result.stdout
         assert "every finer mesh of its type" in result.stdout and "linear kinematics" in result.stdout
-        assert "None: extrapolated, a definition is given up where its error, by its change" in result.stdout
+        assert "None: a definition is given up if its error, extrapolated by its change" in result.stdout
 
     def test_none_is_said(self):
         result = run("predict", *self.NONE, "--springs-alone")

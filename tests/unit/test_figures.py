@@ -380,7 +380,7 @@ def test_both_formats_show_the_same_and_are_the_same_again():
 def test_an_edit_of_one_kinds_figures_redraws_no_other_kind():
     def drawers(output):
         files = {*modules("studies.output.present"), *modules(output.module)}
-        return {Path(path).parent.name for path in files if Path(path).name in ("figures.py", "sweeps.py")}
+        return {Path(path).parent.name for path in files if Path(path).name in ("figures.py", "errors.py")}
 
     kinds = {output.name: drawers(output) for output in outputs().values() if output.plot}
     assert kinds["sensitivity"] == kinds["block"] == {"scenes"} and kinds["definitions"] == {"moduli"}

@@ -423,13 +423,23 @@ RESULTS_FOLDER, CONFIG_FOLDER = Path("results"), Path("config")
 DATASET = "dataset.nc"
 
 
-def studies(given: Path | None) -> "Iterator[tuple[Study, Path]]":
-    """Studies and the folders of their results."""
+def loaded(path: Path, consequence: str = "") -> "Study":
+    """Load a study; its mistakes end the command with exit code 1."""
+    from ..studies.config.messages import StudyError
     from ..studies.kinds import load_study
+
+    try:
+        return load_study(path)
+    except StudyError as error:
+        raise click.ClickException(f"{error}{consequence}") from None
+
+
+def studies(given: Path | None, consequence: str = "") -> "Iterator[tuple[Study, Path]]":
+    """Studies and the folders of their results."""
     from ..studies.runs.locks import LockedError, check_claim, claimed
 
     if given is not None and not given.is_dir():
-        study = load_study(given)
+        study = loaded(given, consequence)
         folder = RESULTS_FOLDER / study.name
         if not folder.is_dir():
             raise click.ClickException(f"{folder}: there is no such folder; run the study, or go to where it was run")
@@ -445,7 +455,7 @@ def studies(given: Path | None) -> "Iterator[tuple[Study, Path]]":
     for folder in folders:
         config = claimed(folder) or folder.parent.parent / CONFIG_FOLDER / f"{folder.name}.yaml"
         if config.is_file():
-            yield load_study(config), folder
+            yield loaded(config, consequence), folder
         elif given:
             raise click.ClickException(f"{folder}: there is no {config}; give the study's YAML file instead")
         else:

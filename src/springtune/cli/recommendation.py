@@ -157,20 +157,18 @@ def search_text(subject: Subject, search: "MeshSearch", springs_alone: bool = Fa
 
     where, steps = "in" if subject.load else "under", subject.dense
     wanted = f"{100 * search.error:.6g} %"
-    answers = [("with springs alone", search.best_springs)]
-    tables = [("with springs alone", search.springs_by_type, True)]
-    if not springs_alone:
-        answers.insert(0, ("recommended", search.best))
-        tables.insert(0, ("with any definition", search.by_type, False))
     lines = [
         f"{subject.name}; {subject.made_of}; an error of at most {wanted} {where} {_listed(search.loads)}",
         "",
-        *(f"{what}: {_answer(one)}" for what, one in answers),
+        *([] if springs_alone else [f"recommended: {_answer(search.best)}"]),
+        f"with springs alone: {_answer(search.best_springs)}",
     ]
     heads = ["mesh", "size", "definition", "cells", "particles", "springs", *search.loads, "static solve"]
     heads += ["largest step"] if steps else []
     right = (3, *range(5, 9 + len(search.loads) + steps))
     notes = []
+    tables = [] if springs_alone else [("with any definition", search.by_type, False)]
+    tables.append(("with springs alone", search.springs_by_type, True))
     for what, found, alone in tables:
         rows = [heads]
         for name, one in sorted(found.items(), key=lambda item: _order(item[1])):
@@ -183,30 +181,28 @@ def search_text(subject: Subject, search: "MeshSearch", springs_alone: bool = Fa
             rows[-1] += [*errors, f"{1e3 * one.seconds:.3g} ms", *([f"{one.step_limit:.3g} s"] if steps else [])]
         if rows[1:]:
             lines += ["", f"{what}:", aligned(rows, left=2, right=right)]
-    if any(one is None for _, found, _ in tables for one in found.values()):
-        notes.insert(
-            0,
-            "None: extrapolated, a definition is given up where its error, by its change over the last doubling, "
-            f"would be too large at {search.most:,} particles, too.",
-        )
-    unsure = any(one and not one.confirmed for _, found, _ in tables for one in found.values())
-    if unsure:
-        notes.insert(
-            0, f"* kept on all finer meshes tried, up to {search.most:,} particles, but these are too few to be sure"
-        )
+    answers = [one for _, found, _ in tables for one in found.values()]
+    explained = []
+    if any(one and not one.confirmed for one in answers):
+        few = f"up to {search.most:,} particles these are too few to be sure"
+        explained.append(f"* kept on all finer meshes tried, but {few}.")
+    if None in answers:
+        change = "extrapolated by its change over the last doubling"
+        explained.append(f"None: a definition is given up if its error, {change},")
+        explained.append(f"is too large at {search.most:,} particles, too.")
     counts = [one.particles for one in search.tried]
     lines += [
         "",
         f"Solved: {len(search.tried)} meshes of {min(counts, default=0):,} to {max(counts, default=0):,} particles.",
-        f"A mesh is taken with a definition that keeps {wanted} on it and on every finer mesh of its type that it was",
-        "tried on, up to one with twice as many cells across, sizes between whole divisions included, and would if its",
-        "errors changed once more by as much as over the last doubling. Meshes are ranked by their particles.",
+        f"A mesh counts if its error and that of all finer meshes tried, up to twice as fine, stay below {wanted},",
+        "with a margin: the last change may happen once more. Sizes between whole divisions are tried, too.",
+        "Meshes are ranked by their particles.",
         f"{subject.meaning}, solved on each mesh,",
         f"{KINEMATICS_TEXT} (error estimate {subject.estimate}).",
         "Static solve: of one load with its network assembled and factorized, measured here once.",
     ]
     lines += ["Largest step: of undamped explicit integrators, about rest, held nowhere."] if steps else []
-    return "\n".join([*lines, *notes])
+    return "\n".join([*lines, *explained, *notes])
 
 
 def prediction_json(
@@ -237,18 +233,13 @@ def search_json(subject: Subject, search: "MeshSearch", springs_alone: bool = Fa
         kept = {"finer_sizes": [finer.size for finer in one.finer]}
         return own | kept | {"seconds": one.seconds, "step_limit": one.step_limit, "choice": _choice_json(one.choice)}
 
-    alone = {
-        "recommended_springs_alone": one_json(search.best_springs),
-        "springs_by_type": {name: one_json(one) for name, one in search.springs_by_type.items()},
-    }
-    of_any = {
-        "recommended": one_json(search.best),
-        "by_type": {name: one_json(one) for name, one in search.by_type.items()},
-    }
-    asked = {"error": search.error, "most": search.most}
-    tried = {"tried": [asdict(one) for one in search.tried]}
-    head = {"springtune": __version__} | subject.about
-    return _json(head | asked | ({} if springs_alone else of_any) | alone | tried)
+    found = {"springtune": __version__} | subject.about | {"error": search.error, "most": search.most}
+    if not springs_alone:
+        found["recommended"] = one_json(search.best)
+        found["by_type"] = {name: one_json(one) for name, one in search.by_type.items()}
+    found["recommended_springs_alone"] = one_json(search.best_springs)
+    found["springs_by_type"] = {name: one_json(one) for name, one in search.springs_by_type.items()}
+    return _json(found | {"tried": [asdict(one) for one in search.tried]})
 
 
 def recommended(choices: "Sequence[Choice]") -> tuple[str | None, str | None]:

@@ -231,14 +231,10 @@ def clean(study: Path | None, remove: bool) -> None:
     were taken out, their meshes and stored results, files of jobs that are no more, and what a run that was stopped
     left unfinished. Results that an edit of the code made stale are among them.
     """
-    from ..studies.config.messages import StudyError
     from ..studies.runs.orphans import orphans
 
-    try:
-        chosen = list(studies(study))
-        found = {folder: orphans(one, folder) for one, folder in chosen}
-    except StudyError as error:
-        raise click.ClickException(f"{error}; nothing is listed or removed") from None
+    chosen = list(studies(study, "; nothing is listed or removed"))
+    found = {folder: orphans(one, folder) for one, folder in chosen}
     for folder in found if remove else ():
         idle(folder)
     total, count = 0, 0
@@ -303,8 +299,6 @@ def verify(
     that has the packages of its lock file and in a new one otherwise; the datasets are compared bit by bit, apart from
     times. That runs what somebody packed: do it with archives whose origin you trust.
     """
-    from ..studies.config.messages import StudyError
-
     if study is not None and study.suffix == ".zip":
         own = {"scenes", "seed", "set_aside"}
         given = [name for name in own if context.get_parameter_source(name) is ParameterSource.COMMANDLINE]
@@ -319,12 +313,7 @@ def verify(
     if reproduce or fresh:
         option = "--reproduce" if reproduce else "--fresh"
         raise click.UsageError(f"{option} is for an archive: springtune archive results/<study> makes one")
-
-    try:
-        faults = sum(_verified(one, folder, scenes, seed, set_aside) for one, folder in studies(study))
-    except StudyError as error:
-        raise click.ClickException(str(error)) from None
-    if faults:
+    if sum(_verified(one, folder, scenes, seed, set_aside) for one, folder in studies(study)):
         raise click.exceptions.Exit(1)
 
 
@@ -436,12 +425,7 @@ def archive(
     same study makes the same file, bit by bit. A study that is not finished, or whose files are not as they were made,
     is refused.
     """
-    from ..studies.config.messages import StudyError
-
-    try:
-        [(found, folder)] = studies(study)
-    except StudyError as error:
-        raise click.ClickException(str(error)) from None
+    [(found, folder)] = studies(study)
     try:
         import rocrate  # noqa: F401
     except ImportError:

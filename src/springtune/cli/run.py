@@ -97,9 +97,8 @@ def run(
         click.echo(f"results go to {folder / 'results' / study.name}", err=True)
     path = path.relative_to(folder) if path.is_relative_to(folder) else path
     workflow = [] if folder == checkout else ["--snakefile", str(checkout / "Snakefile")]
-    for option, chosen in (("no_diff", no_diff), ("no_host", no_host)):
-        if chosen:
-            os.environ[f"SPRINGTUNE_{option.upper()}"] = "true"
+    left_empty = {name: True for name, given in (("no_diff", no_diff), ("no_host", no_host)) if given}
+    os.environ |= {f"SPRINGTUNE_{name.upper()}": "true" for name in left_empty}
     # A list of targets would take a path that follows it for one more of them, and so would --configfile. A path that
     # begins with - is not an option behind =.
     command = [*_snakemake(), *workflow, *options, f"--configfile={path}"]
@@ -113,10 +112,10 @@ def run(
         study = study if path == shown else load_study(path)  # its files are seen from here
         studies = [study, *(_read_for_paper(path, study) if "paper" in options else ())]
     if _plans(options):
-        _made_missing(studies, {"no_diff": no_diff, "no_host": no_host}, remove=False)
+        _remove_records(studies, left_empty, remove=False)
     elif _computes(options):
         _unlock(studies, [*_snakemake(), *workflow, "--unlock", f"--configfile={path}"])
-        if _made_missing(studies, {"no_diff": no_diff, "no_host": no_host}) and _asks_for_all(options):
+        if _remove_records(studies, left_empty) and _asks_for_all(options):
             from ..studies.output.summary import reminder
 
             click.echo(f"Nothing to be done: {_results(study)} is complete.\n{reminder(_results(study))}", nl=False)
@@ -193,13 +192,13 @@ def _unlock(studies: "list[Study]", command: list[str]) -> None:
         click.echo(f"{which}: the run before was killed and left its lock; the lock is removed", err=True)
 
 
-def _made_missing(studies: "list[Study]", chosen: dict[str, bool], remove: bool = True) -> bool:
+def _remove_records(studies: "list[Study]", left_empty: dict[str, bool], remove: bool = True) -> bool:
     """Remove the records of outdated jobs, so that Snakemake runs them; return whether there is nothing to do."""
     from ..studies.runs import rerun
 
     done = True
     for study in studies:
-        found = rerun.outdated(study, _results(study), {name: True for name, value in chosen.items() if value})
+        found = rerun.outdated(study, _results(study), left_empty)
         done = done and found == {}
         for record, why in (found or {}).items():
             if rerun.is_damage(why):

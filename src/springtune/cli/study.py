@@ -13,7 +13,7 @@ from ..registry import NAME, NAME_RULE
 from ..safe_io.atomic import write_text
 from ..studies.output.text import aligned
 from . import examples, studies_here
-from .options import CONFIG_FOLDER, WrongCall, allow, max_scenes
+from .options import CONFIG_FOLDER, WrongCall, allow, loaded, max_scenes
 from .run import checkout_here, checkout_of_run, how_to_get_one
 
 if TYPE_CHECKING:
@@ -166,10 +166,9 @@ def split(config: Path, count: int, by: str, out: Path | None, most: int | None)
     allow(most)
     from ..studies.archive.parts import share_table, write_parts  # here, so that --help does not wait for it
     from ..studies.config.messages import StudyError
-    from ..studies.kinds import load_study
 
+    study = loaded(config)
     try:
-        study = load_study(config)
         written = write_parts(study, count, by, config.parent if out is None else out)
     except StudyError as error:
         raise click.ClickException(str(error)) from None
@@ -199,13 +198,12 @@ def merge(config: Path, results: tuple[Path, ...], incomplete: bool) -> None:
     studies.
     """
     from ..studies.archive.parts import MergeError, merge_sites, merge_text  # here, so that --help does not wait for it
-    from ..studies.config.messages import StudyError
-    from ..studies.kinds import load_study
     from ..studies.runs.locks import LockedError
 
+    study = loaded(config)
     try:
-        merged = merge_sites(load_study(config), results, incomplete)
-    except (StudyError, MergeError, LockedError) as error:
+        merged = merge_sites(study, results, incomplete)
+    except (MergeError, LockedError) as error:
         raise click.ClickException(str(error)) from None
     except OSError as error:
         raise click.ClickException(f"{error.filename}: {error.strerror}; the same command goes on from here") from None

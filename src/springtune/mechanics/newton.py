@@ -1,4 +1,4 @@
-"""Newton's method for one equilibrium of a network, with an error estimate."""
+"""A network under a load, and Newton's method for one equilibrium of it, with an error estimate."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Time steps of a network in motion: one class for each kind of integrator."""
+"""Networks in motion and their time steps: one class for each kind of integrator."""
 
 from __future__ import annotations
 
@@ -100,10 +100,10 @@ def make_stepper(
 ) -> Stepper:
     """Return the state of a run of one integrator; `step` in s."""
     if integrator in EXPLICIT:
-        return ExplicitSteps(motion, integrator, step, precision, threads)
+        return _ExplicitSteps(motion, integrator, step, precision, threads)
     if integrator == "implicit-midpoint":
-        return MidpointSteps(motion, step)
-    return BackwardEulerSteps(motion, step, integrator if isinstance(integrator, BackwardEuler) else BackwardEuler())
+        return _MidpointSteps(motion, step)
+    return _BackwardEulerSteps(motion, step, integrator if isinstance(integrator, BackwardEuler) else BackwardEuler())
 
 
 class Stepper(ABC):
@@ -127,7 +127,7 @@ class Stepper(ABC):
         """Stop the threads of the run."""
 
 
-class ExplicitSteps(Stepper):
+class _ExplicitSteps(Stepper):
     """Explicit steps: compiled for springs with their length law or linear networks, else in numpy."""
 
     def __init__(self, motion: Moving, integrator: str, step: float, precision: str, threads: int) -> None:
@@ -216,7 +216,6 @@ class ExplicitSteps(Stepper):
         return order, np.argsort(order)
 
     def begin(self, u: np.ndarray, v: np.ndarray) -> None:
-        """See `Stepper`."""
         if self.half:  # the velocity half a step before the start
             v = v - 0.5 * self.step * self._acceleration(u, v)
         self._u, self._v = (
@@ -235,7 +234,6 @@ class ExplicitSteps(Stepper):
         return force * self.inverse - motion.mass_damping * v
 
     def advance(self, steps: int) -> None:
-        """See `Stepper`."""
         if self.function is None:
             self._advance_energies(steps)
             return
@@ -283,7 +281,6 @@ class ExplicitSteps(Stepper):
         return ThreadPoolExecutor(max(1, len(self._threads) - 1))
 
     def close(self) -> None:
-        """See `Stepper`."""
         if "threads" in self.__dict__:
             self.threads.shutdown()
 
@@ -299,7 +296,7 @@ class ExplicitSteps(Stepper):
                 u += step * v
 
     def state(self, exact: bool = True) -> tuple[np.ndarray, np.ndarray]:
-        """See `Stepper`; velocities are half a step behind where they need not be exact."""
+        # Velocities are half a step behind where they need not be exact.
         u, v = (self._back(values[0]).astype(float) for values in (self._u, self._v))
         if exact and self.half and np.isfinite(v).all() and np.isfinite(u).all():
             with np.errstate(over="ignore", invalid="ignore"):
@@ -325,7 +322,7 @@ def _deepest(each: float, bandwidth: int) -> int:
     return int(np.clip((CACHE / each - ROWS_AT_ONCE) / bandwidth, 1, DEEPEST_PASS))
 
 
-class BackwardEulerSteps(Stepper):
+class _BackwardEulerSteps(Stepper):
     r"""One linear solve a step, as SOFA's EulerImplicitSolver does; `step` h in s.
 
     .. math:: (M (1 + h \alpha) + h C + h (h + \beta) K) \Delta v = h (f - (h + \beta) K v - C v - \alpha M v)
@@ -336,7 +333,6 @@ class BackwardEulerSteps(Stepper):
         self.solve: Callable[[np.ndarray], np.ndarray] | None = None
 
     def advance(self, steps: int) -> None:
-        """See `Stepper`."""
         motion, network, h, beta = self.motion, self.motion.network, self.step, self.options.stiffness_damping
         for _ in range(steps):
             if self.solve is None or not motion.linear:
@@ -363,7 +359,7 @@ class BackwardEulerSteps(Stepper):
         return lambda right: cg(matrix, right, rtol=self.options.tolerance, maxiter=self.options.iterations)[0]
 
 
-class MidpointSteps(Stepper):
+class _MidpointSteps(Stepper):
     """Implicit midpoint rule: for the mean velocity w of a step, ``2 M (w - v) / h + C w = f(u + h w / 2)``."""
 
     def __init__(self, motion: Moving, step: float) -> None:
@@ -372,7 +368,6 @@ class MidpointSteps(Stepper):
         self._load = float(np.linalg.norm(motion.network.reduce(motion.load)))
 
     def advance(self, steps: int) -> None:
-        """See `Stepper`."""
         network = self.motion.network
         for _ in range(steps):
             v = network.reduce(self.v)

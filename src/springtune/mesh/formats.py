@@ -1,4 +1,7 @@
-"""Mesh files: VTU, as meshio and ParaView open them, and whatever else meshio reads."""
+"""Mesh files: VTU, as meshio and ParaView open them, and whatever else meshio reads.
+
+Groups are Gmsh's physical groups, sets of Abaqus and others, and marks in VTU.
+"""
 
 import io
 import warnings

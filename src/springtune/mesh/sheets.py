@@ -1,4 +1,4 @@
-"""Check that a mesh is a conforming plane sheet."""
+"""Checks of meshes: conforming plane sheets, boxes filled exactly once, and parts held against rigid motions."""
 
 from collections.abc import Sequence
 

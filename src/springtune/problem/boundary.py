@@ -1,4 +1,4 @@
-"""Supports, forces and measured quantities of load cases on a mesh.
+"""Supports, forces and measured quantities of load cases on a mesh, and their checks.
 
 Groups become held directions, prescribed displacements, forces, and weights of displacements or reactions. Beams are
 the special case whose groups are the sides of their box. Held directions and weights have shape (n_points, 2).

@@ -115,7 +115,7 @@ PROGRAM = "ccx"
 
 
 def program() -> str:
-    """Return which CalculiX is installed: another one, or none, gives other results."""
+    """Return which CalculiX is installed, for plans: another one, or none, gives other results."""
     found = shutil.which(PROGRAM)
     if found is None:
         return ""

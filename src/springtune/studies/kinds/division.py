@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 from ..config.kind import kinds
 from ..config.messages import StudyError
-from ..runs.plan import Costs
 
 if TYPE_CHECKING:
     from ..config.kind import Kind
     from ..config.model import Study
+    from ..runs.plan import Costs
     from ..runs.stages import Task
 
 Name = tuple[str | int, ...]
@@ -42,7 +42,7 @@ class Division:
 def by_task(kind: str, tasks: "Callable[[Study], Iterable[Task]]", piece: Callable[[Any], Name]) -> dict[str, Any]:
     """Return how to divide a kind whose part of a study is a tuple with a task an entry."""
 
-    def pieces(study: "Study", costs: Costs, division: Division) -> dict[Name, float]:
+    def pieces(study: "Study", costs: "Costs", division: Division) -> dict[Name, float]:
         return division.of_section({piece(task.of): task.seconds(costs) for task in tasks(study)})
 
     def take(study: "Study", names: Collection[Name]) -> "Study":
@@ -100,6 +100,8 @@ def taken(study: "Study", share: Mapping[str, list[Name]]) -> "Study":
 
 def _pieces(study: "Study", division: Division) -> dict[tuple[str, Name], float]:
     """Return the seconds of each piece by kind and name."""
+    from ..runs.plan import Costs  # here: only a divided study needs it
+
     costs = Costs(Path("no costs"), {name: cost for kind in kinds() for name, cost in kind.costs.items()})
     found: dict[tuple[str, Name], float] = {}
     for kind in kinds():
@@ -109,7 +111,7 @@ def _pieces(study: "Study", division: Division) -> dict[tuple[str, Name], float]
     return found
 
 
-def _seconds(kind: "Kind", study: "Study", costs: Costs) -> float:
+def _seconds(kind: "Kind", study: "Study", costs: "Costs") -> float:
     """Return the seconds of all tasks of a kind."""
     made = (stage.members(study, costs) for stage in kind.stages if stage.members)
     return sum(seconds for members in made for seconds, _ in members.values())

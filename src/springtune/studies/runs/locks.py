@@ -113,12 +113,8 @@ def _told(folder: Path, note: dict[str, Any], where: str) -> str:
     return f"{folder}: process {note['pid']} {where} computes it since {since} ({note['command']}); {remedy}"
 
 
-def _files(folder: Path, pattern: str) -> list[Path]:
-    return sorted(folder.glob(pattern)) if folder.is_dir() else []
-
-
 def _notes(place: Path) -> Iterator[tuple[Path, dict[str, Any]]]:
-    for path in _files(place / RUNS, "*.json"):
+    for path in sorted((place / RUNS).glob("*.json")):
         note = checked_json.read(path, host=str, pid=int, start=float, folders=list)
         if note is not None:
             yield path, note
