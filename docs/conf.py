@@ -1,7 +1,6 @@
-"""The site of the pages: `make site` writes it to build/site, and nothing in it is fetched from elsewhere.
+"""Sphinx configuration of the site: `make site` writes it to build/site, without anything from a network.
 
-Sources are the pages as they stand in the repository, so that their links hold there and on the site; Sphinx is run
-from the repository's folder with this file's folder as that of the configuration.
+Sphinx runs in the repository's folder with `-c docs`, so that links hold in the repository and on the site.
 """
 
 import re
@@ -39,20 +38,20 @@ extensions = [
 root_doc = "docs/index"
 include_patterns = ["README.md", "CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md", "config/README.md"]
 include_patterns += ["workflow/profiles/README.md", "docs/**.md", "docs/reference/generated/*"]
-exclude_patterns = ["docs/README.md"]  # the list of pages where there is no sidebar
-templates_path = [str(DOCS / "templates")]  # some look for it from the sources
+exclude_patterns = ["docs/README.md"]  # the sidebar replaces this list of pages
+templates_path = [str(DOCS / "templates")]  # absolute, since some extensions resolve it from the sources
 
 myst_enable_extensions = ["colon_fence"]
 myst_heading_anchors = 4
 default_role = "py:obj"
 
-autodoc_typehints = "none"  # the docstrings name types
+autodoc_typehints = "none"  # docstrings name the types
 autodoc_member_order = "bysource"
 autosummary_generate = True
 autosummary_context = {"public": ", ".join(springtune.__all__)}  # they have pages of their own
 numpydoc_show_class_members = False
 numpydoc_xref_param_type = True
-# Types that lead to a page here; others' manuals are not at hand.
+# Only types of springtune are linked.
 numpydoc_xref_ignore = "all"
 numpydoc_xref_aliases = {name: name for name in numpydoc.xref.DEFAULT_LINKS}
 numpydoc_xref_aliases |= {name: f"springtune.{name}" for name in springtune.__all__}
@@ -80,7 +79,7 @@ html_context = {"default_mode": "light"}
 pygments_style = "default"
 
 ELSEWHERE = {"examples": "docs/gallery/index", "docs/README": "docs/index"}
-"""Where links lead on the site that lead to a folder or to the list of pages in the repository."""
+"""Targets on the site of links to a folder or to the list of pages."""
 
 
 def _lead(app: Sphinx, doctree: nodes.document) -> None:
@@ -94,17 +93,17 @@ LOADED = {
     "*.html": r"""<(?:script|img|iframe|source|link)\b[^>]*\b(?:src|href)="((?:https?:)?//[^"]+)""",
     "*.css": r"""(?:@import|url\()\s*["']?((?:https?:)?//[^"')]+)""",
 }
-"""What a browser loads from elsewhere by itself, by the files that say so."""
+"""Patterns of remote addresses that a browser loads by itself, by kind of file."""
 
 
 def _stay(app: Sphinx, error: Exception | None) -> None:
     for files, pattern in LOADED.items():
         for path in Path(app.outdir).rglob(files):
             for found in re.findall(pattern, path.read_text()):
-                getLogger(__name__).warning("%s loads %s: pages are to stand by themselves", path.name, found)
+                getLogger(__name__).warning("%s loads %s; include a local copy", path.name, found)
 
 
 def setup(app: Sphinx) -> None:
-    """Let links lead to pages, and pages stand by themselves."""
+    """Resolve links to folders, and warn of remote files."""
     app.connect("doctree-read", _lead)
     app.connect("build-finished", _stay)

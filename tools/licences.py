@@ -1,4 +1,4 @@
-"""Licences of what springtune brings along, in docs/licences.md: python tools/licences.py [--check].
+"""Write the licences of all dependencies into docs/licences.md: python tools/licences.py [--check].
 
 Names are those of the lock files, for all systems and versions of Python; licences are what each package says of
 itself, and stand in OWN where it says nothing, too little, or is not installed here.
@@ -67,16 +67,16 @@ NAMES = {
 """SPDX's names of what packages write."""
 
 PARTS = {
-    "run": "What springtune needs, and what that needs",
-    "cholesky": "Extra `cholesky`, which `make study` installs as well",
+    "run": "Dependencies of springtune, direct and indirect",
+    "cholesky": "Extra `cholesky`, which `make study` also installs",
     "export": "Extra `export`: Parquet and Zarr",
     "paper": "Extra `paper`: `make paper`",
-    "test": "Tests, pages, builds: of use to who changes springtune",
+    "test": "Tests, pages, builds: for developers of springtune",
 }
 
 
 class UnknownLicenceError(Exception):
-    """A package says nothing of its licence that can be read."""
+    """The licence of a package cannot be read."""
 
 
 def licence_of(name):

@@ -1,4 +1,4 @@
-"""What a million particles cost, and an unstable equilibrium; `make million` writes the tables of docs/speed.md anew.
+"""Measure a million particles and an unstable equilibrium; `make million` writes the tables into docs/speed.md.
 
 Each case runs in a process of its own, whose peak is that of its memory: minutes and 3 GB in all.
 """
@@ -23,14 +23,14 @@ SCENES = [
     ("delingette", "nonlinear", "400 kN"),
 ]
 MEMORY = {"MALLOC_MMAP_MAX_": "0", "MALLOC_TRIM_THRESHOLD_": "4000000000", "NUMPY_MADVISE_HUGEPAGE": "0"}
-"""Environment in which a process takes memory that it has given back again, not new memory of the system."""
+"""Environment in which a process reuses freed memory instead of asking the system for more."""
 
 UNSTABLE = [1e-3, 4e-4, 2e-4]
 """Mesh sizes of a beam of 200 x 20 mm beyond its buckling load [m]."""
 
 
 def scene(definition: str, kinematics: str, force: str, particles: float) -> dict[str, object]:
-    """Seconds of the parts of a scene, from nothing to its result."""
+    """Measure the parts of a scene, from nothing to its result."""
     import springtune as st
 
     beam, begin, before = st.Beam("1000 mm", "400 mm"), time.perf_counter(), os.times()
@@ -90,7 +90,7 @@ def unstable(size: float) -> dict[str, object]:
 
 
 def apart(*arguments: object) -> dict[str, object]:
-    """What a case gives in a process of its own."""
+    """Run a case in its own process, and return its result."""
     command = [sys.executable, __file__, "--case", json.dumps(arguments)]
     done = subprocess.run(command, check=True, capture_output=True, text=True, env=MEMORY | os.environ)
     return json.loads(done.stdout)
@@ -118,7 +118,7 @@ def tables(particles: float) -> str:
         seconds = " | ".join(f"{1e3 * part['seconds']:.0f} ms" for part in (rest, pins, superlu))
         left = f"{pins['residual']:.0e}, {superlu['residual']:.0e}"
         lines.append(f"| {one['unknowns']:,} | {pins['negative']} | {seconds} | {left} |")
-    return f"Machine load as it began: {load:.1f}, of {os.cpu_count()} processors.\n\n" + "\n".join(lines)
+    return f"Machine load at the start: {load:.1f}, of {os.cpu_count()} processors.\n\n" + "\n".join(lines)
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""Copy the pictures of the pages from the studies that make them, as docs/figures.yaml has it; `make pictures`."""
+"""Copy the pictures of the pages from studies, as docs/figures.yaml says; `make pictures`."""
 
 import runpy
 import subprocess

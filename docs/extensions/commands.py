@@ -1,4 +1,4 @@
-"""Directive ``commands``: every command of `springtune` with its help, as a terminal shows it."""
+"""Directive ``commands``: the help of every command of `springtune`."""
 
 import click
 from docutils import nodes
@@ -9,7 +9,7 @@ from springtune.cli import main
 
 
 class Commands(SphinxDirective):
-    """A section for each command, from click's own help."""
+    """A section for each command, from click's help."""
 
     def run(self) -> list[nodes.Node]:
         """Make the sections."""

@@ -1,6 +1,6 @@
-"""The gallery: every script of `examples/` is run, and its page shows what it prints and plots.
+"""The gallery: run every script of `examples/`, and write a page with its text and figures.
 
-Pages are written to docs/gallery, where git ignores them, before Sphinx reads the sources.
+Pages go to docs/gallery, which git ignores, before Sphinx reads the sources.
 """
 
 import ast
@@ -21,11 +21,11 @@ REPOSITORY = Path(__file__).parents[2]
 EXAMPLES, PAGES = REPOSITORY / "examples", REPOSITORY / "docs/gallery"
 
 DATASET = REPOSITORY / "results/quick/dataset.nc"
-"""What examples that read a study's dataset are given."""
+"""Dataset for examples that read one."""
 
 
 def _as_markdown(text: str) -> str:
-    """A docstring whose indented lines are commands."""
+    """Return a docstring as Markdown; its indented lines are commands."""
     return re.sub(r"(?:^    .+\n?)+", lambda found: f"\n```sh\n{_dedent(found[0])}\n```\n", text, flags=re.MULTILINE)
 
 
@@ -34,7 +34,7 @@ def _dedent(text: str) -> str:
 
 
 def _run(example: Path) -> tuple[str, list[str]]:
-    """What an example prints, and the files of the figures that it leaves open."""
+    """Run an example: return what it prints, and the files of its figures."""
     from matplotlib import pyplot
 
     pyplot.switch_backend("agg")
@@ -54,13 +54,13 @@ def _run(example: Path) -> tuple[str, list[str]]:
 
 
 def write(app: Sphinx) -> None:
-    """Write a page an example, and the cards that lead to them."""
+    """Write a page for each example, and the cards that link to them."""
     matplotlib.use("agg")
     for page in [*PAGES.glob("*.png"), *PAGES.glob("*.md")]:
         if page.name != "index.md":
             page.unlink()
     made = [(example, *_run(example)) for example in EXAMPLES.glob("*.py")]
-    # Those with a picture first, the shortest of them first.
+    # Examples with a picture first, sorted by size.
     made.sort(key=lambda one: (not one[2], one[0].stat().st_size))
     cards = [_page(*one) for one in made]
     grid = "\n".join(["::::{grid} 1 2 2 3", ":gutter: 3", *cards, "::::"])
@@ -69,7 +69,7 @@ def write(app: Sphinx) -> None:
 
 
 def _page(example: Path, printed: str, figures: list[str]) -> str:
-    """Write the page of an example; its card."""
+    """Write the page of an example, and return its card."""
     source = example.read_text()
     text = ast.get_docstring(ast.parse(source)) or ""
     title, _, meaning = text.partition(":")
@@ -86,6 +86,6 @@ def _page(example: Path, printed: str, figures: list[str]) -> str:
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Write the pages before sources are looked for."""
+    """Write the pages before Sphinx looks for sources."""
     app.connect("builder-inited", write)
     return {"parallel_read_safe": True}

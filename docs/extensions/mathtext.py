@@ -1,4 +1,4 @@
-"""Formulas drawn by matplotlib's mathtext, as SVG inside of the page: no script from elsewhere, no LaTeX."""
+"""Formulas as SVG in the page, drawn by matplotlib's mathtext: no remote script, no LaTeX."""
 
 import base64
 import io
@@ -12,7 +12,7 @@ from matplotlib.mathtext import MathTextParser, math_to_image
 from sphinx.application import Sphinx
 
 POINTS = 10.5
-"""Size of the font; the page's text is of 16 px, 12 points."""
+"""Size of the font; the page's text has 12 points (16 px)."""
 
 
 SPELLINGS = {
@@ -22,11 +22,11 @@ SPELLINGS = {
     r"\\Big": "",
     r"\\sqrt *(\\[a-z]+|\w)": r"\\sqrt{\1}",
 }
-"""What LaTeX knows and mathtext spells otherwise."""
+"""LaTeX commands and their spelling in mathtext."""
 
 
 def _image(formula: str, size: float = POINTS) -> str:
-    """An image element of a formula, its baseline that of the text around it."""
+    """Return the image element of a formula, aligned with the baseline of the text."""
     shown = formula = " ".join(formula.split())
     for pattern, spelling in SPELLINGS.items():
         formula = re.sub(pattern, spelling, formula)

@@ -1,4 +1,4 @@
-"""Directive ``named`` of reStructuredText: what a public mapping of springtune holds, a row a name."""
+"""Directive ``named``: a public mapping of springtune as a table, a row a name."""
 
 from collections.abc import Callable
 
@@ -28,7 +28,7 @@ TABLES: dict[str, tuple[tuple[str, ...], Callable[[], list[tuple[str, ...]]]]] =
 
 
 class Named(SphinxDirective):
-    """A mapping as a table, which is also where links to it lead."""
+    """A mapping as a table, and the target of links to it."""
 
     required_arguments = 1
 

@@ -4,52 +4,12 @@ import copy
 import re
 import struct
 
-WORDS = (
-    "nan",
-    "inf",
-    "-inf",
-    "-1",
-    "0",
-    "1e400",
-    "1e-400",
-    "1e9",
-    "9" * 30,
-    "",
-    " ",
-    "~",
-    "null",
-    "true",
-    "no",
-    "é",
-    "\u202e",
-    "x" * 300,
-    "*",
-    "&a",
-    "!!set",
-    "{{",
-    "[",
-    "|",
-    "\t",
-    "../../etc",
-    "/dev/null",
-    "1e-9 mm",
-    "1e9 mm",
-    "5 mm",
-    "5 m m",
-    "5 mm^9^9",
-    "200 GPa",
-    "1 kN",
-    "0x10",
-    "1_000",
-    "2001-99-99",
-    "<<",
-    "=",
-    "%",
-    "@",
-    "structured",
-    "free",
-    "traction",
-)
+PLAIN = """
+nan inf -inf -1 0 1e400 1e-400 1e9 ~ null true no * &a !!set {{ [ | ../../etc /dev/null 0x10 1_000 2001-99-99 <<
+= % @ structured free traction
+"""
+WORDS = (*PLAIN.split(), "9" * 30, "", " ", "é", "\u202e", "x" * 300, "\t", "1e-9 mm", "1e9 mm", "5 mm", "5 m m",
+         "5 mm^9^9", "200 GPa", "1 kN")  # fmt: skip
 """Values that are seldom meant."""
 
 

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shlex
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 import springtune as st
+from mechanics import spring_forces
 from springtune.cli import main
 from springtune.handover.net import SpringNet
 from springtune.handover.simulation import STEP_SHARE, EquilibriumWarning
@@ -26,6 +28,10 @@ LOADED = tuple(FORCES)
 RELEASE = tuple(int(part) for part in mujoco.__version__.split(".")[:2])
 VERSION = RELEASE[0]
 """Of MuJoCo, that runs here; `tests/versions` runs this file by the other one."""
+
+ASKED = "--beam 60x20 --size '5 mm' --material steel --density '7850 kg/m^3' --load traction --force '20 kN'"
+SPRINGS = shlex.split(ASKED)
+"""Of `springtune springs`."""
 
 PROGRAMS = {".xml": "MuJoCo", ".mjcf": "MuJoCo", ".scn": "SOFA", ".py": "SOFA", ".xpbd.json": "XPBD"}
 
@@ -65,13 +71,8 @@ def out_of_balance(model, data, positions):
 
 def pulls(points, springs, stiffness, lengths, positions):
     """Forces of springs on particles [N], by their law alone."""
-    first, second = springs.T
-    vectors = positions[second] - positions[first]
-    now = np.linalg.norm(vectors, axis=1)
-    force = (stiffness * (now - lengths) / now)[:, None] * vectors
     total = np.zeros_like(points)
-    np.add.at(total, first, force)
-    np.add.at(total, second, -force)
+    np.add.at(total, springs, -spring_forces(positions[springs], stiffness, lengths))
     return total
 
 
@@ -393,8 +394,7 @@ def test_other_versions_and_other_files_are_refused(tmp_path):
 
 def test_the_command_writes_for_a_version_and_says_so(tmp_path):
     out = tmp_path / "net.xml"
-    asked = "--beam 60x20 --size 5_mm --material steel --density 7850_kg/m^3 --load traction --force 20_kN"
-    words = ["springs", *(word.replace("_", " ") for word in asked.split()), "--out", str(out)]
+    words = ["springs", *SPRINGS, "--out", str(out)]
     done = CliRunner().invoke(main, [*words, "--definition", "delingette", "--mujoco", str(VERSION)])
     assert done.exit_code == 0, done.output
     assert f"for MuJoCo {VERSION}; MuJoCo {OTHER}, whose flex has other constants, refuses it" in done.output
@@ -450,6 +450,21 @@ def as_sofa_reads(text):
     return found
 
 
+def held_and_loaded(found, count):
+    """Directions that a scene of SOFA holds, and the forces on its particles."""
+    held, forces = np.zeros((count, 3), dtype=bool), np.zeros((count, 3))
+    for fixed in found.get("FixedProjectiveConstraint", ()):
+        held[np.array(fixed["indices"].split(), dtype=int)] = True
+    for partly in found["PartialFixedProjectiveConstraint"]:
+        axes = np.array(partly["fixedDirections"].split(), dtype=int).astype(bool)
+        held[np.array(partly["indices"].split(), dtype=int)] = axes
+    [field] = found["ConstantForceField"]
+    forces[np.array(field["indices"].split(), dtype=int)] = np.array(field["forces"].split(), dtype=float).reshape(
+        -1, 3
+    )
+    return held, forces
+
+
 def as_python_scene(text):
     """Components that a scene in Python adds, by their class; its nodes are stood in for."""
     found = {}
@@ -494,18 +509,8 @@ def test_sofa_reads_each_spring_with_its_own_stiffness(mesh_type, load, definiti
         np.array(one["position"].split(), dtype=float).reshape(-1, 3) for one in found["MechanicalObject"]
     )
     assert np.array_equal(particles[:, :2], one.mesh.points) and not particles[:, 2].any()
-    held = np.zeros(particles.shape, dtype=bool)
-    for fixed in found["FixedProjectiveConstraint"]:
-        held[np.array(fixed["indices"].split(), dtype=int)] = True
-    for partly in found["PartialFixedProjectiveConstraint"]:
-        axes = np.array(partly["fixedDirections"].split(), dtype=int).astype(bool)
-        held[np.array(partly["indices"].split(), dtype=int)] = axes
+    held, forces = held_and_loaded(found, len(particles))
     assert np.array_equal(held[:, :2], network.held) and held[:, 2].all()
-    forces = np.zeros(particles.shape)
-    [load_field] = found["ConstantForceField"]
-    forces[np.array(load_field["indices"].split(), dtype=int)] = np.array(
-        load_field["forces"].split(), dtype=float
-    ).reshape(-1, 3)
     masses = np.array(found["DiagonalMass"][0]["vertexMass"].split(), dtype=float)
     assert masses.sum() == pytest.approx(7850 * 1e-3 * one.mesh.area)
     moved = particles.copy()
@@ -667,13 +672,11 @@ def test_the_command_says_of_an_equilibrium_that_there_is_none_or_that_it_is_far
 
 def test_two_commands_bring_springs_into_mujoco(tmp_path):
     out = tmp_path / "net.xml"
-    asked = "--beam 60x20 --size 5_mm --material steel --density 7850_kg/m^3 --load traction --force 20_kN"
-    words = [word.replace("_", " ") for word in asked.split()]
-    done = CliRunner().invoke(main, ["springs", *words, "--out", str(out)])
+    done = CliRunner().invoke(main, ["springs", *SPRINGS, "--out", str(out)])
     assert done.exit_code == 0, done.output
     model = mujoco.MjModel.from_xml_path(str(out))
     assert model.nkey == 1 and model.nu == 1
-    done = CliRunner().invoke(main, ["springs", *words, "--definition", "area", "--out", str(tmp_path / "area.xml")])
+    done = CliRunner().invoke(main, ["springs", *SPRINGS, "--definition", "area", "--out", str(tmp_path / "area.xml")])
     assert done.exit_code == 2 and done.output.startswith("--definition 'area': has energies of areas")
     assert not (tmp_path / "area.xml").exists()
 
@@ -767,16 +770,8 @@ def test_files_of_shapes_balance_by_what_they_hold_alone(load, tmp_path):
     moved = one.solve().displacements
     sofa = as_sofa_reads(written(one, tmp_path, ".scn"))
     rows = np.array(sofa["SpringForceField"][0]["spring"].split(), dtype=float).reshape(-1, 5)
-    held, forces = np.zeros(moved.shape, dtype=bool), np.zeros(moved.shape)
-    for fixed in sofa.get("FixedProjectiveConstraint", ()):
-        held[np.array(fixed["indices"].split(), dtype=int)] = True
-    for partly in sofa["PartialFixedProjectiveConstraint"]:
-        axes = np.array(partly["fixedDirections"].split(), dtype=int).astype(bool)
-        held[np.array(partly["indices"].split(), dtype=int)] = axes[:2]
-    [field] = sofa["ConstantForceField"]
-    loads = np.array(field["forces"].split(), dtype=float).reshape(-1, 3)[:, :2]
-    forces[np.array(field["indices"].split(), dtype=int)] = loads
-    found = {"SOFA": (rows[:, :2].astype(int), rows[:, 2], rows[:, 4], held, forces)}
+    held, forces = held_and_loaded(sofa, len(moved))
+    found = {"SOFA": (rows[:, :2].astype(int), rows[:, 2], rows[:, 4], held[:, :2], forces[:, :2])}
     xpbd = json.loads(written(one, tmp_path, ".xpbd.json"))
     pairs, lengths, compliance = (
         np.array(xpbd["constraints"][key]) for key in ("particles", "rest_lengths", "compliance")

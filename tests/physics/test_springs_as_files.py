@@ -11,6 +11,7 @@ import pytest
 from click.testing import CliRunner
 
 import springtune as st
+from mechanics import angle_forces, area_forces, area_of, spring_forces
 from springtune.cli import main
 from springtune.handover import paraview
 from springtune.handover.formats import ENDINGS
@@ -46,21 +47,13 @@ def turned(vectors):
 def forces_of(net, x):
     """dW/dx of each particle [N] by the formulas that a file states, in plain differences of positions."""
     total = np.zeros_like(x)
-    along = x[net.springs[:, 1]] - x[net.springs[:, 0]]
-    length = np.linalg.norm(along, axis=1)
-    pull = (net.stiffness * (length - net.rest_lengths) / length)[:, None] * along
-    np.add.at(total, net.springs[:, 0], -pull)
-    np.add.at(total, net.springs[:, 1], pull)
+    np.add.at(total, net.springs, spring_forces(x[net.springs], net.stiffness, net.rest_lengths))
     for terms in net.energies:
         corners, value = x[terms.cells], terms.values
-        after, before = np.roll(corners, -1, axis=1), np.roll(corners, 1, axis=1)
         if terms.kind == "area":
-            slopes = 0.5 * turned(after - before)
-            here = corners - corners[:, :1]
-            area = 0.5 * (here * turned(np.roll(here, -1, axis=1))).sum(axis=(1, 2))
-            part = (value["modulus"] * (area / value["rest_area"] - 1))[:, None, None] * slopes
+            part = area_forces(corners, value["modulus"], value["rest_area"])
         elif terms.kind == "biquadratic":
-            sides = before - after  # opposite each corner
+            sides = np.roll(corners, 1, axis=1) - np.roll(corners, -1, axis=1)  # opposite each corner
             change = (sides**2).sum(axis=2) - value["rest_length"] ** 2
             k, gamma = value["tensile"], value["coupling"]
             pull = 0.5 * k * change  # dW/dq
@@ -72,12 +65,7 @@ def forces_of(net, x):
         elif terms.kind in ("incompressible", "compressible"):
             part = rubber_forces(terms.kind, corners, value)
         else:
-            a, b = after - corners, before - corners
-            angle = np.arctan2((a * turned(b)).sum(axis=2), (a * b).sum(axis=2))
-            pull = (value["modulus"][:, None] * (angle - value["rest_angle"]))[:, :, None]
-            to_next = pull * turned(a) / (a**2).sum(axis=2, keepdims=True)
-            to_last = -pull * turned(b) / (b**2).sum(axis=2, keepdims=True)
-            part = np.roll(to_next, 1, axis=1) + np.roll(to_last, -1, axis=1) - to_next - to_last
+            part = angle_forces(corners, value["modulus"], value["rest_angle"])
         np.add.at(total, terms.cells, part)
     return total
 
@@ -86,8 +74,8 @@ def rubber_forces(kind, corners, value):
     """Of T, the trace, and of the area; the stretch across the sheet by bisection, where there is one to be found."""
     after, before = np.roll(corners, -1, axis=1), np.roll(corners, 1, axis=1)
     sides, slopes = before - after, 0.5 * turned(after - before)
-    here, rest = corners - corners[:, :1], value["rest_area"]
-    ratio = 0.5 * (here * turned(np.roll(here, -1, axis=1))).sum(axis=(1, 2)) / rest
+    rest = value["rest_area"]
+    ratio = area_of(corners) / rest
     trace = (value["rest_weight"] * (sides**2).sum(axis=2)).sum(axis=1) / rest
     if kind == "incompressible":
         e = trace + ratio**-2 - 3

@@ -483,7 +483,7 @@ class TestOfOtherKinds:
     @pytest.mark.parametrize(
         "command",
         [("scenes",), ("run",), ("split", "--into", "2"), ("clean",), ("info",), ("verify",), ("browse",), ("accept",),
-         ("export", "--to", "x.csv"), ("which",)],
+         ("export", "--to", "x.csv")],
         ids=lambda command: command[0],
     )  # fmt: skip
     def test_what_a_command_is_given(self, tmp_path, odd, command, monkeypatch):
@@ -581,7 +581,7 @@ class TestDatasets:
                 call(path)
         with pytest.raises(PaperError, match=says):
             for_paper([path])
-        commands = ["info", "diff . other.nc", "diff other.nc .", "export --to x.csv", "browse", "accept", "which"]
+        commands = ["info", "diff . other.nc", "diff other.nc .", "export --to x.csv", "browse", "accept"]
         for command in commands:
             first, *rest = command.split()
             told = CliRunner().invoke(main, [first, *([] if "other.nc" in rest else ["dataset.nc"]), *rest])

@@ -49,24 +49,28 @@ def content(text):
     return json.loads(zlib.decompress(base64.b64decode(block)))
 
 
+@pytest.fixture(scope="module")
+def text(path):
+    return page(path)
+
+
 class TestPage:
-    def test_same_dataset_same_bytes(self, path):
-        assert page(path) == page(path)
+    def test_same_dataset_same_bytes(self, path, text):
+        assert page(path) == text
 
     def test_texts_of_the_dataset_are_no_markup(self, path):
         text = page(path, ["figures/<img src=x>.png"])
         assert "alert('" not in text and "<img src=x>" not in text
         assert "<title>&lt;script&gt;alert(&#39;&amp;&#39;)&lt;/script&gt;</title>" in text
 
-    def test_policy_names_every_script_and_forbids_to_load(self, path):
-        text = page(path)
+    def test_policy_names_every_script_and_forbids_to_load(self, text):
         policy = re.search(r'Policy" content="([^"]*)"', text)[1].replace("&#39;", "'")
         assert policy.startswith("default-src 'none'; script-src 'sha256-")
         assert "unsafe-inline" not in policy.partition("script-src")[2].partition(";")[0]
         assert not re.search(r"(src|href)=\"?(https?:)?//", text)
 
-    def test_every_group_and_variable_is_in_it(self, path):
-        groups = {group["path"]: group for group in content(page(path))["groups"]}
+    def test_every_group_and_variable_is_in_it(self, path, text):
+        groups = {group["path"]: group for group in content(text)["groups"]}
         with xr.open_datatree(path, engine="h5netcdf") as tree:
             for node in tree.subtree:
                 held = {row["name"] for row in groups[node.path]["variables"]}

@@ -180,6 +180,14 @@ def test_definitions_lists_all_with_summaries():
     assert lines == [" ".join(f"{name} {definition.summary}".split()) for name, definition in DEFINITIONS.items()]
 
 
+@pytest.fixture(scope="module")
+def validator():
+    """What editors hold a study against."""
+    schema = json.loads(schema_text())
+    jsonschema.Draft202012Validator.check_schema(schema)
+    return jsonschema.Draft202012Validator(schema)
+
+
 class TestSchema:
     def test_printed_and_kept_in_step(self):
         assert run("schema").stdout == schema_text()
@@ -210,11 +218,10 @@ class TestSchema:
         assert not (tmp_path / SCHEMA).exists()
 
     @pytest.mark.parametrize("study", sorted(CONFIG.glob("*.yaml")), ids=lambda path: path.stem)
-    def test_studies_are_valid(self, study):
+    def test_studies_are_valid(self, study, validator):
         text = study.read_text()
         assert text.startswith(f"# yaml-language-server: $schema={SCHEMA}\n")
-        jsonschema.Draft202012Validator.check_schema(json.loads(schema_text()))
-        jsonschema.validate(yaml.safe_load(text), json.loads(schema_text()), jsonschema.Draft202012Validator)
+        validator.validate(yaml.safe_load(text))
         load_study(study)
 
     @pytest.mark.parametrize(
@@ -229,11 +236,11 @@ class TestSchema:
             ("  100x20: {", "  .x: {"),
         ],
     )
-    def test_editors_see_mistakes(self, old, new):
+    def test_editors_see_mistakes(self, old, new, validator):
         text = (CONFIG / "quick.yaml").read_text()
         assert old in text
         with pytest.raises(jsonschema.ValidationError):
-            jsonschema.validate(yaml.safe_load(text.replace(old, new, 1)), json.loads(schema_text()))
+            validator.validate(yaml.safe_load(text.replace(old, new, 1)))
 
     @pytest.mark.parametrize("model", sections(study_model(kinds())).values())
     def test_every_field_is_described(self, model):

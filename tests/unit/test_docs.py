@@ -30,19 +30,8 @@ SITE = sorted(
     if "```{" in page.read_text()
 )
 """Pages with directives, of the site alone: other pages do not lead to them. What the site generates has none."""
-PAGES = sorted(
-    path
-    for pattern in (
-        "*.md",
-        "config/*.md",
-        "docs/*.md",
-        "docs/tutorial/*.md",
-        "docs/how-to/*.md",
-        "workflow/profiles/*.md",
-    )
-    for path in REPOSITORY.glob(pattern)
-    if path not in SITE
-)
+PLACES = ("*.md", "config/*.md", "docs/*.md", "docs/tutorial/*.md", "docs/how-to/*.md", "workflow/profiles/*.md")
+PAGES = sorted(path for pattern in PLACES for path in REPOSITORY.glob(pattern) if path not in SITE)
 
 
 def called(path):

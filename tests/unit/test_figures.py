@@ -16,41 +16,12 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from PIL import Image
 
+import springtune as st
 from springtune.studies.config.kind import FORMATS, Output, outputs
-from springtune.studies.kinds.benchmark.figures import (
-    plot_benchmark,
-    plot_benchmark_costs,
-    plot_benchmark_curve,
-    plot_benchmark_rates,
-)
-from springtune.studies.kinds.laying.figures import plot_laying
-from springtune.studies.kinds.moduli.figures import (
-    definitions,
-    plot_definitions_loads,
-    plot_definitions_size,
-    plot_moduli,
-)
-from springtune.studies.kinds.refinement.figures import plot_refinement
-from springtune.studies.kinds.scenes import figures
-from springtune.studies.kinds.scenes.errors import plot_size
-from springtune.studies.kinds.scenes.figures import (
-    NETWORK_LINE,
-    draw_curve,
-    plot_block,
-    plot_deformed,
-    plot_sensitivity,
-)
-from springtune.studies.kinds.shapes.figures import plot_shape, plot_shape_errors, plot_shapes
-from springtune.studies.kinds.stability.figures import (
-    PLOTS,
-    plot_stability_buckling,
-    plot_stability_energy,
-    plot_stability_limits,
-    plot_stability_maps,
-    plot_stability_meshes,
-    plot_stability_rest,
-    plot_stability_strains,
-)
+from springtune.studies.kinds.moduli.figures import definitions
+from springtune.studies.kinds.scenes import errors, figures
+from springtune.studies.kinds.scenes.figures import NETWORK_LINE, draw_curve
+from springtune.studies.kinds.stability.figures import PLOTS
 from springtune.studies.output import present, style
 from springtune.studies.output.style import png_and_pdf
 from springtune.studies.runs.dependencies import modules
@@ -77,32 +48,29 @@ SCENES = {"mesh_type": "free", "material": "steel", "load": "traction"}
 CURVE = SCENES | {"beam": "200x40"}
 
 EVERY_PLOT = {
-    plot_sensitivity: (CURVE, None),
-    plot_size: (SCENES, 2),
-    plot_deformed: (SCENES | {"definition": "area"}, 2),
-    plot_block: ({"beam": "100x20", "mesh_type": "free", "mesh_size": 2e-3, "material": "steel"}, 2),
-    plot_moduli: ({}, 2),
-    plot_definitions_size: (
-        {"beam": "100x20", "material": "steel", "load": "traction", "kinematics": "linear"},
-        2,
-    ),
-    plot_definitions_loads: ({"beam": "100x20", "mesh_type": "free", "kinematics": "linear"}, 2),
-    plot_laying: ({}, (4, 3)),
-    plot_refinement: ({}, 2),
-    plot_shapes: ({}, None),
-    plot_shape_errors: ({"shape": "cook", "load": "traction"}, (2, 2)),
-    plot_shape: ({"shape": "hole"}, 2),
-    plot_benchmark: ({"scene": "bending"}, None),
-    plot_benchmark_rates: ({}, (2, 2)),
-    plot_benchmark_costs: ({"scene": "bending"}, 2),
-    plot_benchmark_curve: ({}, None),
-    plot_stability_limits: ({}, 2),
-    plot_stability_maps: ({}, 2),
-    plot_stability_energy: ({}, None),
-    plot_stability_rest: ({}, 2),
-    plot_stability_meshes: ({}, 2),
-    plot_stability_strains: ({}, 2),
-    plot_stability_buckling: ({}, 2),
+    st.plot_sensitivity: (CURVE, None),
+    st.plot_size: (SCENES, 2),
+    st.plot_deformed: (SCENES | {"definition": "area"}, 2),
+    st.plot_block: ({"beam": "100x20", "mesh_type": "free", "mesh_size": 2e-3, "material": "steel"}, 2),
+    st.plot_moduli: ({}, 2),
+    st.plot_definitions_size: ({"beam": "100x20", "material": "steel", "load": "traction", "kinematics": "linear"}, 2),
+    st.plot_definitions_loads: ({"beam": "100x20", "mesh_type": "free", "kinematics": "linear"}, 2),
+    st.plot_laying: ({}, (4, 3)),
+    st.plot_refinement: ({}, 2),
+    st.plot_shapes: ({}, None),
+    st.plot_shape_errors: ({"shape": "cook", "load": "traction"}, (2, 2)),
+    st.plot_shape: ({"shape": "hole"}, 2),
+    st.plot_benchmark: ({"scene": "bending"}, None),
+    st.plot_benchmark_rates: ({}, (2, 2)),
+    st.plot_benchmark_costs: ({"scene": "bending"}, 2),
+    st.plot_benchmark_curve: ({}, None),
+    st.plot_stability_limits: ({}, 2),
+    st.plot_stability_maps: ({}, 2),
+    st.plot_stability_energy: ({}, None),
+    st.plot_stability_rest: ({}, 2),
+    st.plot_stability_meshes: ({}, 2),
+    st.plot_stability_strains: ({}, 2),
+    st.plot_stability_buckling: ({}, 2),
 }
 """Every function that plots: a selection, and how many axes it returns; None where it returns one by itself."""
 
@@ -132,7 +100,7 @@ def test_a_plot_draws_on_axes_and_figures_that_it_is_given(tree, plot):
     place, size = [panel.get_position().bounds for panel in given], figure.get_size_inches().tolist()
     axes = plot(tree, given if count else given[0], **selection)
     assert list(np.ravel(axes)) == list(given) and all(panel.has_data() for panel in given)
-    png_and_pdf(figure)  # nothing that cannot be drawn
+    figure.draw_without_rendering()  # nothing that cannot be drawn
     if not np.any([panel.get_aspect() != "auto" for panel in given]):
         assert [panel.get_position().bounds for panel in given] == place
     assert figure.get_size_inches().tolist() == size
@@ -169,7 +137,7 @@ def drawn(axes, label):
 
 
 def test_a_sensitivity_curve_carries_the_errors_of_the_dataset(tree):
-    axes = plot_sensitivity(tree, **CURVE)
+    axes = st.plot_sensitivity(tree, **CURVE)
     curves = tree["sensitivity"].to_dataset().sel(CURVE).sel(kinematics="nonlinear")
     for size in SIZES:
         line, curve = drawn(axes, f"{1e3 * size:g} mm"), curves.sel(mesh_size=size)
@@ -186,7 +154,7 @@ def test_unstable_points_of_a_curve_are_thin(tree):
     data = tree["sensitivity"].to_dataset()
     data["status"] = data.status.copy()
     data.status.loc[{"mesh_size": 2e-3, "stiffness_ratio": 0.5}] = 4
-    axes = plot_sensitivity(data, **CURVE)  # of the group alone
+    axes = st.plot_sensitivity(data, **CURVE)  # of the group alone
     stable = drawn(axes, "2 mm").get_ydata()
     assert np.isnan(stable[0]) and np.isfinite(stable[1:]).all()
     thin = [line for line in axes.get_lines() if line.get_linewidth() == 0.5 and len(line.get_xdata()) == 5]
@@ -194,7 +162,7 @@ def test_unstable_points_of_a_curve_are_thin(tree):
 
 
 def test_errors_against_mesh_size_are_the_datasets(tree):
-    panels = plot_size(tree, **SCENES)
+    panels = st.plot_size(tree, **SCENES)
     for panel, beam in zip(panels, BEAMS):
         error = tree.deformation_error.sel(SCENES).sel(beam=beam, kinematics="nonlinear")
         for definition in DEFINITIONS:
@@ -202,12 +170,12 @@ def test_errors_against_mesh_size_are_the_datasets(tree):
             assert line.get_xdata() == pytest.approx([1, 2, 5])
             assert line.get_ydata() == pytest.approx(100 * error.sel(definition=definition).values)
         assert panel.get_title("left") == f"{beam} mm"
-    (panel,) = plot_size(tree, beam="200x40", **SCENES)
+    (panel,) = st.plot_size(tree, beam="200x40", **SCENES)
     assert panel.get_title("left") == "200x40 mm"
 
 
 def test_springs_of_a_deformed_network_join_its_moved_particles(tree):
-    panel = plot_deformed(tree, beam="100x20", definition="area", **SCENES)[0]
+    panel = st.plot_deformed(tree, beam="100x20", definition="area", **SCENES)[0]
     here = tree["fields"].to_dataset().sel(SCENES).sel(beam="100x20", definition="area", mesh_size=5e-3)
     title = panel.get_title("left")
     scale = float(title.rpartition("×\u00a0")[2])
@@ -224,12 +192,12 @@ def test_a_network_that_is_not_solved_says_so(tree):
     fields = data["fields"].to_dataset()
     data["fields"] = xr.DataTree(fields.assign(displacement_x=np.nan * fields.displacement_x,
                                                displacement_y=np.nan * fields.displacement_y))  # fmt: skip
-    panel = plot_deformed(data, beam="100x20", definition="area", **SCENES)[0]
+    panel = st.plot_deformed(data, beam="100x20", definition="area", **SCENES)[0]
     assert [text.get_text() for text in panel.texts] == ["no network stored"]
 
 
 def test_the_pressed_face_is_the_datasets(tree):
-    chosen = EVERY_PLOT[plot_block][0]
+    chosen = EVERY_PLOT[st.plot_block][0]
     faces = tree["block"].to_dataset()
     small = tree.copy()
     small["block"] = xr.DataTree(faces.sel(reference=["small-strain"]))
@@ -238,7 +206,7 @@ def test_the_pressed_face_is_the_datasets(tree):
         (small, "linear", "small-strain"),
         (tree, "nonlinear", "neo-hooke-plane-stress"),
     ):
-        left, right = plot_block(data, **chosen)
+        left, right = st.plot_block(data, **chosen)
         shown = faces.sel(chosen).sel(load="pressure")
         for definition in ("paper", "area"):
             profile = shown.face_profile.sel(definition=definition, kinematics=kinematics)
@@ -257,14 +225,14 @@ def test_errors_of_nonlinear_networks_are_against_finite_strain(tree, kinematics
     against = (error + 0.5).expand_dims(reference=["neo-hooke-plane-stress"])
     data["finite_strain"] = xr.DataTree(xr.Dataset({"deformation_error": against}))
     chosen = {"mesh_type": "structured", "material": "steel", "load": "traction", "kinematics": kinematics}
-    panels, usual = plot_size(data, **chosen), plot_size(tree, **chosen)
+    panels, usual = st.plot_size(data, **chosen), st.plot_size(tree, **chosen)
     label = usual[0].get_lines()[0].get_label()
     assert drawn(panels[0], label).get_ydata() == pytest.approx(drawn(usual[0], label).get_ydata() + more)
     assert panels[0].figure.get_suptitle().endswith("against finite strain") == (kinematics == "nonlinear")
 
 
 def test_moduli_are_of_the_finest_patch(tree):
-    for panel, mesh_type in zip(plot_moduli(tree), TYPES):
+    for panel, mesh_type in zip(st.plot_moduli(tree), TYPES):
         for definition in DEFINITIONS:
             found = tree["moduli"].effective_poisson_ratio.sel(
                 mesh_type=mesh_type, definition=definition, mesh_size=SIZES[0]
@@ -275,18 +243,18 @@ def test_moduli_are_of_the_finest_patch(tree):
 
 
 def test_a_heat_map_shows_the_finest_mesh_that_was_solved(tree):
-    chosen = EVERY_PLOT[plot_definitions_loads][0]
+    chosen = EVERY_PLOT[st.plot_definitions_loads][0]
     data = tree.to_dataset()
     data["deformation_error"] = data.deformation_error.copy()
     data.deformation_error.loc[chosen | {"definition": "area", "mesh_size": 1e-3}] = np.nan
-    panel = plot_definitions_loads(data, materials=["rubber"], **chosen)[0]
+    panel = st.plot_definitions_loads(data, materials=["rubber"], **chosen)[0]
     error = 100 * data.deformation_error.sel(chosen).sel(material="rubber")
     wanted = [error.sel(definition="paper", mesh_size=1e-3).values, error.sel(definition="area", mesh_size=2e-3).values]
     assert np.asarray(panel.images[0].get_array()) == pytest.approx(np.log10(np.clip(wanted, 0.1, 100)))
 
 
 def test_an_approach_carries_its_errors_and_seconds(tree):
-    panel = plot_benchmark(tree, scene="bending")
+    panel = st.plot_benchmark(tree, scene="bending")
     here = tree["benchmark"].to_dataset().sel(scene="bending", approach="relaxation")
     line = drawn(panel, "in motion")
     assert line.get_xdata() == pytest.approx(here.seconds.values)
@@ -294,7 +262,7 @@ def test_an_approach_carries_its_errors_and_seconds(tree):
 
 
 def test_the_stable_step_carries_the_predicted_limit(tree):
-    _, right = plot_stability_limits(tree)
+    _, right = st.plot_stability_limits(tree)
     limit = tree["stability"].dt_limit_predicted.sel(
         definition="area", integrator="central-difference", damper="mass", damping_ratio=0.0
     )
@@ -306,32 +274,32 @@ def test_the_stable_step_carries_the_predicted_limit(tree):
 
 def test_a_choice_that_is_left_is_named_with_its_labels(tree):
     with pytest.raises(ValueError, match="choose one beam: '100x20', '200x40'"):
-        plot_sensitivity(tree, **SCENES)
+        st.plot_sensitivity(tree, **SCENES)
     with pytest.raises(ValueError, match="choose one scene: 'traction', 'bending'"):
-        plot_benchmark(tree)
+        st.plot_benchmark(tree)
 
 
 def test_a_label_that_is_not_there_is_answered_with_those_that_are(tree):
     with pytest.raises(ValueError, match="nothing has load 'torsion'; there is 'traction', 'compression', 'pressure'"):
-        plot_size(tree, **SCENES | {"load": "torsion"})
+        st.plot_size(tree, **SCENES | {"load": "torsion"})
 
 
 def test_the_only_label_is_taken(tree):
     data = tree["sensitivity"].to_dataset()
     data["status"] = data.status.where((data.beam == "200x40") & (data["load"] == "pressure"), 0)
-    axes = plot_sensitivity(data, mesh_type="free", material="rubber")
+    axes = st.plot_sensitivity(data, mesh_type="free", material="rubber")
     assert axes.get_title("left") == "200x40, free, rubber, pressure"  # a curve alone does not say how long a beam is
 
 
 def test_a_group_or_an_experiment_that_is_missing_is_named(tree):
     with pytest.raises(ValueError, match="no group '/laying'; it has '/moduli'"):
-        plot_laying(xr.DataTree.from_dict({"/moduli": moduli()}))
-    for plot in (plot_deformed, plot_block):
+        st.plot_laying(xr.DataTree.from_dict({"/moduli": moduli()}))
+    for plot in (st.plot_deformed, st.plot_block):
         with pytest.raises(ValueError, match="give the whole dataset"):
             plot(tree["fields"].to_dataset())
     data = tree["stability"].to_dataset().sel(experiment=["limits", "rest"])
     with pytest.raises(ValueError, match="no experiment 'maps'; it has 'limits', 'rest'"):
-        plot_stability_maps(data)
+        st.plot_stability_maps(data)
 
 
 def test_figures_of_a_load_without_the_main_kinematics_are_of_its_own(tree):
@@ -340,12 +308,12 @@ def test_figures_of_a_load_without_the_main_kinematics_are_of_its_own(tree):
     data = xr.DataTree(tree.to_dataset().assign(status=status, field_error=tree.field_error.where(status == 1)))
     chosen = {selection["load"]: selection for stem, _, selection in definitions(data) if "size" in stem}
     assert [chosen[load]["kinematics"] for load in LOADS] == ["nonlinear", "nonlinear", "linear"]
-    panels = plot_definitions_size(data, **chosen["pressure"])
+    panels = st.plot_definitions_size(data, **chosen["pressure"])
     assert [panel.get_title("left") for panel in panels] == TYPES
     named = [{name for line in panel.lines for name in line.get_label().split(" (")[0].split(", ")} for panel in panels]
     assert all(set(DEFINITIONS) <= names for names in named)
     nothing = data.to_dataset().assign(field_error=np.nan * tree.field_error)
-    panels = plot_definitions_size(nothing, **chosen["pressure"])
+    panels = st.plot_definitions_size(nothing, **chosen["pressure"])
     assert [[text.get_text() for text in panel.texts] for panel in panels] == [
         ["No definition has a field error here: solved (6)."]
     ] * 2
@@ -355,7 +323,7 @@ def test_a_heat_map_of_a_mesh_type_of_which_nothing_was_solved_says_so_in_each_c
     data = tree.to_dataset()
     data["status"] = data.status.where(data.mesh_type != "free", 5)
     data["deformation_error"] = data.deformation_error.where(data.mesh_type != "free")
-    panel = plot_definitions_loads(data, **EVERY_PLOT[plot_definitions_loads][0])[0]
+    panel = st.plot_definitions_loads(data, **EVERY_PLOT[st.plot_definitions_loads][0])[0]
     assert {text.get_text() for text in panel.texts} == {"×"}
     assert np.ma.getmaskarray(panel.images[0].get_array()).all()
 
@@ -412,7 +380,7 @@ def test_both_formats_show_the_same_and_are_the_same_again():
 def test_an_edit_of_one_kinds_figures_redraws_no_other_kind():
     def drawers(output):
         files = {*modules("studies.output.present"), *modules(output.module)}
-        return {Path(path).parent.name for path in files if Path(path).name in ("figures.py", "sweeps.py")}
+        return {Path(path).parent.name for path in files if Path(path).name in ("figures.py", "errors.py")}
 
     kinds = {output.name: drawers(output) for output in outputs().values() if output.plot}
     assert kinds["sensitivity"] == kinds["block"] == {"scenes"} and kinds["definitions"] == {"moduli"}
@@ -423,9 +391,9 @@ def test_a_study_of_linear_kinematics_alone_has_its_figures(tree):
     """Each says that it is linear; its files are those that the study declares."""
     root, curves = (tree[name].to_dataset().sel(kinematics=["linear"]) for name in ("/", "sensitivity"))
     linear = xr.DataTree.from_dict({"/": root, "/sensitivity": curves})
-    for name in ("sensitivity", "size"):
-        found = list(getattr(figures, name)(linear))
-        assert [stem for stem, _, _ in found] == [stem for stem, _, _ in getattr(figures, name)(tree)]
+    for drawers in (figures.sensitivity, errors.size):
+        found = list(drawers(linear))
+        assert [stem for stem, _, _ in found] == [stem for stem, _, _ in drawers(tree)]
         for _, plot, selection in found:
             assert selection["kinematics"] == "linear"
             drawn_on = np.ravel(plot(linear, **selection))[0].figure

@@ -3,32 +3,21 @@
 import pytest
 
 from springtune.mesh import MESH_TYPES
+from springtune.problem import loads
 from springtune.problem.geometry import Beam
-from springtune.problem.loads import (
-    AXIAL,
-    BENDING,
-    BOTH,
-    BOTTOM,
-    FACE,
-    LEFT,
-    LOAD_KINDS,
-    LOADS,
-    RIGHT,
-    SHEAR,
-    TOP,
-    Load,
-    LoadKind,
-)
+from springtune.problem.loads import AXIAL, BENDING, BOTH, BOTTOM, FACE, LEFT, LOAD_KINDS, LOADS, RIGHT, SHEAR, TOP
 from springtune.problem.materials import Material
 from springtune.reference.finite_strain import solve_neo_hooke
 from springtune.reference.small_strain import solve_small_strain
 from springtune.scene.sheet import Sheet
-from springtune.studies.kinds import load_study
 from springtune.studies.runs import driver, plan, store
 from springtune.studies.runs.task_costs import TaskCosts
 
-LIFT = LoadKind("lift", loaded=TOP, axis=1, held=((BOTTOM, BOTH),))
-BUILT_IN = LoadKind("built-in", loaded=TOP, axis=1, held=((LEFT, BOTH), (RIGHT, BOTH)), pressed=True)
+from campaigns import load_text
+from tables import STUDIES
+
+LIFT = loads.LoadKind("lift", loaded=TOP, axis=1, held=((BOTTOM, BOTH),))
+BUILT_IN = loads.LoadKind("built-in", loaded=TOP, axis=1, held=((LEFT, BOTH), (RIGHT, BOTH)), pressed=True)
 
 BEAM, FORCE = Beam(0.1, 0.02, 1e-3, "100x20"), 50.0
 CORK = Material(1e9, 0.0, name="cork")
@@ -39,7 +28,7 @@ EXACT = FORCE * BEAM.height / (CORK.young_modulus * BEAM.thickness * BEAM.length
 @pytest.fixture
 def lift(monkeypatch):
     """A load that the package does not have."""
-    monkeypatch.setitem(LOADS, "lift", Load(LIFT, 1.0))
+    monkeypatch.setitem(LOADS, "lift", loads.Load(LIFT, 1.0))
     monkeypatch.setitem(LOAD_KINDS, "lift", LIFT)
 
 
@@ -86,24 +75,7 @@ def test_a_new_kind_in_the_references(lift):
 
 
 def test_a_new_kind_through_a_study(lift, tmp_path):
-    study = tmp_path / "study.yaml"
-    study.write_text("""
-title: A sheet that is lifted
-beams: {sheet: {length: 100 mm, height: 20 mm}}
-materials: {cork: {young_modulus: 1 GPa, poisson_ratio: 0}}
-outputs: [size]
-grids:
-  lifted:
-    beam: sheet
-    mesh_type: structured
-    mesh_size: 5 mm
-    material: cork
-    load: lift
-    force: 50 N
-    definition: delingette
-    kinematics: linear
-""")
-    study = load_study(study)
+    study = load_text(tmp_path, STUDIES["loads"])
     jobs = plan.plan(study, tmp_path, 1).jobs
     for name in ("mesh_0", "reference_0", "solve_0"):
         driver.run(jobs[name].stage.module, jobs[name].content, TaskCosts())
@@ -138,7 +110,7 @@ def test_supports_of_a_new_kind_are_the_same_everywhere(material):
 
 
 def test_a_kind_whose_supports_are_not_symmetric_has_no_half_model():
-    one_sided = LoadKind("one-sided", loaded=TOP, axis=1, held=((LEFT, BOTH),))
+    one_sided = loads.LoadKind("one-sided", loaded=TOP, axis=1, held=((LEFT, BOTH),))
     assert not one_sided.mirrored
     with pytest.raises(ValueError, match="not symmetric"):
         solve_small_strain(BEAM, CORK, FORCE, kind=one_sided)

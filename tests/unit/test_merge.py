@@ -227,6 +227,17 @@ class TestRefusals:
         with pytest.raises(ValueError, match=r"has the dimensions \(material\) in one and \(force, material\) in"):
             st.merge([one, other])
 
+    def test_flags_and_texts_without_dimensions_are_merged_and_compared(self):
+        status = xr.Variable(
+            (), np.int8(1), {"flag_values": np.arange(2, dtype="int8"), "flag_meanings": "not_requested solved"}
+        )
+        tree = xr.DataTree.from_dict(
+            {"/": sized(made()).to_dataset(), "/one": xr.Dataset({"status": status, "message": "m"})}
+        )
+        both = st.merge([named(tree, "one"), named(tree, "other")])
+        assert int(both["one/status"]) == 1 and str(both["one/message"].values) == "m"
+        assert not compare(tree, both, groups=["one"]).different
+
     def test_studies_of_one_name_are_told_apart(self):
         one, other = sized(made()), sized(made(), 3)
         with pytest.raises(ValueError, match=r"beam_length is 100 mm in small \(number 1\) and 400 mm in small"):

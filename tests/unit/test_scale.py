@@ -120,7 +120,7 @@ def test_a_key_is_made_once_a_scene_and_a_file_opened_once_a_mesh(tool, study_of
 def test_keys_made_together_are_those_made_one_by_one():
     study = load_study(REPOSITORY / "config/quick.yaml")
     together = scenes.scene_keys(study)
-    for mesh, members in scenes.by_mesh(study.scenes).items():
+    for mesh, members in scenes.scenes_by_mesh(study).items():
         assert together[mesh] == [scenes.scene_key(study, scene) for scene in members]
 
 

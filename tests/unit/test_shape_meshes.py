@@ -27,17 +27,8 @@ def plate(**more):
     return Shape.rectangle(0.1, 0.04, name="plate", **{"holes": holes, "points": points, **more})
 
 
-LE1 = Shape(
-    "le1",
-    0.1,
-    [
-        Segment((2, 0), group="lower"),
-        Segment((3.25, 0), (0, 0), "outer"),
-        Segment((0, 2.75), group="left"),
-        Segment((0, 1), (0, 0), "inner"),
-    ],
-    points={"D": (2, 0)},
-)
+SIDES = [((2, 0), None, "lower"), ((3.25, 0), (0, 0), "outer"), ((0, 2.75), None, "left"), ((0, 1), (0, 0), "inner")]
+LE1 = Shape("le1", 0.1, [Segment(*side) for side in SIDES], points={"D": (2, 0)})
 
 
 def polygon_area(corners):

@@ -128,67 +128,61 @@ def circle(*place):
     return Hole.circle(place[:2], place[2])
 
 
+def shape(*corners, **arcs):
+    return lambda: Shape("a", 1, outline(*corners, **arcs))
+
+
+def plate(**parts):
+    return lambda: Shape.rectangle(1, 1, **parts)
+
+
+PULL = [Traction("right", (1, 0))]
 REFUSED = {
-    "two sides": (
-        lambda: Shape("a", 1, outline((0, 0), (1, 0))),
-        "has 2 sides, and a round has 3 or more, with arcs 2",
-    ),
-    "one arc": (lambda: Shape("a", 1, outline((0, 0), centres=[(1, 0)])), "has 1 sides, and"),
-    "bow": (lambda: Shape("a", 1, outline((0, 0), (1, 1), (1, 0), (0, 1))), "sides 1 and 3 meet at (500, 500) mm"),
-    "touching itself": (
-        lambda: Shape("a", 1, outline((0, 0), (2, 0), (2, 1), (1, 0), (0, 1))),
-        "sides 1 and 4 meet at (1000, 0) mm",
-    ),
-    "back": (lambda: Shape("a", 1, outline((0, 0), (1, 0), (0.5, 0))), "turns back on itself at (0, 0) mm"),
-    "cusp": (
-        lambda: Shape("a", 1, outline((1, 0), (0, 1), (2, 1), centres=[None, None, (2, 0)][::-1])),
-        "no ellipse with axes along x and y",
-    ),
-    "no length": (lambda: Shape("a", 1, outline((0, 0), (0, 0), (1, 1))), "side 1: from (0, 0) mm to itself"),
-    "short": (lambda: Shape("a", 1, outline((0, 0), (1, 0), (1, 1), (1 - 1e-8, 1))), "side 3: is shorter than"),
+    "two sides": (shape((0, 0), (1, 0)), "has 2 sides, and a round has 3 or more, with arcs 2"),
+    "one arc": (shape((0, 0), centres=[(1, 0)]), "has 1 sides, and"),
+    "bow": (shape((0, 0), (1, 1), (1, 0), (0, 1)), "sides 1 and 3 meet at (500, 500) mm"),
+    "touching itself": (shape((0, 0), (2, 0), (2, 1), (1, 0), (0, 1)), "sides 1 and 4 meet at (1000, 0) mm"),
+    "back": (shape((0, 0), (1, 0), (0.5, 0)), "turns back on itself at (0, 0) mm"),
+    "cusp": (shape((1, 0), (0, 1), (2, 1), centres=[None, None, (2, 0)][::-1]), "no ellipse with axes along x and y"),
+    "no length": (shape((0, 0), (0, 0), (1, 1)), "side 1: from (0, 0) mm to itself"),
+    "short": (shape((0, 0), (1, 0), (1, 1), (1 - 1e-08, 1)), "side 3: is shorter than"),
     "half a turn": (
-        lambda: Shape("a", 1, outline(*SQUARE, centres=[(0.5, 0)])),
+        shape(*SQUARE, centres=[(0.5, 0)]),
         "outline, side 1: arc from (0, 0) mm to (1000, 0) mm about (500, 0) mm: is half a turn",
     ),
-    "no turn": (lambda: Shape("a", 1, outline(*SQUARE, centres=[(-1, 0)])), "no ellipse"),
+    "no turn": (shape(*SQUARE, centres=[(-1, 0)]), "no ellipse"),
     "no ellipse": (
-        lambda: Shape("a", 1, outline(*SQUARE, centres=[(0.3, 0.1)])),
+        shape(*SQUARE, centres=[(0.3, 0.1)]),
         "the ends are 316.227766 and 707.106781 mm from it, and no ellipse",
     ),
-    "centre at an end": (lambda: Shape("a", 1, outline(*SQUARE, centres=[(0, 0)])), "an end is at the centre"),
-    "arc through a side": (
-        lambda: Shape("a", 1, outline((0, 0), (1, 0), (1, 0.3), (0, 0.3), centres=[(0.5, -0.05)])),
-        "sides 1 and 3 meet at",
-    ),
-    "hole through the outline": (lambda: Shape.rectangle(1, 1, holes=[circle(1, 1, 0.3)]), "hole 1 meets outline at"),
-    "hole at the outline": (lambda: Shape.rectangle(1, 1, holes=[circle(0.5, 0.5, 0.5)]), "hole 1 meets outline at"),
+    "centre at an end": (shape(*SQUARE, centres=[(0, 0)]), "an end is at the centre"),
+    "arc through a side": (shape((0, 0), (1, 0), (1, 0.3), (0, 0.3), centres=[(0.5, -0.05)]), "sides 1 and 3 meet at"),
+    "hole through the outline": (plate(holes=[circle(1, 1, 0.3)]), "hole 1 meets outline at"),
+    "hole at the outline": (plate(holes=[circle(0.5, 0.5, 0.5)]), "hole 1 meets outline at"),
     "holes in holes": (
-        lambda: Shape.rectangle(1, 1, holes=[circle(0.5, 0.5, 0.3), circle(0.5, 0.5, 0.1)]),
+        plate(holes=[circle(0.5, 0.5, 0.3), circle(0.5, 0.5, 0.1)]),
         "hole 2: is inside hole 1, where nothing is",
     ),
     "holes that meet": (
-        lambda: Shape.rectangle(1, 1, holes=[circle(0.4, 0.5, 0.1), circle(0.6, 0.5, 0.1)]),
+        plate(holes=[circle(0.4, 0.5, 0.1), circle(0.6, 0.5, 0.1)]),
         "hole 2 meets hole 1 at (500, 500) mm",
     ),
-    "hole outside": (lambda: Shape.rectangle(1, 1, holes=[circle(5, 0, 1)]), "hole 1: is outside the outline"),
-    "hole around": (lambda: Shape.rectangle(1, 1, holes=[circle(0.5, 0.5, 9)]), "hole 1: is outside the outline"),
+    "hole outside": (plate(holes=[circle(5, 0, 1)]), "hole 1: is outside the outline"),
+    "hole around": (plate(holes=[circle(0.5, 0.5, 9)]), "hole 1: is outside the outline"),
     "group within": (
         lambda: Hole.circle((0, 0), 1, group="rim", part="core"),
         "part 'core': a side has the group 'rim', but is inside the body",
     ),
-    "point outside": (
-        lambda: Shape.rectangle(1, 1, points={"p": (2, 0)}),
-        "point 'p': (2000, 0) mm is not in the body",
-    ),
+    "point outside": (plate(points={"p": (2, 0)}), "point 'p': (2000, 0) mm is not in the body"),
     "point in a hole": (
-        lambda: Shape.rectangle(1, 1, points={"p": (0.5, 0.5)}, holes=[circle(0.5, 0.5, 0.1)]),
+        plate(points={"p": (0.5, 0.5)}, holes=[circle(0.5, 0.5, 0.1)]),
         "point 'p': (500, 500) mm is not in the body",
     ),
     "points as one": (
-        lambda: Shape.rectangle(1, 1, points={"p": (0.5, 0.5), "q": (0.5, 0.5 + 1e-8)}),
+        plate(points={"p": (0.5, 0.5), "q": (0.5, 0.5 + 1e-08)}),
         "points 'p' and 'q': are as good as one",
     ),
-    "point and sides": (lambda: Shape.rectangle(1, 1, points={"left": (0, 0)}), "'left' names a point and sides"),
+    "point and sides": (plate(points={"left": (0, 0)}), "'left' names a point and sides"),
     "file and outline": (lambda: Shape("a", 1, outline(*SQUARE), file="b.msh"), "has both an outline and a file"),
     "nothing": (lambda: Shape("a", 1), "has neither an outline nor a file"),
     "file with points": (lambda: Shape("a", 1, file="b.msh", points={"p": (0, 0)}), "holes and points are those of"),
@@ -200,20 +194,16 @@ REFUSED = {
     "no segment": (lambda: Shape("a", 1, SQUARE), "is not a Segment; give springtune.Segment(...)"),
     "radius": (lambda: Hole.circle((0, 0), 0), "radius: 0 is not above zero"),
     "name of a load": (
-        lambda: Shape.rectangle(
-            1, 1, loads={"push": LoadCase("pull", [Support("left", 0)], [Traction("right", (1, 0))])}
-        ),
+        plate(loads={"push": LoadCase("pull", [Support("left", 0)], PULL)}),
         "'push' has a load that is named 'pull'",
     ),
     "misspelt": (
-        lambda: Shape.rectangle(
-            1, 1, loads={"pull": LoadCase("pull", [Support("lfet", 0)], [Traction("right", (1, 0))])}
-        ),
+        plate(loads={"pull": LoadCase("pull", [Support("lfet", 0)], PULL)}),
         "load 'pull', support: no group is named 'lfet'; did you mean 'left'? known: lower, right, upper, left",
     ),
     "no support": (lambda: LoadCase("a", ()), "load 'a': has no supports"),
     "nothing done": (lambda: LoadCase("a", st.Support("left", 0, 0)), "load 'a': does nothing; give tractions"),
-    "held twice": (lambda: LoadCase("a", [Support("left", 0), Support("left", 1e-3)]), "hold 'left' along x twice"),
+    "held twice": (lambda: LoadCase("a", [Support("left", 0), Support("left", 0.001)]), "hold 'left' along x twice"),
     "holds nothing": (lambda: Support("left"), "support on 'left': holds neither x nor y"),
     "no force": (lambda: Traction("left", ("1 mm", 0)), "traction on 'left', force, x: '1 mm' is a length"),
     "scalar force": (lambda: Traction("left", 5), "traction on 'left', force: 5 is not x and y"),

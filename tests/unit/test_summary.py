@@ -19,7 +19,7 @@ from snakemake_logger_plugin_springtune import LogHandler
 from snakemake_logger_plugin_springtune.display import Display
 from springtune.problem.status import Status
 from springtune.studies.kinds import load_study
-from springtune.studies.kinds.scenes.plan import by_mesh
+from springtune.studies.kinds.scenes.plan import curves_by_mesh
 from springtune.studies.kinds.scenes.variables import ROOT, SENSITIVITY
 from springtune.studies.output import summary
 from springtune.studies.output.dataset import Filler
@@ -169,7 +169,7 @@ def test_planning_adds_no_mesh_to_those_that_have_curves(tmp_path):
     (tmp_path / "some.yaml").write_text(STUDY + other)
     study = load_study(tmp_path / "some.yaml")
     plan.plan(study, tmp_path / "results/some", 1)
-    groups = by_mesh(study.curves)
+    groups = curves_by_mesh(study)
     assert len(groups) == 2 < len(study.meshes) and all(groups.values())
 
 

@@ -15,38 +15,13 @@ import springtune as st
 from springtune.cli import main
 from springtune.studies.output.browse.page import page
 
+from tables import STUDIES
+
 HOSTILE = (
     "`click <javascript:alert(1)>`__ <script>alert(1)</script> $x_{$ #panic('x') .. raw:: html *a* |b| \\ {{ 7*7 }} {x}"
 )
 
-STUDY = """
-title: %s
-beams: {long: {length: 20 mm, height: 10 mm}}
-materials: {steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}}
-shapes:
-  plate:
-    outline:
-      - {from: [0, 0]}
-      - {from: [20 mm, 0], group: right}
-      - {from: [20 mm, 10 mm]}
-      - {from: [0, 10 mm], group: left}
-    loads:
-      pull:
-        supports: {left: fixed}
-        forces: {right: [1 kN, 0]}
-        quantities: {end: {displacement: x, of: right, expected: 9.5 um, source: %s}}
-shape_grids:
-  %s: {shape: plate, mesh_size: 5 mm, material: steel, definition: lattice, kinematics: linear,
-       reference: false}
-refine:
-  %s: {beam: long, material: steel, load: traction, force: 1 kN, mesh_size: 5 mm, definition: lattice,
-       kinematics: linear, parameter: stiffness_scale, from: 0.9, to: 1.1, points: 3, most: 3}
-grids:
-  %s: {beam: long, mesh_type: structured, mesh_size: 5 mm, material: steel, load: traction, force: 1 kN,
-       definition: lattice, kinematics: linear, sensitivity: false}
-printed: printed.csv
-outputs: [tables, refinement, shapes]
-""" % (5 * (json.dumps(HOSTILE),))
+STUDY = STUDIES["hostile_texts"].replace("HOSTILE", json.dumps(HOSTILE))
 
 PRINTED = {
     "table": 1, "beam": "long", "mesh_type": "structured", "mesh_size_mm": 5, "material": "steel", "load": "traction",

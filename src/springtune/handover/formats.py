@@ -57,7 +57,7 @@ COUNTED = {"particles": "points", "springs": "springs", "triangles": "triangles"
 
 
 Read = tuple[dict[str, np.ndarray], Iterable[Terms], dict[str, Any]]
-"""What a file has: arrays by the names of `ARRAYS`, energies and header."""
+"""Content of a file: arrays by the names of `ARRAYS`, energies and header."""
 
 
 def write(path: str | Path, net: Net, mujoco: int | None = None) -> list[Path]:
@@ -82,11 +82,11 @@ def read(path: str | Path) -> Net:
         raise ValueError(f"{path}: there is no such file; give one that was written by springtune")
     told = io.StringIO()
     try:
-        # meshio tells people of what it trips over, and exits.
+        # meshio prints its errors, and exits.
         with redirect_stdout(told), redirect_stderr(told), warnings.catch_warnings():
             warnings.simplefilter("ignore")
             return _checked(*form.read(path))
-    except (Exception, SystemExit) as error:  # of a damaged file the libraries raise whatever they trip over
+    except (Exception, SystemExit) as error:  # libraries raise many kinds of errors for a damaged file
         if isinstance(error, DataElsewhere) or (isinstance(error, OSError) and error.errno is not None):
             raise
         said = " ".join(str(error).split())[:LONGEST_SAID] or type(error).__name__
@@ -100,7 +100,7 @@ def check_target(path: str | Path) -> None:
 
 
 def for_mujoco(path: Path) -> bool:
-    """Whether the ending of a name is that of a model for MuJoCo."""
+    """Whether the ending of a name is one for MuJoCo."""
     return _format_of(path) is _MUJOCO
 
 
@@ -148,7 +148,7 @@ def arrays_of(net: Net) -> dict[str, np.ndarray]:
 
 
 def _counts(header: Mapping[str, Any]) -> dict[str, Any]:
-    """How many particles, springs and cells a header says that a net has; a header of one's own may not say it."""
+    """Numbers of particles, springs and cells by the header; a user's own header may lack them."""
     mesh = header.get("mesh")
     return {name: mesh[name] for name in COUNTED if name in mesh} if isinstance(mesh, dict) else {}
 
@@ -187,7 +187,7 @@ SPRING_COLUMNS = ("springs", "rest_lengths", "stiffness")
 
 
 def companions(path: Path) -> dict[str, Path]:
-    """Tables beside that of the springs, ``net.particles.csv`` and so on, by what they hold."""
+    """Tables beside the table of springs, such as ``net.particles.csv``, by their content."""
     return {name: path.with_name(f"{path.stem}.{name}{path.suffix}") for name in ("particles", *CELL_ARRAYS.values())}
 
 
@@ -207,11 +207,11 @@ def _write_csv(path: Path, net: Net) -> list[Path]:
     said += [f"# {line}" for line in _header_lines(net.header)]
     texts = {other: _csv_text(table) for other, table in tables.items()}
     texts[path] = "\n".join([*said, ""]) + _csv_text(_table(arrays, SPRING_COLUMNS))
-    with ExitStack() as unfinished:  # the last one is the first to get its name: where it cannot, none does
+    with ExitStack() as unfinished:  # the last one gets its name first: if that fails, none gets one
         for one, text in texts.items():
             unfinished.enter_context(replacing(one)).write_text(text, encoding="utf-8")
     for other in set(others.values()) - set(tables):
-        other.unlink(missing_ok=True)  # of another net, written before
+        other.unlink(missing_ok=True)  # left by another net
     return [path, *tables]
 
 
@@ -412,7 +412,7 @@ def write_vtu_with(
 
 
 def _numbers(header: Mapping[str, Any]) -> dict[str, float]:
-    """Numbers of a header that one looks for in ParaView."""
+    """Numbers of a header for ParaView."""
     found = {"thickness": header["thickness"]}
     for group in ("expected_error", "largest_stable_step"):
         values = header.get(group)

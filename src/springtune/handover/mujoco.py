@@ -3,12 +3,12 @@
 Each particle that can move is a body on a slide joint for each direction that is not held, each spring a spatial tendon
 with its stiffness and its rest length: MuJoCo's law is ``stiffness (springlength - length)`` along the tendon, which is
 that of springtune, in tension and in compression. A fixed tendon spreads the load, and one actuator is the load, its
-control added to it: whoever opens the file sees it move, and changes the load by a slider. Damping is that of the
+control added to it: in the viewer the net moves, and a slider changes the load. Damping is that of the
 joints, which MuJoCo's integrator Euler takes implicitly; else it is `symplectic-euler`, and so is its largest step.
 
 Coupled springs of squared lengths (definition `delingette`) are the St. Venant-Kirchhoff energy of linear triangles,
-and so is MuJoCo's flex of two dimensions (3.3.7 and later), but for what version 3 calls young and poisson. Its shear
-modulus and Lame's first constant, times the thickness t, are
+and so is MuJoCo's flex of two dimensions (3.3.7 and later); young and poisson mean other constants in version 3. Its
+shear modulus and Lame's first constant, times the thickness t, are
 
     MuJoCo 3: mu t = t young / (8 (1 + poisson)), lambda t = t young poisson / (2 (1 + poisson) (1 - 2 poisson));
     MuJoCo 4: mu t = t young / (2 (1 + poisson)), lambda t = t young poisson / (1 - poisson^2), those of plane stress,
@@ -193,7 +193,7 @@ def _flex(net: Net, terms: Terms, size: float, version: int) -> str:
     # MuJoCo refuses a half, which plane stress allows in MuJoCo 4.
     poisson = ratio / (4 + 2 * ratio) if version == 3 else min(ratio / (2 + ratio), float(np.nextafter(0.5, 0)))
     young = (8 if version == 3 else 2) * (1 + poisson) * second
-    # An attribute that MuJoCo 3 does not know, and refuses; 0 is none.
+    # An attribute that MuJoCo 3 does not know, and refuses; 0 turns it off.
     only = "" if version == 3 else ' yield="0"'
     bodies = " ".join(f"b{number}" for number in range(len(net.points)))
     return "\n".join(

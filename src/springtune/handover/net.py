@@ -59,21 +59,21 @@ MEANING = (
     "(network - reference) / |reference| of the displacement along the force, tension positive: above zero where the "
     "springs are too soft, under compression and pressure below; linear kinematics, small strain"
 )
-"""What an expected error is."""
+"""Meaning of an expected error."""
 
 MEANING_ON_SHAPES = (
     "(network - reference) / |reference| of each quantity that the load case asks for; linear kinematics, small strain"
 )
-"""What an expected error is on a shape."""
+"""Meaning of an expected error on a shape."""
 
 CONSTANTS_SAID = ("name", "young_modulus", "poisson_ratio", "density")
-"""What a header says of a material."""
+"""Constants of a material in a header."""
 
 STEP_MEANING = "about rest, undamped; springs that stiffen, and damping that lags, narrow it"
-"""What a largest stable step is."""
+"""Meaning of a largest stable step."""
 
 NOT_COMPUTED = "not computed"
-"""How a text begins that stands in the place of a number."""
+"""First words of a text in the place of a number."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +91,7 @@ class SpringNet(Net):
     stiffness : ndarray of float, shape (n_springs,)
         [N/m]; 0 for edges that a definition gives no spring, as where the law of all springs is part of `energies`.
     energies : tuple of Terms
-        What there is besides springs; empty for springs alone.
+        Energies besides springs; empty for springs alone.
     masses : ndarray of float, shape (n_points,), or None
         Of particles [kg]; None where the material has no density.
     thickness : float
@@ -149,7 +149,7 @@ class SpringNet(Net):
         Raises
         ------
         DefinitionError
-            If the definition cannot live on the mesh or with the material.
+            If the definition does not support the mesh or the material.
         """
         springs = scene.springs if springs is None else springs
         about, forces = scene.statement, scene.statement.forces(scene.sheet, springs)
@@ -203,9 +203,9 @@ class SpringNet(Net):
         beam : Beam, optional
             That the mesh fills: with it the header says the expected errors.
         stiffness : float or str, optional
-            Uniform stiffness [N/m], for definitions that are told one.
+            Uniform stiffness [N/m], for definitions that need one.
         springs : Springs, optional
-            In the place of those that the definition gives.
+            In the place of the definition's.
         mesh_name, errors : optional
             As of `from_scene`.
         loads : iterable of str, optional
@@ -222,7 +222,7 @@ class SpringNet(Net):
             If an argument is unknown or out of its range, the mesh does not fill the beam, or loads are given without
             a beam.
         DefinitionError
-            If the definition cannot live on the mesh or with the material, or is not told what it needs.
+            If the definition does not support the mesh or the material, or lacks what it needs.
         """
         is_a(mesh, Mesh, "mesh", A_MESH)
         is_a(material, Material, "material", A_MATERIAL)
@@ -340,7 +340,7 @@ def terms(energy: Energy, reference: float) -> Terms:
 
 
 def _everywhere(energy: Energy, mesh: Mesh) -> Energy:
-    """An energy of some cells as one of all with as many corners, the others' moduli zero: files have all cells."""
+    """Extend an energy to all cells with as many corners, by moduli of zero: files have all cells."""
     if type(energy) not in (AngleEnergy, AreaEnergy, BiquadraticEnergy, NeoHookeEnergy, YeohEnergy):
         return energy  # which `terms` refuses
     cells = mesh.cells[energy.corners.shape[1]]
@@ -448,7 +448,7 @@ def _expected_errors(
     material: Material,
     loads: Sequence[str],
 ) -> dict[str, float | str]:
-    """Error of the displacement by load, linear kinematics against the reference of small strain; or why none."""
+    """Error by load, linear kinematics against the reference of small strain; or why it is not computed."""
     # Here, since finite elements take half a second to import.
     from ..prediction.choices import PREDICTED, SOLVED, displacement_of, error_of, references
 
@@ -458,7 +458,7 @@ def _expected_errors(
         return dict.fromkeys(loads, why)
     refused = f"{NOT_COMPUTED}: definition '{definition.name}' is not for this load"
     solved = [name for name in loads if LOADS[name].kind.uniaxial or not definition.uniaxial]
-    # To linear kinematics a load that turns with its side is the one that does not.
+    # In linear kinematics a load that turns with its side equals the one that does not.
     steady = {name: name if name in PREDICTED else _steady(name) for name in solved}
     known = references(beam, material, steady.values()) if solved else {}
     displacements: dict[LoadKind, float | str] = {}
@@ -476,12 +476,12 @@ def _expected_errors(
 
 
 def _steady(load: str) -> str:
-    """The load that differs from one in that it does not turn with its side."""
+    """The same load with a fixed direction."""
     return next(name for name, one in LOADS.items() if one == replace(LOADS[load], follower=False))
 
 
 def _errors_on_shape(scene: Scene) -> dict[str, float | str]:
-    """Error of each quantity of a load case, linear kinematics against the reference of small strain; or why none."""
+    """Error by quantity, linear kinematics against the reference of small strain; or why it is not computed."""
     # Here, since finite elements take half a second to import.
     from ..prediction import ReferenceNotConvergedError
     from ..prediction.choices import SOLVED, shape_references
@@ -525,7 +525,7 @@ def _stable_steps(
     inertia: np.ndarray | None,
     held: np.ndarray | None,
 ) -> dict[str, float | str] | str:
-    """Largest stable step of each integrator, undamped [s], or that any is stable; or why there is none."""
+    """Largest stable step of each integrator, undamped [s], or "unlimited"; or why it is not computed."""
     if inertia is None:
         lacking = next(one.name for one in materials if one.density is None)
         return f"{NOT_COMPUTED}: material '{lacking}' has no density"

@@ -73,7 +73,7 @@ def comment_of(path: str | Path) -> str:
 
 
 MOST_PIECES = 10_000
-"""Most files of a collection: ParaView and file systems take no more gladly."""
+"""Most files of a collection: more are slow in ParaView and file systems."""
 
 Add = Callable[..., None]
 """Adds a piece to a collection: its time, what writes it to a file of a given name, and a name where it has one."""
@@ -118,7 +118,7 @@ def series(path: str | Path) -> Iterator[Add]:
         for piece in {*pieces, *finished} - set(before):
             piece.unlink(missing_ok=True)
         if made:
-            with suppress(OSError):  # where it is not empty: the cause is what is to be told
+            with suppress(OSError):  # not empty: the first error is the one to raise
                 folder.rmdir()
         raise
     for old in set(before) - set(finished):
@@ -135,5 +135,5 @@ def pieces_of(path: str | Path) -> list[Path]:
         return []
     folder = path.with_suffix("")
     named = re.findall(r' file="([^"]*)"', path.read_text(encoding="utf-8", errors="replace"))
-    mine = re.compile(rf"{re.escape(folder.name)}/([^/]*\.vtu)")  # another program's collection may name anything
+    mine = re.compile(rf"{re.escape(folder.name)}/([^/]*\.vtu)")  # other programs' collections may name any file
     return [path, *(folder / found.group(1) for name in named if (found := mine.fullmatch(unescape(name))))]

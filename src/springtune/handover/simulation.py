@@ -1,4 +1,4 @@
-"""What simulators need besides springs: masses, a damping, a step that is stable, and where it all should come to."""
+"""What simulators need besides springs: masses, damping, a stable step, and the equilibrium to expect."""
 
 import warnings
 from collections.abc import Iterable, Mapping
@@ -18,8 +18,8 @@ from ..problem.status import Status
 from .terms import Net
 
 STEP_SHARE = 0.8
-"""Step that is written, over the largest stable one at rest, in equilibrium and where the net swings to on its way:
-fronts of waves stretch springs further."""
+"""Written step over the largest stable one, at rest, in equilibrium and as far as the net swings: fronts of waves
+stretch springs further."""
 
 WORDS = {
     "area": "areas",
@@ -28,11 +28,11 @@ WORDS = {
     "incompressible": "rubber",
     "compressible": "rubber",
 }
-"""What energies besides springs are of, by their kind."""
+"""Words for energies besides springs, by kind."""
 
 
 class EquilibriumWarning(UserWarning):
-    """What is written has no equilibrium to come to, or one that is far away."""
+    """Warning of a net without an equilibrium, or with one that is far away."""
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ def simulate(net: Net, program: str, laws: Iterable[str] = ()) -> Simulation:
 
 
 def _warn(net: Net, displacements: np.ndarray | None, why: str) -> None:
-    """Say aloud what a file says of its equilibrium only where somebody looks for it."""
+    """Warn of a missing equilibrium, or of one that is far away."""
     if displacements is None:
         smaller = "force" if net.header.get("beam") else "scale"
         said = f"no equilibrium was found, so the file has none: {why}; give a smaller {smaller}"
@@ -161,7 +161,7 @@ def _lowest_frequency(motion: Motion, displacements: np.ndarray | None = None) -
 
 
 def _check(net: Net, program: str, laws: Iterable[str]) -> None:
-    """Refuse what no file for a simulator can hold."""
+    """Refuse a net that a simulator cannot represent."""
     name = net.header["definition"]
     lacking = [WORDS[terms.kind] for terms in net.energies if terms.kind not in laws]
     if lacking:
@@ -209,7 +209,7 @@ def _network(net: Net, reference: float) -> Network:
 
 
 def about(net: Net, simulation: Simulation, integrator: str) -> list[str]:
-    """Lines that say in a file what it is of: definition, material, load, expected errors, and its step."""
+    """Lines of comment: definition, material, load, expected errors and step."""
     header = net.header
     material, load, errors = header["material"], header.get("load"), header.get("expected_error")
     constants = ""
@@ -249,7 +249,7 @@ def about(net: Net, simulation: Simulation, integrator: str) -> list[str]:
 
 
 def numbers(values: np.ndarray) -> str:
-    """Numbers of an array one after the other, each as short as it can be read back exactly."""
+    """Numbers of an array in a row, each in the shortest text that is read back exactly."""
     return " ".join(map(repr, values.ravel().tolist()))
 
 

@@ -1,7 +1,7 @@
 """Constraints for extended position-based dynamics (XPBD), as JSON.
 
 A spring is the distance constraint ``C = l - L`` with the compliance 1/k [m/N] (Macklin, Mueller, Chentanez, XPBD,
-Motion in Games 2016): where a solver has converged, the constraint pulls with C over its compliance, whatever the step.
+Motion in Games 2016): where a solver has converged, the constraint pulls with C over its compliance, for any step.
 """
 
 import json

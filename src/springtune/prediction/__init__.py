@@ -1,6 +1,6 @@
-"""What a user without a study needs: which definition on a mesh, how far off it is, and which mesh keeps an error.
+"""Predictions without a study: which definition on a mesh, how large its error, and which mesh keeps an error.
 
-`choices` solves the definitions on one mesh, `bands` says what can be said of meshes too large for that, and `search`
+`choices` solves the definitions on one mesh, `bands` extrapolates to meshes too large for that, and `search`
 finds the coarsest mesh that keeps an error.
 """
 

@@ -12,16 +12,16 @@ from ..problem.materials import Material
 from .choices import CASES, Choice, Number, References, best_first, check_beam, check_loads, predict, references
 
 BANDS_FROM = 10_000
-"""Particles of the finest mesh that a band is from."""
+"""Particles of the finest mesh for a band."""
 
 FEWEST_CELLS = 4
-"""Cells across a beam from which on errors are taken to change regularly with the mesh size."""
+"""Cells across a beam above which errors change regularly with the mesh size."""
 
 COARSER, TRIED = 6, 30
-"""Meshes that a band is from, and sizes of which each of them is chosen."""
+"""Meshes for a band, and sizes to choose each of them from."""
 
 MARGIN, LEAST_MARGIN, LEAST_OF_ERROR = 1.0, 5e-4, 0.05
-"""What is added to a band at either end: over its width, at least [1], and at least over the error itself."""
+"""Margin at either end of a band: over its width, least margin [1], and least margin over the error."""
 
 
 def extrapolate(
@@ -65,7 +65,7 @@ def extrapolate(
 
 
 def _like(mesh_type: str, beam: Beam, size: float, sizes: np.ndarray, sign: int) -> float:
-    """Of some mesh sizes that whose cells are next to those of a size in their stretch, on one side of it if any is."""
+    """Mesh size with the closest cell stretch, on one side of it if possible."""
     stretch, box = MESH_TYPES[mesh_type].stretch, (beam.length, beam.height)
     apart = sign * np.array([stretch(*box, one) / stretch(*box, size) - 1 for one in sizes])
     return float(sizes[np.argmin(np.where(apart >= -1e-9, np.abs(apart), 1 + np.abs(apart)))])
@@ -101,7 +101,7 @@ def _band(choices: list[Choice], sizes: list[float], size: float) -> Choice:
 
 
 def _band_in_words(texts: list[list[str]]) -> str:
-    """One text of several that differ in their numbers, given in words."""
+    """One text for several that differ in their numbers, given as lists of words."""
     merged = []
     for words in zip(*texts):
         ends = [words[0]] if len(set(words)) == 1 else [min(words, key=float), max(words, key=float)]

@@ -39,8 +39,7 @@ CASES = ("traction", "bending", "shear")
 """Loads that are predicted where none are named."""
 
 SHORTEST_SIDE, LONGEST_SIDE, MOST_SLENDER = 1e-9, 1e7, 1e4
-"""Sides [m] and aspect ratio beyond which a beam is taken for an error of units: atoms are next, the Earth is no
-larger, and more slender beams are beyond what the references of bending resolve."""
+"""Limits of a beam's sides [m] and aspect ratio: beyond them the unit is likely wrong, or bending has no reference."""
 
 ON_TRIANGLES = ("patch", "lattice", "van-gelder", "oriented", "delingette", "area", "patch-area")
 """Definitions that are tried on triangles, springs alone first: of all that need no tuning, those that are the best one
@@ -56,14 +55,14 @@ NEED_ENERGIES = ("delingette", "area", "patch-area", "orthotropic")
 """Those of them that need more than springs."""
 
 ALIKE = 1e-5
-"""Difference of stiffnesses, relative, below which they are one: they are shown with five digits."""
+"""Relative difference below which stiffnesses count as equal: five digits are shown."""
 
 SOLVED, SOLVED_FROM_FILE = 20_000, 100_000
 """Particles up to which a mesh is solved, in some three seconds; up to which one from a file is, in some twenty."""
 
 
 ROUNDED = 1e-9
-"""Error that rounding makes up to, at most [1]: references of closed form are surer than networks are solved."""
+"""Largest error by rounding [1]; references of closed form have a smaller estimate."""
 
 _T = TypeVar("_T")
 
@@ -71,7 +70,7 @@ Number = float | tuple[float, float]
 """A number, or the two bounds of a band."""
 
 References = dict[str, ReferenceSolution | str]
-"""References of 1 N by load, or why there is none."""
+"""References of 1 N by load, or why one is missing."""
 
 
 class QuantityReference(NamedTuple):
@@ -82,7 +81,7 @@ class QuantityReference(NamedTuple):
 
 
 ShapeReferences = dict[str, QuantityReference | str]
-"""References by quantity of interest, or why there is none."""
+"""References by quantity of interest, or why one is missing."""
 
 
 @dataclass(frozen=True)
@@ -98,21 +97,21 @@ class Choice:
     inside, outline : float
         Stiffness of the sides of cells inside and on the outline [N/m]; NaN where they differ from one to the next.
     extra : str
-        What there is besides these springs.
+        Energies, diagonals and scale besides these springs, in words.
     energies : bool
-        Whether a simulator needs more than springs for it.
+        Whether it needs more than springs.
     errors : dict of str to float
         Deformation error by load, of a shape by quantity, linear kinematics against the reference of small strain,
         (network - reference) / abs(reference) [1]: above zero where the network is too soft, but below under
-        compression and pressure, whose displacements are negative. NaN where there is none, because of the reference or
-        for the reason in `failures`, and of a quantity that is next to nothing beside others of its kind.
+        compression and pressure, whose displacements are negative. NaN without a reference, for
+        the reason in `failures`, and of a quantity that is negligible beside others of its kind.
     young_modulus_error : float
         Young's modulus along x between rollers over the material's, less one [1].
     poisson_ratio : float
         Poisson's ratio there [1].
     failures : dict of str to str
-        What has no number on this mesh, a load, the ``"patch test"`` or the ``"springs"`` themselves, and why: the
-        network is unstable or singular at rest, or too ill-conditioned, or the definition refuses the mesh.
+        Why numbers are missing, by load, ``"patch test"`` or ``"springs"``: the network is unstable, singular or
+        ill-conditioned at rest, or the definition does not support the mesh.
 
     Examples
     --------
@@ -149,7 +148,7 @@ class Choice:
 
 
 def check_beam(beam: Beam) -> None:
-    """Refuse a beam that is none: larger than any, smaller than atoms, or more slender than its references resolve."""
+    """Refuse a beam of absurd size, or too slender for its references."""
     is_a(beam, Beam, "beam", A_BEAM)
     sides = {"long": beam.length, "high": beam.height, "thick": beam.thickness}
     for word, side in sides.items():
@@ -222,19 +221,18 @@ def predict(
     list of Choice
         Of `ON_TRIANGLES`, `ON_QUADS` or `ANISOTROPIC`, the same springs once; those that fail come last. Errors that
         differ by less than the reference's error estimate are equal: springs alone come first, then names. On a shape
-        their errors are by quantity of interest, and moduli are none, since a patch test between rollers is one of
-        strips.
+        errors are by quantity of interest, and moduli are NaN: a patch test between rollers needs a strip.
 
     Raises
     ------
     ValueError
-        If an argument is none, the mesh does not fill the beam, or a load cannot be predicted.
+        If an argument is wrong, the mesh does not fill the beam, or a load cannot be predicted.
     DefinitionError
-        If none of them can live on the mesh.
+        If no definition supports the mesh.
 
     Notes
     -----
-    Each number is that of a scene of the same beam, mesh, material, load and definition, solved with linear kinematics.
+    Each number equals that of a scene of the same beam, mesh, material, load and definition in linear kinematics.
 
     Examples
     --------
@@ -362,7 +360,7 @@ def shape_references(statement: ShapeStatement) -> ShapeReferences:
 
 
 def displacement_of(sheet: Sheet, springs: Springs, kind: LoadKind) -> float | str:
-    """Displacement [1] under the springs' reference stiffness times 1 m, linear kinematics; or why there is none."""
+    """Displacement [1] under the springs' reference stiffness times 1 m, linear kinematics; or why it is missing."""
     try:
         found = sheet.solve(kind, springs, springs.reference, "linear")
     except SingularError as error:
@@ -482,7 +480,7 @@ class Trial:
         )
 
     def _axial_moduli(self, springs: Springs) -> tuple[float, float] | str:
-        """Young's modulus over the reference stiffness and Poisson's ratio between rollers; or why there are none."""
+        """Young's modulus over the reference stiffness and Poisson's ratio between rollers; or why they are missing."""
         assert self._test is not None
         key = key_of(springs)
         if key not in self._moduli:
@@ -507,7 +505,7 @@ class Trial:
 
 
 def in_words(sheet: Sheet, material: AnyMaterial | None, name: str, springs: Springs) -> tuple[float, float, str]:
-    """Stiffness of sides inside and on the outline, and in words what else there is."""
+    """Stiffness of sides inside and on the outline, and the rest in words."""
     mesh = sheet.mesh
     outline, several = mesh.on_outline, mesh.cells_per_edge > 1
     inside, at_outline, diagonals = (
@@ -530,11 +528,11 @@ def in_words(sheet: Sheet, material: AnyMaterial | None, name: str, springs: Spr
 
 
 def _common(values: np.ndarray) -> float:
-    """The one that all values are, NaN where they differ."""
+    """The common value of all, NaN where they differ."""
     alike = len(values) and values.any() and np.ptp(values) <= ALIKE * np.abs(values).max()
     return float(np.median(values)) if alike else nan
 
 
 def key_of(springs: Springs) -> tuple[bytes, ...]:
-    """What tells networks apart but for their reference stiffness."""
+    """Key of a network up to its reference stiffness."""
     return springs.relative.tobytes(), *(energy.key for energy in springs.energies)

@@ -1,11 +1,10 @@
 """Which mesh keeps an error: the coarsest one of each type, found by solving.
 
 Errors do not fall evenly with the mesh size: the error of one load may pass through zero, and whole numbers of cells
-stretch a mesh now more, now less. So a mesh is not taken because it happens to keep the error. It is taken with a
-definition that keeps it there and on every finer mesh of its type that was tried, up to one with at least twice as many
-cells across the beam, two finer ones at least; and that would still keep it there if its error changed once more by as
-much as it did over the last doubling of the cells, so that it is not just passing by zero. Finer meshes are those of
-whole numbers of cells across, and some of sizes between these, whose cells are stretched to fit.
+stretch a mesh now more, now less. So one mesh that keeps the error proves nothing. A mesh counts if a definition
+keeps the error on it and on all finer meshes tried, at least two, up to one with twice as many cells across the beam.
+The last change over a doubling of the cells may happen once more, so that the error is not just passing zero. Finer
+meshes have whole numbers of cells across, and some sizes between, whose cells are stretched to fit.
 """
 
 import math
@@ -47,14 +46,13 @@ from .choices import (
 )
 
 ENOUGH_FINER, FEWEST_FINER = 2.0, 2
-"""Cells across the finest mesh that was tried over those of the one that is taken, and how many finer ones were, at
-least."""
+"""Cells across the finest mesh tried over those of the answer, and number of finer meshes tried, at least."""
 
 ROW_HEIGHT = math.sqrt(3) / 2
 """Height of an equilateral triangle, over its side."""
 
 LEFT_TO_GO = 1.5
-"""What may be left of an error's way to its limit, over what is left of one in proportion to the mesh size."""
+"""Allowed rest of an error's way to its limit, over the rest of an error in proportion to the mesh size."""
 
 
 EVERY_UP_TO, STEPS_A_DOUBLING, TRIED_BETWEEN = 16, 4, 2
@@ -62,10 +60,10 @@ EVERY_UP_TO, STEPS_A_DOUBLING, TRIED_BETWEEN = 16, 4, 2
 tried between two of these, where the coarsest mesh is."""
 
 DEFINITIONS_TRIED = tuple(dict.fromkeys((*ON_TRIANGLES, *ON_QUADS)))
-"""Definitions of which some live on each mesh."""
+"""Definitions to try; each mesh supports some."""
 
 SPRINGS_ALONE = tuple(name for name in DEFINITIONS_TRIED if name not in NEED_ENERGIES)
-"""Definitions that need nothing but springs."""
+"""Definitions of springs alone."""
 
 BETWEEN_DIVISIONS = (0.98, 0.95, 0.9, 0.83, 0.7, 0.56)
 """Sizes between whole divisions that an answer is tried on, over its own."""
@@ -144,10 +142,10 @@ class MeshChoice:
         The definition, its stiffness and its errors.
     particles, springs : int
     seconds : float
-        That one static solve takes with linear kinematics, springs at hand, the longest of the loads'; measured once.
+        Time of one static solve with linear kinematics, without deriving springs, the longest of the loads.
     step_limit : float
-        Largest stable step of undamped explicit schemes about rest [s], the sheet held nowhere, which is the least of
-        all supports; NaN where the material has no density, or the eigenvalue could not be found.
+        Largest stable step of undamped explicit schemes about rest [s], the sheet held nowhere, which no
+        support lowers; NaN without a density, or if the eigenvalue is not found.
     finer : tuple of SolvedMesh
         Finer meshes that were tried, on each of which the definition keeps the error, too.
     confirmed : bool
@@ -192,18 +190,18 @@ class MeshSearch:
     Attributes
     ----------
     error : float
-        What is to be kept [1].
+        Error to keep [1].
     loads : tuple of str
-        Under which.
+        Loads that keep it.
     most : int
         Particles of the largest mesh that may be tried.
     known : dict
-        Reference of 1 N by load; of a shape that of each quantity of interest, and `loads` are those quantities.
+        Reference of 1 N by load; of a shape by quantity of interest, and `loads` are these quantities.
     by_type : dict of str to MeshChoice or None
-        By mesh type the coarsest mesh, with whatever definition keeps the error; None where none does up to `most`
-        particles. Where too few finer ones are as small, one that is not `MeshChoice.confirmed`.
+        The coarsest mesh by mesh type, with a definition that keeps the error; None if there is none up to `most`
+        particles. Without enough finer meshes it is not `MeshChoice.confirmed`.
     springs_by_type : dict of str to MeshChoice or None
-        As `by_type`, with springs alone.
+        As `by_type`, for springs alone.
     tried : tuple of SolvedMesh
         All that was solved, each type from coarse to fine.
 
@@ -230,12 +228,12 @@ class MeshSearch:
 
     @property
     def best(self) -> MeshChoice | None:
-        """The one of least particles of all types, confirmed ones first; None where none keeps the error."""
+        """The mesh with the fewest particles, confirmed ones first; None if no mesh keeps the error."""
         return self._least(self.by_type)
 
     @property
     def best_springs(self) -> MeshChoice | None:
-        """The one of least particles that has springs alone; None where none keeps the error."""
+        """The mesh with the fewest particles and springs alone; None if no mesh keeps the error."""
         return self._least(self.springs_by_type)
 
     def _least(self, found: dict[str, MeshChoice | None]) -> MeshChoice | None:
@@ -281,13 +279,13 @@ def find_mesh(
     Parameters
     ----------
     beam : Beam or Shape
-        A shape has an outline; what is to be kept is the error of all quantities of interest of a load case.
+        A shape needs an outline; all quantities of interest of a load case keep the error.
     material : Material, AnisotropicMaterial or mapping of str to those
         Of a shape of several parts by their names.
     error : float or str
         Largest size of an error to keep, a fraction or a text such as ``"1 %"``.
     loads : iterable of str, optional
-        Loads of a beam under which it is to be kept: of traction, compression, bending, shear and pressure.
+        Loads of a beam that keep it: of traction, compression, bending, shear and pressure.
     mesh_types : sequence of str, optional
         Keys of `springtune.MESH_TYPES`, for a beam; all without. Meshes of shapes are free ones.
     load : str, optional
@@ -302,8 +300,8 @@ def find_mesh(
     Raises
     ------
     ValueError
-        If an argument is none or unknown, a load has no reference, or the error is below what the reference's own error
-        estimate allows.
+        If an argument is wrong or unknown, a load has no reference, or the error is not above
+        the error estimate of the reference.
 
     Notes
     -----
@@ -340,7 +338,7 @@ def find_mesh(
         raise ValueError(f"load: {load!r} is of shapes alone; give loads for a beam")
     check_beam(beam)
     is_a(material, Material, "material", A_MATERIAL)
-    assert isinstance(material, Material)  # as type checkers are told
+    assert isinstance(material, Material)  # for type checkers
     asked_error(error)
     loads = check_loads(loads)
     names = tuple(MESH_TYPES) if mesh_types is None else _mesh_types(mesh_types)
@@ -553,7 +551,7 @@ class _Search:
         return [self._tried[cells] for cells in sorted(self._tried)]
 
     def found(self, springs_alone: bool) -> MeshChoice | None:
-        """The coarsest mesh that is taken, and what it costs; None where there is none."""
+        """The coarsest mesh that counts, with its cost; None without one."""
         sure = self._start(springs_alone) if self._holds(springs_alone) else None
         start = sure or self._start(springs_alone, confirmed=False)
         if start is None:

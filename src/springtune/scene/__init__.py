@@ -1,6 +1,6 @@
 """Scenes: the one recipe from a mesh to an answer, and what is read from it.
 
 `sheet` has the recipe, springs to network to problem to equilibrium; `single` one scene and its result, `curve` the
-displacement over uniform stiffness, `moduli` patch tests, `motion` a scene in time. A module of its own each: a stage
-of a study depends on those that it imports.
+displacement over uniform stiffness, `moduli` patch tests, `motion` a scene in time. A stage of a
+study depends on the modules that it imports.
 """

@@ -26,7 +26,7 @@ RATIOS = tuple(COEFFICIENT * np.linspace(0.4, 1.6, 61))
 
 
 LEAST_RATIO = 1e-9
-"""Ratio above which stiffnesses have to be, and below one over which [1]."""
+"""Least ratio of a stiffness; the largest is one over it [1]."""
 
 
 def follow(sheet: Sheet, kind: LoadKind, kinematics: str, loads: np.ndarray) -> LinearPath | StablePath:
@@ -77,12 +77,12 @@ class Curve:
     stable : ndarray of bool, shape (n,)
         Whether the path from rest gets there and is stable all the way.
     message : str
-        Why it is not; empty where all are stable.
+        Why some are not stable; empty where all are.
     best_stiffness : float
-        Where a stable equilibrium has no error [N/m]; NaN where there is none.
+        Stiffness of the stable equilibrium without error [N/m]; NaN without one.
     best_status : Status
     best_message : str
-        Why there is none.
+        Why `best_stiffness` is NaN.
     predicted_stiffness : float
         By closed form [N/m], of rows of equilateral triangles, see `springtune.springs.lattice.predicted_stiffness`;
         NaN for loads that have none.
@@ -144,7 +144,7 @@ def sensitivity(scene: "Scene", stiffness_ratios: ArrayLike | None = None) -> Cu
     Parameters
     ----------
     scene : Scene
-        Its definition plays no part; a force that follows its side, in nonlinear kinematics, has no curve.
+        Its definition is not used; a force that follows its side, in nonlinear kinematics, has no curve.
     stiffness_ratios : array_like of float, optional
         Stiffnesses over E t [1], above zero; 61 from 0.4 to 1.6 times sqrt(3)/2 without.
 

@@ -19,14 +19,14 @@ from ..problem.shapes import Shape
 from .sheet import chosen
 
 FILLED = 1e-6
-"""What a mesh may miss of its beam, over the beam's extent."""
+"""Largest gap between a mesh and its beam, over the beam's extent."""
 
 
 OFF_SIDE = 1e-5
-"""What particles may be off the side of a shape that they are on, over its extent: formats in text have few digits."""
+"""Largest distance of a particle from its side of a shape, over its extent: text formats have few digits."""
 
 LEAST_COVERED = 0.9
-"""Length of a group's edges over that of its sides, at least: chords are shorter than arcs, of six a turn by 5 %."""
+"""Least length of a group's edges over the length of its sides: six chords are 5 % shorter than a circle."""
 
 
 def is_a(value: object, wanted: type | tuple[type, ...], name: str, example: str) -> None:
@@ -158,8 +158,8 @@ def mesh_shape(
     Raises
     ------
     ValueError
-        If the shape is that of a file, the mesh type another one, or a size not above zero, larger than the shape or
-        absurdly small.
+        If the shape has the mesh of a file, the mesh type is another one, or a size is not above zero, larger than the
+        shape or absurdly small.
 
     Examples
     --------
@@ -178,7 +178,7 @@ def read_shape(path: str | Path, unit: float | str = "1 m") -> GroupedMesh:
     """Read the mesh of a shape with its groups, of any format that meshio knows.
 
     Groups are Gmsh's physical groups, sets of cells and of points in Abaqus and other files, and arrays of zeros and
-    ones in VTU; how each becomes sides, a point or a part is told in the guide on mesh files.
+    ones in VTU; the guide on mesh files says how each becomes sides, a point or a part.
 
     Parameters
     ----------
@@ -208,7 +208,7 @@ def read_shape(path: str | Path, unit: float | str = "1 m") -> GroupedMesh:
 
 
 def check_meshed(shape: Shape, grouped: GroupedMesh, materials: Mapping[str, AnyMaterial]) -> None:
-    """Refuse a mesh that is of another shape, or has groups that are not the shape's: the reference is on the outline.
+    """Refuse a mesh of another shape, or with other groups: the reference is on the outline.
 
     Examples
     --------
@@ -229,7 +229,7 @@ def check_meshed(shape: Shape, grouped: GroupedMesh, materials: Mapping[str, Any
     small = OFF_SIDE * max(high[0] - low[0], high[1] - low[1])
 
     def filled(part: str | None) -> object:
-        """What a part is of: its material, or a part that the mesh lacks; None for nothing."""
+        """Material of a part, or the name of a part that the mesh lacks; None for nothing."""
         return None if part is None else materials.get(part, part)
 
     sides = [side for one in shape.rounds if filled(one.inner) != filled(one.outer) for side in one.sides]
@@ -280,7 +280,7 @@ def _between(grouped: GroupedMesh, materials: Mapping[str, AnyMaterial]) -> np.n
 
 
 def _distances(side: OutlineSide, points: np.ndarray) -> np.ndarray:
-    """Distances of points from a side [m], shape (n,); of an ellipse's arc of points that are next to it."""
+    """Distances of points from a side [m], shape (n,); on an ellipse only for points close to it."""
     if side.arc is None or side.centre is None:
         start, along = np.array(side.start), np.subtract(side.end, side.start)
         shares = np.clip((points - start) @ along / (along @ along), 0.0, 1.0)

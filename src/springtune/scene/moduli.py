@@ -15,7 +15,7 @@ from .sheet import AnyDefinition, Sheet, definition_of, named
 
 @dataclass(frozen=True)
 class Moduli:
-    """What a network is as a material.
+    """Effective moduli of a network.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class Moduli:
 
     Examples
     --------
-    On squares with both diagonals, springs alone have the Young's modulus asked for, and nu = 1/3 whatever is asked:
+    On squares with both diagonals, springs alone have the wanted Young's modulus, and always nu = 1/3:
 
     >>> import springtune as st
     >>> mesh = st.make_mesh(st.Beam("100 mm", "20 mm"), "braced", "5 mm")
@@ -68,7 +68,7 @@ class Moduli:
 
         Examples
         --------
-        Springs alone have C12 = C66, whatever is asked:
+        Springs alone always have C12 = C66:
 
         >>> import springtune as st
         >>> board = st.AnisotropicMaterial("9 GPa", "4 GPa", "1.5 GPa", "2 GPa")
@@ -85,7 +85,7 @@ class Moduli:
 
     @property
     def stiffness_error(self) -> float:
-        """Norm of what `stiffness` differs by from the material's, over the norm of that [1].
+        """Norm of the difference of `stiffness` from the material's, over the norm of the material's [1].
 
         Examples
         --------
@@ -148,7 +148,7 @@ def moduli(mesh: Mesh, material: AnyMaterial, definition: AnyDefinition) -> Modu
     Raises
     ------
     DefinitionError
-        If the definition cannot live on the mesh or with the material, or is told a stiffness.
+        If the definition does not support the mesh or the material, or needs a uniform stiffness.
     SingularError
         If the network is singular or unstable at rest.
     MeshError

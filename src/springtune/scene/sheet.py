@@ -26,11 +26,11 @@ from ..springs import DEFINITIONS, Definition, DefinitionError, Springs
 from ..springs.identification import Case, patch_cases
 
 NETWORKS = 6
-"""Factorized networks of a mesh that are kept: scenes come in an order in which few are enough."""
+"""Factorized networks of a mesh that are kept; few are enough for scenes in order."""
 
 
 AnyDefinition = str | Definition | Callable[..., Springs]
-"""Definition by its name, or a function of one's own."""
+"""Definition, its name, or a function (mesh, material, thickness) -> Springs."""
 
 Entry = TypeVar("Entry")
 
@@ -46,14 +46,14 @@ def definition_of(definition: AnyDefinition) -> Definition:
 
 
 def chosen(known: Mapping[str, Entry], name: object, what: str) -> Entry:
-    """Entry of a mapping, or an error that says what there is."""
+    """Entry of a mapping, or an error that lists the known names."""
     if isinstance(name, str) and name in known:
         return known[name]
     raise ValueError(f"{what}: {name!r} is unknown; {nearest(str(name), known)}")
 
 
 def check_stiffness(definition: Definition, stiffness: object) -> None:
-    """Refuse a definition that lacks the uniform stiffness that it is told, or has one that it does not use."""
+    """Refuse a definition without the uniform stiffness that it needs, or with one that it does not use."""
     if (definition.needs == "stiffness") == (stiffness is not None):
         return
     if stiffness is None:
@@ -68,7 +68,7 @@ def check_stiffness(definition: Definition, stiffness: object) -> None:
 
 @contextmanager
 def named(definition: Definition) -> Iterator[None]:
-    """Context in which a definition that refuses a mesh or material is named."""
+    """Context that adds the name of a definition to its errors."""
     try:
         yield
     except DefinitionError as error:
@@ -226,7 +226,7 @@ class Sheet:
             self._patterns.setdefault(directions.tobytes(), network)
         while len(self._networks) >= self._most:
             self._networks.pop(next(iter(self._networks)))
-        self._networks[name] = network, problems  # the last one used is the last one to go
+        self._networks[name] = network, problems  # the last one used is dropped last
         return network, problems
 
     def _loading(self, load: LoadKind | Loading, follower: bool = False) -> Loading:

@@ -59,18 +59,18 @@ class Scene:
     kinematics : str, optional
         ``"nonlinear"``: springs keep their length law; or ``"linear"``.
     stiffness : float or str, optional
-        Uniform stiffness [N/m], or a text with its unit, for definitions that are told one.
+        Uniform stiffness [N/m], or a text with its unit, for definitions that need one.
     scale : float, optional
         Factor on all that the load case of a shape prescribes, forces and displacements [1].
     sheet : Sheet, optional
-        Of another scene of the same mesh and thickness: what the two have in common is then computed once.
+        Of another scene of the same mesh and thickness, to compute once what the two share.
 
     Attributes
     ----------
     sheet : Sheet
         What scenes of the same mesh and thickness can share.
     statement : BeamStatement or ShapeStatement
-        What is held and loaded, and what is read, see `springtune.scene.statements`.
+        Supports, forces, quantities and reference, see `springtune.scene.statements`.
     definition : Definition
     uniform_stiffness : float or None
         The stiffness that was given [N/m].
@@ -288,7 +288,7 @@ class Scene:
         Raises
         ------
         DefinitionError
-            If the definition cannot live on the mesh or with the material.
+            If the definition does not support the mesh or the material.
 
         Examples
         --------
@@ -490,7 +490,7 @@ class Scene:
         Returns
         -------
         Run
-            What became of it.
+            How it ended.
 
         Raises
         ------
@@ -563,7 +563,7 @@ class Scene:
 
 @dataclass(frozen=True, eq=False)
 class SceneSprings(Springs):
-    """Springs of a scene, which knows what their numbers are of."""
+    """Springs of a scene; they can be written to a file."""
 
     scene: Scene | None = field(default=None, repr=False)
 
@@ -575,7 +575,7 @@ class SceneSprings(Springs):
 
 @dataclass(frozen=True)
 class Result:
-    """What became of a scene.
+    """The answer of a scene.
 
     Attributes
     ----------
@@ -585,12 +585,12 @@ class Result:
     status : Status
         Whether there is an equilibrium and whether it is stable.
     message : str
-        Why it is not solved; empty where it is.
+        Why it is not solved; empty where it is solved.
     negative_pivots : int or float
         Negative eigenvalues of the tangent; NaN where there is no equilibrium, or the tangent is singular.
     displacement : float
         Displacement of the load [m]: the mean one of the loaded side along the force, or that of a pressed side's
-        middle; of a shape its first quantity, whatever that is. NaN where there is no equilibrium.
+        middle; of a shape its first quantity. NaN where there is no equilibrium.
     seconds : float
         That the solve took, springs not included.
     definition_seconds : float
@@ -697,7 +697,7 @@ class Result:
         return quantity_errors(self.values, self.scene.reference_values())
 
     def write(self, path: str | Path, steps: int = 10) -> list[Path]:
-        """Write the deformed network for ParaView, or whatever else reads VTU.
+        """Write the deformed network as VTU, for ParaView and others.
 
         Parameters
         ----------
@@ -730,7 +730,7 @@ class Result:
         return written
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
-        """Draw the springs where they have come to, coloured by their force.
+        """Draw the deformed springs, coloured by their force.
 
         Parameters
         ----------

@@ -1,6 +1,6 @@
-"""What a scene is of: a beam under a force, or a shape under a load case.
+"""The problem of a scene: a beam under a force, or a shape under a load case.
 
-Either says how a mesh is held and loaded, what is read from its displacements, and what the reference is.
+A statement has supports and forces on a mesh, the quantities of interest, and the reference.
 """
 
 from abc import ABC, abstractmethod
@@ -92,7 +92,7 @@ class Statement(ABC):
 
     @abstractmethod
     def reference_values(self, sheet: Sheet, finite_strain: bool = False) -> dict[str, float]:
-        """Quantities of interest of the reference; NaN of those that it does not have."""
+        """Quantities of interest of the reference; NaN of those that it lacks."""
 
     @abstractmethod
     def _unit_field(self, sheet: Sheet) -> np.ndarray:
@@ -197,7 +197,7 @@ class BeamStatement(Statement):
         is_a(beam, Beam, "beam", A_BEAM)
         is_a(mesh, Mesh, "mesh", A_MESH)
         is_a(material, Material, "material", A_MATERIAL)
-        assert isinstance(mesh, Mesh) and isinstance(material, Material)  # as type checkers are told
+        assert isinstance(mesh, Mesh) and isinstance(material, Material)  # for type checkers
         check_filled(mesh, beam)
         about = chosen(LOADS, load, "load")
         if force is None:
@@ -350,7 +350,7 @@ class ShapeStatement(Statement):
     def reference(self, sheet: Sheet, finite_strain: bool = False) -> "ShapeReference":
         """Converged finite-element solution, once for all scenes of a sheet; of shapes there is small strain alone."""
         case = self.shape.loads[self.load]
-        # The shape is kept with it: what is no longer there leaves its number to others.
+        # The shape is kept too, so that its id is not used again.
         key = id(self.shape), self.grouped, case, tuple(self.by_part.items())
         if (key, 1.0) not in sheet.references:
             from ..reference.shapes import solve_shape  # here, since finite elements take half a second to import
@@ -363,7 +363,7 @@ class ShapeStatement(Statement):
         return found
 
     def reference_values(self, sheet: Sheet, finite_strain: bool = False) -> dict[str, float]:
-        """Quantities of interest of the reference; NaN where that is none of what is asked for."""
+        """Quantities of interest of the reference; NaN where the reference does not apply."""
         values = dict(self.reference(sheet).values)
         return dict.fromkeys(values, np.nan) if finite_strain and self.objection(sheet) else values
 

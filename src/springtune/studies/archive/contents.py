@@ -9,7 +9,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from filecmp import cmpfiles
 from pathlib import Path, PurePosixPath
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from springtune.safe_io.atomic import write_text
 from springtune.safe_io.escapes import markdown
@@ -471,6 +471,11 @@ def of_text(name: str, text: str) -> Packed:
     """Archive file with a given text."""
     content = text.encode(errors="surrogateescape")
     return Packed(name, content, hashlib.sha256(content).hexdigest(), len(content))
+
+
+def several(value: Any) -> list[Any]:
+    """Return a list, also of a single value."""
+    return value if isinstance(value, list) else [value]
 
 
 # -- software and machine ----------------------------------------------------------------------------------------------

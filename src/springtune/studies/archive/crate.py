@@ -43,6 +43,7 @@ from .contents import (
     ArchiveError,
     gather,
     of_text,
+    several,
 )
 
 if TYPE_CHECKING:
@@ -237,7 +238,7 @@ class _Crate:
         if self.cited.get("keywords"):
             root["keywords"] = [str(word) for word in self.cited["keywords"]]
         root["author"] = [self._author(number, one) for number, one in enumerate(self.cited["authors"], 1)]
-        root["license"] = [self._licence(name) for name in _several(self.cited["license"])]
+        root["license"] = [self._licence(str(name)) for name in several(self.cited["license"])]
         root["conformsTo"] = [
             self._add(name, "CreativeWork", name=title, version=number) for name, (title, number) in PROFILES.items()
         ]
@@ -412,10 +413,6 @@ class _Crate:
             actionStatus=DONE,
             resourceUsage=used or None,
         )
-
-
-def _several(value: Any) -> list[str]:
-    return [str(one) for one in (value if isinstance(value, list) else [value])]
 
 
 def _benchmark(path: Path) -> dict[str, str]:

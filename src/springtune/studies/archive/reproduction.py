@@ -25,7 +25,7 @@ from springtune.safe_io.inputs import fault
 from ..output import reading
 from ..runs import rerun
 from . import contents
-from .contents import CODE, METADATA, MOST_FILES, MOST_TEXT, OF_RESULTS, SUMS
+from .contents import CODE, METADATA, MOST_FILES, MOST_TEXT, OF_RESULTS, SUMS, several
 
 if TYPE_CHECKING:
     from ..output.comparison import Comparison
@@ -179,7 +179,7 @@ def _listed(found: Checked, text: bytes) -> dict[str, str]:
     try:
         graph = {_text(one["@id"]): one for one in json.loads(text)["@graph"]}
         root, workflow = graph["./"], graph[f"{CODE}/Snakefile"]
-        profiles = [one["@id"] for one in _several(root["conformsTo"])]
+        profiles = [one["@id"] for one in several(root["conformsTo"])]
         if MADE_BY not in profiles:
             raise ValueError(MADE_BY)
         found.title, found.version = _text(root["name"]), _text(root["version"])
@@ -209,10 +209,6 @@ def _text(value: Any) -> str:
         raise TypeError(value)
     value.encode()
     return value
-
-
-def _several(value: Any) -> list[Any]:
-    return value if isinstance(value, list) else [value]
 
 
 # -- computed again ----------------------------------------------------------------------------------------------------

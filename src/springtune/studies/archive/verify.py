@@ -14,7 +14,7 @@ from springtune.safe_io import atomic
 from ..config.kind import kinds
 from ..config.model import SceneSpec
 from ..kinds import load_study
-from ..kinds.scenes.division import of_scenes
+from ..kinds.scenes.plan import of_scenes
 from ..kinds.shapes.plan import of_shape_scenes
 from ..output import reading
 from ..output.summary import SCENES

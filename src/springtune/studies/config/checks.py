@@ -200,13 +200,27 @@ def _counted(count: int) -> str:
     return str(count) if count < 1e7 else f"{count:.3g}"
 
 
-def check_for_triangles(names: Iterable[str], path: Sequence[Key], problems: Problems) -> None:
-    """Check that definitions work on triangles without a reference or a stated stiffness."""
-    able = [other for other, one in DEFINITIONS.items() if not one.needs and 3 in one.cells]
+def check_able(
+    problems: Problems, path: Sequence[Key], names: Iterable[str], why: str, corners: int = 0, stretched: bool = True
+) -> None:
+    """Check that definitions need no reference and no stated stiffness, and have cells of so many corners.
+
+    Where a beam is not stretched they must not be uniaxial.
+    """
+    able = [
+        name
+        for name, one in DEFINITIONS.items()
+        if not one.needs and (not corners or corners in one.cells) and (stretched or not one.uniaxial)
+    ]
     for name in names:
         if name not in able:
-            message = f"'{name}' is for triangles with a reference or a stated stiffness, or for rectangles"
-            problems.add(path, f"{message}; choose of {', '.join(able)}")
+            problems.add(path, f"'{name}' {why} choose of {', '.join(able)}")
+
+
+def check_for_triangles(names: Iterable[str], path: Sequence[Key], problems: Problems) -> None:
+    """Check that definitions work on triangles without a reference or a stated stiffness."""
+    why = "is for triangles with a reference or a stated stiffness, or for rectangles;"
+    check_able(problems, path, names, why, 3)
 
 
 def check_density(config: StudyConfig, name: str, path: Sequence[Key], problems: Problems) -> None:

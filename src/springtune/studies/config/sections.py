@@ -110,6 +110,11 @@ class Section(BaseModel):
         return {name: "" for name, field in names.items() if field.is_required()}
 
 
+def optional(section: Any, description: str) -> tuple[Any, Any]:
+    """Type and field of a section that a study may leave out."""
+    return section | None, Field(None, description=description)
+
+
 class BeamConfig(Section):
     """A rectangular sheet, its length along x."""
 

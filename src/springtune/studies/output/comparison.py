@@ -272,23 +272,18 @@ class _Group:
 
     def _cells(self) -> tuple[tuple[Alone, Alone], int]:
         """Cells requested by one side only, and the number requested by both."""
-        asked = self.asked
-        assert asked[0] is not None and asked[1] is not None
-        names = [str(name) for name in asked[0].dims if name in self.cell_dimensions]
-        shape = [len(self.axes[name].labels) for name in names]
-        spread = []
-        for side, mask in enumerate(asked):
-            assert mask is not None
-            own = mask.any([name for name in mask.dims if name not in names]).transpose(*names).values
-            whole = np.zeros(shape, dtype=bool)
-            whole[np.ix_(*(self.axes[name].places[side] for name in names))] = own
-            spread.append(whole)
-        sides = []
-        for side in (0, 1):
-            places = np.argwhere(spread[side] & ~spread[1 - side])
-            rows = [self._labels(names, place) for place in places[: self.how.most]]
-            sides.append(Alone(len(places), rows))
-        return (sides[0], sides[1]), int((spread[0] & spread[1]).sum())
+        masks = [mask for mask in self.asked if mask is not None]
+        names = [str(name) for name in masks[0].dims if name in self.cell_dimensions]
+        asked = [np.zeros([len(self.axes[name].labels) for name in names], dtype=bool) for _ in masks]
+        for side, mask in enumerate(masks):
+            own = mask.any(set(mask.dims) - set(names)).transpose(*names).values
+            asked[side][np.ix_(*(self.axes[name].places[side] for name in names))] = own
+
+        def alone(one: np.ndarray, other: np.ndarray) -> Alone:
+            places = np.argwhere(one & ~other)
+            return Alone(len(places), [self._labels(names, place) for place in places[: self.how.most]])
+
+        return (alone(*asked), alone(*reversed(asked))), int((asked[0] & asked[1]).sum())
 
     def _labels(self, names: Sequence[str], place: Sequence[int]) -> Labels:
         found: Labels = {}
@@ -319,12 +314,9 @@ class _Group:
         compared = changed = 0
         rows: list[Change] = []
         shape = [len(among) for among, *_ in common]
-        for axis_number, part in _blocks(shape, cells, max(8, pair[0].dtype.itemsize), self.how.block):
-            among, *places = (
-                zip(*(tuple(one[part] for one in own) if at == axis_number else own for at, own in enumerate(common)))
-                if common
-                else ((), (), ())
-            )
+        for longest, part in _blocks(shape, cells, max(8, pair[0].dtype.itemsize), self.how.block):
+            of_block = [tuple(one[part] for one in own) if at == longest else own for at, own in enumerate(common)]
+            among, *places = zip(*of_block) if of_block else ((), (), ())
             values = [_values(array, names, own) for array, own in zip(pair, places)]
             excess, there = kind.excess(
                 values,
@@ -433,7 +425,7 @@ def _as_words(values: np.ndarray, words: Mapping[int, str]) -> np.ndarray:
     """Flags as words, empty where nothing was requested."""
     known, back = np.unique(values, return_inverse=True)
     said = [words.get(int(one), NOT_REQUESTED).replace(NOT_REQUESTED, "") for one in known]
-    return np.array(said, dtype=object)[back.reshape(values.shape)]
+    return np.array(said, dtype=object)[back.ravel()].reshape(values.shape)
 
 
 def _asked(data: xr.Dataset, root: xr.Dataset) -> xr.DataArray | None:

@@ -152,8 +152,9 @@ class _Merger:
         source = np.full(shape, -1, dtype="int32")
         for number, array in arrays.items():
             place = np.ix_(*(self.places[path, one, number] for one in dims))
-            own = array.transpose(*dims).values.astype(dtype)
-            known, of_both = values[place], Values(first, array, Tolerance(self.relative))
+            own = np.asarray(array.transpose(*dims).values, dtype)
+            known = np.asarray(values[place], dtype)
+            of_both = Values(first, array, Tolerance(self.relative))
             there = ~of_both.missing(1, own)
             both = there & (source[place] >= 0)
             if both.any() and not any(fnmatchcase(name, one) for one in FOUND_ANYHOW):

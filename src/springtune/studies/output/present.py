@@ -26,7 +26,7 @@ def run(dataset: str | Path, folder: str | Path, *names: str) -> list[Path]:
     """Draw the figures of outputs into ``folder/figures``, and write their tables and other files."""
     made: list[Path] = []
     figures = Path(folder) / "figures"
-    # Arrays are read when something is shown of them: most are not.
+    # Arrays are read on demand: most are not shown.
     with lazily(dataset) as tree:
         for output in (outputs()[name] for name in names):
             if output.plot:
@@ -48,7 +48,7 @@ def main(dataset: str, folder: str, record: str, digest: str, *names: str) -> No
 
 
 def _draw(output: "Output", tree: xr.DataTree, folder: Path) -> Iterator[Path]:
-    # Here, since what only writes tables does without.
+    # Here: a job that only writes tables needs no matplotlib.
     import matplotlib.pyplot as plt
     import numpy as np
 
@@ -70,6 +70,6 @@ if __name__ == "__main__":
     import os
 
     os.environ["MPLBACKEND"] = "Agg"
-    # What small figures leave behind is less than looking for it costs; large ones are looked for one by one.
+    # Collecting the garbage of small figures costs more than it frees; large figures are collected one by one.
     gc.disable()
     main(*sys.argv[1:])

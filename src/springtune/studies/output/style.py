@@ -162,9 +162,15 @@ def panels(
 
 
 def multiples(
-    ax: Figure | SubFigure | Axes | np.ndarray | None, count: int, columns: int, height: float, *, sharey: bool = False
+    ax: Figure | SubFigure | Axes | np.ndarray | None,
+    count: int,
+    columns: int,
+    height: float,
+    *,
+    sharey: bool = False,
+    further: float = 0.0,
 ) -> tuple[Figure | SubFigure | None, np.ndarray, np.ndarray, float]:
-    """Panels of small multiples: one of them a column wide, more of them in rows of a page.
+    """Panels of small multiples: one of them a column wide, more of them in rows of a page, and `further` height.
 
     Returns
     -------
@@ -172,7 +178,7 @@ def multiples(
         Those that are not left over in the last row.
     """
     rows = -(-count // columns)
-    figsize = (COLUMN if columns == 1 else PAGE, 0.2 + height * rows)
+    figsize = (COLUMN if columns == 1 else PAGE, 0.2 + height * rows + further)
     if ax is not None and not isinstance(ax, Figure | SubFigure):
         figure, axes = panels(ax, 1, count, figsize=figsize)
     else:

@@ -116,6 +116,11 @@ def _cell(value: object) -> object:
     return "" if math.isnan(value) else f"{value:.8g}"
 
 
+def markdown_section(title: str, *said: str) -> list[str]:
+    """Markdown lines: the head of a section, and paragraphs."""
+    return [f"### {title}", "", *(line for text in said for line in (text, ""))]
+
+
 def markdown_table(heads: list[str], rows: Iterable[list[str]]) -> list[str]:
     """Markdown lines: first column left, others right."""
     lines = [heads, ["---", *["---:"] * (len(heads) - 1)], *rows]

@@ -16,7 +16,7 @@ from springtune.problem.quantities import nearest
 from springtune.reference.calculix import program
 from springtune.springs import DEFINITIONS
 
-from ...config.checks import check_beam_material, check_density, check_known, check_particles, check_product
+from ...config.checks import check_able, check_beam_material, check_density, check_known, check_particles, check_product
 from ...config.fields import (
     BeamName,
     DefinitionName,
@@ -31,7 +31,7 @@ from ...config.fields import (
     one_of,
 )
 from ...config.kind import Kind
-from ...config.sections import Section
+from ...config.sections import Section, optional
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key
 from ...runs.stages import Task, stage
 from . import CURVE_COUNTS, OTHER_APPROACHES, THREAD_COUNTS, approach_names
@@ -133,10 +133,7 @@ def _check(config, problems):
         if not in_benchmark(scene.load):
             able = ", ".join(filter(in_benchmark, LOADS))
             problems.add((*place, "load"), f"'{scene.load}' is no load of the benchmark; choose of {able}")
-    for name in section.definition:
-        if DEFINITIONS[name].needs:
-            able = ", ".join(other for other, one in DEFINITIONS.items() if not one.needs)
-            problems.add(("benchmark", "definition"), f"'{name}' needs more than mesh and material; choose of {able}")
+    check_able(problems, ("benchmark", "definition"), section.definition, "needs more than mesh and material;")
     for name in section.mesh_type:
         if name not in MESH_TYPES:
             problems.add(("benchmark", "mesh_type"), f"unknown mesh type '{name}'; {nearest(name, MESH_TYPES)}")
@@ -278,12 +275,7 @@ VARIABLES = {
 
 KIND = Kind(
     "benchmark",
-    study_fields={
-        "benchmark": (
-            BenchmarkConfig | None,
-            Field(None, description="Run time against error; it makes the group `/benchmark`."),
-        )
-    },
+    study_fields={"benchmark": optional(BenchmarkConfig, "Run time against error; it makes the group `/benchmark`.")},
     check=_check,
     expand=_expand,
     axes=_axes,

@@ -9,7 +9,8 @@ from springtune.problem.status import Status
 from springtune.safe_io.atomic import write_text
 from springtune.safe_io.escapes import markdown
 
-from ...output.text import markdown_table
+from ...output.selection import labels_of
+from ...output.text import markdown_section, markdown_table
 from . import PARTS
 from .outputs import PAGE
 
@@ -27,25 +28,27 @@ def page(tree: xr.DataTree) -> str:
     """Markdown: the quickest ways to an error, costs of one mesh size, orders and exponents, curves."""
     data = tree["benchmark"].to_dataset()
     loads = ", ".join(f"{float(value):.1f}" for value in data.machine_load.values)
-    parts = [f"Machine load at the start of each scene: {loads}.", "", _rule(data), ""]
+    parts = {}
     for scene in map(str, data.scene.values):
         cells = data.sel(scene=scene)
         if np.isfinite(cells.assured_error).any():
-            parts += [f"### {scene}: the quickest ways to an error", "", *_quickest(cells), ""]
-        parts += [f"### {scene}: approaches on one mesh size", "", *_one_size(cells), ""]
-        lost = _holes(cells.approach.values, cells.mesh_size.values, cells.status, cells.message)
-        if lost:
-            parts += [f"### {scene}: what has no numbers", "", *lost, ""]
-    parts += ["### Solvers of one linear system", "", *_solvers(data), ""]
-    parts += ["### A sensitivity curve", "", *_curve(data), ""]
-    return "\n".join([*parts, "### Explicit steps", "", *_explicit(data), ""])
+            parts[f"{scene}: the quickest ways to an error"] = _quickest(cells)
+        parts[f"{scene}: approaches on one mesh size"] = _one_size(cells)
+        parts[f"{scene}: what has no numbers"] = _holes(cells.approach, cells.mesh_size, cells.status, cells.message)
+    parts |= {
+        "Solvers of one linear system": _solvers(data),
+        "A sensitivity curve": _curve(data),
+        "Explicit steps": _explicit(data),
+    }
+    lines = [f"Machine load at the start of each scene: {loads}.", "", _rule(data), ""]
+    for title, part in parts.items():
+        lines += [*markdown_section(title), *part, ""] if part else []
+    return "\n".join(lines)
 
 
 def _time(seconds):
     seconds = float(seconds)
-    if np.isnan(seconds):
-        return ""
-    return f"{1e3 * seconds:.3g} ms" if seconds < 1 else f"{seconds:.3g} s"
+    return "" if np.isnan(seconds) else f"{1e3 * seconds:.3g} ms" if seconds < 1 else f"{seconds:.3g} s"
 
 
 def _percent(value):
@@ -88,9 +91,8 @@ def _holes(approaches, sizes, status, message):
     """What was asked for and has no numbers: a line a reason, with its approaches and mesh sizes."""
     flags, words = (one.transpose(..., "mesh_size").values for one in (status, message))
     found = {}
-    for i, approach in enumerate(approaches):
-        for j in np.flatnonzero((flags[i] != Status.NOT_REQUESTED) & (flags[i] != Status.SOLVED)):
-            found.setdefault(str(words[i, j]), {}).setdefault(str(approach), []).append(sizes[j])
+    for i, j in np.argwhere((flags != Status.NOT_REQUESTED) & (flags != Status.SOLVED)):
+        found.setdefault(str(words[i, j]), {}).setdefault(str(approaches.values[i]), []).append(sizes.values[j])
     lines = []
     for why, places in found.items():
         named = [f"`{name}` ({', '.join(f'{1e3 * size:g}' for size in at)} mm)" for name, at in places.items()]
@@ -104,9 +106,8 @@ def _one_size(cells):
     counts = asked.transpose("approach", "mesh_size").values.sum(axis=0)
     place = int(np.flatnonzero(counts >= 0.5 * counts.max())[0])
     cells = cells.isel(mesh_size=place)
-    order = np.argsort(np.abs(cells.error.values))
     rows = []
-    for i in order:
+    for i in np.argsort(np.abs(cells.error.values)):
         cell = cells.isel(approach=i)
         if np.isnan(cell.seconds):
             continue
@@ -124,17 +125,13 @@ def _solvers(data):
     first, again = data.solver_seconds, data.solver_again_seconds
     status, message = data.solver_status, data.solver_message
     asked = (status != Status.NOT_REQUESTED) | np.isfinite(first)
-    sizes = [size for size in data.mesh_size.values if asked.sel(mesh_size=size).any()]
-    rows = [
-        [f"{1e3 * size:g} mm"]
-        + [
-            f"{_time(first.sel(cell))}, {_time(again.sel(cell))}" if np.isfinite(first.sel(cell)) else ""
-            for cell in ({"mesh_size": size, "linear_solver": name} for name in data.linear_solver.values)
-        ]
-        for size in sizes
-    ]
+    rows = []
+    for size in labels_of(asked, "mesh_size"):
+        seconds = zip(first.sel(mesh_size=size).values, again.sel(mesh_size=size).values)
+        texts = (f"{_time(one)}, {_time(other)}" if np.isfinite(one) else "" for one, other in seconds)
+        rows.append([f"{1e3 * size:g} mm", *texts])
     heads = ["structured mesh", *(f"{name}: first, next" for name in data.linear_solver.values)]
-    lost = _holes(data.linear_solver.values, data.mesh_size.values, status, message)
+    lost = _holes(data.linear_solver, data.mesh_size, status, message)
     return markdown_table(heads, rows) + (["", *lost] if lost else [])
 
 
@@ -155,7 +152,7 @@ def _explicit(data):
     rates, moved = data.spring_updates / 1e6, data.explicit_bandwidth / 1e9
     ways = [(threads, kind) for kind in data.precision.values for threads in data.thread_count.values]
     rows = []
-    for size in data.mesh_size.values[np.isfinite(rates).any(["thread_count", "precision"]).values]:
+    for size in labels_of(np.isfinite(rates), "mesh_size"):
         cells = [dict(mesh_size=size, thread_count=threads, precision=kind) for threads, kind in ways]
         numbers = [f"{float(rates.sel(cell)):.0f}, {float(moved.sel(cell)):.1f}" for cell in cells]
         wrong = float(data.explicit_error.sel(mesh_size=size, precision=data.precision.values[-1]))

@@ -13,7 +13,7 @@ from springtune.springs import DEFINITIONS
 from ...config.checks import check_beam_material, check_for_triangles, check_known, check_particles, check_product
 from ...config.fields import BeamName, DefinitionName, Length, MaterialName, OneOrMore, Stress, number, one_of
 from ...config.kind import Kind
-from ...config.sections import Section
+from ...config.sections import Section, optional
 from ...runs.keys import definition_key, material_key, mesh_type_key
 from ...runs.stages import Task, stage
 from .outputs import OUTPUTS
@@ -157,12 +157,7 @@ STAGE = stage("laying", "studies.kinds.laying.solve", "Laying the strips", _task
 
 KIND = Kind(
     "laying",
-    study_fields={
-        "laying": (
-            LayingConfig | None,
-            Field(None, description="A strip laid on a trapezoid; it makes the group `/laying`."),
-        )
-    },
+    study_fields={"laying": optional(LayingConfig, "A strip laid on a trapezoid; it makes the group `/laying`.")},
     check=_check,
     expand=_expand,
     axes=_axes,

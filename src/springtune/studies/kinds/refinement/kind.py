@@ -12,7 +12,7 @@ from springtune.problem.loads import LOADS
 from springtune.problem.materials import Material
 from springtune.springs import DEFINITIONS
 
-from ...config.checks import check_beam_material, check_known, check_particles
+from ...config.checks import check_able, check_beam_material, check_known, check_particles
 from ...config.fields import (
     BeamName,
     DefinitionName,
@@ -29,7 +29,7 @@ from ...config.fields import (
 )
 from ...config.kind import Kind
 from ...config.messages import refuse, show
-from ...config.sections import Section
+from ...config.sections import Section, optional
 from ...runs.checked_json import hash_of
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key, stage_key
 from ...runs.stages import Task, stage
@@ -179,17 +179,12 @@ def _check_sizes(section, sizes, beam, path, problems):
 
 
 def _check_definitions(section, path, problems):
-    corners, kind = MESH_TYPES[section.mesh_type].corners, LOADS[section.load].kind
-    able = [
-        other
-        for other, one in DEFINITIONS.items()
-        if not one.needs and corners in one.cells and (kind.uniaxial or not one.uniaxial)
-    ]
-    for name in section.definition:
-        if name not in able:
-            on = f"on '{section.mesh_type}' meshes in {section.load}"
-            message = f"'{name}' needs a reference or a stated stiffness, or other cells or loads; {on} choose of"
-            problems.add((*path, "definition"), f"{message} {', '.join(able)}")
+    why = (
+        "needs a reference or a stated stiffness, or other cells or loads; on "
+        f"'{section.mesh_type}' meshes in {section.load}"
+    )
+    corners, stretched = MESH_TYPES[section.mesh_type].corners, LOADS[section.load].kind.uniaxial
+    check_able(problems, (*path, "definition"), section.definition, why, corners, stretched)
 
 
 def _expand(config, declared):
@@ -269,9 +264,9 @@ def _cost(one):
 KIND = Kind(
     "refinement",
     study_fields={
-        "refine": (
-            Annotated[dict[str, RefinementConfig], Named("refinement", for_files=False)] | None,
-            Field(None, description="Values that are added where an error matters; they make the group `/refinement`."),
+        "refine": optional(
+            Annotated[dict[str, RefinementConfig], Named("refinement", for_files=False)],
+            "Values that are added where an error matters; they make the group `/refinement`.",
         )
     },
     check=_check,

@@ -12,7 +12,7 @@ from springtune.springs.lattice import COEFFICIENT
 
 from ...output.dataset import Group
 from ...runs import store
-from ..scenes import stored_interpolant
+from ..scenes import any_reference
 from .designs import PARAMETERS, SOBOL_INDICES, blocks, roles
 from .indices import LEVEL, RESAMPLES, main_effect, sobol_indices
 from .interpolate import problem_key
@@ -190,13 +190,13 @@ def _referred(sample, data, drawn, folder):
 def _answers(sample, drawn, folder, kind, aspects):
     """Answers of the unit problem of each row, and why some are missing."""
     key, ratios = reference_key(sample, kind), drawn["poisson_ratio"]
-    interpolant, alone, _, why = stored_interpolant.read(folder, key)
+    interpolant, alone, _, why = any_reference.read_interpolant(folder, key)
     if interpolant:
         return interpolant.evaluate(aspects, ratios), ""
     if sample.rows > MOST_SOLVED:
         why += f"; up to {MOST_SOLVED} points they would be solved one by one"
     rows = [alone.get(problem_key(key, *pair), {"message": why}) for pair in zip(aspects, ratios)]
-    names = stored_interpolant.ANSWERS
+    names = any_reference.ANSWERS
     answers = SimpleNamespace(**{name: np.array([row.get(name, np.nan) for row in rows]) for name in names})
     reasons = [row["message"] for row in rows if row["message"]]
     return answers, f"{len(reasons)} of {len(rows)} points: {reasons[0]}" if reasons else ""

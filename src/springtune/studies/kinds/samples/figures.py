@@ -117,12 +117,12 @@ def plot_sobol(data, ax=None, *, load=None):
     names = found.parameter.values.tolist()
     words = [PARAMETER_AXES[name][0] for name in names]
     columns = min(COLUMNS, max(1, sum(quantity == shown[0][0] for quantity, _ in shown)))
-    figure, axes, flat, height = style.multiples(ax, len(shown), columns, 0.21 * len(names) + 0.52)
     note, title = _note(found.sel(load=load), samples.attrs["size"]), _titled(samples, load, "Sobol indices", columns)
     room = style.PAGE if columns > 1 else style.COLUMN
     under, over = (0.14 * labels.lines_of(text) for text in (labels.wrapped(note, room - 0.2), title))
-    if figure is not None and ax is None:
-        figure.set_size_inches(style.size(figure)[0], height + 0.11 + under + over)
+    figure, axes, flat, _ = style.multiples(
+        ax, len(shown), columns, 0.21 * len(names) + 0.52, further=0.11 + under + over
+    )
     style.arrange(figure, axes, left=0.15 + max(map(labels.width, words)), right=0.15, bottom=0.42 + under,
                   top=0.35 + over, across=0.18, down=0.42 if axes.shape[0] > 1 else 0.0, title=title)  # fmt: skip
     order, limits = found["definition"].values.tolist(), _limits(found, shown, load)
@@ -222,13 +222,11 @@ def plot_effects(data, ax=None, *, load=None, quantity="deformation_error"):
     definitions = definitions[:1] if quantity == "best_stiffness" else definitions
     names, every = effects.parameter.values.tolist(), effects["definition"].values.tolist()
     columns = min(COLUMNS, len(names))
-    figure, axes, flat, height = style.multiples(ax, len(names), columns, 1.75, sharey=True)
     lines = [style.line(every.index(name)) for name in definitions]
     text, factor, unit = QUANTITY_AXES[quantity]
     title = _titled(samples, load, f"mean {text} over each parameter alone", columns)
     over = 0.14 * labels.lines_of(title)
-    if figure is not None and ax is None:
-        figure.set_size_inches(style.size(figure)[0], height + 0.45 + over)
+    figure, axes, flat, _ = style.multiples(ax, len(names), columns, 1.75, sharey=True, further=0.45 + over)
     style.arrange(figure, axes, left=0.62, right=0.14, bottom=0.86, top=0.16 + over, across=0.2, down=0.5, title=title)
     for number, (panel, name) in enumerate(zip(flat, names)):
         values = effects.parameter_value.sel(parameter=name).values

@@ -8,7 +8,7 @@ from typing import Any
 
 from ...runs import store
 from ...runs.task_costs import TaskCosts
-from ..scenes import stored_interpolant
+from ..scenes import reference
 from .designs import draw
 
 
@@ -20,15 +20,15 @@ def run(content: dict[str, Any], costs: TaskCosts) -> None:
             drawn = draw(**file["sample"])
             pairs = set(zip((drawn["length"] / drawn["height"]).tolist(), drawn["poisson_ratio"].tolist()))
         problems = {problem_key(task["key"], *pair): pair for pair in sorted(pairs)}
-        stored_interpolant.make(Path(content["folder"]) / f"{task['key']}.h5", task | {"problems": problems}, costs)
+        reference.make_interpolant(Path(content["folder"]) / f"{task['key']}.h5", task | {"problems": problems}, costs)
 
 
 def gone(content: dict[str, Any], key: str, why: str, limits: str) -> None:
     """Store the failed result of a reference, or of an interpolant, beyond its limits."""
     path = Path(content["folder"]) / f"{key.partition(' ')[0]}.h5"
-    store.add(path, {key: stored_interpolant.failed(why) | {store.LIMITS: limits}})
+    store.add(path, {key: reference.failed({}, why) | {store.LIMITS: limits}})
 
 
-def problem_key(reference: str, aspect_ratio: float, nu: float) -> str:
+def problem_key(interpolant: str, aspect_ratio: float, nu: float) -> str:
     """Key of a reference that is solved by itself, in the file of the interpolant that it lacks."""
-    return f"{reference} {float(aspect_ratio)!r} {float(nu)!r}"
+    return f"{interpolant} {float(aspect_ratio)!r} {float(nu)!r}"

@@ -13,11 +13,11 @@ from springtune.problem.loads import LOADS
 from springtune.problem.parameters import MOST_SCENES
 from springtune.springs import DEFINITIONS
 
-from ...config.checks import MORE_SCENES, most_scenes
+from ...config.checks import MORE_SCENES, check_able, most_scenes
 from ...config.fields import DefinitionName, Flag, Kinematics, Load, OneOrMore, Scalar, number, one_of
 from ...config.kind import Kind
 from ...config.messages import refuse, show
-from ...config.sections import Section
+from ...config.sections import Section, optional
 from ...runs.checked_json import hash_of
 from ...runs.keys import definition_key, mesh_type_key, stage_key
 from ...runs.stages import Task, stage
@@ -194,21 +194,14 @@ def _check(config, problems):
 
 
 def _check_definitions(section, problems):
+    path, why = ("samples", "definition"), "needs a reference, a stated stiffness or other cells than those of"
     corners = MESH_TYPES[section.mesh_type].corners
-    able = [name for name, one in DEFINITIONS.items() if not one.needs and corners in one.cells]
+    check_able(problems, path, section.definition, f"{why} {section.mesh_type} meshes;", corners)
+    unstretched = [load for load in section.load if not LOADS[load].kind.uniaxial]
     for name in section.definition:
-        if name not in able:
-            problems.add(
-                ("samples", "definition"),
-                f"'{name}' needs a reference, a stated stiffness or other cells than those of {section.mesh_type} "
-                f"meshes; choose of {', '.join(able)}",
-            )
-        elif DEFINITIONS[name].uniaxial:
-            for load in (load for load in section.load if not LOADS[load].kind.uniaxial):
-                problems.add(
-                    ("samples", "definition"),
-                    f"'{name}' is for loads that stretch a beam along its length, and '{load}' does not; remove one",
-                )
+        for load in unstretched if DEFINITIONS[name].uniaxial and corners in DEFINITIONS[name].cells else ():
+            why = "is for loads that stretch a beam along its length"
+            problems.add(path, f"'{name}' {why}, and '{load}' does not; remove one")
 
 
 def _check_sizes(sample, problems):
@@ -378,10 +371,7 @@ def _tables(study):
 KIND = Kind(
     "samples",
     study_fields={
-        "samples": (
-            SamplesConfig | None,
-            Field(None, description="Sampled scenes; they make the groups `/samples`, `/effects` and `/sobol`."),
-        )
+        "samples": optional(SamplesConfig, "Sampled scenes; they make the groups `/samples`, `/effects` and `/sobol`.")
     },
     check=_check,
     expand=_expand,

@@ -19,7 +19,7 @@ def run(content, costs):
 
 
 def _best(content, member):
-    """What a curve is called, its best stiffness [N/m], and why there is none."""
+    """Name of a curve, its best stiffness [N/m], and the reason if it has none."""
     name = member["curve"]
     curve = store.read(Path(content["curves"]) / f"{member['mesh']}.h5", [name])[name]
     called = f"{member['mesh']} in {member['load']} of {member['force']:g} N"

@@ -22,23 +22,6 @@ from .outputs import pressed
 from .stored import PACKED, fields_key, unpacked
 from .variables import BLOCK, CELL, FIELDS, FINITE_STRAIN, ROOT, SENSITIVITY, fields_of, swept
 
-COPIED = (
-    "displacement",
-    "stiffness",
-    "message",
-    "iterations",
-    "residual",
-    "negative_pivots",
-    "field_error",
-    "definition_seconds",
-    "definition_evaluations",
-    "spring_ratio",
-    "load_share",
-    "solver",
-)
-"""What of a scene's result goes into the dataset as it is."""
-
-
 SMALL_STRAIN = "small-strain-plane-stress"
 """Name of the reference that all studies have."""
 
@@ -80,7 +63,7 @@ def groups(study, folder):
 
 
 def _bodies(study, root):
-    """Materials and beams; what rubber was fitted by, and how well, beside its modulus."""
+    """Write materials and beams; the fit of a rubber goes into a comment."""
     fits = {}
     for material in {scene.material for scene in study.scenes}:
         values = {
@@ -125,7 +108,7 @@ def _meshes(study, folder, root):
 
 
 def _references(study, folder, root):
-    """Displacement of each reference, and by reference and kinematics objections to it."""
+    """Write references; return the displacement of each, and the objection by reference and kinematics."""
     displacements, objections, interpolated = {}, {}, 0
     read = cache(lambda beam, material, load: _reference(study, folder, Reference(beam, material, load, 1.0)))
     for one in study.references:
@@ -164,12 +147,12 @@ def _reference(study, folder, one, fields=()):
 
 
 def _scenes(study, folder, root, block, fields, objections):
-    """Results of the scenes, each mesh's read once, into the root and, where they are there, its groups."""
+    """Write the results of the scenes into the root and the groups; each file is read once."""
     compared = set()  # places of fields that have their reference
     calibration = _calibration(study, folder)
-    arrays = ["face_profile"] * (block is not None)
+    arrays, known = ["face_profile"] * (block is not None), set(root.data.data_vars)
     shown = plan.shown_scenes(study) if fields else ()
-    for mesh, scenes in plan.by_mesh(study.scenes).items():
+    for mesh, scenes in plan.scenes_by_mesh(study).items():
         names = plan.solved_keys(study, mesh, calibration)
         path = folder / "solutions" / f"{plan.stem(mesh)}.h5"
         results = store.read(path, set(names), arrays)
@@ -184,12 +167,10 @@ def _scenes(study, folder, root, block, fields, objections):
         rows = []
         for scene, name in zip(scenes, names):
             result = results[name]
-            values = {"status": result["status"], "solve_seconds": result["seconds"]}
-            values |= {label: result[label] for label in COPIED if label in result}
+            values = {name: value for name, value in result.items() if name in known}
             why = against[id(scene.material), scene.load, scene.force, scene.kinematics]
-            if why and result["status"] in (Status.SOLVED, Status.UNSTABLE):
-                values["message"] = "; ".join(filter(None, (values.get("message"), why)))
-            rows.append(values)
+            values["message"] = with_objection(result, result.get("message", ""), why)
+            rows.append(values | {"solve_seconds": result["seconds"]})
         root.put_each(rows, labels)
         for scene, name, place in zip(scenes, names, labels) if block or of_fields else ():
             if LOADS[scene.load].kind.pressed:
@@ -206,8 +187,13 @@ def _scenes(study, folder, root, block, fields, objections):
                     fields.put_rows(_at_particles(study, folder, scene, fields.data), **body)
 
 
+def with_objection(result, message, why):
+    """Message of a scene; of a solved one with the objection to its reference."""
+    return "; ".join(filter(None, (message, why if result["status"] in (Status.SOLVED, Status.UNSTABLE) else "")))
+
+
 def _at_particles(study, folder, scene, fields):
-    """Displacements of the reference of a scene where its particles are at rest [m]; nothing without a reference."""
+    """Displacements of the reference at the places of the particles at rest [m]; empty without a reference."""
     reference = plan.reference_of(study, scene.mesh.beam, scene.material, scene.load)
     found = any_reference.read(folder / "references", reference, ["x", "y", "displacements"])
     if "x" not in found:
@@ -240,7 +226,7 @@ def _printed(study, root):
 
 def _sensitivity(study, folder, displacements, axes):
     curves = Filler(swept(SENSITIVITY, study).empty(axes))
-    for mesh, members in plan.by_mesh(study.curves).items():
+    for mesh, members in plan.curves_by_mesh(study).items():
         names = [plan.curve_key(study, curve) for curve in members]
         results = store.read(folder / "curves" / f"{plan.stem(mesh)}.h5", names, ["displacement", "stable"])
         for curve, name in zip(members, names):
@@ -268,7 +254,7 @@ def _sensitivity(study, folder, displacements, axes):
 
 
 def _block(study, folder, axes):
-    """Group of pressed faces with the references of all kinds; scenes are still to come."""
+    """Group of pressed faces with all references and, so far, no scenes."""
     kinds = (SMALL_STRAIN, *study.further_references)
     block = Filler(swept(BLOCK, study).empty(axes | {"reference": kinds, "face_position": tuple(FACE_POSITIONS)}))
     for one in study.references:
@@ -301,7 +287,7 @@ def _finite_reference(folder, one, kind, fields=()):
 
 
 def _compare(error, network, reference):
-    """Write deformation errors where both displacements are: of a dataset that is mostly holes few cells."""
+    """Write deformation errors where both displacements are known: often few cells."""
     network, reference = (array.transpose(*error.dims).values for array in xr.broadcast(network, reference))
     there = np.isfinite(network) & np.isfinite(reference)
     error.values[there] = deformation_error(network[there], reference[there])
@@ -331,42 +317,48 @@ def _face_reference(study, folder, one, kind):
 
 
 def _fields(study, folder, axes):
-    """Group of whole fields with the meshes and the references' outlines; displacements are still to come."""
+    """Group of whole fields with meshes and references and, so far, no displacements of networks."""
     whole = plan.shown_scenes(study)
     scenes = [scene for scene in study.scenes if scene in whole]
     shown = {scene.mesh for scene in scenes}
-    kept = [
-        mesh for mesh in study.meshes if mesh in shown and not stored.is_refused(folder / "meshes", plan.stem(mesh))
-    ]
-    meshes = {mesh: stored.read(folder / "meshes", plan.stem(mesh)).mesh for mesh in kept}
+    read = {mesh: stored.read(folder / "meshes", plan.stem(mesh)) for mesh in study.meshes if mesh in shown}
+    meshes = [(_mesh_labels(mesh), found.mesh) for mesh, found in read.items() if found]
     outlines = {one: _outline(study, folder, one) for one in dict.fromkeys(map(_reference_of, scenes))}
-    cells = {spec: cells_of(mesh) for spec, mesh in meshes.items()}
-    lengths = {
-        "particle": max((len(mesh.points) for mesh in meshes.values()), default=1),
-        "spring": max((len(mesh.edges) for mesh in meshes.values()), default=1),
-        "spring_end": 2,
-        "cell": max((len(corners) for corners in cells.values()), default=1),
-        "cell_corner": max((corners.shape[1] for corners in cells.values()), default=3),
-        "outline_point": max((len(points) for points, _ in outlines.values()), default=1),
-    }
-    numbers = {name: tuple(range(length)) for name, length in lengths.items()}
-    fields = Filler(fields_of(study).empty(axes | numbers))
-    fields.data.attrs["Conventions"] = "CF-1.11 UGRID-1.0"
-    for spec, mesh in meshes.items():
-        labels = _mesh_labels(spec)
-        fields.put_rows({"x": mesh.points[:, 0], "y": mesh.points[:, 1]}, **labels)
-        fields.put_rows({"spring_nodes": mesh.edges, "cell_nodes": cells[spec]}, **labels)
+    fields = fields_on(fields_of(study), axes, meshes, [points for points, _ in outlines.values()])
     for scene in scenes:
         labels = study.labels(scene)
         fields.put({f"{OF_FIELDS}{name}": labels[name] for name in study.swept}, **labels)
     for one, (points, displacements) in outlines.items():
-        moved = one.force * displacements
-        beam, load = {"beam": one.beam.name}, {"material": one.material.name, "load": one.load}
-        fields.put_rows({"outline_x": points[:, 0], "outline_y": points[:, 1]}, **beam)
-        fields.put_rows(
-            {"reference_displacement_x": moved[:, 0], "reference_displacement_y": moved[:, 1]}, **beam, **load
-        )
+        labels = {"beam": one.beam.name, "material": one.material.name, "load": one.load}
+        put_outline(fields, points, one.force * displacements, **labels)
     return fields
+
+
+def fields_on(group, axes, meshes, outlines):
+    """Group of whole fields with meshes, each at its labels."""
+    cells = [cells_of(mesh) for _, mesh in meshes]
+    lengths = {
+        "particle": [len(mesh.points) for _, mesh in meshes],
+        "spring": [len(mesh.edges) for _, mesh in meshes],
+        "spring_end": [2],
+        "cell": list(map(len, cells)),
+        "cell_corner": [corners.shape[1] for corners in cells] or [3],
+        "outline_point": list(map(len, outlines)),
+    }
+    found = Filler(group.empty(axes | {name: tuple(range(max(1, *each, 1))) for name, each in lengths.items()}))
+    found.data.attrs["Conventions"] = "CF-1.11 UGRID-1.0"
+    for (labels, mesh), corners in zip(meshes, cells):
+        places = {"x": mesh.points[:, 0], "y": mesh.points[:, 1]}
+        found.put_rows(places | {"spring_nodes": mesh.edges, "cell_nodes": corners}, **labels)
+    return found
+
+
+def put_outline(fields, points, moved, **labels):
+    """Write the outline of a reference at rest, and its displacements."""
+    values = {"outline_x": points[:, 0], "outline_y": points[:, 1]}
+    fields.put_rows(
+        values | {"reference_displacement_x": moved[:, 0], "reference_displacement_y": moved[:, 1]}, **labels
+    )
 
 
 def cells_of(mesh):

@@ -10,7 +10,7 @@ from ...output.drawing import fitted, in_words
 from ...output.own_law import of_own_law
 from ...output.selection import at, cells, group, labelled_beam, labels_of, last_swept
 from .figures import USUAL, by_beam, each, named, swept_words
-from .outputs import SCENE_LABELS
+from .outputs import SCENE_LABELS, SWEPT_SHOWN
 
 MOST_LINES = 6
 """Definitions in one panel; more of them take further rows of panels."""
@@ -19,7 +19,7 @@ MOST_LINES = 6
 
 
 def like_with_like(data):
-    """Root of a dataset whose errors of nonlinear networks are against finite strain, where it has that reference."""
+    """Root of a dataset; errors of nonlinear networks are against finite strain where that is known."""
     root = group(data, "/")
     finite = data["finite_strain"].to_dataset() if "finite_strain" in getattr(data, "children", ()) else None
     finite = None if finite is None else of_own_law(finite)
@@ -31,7 +31,7 @@ def like_with_like(data):
 
 
 def compared(root, selection):
-    """Title of a figure of errors: what it is of, and whether they are against finite strain."""
+    """Title of a figure of errors."""
     finite = root.attrs.get("finite_strain") and selection["kinematics"] != "linear"
     return ", ".join(
         [*named(selection, "mesh_type", "material", "load"), *(["against finite strain"] if finite else [])]
@@ -39,14 +39,14 @@ def compared(root, selection):
 
 
 def _by_beam(root, beam, mesh_type, material, load, kinematics):
-    """Data of a figure with a panel a beam, the beams, the selection, and the look of each definition."""
+    """Data of a figure with one panel a beam, the beams, the selection, and the line style of each definition."""
     root, beams, selection = by_beam(root, beam, mesh_type, material, load, kinematics)
     looks = {name: style.line(number) for number, name in enumerate(labels_of(root.status != 0, "definition"))}
     return root, beams, selection, looks
 
 
 def _parts(present):
-    """Definitions that a beam has, in parts that one panel can show."""
+    """Definitions of a beam, split into parts of at most `MOST_LINES`."""
     asked = labels_of(present, "definition")
     return [part.tolist() for part in np.array_split(asked, -(-len(asked) // MOST_LINES))]
 
@@ -189,15 +189,6 @@ def _over_sizes(panel, here, looks, first):
 
 # -- against what is swept ---------------------------------------------------------------------------------------------
 
-ALONG_X = {
-    "force": ("Force [N]", 1.0),
-    "thickness": ("Thickness [mm]", 1e3),
-    "young_modulus": ("Young's modulus [MPa]", 1e-6),
-    "poisson_ratio": ("Poisson's ratio", 1.0),
-    "stiffness_scale": ("Factor on the stiffness", 1.0),
-}
-"""What is written along the axis of a parameter, and the unit there over that of the dataset."""
-
 WIDE = 20.0
 """Largest value over the smallest from which on an axis is logarithmic."""
 
@@ -282,12 +273,12 @@ def plot_sweep(
 
 
 def _most(present, parameter):
-    """Values that a beam has of a parameter, at most."""
+    """Largest number of values of a parameter that a beam has."""
     return int(present.any([name for name in present.dims if name not in ("beam", parameter)]).sum(parameter).max())
 
 
 def _of_beam(root, name, parameter, mesh_size):
-    """Errors of a beam over a parameter and definitions, with what they are of in words."""
+    """Errors of a beam over a parameter and definitions; the attribute `words` is the panel's title."""
     here = root.sel(beam=name)
     present = here.status != 0
     sizes = labels_of(present, "mesh_size")
@@ -311,13 +302,12 @@ def _of_beam(root, name, parameter, mesh_size):
 
 def _over_values(panel, here, looks, parameter):
     """Draw errors over a parameter: as `_lines`."""
-    here, (words, unit) = here.transpose("definition", parameter, ...), ALONG_X[parameter]
+    here, (words, _, unit) = here.transpose("definition", parameter, ...), SWEPT_SHOWN[parameter]
     x = unit * here[parameter].values
 
     def listed(values):
-        return (
-            f"{min(values):.4g}" if len(values) == 1 else f"{len(values)} from {min(values):.4g} to {max(values):.4g}"
-        )
+        several = f"{len(values)} from {min(values):.4g} to {max(values):.4g}"
+        return several if len(values) > 1 else f"{values[0]:.4g}"
 
     # What other beams or grids ask for makes no gaps.
     ends, said = _lines(panel, x, here, looks, listed, False)

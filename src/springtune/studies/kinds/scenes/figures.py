@@ -1,4 +1,4 @@
-"""Figures of scenes: sensitivity curves, errors against mesh size, deformed networks, the pressed block."""
+"""Figures of scenes: sensitivity curves, deformed networks, the pressed block."""
 
 import numpy as np
 
@@ -28,7 +28,7 @@ USUAL = "nonlinear"
 
 
 def each(name, plot, status, names):
-    """Figures of each selection that has cells, of the usual kinematics or, without them, of the first that it has."""
+    """Figures of each selection that has cells, in the usual kinematics or else the first ones present."""
     for stem, selection in distinct(name, names, cells(status != 0, names)).items():
         there = labels_of((status != 0).sel(selection), "kinematics")
         yield stem, plot, selection | {"kinematics": USUAL if USUAL in there else there[0]}
@@ -116,7 +116,7 @@ def _sensitivity(curves, root, selection, swept, ax):
 
 
 def draw_curve(panel, curve, unit, name, look, known):
-    """Draw one curve: ends for names, and what of it needs a word."""
+    """Draw one curve; return where its name goes, and the keys of `KEY` that it needs."""
     marker, colour, seen = look["marker"], look["color"], set()
     line = {"color": colour, "linestyle": look["linestyle"]}
     stiffness, error = curve.stiffness.values, 100 * np.abs(curve.deformation_error.values)
@@ -178,7 +178,7 @@ def _sensitivity_title(panel, root, selection, swept):
 
 
 def _mark_printed(panel, printed, unit):
-    """Where the paper's stiffness lies; its name stands above the panel, where no curve is."""
+    """Mark the paper's stiffness and name it above the panel."""
     low, high = panel.get_xlim()
     values = np.unique(printed[np.isfinite(printed)])
     values = values[(values > low * unit) & (values < high * unit)]
@@ -191,7 +191,7 @@ def _mark_printed(panel, printed, unit):
 
 
 def _why_no_curve(curves):
-    """Words in place of curves none of which has an error."""
+    """Reason why no curve has an error."""
     if 1 in curves.status.values:
         return "solved, but without a reference there is no error"
     messages = [text for text in np.unique(curves.message.values.astype(str)) if text] if "message" in curves else []
@@ -204,7 +204,7 @@ def _force(newtons):
 
 
 def swept_words(values):
-    """Values of what the study sweeps that are shown, in words; nothing where nothing is swept."""
+    """Shown values of swept parameters in words."""
     found = []
     for name, value in values.items():
         ends = list(dict.fromkeys((float(value.min()), float(value.max()))))
@@ -220,7 +220,7 @@ def named(selection, *names):
 
 
 def by_beam(root, beam, mesh_type, material, load, kinematics):
-    """Data of a figure with a panel a beam, the beams, and the selection."""
+    """Data of a figure with one panel a beam, the beams, and the selection."""
     if beam is not None:
         choose(root.status != 0, beam=beam)
         root = root.sel(beam=[beam])
@@ -307,15 +307,8 @@ def plot_deformed(
     style.arrange(figure, axes, **place)
     grid, axes = axes, axes[:, 0]
     for panel, name in zip(axes, beams):
-        _deformed(
-            panel,
-            fields.sel(beam=name),
-            cut.sel(beam=name),
-            selection,
-            ", ".join(
-                [labelled_beam(root, name), *swept_words({one: value.sel(beam=name) for one, value in values.items()})]
-            ),
-        )
+        words = [labelled_beam(root, name), *swept_words({one: value.sel(beam=name) for one, value in values.items()})]
+        _deformed(panel, fields.sel(beam=name), cut.sel(beam=name), selection, ", ".join(words))
         panel.apply_aspect()  # its limits
     over = labels.TITLE_LINE * (max(labels.lines_of(panel.get_title("left")) for panel in axes) - 1)
     if ax is None:
@@ -337,7 +330,7 @@ def _deformed(panel, fields, root, selection, beam):
             break
     fields = fields.isel(mesh_size=places[-1] if len(places) else 0)
     here = fields.sel(load)
-    rest, moved = 1e3 * np.stack([fields.x.values, fields.y.values], axis=1), 1e3 * plane(here, "displacement_{}")
+    rest, moved = 1e3 * plane(fields, "{}"), 1e3 * plane(here, "displacement_{}")
     outline, there = 1e3 * plane(fields, "outline_{}"), 1e3 * plane(here, "reference_displacement_{}")
     kept = np.isfinite(outline[:, 0])
     outline, there = outline[kept], there[kept]
@@ -382,7 +375,7 @@ MOST_FACES = 5
 
 
 def _pressing(names):
-    """The load under which a face is looked at: pressure, else the first that presses a face."""
+    """Load whose pressed face is shown: pressure, else the first that presses a face."""
     pressed = [name for name in names if name in LOADS and LOADS[name].kind.pressed]
     return "pressure" if "pressure" in pressed or not pressed else pressed[0]
 
@@ -465,7 +458,7 @@ def plot_block(data, ax=None, *, beam=None, mesh_type=None, mesh_size=None, mate
 
 
 def _stiffness(panel, curves, root):
-    """Draw linear kinematics, the reference's own: ends of lines, a note, and what to say without a curve."""
+    """Draw errors in linear kinematics; return ends of lines, a note, and the reason if there is no curve."""
     panel.set(xlabel="Uniform stiffness [N/m]", ylabel="|Deformation error| [%]")
     panel.set_title("One stiffness for all loads? (small strain)", pad=13)
     if curves is None or "linear" not in curves.kinematics.values:
@@ -511,12 +504,12 @@ def _stiffness(panel, curves, root):
 
 
 def _membrane(curves):
-    """E t of the study's sheet, by which its stiffnesses were chosen [N/m]."""
+    """E t of the sheet [N/m]."""
     return np.nanmax((curves.stiffness / curves.stiffness_ratio).values, initial=0.0)
 
 
 def _marks(panel, curves, root):
-    """Stiffnesses by closed form and as stated, named above the panel, once it has its limits."""
+    """Mark stiffnesses by closed form and as stated; call it once the panel has its limits."""
     marks, middle = {}, np.sqrt(3) / 2 * _membrane(curves)
     if "paper" in root.definition.values:
         stated = root.stiffness.sel(definition="paper").values
@@ -543,7 +536,7 @@ def _marks(panel, curves, root):
 
 
 def _profile(panel, block, root, load):
-    """Draw the pressed face, nonlinear over finite strain or linear over small strain; returned as by `_stiffness`."""
+    """Draw the pressed face over the reference of its kinematics; returns as `_stiffness`."""
     x, pressed, ends, said, highest = block.face_position.values, block.sel(load=load), [], [], []
     panel.set(xlabel="Place on the loaded face over its length", ylabel="Displacement along the load [mm]")
     of_networks = pressed.face_profile.notnull().any(["definition", "face_position"])

@@ -1,4 +1,4 @@
-"""Which references of a study come from interpolants: where that takes fewer solves than the unit problems.
+"""Choice of the references that are interpolated: where that takes fewer solves.
 
 An interpolant has no whole fields; references that need one are solved one by one.
 """
@@ -44,7 +44,7 @@ NU_STEP = 0.05
 
 @once_a_study("grids", "outputs")
 def interpolants(study: "Study") -> "dict[str, tuple[Box, dict[Body, tuple[float, float]]]]":
-    """Interpolants that a study has."""
+    """Interpolants of a study by kind of load: their box, and the unit problem of each body in it."""
     if any(name in study.outputs for name in WITH_FIELDS):
         return {}
     scenes = [scene for grid in study.grids for scene in grid.scenes]
@@ -100,7 +100,7 @@ def box_of(problems: set[tuple[float, float]]) -> "Box":
 
 
 def expected_solves(box: "Box") -> int:
-    """Number of solves that an interpolant over a box takes, about.
+    """Approximate number of solves for an interpolant over a box.
 
     Examples
     --------

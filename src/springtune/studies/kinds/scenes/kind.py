@@ -1,9 +1,8 @@
 """Scenes of the grids: a study's own sections say what they are, see `springtune.studies.config.sections`."""
 
 from ...config.kind import Kind
-from .division import pieces, take
 from .outputs import OUTPUTS, stems
-from .plan import STAGES
+from .plan import STAGES, pieces, take
 
 KIND = Kind(
     "scenes",

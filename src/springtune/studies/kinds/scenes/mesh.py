@@ -22,13 +22,13 @@ def make(source):
 
 
 def check_unchanged(source):
-    """End the job if a mesh file is another one than as the study was read."""
+    """End the job if a mesh file changed since the study was read."""
     if hashlib.sha256(Path(source["file"]).read_bytes()).hexdigest() != source["content"]:
         raise SystemExit(f"{source['file']} was changed while the study ran; call the same command again")
 
 
 def run(content, costs, make=make, counted="mesh"):
-    """Make the meshes of a bundle that are not there yet."""
+    """Make the missing meshes of a bundle."""
     folder = content["folder"]
     for task in content["files"]:
         if stored.is_stored(folder, task["name"], task["key"], costs.limits):

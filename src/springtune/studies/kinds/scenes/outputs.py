@@ -1,4 +1,4 @@
-"""What is made of scenes."""
+"""Outputs of scenes."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING
@@ -17,7 +17,16 @@ SENSITIVITY_LABELS = ("beam", "mesh_type", "material", "load")
 SCENE_LABELS = ("mesh_type", "material", "load")
 """The same for figures of errors against mesh size, and of deformed networks."""
 
-PLOTS, ERRORS = "studies.kinds.scenes.figures", "studies.kinds.scenes.errors"
+SWEPT_SHOWN = {
+    "force": ("Force [N]", "force_N", 1.0),
+    "thickness": ("Thickness [mm]", "thickness_mm", 1e3),
+    "young_modulus": ("Young's modulus [MPa]", "young_modulus_MPa", 1e-6),
+    "poisson_ratio": ("Poisson's ratio", "poisson_ratio", 1.0),
+    "stiffness_scale": ("Factor on the stiffness", "stiffness_scale", 1.0),
+}
+"""What a study sweeps along an axis and in a column, and the unit there over that of the dataset."""
+
+PLOTS, ERROR_PLOTS = "studies.kinds.scenes.figures", "studies.kinds.scenes.errors"
 
 COLLECTION = "scenes.pvd"
 """What ParaView opens."""
@@ -59,7 +68,7 @@ def _cells(items: "Iterable[SceneSpec | CurveSpec]") -> Iterator[dict[str, str]]
 
 
 def _sweeps(study: "Study") -> dict[str, Mapping[str, str]]:
-    """Selections of the figures of sweeps: those under which a parameter has several values, by stem."""
+    """Selections of figures of sweeps by stem: where a parameter has several values."""
     found: dict[str, Mapping[str, str]] = {}
     for name in study.swept:
         values: dict[tuple[str, ...], set[float]] = {}
@@ -91,7 +100,7 @@ OUTPUTS = (
         "size",
         "figures of errors against mesh size",
         figures=lambda study: distinct("size", SCENE_LABELS, _cells(study.scenes)),
-        plot=f"{ERRORS}:size",
+        plot=f"{ERROR_PLOTS}:size",
         job="scenes",
         usual=True,
     ),
@@ -107,7 +116,7 @@ OUTPUTS = (
         "sweep",
         "figures of errors against what grids sweep: force, thickness, Young's modulus, Poisson's ratio, stiffness",
         figures=_sweeps,
-        plot=f"{ERRORS}:sweep",
+        plot=f"{ERROR_PLOTS}:sweep",
         job="scenes",
         usual=True,
     ),

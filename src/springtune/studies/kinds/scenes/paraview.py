@@ -1,4 +1,4 @@
-"""Scenes of a study for ParaView: a collection of those whose fields its dataset has, and a file for each of them."""
+"""Scenes of a study for ParaView: a file for each scene with fields, and a collection."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING

@@ -1,8 +1,9 @@
-"""Stages of scenes: what their jobs are to do, and the keys of what they store."""
+"""Stages of scenes: tasks of their jobs, and keys of their results."""
 
 import hashlib
 from collections import defaultdict
-from functools import cache, partial
+from dataclasses import replace
+from functools import cache, lru_cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,38 +14,44 @@ from ...config.kind import Stage
 from ...config.model import once_a_study, shown
 from ...runs.checked_json import hash_of
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key, stage_key
-from ...runs.stages import products
+from ...runs.stages import Task, products, stage
 from . import stored
 from .interpolated import expected_solves, interpolants
 from .stored import calibrated_key
 
 if TYPE_CHECKING:
-    from ...config.model import SceneSpec, Study
+    from collections.abc import Collection
 
-INTERPOLANT = "interpolant"
-"""What stands in the place of a kind at finite strain."""
+    from ...config.model import SceneSpec, Study
 
 
 def particles(mesh):
-    """Number of particles of a mesh, about."""
-    return mesh.beam.length * mesh.beam.height / (0.866 * mesh.mesh_size**2)
+    """Approximate number of particles of a mesh."""
+    return particles_in(mesh.beam.length * mesh.beam.height, mesh.mesh_size)
 
 
-_grouped: dict[int, tuple[Any, Any]] = {}
+def particles_in(area, mesh_size):
+    """Approximate number of particles in an area."""
+    return area / (0.866 * mesh_size**2)
 
 
-def by_mesh(items):
-    """Scenes or curves of a study by their mesh."""
-    # Every bundle asks: the tuple of a study is known by its place, since comparing 10,000 scenes is no way to find it.
-    if len(_grouped) > 8:
-        _grouped.clear()
-    known, groups = _grouped.get(id(items), (None, None))
-    if known is not items:
-        groups = defaultdict(list)
-        for item in items:
-            groups[item.mesh].append(item)
-        _grouped[id(items)] = items, groups
-    return groups
+def _by_mesh(items):
+    groups = defaultdict(list)
+    for item in items:
+        groups[item.mesh].append(item)
+    return dict(groups)
+
+
+@once_a_study("scenes")
+def scenes_by_mesh(study):
+    """Scenes of a study by their mesh."""
+    return _by_mesh(study.scenes)
+
+
+@once_a_study("curves")
+def curves_by_mesh(study):
+    """Sensitivity curves of a study by their mesh."""
+    return _by_mesh(study.curves)
 
 
 # -- keys --------------------------------------------------------------------------------------------------------------
@@ -57,23 +64,38 @@ def mesh_key(mesh):
 
 
 def mesh_parameters(mesh):
-    """What of its source a mesh depends on: not on where its file is, but on its ending, which says its format."""
-    source = mesh_source(mesh)
-    return source | {"file": mesh.file.suffix} if mesh.file else source
+    """Parameters that a mesh depends on."""
+    return parameters(mesh_source(mesh))
+
+
+def parameters(source):
+    """Parameters that results depend on: of a file its ending, which tells the format, and not its folder."""
+    return source | {"file": Path(source["file"]).suffix} if "file" in source else source
 
 
 def mesh_source(mesh):
-    """What a mesh is made from."""
+    """Source of a mesh: its box and mesh size, or its file."""
     source = {"length": mesh.beam.length, "height": mesh.beam.height}
     if mesh.file is None:
         return source | {"mesh_type": mesh.mesh_type, "mesh_size": mesh.mesh_size}
-    content = hashlib.sha256(mesh.file.read_bytes()).hexdigest()
-    return source | {"file": str(mesh.file), "unit": mesh.unit, "content": content}
+    return source | file_source(mesh.file, mesh.unit)
+
+
+def file_source(file, unit):
+    """Source of a mesh from a file: path, unit and hash of the content."""
+    state = Path(file).stat()
+    return {"file": str(file), "unit": unit, "content": _content(file, state.st_size, state.st_mtime_ns)}
+
+
+@lru_cache(maxsize=256)
+def _content(file, size, time):
+    """Hash of a file in its state; each of its scenes asks."""
+    return hashlib.sha256(Path(file).read_bytes()).hexdigest()
 
 
 @cache
 def stem(mesh):
-    """Stem of a mesh's files: says what it is, not by which labels a study knows it; beams of one extent share it."""
+    """Stem of a mesh's files; beams of the same extent share it, whatever their labels."""
     extent = f"{1e3 * mesh.beam.length:g}x{1e3 * mesh.beam.height:g}"
     own = f"_{mesh_source(mesh)['content'][:8]}" if mesh.file else ""
     return f"{extent}_{mesh.mesh_type}_{1e3 * mesh.mesh_size:g}mm{own}"
@@ -101,15 +123,13 @@ def interpolant_key(kind, box):
 def solved_reference(beam, material, load):
     """Reference that is solved by itself, under the key of its unit problem, which scaled beams share."""
     length, displacement = unit_scales(beam, material, LOADS[load].kind)
-    code = stage_key(
-        "studies.kinds.scenes.reference", without=("reference.finite_strain", "studies.kinds.scenes.stored_interpolant")
-    )
+    code = stage_key("studies.kinds.scenes.reference", without=("reference.finite_strain", "reference.interpolant"))
     key = hash_of(_unit_problem(beam, material, load), code)
     return {"key": key, "length": length, "displacement": displacement}
 
 
 def finite_key(reference, kind):
-    """Key of a reference at finite strain, which no load scales."""
+    """Key of a reference at finite strain."""
     return hash_of(kind, _finite_problem(reference), stage_key("studies.kinds.scenes.reference"))
 
 
@@ -131,9 +151,9 @@ def curve_key(study, curve):
 
 
 def scene_key(study: "Study", scene: "SceneSpec") -> str:
-    """Key of a scene; a calibrated one's result is stored under a key that holds the calibrated stiffness, too."""
+    """Key of a scene; results of calibrated scenes are stored under `solved_keys`."""
     return hash_of(
-        _commons(study).of(scene)["key"],
+        _common(study, scene)[1],
         scene.force,
         _given_stiffness(study, scene),
         _thickness_ratio(study, scene),
@@ -143,48 +163,42 @@ def scene_key(study: "Study", scene: "SceneSpec") -> str:
 
 @once_a_study("scenes", "curves", "grids", "outputs", "stiffness_table", "calibration")
 def scene_keys(study):
-    """Keys of a study's scenes by their mesh, in the order of `by_mesh`: tasks and the dataset both want them."""
-    return {mesh: [scene_key(study, scene) for scene in scenes] for mesh, scenes in by_mesh(study.scenes).items()}
+    """Keys of a study's scenes by their mesh, in the order of `scenes_by_mesh`: for tasks and the dataset."""
+    return {mesh: [scene_key(study, scene) for scene in scenes] for mesh, scenes in scenes_by_mesh(study).items()}
 
 
-class _Commons:
-    """What scenes share that differ in force or by a factor on the stiffness, asked for once."""
-
-    def __init__(self, study):
-        self._study, self._known = study, {}
-
-    def of(self, scene):
-        """A part of a scene's task, and its key."""
-        # By their places: hashing materials for each of 100,000 scenes is no way to know them.
-        place = id(scene.mesh), id(scene.material), scene.load, scene.definition, scene.kinematics
-        if place not in self._known:
-            # The scene is kept with it, so that nothing else comes to be in these places.
-            self._known[place] = self._found(scene), scene
-        return self._known[place][0]
-
-    def _found(self, scene):
+def _common(study, scene):
+    """Part of a task, and its key, that scenes share if only force or stiffness factor differ."""
+    # By their places: hashing materials for each of 100,000 scenes is slow.
+    place = id(scene.mesh), id(scene.material), scene.load, scene.definition, scene.kinematics
+    known = _commons(study)
+    if place not in known:
         load, mesh = LOADS[scene.load], scene.mesh
         task = {
             "material": material_key(scene.material),
             "kind": load.kind.name,
-            # Linear kinematics know no other place of what a force follows than that at rest.
+            # In linear kinematics follower forces keep their initial direction.
             "follower": load.follower and scene.kinematics == "nonlinear",
             "definition": scene.definition,
             "kinematics": scene.kinematics,
         }
-        reference = reference_of(self._study, mesh.beam, scene.material, scene.load)
+        reference = reference_of(study, mesh.beam, scene.material, scene.load)
         if "interpolant" not in reference:  # which has no field, all that a scene wants of it
             task["reference"] = reference
         code = stage_key("studies.kinds.scenes.solve"), definition_key(scene.definition)
-        return {"task": task, "key": hash_of(mesh_key(mesh), mesh.beam.thickness, task, code)}
+        key = hash_of(mesh_key(mesh), mesh.beam.thickness, task, code)
+        known[place] = task, key, scene  # the scene, so that nothing else comes to be in these places
+    return known[place][:2]
 
 
-_commons = once_a_study("grids", "outputs")(_Commons)
+@once_a_study("grids", "outputs")
+def _commons(study):
+    return {}
 
 
 @once_a_study("grids")
 def shown_scenes(study):
-    """Scenes whose whole fields are kept, whether or not they are drawn: of a part those of the whole study."""
+    """Scenes whose whole fields are stored, chosen from the whole study."""
     scenes = study.scenes if study.part is None else {scene for grid in study.grids for scene in grid.scenes}
     return shown(scenes, study.swept)
 
@@ -195,7 +209,7 @@ def solved_keys(study, mesh, calibration):
         calibrated_key(key, calibration[calibration_name(scene)]["stiffness"])
         if scene.definition == "calibrated"
         else key
-        for scene, key in zip(by_mesh(study.scenes)[mesh], scene_keys(study)[mesh])
+        for scene, key in zip(scenes_by_mesh(study)[mesh], scene_keys(study)[mesh])
     ]
 
 
@@ -206,7 +220,7 @@ def stiffnesses(study, curve):
 
 
 def _thickness_ratio(study, scene):
-    """Thickness over that of the beam that calibrates: stiffness is in proportion to it."""
+    """Thickness over that of the calibrating beam; stiffness is proportional to it."""
     if scene.definition != "calibrated":
         return 1.0
     return scene.mesh.beam.thickness / _calibrating(study)[calibration_name(scene)]
@@ -215,13 +229,21 @@ def _thickness_ratio(study, scene):
 @once_a_study("curves")
 def _calibrating(study):
     """Thickness of the beam that calibrates each group of scenes [m]; a study gives a group one."""
-    curves = [one for one in study.curves if (one.mesh.beam.name, one.load) == study.calibration]
-    return {calibration_name(one): one.mesh.beam.thickness for one in curves}
+    return {calibration_name(one): one.mesh.beam.thickness for one in _calibrating_curves(study)}
+
+
+def _calibrating_curves(study):
+    return [one for one in study.curves if (one.mesh.beam.name, one.load) == study.calibration]
 
 
 def calibration_name(scene):
     """Name of the group of curves that calibrates a scene."""
     return f"{scene.mesh.mesh_type}_{hash_of(material_key(scene.material))[:8]}_{scene.kinematics}"
+
+
+def _group(one):
+    """Mesh type, material and kinematics, which a scene shares with its calibrating curves."""
+    return one.mesh.mesh_type, one.material, one.kinematics
 
 
 def _given_stiffness(study, scene):
@@ -232,9 +254,9 @@ def _given_stiffness(study, scene):
 
 
 def _mesh_members(study, costs):
-    """Meshes, and what they and all their scenes and curves cost."""
+    """Meshes, and the cost of each with all its scenes and curves."""
     seconds = {stem(mesh): costs.of("mesh", particles(mesh)) for mesh in study.meshes}
-    for mesh, scenes in by_mesh(study.scenes).items():
+    for mesh, scenes in scenes_by_mesh(study).items():
         name, cost = stem(mesh), cache(partial(costs.of, units=particles(mesh)))
         for scene in scenes:
             seconds[name] += cost(scene.kinematics)
@@ -248,10 +270,9 @@ def _mesh_members(study, costs):
 
 
 def _meshes(study, folder, members):
-    return {
-        "folder": str(folder / "meshes"),
-        "files": [{"name": stem(mesh), "key": mesh_key(mesh)} | mesh_source(mesh) for mesh, *_ in members],
-    }
+    sources = [(mesh, mesh_source(mesh)) for mesh, *_ in members]
+    files = [{"name": stem(mesh), "key": mesh_key(mesh)} | source for mesh, source in sources]
+    return {"folder": str(folder / "meshes"), "files": files}
 
 
 def mesh_products(content):
@@ -259,62 +280,50 @@ def mesh_products(content):
     return [path for mesh in content["files"] for path in stored.files(content["folder"], mesh["name"])]
 
 
-def _reference_members(study, costs):
-    """References in groups: unit problems that share elements and differ in Poisson's ratio; each at finite strain."""
-    groups, boxes = defaultdict(dict), {}
-    for reference in study.references:
-        if "interpolant" in reference_of(study, reference.beam, reference.material, reference.load):
-            kind = LOADS[reference.load].kind.name
-            boxes[kind] = interpolants(study)[kind]
-            continue
-        aspect_ratio, nu, kind = _unit_problem(reference.beam, reference.material, reference.load)
-        groups[hash_of(aspect_ratio, kind)].setdefault(nu, (reference, None))
-    members = {
-        name: (sum(costs.of("reference") for _ in group), list(group.values())) for name, group in groups.items()
-    }
-    for kind, (box, _) in boxes.items():
-        members[interpolant_key(kind, box)] = costs.of("interpolant", expected_solves(box)), [(kind, INTERPOLANT)]
-    for reference in study.references:
+def _reference_tasks(study):
+    """Tasks of references that are not interpolated; those that share elements are in one job."""
+    found = {}
+    for one in study.references:
+        body = one.beam, one.material, one.load
+        if "interpolant" not in reference_of(study, *body):
+            problem, key = _unit_problem(*body), solved_reference(*body)["key"]
+            name = hash_of(problem[0], problem[2])
+            found[key] = Task({"problem": problem}, costs=[("reference", 0)], name=name, key=key)
         for kind in study.further_references:
-            name = hash_of(kind, _finite_problem(reference))
-            members[name] = costs.of("finite"), [(reference, kind)]
+            law, _, plane = kind.partition("-plane-")
+            load, key = LOADS[one.load], finite_key(one, kind)
+            values = {"law": law, "plane": plane, "load": load.kind.name, "force": one.force, "follower": load.follower}
+            values |= {"beam": beam_key(one.beam), "material": material_key(one.material)}
+            found[key] = Task(values, costs=[("finite", 0)], name=hash_of(kind, _finite_problem(one)), key=key)
+    return found.values()
+
+
+_REFERENCE_STAGE = stage(
+    "reference",
+    "studies.kinds.scenes.reference",
+    "Solving the finite-element references",
+    _reference_tasks,
+    "references",
+)
+
+
+def _reference_members(study, costs):
+    """References, and interpolants with the unit problems that are asked of them."""
+    members = dict(_REFERENCE_STAGE.members(study, costs))
+    asked = {(one.beam, one.material, one.load) for one in study.references}
+    for kind, (box, problems) in interpolants(study).items():
+        if not asked.isdisjoint(problems):  # a part of a study may ask for none
+            key = interpolant_key(kind, box)
+            keys = {solved_reference(*body)["key"]: problem for body, problem in problems.items()}
+            task = {"key": key, "kind": kind, "box": box, "problems": keys}
+            members[key] = costs.of("interpolant", expected_solves(box)), task
     return members
 
 
-def _references(study, folder, groups):
-    """References and their kinds at finite strain, nothing of a unit problem."""
-    members = [one for group in groups for one in group]
-    interpolated = [_interpolant(study, name) for name, kind in members if kind == INTERPOLANT]
-    references = [member for member in members if member[1] != INTERPOLANT]
-    tasks = [
-        {"key": solved_reference(*problem)["key"], "cost": ["reference", 0], "problem": _unit_problem(*problem)}
-        for problem in ((one.beam, one.material, one.load) for one, kind in references if kind is None)
-    ]
-    tasks += [
-        {
-            "key": finite_key(one, kind),
-            "cost": ["finite", 0],
-            "beam": beam_key(one.beam),
-            "material": material_key(one.material),
-            "force": one.force,
-            "load": LOADS[one.load].kind.name,
-            "law": kind.partition("-plane-")[0],
-            "plane": kind.partition("-plane-")[2],
-            "follower": LOADS[one.load].follower,
-        }
-        for one, kind in references
-        if kind is not None
-    ]
-    files = [{"name": task["key"], "tasks": [task]} for task in tasks]
-    more = {"interpolants": interpolated} if interpolated else {}
-    return {"folder": str(folder / "references"), "files": files} | more
-
-
-def _interpolant(study, kind):
-    """Interpolant, and the unit problems that are asked of it by the keys of those that are solved by themselves."""
-    box, problems = interpolants(study)[kind]
-    keys = {solved_reference(*body)["key"]: problem for body, problem in problems.items()}
-    return {"key": interpolant_key(kind, box), "kind": kind, "box": box, "problems": keys}
+def _references(study, folder, members):
+    interpolated = [one for one in members if isinstance(one, dict)]
+    content = _REFERENCE_STAGE.content(study, folder, [one for one in members if not isinstance(one, dict)])
+    return content | ({"interpolants": interpolated} if interpolated else {})
 
 
 def _reference_products(content):
@@ -333,48 +342,54 @@ def _curve(study, curve):
     }
 
 
+def on_meshes(folder, name, files, **more):
+    """Content of a job whose tasks read meshes and references; empty without tasks."""
+    read = {one: str(folder / one) for one in ("meshes", "references")}
+    return files and {"folder": str(folder / name), "files": files} | read | more
+
+
+def mesh_stage(name, module, message, content, members):
+    """Stage that makes meshes."""
+    return Stage(name, module, message, content, mesh_products, members, folder="meshes")
+
+
+def stage_on_meshes(name, module, message, content, folder, mesh="mesh", every=()):
+    """Stage that works on the bundles of one that makes meshes."""
+    return Stage(name, module, message, content, products, like=mesh, same=(mesh,), every=every, folder=folder)
+
+
 def _sensitivity(study, folder, members):
-    curves = by_mesh(study.curves)
+    curves = curves_by_mesh(study)
     files = [
         {"name": stem(mesh), "tasks": [_curve(study, curve) for curve in curves[mesh]]}
         for meshes in members
         for mesh in meshes
-        if mesh in curves  # asking otherwise would add it for all who ask later
+        if mesh in curves
     ]
-    return files and {
-        "folder": str(folder / "curves"),
-        "meshes": str(folder / "meshes"),
-        "references": str(folder / "references"),
-        "files": files,
-    }
+    return on_meshes(folder, "curves", files)
 
 
 def _solve(study, folder, members):
-    scenes = by_mesh(study.scenes)
+    scenes = scenes_by_mesh(study)
     files = [
         {"name": stem(mesh), "thickness": mesh.beam.thickness, "tasks": _scenes(study, mesh)}
         for meshes in members
         for mesh in meshes
-        if mesh in scenes  # as above; a part of a study may have curves alone
+        if mesh in scenes  # a part of a study may have curves alone
     ]
-    return files and {
-        "calibration": str(calibration_path(folder)) if calibrated(study) else None,
-        "folder": str(folder / "solutions"),
-        "meshes": str(folder / "meshes"),
-        "references": str(folder / "references"),
-        "files": files,
-    }
+    calibration = str(calibration_path(folder)) if calibrated(study) else None
+    return on_meshes(folder, "solutions", files, calibration=calibration)
 
 
 def _scenes(study, mesh):
     """Tasks of a mesh's scenes."""
-    scenes, keys = by_mesh(study.scenes)[mesh], scene_keys(study)[mesh]
-    commons, kept = _commons(study), shown_scenes(study)
-    return [_scene(study, scene, commons.of(scene)["task"], key, kept) for scene, key in zip(scenes, keys)]
+    scenes, keys = scenes_by_mesh(study)[mesh], scene_keys(study)[mesh]
+    kept = shown_scenes(study)
+    return [_scene(study, scene, key, kept) for scene, key in zip(scenes, keys)]
 
 
-def _scene(study, scene, common, key, kept):
-    task = common | {"key": key, "force": scene.force}
+def _scene(study, scene, key, kept):
+    task = _common(study, scene)[0] | {"key": key, "force": scene.force}
     stiffness = _given_stiffness(study, scene)
     if stiffness is not None:
         task["stiffness"] = stiffness
@@ -383,8 +398,7 @@ def _scene(study, scene, common, key, kept):
     if scene in kept:
         task["keep_fields"] = True
     if scene.definition == "calibrated":
-        task["calibration"] = calibration_name(scene)
-        task["thickness_ratio"] = _thickness_ratio(study, scene)
+        task |= {"calibration": calibration_name(scene), "thickness_ratio": _thickness_ratio(study, scene)}
     return task
 
 
@@ -400,23 +414,21 @@ def calibration_path(folder):
 
 
 def _calibrate_members(study, costs):
-    """Groups of scenes that share a calibrated stiffness, in one job."""
-    groups = {}
-    for scene in calibrated(study):
-        groups[calibration_name(scene)] = scene.mesh.mesh_type, scene.material, scene.kinematics
+    """All groups of scenes that share a calibrated stiffness, in one job."""
+    groups = {calibration_name(scene): _group(scene) for scene in calibrated(study)}
     return {"all": (0.0, sorted(groups.items()))} if groups else {}
 
 
 def _calibrate(study, folder, members):
-    tasks = []
-    for name, (mesh_type, material, kinematics) in (pair for groups in members for pair in groups):
-        curves = [
-            {"mesh": stem(curve.mesh), "curve": curve_key(study, curve), "load": curve.load, "force": curve.force}
-            for curve in study.curves
-            if (curve.mesh.beam.name, curve.load) == study.calibration
-            and (curve.mesh.mesh_type, curve.material, curve.kinematics) == (mesh_type, material, kinematics)
-        ]
-        tasks.append({"name": name, "members": curves})
+    def named(curve):
+        place = {"mesh": stem(curve.mesh), "curve": curve_key(study, curve)}
+        return place | {"load": curve.load, "force": curve.force}
+
+    tasks = [
+        {"name": name, "members": [named(one) for one in _calibrating_curves(study) if _group(one) == group]}
+        for groups in members
+        for name, group in groups
+    ]
     return {
         "file": str(calibration_path(folder)),
         "curves": str(folder / "curves"),
@@ -425,27 +437,90 @@ def _calibrate(study, folder, members):
     }
 
 
+# -- parts of a study --------------------------------------------------------------------------------------------------
+
+
+def pieces(study, costs, division):
+    """Seconds of each piece: of a mesh's scenes and curves, of a part of them, or of a grid's."""
+    if division.by == "grid":
+        return {("grid", name): sum(_seconds(one, costs) for one in items) for name, items in _by_grid(study).items()}
+    found = {}
+    for name, items in _by_stem(study).items():
+        each = [_seconds(one, costs) for one in items]
+        meshed = costs.of("mesh", particles(items[0].mesh))
+        count = division.pieces(sum(each), len(each))
+        for number in range(count):
+            found[name, number, count] = meshed + sum(_slice(each, number, count))
+    return found
+
+
+def take(study, names):
+    """Study reduced to some pieces and what they need."""
+    by_grid, by_stem = _by_grid(study), _by_stem(study)
+    chosen = set()
+    for first, *rest in names:
+        chosen.update(by_grid[rest[0]] if first == "grid" else _slice(by_stem[first], *map(int, rest)))
+    return of_scenes(study, chosen)
+
+
+def of_scenes(study: "Study", chosen: "Collection[object]") -> "Study":
+    """Study reduced to some scenes and curves and what they need."""
+    scenes = tuple(scene for scene in study.scenes if scene in chosen)
+    groups = {_group(scene) for scene in scenes if scene.definition == "calibrated"}
+    calibrating = {one for one in _calibrating_curves(study) if _group(one) in groups}
+    curves = tuple(one for one in study.curves if one in chosen or one in calibrating)
+    asked: list[Any] = [*scenes, *curves]
+    bodies = {(one.mesh.beam, one.material, one.load, one.force) for one in asked}
+    meshes = {one.mesh for one in asked}
+    return replace(
+        study,
+        scenes=scenes,
+        curves=curves,
+        meshes=tuple(mesh for mesh in study.meshes if mesh in meshes),
+        references=tuple(one for one in study.references if (one.beam, one.material, one.load, one.force) in bodies),
+        parts=study.parts | {"scenes": study.parts["scenes"] if asked else ()},
+    )
+
+
+def _by_grid(study):
+    """Scenes and curves by the first grid that asks for them."""
+    found, seen = {}, set()
+    for grid in study.grids:
+        found[grid.name] = [one for one in dict.fromkeys((*grid.curves, *grid.scenes)) if one not in seen]
+        seen.update(found[grid.name])
+    return {name: asked for name, asked in found.items() if asked}
+
+
+def _by_stem(study):
+    """Scenes and curves by the file of their mesh, which sheets of several thicknesses share."""
+    found = defaultdict(list)
+    for one in (*study.curves, *study.scenes):
+        found[stem(one.mesh)].append(one)
+    return found
+
+
+def _slice(items, number, count):
+    """Piece `number` of `count` of some items."""
+    return items[len(items) * number // count : len(items) * (number + 1) // count]
+
+
+def _seconds(one, costs):
+    """Expected seconds of a scene or a curve."""
+    count = particles(one.mesh)
+    kinds = (one.kinematics, one.definition) if hasattr(one, "definition") else ("curve",)
+    return sum(costs.of(kind, count) for kind in kinds)
+
+
 STAGES = (
-    Stage(
-        "reference",
-        "studies.kinds.scenes.reference",
-        "Solving the finite-element references",
-        _references,
-        _reference_products,
-        _reference_members,
-        folder="references",
-    ),
-    Stage("mesh", "studies.kinds.scenes.mesh", "Meshing", _meshes, mesh_products, _mesh_members, folder="meshes"),
-    Stage(
+    replace(_REFERENCE_STAGE, content=_references, products=_reference_products, members=_reference_members),
+    mesh_stage("mesh", "studies.kinds.scenes.mesh", "Meshing", _meshes, _mesh_members),
+    stage_on_meshes(
         "sensitivity",
         "studies.kinds.scenes.sensitivity",
         "Tracing the sensitivity curves",
         _sensitivity,
-        products,
-        like="mesh",
-        same=("mesh",),
+        "curves",
         every=("reference",),
-        folder="curves",
     ),
     Stage(
         "calibrate",
@@ -456,15 +531,12 @@ STAGES = (
         _calibrate_members,
         every=("sensitivity",),
     ),
-    Stage(
+    stage_on_meshes(
         "solve",
         "studies.kinds.scenes.solve",
         "Solving the networks",
         _solve,
-        products,
-        like="mesh",
-        same=("mesh",),
+        "solutions",
         every=("reference", "calibrate"),
-        folder="solutions",
     ),
 )

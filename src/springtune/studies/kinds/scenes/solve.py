@@ -2,6 +2,7 @@
 
 import time
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -21,7 +22,7 @@ parts = stored.parts
 
 
 def tasks(family, content):
-    """Scenes of a mesh under the keys of their results, and what is calibrated for them."""
+    """Scenes of a mesh under the keys of their results, with their calibrated stiffness."""
     calibration = checked_json.demand(content["calibration"]) if content["calibration"] else {}
     if not calibration:
         return family["tasks"]
@@ -32,9 +33,21 @@ def tasks(family, content):
 
 
 def prepare(family, content):
-    """Sheet of a mesh, and the fields of references on it."""
-    mesh = stored.prepared(content["meshes"], family["name"]).mesh
-    return Sheet(mesh, family["thickness"]), References(content["references"], mesh)
+    """Sheet of a mesh, and a function that reads the fields of references on it for 1 N [m]."""
+    mesh, labels = stored.prepared(content["meshes"], family["name"]).mesh, ("x", "y", "displacements")
+
+    @cache
+    def for_one(key, length):
+        """Displacements for 1 N of a material that moves by 1 m; None where the reference has none."""
+        scales = {"key": key, "length": length, "displacement": 1.0}
+        found = stored.read_reference(content["references"], scales, labels)
+        return interpolate(*(found[label] for label in labels), mesh.points) if "x" in found else None
+
+    def field(reference):
+        unit = for_one(reference["key"], reference["length"])
+        return None if unit is None else reference["displacement"] * unit
+
+    return Sheet(mesh, family["thickness"]), field
 
 
 def failed(scene, why):
@@ -49,34 +62,16 @@ def order(scene):
 
 
 def stored_key(scene, calibration):
-    """Key of a scene's result; as `springtune.studies.kinds.scenes.plan.solved_key`, from the task."""
+    """Key of a scene's result; as in `springtune.studies.kinds.scenes.plan.solved_keys`, from the task."""
     group = scene.get("calibration")
     return calibrated_key(scene["key"], calibration[group]["stiffness"]) if group else scene["key"]
 
 
-class References:
-    """Fields of references at the particles of a mesh, read when first asked for."""
-
-    def __init__(self, folder, mesh):
-        self.folder, self.mesh, self.fields = folder, mesh, {}
-
-    def field(self, reference):
-        """Displacements for 1 N [m], shape (n_points, 2); None where the reference has none."""
-        key = reference["key"]
-        if key not in self.fields:  # for 1 N, of whichever material asks first
-            labels = ("x", "y", "displacements")
-            found = stored.read_reference(self.folder, reference | {"displacement": 1.0}, labels)
-            grid = [found.get(label) for label in labels]
-            self.fields[key] = None if grid[0] is None else interpolate(*grid, self.mesh.points)
-        field = self.fields[key]
-        return None if field is None else reference["displacement"] * field
-
-
 def solve(scene, shared):
     """Result of a scene, and the seconds of deriving its springs."""
-    sheet, references = shared
+    sheet, field = shared
     derived = sheet.deriving
-    result = solved(sheet, scene, references.field)
+    result = solved(sheet, scene, field)
     return result | {"deriving": sheet.deriving - derived}
 
 
@@ -139,7 +134,7 @@ def _solved(sheet, scene, reference):
 
 
 def _fields(springs, solution, kinematics):
-    """Displacements of the particles [m], stiffness [N/m] and axial force [N] of the springs, these to be looked at."""
+    """Displacements of the particles [m], stiffness [N/m] and axial force [N] of the springs."""
     network, moved = solution.problem.network, solution.equilibrium.displacements
     forces = springs.reference * network.spring_forces(moved, kinematics == "linear")
     return {

@@ -1,4 +1,4 @@
-"""What stages store of meshes, references and scenes, and how it is read.
+"""Stored meshes, references and scenes, and how they are read.
 
 A mesh is a VTU file and a note with its key, its checksum, its quality and, of a shape, its groups. A mesh that cannot
 be made has no VTU file, and its note says why.
@@ -57,7 +57,7 @@ def refuse(folder: str | Path, name: str, key: str, why: dict[str, str]) -> None
 
 
 def is_stored(folder: str | Path, name: str, key: str, limits: str) -> bool:
-    """Whether a mesh is stored, or that it cannot be made; one that is damaged is set aside."""
+    """Whether a mesh, or the reason why it cannot be made, is stored; a damaged one is set aside."""
     path, notes = files(folder, name)
     if not notes.exists():
         return False
@@ -74,27 +74,24 @@ def is_stored(folder: str | Path, name: str, key: str, limits: str) -> bool:
 
 
 def read_notes(folder: str | Path, name: str) -> dict[str, Any]:
-    """What is known of a mesh: its ``key`` and ``checksum``, what it took and its quality."""
+    """Notes of a mesh: its ``key``, ``checksum``, seconds and quality."""
     notes: dict[str, Any] = checked_json.demand(files(folder, name)[1])
     return notes
 
 
-def is_refused(folder: str | Path, name: str) -> bool:
-    """Whether a mesh could not be made."""
-    return "message" in read_notes(folder, name)
-
-
 def prepared(folder: str | Path, name: str) -> GroupedMesh:
     """Mesh by its name, for tasks that need it."""
+    if found := read(folder, name):
+        return found
     notes = read_notes(folder, name)
-    if "message" in notes:
-        raise RefusedError(notes["message"], "limits" in notes)
-    return read(folder, name)
+    raise RefusedError(notes["message"], "limits" in notes)
 
 
-def read(folder: str | Path, name: str) -> GroupedMesh:
-    """Mesh by its name with its groups, of which a beam's has none."""
+def read(folder: str | Path, name: str) -> GroupedMesh | None:
+    """Mesh by its name with its groups, of which a beam's has none; None where it could not be made."""
     (path, _), notes = files(folder, name), read_notes(folder, name)
+    if "message" in notes:
+        return None
     _checked(path, notes["checksum"])
     mesh = read_mesh(path)
     if "groups" not in notes:
@@ -159,13 +156,13 @@ def fields_key(key: str) -> str:
 
 
 def parts(task: dict[str, Any], result: dict[str, Any]) -> dict[str, dict[str, Any]]:
-    """What is stored of a result of a task, by key: numbers and, where they are kept, fields."""
+    """Stored parts of a result by key: its numbers and, if they are kept, its fields."""
     fields = {fields_key(task["key"]): packed(result)} if task.get("keep_fields") else {}
     return fields | {task["key"]: {name: value for name, value in result.items() if name not in FIELD_ARRAYS}}
 
 
 def packed(result: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Fields of a result as they are stored; nothing where it has none."""
+    """Fields of a result as they are stored; empty without any."""
     if not FIELD_ARRAYS.keys() <= result.keys():
         return {}
     arrays = [result[name].astype(kind).ravel() for name, kind in FIELD_ARRAYS.items()]
@@ -174,7 +171,7 @@ def packed(result: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 
 def unpacked(stored: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Fields of what is stored: `packed`, undone.
+    """Fields of a stored result: the inverse of `packed`.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""What a study asks for, before anything runs."""
+"""Summary of a study before it runs."""
 
 from math import prod
 
@@ -18,7 +18,7 @@ SPARSE = 50
 
 
 def summary(study: Study, further: list[list[object]]) -> str:
-    """What a study asks for and what of it is shared, as text."""
+    """Summary of a study as text: what it asks for, and what is shared."""
     title = f"{study.name}: {study.title}"
     if not study.scenes:
         return "\n".join([title, "", aligned(further, left=0, right=(1,))])
@@ -54,7 +54,7 @@ def summary(study: Study, further: list[list[object]]) -> str:
 
 
 def _solutions(study: Study) -> str:
-    """How many finite-element solutions the references take, in words."""
+    """Number of finite-element solutions of the references, in words."""
     problems, known = set(), interpolants(study)
     for one in study.references:
         kind = LOADS[one.load].kind
@@ -90,7 +90,7 @@ def _within(study: Study) -> int:
 
 
 def _contributions(study: Study) -> list[list[object]]:
-    """Rows of what each grid asks for; new scenes are those that no grid above asks for."""
+    """Rows of a table of grids; new scenes are those that no grid above has."""
     rows: list[list[object]] = [["grid", "scenes", "new", "meshes", "references", "curves"]]
     seen: set[SceneSpec] = set()
     own, traced = set(study.scenes), set(study.curves)  # of a part, some

@@ -7,7 +7,7 @@ from springtune.problem.parameters import SWEPT
 
 from ...output.dataset import STATUS
 from ...output.own_law import OWN_LAWS, of_own_law
-from .outputs import TABLE, stem
+from .outputs import SWEPT_SHOWN, TABLE, stem
 
 ROW = ("beam", "mesh_size")
 
@@ -40,7 +40,7 @@ OF_ROWS = (
 
 
 def _read(array):
-    """An array in memory; texts are read a beam at a time: netCDF's library takes ten times their room meanwhile."""
+    """Read an array; texts one beam at a time, since netCDF takes ten times their room."""
     if array.dtype != object or "beam" not in array.dims:
         return array.variable
     each = [array.variable.isel(beam=[number]).values for number in range(array.sizes["beam"])]
@@ -54,7 +54,7 @@ def _selections(root):
 
 
 def _finite(tree):
-    """References at finite strain, and errors of networks of nonlinear kinematics against them; None without any."""
+    """References at finite strain and the errors against them; None without any."""
     found = tree["finite_strain"].to_dataset() if "finite_strain" in tree else None
     found = None if found is None else of_own_law(found)
     if found is None:
@@ -82,17 +82,7 @@ def _table(cells, selection, finite=None):
     present = requested.any(axis=tuple(range(requested.ndim - 1)))
     definitions = [name for name, there in zip(labels["definition"], present) if there]
     found = {"number": number, "stem": stem(selection, number), "rows": rows, "definitions": definitions}
-    return found | {"swept": [SWEPT_COLUMNS[name][0] for name in swept if name != "force"], **selection}
-
-
-SWEPT_COLUMNS = {
-    "force": ("force_N", 1.0),
-    "thickness": ("thickness_mm", 1e3),
-    "young_modulus": ("young_modulus_MPa", 1e-6),
-    "poisson_ratio": ("poisson_ratio", 1.0),
-    "stiffness_scale": ("stiffness_scale", 1.0),
-}
-"""Columns of what a study sweeps, and units in them over those of the dataset."""
+    return found | {"swept": [SWEPT_SHOWN[name][1] for name in swept if name != "force"], **selection}
 
 
 def _row(values, labels, place, swept, sign):
@@ -140,31 +130,31 @@ def _row(values, labels, place, swept, sign):
 
 
 def _swept(labels):
-    """Columns of what a study sweeps, of the labels of a cell."""
-    return {column: unit * labels[name] for name, (column, unit) in SWEPT_COLUMNS.items() if name in labels}
+    """Columns of swept parameters from the labels of a cell."""
+    return {column: unit * labels[name] for name, (_, column, unit) in SWEPT_SHOWN.items() if name in labels}
 
 
 # Selecting each cell by its labels takes a thousand times as long as taking all of them by their numbers.
 
 
 def _places(values, dimensions):
-    """Numbers of the labels of the cells that have a value, by dimension; in the order of these dimensions."""
+    """Indices of the cells that have a value, by dimension."""
     return dict(zip(dimensions, np.argwhere(np.isfinite(values.transpose(*dimensions).values)).T))
 
 
 def _at(places, array):
-    """Values of an array at such cells."""
+    """Values of an array at such indices."""
     return array.values[tuple(places[name] for name in array.dims)].tolist()
 
 
 def _labels(data, places):
-    """Labels of each of such cells by dimension."""
+    """Labels by dimension of each such cell."""
     columns = [map(data[name].values.tolist().__getitem__, numbers) for name, numbers in places.items()]
     return (dict(zip(places, labels)) for labels in zip(*columns))
 
 
 def _own_laws(references, places):
-    """Numbers of the references in plane stress of each cell's own law; 0, the first one, without any."""
+    """Index of the plane-stress reference of each cell's own law; 0 without any."""
     known = references.reference.values.tolist()
     kinds = [known.index(kind) for kind in OWN_LAWS if kind in known]
     found = np.full(len(places["beam"]), kinds[-1] if kinds else 0)
@@ -173,14 +163,13 @@ def _own_laws(references, places):
     return found
 
 
-def _compared(place, network, reference, error):
-    """Columns of a network beside a reference."""
-    return {
-        "mesh_size_mm": 1e3 * place["mesh_size"],
-        "network_mm": 1e3 * network,
-        "reference_mm": 1e3 * reference,
-        "error_percent": 100 * error,
-    }
+def _rows(data, places, names, arrays):
+    """Rows of networks beside references, from cells at some places."""
+    values = (_at(places, array) for array in arrays)
+    for place, network, reference, error in zip(_labels(data, places), *values):
+        row = {name: place[name] for name in names} | _swept(place)
+        row |= {"mesh_size_mm": 1e3 * place["mesh_size"], "network_mm": 1e3 * network}
+        yield row | {"reference_mm": 1e3 * reference, "error_percent": 100 * error}
 
 
 def _finite_strain(finite, root):
@@ -191,12 +180,8 @@ def _finite_strain(finite, root):
     finite, root = finite.isel(nonlinear), root[["displacement"]].isel(nonlinear)
     places = _places(finite.deformation_error, (*dimensions, *swept))
     arrays = root.displacement, finite.reference_displacement, finite.deformation_error
-    rows = [
-        {name: place[name] for name in ("material", "load", "beam", "mesh_type", "definition", "reference")}
-        | _swept(place)
-        | _compared(place, *values)
-        for place, *values in zip(_labels(finite, places), *(_at(places, array) for array in arrays))
-    ]
+    names = ("material", "load", "beam", "mesh_type", "definition", "reference")
+    rows = list(_rows(finite, places, names, arrays))
     note = (
         "Networks of nonlinear kinematics against finite elements of rubber: neo-Hookean ones, or of the law that is "
         "fitted to a uniaxial test. At finite strain an error holds the difference of two material laws, where "
@@ -216,13 +201,8 @@ def _block(block, root):
     linear = (block.kinematics.values == "linear")[places["kinematics"]]
     places["reference"] = np.where(linear, 0, _own_laws(block.reference_face_displacement, places))
     arrays = block.face_displacement, block.reference_face_displacement, block.face_error
-    rows = [
-        {name: place[name] for name in ("beam", "material", "load", "mesh_type", "definition", "kinematics")}
-        | {"reference": str(place["reference"])}
-        | _swept(place)
-        | _compared(place, *values)
-        for place, *values in zip(_labels(block, places), *(_at(places, array) for array in arrays))
-    ]
+    names = ("beam", "material", "load", "mesh_type", "definition", "kinematics", "reference")
+    rows = list(_rows(block, places, names, arrays))
     note = (
         "Displacement of the middle of the pressed face along the load. Networks of nonlinear kinematics are compared "
         "with the reference at finite strain in plane stress where the study has it, linear ones with that of small "

@@ -25,7 +25,7 @@ SCENE = (*CELL, "definition", "kinematics")
 
 FURTHER = (*REFERENCE, "reference")
 
-SOLVERS = "(pinned) Cholesky, SuperLU or multigrid, by what is installed and the number of unknowns"
+SOLVER_NAMES = "(pinned) Cholesky, SuperLU or multigrid, by what is installed and the number of unknowns"
 
 
 def declared(name: str, tables: "Mapping[tuple[str, ...], Rows]", **options: Any) -> Group:
@@ -38,27 +38,27 @@ def declared(name: str, tables: "Mapping[tuple[str, ...], Rows]", **options: Any
     return Group(name, variables, **options)
 
 
-OF_SCENE: "Rows" = {
+SCENE_ROWS: "Rows" = {
     "status": ("1", "what became of the scene", 0),
     "message": ("1", "why the scene is not solved, or what there is against its reference", ""),
     "solve_seconds": ("s", "time to solve the scene, networks shared"),
     "definition_seconds": ("s", "time to derive the springs' parameters, shared by loads"),
     "negative_pivots": ("1", "negative pivots of the tangent; 0 where the equilibrium is stable"),
 }
-OF_MESH: "Rows" = {
+MESH_ROWS: "Rows" = {
     "particles": ("1", "number of particles"),
     "springs": ("1", "number of springs"),
     "minimum_angle": ("degree", "smallest angle of all triangles"),
     "edge_length_spread": ("1", "standard deviation of the edge lengths over their mean"),
     "mesh_seconds": ("s", "time to make the mesh"),
 }
-ESTIMATE: "Rows" = {"reference_error_estimate": ("1", "estimated relative error of the reference")}
-OF_REFERENCE: "Rows" = {
+ESTIMATE_ROW: "Rows" = {"reference_error_estimate": ("1", "estimated relative error of the reference")}
+REFERENCE_ROWS: "Rows" = {
     "reference_message": ("1", "why there is no reference, or none for nonlinear kinematics", ""),
     "reference_rotation": ("rad", "rotation that 95 % of the reference does not exceed"),
     "reference_strain": ("1", "principal strain that 95 % of the reference does not exceed"),
 }
-APPLIES: "Rows" = {
+APPLIES_ROW: "Rows" = {
     "reference_applies": (
         "1",
         "whether small strain applies to networks of these kinematics, by rotation and strain",
@@ -66,19 +66,19 @@ APPLIES: "Rows" = {
     )
 }
 YES_OR_NO = {"applies": ("no", "yes")}
-MOVED: "Rows" = {
+DISPLACEMENT_ROWS: "Rows" = {
     "displacement_x": ("m", "displacement along x, network"),
     "displacement_y": ("m", "displacement along y, network"),
 }
 # Not "force", which is a dimension of the root where a study sweeps it, and would hide this one.
-SPRING_FORCE: "Rows" = {
+SPRING_FORCE_ROW: "Rows" = {
     "spring_force": ("N", "axial force of each spring, tension positive, energies' part left out", np.float32(np.nan))
 }
-OUTLINE: "Rows" = {
+OUTLINE_ROWS: "Rows" = {
     "outline_x": ("m", "position at rest along x, reference"),
     "outline_y": ("m", "position at rest along y, reference"),
 }
-OUTLINE_MOVED: "Rows" = {
+OUTLINE_DISPLACEMENT_ROWS: "Rows" = {
     "reference_displacement_x": ("m", "displacement along x, reference"),
     "reference_displacement_y": ("m", "displacement along y, reference"),
 }
@@ -86,7 +86,7 @@ OUTLINE_MOVED: "Rows" = {
 
 
 def topology(one: "tuple[str, ...]", words: str) -> "dict[tuple[str, ...], Rows]":
-    """Rows of meshes by UGRID-1.0, one mesh over some dimensions."""
+    """Rows of meshes by UGRID-1.0; `one` are the dimensions that tell meshes apart."""
     return {
         (): {"mesh": ("1", f"topology of a network, of one {words}", np.int32(0))},
         (*one, "particle"): {"x": ("m", "position at rest along x"), "y": ("m", "position at rest along y")},
@@ -103,11 +103,11 @@ ROOT = declared(
             "deformation_error": ("1", "signed deformation error, (network - reference) / |reference|"),
             "field_error": ("1", "difference of the whole displacement fields in L2, over the reference"),
             "stiffness": ("N/m", "uniform spring stiffness"),
-            **OF_SCENE,
+            **SCENE_ROWS,
             "iterations": ("1", "Newton steps"),
             "residual": ("1", "out-of-balance force over the load"),
             "load_share": ("1", "largest share of the load with a good equilibrium, nonlinear"),
-            "solver": ("1", f"what solved: {SOLVERS}", ""),
+            "solver": ("1", f"what solved: {SOLVER_NAMES}", ""),
             "definition_evaluations": ("1", "solves that deriving the springs' parameters took"),
             "spring_ratio": ("1", "largest spring stiffness over the smallest"),
         },
@@ -120,12 +120,12 @@ ROOT = declared(
         REFERENCE: {
             "force": ("N", "force on the loaded side, tension positive"),
             "reference_displacement": ("m", "mean displacement of the loaded side along the force, reference"),
-            **ESTIMATE,
-            **OF_REFERENCE,
+            **ESTIMATE_ROW,
+            **REFERENCE_ROWS,
             "reference_seconds": ("s", "time to solve the reference, shared by all loads"),
         },
-        (*REFERENCE, "kinematics"): APPLIES,
-        MESH: OF_MESH,
+        (*REFERENCE, "kinematics"): APPLIES_ROW,
+        MESH: MESH_ROWS,
         CELL: {
             "paper_displacement": ("m", "displacement of the network as the paper prints it"),
             "paper_reference_displacement": ("m", "displacement of the reference as the paper prints it"),
@@ -164,7 +164,7 @@ OF_PRINT = "paper_"
 
 
 def swept(group: Group, study: "Study") -> Group:
-    """Group whose variables are over what a study sweeps, each over what it depends on."""
+    """Group whose variables also have the swept dimensions that they depend on."""
     further: dict[str, list[str]] = {}
     for name, (dimensions, *_) in group.variables.items():
         if name in OF_BODIES.values():
@@ -175,7 +175,7 @@ def swept(group: Group, study: "Study") -> Group:
 
 
 def fields_of(study: "Study") -> Group:
-    """Group of whole fields of a study: of what it sweeps they are of one value each, which the group says."""
+    """Group of whole fields, which are stored for one value of each swept parameter: the group says which."""
     place = "beam", "mesh_type", "material", "load"
     swept = {
         f"{OF_FIELDS}{name}": (place, SWEPT[name][1], f"{SWEPT[name][0]}, of the fields", np.nan)
@@ -184,15 +184,15 @@ def fields_of(study: "Study") -> Group:
     return replace(FIELDS, variables=FIELDS.variables | swept)
 
 
-NO_REFERENCE: "Rows" = {"reference_message": ("1", "why there is no reference", "")}
+NO_REFERENCE_ROW: "Rows" = {"reference_message": ("1", "why there is no reference", "")}
 
 FINITE_STRAIN = declared(
     "/finite_strain",
     {
         FURTHER: {
             "reference_displacement": ("m", "displacement of the load, reference at finite strain"),
-            **ESTIMATE,
-            **NO_REFERENCE,
+            **ESTIMATE_ROW,
+            **NO_REFERENCE_ROW,
         },
         (*SCENE, "reference"): {
             "deformation_error": (
@@ -221,8 +221,8 @@ BLOCK = declared(
         FURTHER: {
             "reference_face_displacement": ("m", "displacement of the middle of the face, reference"),
             "reference_face_mean_displacement": ("m", "mean displacement of the face, reference"),
-            **ESTIMATE,
-            **NO_REFERENCE,
+            **ESTIMATE_ROW,
+            **NO_REFERENCE_ROW,
         },
         (*FURTHER, "face_position"): {"reference_face_profile": ("m", "displacement over the face, reference")},
         (*SCENE, "reference"): {
@@ -236,14 +236,14 @@ FIELDS = declared(
     "/fields",
     topology(MESH, "beam, mesh type and mesh size")
     | {
-        (*SCENE, "particle"): MOVED,
+        (*SCENE, "particle"): DISPLACEMENT_ROWS,
         (*CELL, "particle"): {
             f"particle_reference_{axis}": ("m", f"{words} of the reference where the particles are at rest")
             for axis, words in {"x": "displacement along x", "y": "displacement along y"}.items()
         },
-        (*SCENE, "spring"): {"stiffness": ("N/m", "stiffness of each spring", np.float32(np.nan)), **SPRING_FORCE},
-        ("beam", "outline_point"): OUTLINE,
-        ("beam", "material", "load", "outline_point"): OUTLINE_MOVED,
+        (*SCENE, "spring"): {"stiffness": ("N/m", "stiffness of each spring", np.float32(np.nan)), **SPRING_FORCE_ROW},
+        ("beam", "outline_point"): OUTLINE_ROWS,
+        ("beam", "material", "load", "outline_point"): OUTLINE_DISPLACEMENT_ROWS,
     },
     further=UGRID
     | dict.fromkeys(("displacement_x", "displacement_y", "particle_reference_x", "particle_reference_y"), OF_PARTICLES)

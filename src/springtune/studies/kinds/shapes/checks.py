@@ -1,7 +1,9 @@
-"""What is wrong with a study's shapes and their grids."""
+"""Checks of a study's shapes and their grids."""
 
 import re
 from pathlib import Path
+
+import numpy as np
 
 from springtune.mesh import MeshError
 from springtune.problem.quantities import nearest
@@ -55,7 +57,7 @@ def check(config, problems):
 
 
 def _check_file(name, shape, path, problems):
-    """Groups of a mesh file, if it is small: of a large one the stages say what is wrong, scene by scene."""
+    """Check the groups of a small mesh file; faults of large files show in their scenes."""
     file = problems.folder / shape.file
     if file.stat().st_size > READ_AT_ONCE:
         return
@@ -88,7 +90,7 @@ def _check_file(name, shape, path, problems):
 
 
 def _check_something(case, path, problems):
-    """Whether a load does anything."""
+    """Check that a load moves or pulls the body."""
     moved = any(one.x or one.y for one in case.supports.values())
     pressed = any(one.pressure for one in case.pressures.values())
     if not (moved or pressed or any(case.gravity) or any(map(any, case.forces.values()))):
@@ -97,7 +99,7 @@ def _check_something(case, path, problems):
 
 
 def _place(message):
-    """Keys of a shape that a message on its geometry is about."""
+    """Keys in the section of a shape that a message on its geometry is about."""
     if found := re.match(r"point '([^']+)'", message):
         return "points", found[1]
     if found := re.match(r"hole (\d+)\b", message):
@@ -108,7 +110,7 @@ def _place(message):
 
 
 def _check_stems(config, problems):
-    """Names that are told apart once they are joined in those of files."""
+    """Check that joined names of files differ."""
     stems = {}
     for name, shape in config.shapes.items():
         for load in shape.loads:
@@ -122,7 +124,7 @@ def _check_stems(config, problems):
 
 
 def _check_held(shape, path, problems):
-    """Whether supports hold a body against all rigid motions, by the corners of what they hold."""
+    """Check that supports hold a body against all rigid motions."""
     (left, low), (right, top) = shape.extent
     size = max(right - left, top - low)
     for name, case in shape.loads.items():
@@ -134,26 +136,13 @@ def _check_held(shape, path, problems):
             for x, y in places:
                 x, y = (x - left) / size, (y - low) / size
                 rows += [(1.0, 0.0, -y)] * (support.x is not None) + [(0.0, 1.0, x)] * (support.y is not None)
-        if _rank(rows) < 3:
+        if not rows or np.linalg.matrix_rank(np.array(rows), tol=1e-9) < 3:
             message = "leave the body free to move, or to turn; hold it against both, such as {left: fixed}"
             problems.add((*path, "loads", name, "supports"), message)
 
 
-def _rank(rows):
-    """Rank of rows of three numbers of the size of one."""
-    found, rows = 0, [list(row) for row in rows]
-    for column in range(3):
-        pivot = max(rows, key=lambda row: abs(row[column]), default=None)
-        if pivot is None or abs(pivot[column]) < 1e-9:
-            continue
-        rows.remove(pivot)
-        rows = [[a - b * row[column] / pivot[column] for a, b in zip(row, pivot)] for row in rows]
-        found += 1
-    return found
-
-
 def _check_outlines(shape, path, problems):
-    """Numbers of sides, and parts."""
+    """Check the numbers of sides, and the parts."""
     rounds = [((*path, "outline"), shape.outline)]
     rounds += [
         ((*path, "holes", number, "outline"), hole.outline) for number, hole in enumerate(shape.holes) if hole.outline
@@ -170,7 +159,7 @@ def _check_outlines(shape, path, problems):
 
 
 def _groups(shape):
-    """Names of the groups of sides of a shape with an outline: of the body's, not of what fills its holes."""
+    """Groups of sides of a shape with an outline, without those of parts in its holes."""
     sides = [*shape.outline]
     found = [hole.group for hole in shape.holes if hole.circle and not hole.part]
     for hole in shape.holes:
@@ -179,7 +168,7 @@ def _groups(shape):
 
 
 def _check_names(shape, path, problems):
-    """Groups and points that supports, loads and quantities name."""
+    """Check the groups and points that supports, loads and quantities name."""
     groups, points = _groups(shape), list(shape.points)
     for number, hole in enumerate(shape.holes):
         if hole.part and (hole.group or any(side.group for side in hole.outline or ())):

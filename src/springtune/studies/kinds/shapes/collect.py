@@ -3,59 +3,50 @@
 import numpy as np
 
 from springtune.problem.compare import deformation_error
-from springtune.problem.status import Status
 from springtune.reference.answers import beyond_linear
 
 from ...output.dataset import Filler
 from ...runs import store
 from ..scenes import stored
-from ..scenes.variables import OF_MESH
+from ..scenes.collect import with_objection
+from ..scenes.variables import MESH_ROWS, SCENE_ROWS
 from . import plan
-from .names import QUANTITY_UNITS
 from .task_values import named, quantity_key
 from .variables import SHAPES
 
-COPIED_OF_SCENE = ("status", "message", "definition_seconds", "negative_pivots")
+QUANTITY_UNITS = {"displacement": "m", "stress": "Pa", "reaction": "N", "area": "m2", "energy": "J"}
+"""Units of the values in the dataset."""
 
 
 def groups(study, folder):
     """Groups of a dataset, see `springtune.studies.kinds.scenes.collect.groups`."""
     part = study.parts["shapes"]
     found = Filler(SHAPES.empty(study.axes))
-    expected = _quantities(part, found)
-    references = _references(study, part, folder, found, expected)
+    _quantities(part, found)
+    references = _references(study, part, folder, found)
     for scenes in plan.by_mesh(part).values():
         _mesh(scenes[0], folder, found)
-        tasks = {plan.scene_task(part, one)["key"]: one for one in scenes}
-        results = store.read(folder / "solutions" / f"{plan.file_name(scenes[0])}.h5", tasks)
-        for one in scenes:
-            _scene(part, one, results[plan.scene_task(part, one)["key"]], references, expected, found)
+        keys = {one: plan.scene_task(part, one)["key"] for one in scenes}
+        results = store.read(folder / "solutions" / f"{plan.file_name(scenes[0])}.h5", set(keys.values()))
+        for one, key in keys.items():
+            _scene(part, one, results[key], references, found)
     return {SHAPES.name: found.data}
 
 
 def _quantities(part, found):
-    """Put what quantities are; by shape and load, the expected values by name."""
-    expected = {}
+    """Write what quantities are."""
     for shape, load in dict.fromkeys((one.shape, one.load) for one in part.scenes):
         found.put({"shape_thickness": part.shape[shape].thickness}, shape=shape)
-        expected[shape, load] = {}
         for one in part.shape[shape].loads[load].quantities:
-            known = np.nan if one.expected is None else one.expected
-            expected[shape, load][one.name] = known
-            values = {
-                "quantity_kind": one.kind,
-                "quantity_component": one.component,
-                "quantity_of": one.of,
-                "quantity_units": QUANTITY_UNITS[one.kind],
-                "expected_value": known,
-                "source": one.source,
-            }
+            values = {f"quantity_{name}": getattr(one, name) for name in ("kind", "component", "of")}
+            values |= {"quantity_units": QUANTITY_UNITS[one.kind], "source": one.source}
+            if one.expected is not None:
+                values["expected_value"] = one.expected
             found.put(values, shape=shape, load=load, quantity=one.name)
-    return expected
 
 
-def _references(study, part, folder, found, expected):
-    """Put references; by shape, material and load their values by key, and the objection to each kinematics."""
+def _references(study, part, folder, found):
+    """Write references; return result and objections by shape, material and load."""
     answers = {}
     for shape, material, load in part.referred:
         task = plan.reference_task(part, shape, material, load)
@@ -75,7 +66,7 @@ def _references(study, part, folder, found, expected):
                 compared = {
                     "reference_value": value,
                     "reference_error_estimate": result["error_estimates"].get(key, np.nan),
-                    "reference_expected_error": _error(value, expected[shape, load][one.name]),
+                    "reference_expected_error": _error(value, one.expected),
                 }
                 found.put(compared, quantity=one.name, **labels)
             lacking = (named(why, part.shape[shape], case) for why in result["lacking"].values())
@@ -89,23 +80,18 @@ def _references(study, part, folder, found, expected):
 def _mesh(one, folder, found):
     notes = stored.read_notes(folder / "meshes", plan.file_name(one))
     labels = {"shape": one.shape, "mesh_type": one.mesh_type, "mesh_size": one.mesh_size}
-    found.put({name: notes[name] for name in OF_MESH if name in notes}, **labels)
+    found.put({name: notes[name] for name in MESH_ROWS if name in notes}, **labels)
 
 
-def _scene(part, one, result, references, expected, found):
-    labels = {
-        name: getattr(one, name)
-        for name in ("shape", "mesh_type", "mesh_size", "material", "load", "definition", "kinematics")
-    }
+def _scene(part, one, result, references, found):
+    labels = vars(one)
     reference, objections = references.get((one.shape, one.material, one.load), ({}, {}))
-    values = {name: result[name] for name in COPIED_OF_SCENE if name in result} | {"solve_seconds": result["seconds"]}
+    values = {name: result[name] for name in SCENE_ROWS if name in result} | {"solve_seconds": result["seconds"]}
     case = part.shape[one.shape].loads[one.load]
     whys = [reference.get("message", ""), *reference.get("lacking", {}).values()]
     whys = [f"no reference: {named(why, part.shape[one.shape], case)}" for why in whys if why]
     why = "; ".join(filter(None, (*whys, objections.get(one.kinematics, ""))))
-    values["message"] = named(values.get("message", ""), part.shape[one.shape], case)
-    if why and result["status"] in (Status.SOLVED, Status.UNSTABLE):
-        values["message"] = "; ".join(filter(None, (values["message"], why)))
+    values["message"] = with_objection(result, named(result.get("message", ""), part.shape[one.shape], case), why)
     found.put(values, **labels)
     for quantity in case.quantities:
         key = quantity_key(quantity)
@@ -113,11 +99,11 @@ def _scene(part, one, result, references, expected, found):
         compared = {
             "value": value,
             "error": _error(value, reference.get("values", {}).get(key, np.nan)),
-            "expected_error": _error(value, expected[one.shape, one.load][quantity.name]),
+            "expected_error": _error(value, quantity.expected),
         }
         found.put(compared, quantity=quantity.name, **labels)
 
 
 def _error(value, reference):
-    """Signed relative error; nothing where there is nothing to divide by."""
+    """Signed relative error; NaN where there is nothing to divide by."""
     return deformation_error(value, reference) if reference else np.nan

@@ -9,8 +9,8 @@ from springtune.problem.materials import Material
 from springtune.problem.shapes import Hole, LoadCase, Pressure, Quantity, Segment, Shape, Support, Traction
 from springtune.springs import DEFINITIONS
 
-from .names import OUTLINED, OWN_FILE, OWN_SIZE
-from .plan import mesh_name
+from .plan import OWN_FILE, mesh_name
+from .sections import OUTLINED
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class ShapeScene:
 
 @dataclass(frozen=True)
 class Shapes:
-    """What a study asks of shapes: those with scenes, the material of each part, and mesh sizes over the rest's."""
+    """Shapes of a study, their scenes, the materials of parts, and refinements."""
 
     declared: dict[str, Shape]
     shapes: tuple[Shape, ...]
@@ -82,7 +82,7 @@ def _load(name, case):
 
 
 def shape_of_config(name, shape, folder):
-    """Shape of its section, its file seen from a folder."""
+    """Shape from its section; files are relative to a folder."""
     return Shape(
         name,
         shape.thickness,
@@ -96,15 +96,13 @@ def shape_of_config(name, shape, folder):
 
 
 def _scenes(config):
-    """Scenes of all grids, and which of them have a reference."""
+    """Scenes of all grids, and the cases that have a reference."""
     found, referred = {}, {}
     for grid in config.shape_grids.values():
         for name in grid.shape:
             shape = config.shapes[name]
             meshes = (
-                [(OWN_FILE, OWN_SIZE)]
-                if shape.file is not None
-                else product(grid.mesh_type or OUTLINED, grid.mesh_size)
+                [(OWN_FILE, 0.0)] if shape.file is not None else product(grid.mesh_type or OUTLINED, grid.mesh_size)
             )
             for mesh, material, load in product(list(meshes), grid.material, grid.load or shape.loads):
                 if grid.reference:
@@ -117,20 +115,21 @@ def _scenes(config):
 def expand(config, declared):
     """Shapes of a study that has any, see `springtune.studies.config.kind.Kind`."""
     found, referred = _scenes(config)
-    ranks = [
-        {name: rank for rank, name in enumerate(names)}
-        for names in (config.shapes, (*OUTLINED, OWN_FILE), config.materials, DEFINITIONS, KINEMATICS)
-    ]
+    ranks = {
+        name: {label: rank for rank, label in enumerate(labels)}
+        for name, labels in (
+            ("shape", config.shapes),
+            ("mesh_type", (*OUTLINED, OWN_FILE)),
+            ("material", config.materials),
+            ("definition", DEFINITIONS),
+            ("kinematics", KINEMATICS),
+        )
+    }
 
     def order(one):
-        shape, mesh_type, material, definition, kinematics = (
-            rank[label]
-            for rank, label in zip(
-                ranks, (one.shape, one.mesh_type, one.material, one.definition, one.kinematics), strict=True
-            )
-        )
+        shape, mesh_type, material, *rest = (known[getattr(one, name)] for name, known in ranks.items())
         load = list(config.shapes[one.shape].loads).index(one.load)
-        return shape, mesh_type, one.mesh_size, material, load, definition, kinematics
+        return shape, mesh_type, one.mesh_size, material, load, *rest
 
     scenes = sorted(found, key=order)
     names = dict.fromkeys(one.shape for one in scenes)

@@ -1,7 +1,5 @@
 """Figures of shapes: errors of their quantities over particles and seconds, and their deformed networks."""
 
-import math
-
 import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.colors import LinearSegmentedColormap
@@ -9,8 +7,9 @@ from matplotlib.colors import LinearSegmentedColormap
 from springtune.safe_io.escapes import no_mathematics
 
 from ...output import labels, style
-from ...output.dataset import NO_NODE, STATUS
-from ...output.selection import choose, group
+from ...output.dataset import STATUS
+from ...output.drawing import extent, in_words, largest, magnification, plane, spring_ends
+from ...output.selection import cells, choose, group, labels_of
 from .outputs import DEFORMED, ERRORS, figures
 
 NETWORK_COLUMNS = 3
@@ -35,15 +34,8 @@ MOST_SHOWN_ERROR = 100.0
 def shapes(tree):
     """Figures of shapes: all quantities; and of each shape and load its errors, and its networks."""
     data = group(tree, "shapes")
-    asked = (data.status != 0).any([name for name in data.status.dims if name not in ("shape", "load")])
-    pairs = [
-        {"shape": shape, "load": load}
-        for shape in data["shape"].values.tolist()
-        for load in data["load"].values.tolist()
-        if bool(asked.sel(shape=shape, load=load))
-    ]
     plots = {ERRORS: plot_shape_errors, DEFORMED: plot_shape}
-    for stem, selection in figures(pairs).items():
+    for stem, selection in figures(cells(data.status != 0, ("shape", "load"))).items():
         plot = next((plots[name] for name in plots if stem.startswith(name)), plot_shapes)
         yield stem, plot, selection
 
@@ -85,26 +77,23 @@ def plot_shape_errors(data, ax=None, *, shape=None, load=None, material=None, ki
     ('tip: displacement y, tip', 'Seconds, springs and solve')
     """
     cut, selection = _cut(data, shape, load, material, kinematics)
-    names = _quantities(cut)
+    names, definitions = _quantities(cut), labels_of(cut.status != 0, "definition")
     rows = max(1, len(names))
-    tall = max(2.25, 0.72 + 0.16 * len(_definitions(cut)))  # a line of names for each
+    tall = max(2.25, 0.72 + 0.16 * len(definitions))  # a line of names for each
     figure, axes = style.panels(ax, rows, 2, figsize=(style.PAGE, 0.35 + tall * rows), sharey=False)
     title = ", ".join([selection["shape"], selection["load"], selection["material"], selection["kinematics"]])
-    if not all(_points(cut, name, one)[3].all() for name in names for one in _definitions(cut)):
+    points = {name: {one: _points(cut, name, one) for one in definitions} for name in names}
+    if not all(line[3].all() for lines in points.values() for line in lines.values()):
         title += "; hollow: unstable, or beyond the linear reference"
     place = {"left": 0.6, "right": 0.08, "bottom": 0.42, "top": 0.52, "across": 0.2, "down": 0.72, "title": title}
     style.arrange(figure, axes, **place)
-    looks = {name: style.line(i) for i, name in enumerate(_definitions(cut))}
-    for panels, name in zip(axes, names):
-        _errors_of(panels, cut, name, looks)
+    ends = [_errors_of(panels, cut, name, points[name]) for panels, name in zip(axes, names)]
     if not names:
         for panel in axes.flat:
             labels.say(panel, "No quantity was asked for.")
     labels.settle(figure, axes, place)
-    for panels, name in zip(axes, names):
-        ends = _ends(cut, name, looks)
-        for panel, found in zip(panels, ends):
-            labels.name_lines(panel, found)
+    for panel, found in zip(axes.flat, (one for pair in ends for one in pair)):
+        labels.name_lines(panel, found)
     return axes
 
 
@@ -115,19 +104,13 @@ def _cut(data, shape, load, material, kinematics):
     chosen = choose(present, shape=shape, load=load)
     here = present.sel(chosen)
     for name, label in (("material", material), ("kinematics", kinematics)):
-        there = here.any([one for one in here.dims if one != name])
-        chosen[name] = label or str(there[name].values[int(np.argmax(there.values))])
+        chosen[name] = label or labels_of(here, name)[0]
     chosen = choose(present, **chosen)
     return data.sel(chosen), chosen
 
 
 def _quantities(cut):
     return [name for name in cut.quantity.values.tolist() if str(cut.quantity_kind.sel(quantity=name).item())]
-
-
-def _definitions(cut):
-    there = (cut.status != 0).any([name for name in cut.status.dims if name != "definition"])
-    return [name for name, asked in zip(cut.definition.values.tolist(), there.values) if asked]
 
 
 def described(cut, name):
@@ -142,7 +125,7 @@ def described(cut, name):
 
 
 def _points(cut, name, definition):
-    """Particles, seconds, sizes of errors [%], and whether each counts, of a line, by particles."""
+    """Particles, seconds, sizes of errors [%] and whether each counts, of one line, by particles."""
     against = _against(cut, name)
     line = cut.sel(definition=definition, quantity=name).stack(mesh=("mesh_type", "mesh_size"))
     seconds = line.solve_seconds.values + np.nan_to_num(line.definition_seconds.values)
@@ -160,22 +143,23 @@ def _against(cut, name):
     return "error" if there else "expected_error"
 
 
-def _errors_of(panels, cut, name, looks):
-    """Lines of a quantity over particles, and over seconds."""
-    one, drawn = cut.sel(quantity=name), False
-    estimate = 100 * float(one.reference_error_estimate)
-    difference = 100 * abs(float(one.reference_expected_error))
-    for definition, look in looks.items():
-        particles, seconds, errors, counted = _points(cut, name, definition)
-        for panel, along in zip(panels, (particles, seconds)):
+def _errors_of(panels, cut, name, points):
+    """Draw lines of a quantity over particles and over seconds; return their ends in both panels."""
+    one, ends = cut.sel(quantity=name), ([], [])
+    estimate, difference = (
+        100 * abs(float(one[f"reference_{error}"])) for error in ("error_estimate", "expected_error")
+    )
+    for number, (definition, (*places, errors, counted)) in enumerate(points.items()):
+        look = style.line(number)
+        for panel, along, found in zip(panels, places, ends):
             panel.plot(along, errors, label=definition, **look)
             hollow = look | {"linestyle": "", "markerfacecolor": "white"}
             panel.plot(along[~counted], errors[~counted], **hollow)
-        drawn |= bool(len(errors))
+            found += [(along[-1], errors[-1], definition, look["color"])] if len(errors) else []
     for panel, words in zip(panels, ("Particles", "Seconds, springs and solve")):
         against = "error" if _against(cut, name) == "error" else "difference to expected"
         panel.set(xlabel=words, ylabel=f"|{against[0].upper()}{against[1:]}| [%]")
-        if not drawn:
+        if not ends[0]:
             labels.say(panel, _why(cut))
             continue
         panel.set(xscale="log", yscale="log")
@@ -192,23 +176,12 @@ def _errors_of(panels, cut, name, looks):
     if estimate > 0:
         said.append(f"known to {estimate:.1g} %")
     panels[1].set_title(f"reference: {', '.join(said)}" if said else "over seconds", fontsize=style.SMALL)
-
-
-def _ends(cut, name, looks):
-    """Where lines end in both panels, with their names and colours."""
-    found = [], []
-    for definition, look in looks.items():
-        particles, seconds, errors, _ = _points(cut, name, definition)
-        for ends, along in zip(found, (particles, seconds)):
-            if len(errors):
-                ends.append((along[-1], errors[-1], definition, look["color"]))
-    return found
+    return ends
 
 
 def _why(cut):
     """Why there is no error."""
-    flags = np.unique(cut.status.values[cut.status.values != 0])
-    states = ", ".join(STATUS[flag].replace("_", " ") for flag in flags) or "not asked for"
+    states = in_words(cut.status.values) or "not asked for"
     message = next((text for text in cut.message.values.ravel().tolist() if text), "")
     if message:
         return f"No error: {states}. {message[:160]}"
@@ -301,36 +274,30 @@ def plot_shapes(data, ax=None, *, material=None, kinematics=None):
 def _rows(whole, material, kinematics):
     """Quantities with the errors of definitions on the finest mesh that has one [%]."""
     found = []
-    for shape in whole["shape"].values.tolist():
-        for load in whole["load"].values.tolist():
-            if not bool((whole.status.sel(shape=shape, load=load) != 0).any()):
-                continue
-            try:
-                cut, _ = _cut(whole, shape, load, material, kinematics)
-            except ValueError:  # not of this material or kinematics
-                continue
-            for name in _quantities(cut):
-                errors = {}
-                for definition in _definitions(cut):
-                    particles, _, sizes, counted = _points(cut, name, definition)
-                    finest = np.nanmax(cut.particles.values, initial=0.0)
-                    if len(sizes) and counted[-1] and particles[-1] == finest:
-                        errors[definition] = sizes[-1]
-                reference = 100 * abs(float(cut.reference_expected_error.sel(quantity=name)))
-                several = int((whole.status.sel(shape=shape) != 0).any(_others(whole, "load")).sum()) > 1
-                where = f"{shape} {load}" if several else shape
-                row = {"name": f"{where}: {name}", "errors": errors, "asked": _definitions(cut)}
-                found.append(row | {"reference": reference or np.nan})
+    asked = whole.status != 0
+    for place in cells(asked, ("shape", "load")):
+        try:
+            cut, _ = _cut(whole, *place.values(), material, kinematics)
+        except ValueError:  # not of this material or kinematics
+            continue
+        several = len(labels_of(asked.sel(shape=place["shape"]), "load")) > 1
+        where = " ".join(place.values()) if several else place["shape"]
+        definitions = labels_of(cut.status != 0, "definition")
+        for name in _quantities(cut):
+            errors, finest = {}, np.nanmax(cut.particles.values, initial=0.0)
+            for definition in definitions:
+                particles, _, sizes, counted = _points(cut, name, definition)
+                if len(sizes) and counted[-1] and particles[-1] == finest:
+                    errors[definition] = sizes[-1]
+            reference = 100 * abs(float(cut.reference_expected_error.sel(quantity=name)))
+            row = {"name": f"{where}: {name}", "errors": errors, "asked": definitions}
+            found.append(row | {"reference": reference or np.nan})
     return found
 
 
 def _lost(row):
     """Definitions that were asked for and have no error that counts on the finest mesh."""
     return [name for name in row["asked"] if name not in row["errors"]]
-
-
-def _others(whole, name):
-    return [one for one in whole.status.dims if one not in (name, "shape")]
 
 
 # -- networks ----------------------------------------------------------------------------------------------------------
@@ -370,7 +337,7 @@ def plot_shape(data, ax=None, *, shape=None, load=None, definition=None):
     >>> axes[0].get_title(loc="left")
     'area'
     """
-    fields, cells = group(data, "shape_fields", alone=False), group(data, "shapes")
+    fields, scenes = group(data, "shape_fields", alone=False), group(data, "shapes")
     names = list(zip(fields.shape_name.values.tolist(), fields.load_name.values.tolist()))
     here = [i for i, one in enumerate(names) if shape in (None, one[0]) and load in (None, one[1])]
     if len(here) != 1:
@@ -378,15 +345,15 @@ def plot_shape(data, ax=None, *, shape=None, load=None, definition=None):
         what = "choose one shape and load" if here else "nothing has this shape and load; there is"
         raise ValueError(f"{what}: {known}")
     case = fields.isel(case=here[0])
-    labels_of = {name: str(case[f"{name}_name"].item()) for name in ("shape", "load", "material", "kinematics")}
+    about = {name: str(case[f"{name}_name"].item()) for name in ("shape", "load", "material", "kinematics")}
     mesh = {"mesh_type": str(case.mesh_type_name.item()), "mesh_size": float(case.case_mesh_size)}
-    cut = cells.sel(labels_of | mesh)
-    asked = _definitions(cut)
+    cut = scenes.sel(about | mesh)
+    asked = labels_of(cut.status != 0, "definition")
     wanted = _few(cut, asked) if definition is None else [definition] if isinstance(definition, str) else definition
     missing = [name for name in wanted if name not in asked]
     if missing:
         raise ValueError(f"nothing has definition {missing[0]!r}; there is {', '.join(asked)}")
-    width, height = _extent(case)
+    width, height = extent(np.concatenate([plane(case, "{}"), plane(case, "outline_{}")]), (1.0, 1.0))
     columns = min(NETWORK_COLUMNS, len(wanted))
     page = style.COLUMN if columns == 1 else style.PAGE
     room = (page - 0.5 - 0.25 * columns) / columns
@@ -395,9 +362,9 @@ def plot_shape(data, ax=None, *, shape=None, load=None, definition=None):
     rows = axes.shape[0]
     if ax is None:
         figure.set_size_inches(page, 0.5 + 0.75 + (tall + 0.3) * rows)
-    scale = _scale(case, cut, wanted, max(width, height))
+    scale = _scale(case, wanted, max(width, height))
     size = "mesh of the file" if not mesh["mesh_size"] else f"mesh {1e3 * mesh['mesh_size']:g} mm"
-    said = [*labels_of.values(), f"{size}, {float(cut.particles):.0f} particles", f"displaced × {scale:g}"]
+    said = [*about.values(), f"{size}, {float(cut.particles):.0f} particles", f"displaced × {scale:g}"]
     lost = [name for name in asked if STATUS[int(cut.status.sel(definition=name))] != "solved" and name not in wanted]
     said += [f"not solved: {', '.join(lost)}"] if lost and definition is None else []
     title = labels.wrapped(", ".join(said), page - 0.2, 8.5)
@@ -405,8 +372,8 @@ def plot_shape(data, ax=None, *, shape=None, load=None, definition=None):
     place = {"left": left, "right": 0.08, "bottom": 0.9, "top": 0.42 + 0.13 * labels.lines_of(title)}
     place |= {"down": 0.3, "across": 0.1, "title": title}
     style.arrange(figure, axes, **place)
-    largest = _largest_force(case, wanted)
-    drawn = [_network(panel, case, cut, name, scale, largest) for panel, name in zip(flat, wanted)]
+    most = _largest_force(case, wanted)
+    drawn = [_network(panel, case, cut, name, scale, most) for panel, name in zip(flat, wanted)]
     for number, panel in enumerate(flat):
         panel.set(aspect="equal", adjustable="datalim")
         panel.set_title(panel.get_title("left") or wanted[number])
@@ -426,48 +393,34 @@ def plot_shape(data, ax=None, *, shape=None, load=None, definition=None):
 
 
 def _few(cut, asked):
-    """Definitions to draw, in their order: those that have an answer before others, and `FIRST` before the rest."""
+    """Definitions to draw: solved ones before others, and `FIRST` before the rest."""
     solved = {name: int(cut.status.sel(definition=name)) == STATUS.index("solved") for name in asked}
     order = sorted(asked, key=lambda name: (not solved[name], name not in FIRST))
     return [name for name in asked if name in order[:MOST_NETWORKS]]
 
 
-def _extent(case):
-    """Width and height of a body at rest."""
-    sides = []
-    for axis in "xy":
-        values = np.concatenate([case[axis].values, case[f"outline_{axis}"].values])
-        sides.append(np.ptp(values[np.isfinite(values)]) if np.isfinite(values).any() else 1.0)
-    return sides if min(sides) > 0 else (1.0, 1.0)
-
-
-def _scale(case, cut, wanted, extent):
+def _scale(case, wanted, extent):
     """Factor on displacements: the largest is about a twelfth of the body."""
-    sizes = [np.hypot(case.reference_displacement_x.values, case.reference_displacement_y.values)]
-    if not np.isfinite(sizes[0]).any():
+    sizes = np.hypot(case.reference_displacement_x.values, case.reference_displacement_y.values)
+    if not np.isfinite(sizes).any():
         moved = case.sel(definition=[name for name in wanted if name in case.definition.values])
-        sizes = [np.hypot(moved.displacement_x.values, moved.displacement_y.values)]
-    largest = np.nanmax(sizes[0], initial=0.0) if np.isfinite(sizes[0]).any() else 0.0
-    if not largest > 0:
-        return 1.0
-    factor = 0.08 * extent / largest
-    power = 10.0 ** math.floor(math.log10(factor))
-    return 1.0 if 0.4 < factor < 2 else max(step for step in (1, 2, 5) if step * power <= factor * (1 + 1e-9)) * power
+        sizes = np.hypot(moved.displacement_x.values, moved.displacement_y.values)
+    factor = 0.08 * extent / (largest(sizes) or np.inf)
+    return 1.0 if 0.4 < factor < 2 or not factor else magnification(factor)
 
 
 def _largest_force(case, wanted):
-    """Force at the ends of the colours [N]: three in a hundred springs are beyond."""
+    """Force at the ends of the colour scale [N]; 3 % of the springs are beyond."""
     forces = case.spring_force.sel(definition=[name for name in wanted if name in case.definition.values]).values
     forces = np.abs(forces[np.isfinite(forces)])
     return float(np.quantile(forces, 0.97)) if len(forces) and forces.max() > 0 else 1.0
 
 
-def _network(panel, case, cut, name, scale, largest):
-    """Draw one network; its lines, or nothing where there is none."""
+def _network(panel, case, cut, name, scale, most):
+    """Draw one network; return its lines, or None."""
     one = case.sel(definition=name) if name in case.definition.values else None
     drawn = one is not None and bool(np.isfinite(one.displacement_x.values).any())
-    outline = np.stack([case.outline_x.values, case.outline_y.values], axis=1)
-    there = np.stack([case.reference_displacement_x.values, case.reference_displacement_y.values], axis=1)
+    outline, there = plane(case, "outline_{}"), plane(case, "reference_displacement_{}")
     for number in range(int(case.outline_round.values.max(initial=-1)) + 1):
         places = np.flatnonzero(case.outline_round.values == number)
         closed = np.append(places, places[:1])
@@ -477,17 +430,14 @@ def _network(panel, case, cut, name, scale, largest):
     flag = int(cut.status.sel(definition=name))
     lines = None
     if drawn:
-        rest = np.stack([case.x.values, case.y.values], axis=1)
-        moved = np.stack([one.displacement_x.values, one.displacement_y.values], axis=1)
-        nodes = case.spring_nodes.transpose("spring", "spring_end").fillna(NO_NODE).values.astype(int)
-        kept = (nodes != NO_NODE).all(axis=1)
-        springs, forces = nodes[kept], one.spring_force.values[kept]
+        springs, kept = spring_ends(case)
+        forces = one.spring_force.values[kept]
         width = float(np.clip(18 / np.sqrt(len(springs)), 0.25, 0.9))
         lines = LineCollection(
-            1e3 * (rest + scale * moved)[springs],
+            1e3 * (plane(case, "{}") + scale * plane(one, "displacement_{}"))[springs],
             array=forces,
             cmap=FORCES,
-            clim=(-largest, largest),
+            clim=(-most, most),
             linewidths=width,
             zorder=2,
         )
@@ -497,13 +447,13 @@ def _network(panel, case, cut, name, scale, largest):
             panel.set_title(f"{name}: forces in an energy")
     if flag != STATUS.index("solved"):
         message = str(cut.message.sel(definition=name).item())
-        text = f"{STATUS[flag].replace('_', ' ')}: {message[:120]}" if lines is None else STATUS[flag]
+        text = f"{in_words(flag)}: {message[:120]}" if lines is None else STATUS[flag]
         labels.say(panel, text, bare=False)
     return lines
 
 
 def _bar(figure, lines, case):
-    """Scale of the colours, and what lines are, below all panels."""
+    """Draw the colour scale and explain the lines below all panels."""
     width, height = style.size(figure)
     if lines is not None:
         place = figure.add_axes((0.45 / width, 0.36 / height, min(3.0, 0.45 * width) / width, 0.08 / height))

@@ -29,10 +29,7 @@ def _expand(config, declared):
 
 
 def _axes(part):
-    labels = {
-        name: tuple(dict.fromkeys(getattr(one, name) for one in part.scenes))
-        for name in ("shape", "mesh_type", "mesh_size", "material", "load", "definition", "kinematics")
-    }
+    labels = {name: tuple(dict.fromkeys(getattr(one, name) for one in part.scenes)) for name in vars(part.scenes[0])}
     pairs = dict.fromkeys((one.shape, one.load) for one in part.scenes)
     asked = [one.name for shape, load in pairs for one in part.shape[shape].loads[load].quantities]
     return labels | {"quantity": tuple(dict.fromkeys(asked))}

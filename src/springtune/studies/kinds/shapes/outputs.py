@@ -1,4 +1,4 @@
-"""What is made of shapes."""
+"""Outputs of shapes."""
 
 from typing import TYPE_CHECKING
 

@@ -1,19 +1,15 @@
-"""Stages of shapes: what their jobs are to do, and the keys of what they store."""
+"""Stages of shapes: tasks of their jobs, and keys of their results."""
 
-import hashlib
 from collections import defaultdict
 from dataclasses import replace
-from functools import lru_cache
-from pathlib import Path
+from operator import attrgetter
 from typing import TYPE_CHECKING
 
-from ...config.kind import Stage
 from ...runs import driver
 from ...runs.checked_json import hash_of
 from ...runs.keys import definition_key, material_key, mesh_type_key, stage_key
-from ...runs.stages import Task, products, stage
-from ..scenes.plan import mesh_products
-from .names import OWN_FILE
+from ...runs.stages import Task, stage
+from ..scenes.plan import file_source, mesh_stage, on_meshes, parameters, particles_in, stage_on_meshes
 from .outputs import DRAWING
 
 if TYPE_CHECKING:
@@ -24,54 +20,41 @@ if TYPE_CHECKING:
 MOST_DRAWN = 1500
 """Particles, about, of the largest mesh that is drawn where a coarser one is there."""
 
+OWN_FILE = "file"
+"""Mesh type of a shape whose mesh is that of its file."""
+
 FILE_PARTICLES = 2000.0
 """Particles of a mesh from a file, for costs, before it is read."""
 
 
 def mesh_name(one):
-    """Stem of the files of a scene's mesh, and of what is solved on it."""
+    """Readable name of a scene's mesh."""
     return f"{one.shape}_{one.mesh_type}" + ("" if one.mesh_type == OWN_FILE else f"_{1e3 * one.mesh_size:.9g}mm")
 
 
 def file_name(one):
-    """The same beside files of beams, whose names begin with a number."""
+    """Stem of its files, which differs from those of beams."""
     return f"shape_{mesh_name(one)}"
 
 
 def particles(part, one):
-    """Number of particles of a scene's mesh, about."""
+    """Approximate number of particles of a scene's mesh."""
     shape = part.shape[one.shape]
-    return FILE_PARTICLES if shape.file else shape.area / (0.866 * one.mesh_size**2)
+    return FILE_PARTICLES if shape.file else particles_in(shape.area, one.mesh_size)
 
 
 # -- keys --------------------------------------------------------------------------------------------------------------
 
 
 def _source(shape):
-    """What the geometry of a shape is made from."""
+    """Geometry of a shape, or its file."""
     from .task_values import geometry  # here, as below: studies of beams read the stages as well
 
-    described = geometry(shape)
-    if not shape.file:
-        return described
-    state = Path(shape.file).stat()
-    content = _content(shape.file, state.st_size, state.st_mtime_ns)
-    return described | {"file": shape.file, "unit": shape.unit, "content": content}
-
-
-@lru_cache(maxsize=256)
-def _content(file, size, time):
-    """Hash of a file; each of its scenes asks."""
-    return hashlib.sha256(Path(file).read_bytes()).hexdigest()
-
-
-def _parameters(source):
-    """What of it results depend on: not on where a file is, but on its ending, which says its format."""
-    return source | {"file": Path(source["file"]).suffix} if "file" in source else source
+    return geometry(shape) | (file_source(shape.file, shape.unit) if shape.file else {})
 
 
 def mesh_source(part, one):
-    """What a scene's mesh is made from."""
+    """Source of a scene's mesh."""
     source = _source(part.shape[one.shape])
     if "file" in source:
         return source
@@ -82,19 +65,19 @@ def mesh_source(part, one):
 def mesh_key(part, one):
     """Key of a scene's mesh."""
     return hash_of(
-        _parameters(mesh_source(part, one)),
+        parameters(mesh_source(part, one)),
         stage_key("studies.kinds.shapes.mesh"),
         _reader(part.shape[one.shape]),
     )
 
 
 def _reader(shape):
-    """What reads the mesh file of a shape, the library behind it included; nothing where it has none."""
+    """Key of the code that reads the mesh file of a shape; empty without a file."""
     return mesh_type_key(OWN_FILE) if shape.file else ""
 
 
 def _case(part, shape, material, name):
-    """What a shape of its materials under a load is, but for its geometry; no density where nothing weighs."""
+    """Thickness, load and materials of a scene; densities only under gravity."""
     from .task_values import load
 
     case = part.shape[shape].loads[name]
@@ -107,7 +90,7 @@ def reference_task(part, shape, material, name):
     """Task of a reference."""
     task = {"shape": _source(part.shape[shape])} | _case(part, shape, material, name)
     code = stage_key("studies.kinds.shapes.reference", driver.DRIVER), _reader(part.shape[shape])
-    key = hash_of(task | {"shape": _parameters(task["shape"])}, code)
+    key = hash_of(task | {"shape": parameters(task["shape"])}, code)
     return {"key": key} | task
 
 
@@ -121,27 +104,18 @@ def scene_task(part, one, kept=()):
     return {"key": key} | task | ({"keep_fields": True} if one in kept else {})
 
 
-def draws(study):
-    """Whether a study's dataset has the networks that are drawn."""
-    return DRAWING in study.outputs
-
-
 def shown(part):
     """Scenes whose networks are drawn: of a shape and load the finest mesh that is not too large, one material."""
-    cases = defaultdict(list)
+    cases, size = defaultdict(list), attrgetter("mesh_size")
     for one in part.scenes:
         cases[one.shape, one.load].append(one)
     found = set()
     for scenes in cases.values():
         few = [one for one in scenes if particles(part, one) <= MOST_DRAWN]
-        mesh = min(few, key=_size) if few else max(scenes, key=_size)
+        mesh = min(few, key=size) if few else max(scenes, key=size)
         alike = [one for one in scenes if mesh_name(one) == mesh_name(mesh)]
         found |= {one for one in alike if (one.material, one.kinematics) == (alike[0].material, alike[0].kinematics)}
     return found
-
-
-def _size(one):
-    return one.mesh_size
 
 
 def by_mesh(part):
@@ -156,7 +130,7 @@ def by_mesh(part):
 
 
 def _mesh_members(study, costs):
-    """Meshes with their scenes, and what all of that costs."""
+    """Meshes with their scenes, and the cost of both."""
     part = study.parts["shapes"]
     members = {}
     for name, scenes in by_mesh(part).items() if part else ():
@@ -184,16 +158,16 @@ def _reference_tasks(study):
 
 def _solve(study, folder, members):
     part = study.parts["shapes"]
-    kept = shown(part) if draws(study) else ()
+    kept = shown(part) if DRAWING in study.outputs else ()
     files = [
         {
             "name": file_name(scenes[0]),
-            "shape": _parameters(_source(part.shape[scenes[0].shape])),
+            "shape": parameters(_source(part.shape[scenes[0].shape])),
             "tasks": list({task["key"]: task for task in (scene_task(part, one, kept) for one in scenes)}.values()),
         }
         for scenes in members
     ]
-    return {"folder": str(folder / "solutions"), "meshes": str(folder / "meshes"), "files": files}
+    return on_meshes(folder, "solutions", files)
 
 
 # -- parts of a study --------------------------------------------------------------------------------------------------
@@ -212,13 +186,13 @@ def pieces(study, costs, division):
 
 
 def take(study, names):
-    """The study with some of its pieces alone."""
+    """Study reduced to some pieces."""
     wanted = set(names)
     return of_shape_scenes(study, {one for one in study.parts["shapes"].scenes if (one.shape, one.load) in wanted})
 
 
 def of_shape_scenes(study: "Study", chosen: "Collection[object]") -> "Study":
-    """A study of a few scenes of shapes of another one, and of what these need."""
+    """Study reduced to some scenes of shapes and what they need."""
     part = study.parts["shapes"]
     scenes = tuple(scene for scene in part.scenes if scene in chosen) if part else ()
     if not scenes:
@@ -242,23 +216,13 @@ STAGES = (
         _reference_tasks,
         "shape_references",
     ),
-    Stage(
-        "shape_mesh",
-        "studies.kinds.shapes.mesh",
-        "Meshing shapes",
-        _meshes,
-        mesh_products,
-        _mesh_members,
-        folder="meshes",
-    ),
-    Stage(
+    mesh_stage("shape_mesh", "studies.kinds.shapes.mesh", "Meshing shapes", _meshes, _mesh_members),
+    stage_on_meshes(
         "shape_solve",
         "studies.kinds.shapes.solve",
         "Solving the networks of shapes",
         _solve,
-        products,
-        like="shape_mesh",
-        same=("shape_mesh",),
-        folder="solutions",
+        "solutions",
+        "shape_mesh",
     ),
 )

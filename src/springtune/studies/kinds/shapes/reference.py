@@ -53,7 +53,7 @@ def _solved(task):
 
 
 def _rounds(shape, grouped):
-    """Points around the outline and around each hole [m], a closed round each."""
+    """Points around the outline and around each hole [m]."""
     if grouped is None:
         outlines = [one.sides for one in shape.rounds if one.inner is None or one.outer is None]
         return [np.array([side.at(i / ALONG) for side in sides for i in range(ALONG)]) for sides in outlines]
@@ -63,7 +63,7 @@ def _rounds(shape, grouped):
 
 
 def rounds_of(edges):
-    """Closed rounds of points that edges, shape (n, 2), join; each point has two of them."""
+    """Closed rounds of points from edges, shape (n, 2); each point has two edges."""
     beside = {}
     for one, other in edges.tolist():
         beside.setdefault(one, []).append(other)

@@ -1,6 +1,6 @@
 """Sections of a study that describe shapes, and how their values are read."""
 
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, NamedTuple, Self
 
 from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, model_validator
 from pydantic_core import CoreSchema, core_schema
@@ -24,7 +24,27 @@ from ...config.fields import (
 )
 from ...config.messages import refuse, show
 from ...config.sections import Section
-from .names import ALONG_AXES, KINDS_OF_QUANTITY, OUTLINED, STRESSES
+
+OUTLINED = {"free": "Delaunay triangles inside of the outline"}
+"""Mesh types of outlines, and what they are."""
+
+
+class QuantityKind(NamedTuple):
+    """A kind of quantity of interest: ``places`` are ``at`` a point or ``of`` a group."""
+
+    unit_kind: str
+    places: tuple[str, ...] = ()
+    example: str = ""
+
+
+KINDS_OF_QUANTITY = {
+    "displacement": QuantityKind("length", ("at", "of"), "at: a point, or of: a group"),
+    "stress": QuantityKind("stress", ("at",), "at: a point"),
+    "reaction": QuantityKind("force", ("of",), "of: a group that is held"),
+    "area": QuantityKind("area"),
+    "energy": QuantityKind("energy"),
+}
+"""Kinds of quantity by name, as `springtune.problem.shapes.QUANTITY_KINDS` has them."""
 
 BEYOND_MEASURE = 1e30
 """Size of a coordinate, force or pressure from which it is beyond all measure [SI units]."""
@@ -74,7 +94,7 @@ class Vector:
 
 
 class Words:
-    """Annotation of what is expected where the items of a list or mapping do not tell."""
+    """Annotation with words for the expected value of a list or mapping."""
 
     def __init__(self, words: str) -> None:
         self.words = words
@@ -91,13 +111,13 @@ PartName = Annotated[str, Scalar(str, {"type": "string", "minLength": 1}, "the n
 ShapeName = Annotated[str, Scalar(str, {"type": "string"}, "the name of a shape")]
 LoadName = Annotated[str, Scalar(str, {"type": "string"}, "the name of a load of the shape")]
 MadeType = Annotated[str, one_of("mesh type", OUTLINED)]
-Axis = Annotated[str, one_of("component", ALONG_AXES)]
-StressComponent = Annotated[str, one_of("component", STRESSES)]
+Axis = Annotated[str, one_of("component", ("x", "y"))]
+StressComponent = Annotated[str, one_of("component", ("xx", "yy", "xy"))]
 Anything = Annotated[str, Scalar(str, {"type": ["string", "number"]}, "a value with its unit")]
 
 
 def _or_text(*texts: str) -> Any:
-    """What the schema says of a section in the place of which a text may stand."""
+    """Schema of a section that may be given as a text."""
 
     def extend(schema: dict[str, Any]) -> None:
         section = dict(schema)
@@ -251,7 +271,7 @@ class QuantityConfig(Section):
 
     @property
     def kind(self) -> str:
-        """Key of `springtune.studies.kinds.shapes.names.KINDS_OF_QUANTITY`."""
+        """Key of `KINDS_OF_QUANTITY`."""
         return next(name for name in KINDS_OF_QUANTITY if getattr(self, name))
 
     @property

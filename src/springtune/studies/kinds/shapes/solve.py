@@ -17,7 +17,7 @@ parts = stored.parts
 
 
 def prepare(family, content):
-    """Mesh of a family of scenes, and the sheets of its thicknesses, which scenes add."""
+    """Shape, mesh, and the sheets by thickness, which scenes add."""
     return family["shape"], stored.prepared(content["meshes"], family["name"]), {}
 
 
@@ -36,20 +36,16 @@ def solve(task, family):
     described, grouped, sheets = family
     shape = shape_of(described, task["thickness"], task["load"])
     chosen = {"definition": task["definition"], "kinematics": task["kinematics"]}
-    try:
-        check_case(grouped, shape.loads[ONE_LOAD])
-    except ValueError as error:
-        return failed(task, str(error))
-    begin, sheet = time.perf_counter(), sheets.get(shape.thickness)
+    sheet = sheets.get(shape.thickness)
     derived = sheet.deriving if sheet else 0.0
     try:
-        try:
-            scene = Scene(shape, grouped, materials_of(task["materials"]), ONE_LOAD, sheet=sheet, **chosen)
-        except DefinitionError:
-            raise
-        except ValueError as error:  # loads on what is held, quantities that the mesh has not
-            return failed(task, str(error))
-        sheets[shape.thickness] = scene.sheet
+        check_case(grouped, shape.loads[ONE_LOAD])
+        scene = Scene(shape, grouped, materials_of(task["materials"]), ONE_LOAD, sheet=sheet, **chosen)
+    except ValueError as error:  # loads on what is held, quantities that the mesh has not, definitions that refuse it
+        return failed(task, str(error))
+    sheets[shape.thickness] = scene.sheet
+    begin = time.perf_counter()
+    try:
         found = scene.solve()
     except DefinitionError as error:
         return failed(task, str(error)) | {"seconds": time.perf_counter() - begin}
@@ -72,7 +68,7 @@ def solve(task, family):
 
 
 def cost(task, family, result, seconds):
-    """Seconds of the network, and those of deriving its springs: these once, in the scene that asked first."""
+    """Seconds of the network, and of deriving its springs in the scene that asked first."""
     particles, deriving = len(family[1].mesh.points), result.pop("deriving", 0.0)
     yield "shape_scene", particles, seconds - deriving
     yield task["definition"], particles, deriving

@@ -1,4 +1,4 @@
-"""Shapes, loads and materials as tasks hold them: plain dicts of what results depend on, without labels."""
+"""Shapes, loads and materials in tasks: plain dicts without labels."""
 
 import warnings
 from dataclasses import asdict, replace
@@ -14,7 +14,7 @@ UNNAMED, ONE_LOAD = "shape", "load"
 
 
 def quantity_key(quantity: Quantity) -> str:
-    """What a quantity is, whatever a study calls it.
+    """Key of a quantity that does not depend on its name.
 
     Examples
     --------
@@ -25,7 +25,7 @@ def quantity_key(quantity: Quantity) -> str:
 
 
 def geometry(shape: Shape) -> dict[str, Any]:
-    """What meshes of a shape depend on: its sides and points; of a file nothing that is in it."""
+    """Sides, holes and points of a shape, on which meshes depend."""
     return {
         "outline": [asdict(side) for side in shape.outline],
         "holes": [asdict(hole) for hole in shape.holes],
@@ -34,7 +34,7 @@ def geometry(shape: Shape) -> dict[str, Any]:
 
 
 def load(case: LoadCase) -> dict[str, Any]:
-    """What results under a load depend on."""
+    """A load case without its name and the names of its quantities."""
     quantities = {quantity_key(one): one for one in case.quantities}
     plain = [
         replace(one, name=f"q{number}", expected=None, source="")
@@ -44,24 +44,26 @@ def load(case: LoadCase) -> dict[str, Any]:
 
 
 def shape_of(described: dict[str, Any], thickness: float = 1.0, case: dict[str, Any] | None = None) -> Shape:
-    """Shape of what `geometry` gives, of a thickness [m]."""
+    """Shape from its `geometry` and thickness [m]."""
+    described = _frozen(described)
     holes = (Hole(_segments(hole["outline"]), hole["part"]) for hole in described["holes"])
-    points = {name: _pair(point) for name, point in described["points"].items()}
     loads = {} if case is None else {ONE_LOAD: load_of(case)}
     file = described.get("file", "")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", AssumptionWarning)  # whoever read the study said it
-        return Shape(UNNAMED, thickness, _segments(described["outline"]), tuple(holes), points, loads, file)
+        return Shape(
+            UNNAMED, thickness, _segments(described["outline"]), tuple(holes), described["points"], loads, file
+        )
 
 
 def by_key(values: dict[str, float], case: LoadCase) -> dict[str, float]:
-    """Values of quantities by their `quantity_key`; those that are no finite numbers are left out."""
+    """Finite values of quantities by their `quantity_key`."""
     found = {quantity_key(one): float(values[one.name]) for one in case.quantities if one.name in values}
     return {key: value for key, value in found.items() if isfinite(value)}
 
 
 def named(message: str, shape: Shape, case: LoadCase) -> str:
-    """A message of a task with the names that a study has."""
+    """Message of a task with the names of the study."""
     names = {f"shape '{UNNAMED}'": f"shape '{shape.name}'", f"load '{ONE_LOAD}'": f"load '{case.name}'"}
     order = sorted({quantity_key(one) for one in case.quantities})
     names |= {f"'q{order.index(quantity_key(one))}'": f"'{one.name}'" for one in case.quantities}
@@ -71,29 +73,23 @@ def named(message: str, shape: Shape, case: LoadCase) -> str:
 
 
 def load_of(described: dict[str, Any]) -> LoadCase:
-    """Load of what `load` gives."""
-    return LoadCase(
-        described["name"],
-        tuple(Support(**one) for one in described["supports"]),
-        tuple(Traction(one["group"], _pair(one["force"])) for one in described["tractions"]),
-        tuple(Pressure(**one) for one in described["pressures"]),
-        _pair(described["gravity"]),
-        tuple(Quantity(**one) for one in described["quantities"]),
-    )
+    """Load case, the inverse of `load`."""
+    kinds = {"supports": Support, "tractions": Traction, "pressures": Pressure, "quantities": Quantity}
+    parts = {name: tuple(kind(**one) for one in _frozen(described[name])) for name, kind in kinds.items()}
+    return LoadCase(**(_frozen(described) | parts))
 
 
-def _segments(sides: list[dict[str, Any]]) -> tuple[Segment, ...]:
-    return tuple(
-        Segment(_pair(side["start"]), None if side["centre"] is None else _pair(side["centre"]), side["group"])
-        for side in sides
-    )
+def _segments(sides: Any) -> tuple[Segment, ...]:
+    return tuple(Segment(**side) for side in sides)
 
 
-def _pair(values: Any) -> tuple[float, float]:
-    x, y = values
-    return x, y
+def _frozen(value: Any) -> Any:
+    """Value with tuples for lists: JSON has no tuples."""
+    if isinstance(value, dict):
+        return {name: _frozen(one) for name, one in value.items()}
+    return tuple(map(_frozen, value)) if isinstance(value, list | tuple) else value
 
 
 def materials_of(described: dict[str, dict[str, Any]]) -> dict[str, AnyMaterial]:
-    """Materials by part, of what `springtune.studies.runs.keys.material_key` gives of each."""
+    """Materials by part, the inverse of `springtune.studies.runs.keys.material_key`."""
     return {part: material_of(one) for part, one in described.items()}

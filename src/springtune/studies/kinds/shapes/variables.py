@@ -12,6 +12,8 @@ SCENE_AXES = (*MESH_AXES, "material", "load", "definition", "kinematics")
 
 MIXED: dict[str, object] = {"comment": "in SI units: quantity_units says which", "units_variable": "quantity_units"}
 
+SEVEN_DIGITS = {name: (*row, np.float32(np.nan)) for name, row in shared.DISPLACEMENT_ROWS.items()}
+
 SHAPES = declared(
     "/shapes",
     {
@@ -22,7 +24,7 @@ SHAPES = declared(
         },
         (*CASE_AXES, "quantity"): {
             "reference_value": ("1", "quantity of interest, reference"),
-            **shared.ESTIMATE,
+            **shared.ESTIMATE_ROW,
             "reference_expected_error": ("1", "signed difference, (reference - expected) / |expected|"),
         },
         ("shape", "load", "quantity"): {
@@ -33,14 +35,14 @@ SHAPES = declared(
             "quantity_units": ("1", "units of its values", ""),
             "source": ("1", "who gives the expected value", ""),
         },
-        SCENE_AXES: shared.OF_SCENE,
-        MESH_AXES: shared.OF_MESH,
+        SCENE_AXES: shared.SCENE_ROWS,
+        MESH_AXES: shared.MESH_ROWS,
         CASE_AXES: {
-            **shared.OF_REFERENCE,
+            **shared.REFERENCE_ROWS,
             "reference_seconds": ("s", "time to solve the reference"),
             "reference_unknowns": ("1", "unknowns of the finest reference"),
         },
-        (*CASE_AXES, "kinematics"): shared.APPLIES,
+        (*CASE_AXES, "kinematics"): shared.APPLIES_ROW,
         ("shape",): {"shape_thickness": ("m", "thickness of the shape")},
     },
     dimensions={"shape": "shape, by name", "quantity": "quantity of interest, by name"},
@@ -56,12 +58,12 @@ SHAPE_FIELDS = declared(
             f"{name}_name": ("1", name.replace("_", " "), "") for name in (*CASE_AXES, "kinematics", "mesh_type")
         }
         | {"case_mesh_size": ("m", "asked length of an edge; 0 where the mesh is that of a file")},
-        ("case", "definition", "particle"): {name: (*row, np.float32(np.nan)) for name, row in shared.MOVED.items()},
-        ("case", "definition", "spring"): shared.SPRING_FORCE,
+        ("case", "definition", "particle"): SEVEN_DIGITS,
+        ("case", "definition", "spring"): shared.SPRING_FORCE_ROW,
         ("case", "outline_point"): {
             "outline_round": ("1", "number of the round that a point is of, from 0", -1),
-            **shared.OUTLINE,
-            **shared.OUTLINE_MOVED,
+            **shared.OUTLINE_ROWS,
+            **shared.OUTLINE_DISPLACEMENT_ROWS,
         },
     },
     dimensions={"case": "shape and load"},

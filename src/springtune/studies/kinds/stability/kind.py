@@ -12,7 +12,7 @@ from springtune.problem.materials import Material
 from ...config.checks import check_beam_material, check_density, check_for_triangles, check_known, check_particles
 from ...config.fields import BeamName, DefinitionName, Force, Length, MaterialName, MeshType, OneOrMore, one_of
 from ...config.kind import Kind
-from ...config.sections import Section
+from ...config.sections import Section, optional
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key
 from ...runs.stages import Task, stage
 from ..division import by_task
@@ -119,10 +119,7 @@ STAGE = stage("stability", "studies.kinds.stability.solve", "Experiments on stab
 KIND = Kind(
     "stability",
     study_fields={
-        "stability": (
-            StabilityConfig | None,
-            Field(None, description="Experiments on numerical stability; they make the group `/stability`."),
-        )
+        "stability": optional(StabilityConfig, "Experiments on numerical stability; they make the group `/stability`.")
     },
     check=_check,
     expand=_expand,

@@ -11,7 +11,7 @@ from springtune.safe_io.escapes import markdown
 
 from ...output.dataset import STATUS
 from ...output.selection import cells, labels_of
-from ...output.text import markdown_table
+from ...output.text import markdown_section, markdown_table
 from .outputs import PAGE
 
 
@@ -39,10 +39,6 @@ def page(tree: xr.DataTree) -> str:
     done = [name for name in sections if name in data.experiment.values]
     parts = [line for name in done for line in (*sections[name](data), "")]
     return "\n".join(parts + _scenes(tree.to_dataset()))
-
-
-def _section(title, *said):
-    return [f"### {title}", "", *(line for text in said for line in (text, ""))]
 
 
 def _number(value, form=".3g", scale=1.0):
@@ -78,7 +74,7 @@ def _limits(data):
         f"Over {int(np.isfinite(ratio).sum())} cases (explicit schemes, dampings, definitions, sizes) the measured "
         f"limit is within {worst:.2f} % of the predicted one."
     )
-    return _section("Largest step", said) + markdown_table(heads, rows)
+    return markdown_section("Largest step", said) + markdown_table(heads, rows)
 
 
 def _drift(data):
@@ -88,7 +84,7 @@ def _drift(data):
         for name in data.integrator.values
     ]
     heads = ["integrator", "drift of energy", "swing of energy", "drift of momentum"]
-    return _section("Energy and momentum, no damping, half of the limit") + markdown_table(heads, rows)
+    return markdown_section("Energy and momentum, no damping, half of the limit") + markdown_table(heads, rows)
 
 
 def _rest(data):
@@ -105,7 +101,7 @@ def _rest(data):
             rows.append([f"{1e3 * size:g} mm", solver, *(_number(error, ".2g") for error in errors)])
     heads = ["mesh", "iterations", *(f"{n} steps" for n in data.implicit_steps.values)]
     distances = "Distance of backward Euler from the static solution, by iterations of its linear solver:"
-    return _section("To rest", said, distances) + markdown_table(heads, rows)
+    return markdown_section("To rest", said, distances) + markdown_table(heads, rows)
 
 
 def _contrast(data):
@@ -114,7 +110,9 @@ def _contrast(data):
         cell = data.sel(stiffness_contrast=contrast)
         errors = (_number(one, ".2g") for one in (cell.contrast_error, cell.contrast_estimate))
         rows.append([f"{contrast:.0e}", STATUS[int(cell.contrast_status)], *errors])
-    return _section("Stiff parts beside soft ones") + markdown_table(["contrast", "status", "error", "estimated"], rows)
+    return markdown_section("Stiff parts beside soft ones") + markdown_table(
+        ["contrast", "status", "error", "estimated"], rows
+    )
 
 
 def _poisson(data):
@@ -123,7 +121,7 @@ def _poisson(data):
 
     heads = [f"{nu:g}" for nu in data.stressed_poisson_ratio.values]
     title = "Largest step [ns] over Poisson's ratio"
-    return _section(title) + _by_definition(data, "poisson_step_limit", heads, texts)
+    return markdown_section(title) + _by_definition(data, "poisson_step_limit", heads, texts)
 
 
 def _sizes(data):
@@ -133,11 +131,11 @@ def _sizes(data):
         errors = (_number(error, ".2g") for error in cell.precision_error.values)
         rows.append([f"{1e3 * scale:g}", _number(cell.scaled_step_limit), *errors])
     heads = ["mesh [mm]", "step over mesh size [s/m]", *(f"error, {kind}" for kind in data.precision.values)]
-    return _section("Scale and precision") + markdown_table(heads, rows)
+    return markdown_section("Scale and precision") + markdown_table(heads, rows)
 
 
 def _strains(data):
-    lines = _section(
+    lines = markdown_section(
         "Large loads",
         "Status, in brackets the negative pivots, or flutter, or the share of the load that is reached: beyond it the "
         "path turns back at a limit point where it is unstable, else Newton's method found nothing.",
@@ -167,7 +165,7 @@ def _perturbation(data):
         yield from (f"{100 * float(cell[f'inverted_starts_{end}']):.0f} %" for end in ("right", "wrong"))
 
     title = "Displacement with particles moved at random, and Newton's method from inverted starts"
-    return _section(title) + _by_definition(data, "inverted_starts_right", heads, texts)
+    return markdown_section(title) + _by_definition(data, "inverted_starts_right", heads, texts)
 
 
 def _slivers(data):
@@ -176,7 +174,7 @@ def _slivers(data):
 
     heads = [f"{angle:g}°" for angle in data.sliver_angle.values]
     title = "Largest step with a sliver, over that at 30 degrees"
-    return _section(title) + _by_definition(data, "sliver_step_limit", heads, texts)
+    return markdown_section(title) + _by_definition(data, "sliver_step_limit", heads, texts)
 
 
 def _buckling(data):
@@ -191,7 +189,7 @@ def _buckling(data):
     why = dict.fromkeys(str(one) for one in data.buckling_message.values[data.restricted.values])
     notes = ["", *(f"\\* {markdown(one)}" for one in why)] if why else []
     title = "Buckling load of a slender column over Euler's"
-    return _section(title) + _by_definition(data, "buckling_load", heads, texts) + notes
+    return markdown_section(title) + _by_definition(data, "buckling_load", heads, texts) + notes
 
 
 def _scenes(root):
@@ -204,4 +202,4 @@ def _scenes(root):
     if not rows:
         return []
     said = f"{int((flags == 1).sum())} of {int((flags != 0).sum())} scenes are solved; the others:"
-    return [*_section("Scenes of the study", said), *markdown_table(["scene", "status", "message"], rows), ""]
+    return [*markdown_section("Scenes of the study", said), *markdown_table(["scene", "status", "message"], rows), ""]

@@ -51,7 +51,7 @@ def page(dataset: str | os.PathLike[str], files: Iterable[str] = ()) -> str:
     try:
         check_links(path)
         with guarded(path), bounded(most_of(path)), h5py.File(path) as opened:
-            # Asked first: of what it cannot read h5netcdf leaves a half-made file that complains when it is forgotten.
+            # Read first: if h5netcdf itself fails here, the file that it leaves open raises a warning later.
             opened.attrs.get("_nc3_strict")
             with h5netcdf.File(opened, decode_vlen_strings=True) as file:
                 groups, contents = packed(file)
@@ -62,12 +62,13 @@ def page(dataset: str | os.PathLike[str], files: Iterable[str] = ()) -> str:
         raise ValueError(f"{path}: is not a dataset of springtune; {REMEDY}")
     declared = {path: asdict(view) for path, view in views().items()}
     content = {"groups": groups, "declared": declared, "files": sorted(files)}
-    texts = {"content": json.dumps(content, separators=(",", ":"), allow_nan=False)} | _library()
+    library = _library()
+    texts = {"content": json.dumps(content, separators=(",", ":"), allow_nan=False)} | library
     script = "(() => {\n" + "".join(_asset(f"{name}.js") for name in SCRIPTS) + "})();\n"
     blocks = {name: zlib.compress(text.encode(), 9) for name, text in texts.items()}
     blocks |= {f"group-{number}": content for number, content in enumerate(contents)}
-    # What runs is named by its hash and nothing may be loaded: a title that is a script is a text, wherever it stands.
-    hashes = " ".join(_hash(text) for text in (script, *_library().values()))
+    # Scripts run only with one of these hashes, and nothing may be loaded: a script in a title stays a text.
+    hashes = " ".join(_hash(text) for text in (script, *library.values()))
     policy = f"default-src 'none'; script-src {hashes}; style-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'"
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("springtune.studies.output.browse", "assets"), autoescape=True, trim_blocks=True
@@ -86,7 +87,7 @@ def _asset(name: str) -> str:
 
 
 def _library() -> dict[str, str]:
-    """Scripts of BokehJS by name; found without importing Bokeh, which takes longer than making the page."""
+    """Scripts of BokehJS by name, without importing Bokeh, which takes longer than making the page."""
     found = find_spec("bokeh")
     if found is None or found.origin is None:
         raise FileNotFoundError("the package bokeh is not installed; `pip install bokeh` or `make study` installs it")

@@ -1,9 +1,8 @@
-"""A dataset's tree as compressed binary arrays, small enough for a page.
+"""Pack a dataset into compressed binary arrays, small enough for a page.
 
-Numbers are float32 of which the digits that no plot and no table of the page shows are cleared. An array whose last
-dimension is long (a curve, a field) keeps its rows that hold anything, each as differences from point to point. Bytes
-are sorted by their place in a number, since those of one place are alike, and each group is deflated as a whole.
-`assets/payload.js` reads it.
+Numbers are float32 without the digits that the page never shows. An array with a long last dimension (a curve, a
+field) keeps only rows with values, as differences from point to point. Bytes are sorted by their place in a number,
+where they are alike, and each group is compressed as a whole. `assets/payload.js` reads it.
 """
 
 import zlib
@@ -15,23 +14,23 @@ import h5netcdf
 import numpy as np
 
 LONG_DIMENSION = 16
-"""From so many labels on the last dimension is one of points along a line."""
+"""Fewest labels of a last dimension that counts as points along a line."""
 
 CLEARED_OF_CELLS, CLEARED_OF_LINES = 6, 9
-"""Bits of 23 that are cleared: 5 digits are left of a number, and 4 of a point on a line, finer than a pixel."""
+"""Cleared bits of 23: 5 digits of a number are left, and 4 of a point on a line, finer than a pixel."""
 
 ABSENT = -1
-"""Place of a text that is not there."""
+"""Number of an empty text."""
 
 ROOM = 3_200_000
-"""Bytes of all numbers together, so that the page stays below 5 MB with its library, in base64."""
+"""Most bytes of all numbers: the page with its library, in base64, stays below 5 MB."""
 
 Packed = tuple[dict[str, Any], list[bytes]]
 """A group's description, and the bytes of each of its variables."""
 
 
 def packed(file: h5netcdf.File, room: int = ROOM) -> tuple[list[dict[str, Any]], list[bytes]]:
-    """Groups of a dataset, described and packed."""
+    """Describe and pack the groups of a dataset."""
     found = list(_walk(file, {}))
     contents = [zlib.compress(b"".join(parts), 9) for _, parts in found]
     if sum(map(len, contents)) > room:
@@ -45,7 +44,7 @@ def packed(file: h5netcdf.File, room: int = ROOM) -> tuple[list[dict[str, Any]],
 
 
 def _lighten(found: list[Packed], room: int) -> None:
-    """Leave out the largest variables until the rest has room; a group names what it lacks."""
+    """Leave out the largest variables until the rest fits; each group lists what is left out."""
     sizes = [
         (len(zlib.compress(part, 1)), number, row["name"])
         for number, (described, parts) in enumerate(found)
@@ -64,8 +63,8 @@ def _lighten(found: list[Packed], room: int) -> None:
 
 
 def _walk(group: h5netcdf.Group, above: dict[str, Any]) -> Iterator[Packed]:
-    """A group's description and its numbers, and those of the groups in it; `above` are labels that they share."""
-    # Each is asked for once: h5netcdf looks dimensions up anew whenever it is asked.
+    """Describe and pack a group and the groups below it; `above` holds labels that they share."""
+    # Once: h5netcdf looks up dimensions at each access.
     read = {name: (variable.dimensions, _attributes(variable)) for name, variable in group.variables.items()}
     labels = above | {
         name: {
@@ -113,7 +112,7 @@ def _described(
 
 
 def _attributes(holder: h5netcdf.Group | h5netcdf.Variable) -> dict[str, Any]:
-    """Attributes, texts as texts: netCDF's own library writes those of one letter as bytes."""
+    """Attributes; netCDF's own library writes texts of one letter as bytes."""
     found = dict(holder.attrs)
     return {key: one.decode(errors="replace") if isinstance(one, bytes) else one for key, one in found.items()}
 
@@ -123,7 +122,7 @@ def _words_on(attributes: dict[str, Any]) -> dict[str, str]:
 
 
 def _values(variable: h5netcdf.Variable, attributes: dict[str, Any]) -> np.ndarray:
-    """Values of a variable as the conventions of netCDF say that they are to be read."""
+    """Values of a variable, decoded by the conventions of netCDF."""
     values = np.asarray(variable[...])
     fill = attributes.get("_FillValue")
     if values.dtype.kind in "iuf" and fill is not None and np.isfinite(fill).all():
@@ -134,7 +133,7 @@ def _values(variable: h5netcdf.Variable, attributes: dict[str, Any]) -> np.ndarr
 
 
 def _plain(value: Any) -> Any:
-    """A label or an attribute as JSON has it; no NaN, which JSON has not."""
+    """A label or an attribute for JSON, which has no NaN."""
     if isinstance(value, np.ndarray):
         return [_plain(one) for one in value.tolist()]
     if isinstance(value, np.generic):
@@ -147,12 +146,12 @@ def _plain(value: Any) -> Any:
 def _variable(values: np.ndarray) -> tuple[dict[str, Any], bytes]:
     row: dict[str, Any] = {}
     if values.dtype.kind in "fc" or values.dtype.kind in "iu" and np.abs(values, dtype=float).max(initial=0) >= 2**31:
-        with np.errstate(over="ignore"):  # beyond 3e38 nothing is shown but that it is infinite
+        with np.errstate(over="ignore"):  # numbers beyond 3e38 are shown as infinite
             numbers = values.real.astype(np.float32)
         return _rows(row | {"type": "float"}, numbers, ~np.isnan(numbers))
     if values.dtype.kind in "iub":
         return _rows(row | {"type": "integer"}, values.astype(np.int32), values != 0)
-    # Not as an array of texts, each of which takes the room of the longest one.
+    # No array of texts, which gives each the room of the longest one.
     texts = list(map(str, (values if values.dtype.kind == "O" else values.astype(str)).ravel().tolist()))
     words = sorted(set(texts))
     numbers_of = {word: number if word else ABSENT for number, word in enumerate(words)}
@@ -161,7 +160,7 @@ def _variable(values: np.ndarray) -> tuple[dict[str, Any], bytes]:
 
 
 def _rows(row: dict[str, Any], values: np.ndarray, present: np.ndarray) -> tuple[dict[str, Any], bytes]:
-    """Bytes of an array, and how they are to be read."""
+    """Pack an array: how to read it, and its bytes."""
     long = values.ndim > 1 and values.shape[-1] >= LONG_DIMENSION
     points = values.shape[-1] if long or values.ndim == 1 and values.size >= LONG_DIMENSION else 1
     numbers = values.reshape(-1, points)
@@ -178,7 +177,7 @@ def _rows(row: dict[str, Any], values: np.ndarray, present: np.ndarray) -> tuple
     else:
         bits = np.ascontiguousarray(numbers)
     if points > 1:
-        # Differences wrap around, there as here.
+        # Integer differences wrap around, as they do in the page.
         bits = np.diff(bits, axis=1, prepend=np.int32(0))
     folded = (bits << 1) ^ (bits >> 31)
     parts.append(np.ascontiguousarray(folded.reshape(-1).view(np.uint8).reshape(-1, 4).T).tobytes())
@@ -186,7 +185,7 @@ def _rows(row: dict[str, Any], values: np.ndarray, present: np.ndarray) -> tuple
 
 
 def _rounded(numbers: np.ndarray, cleared: int) -> np.ndarray:
-    """Bits of float32 numbers without the last ones, rounded; every NaN has the same."""
+    """Bits of float32 numbers, rounded to the kept ones; all NaN are equal."""
     numbers = np.where(np.isnan(numbers), np.float32(np.nan), numbers)
     bits = numbers.view(np.int32).copy()
     finite = np.isfinite(numbers)

@@ -1,4 +1,4 @@
-"""A server of one dataset's page, for the machine that it runs on."""
+"""Serve the page of one dataset to this machine alone."""
 
 import errno
 import mimetypes
@@ -16,23 +16,23 @@ from .page import page
 HOST = "127.0.0.1"
 
 SERVED = {"figures": (".pdf", ".png"), "tables": (".csv", ".html", ".md")}
-"""Folders beside a dataset, and the endings of those of their files that are served."""
+"""Served folders beside a dataset, with the endings of served files."""
 
 ALONE = ("paper.pdf", "report.zip")
-"""Files beside a dataset that are served."""
+"""Served files beside a dataset."""
 
 POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src 'self' data: blob:; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
-"""What a page from here may load: nothing but pictures from here."""
+"""The page may load nothing but pictures of this server."""
 
 
 class Server(ThreadingHTTPServer):
-    """Server of a page, its dataset, and of the figures and tables beside it; of nothing else, and to nobody else.
+    """Server of a page, its dataset, and the figures and tables beside it.
 
-    It listens on the loopback address, answers requests for it by that name alone (a page of somebody else that gives
-    its own name this address is refused), and every path begins with a token that is drawn anew.
+    It listens on the loopback address and refuses requests by another host name, so that no foreign site can rename
+    this address to its own. Every path begins with a new random token.
     """
 
     daemon_threads = True
@@ -56,19 +56,19 @@ class Server(ThreadingHTTPServer):
         self.address = f"http://{HOST}:{self.server_port}/{self.token}/"
 
     def server_bind(self) -> None:
-        """Bind without asking who one is by name, which may ask a network."""
+        """Bind without looking up the host name, which may need a network."""
         self.socket.bind(self.server_address)
         self.server_address = self.socket.getsockname()
         self.server_name, self.server_port = HOST, int(self.server_address[1])
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """Keep quiet about a browser that went away in the middle of a file; it reloads, or has seen enough."""
+        """Ignore browsers that close the connection in the middle of a file."""
         if not isinstance(sys.exception(), ConnectionError):
             super().handle_error(request, client_address)
 
 
 class Handler(BaseHTTPRequestHandler):
-    """Answers a request."""
+    """Answer requests."""
 
     server: Server
     server_version, sys_version = "springtune", ""
@@ -83,7 +83,7 @@ class Handler(BaseHTTPRequestHandler):
             self._refuse(HTTPStatus.NOT_FOUND)
         elif name in ("", "index.html"):
             self._send(self.server.text, "text/html; charset=utf-8")
-        elif name in self.server.served:  # names known from the beginning: no path is put together from a request
+        elif name in self.server.served:  # known names alone: no path is built from a request
             try:
                 content = self.server.served[name].read_bytes()
             except OSError:
@@ -113,11 +113,11 @@ class Handler(BaseHTTPRequestHandler):
         self._send(f"{status.value} {status.phrase}\n".encode(), "text/plain; charset=utf-8", status)
 
     def log_message(self, format: str, *args: object) -> None:
-        """Keep quiet: the address holds the token."""
+        """Log nothing: the address holds the token."""
 
 
 def _served(dataset: Path) -> dict[str, Path]:
-    """Files by the names under which they are served."""
+    """Served files by name."""
     found = {"dataset.nc": dataset}
     for folder, endings in SERVED.items():
         for path in sorted((dataset.parent / folder).glob("*")):
@@ -130,5 +130,5 @@ def _served(dataset: Path) -> dict[str, Path]:
 
 
 def _is_own(path: Path) -> bool:
-    """Whether it is a file, and no link to one elsewhere."""
+    """Return whether a path is a file and no link."""
     return path.is_file() and not path.is_symlink()
