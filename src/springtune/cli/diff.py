@@ -408,9 +408,9 @@ def _accept(
     with opened(path) as tree, reading.guarded(path):
         if expected.ACCEPTED in tree.attrs:
             raise ValueError(f"{path}: holds accepted values; give the results of a study")
-        holes = expected.unsolved(tree)
-        if holes:
-            _tell_unsolved(holes)
+        unsolved_cells = expected.unsolved(tree)
+        if unsolved_cells:
+            _tell_unsolved(unsolved_cells)
             if not unsolved:
                 raise ValueError(f"{path}: nothing is accepted; mend these, or accept that they are so with --unsolved")
         target = target or _usual_target(str(tree.attrs.get("study", path.parent.name)))
@@ -456,14 +456,14 @@ def _count(tree: "xr.DataTree") -> str:
     return ", ".join(f"{count} scenes" if path == "/" else f"{count} of {path}" for path, count in counts)
 
 
-def _tell_unsolved(holes: list[tuple[str, str, str, str]]) -> None:
+def _tell_unsolved(unsolved_cells: list[tuple[str, str, str, str]]) -> None:
     """Print the unsolved cells."""
-    click.echo(f"{len(holes)} are not solved:", err=True)
-    for group, place, status, why in holes[:LISTED_UNSOLVED]:
+    click.echo(f"{len(unsolved_cells)} are not solved:", err=True)
+    for group, place, status, why in unsolved_cells[:LISTED_UNSOLVED]:
         head = "" if group == "/" else f"{group}: "
         click.echo(shown(f"  {head}{place}: {status}{f', {why}' if why else ''}"), err=True)
-    if len(holes) > LISTED_UNSOLVED:
-        click.echo(f"  and {len(holes) - LISTED_UNSOLVED} more", err=True)
+    if len(unsolved_cells) > LISTED_UNSOLVED:
+        click.echo(f"  and {len(unsolved_cells) - LISTED_UNSOLVED} more", err=True)
 
 
 def _check(results: str | None, target: Path | None, every: bool) -> None:

@@ -134,42 +134,6 @@ def asked_material(name: str | None, young: str | None, poisson: str | None, den
     return Material(asked_quantity("--young", young, "stress"), ratio, heavy, name or "material")
 
 
-def is_made(mesh_type: str) -> bool:
-    """Whether a mesh is of a type, not from a file."""
-    from ..mesh import MESH_TYPES
-
-    if mesh_type not in MESH_TYPES and not Path(mesh_type).is_file():
-        known = ", ".join(MESH_TYPES)
-        raise ValueError(f"--mesh: '{mesh_type}' is neither a mesh type nor a file; known: {known}")
-    return mesh_type in MESH_TYPES
-
-
-def asked_size(beam: "Beam", mesh_type: str, size: str | None) -> float:
-    """Length of an edge [m]; ValueError if the mesh would be too large."""
-    from ..mesh import MESH_TYPES
-
-    if size is None:
-        raise ValueError("--size: missing; give the length of an edge such as '2 mm'")
-    edge = asked_quantity("--size", size, "length")
-    refusal = MESH_TYPES[mesh_type].refusal(beam.length, beam.height, edge, f"beam '{beam.name}'")
-    if refusal:
-        raise ValueError(f"--size: '{size}' {refusal}")
-    return edge
-
-
-def asked_mesh(beam: "Beam", mesh_type: str, edge: float | None, unit: str) -> "Mesh":
-    """Mesh of a type with edges of a length [m]; without length the mesh of a file."""
-    from ..mesh import MESH_TYPES, read_beam_mesh
-
-    if edge is not None:
-        count = MESH_TYPES[mesh_type].particles(beam.length, beam.height, edge)
-        if count > SAID_FROM:
-            click.echo(f"making a {mesh_type} mesh of some {count / 1e6:.1f} million particles ...", err=True)
-        return MESH_TYPES[mesh_type](beam.length, beam.height, edge)
-    scale = asked_quantity("--unit", unit if unit[:1].isdigit() else f"1 {unit}", "length")
-    return read_beam_mesh(mesh_type, beam.length, beam.height, scale)
-
-
 NAMED_SHAPE = "config/shapes.yaml:cook"
 """Example of a shape's name, for messages."""
 
@@ -246,36 +210,6 @@ class AskedShape:
             said = MESH_SIZE.sub("", str(error))
             between = " " if said != str(error) else ": "
             raise ValueError(f"--size: '{self.size_text}'{between}{said}") from None
-
-
-def asked_shape(
-    text: str, load: str | None, material: str | None, density: str | None, size: str | None, *, sized: bool = True
-) -> AskedShape:
-    """Shape of an option such as ``config/shapes.yaml:cook``.
-
-    Load and material may be None if the study has only one for the shape. `sized`: an outline needs a size.
-    """
-    study, part, shape = _shape(text)
-    if load is None and len(shape.loads) > 1:
-        raise ValueError(f"--load: missing; shape '{shape.name}' has {', '.join(shape.loads)}; give one")
-    from ..problem.quantities import nearest
-
-    load = next(iter(shape.loads)) if load is None else load
-    if load not in shape.loads:
-        raise ValueError(f"--load: shape '{shape.name}' has no load '{load}'; {nearest(load, shape.loads)}")
-    materials = _materials(study, part, shape, material, density)
-    if shape.file:
-        if size is not None:
-            raise ValueError(f"--size: '{size}' is beside the mesh of {Path(shape.file).name}; leave --size out")
-        return AskedShape(part, shape, load, materials, None)
-    if size is None and sized:
-        raise ValueError("--size: missing; give the length of an edge such as '2 mm'")
-    edge = None if size is None else asked_quantity("--size", size, "length")
-    (left, low), (right, top) = shape.extent
-    most = min(right - left, top - low)
-    if edge is not None and edge > most:
-        raise ValueError(f"--size: '{size}' is larger than shape '{shape.name}'; give at most {1e3 * most:.4g} mm")
-    return AskedShape(part, shape, load, materials, edge)
 
 
 def _shape(text: str) -> "tuple[Study, Shapes, Shape]":
@@ -369,15 +303,74 @@ class SheetOptions:
         return asked_beam(self.beam or "", self.thickness), material
 
     def asked_shape(self, load: str | None, sized: bool = True) -> "AskedShape":
-        """Shape of a study; ValueError names the option."""
-        return asked_shape(self.shape or "", load, self.material, self.density, self.size, sized=sized)
+        """Shape of an option such as ``config/shapes.yaml:cook``; ValueError names the option.
 
-    def asked_mesh(self, beam: "Beam") -> "tuple[str, float | None]":
-        """Name of a beam's mesh, and its length of an edge [m], None for a mesh file; ValueError names the option."""
-        mesh_type = self.mesh_type or "structured"
-        if is_made(mesh_type):
-            return f"{mesh_type} {self.size}", asked_size(beam, mesh_type, self.size)
-        return Path(mesh_type).name, None
+        Load and material may be None if the study has only one for the shape. `sized`: an outline needs a size.
+        """
+        study, part, shape = _shape(self.shape or "")
+        if load is None and len(shape.loads) > 1:
+            raise ValueError(f"--load: missing; shape '{shape.name}' has {', '.join(shape.loads)}; give one")
+        from ..problem.quantities import nearest
+
+        load = next(iter(shape.loads)) if load is None else load
+        if load not in shape.loads:
+            raise ValueError(f"--load: shape '{shape.name}' has no load '{load}'; {nearest(load, shape.loads)}")
+        materials = _materials(study, part, shape, self.material, self.density)
+        if shape.file:
+            if self.size is not None:
+                raise ValueError(
+                    f"--size: '{self.size}' is beside the mesh of {Path(shape.file).name}; leave --size out"
+                )
+            return AskedShape(part, shape, load, materials, None)
+        if self.size is None and sized:
+            raise ValueError("--size: missing; give the length of an edge such as '2 mm'")
+        edge = None if self.size is None else asked_quantity("--size", self.size, "length")
+        (left, low), (right, top) = shape.extent
+        most = min(right - left, top - low)
+        if edge is not None and edge > most:
+            raise ValueError(
+                f"--size: '{self.size}' is larger than shape '{shape.name}'; give at most {1e3 * most:.4g} mm"
+            )
+        return AskedShape(part, shape, load, materials, edge)
+
+    @property
+    def mesh_or_file(self) -> str:
+        """Mesh type, or mesh file."""
+        return self.mesh_type or "structured"
+
+    def edge(self, beam: "Beam") -> float | None:
+        """Length of an edge [m], None for a mesh file; ValueError if the mesh would be too large."""
+        from ..mesh import MESH_TYPES
+
+        made = MESH_TYPES.get(self.mesh_or_file)
+        if made is None:
+            if not Path(self.mesh_or_file).is_file():
+                known = ", ".join(MESH_TYPES)
+                raise ValueError(f"--mesh: '{self.mesh_or_file}' is neither a mesh type nor a file; known: {known}")
+            return None
+        if self.size is None:
+            raise ValueError("--size: missing; give the length of an edge such as '2 mm'")
+        edge = asked_quantity("--size", self.size, "length")
+        if refusal := made.refusal(beam.length, beam.height, edge, f"beam '{beam.name}'"):
+            raise ValueError(f"--size: '{self.size}' {refusal}")
+        return edge
+
+    def mesh_name(self, edge: float | None) -> str:
+        """Name of the mesh of a beam."""
+        return Path(self.mesh_or_file).name if edge is None else f"{self.mesh_or_file} {self.size}"
+
+    def mesh(self, beam: "Beam", edge: float | None) -> "Mesh":
+        """Mesh with edges of a length [m]; without length the mesh of the file."""
+        from ..mesh import MESH_TYPES, read_beam_mesh
+
+        if edge is None:
+            unit = self.unit if self.unit[:1].isdigit() else f"1 {self.unit}"
+            return read_beam_mesh(self.mesh_or_file, beam.length, beam.height, asked_quantity("--unit", unit, "length"))
+        made = MESH_TYPES[self.mesh_or_file]
+        count = made.particles(beam.length, beam.height, edge)
+        if count > SAID_FROM:
+            click.echo(f"making a {made.name} mesh of some {count / 1e6:.1f} million particles ...", err=True)
+        return made(beam.length, beam.height, edge)
 
 
 def sheet_options(

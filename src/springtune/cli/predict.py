@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import click
 
 from . import examples
-from .options import SPRING_FILES, SheetOptions, Unmet, asked_mesh, check_kind, check_target, refusals, sheet_options
+from .options import SPRING_FILES, SheetOptions, Unmet, check_kind, check_target, refusals, sheet_options
 
 if TYPE_CHECKING:
     from ..handover.net import SpringNet
@@ -138,11 +138,11 @@ def _on_beam(
     from ..prediction import SOLVED, SOLVED_FROM_FILE, extrapolate, predict, references
     from .recommendation import beam_subject, prediction_json, prediction_text
 
-    mesh_type = sheet.mesh_type or "structured"
-    name, edge = sheet.asked_mesh(beam)
+    mesh_type, edge = sheet.mesh_or_file, sheet.edge(beam)
+    name = sheet.mesh_name(edge)
 
     def make() -> "Mesh":
-        mesh = asked_mesh(beam, mesh_type, edge, sheet.unit)
+        mesh = sheet.mesh(beam, edge)
         if edge is None and len(mesh.points) > SOLVED_FROM_FILE:
             raise Unmet(
                 f"--mesh: '{mesh_type}' has {len(mesh.points)} particles, more than the {SOLVED_FROM_FILE} that are "

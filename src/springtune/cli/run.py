@@ -210,10 +210,10 @@ def _remove_records(studies: "list[Study]", left_empty: dict[str, bool], remove:
 
 def _strictly(strict: bool, study: "Study") -> int:
     """Exit code of a complete run."""
-    holes = _unsolved(_results(study) / "dataset.nc") if strict else 0
-    if holes:
-        click.echo(f"--strict: {holes} scenes are not solved", err=True)
-    return NOT_SOLVED if holes else 0
+    count = _unsolved(_results(study) / "dataset.nc") if strict else 0
+    if count:
+        click.echo(f"--strict: {count} scenes are not solved", err=True)
+    return NOT_SOLVED if count else 0
 
 
 SLURM = "snakemake_executor_plugin_slurm"

@@ -15,7 +15,6 @@ from .options import (
     SPRING_FILES,
     SheetOptions,
     Unmet,
-    asked_mesh,
     check_kind,
     check_target,
     names_from,
@@ -108,9 +107,8 @@ def springs(
             net = net_of_shape(sheet.asked_shape(load), definition, scale, stiffness)
         else:
             beam, solid = sheet.asked_beam()
-            name, edge = sheet.asked_mesh(beam)
-            mesh = asked_mesh(beam, sheet.mesh_type or "structured", edge, sheet.unit)
-            net = _net(beam, solid, mesh, name, definition, stiffness, load, force)
+            edge = sheet.edge(beam)
+            net = _net(beam, solid, sheet.mesh(beam, edge), sheet.mesh_name(edge), definition, stiffness, load, force)
         with warnings.catch_warnings(record=True) as heard:
             warnings.simplefilter("always", EquilibriumWarning)
             written = net.write(target, mujoco=mujoco)
