@@ -43,7 +43,7 @@ COMPARED = {
 SAME_SOFTWARE, OTHER_SOFTWARE = 1e-12, 1e-6
 """Tolerances for the same software and for other versions; equilibria converge to 1e-10 of the load."""
 
-EXACT = 1e-18
+SMALLEST_SEEN = 1e-18
 """Tolerance with which scenes are compared, so that every difference is seen."""
 
 
@@ -202,6 +202,6 @@ def _compared(
         data[[*numbers, "status"]].sel({name: label for name, label in labels.items() if name in data.dims}, drop=True)
         for data in (before.drop_attrs(deep=False), after.drop_attrs(deep=False))
     )
-    found = compare(xr.DataTree(one), xr.DataTree(other), Tolerance(EXACT))
-    difference = EXACT * max((row.excess for row in found.changes), default=0.0)
+    found = compare(xr.DataTree(one), xr.DataTree(other), Tolerance(SMALLEST_SEEN))
+    difference = SMALLEST_SEEN * max((row.excess for row in found.changes), default=0.0)
     return Again(name, str(Status(int(one.status))), str(Status(int(other.status))), difference, limit)
