@@ -95,7 +95,7 @@ class TestNew:
             assert (campaign.folder / product).exists()
         # And what it drew goes to ParaView.
         said = run("export", "results/my-plate", "--to", "plate.pvd")
-        assert said.exit_code == 0 and "2 networks of shapes, in the folder plate" in said.stdout, said.output
+        assert said.exit_code == 0 and "2 networks, in the folder plate" in said.stdout, said.output
         found = meshio.read("plate/plate_pull_patch.vtu")
         with st.open("results/my-plate") as tree:
             one = tree["shape_fields"].to_dataset().isel(case=0).sel(definition="patch")
