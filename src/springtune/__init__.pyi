@@ -30,11 +30,11 @@ from .problem.status import Status as Status
 from .scene.curve import Curve as Curve
 from .scene.curve import sensitivity as sensitivity
 from .scene.meshes import make_mesh as make_mesh
-from .scene.meshes import mesh_shape as mesh_shape
 from .scene.meshes import read_mesh as read_mesh
-from .scene.meshes import read_shape as read_shape
 from .scene.moduli import Moduli as Moduli
 from .scene.moduli import moduli as moduli
+from .scene.shape_meshes import mesh_shape as mesh_shape
+from .scene.shape_meshes import read_shape as read_shape
 from .scene.single import Result as Result
 from .scene.single import Scene as Scene
 from .springs import DEFINITIONS as DEFINITIONS

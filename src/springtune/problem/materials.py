@@ -19,11 +19,12 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from numbers import Real
-from typing import Any, ClassVar, NamedTuple
-
-import numpy as np
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from .quantities import Number, positive, put, quantity
+
+if TYPE_CHECKING:
+    import numpy as np
 
 
 @dataclass(frozen=True)
@@ -84,6 +85,8 @@ class Material:
         >>> (st.Material("210 GPa", 0.3).plane_stress / 1e9).round(2).tolist()
         [[230.77, 69.23, 0.0], [69.23, 230.77, 0.0], [0.0, 0.0, 80.77]]
         """
+        import numpy as np  # here: making a material needs none
+
         modulus, nu = self.young_modulus, self.poisson_ratio
         diagonal, coupling, shear = modulus / (1 - nu**2), modulus * nu / (1 - nu**2), modulus / (2 * (1 + nu))
         return np.array([[diagonal, coupling, 0.0], [coupling, diagonal, 0.0], [0.0, 0.0, shear]])
@@ -203,6 +206,8 @@ class Rubber(Material):
         >>> [round(float(st.Rubber.excess(test, 2.0)), 3) for test in ("uniaxial", "equibiaxial", "pure shear")]
         [2.0, 5.062, 2.25]
         """
+        import numpy as np  # here: making a material needs none
+
         q = np.asarray(stretch, float)
         other = {"uniaxial": q**-0.5, "equibiaxial": q, "pure shear": np.ones_like(q)}[_known_test(test)]
         return np.asarray(q**2 + other**2 + (q * other) ** -2 - 3)
@@ -234,6 +239,8 @@ class Rubber(Material):
         >>> [round(float(rubber.stress(test, 1 + 1e-6)), 3) for test in ("uniaxial", "equibiaxial", "pure shear")]
         [1.0, 2.0, 1.333]
         """
+        import numpy as np  # here: making a material needs none
+
         q, excess = np.asarray(stretch, float), self.excess(test, stretch)
         slope = np.zeros(q.shape)
         for n, c in enumerate(self.coefficients, 1):
@@ -403,6 +410,8 @@ class AnisotropicMaterial:
         >>> [f"{one.young_modulus_x / 1e9:.1f} GPa, {one.poisson_ratio_xy:.3f}" for one in constants]
         ['54.1 GPa, 0.311', '54.1 GPa, 0.311', '54.1 GPa, 0.311']
         """
+        import numpy as np  # here: making a material needs none
+
         parts: list[tuple[AnyMaterial, np.ndarray, float]] = []
         for number, ply in enumerate(plies):
             if not (isinstance(ply, tuple | list) and len(ply) == 3 and isinstance(ply[0], ANY_MATERIAL)):
@@ -445,6 +454,8 @@ class AnisotropicMaterial:
         >>> st.AnisotropicMaterial.of(st.Material("1 MPa", 0.0).plane_stress).C66
         500000.0
         """
+        import numpy as np  # here: making a material needs none
+
         given = np.asarray(stiffness, dtype=float)
         if given.shape != (3, 3) or not np.allclose(given, given.T, rtol=1e-9, atol=1e-12 * np.abs(given).max()):
             raise ValueError(f"stiffness: {stiffness!r} is no symmetric array of shape (3, 3); give one in Pa")
@@ -461,6 +472,8 @@ class AnisotropicMaterial:
         >>> st.AnisotropicMaterial(3.0, 2.0, 0.5, 1.0, C16=0.1).plane_stress.tolist()
         [[3.0, 0.5, 0.1], [0.5, 2.0, 0.0], [0.1, 0.0, 1.0]]
         """
+        import numpy as np  # here: making a material needs none
+
         return np.array(
             [[self.C11, self.C12, self.C16], [self.C12, self.C22, self.C26], [self.C16, self.C26, self.C66]]
         )
@@ -555,6 +568,8 @@ class EngineeringConstants(NamedTuple):
 
 def engineering_constants(stiffness: np.ndarray, angle: float = 0.0) -> EngineeringConstants:
     """Return engineering constants of a stiffness in plane stress (3, 3) [Pa], along axes turned by `angle` [rad]."""
+    import numpy as np  # here: making a material needs none
+
     compliance = np.linalg.inv(rotated(stiffness, -angle) if angle else stiffness)
     (along, coupled, sheared), across, shear = compliance[0].tolist(), float(compliance[1, 1]), float(compliance[2, 2])
     return EngineeringConstants(1 / along, 1 / across, -coupled / along, 1 / shear, sheared / along)
@@ -562,6 +577,8 @@ def engineering_constants(stiffness: np.ndarray, angle: float = 0.0) -> Engineer
 
 def rotated(stiffness: np.ndarray, angle: float) -> np.ndarray:
     """Return a stiffness in plane stress (3, 3) turned counter-clockwise by `angle` [rad]."""
+    import numpy as np  # here: making a material needs none
+
     c, s = math.cos(angle), math.sin(angle)
     # Strains along the turned axes of strains along x and y; the energy is the same.
     strains = np.array([[c * c, s * s, c * s], [s * s, c * c, -c * s], [-2 * c * s, 2 * c * s, c * c - s * s]])

@@ -34,7 +34,8 @@ from ..problem.quantities import positive
 from ..problem.shapes import LoadCase, Quantity, Shape
 from ..reference.answers import beyond_linear
 from ..springs import Definition, DefinitionError, Springs
-from .meshes import A_BEAM, A_MATERIAL, A_MESH, A_SHAPE, check_filled, check_meshed, is_a
+from .meshes import A_BEAM, A_MATERIAL, A_MESH, A_SHAPE, check_filled, is_a
+from .shape_meshes import check_meshed
 from .sheet import Loading, Sheet, Solution, box_loading, chosen, solved
 
 if TYPE_CHECKING:

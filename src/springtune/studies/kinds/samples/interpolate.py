@@ -8,7 +8,7 @@ from typing import Any
 
 from ...runs import store
 from ...runs.task_costs import TaskCosts
-from ..scenes import reference
+from ..scenes import unit_references
 from .designs import draw
 
 
@@ -20,13 +20,15 @@ def run(content: dict[str, Any], costs: TaskCosts) -> None:
             drawn = draw(**file["sample"])
             pairs = set(zip((drawn["length"] / drawn["height"]).tolist(), drawn["poisson_ratio"].tolist()))
         problems = {problem_key(task["key"], *pair): pair for pair in sorted(pairs)}
-        reference.make_interpolant(Path(content["folder"]) / f"{task['key']}.h5", task | {"problems": problems}, costs)
+        unit_references.make_interpolant(
+            Path(content["folder"]) / f"{task['key']}.h5", task | {"problems": problems}, costs
+        )
 
 
 def gone(content: dict[str, Any], key: str, why: str, limits: str) -> None:
     """Store the failed result of a reference, or of an interpolant, beyond its limits."""
     path = Path(content["folder"]) / f"{key.partition(' ')[0]}.h5"
-    store.add(path, {key: reference.failed({}, why) | {store.LIMITS: limits}})
+    store.add(path, {key: unit_references.failed({}, why) | {store.LIMITS: limits}})
 
 
 def problem_key(interpolant: str, aspect_ratio: float, nu: float) -> str:
