@@ -68,6 +68,7 @@ class StaticProblem(LoadedNetwork):
     --------
     A spring of length 1 and stiffness 1 between a clamp and a roller, pulled by a force of a tenth of the stiffness:
 
+    >>> from springtune.mechanics.network import Network
     >>> from springtune.mesh.cells import Mesh
     >>> mesh = Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 1.0]]), np.array([[0, 1, 2]]))
     >>> held = np.array([[True, True], [False, True], [True, True]])

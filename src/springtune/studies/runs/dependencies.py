@@ -6,7 +6,7 @@ functions and ``try``; type-checking imports do not. Of an ``__init__`` that onl
 followed.
 
 Imports by a name in a text are not seen. Definitions and mesh types are added where they are chosen
-(`definition_closure`, `mesh_type_closure`); the rules name the modules of outputs.
+(`definition_closure`, `mesh_type_closure`), and modules of outputs in `rerun`.
 """
 
 import ast
