@@ -22,22 +22,9 @@ SHAPE_ERRORS = "Errors are (network - reference) / |reference| of each quantity"
 class Subject:
     """A beam under loads, or a shape under a load case, as a prediction names it.
 
-    Attributes
-    ----------
-    name, made_of : str
-        The body, and its material and thickness.
-    about : dict
-        The same as JSON.
-    known : dict
-        References by load; of a shape by quantity of interest.
-    load : str
-        Load case of a shape; empty for beams.
-    meaning : str
-        What an error is of.
-    dense : bool
-        Whether all materials have a density, so that there are largest time steps.
-    references : list
-        Rows of a table of references; empty for beams.
+    `name` and `made_of` (material, thickness) are texts, `about` is the same as JSON. `known` are references by load,
+    of a shape by quantity; `meaning` says what an error is of. `dense`: all materials have a density, so that there are
+    largest time steps. Only shapes have a `load`, only beams rows of a table of `references`.
     """
 
     name: str

@@ -39,23 +39,11 @@ class EquilibriumWarning(UserWarning):
 class Simulation:
     """How a net moves in a simulator, and its equilibrium.
 
-    Attributes
-    ----------
-    masses : ndarray of float, shape (n_points,)
-        [kg]
-    force : float
-        Of the load, with its sign [N]; 1 for a load case of a shape, 0 without a load.
-    largest_step : float
-        Largest stable step of explicit schemes about rest, undamped [s].
-    step : float
-        Step that stays stable in motion [s]: `STEP_SHARE` of the largest one, or less where the net stiffens.
-    frequency, loaded_frequency : float
-        Lowest frequency, and the lowest one that the load excites [rad/s]; 0 without a load.
-    mass_damping : float
-        Damping over mass [1/s], critical for the loaded frequency, or less, so that no mode comes to rest later than
-        the lowest one under its own critical damping.
-    displacements : ndarray of float, shape (n_points, 2), or None
-        Stable equilibrium under the load [m]; None without one.
+    `masses` (n_points,) are in kg. `force` is signed [N]; 1 for a load case of a shape, 0 without a load.
+    `largest_step` is stable about rest without damping, `step` also in motion [s]. `frequency` and `loaded_frequency`,
+    which the load excites, are the lowest [rad/s]. `mass_damping` over mass [1/s] is critical for the loaded frequency,
+    or less, so that no mode comes to rest later than the lowest one. `displacements` (n_points, 2) are the stable
+    equilibrium [m], or None.
     """
 
     masses: np.ndarray

@@ -52,14 +52,8 @@ NEAR = 0.02
 def trace(problem: StaticProblem, weights: np.ndarray, targets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the weighted displacement at many loads on one equilibrium path, and where it is stable.
 
-    `weights` has shape (n_points, 2); `targets` (n,) is force over reference stiffness, all of one sign [m].
-
-    Returns
-    -------
-    values : ndarray of float, shape (n,)
-        NaN where the path from rest reaches no equilibrium.
-    stable : ndarray of bool, shape (n,)
-        Whether the path from rest reaches the load and is stable up to there.
+    `weights` has shape (n_points, 2); `targets` (n,) is force over reference stiffness, all of one sign [m]. Values are
+    NaN where the path from rest reaches no equilibrium. A load is stable if the path is stable up to there.
     """
     path = StablePath(problem, weights, targets)
     return path.values, path.stable

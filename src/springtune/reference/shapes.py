@@ -111,8 +111,6 @@ def solve_shape(
     `grouped` is the mesh of a shape from a file: the polygon around its cells is the geometry. `tolerance` is the
     largest accepted relative error estimate [1]; ten times as much for stresses.
 
-    Notes
-    -----
     A level of degree p has p layers of triangles at each corner that is not smooth. With :math:`u \sim r^\lambda` one
     more layer scales the missing energy of the innermost triangles by :math:`.2^{2\lambda}`, and one more degree that
     of the others similarly. So steps from level to level fall geometrically: while each is at most half of the last,

@@ -218,8 +218,6 @@ class UnitLevel:
     `length` is over half the height [1]. `displacement` is the loaded side's mean along the force, `measured` the
     displacement of the load, and `round_off` bounds the relative rounding error of both [1].
 
-    Notes
-    -----
     The basis on a grid of rectangles is a product of one along x and one along y, so matrices are Kronecker products:
     milliseconds, for any degree. Each side is held as a whole, so the unknowns are products too.
 

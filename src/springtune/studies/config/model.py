@@ -140,29 +140,16 @@ class Study:
     All tuples are free of duplicates and ordered by beam and material as declared, then by mesh type, mesh size, load,
     definition and kinematics, whatever the order of grids and of the lists in them.
 
-    Attributes
-    ----------
-    mesh_files : dict
-        `MeshSpec` of meshes from files by (mesh type, beam's name, mesh size).
-    parts : dict
-        Parts of study kinds by their names; empty if the study does not use a kind.
-    limits : dict
-        ``seconds`` of the processor and ``memory`` [byte] that one task may take.
-    stiffness_ratios : tuple of float
-        k / (E t) along every curve, ascending [1].
-    stiffness_table : dict
-        Stiffness [N/m] of the definition ``paper`` by (mesh type, material).
-    calibration : tuple of str or None
-        Beam and load whose curves calibrate the definition ``calibrated``.
-    axes : dict of str to tuple
-        Labels of each dimension of the dataset: texts, for ``mesh_size`` numbers [m].
-    swept : tuple of str
-        Parameters of `springtune.problem.parameters.SWEPT` that are dimensions; their labels are numbers.
-    test_files : tuple of Path
-        Files of the tests that rubber is fitted to or compared with.
-    part : Part or None
-        Part of a study. It has its own scenes, curves, meshes, references and `parts`; everything else, such as grids
-        and axes, is of the whole study.
+    `mesh_files` has the `MeshSpec` of meshes from files by mesh type, beam's name and mesh size. `parts` has what study
+    kinds made of it, by their names. `limits` are ``seconds`` of the processor and ``memory`` [byte] of one task.
+
+    `stiffness_ratios` are k / (E t) along every curve, ascending [1]; `stiffness_table` has the stiffness [N/m] of the
+    definition ``paper`` by mesh type and material; the curves of a beam and load, `calibration`, calibrate
+    ``calibrated``.
+
+    `axes` has the labels of each dimension of the dataset: texts, for ``mesh_size`` numbers [m]. `swept` are parameters
+    of `springtune.problem.parameters.SWEPT` that are dimensions. `test_files` are tests of rubber. A `part` of a study
+    has its own scenes, curves, meshes, references and `parts`; everything else is of the whole study.
     """
 
     name: str

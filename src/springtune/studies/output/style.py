@@ -140,12 +140,7 @@ def panels(
     ratios: Sequence[float] | None = None,
     widths: Sequence[float] | None = None,
 ) -> tuple[Figure | SubFigure | None, np.ndarray]:
-    """Axes to plot on, and the figure where that is to be arranged.
-
-    Returns
-    -------
-    axes : (nrows, ncols) ndarray of Axes
-    """
+    """Axes of shape (nrows, ncols) to plot on, and the figure where it is to be arranged."""
     if ax is None:
         # Here, since pyplot chooses a backend: who only imports, or plots on axes that are there, chooses none.
         import matplotlib.pyplot as plt
@@ -170,12 +165,10 @@ def multiples(
     sharey: bool = False,
     further: float = 0.0,
 ) -> tuple[Figure | SubFigure | None, np.ndarray, np.ndarray, float]:
-    """Panels of small multiples: one of them a column wide, more of them in rows of a page, and `further` height.
+    """Panels of small multiples, and the height of a new figure [inch].
 
-    Returns
-    -------
-    used : (count,) ndarray of Axes
-        Those that are not left over in the last row.
+    One panel is a column wide, several stand in rows of a page, with `further` height. Returns the figure, all axes,
+    those in use (count,), and the height.
     """
     rows = -(-count // columns)
     figsize = (COLUMN if columns == 1 else PAGE, 0.2 + height * rows + further)
@@ -206,12 +199,7 @@ def arrange(
     down: float = 0.0,
     title: str = "",
 ) -> None:
-    """Margins of a figure and the gaps between its panels [inch], and the title above them, at the upper left.
-
-    Parameters
-    ----------
-    axes : (nrows, ncols) ndarray of Axes
-    """
+    """Set margins and gaps between the panels of `axes` (nrows, ncols) [inch], and the title at the upper left."""
     if figure is None:
         return
     width, height = size(figure)

@@ -246,14 +246,8 @@ class Tasks:
 class Plan:
     """Jobs of a study's stages.
 
-    Attributes
-    ----------
-    limits : dict
-        Of one task, see `springtune.studies.config.model.Study`.
-    bundles : dict
-        Tasks of each bundle, by stage and label, and the cores and seconds of a job that bundles are made for.
-    needs : dict of tuple to springtune.studies.runs.plan.Needs
-        Resources of a job, by stage and label; stages that share bundles share their seconds.
+    `limits` are those of one task. `bundles` has the tasks of each bundle by stage and label, and the cores and seconds
+    that bundles are made for. `needs` are the resources of a job by stage and label.
     """
 
     folder: Path

@@ -43,14 +43,8 @@ BLANKED = {"no_diff": "git_diff", "no_host": "host"}
 class Job:
     """A job of a run.
 
-    Attributes
-    ----------
-    digest : str
-        Hash of all that the job depends on, without the products of other jobs.
-    reads : str
-        Job whose first product it reads; empty for stages, whose results are found by keys.
-    inputs : tuple of str
-        Files that it reads, if several jobs make them.
+    `digest` is a hash of all that it depends on, without products of other jobs. It reads the first product of the job
+    `reads`, if any, and `inputs`, which several jobs make.
     """
 
     name: str

@@ -39,14 +39,7 @@ TRACEBACKS = 3
 
 
 def main(tasks: str, done: str, digest: str) -> None:
-    """Do the tasks of a note.
-
-    Parameters
-    ----------
-    tasks : str
-        The note: ``digest``, ``limits``, ``module`` of the package and ``content`` for it, see
-        `springtune.studies.runs.driver`, and ``products``, files that it makes.
-    """
+    """Do what the note at `tasks` says: the tasks of its `content`, by its `module`, within its `limits`."""
     note = checked_json.read(tasks)
     if note is None or note["digest"] != digest:
         raise SystemExit(

@@ -30,15 +30,7 @@ AFTER = "Dataset, figures and tables"
 
 @dataclass
 class Estimate:
-    """Expected work of a job.
-
-    Attributes
-    ----------
-    tasks : int
-        Number of its scenes, references or other tasks.
-    seconds : float
-        Expected seconds if nothing is stored yet.
-    """
+    """Expected work of a job: its `tasks`, and `seconds` if nothing is stored yet."""
 
     part: str
     tasks: int
