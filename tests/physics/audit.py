@@ -1,27 +1,20 @@
 """Random scenes solved as a study solves them, and each answer checked by the mechanics of `mechanics`.
 
-    python tests/physics/audit.py --scenes 2000 --seed 1
-    python tests/physics/audit.py --scenes 500 --seed 1 --snaps
-
-prints how many scenes ended in which status, and every one whose answer is wrong. A ``solved`` scene is wrong where
+A ``solved`` scene is wrong where
 
 - its displacements are further than `PROMISED` from the equilibrium next to them, or none is next to them;
 - that equilibrium has a negative eigenvalue, or under a following pressure two of its lowest modes have merged
-  (flutter);
+  (flutter; higher ones are the mesh's rather than the sheet's, and little damping holds them);
 - it is not on the path that leads from rest, step by step, through equilibria without a negative eigenvalue. (Flutter
   on the way is no matter of where the path leads.)
 
-Higher modes that have merged, which are the mesh's rather than the sheet's and which little damping holds, are counted
-beside with the damping ratio that they need, and so is what is refused though the path reaches its load stably. Scenes
-depend on seed and number alone, so ``--only 17`` shows one of them again.
+Scenes depend on seed and number alone.
 """
 
-import argparse
 import copy
 import math
-import time
-from collections import Counter
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -88,22 +81,6 @@ class Scene:
         return Material(self.young_modulus, self.poisson_ratio, name="drawn")
 
 
-@dataclass
-class Verdict:
-    """What the library said of a scene and what is wrong with it, empty where nothing is."""
-
-    scene: Scene
-    status: str = ""
-    message: str = ""
-    wrong: list = field(default_factory=list)
-    refused: str = ""
-    force: float = math.nan
-    error: float = math.nan
-    lowest: float = math.nan
-    held: dict = field(default_factory=dict)
-    unknowns: int = 0
-
-
 def draw(seed, number):
     """Scene of a seed and a number."""
     rng = np.random.default_rng([seed, number])
@@ -159,9 +136,6 @@ class Snap:
     arch: Arch
     way: str
     level: float
-    kinematics = "nonlinear"
-    load = property(lambda self: f"{self.arch.form} {self.arch.load}")
-    mesh_type = property(lambda self: self.arch.mesh_type)
 
 
 def draw_snap(seed, number):
@@ -270,19 +244,16 @@ def parts_of(scene, mesh, springs):
             squares = 4 / math.sqrt(3) * area
             modulus = squares * young * t * (1 - 3 * nu) / (6 * math.sqrt(3) * (1 - nu**2))
             parts.append(Part(corners, angle_forces, modulus, angles_of(rest)[0]))
-        elif scene.definition == "delingette":
+        elif scene.definition in ("delingette", "neo-hooke"):
             sides = np.stack([rest[:, 1] - rest[:, 0], rest[:, 2] - rest[:, 0]], axis=2)
             turned = np.stack([[sides[:, 1, 1], -sides[:, 0, 1]], [-sides[:, 1, 0], sides[:, 0, 0]]])
             inverse = (turned / (2 * area)).transpose(2, 0, 1)
-            moduli = [np.full(len(corners), young * t * m) for m in (nu / (1 - nu**2), 1 / (2 * (1 + nu)))]
-            parts.append(Part(corners, element_forces, inverse, area, *moduli))
-        elif scene.definition == "neo-hooke":
-            sides = np.stack([rest[:, 1] - rest[:, 0], rest[:, 2] - rest[:, 0]], axis=2)
-            turned = np.stack([[sides[:, 1, 1], -sides[:, 0, 1]], [-sides[:, 1, 0], sides[:, 0, 0]]])
-            inverse = (turned / (2 * area)).transpose(2, 0, 1)
-            bulk = 0.0 if nu >= 0.5 else young * t / (3 * (1 - 2 * nu))
-            moduli = [np.full(len(corners), one) for one in (young * t / (2 * (1 + nu)), bulk)]
-            parts.append(Part(corners, rubber_forces, inverse, area, *moduli))
+            shear = young * t / (2 * (1 + nu))
+            if scene.definition == "delingette":
+                law, moduli = element_forces, (young * t * nu / (1 - nu**2), shear)
+            else:
+                law, moduli = rubber_forces, (shear, 0.0 if nu >= 0.5 else young * t / (3 * (1 - 2 * nu)))
+            parts.append(Part(corners, law, inverse, area, *(np.full(len(corners), one) for one in moduli)))
         elif scene.definition == "delingette-tensile":
             first, second = young * t * nu / (1 - nu**2), young * t / (1 + nu)
             angles, a, b = angles_of(rest)
@@ -302,244 +273,145 @@ def masses_of(mesh):
     return shares
 
 
-def merged_modes(body, unknowns, force, masses):
-    """Modes whose eigenvalue is negative or complex, by their place from the lowest, and the damping that holds each.
-
-    Returns
-    -------
-    fluttering, held : dict of int to float
-        Ratio of damping to the critical one from which a merged mode decays, infinite where it is negative: of modes
-        that make the body unstable, and of higher ones that little damping holds.
-    """
+def fluttering(body, unknowns, force, masses):
+    """Places from the lowest, below `LOW`, of modes whose eigenvalue is complex, and of any whose is negative."""
     values = body.modes(unknowns, force, masses)
-    bad = np.flatnonzero((np.abs(values.imag) > MERGED * np.abs(values) + ROUNDING) | (values.real < 0))
-    # The frequency is the root of the eigenvalue: its imaginary part over its real one is half of the eigenvalue's.
-    needed = {int(i): float(abs(values[i].imag) / (2 * values[i].real)) if values[i].real > 0 else np.inf for i in bad}
-    fluttering = {mode: ratio for mode, ratio in needed.items() if mode < LOW or ratio == np.inf}
-    return fluttering, {mode: ratio for mode, ratio in needed.items() if mode not in fluttering}
+    merged = np.abs(values.imag) > MERGED * np.abs(values) + ROUNDING
+    return np.flatnonzero((merged & (np.arange(len(values)) < LOW)) | (values.real < 0))
 
 
-def solve(scene, mesh, force, stiffness):
-    """The scene's result by the recipe of a study's jobs."""
-    task = {
-        "material": asdict(scene.material),
-        "kind": LOADS[scene.load].kind.name,
-        "follower": LOADS[scene.load].follower,
-        "force": force,
-        "definition": scene.definition,
-        "kinematics": scene.kinematics,
-        "reference": None,
-        "stiffness": stiffness,
-    }
-    return solve_scene(Sheet(mesh, scene.thickness), task | {"keep_fields": True})
+def upright(body, unknowns, force, masses):
+    """Whether no eigenvalue is real and negative, flutter or not."""
+    values = body.modes(unknowns, force, masses)
+    return not ((values.real < 0) & (np.abs(values.imag) <= MERGED * np.abs(values) + ROUNDING)).any()
 
 
 def audit(scene, path=True):
-    """Solve a scene and check the answer.
+    """Solve a scene by the recipe of a study's jobs and return what is wrong with the answer, a list of texts.
 
     Parameters
     ----------
     scene : Scene
     path : bool
-        Whether to follow the path from rest where that is not needed to tell a refusal from a wrong one.
-
-    Returns
-    -------
-    Verdict
+        Whether to follow the path from rest, which takes longest.
     """
-    verdict = Verdict(scene)
     mesh = MESH_TYPES[scene.mesh_type](scene.length, scene.height, scene.size)
     stiffness = 0.85 * scene.young_modulus * scene.thickness if DEFINITIONS[scene.definition].needs else None
     try:
         springs = DEFINITIONS[scene.definition].springs(mesh, scene.material, scene.thickness, stiffness)
-    except DefinitionError as error:
-        verdict.status, verdict.message = "no network", str(error)
-        return verdict
-    body = body_of(scene, mesh, springs)
-    verdict.unknowns = body.size
-    masses = masses_of(mesh)
-
-    def sound(unknowns, force):
-        if body.follower is None:
-            return body.stable(unknowns, force)
-        return not merged_modes(body, unknowns, force, masses)[0]
-
-    def upright(unknowns, force):
-        values = body.modes(unknowns, force, masses)
-        return not ((values.real < 0) & (np.abs(values.imag) <= MERGED * np.abs(values) + ROUNDING)).any()
-
+    except DefinitionError:
+        return []
+    body, masses, load = body_of(scene, mesh, springs), masses_of(mesh), LOADS[scene.load]
     force = unit_force(scene) * scene.level
-    if scene.way == "critical":
-        guess = 1.6 * column(scene) if scene.load in ("compression", "pressure", "follower-pressure") else None
-        if guess is None:
-            force = unit_force(scene) * 0.3
-        else:
-            if body.follower is not None:
-                guess *= 8  # Beck's column carries eight times Euler's load
-            force = (body.critical(guess, sound if body.follower else None) or guess / 1.6) * scene.level
-    verdict.force = force = float(force)
-    result = solve(scene, mesh, force, stiffness)
-    verdict.status, verdict.message = str(result["status"]), result["message"]
-    if scene.kinematics == "linear":
-        _check_linear(verdict, body, force, result)
-    else:
-        _check_nonlinear(verdict, body, force, result, mesh, masses, upright if body.follower else None, path)
-    return verdict
+    if scene.way == "critical" and scene.load not in ("compression", "pressure", "follower-pressure"):
+        force = 0.3 * unit_force(scene)
+    elif scene.way == "critical":
+        judge, guess = None, 1.6 * column(scene)
+        if body.follower is not None:
+            guess *= 8  # Beck's column carries eight times Euler's load
+
+            def judge(unknowns, force):
+                return not fluttering(body, unknowns, force, masses).size
+
+        force = (body.critical(guess, judge) or guess / 1.6) * scene.level
+    task = {
+        "material": asdict(scene.material), "kind": load.kind.name, "follower": load.follower, "force": float(force),
+        "definition": scene.definition, "kinematics": scene.kinematics, "reference": None, "stiffness": stiffness,
+        "keep_fields": True,
+    }  # fmt: skip
+    result = solve_scene(Sheet(mesh, scene.thickness), task)
+    if str(result["status"]) != "solved":
+        return []
+    check = check_linear if scene.kinematics == "linear" else partial(check_nonlinear, mesh, masses, path)
+    return list(check(body, float(force), result["displacements"]))
 
 
 def audit_snap(scene, path=True):
     """As `audit`, of an arch: solved as scenes of shapes are."""
-    verdict, arch = Verdict(scene), scene.arch
+    arch = scene.arch
     mesh, held, pattern, given, edges = arch.parts()
     try:
         springs = arch.springs(mesh)
-    except (DefinitionError, SingularError) as error:
-        verdict.status, verdict.message = "no network", str(error)
-        return verdict
-    follower = pressure = None
+    except (DefinitionError, SingularError):
+        return []
+    follower = pressure = judge = None
     if arch.load == "follower-pressure":
         follower = Part(edges, follower_forces, np.ones(len(edges)))
         pressure = FollowerPressure(mesh, edges, 1.0)
     body = Body(mesh.points, held, pattern, parts_of(arch, mesh, springs), follower, 0.0 if given is None else given)
-    verdict.unknowns, masses = body.size, masses_of(mesh)
+    masses = masses_of(mesh)
+    if follower is not None:
 
-    def upright(unknowns, force):
-        values = body.modes(unknowns, force, masses)
-        return not ((values.real < 0) & (np.abs(values.imag) <= MERGED * np.abs(values) + ROUNDING)).any()
+        def judge(unknowns, force):
+            return upright(body, unknowns, force, masses)
 
-    judge = upright if follower is not None else None
     # The load that would move it by three times its rise, were it linear, or shorten it by four times what buckles it.
     rest = np.zeros(body.size, LONG)
     soft = np.abs(body.solve(body.tangent(rest, 0.0), body.missing(rest, LONG(1.0)))).max()
     guess = 2 * arch.strip**2 if given is not None else 3 * arch.rise * arch.strip / float(soft)
-    share = body.follow(guess, judge=judge)[1]
-    verdict.force = force = float(guess * (share or 1e-3) * scene.level)
-    loading = Loading(("arch",), held, pattern, given, pressure)
-    problem = Sheet(mesh, arch.thickness).problem(replace_scale(loading, force), springs)
-    found = solved(problem, 1 / springs.reference, "nonlinear", lambda moved: 0.0)
-    verdict.status, verdict.message = str(found.status), found.message
-    result = {"displacements": found.equilibrium.displacements}
-    _check_nonlinear(verdict, body, force, result, mesh, masses, judge, path)
-    return verdict
+    force = float(guess * (body.follow(guess, judge=judge)[1] or 1e-3) * scene.level)
+    loading = scaled(Loading(("arch",), held, pattern, given, pressure), force)
+    found = solved(Sheet(mesh, arch.thickness).problem(loading, springs), 1 / springs.reference, "nonlinear",
+                   lambda moved: 0.0)  # fmt: skip
+    if str(found.status) != "solved":
+        return []
+    return list(check_nonlinear(mesh, masses, path, body, force, found.equilibrium.displacements))
 
 
-def replace_scale(loading, factor):
+def scaled(loading, factor):
     """A loading times a factor."""
-    follower = loading.follower
+    follower = copy.copy(loading.follower)
     if follower is not None:
-        follower = copy.copy(follower)
         follower.half, follower.derivative = factor * follower.half, factor * follower.derivative
     given = None if loading.given is None else factor * loading.given
     return replace(loading, pattern=factor * loading.pattern, given=given, follower=follower)
 
 
-def _distance(found, exact):
+def distance(found, exact):
     return float(np.linalg.norm((found - exact).astype(float)) / (np.linalg.norm(exact.astype(float)) or 1.0))
 
 
-def _check_linear(verdict, body, force, result):
-    exact = body.linear(force)
-    rest = np.zeros(body.size, LONG)
-    verdict.lowest = body.lowest(rest, 0.0)[0]
-    if verdict.status != "solved":
-        if exact is not None and verdict.lowest > 0 and verdict.status != "failed":
-            verdict.refused = "though the linear network has a stable equilibrium"
-        return
+def check_linear(body, force, displacements):
+    """What is wrong with a linear answer."""
+    exact, lowest = body.linear(force), body.lowest(np.zeros(body.size, LONG), 0.0)[0]
     if exact is None:
-        verdict.wrong.append("no linear solution found")
-        return
-    verdict.error = _distance(result["displacements"].ravel()[body.free], exact)
-    if verdict.error > PROMISED:
-        verdict.wrong.append(f"error {verdict.error:.1e}")
-    if verdict.lowest <= 0:
-        verdict.wrong.append(f"eigenvalue {verdict.lowest:.1e}")
+        yield "no linear solution found"
+    elif distance(displacements.ravel()[body.free], exact) > PROMISED:
+        yield f"error {distance(displacements.ravel()[body.free], exact):.1e}"
+    if lowest <= 0:
+        yield f"eigenvalue {lowest:.1e}"
 
 
-def _check_nonlinear(verdict, body, force, result, mesh, masses, judge, path):
-    if verdict.status != "solved":
-        if verdict.status == "failed":
-            return
-        end, share, why = body.follow(force, judge=judge)
-        if not why and not body.inside_out(end, mesh.cells.values(), force):
-            verdict.lowest = float(body.lowest(end, force)[0]) if body.follower is None else math.nan
-            flutters = body.follower is not None and merged_modes(body, end, force, masses)[0]
-            if not flutters and not verdict.lowest <= 0:  # by less than what ends a path
-                verdict.refused = "though the path from rest is stable up to the load"
-        return
-    found = result["displacements"].ravel()[body.free].astype(LONG)
+def check_nonlinear(mesh, masses, path, body, force, displacements):
+    """What is wrong with a nonlinear answer; the path from rest where nothing else is."""
+    found, right = displacements.ravel()[body.free].astype(LONG), True
     exact = body.newton(found, force)
     if exact is None:
-        verdict.wrong.append("no equilibrium next to the answer")
+        yield "no equilibrium next to the answer"
         return
-    verdict.error = _distance(found, exact)
-    if verdict.error > PROMISED:
-        verdict.wrong.append(f"error {verdict.error:.1e}")
+    if distance(found, exact) > PROMISED:
+        right = False
+        yield f"error {distance(found, exact):.1e}"
     if body.inside_out(exact, mesh.cells.values(), force):
-        verdict.wrong.append("cells inside out")
+        right = False
+        yield "cells inside out"
     if body.follower is None:
-        verdict.lowest = body.lowest(exact, force)[0]
-        if verdict.lowest <= 0:
-            verdict.wrong.append(f"eigenvalue {verdict.lowest:.1e}")
+        judge, lowest = None, body.lowest(exact, force)[0]
+        if lowest <= 0:
+            right = False
+            yield f"eigenvalue {lowest:.1e}"
     else:
-        fluttering, verdict.held = merged_modes(body, exact, force, masses)
-        if fluttering:
-            modes = ", ".join(f"{mode} ({ratio:.1e})" for mode, ratio in fluttering.items())
-            verdict.wrong.append(f"flutter: modes (damping that holds each) {modes} of {body.size}")
-    if path and not verdict.wrong:
+        modes = fluttering(body, exact, force, masses)
+        if modes.size:
+            right = False
+            yield f"flutter of modes {modes}"
+
+        def judge(unknowns, force):
+            return upright(body, unknowns, force, masses)
+
+    if path and right:
         end, share, why = body.follow(force, judge=judge)
         if why:
-            verdict.wrong.append(f"path from rest: {why} beyond {100 * share:.4g} % of the load")
-        elif _distance(end, exact) > 1e-5:
-            verdict.wrong.append(f"path from rest ends {_distance(end, exact):.1e} away")
-
-
-def main():
-    """Audit random scenes and print what came of them."""
-    parser = argparse.ArgumentParser(description=main.__doc__)
-    parser.add_argument("--scenes", type=int, default=60)
-    parser.add_argument("--snaps", action="store_true", help="audit arches, trusses, domes and columns, not rectangles")
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--only", type=int, help="audit this scene alone")
-    parser.add_argument("--first", type=int, default=0, help="number of the first scene")
-    asked = parser.parse_args()
-    numbers = range(asked.first, asked.first + asked.scenes) if asked.only is None else [asked.only]
-    begin, verdicts = time.perf_counter(), []
-    for number in numbers:
-        if asked.snaps:
-            verdict = audit_snap(draw_snap(asked.seed, number))
-        else:
-            verdict = audit(draw(asked.seed, number), path=number % 3 == 0)
-        verdicts.append(verdict)
-        if verdict.wrong or verdict.refused or verdict.held or asked.only is not None:
-            said = "; ".join(verdict.wrong) or verdict.refused or "higher modes merged" * bool(verdict.held)
-            print(f"{asked.seed}:{number} {verdict.status} [{verdict.message}] {said} | {verdict}", flush=True)
-    print(summary(verdicts))
-    print(f"{time.perf_counter() - begin:.0f} s")
-
-
-def summary(verdicts):
-    """Counts of a run, as text."""
-    lines = [f"{len(verdicts)} scenes, {len({v.scene for v in verdicts})} different"]
-    for title, value in (
-        ("status", lambda v: v.status),
-        ("wrong by load", lambda v: v.scene.load if v.wrong else None),
-        ("wrong by way", lambda v: v.scene.way if v.wrong else None),
-        ("wrong by mesh type", lambda v: v.scene.mesh_type if v.wrong else None),
-        ("wrong for", lambda v: " and ".join(w.split()[0] for w in v.wrong) if v.wrong else None),
-        ("solved with higher modes merged", lambda v: v.scene.load if v.held and not v.wrong else None),
-        ("refused though stable", lambda v: f"{v.status}, {v.scene.load}, {v.scene.way}" if v.refused else None),
-    ):
-        counts = Counter(value(v) for v in verdicts)
-        counts.pop(None, None)
-        lines.append(f"{title}: " + (", ".join(f"{name} {n}" for name, n in counts.most_common()) or "none"))
-    ratios = [ratio for v in verdicts for ratio in v.held.values()]
-    if ratios:
-        lines.append(f"damping ratio that holds these: {min(ratios):.1e} to {max(ratios):.1e}")
-    errors = np.array([v.error for v in verdicts if not math.isnan(v.error)])
-    if len(errors):
-        lines.append(f"error of solved scenes: median {np.median(errors):.1e}, largest {errors.max():.1e}")
-    return "\n".join(lines)
-
-
-if __name__ == "__main__":
-    main()
+            yield f"path from rest: {why} beyond {100 * share:.4g} % of the load"
+        elif distance(end, exact) > 1e-5:
+            yield f"path from rest ends {distance(end, exact):.1e} away"

@@ -9,11 +9,12 @@ from hypothesis import strategies as st
 
 from springtune.mechanics.energies import AngleEnergy, AreaEnergy, BiquadraticEnergy, NeoHookeEnergy, YeohEnergy
 from springtune.mechanics.network import Network
-from springtune.mesh import MESH_TYPES, corner_angles, signed_areas
+from springtune.mesh import MESH_TYPES
 from springtune.problem.materials import Material
-from springtune.springs import DEFINITIONS, delingette
+from springtune.springs import DEFINITIONS
 
-KINDS = ("area of triangles", "area of quads", "angles", "tensile", "coupled")
+RATIOS = {"neo-Hooke": 0.3, "neo-Hooke, nearly incompressible": 0.4999}
+KINDS = ("area of triangles", "area of quads", "angles", "tensile", "coupled", "Yeoh", *RATIOS)
 
 
 def energy_of(kind, seed):
@@ -22,6 +23,12 @@ def energy_of(kind, seed):
     mesh = MESH_TYPES["braced" if "quads" in kind else "free"](0.02, 0.01, 5e-3)
     corners = mesh.quads if "quads" in kind else mesh.triangles
     modulus = generator.uniform(-0.5, 1.0, len(corners))
+    if kind == "Yeoh":
+        coefficients = generator.uniform([0.1, -0.01, 0.0], [1, 0.05, 0.01], (len(corners), 3))
+        return mesh, YeohEnergy(mesh.points, corners, coefficients)
+    if kind in RATIOS:
+        shear, nu = 1.0 + modulus, RATIOS[kind]
+        return mesh, NeoHookeEnergy(mesh.points, corners, shear, shear * 2 * (1 + nu) / (3 * (1 - 2 * nu)))
     if "area" in kind:
         return mesh, AreaEnergy(mesh.points, corners, modulus)
     if kind == "angles":
@@ -42,7 +49,7 @@ def assembled(mesh, corners, forces):
 
 @pytest.mark.parametrize("kind", KINDS)
 @settings(max_examples=15)
-@given(seed=st.integers(0, 2**31), amplitude=st.floats(1e-6, 8e-4))
+@given(seed=st.integers(0, 2**31), amplitude=st.floats(1e-6, 4e-4))
 def test_forces_are_the_derivative_of_the_energy(kind, seed, amplitude):
     mesh, energy = energy_of(kind, seed)
     here, direction = scattered(mesh, seed + 1, amplitude), scattered(mesh, seed + 2, 1.0)
@@ -57,7 +64,7 @@ def test_forces_are_the_derivative_of_the_energy(kind, seed, amplitude):
 
 @pytest.mark.parametrize("kind", KINDS)
 @settings(max_examples=15)
-@given(seed=st.integers(0, 2**31), amplitude=st.floats(1e-6, 8e-4))
+@given(seed=st.integers(0, 2**31), amplitude=st.floats(1e-6, 4e-4))
 def test_tangent_is_the_derivative_of_the_forces(kind, seed, amplitude):
     mesh, energy = energy_of(kind, seed)
     here, direction = scattered(mesh, seed + 1, amplitude), scattered(mesh, seed + 2, 1.0)
@@ -99,23 +106,10 @@ def test_small_strain_keeps_its_digits(kind):
     assert np.abs(forces - linear).max() <= 1e-10 * np.abs(linear).max()
 
 
-ALL_KINDS = (*KINDS, "neo-Hooke", "Yeoh")
-
-
-def any_energy(kind, seed):
-    """As `energy_of`, with the laws of rubber."""
-    if kind in KINDS:
-        return energy_of(kind, seed)
-    mesh, one = MESH_TYPES["free"](0.02, 0.01, 5e-3), np.ones
-    count = len(mesh.triangles)
-    moduli = (one((count, 3)),) if kind == "Yeoh" else (one(count), 2 * one(count))
-    return mesh, (YeohEnergy if kind == "Yeoh" else NeoHookeEnergy)(mesh.points, mesh.triangles, *moduli)
-
-
-@pytest.mark.parametrize("kind", ALL_KINDS)
+@pytest.mark.parametrize("kind", KINDS)
 def test_a_common_motion_costs_no_digits(kind):
     """Strains of 1e-9, moved by 1 m as a whole: changes are taken from differences of displacements."""
-    mesh, energy = any_energy(kind, 8)
+    mesh, energy = energy_of(kind, 8)
     # Multiples of 2^-50 m: one added to them is exact.
     moved = np.round(scattered(mesh, 9, 5e-12) * 2**50) / 2**50
     forces = energy.forces(moved)
@@ -123,10 +117,10 @@ def test_a_common_motion_costs_no_digits(kind):
     assert np.abs(energy.forces(moved + 1.0) - forces).max() <= 1e-12 * np.abs(forces).max()
 
 
-@pytest.mark.parametrize("kind", ALL_KINDS)
+@pytest.mark.parametrize("kind", KINDS)
 def test_a_place_far_from_the_origin_costs_no_digits(kind):
     """A kilometre away: areas and sides at rest are taken from differences of positions, too."""
-    mesh, energy = any_energy(kind, 8)
+    mesh, energy = energy_of(kind, 8)
     # Multiples of 2^-40 m: 1,024 m added to them are exact.
     points = np.round(mesh.points * 2**40) / 2**40
     moved = np.round(scattered(mesh, 9, 1e-5) * 2**40) / 2**40
@@ -162,44 +156,6 @@ def test_keys_tell_energies_apart_by_their_cells_and_by_each_modulus(kind, shape
     assert len({known, *(one.key for one in others)}) == 1 + len(others)
 
 
-@settings(max_examples=25)
-@given(seed=st.integers(0, 2**31), nu=st.floats(0, 0.5), amplitude=st.floats(1e-5, 1.5e-3))
-def test_delingette_is_saint_venant_kirchhoff_at_any_strain(seed, nu, amplitude):
-    mesh = MESH_TYPES["free"](0.02, 0.01, 5e-3)
-    moved = scattered(mesh, seed, amplitude)
-    springs = delingette.springs(mesh, Material(7.0, nu, name="any"), 2.0)
-    ours = springs.reference * springs.energies[0].value(moved)
-    # Green's strain of each triangle, from its two sides.
-    rest, now = mesh.points[mesh.triangles], (mesh.points + moved)[mesh.triangles]
-    gradient = (now[:, 1:] - now[:, :1]).transpose(0, 2, 1) @ np.linalg.inv(
-        (rest[:, 1:] - rest[:, :1]).transpose(0, 2, 1)
-    )
-    strain = 0.5 * (gradient.transpose(0, 2, 1) @ gradient - np.eye(2))
-    trace = np.trace(strain, axis1=1, axis2=2)
-    first, second = 7.0 * nu / (1 - nu**2), 7.0 / (2 * (1 + nu))  # Lame's parameters in plane stress
-    density = 0.5 * first * trace**2 + second * (strain**2).sum(axis=(1, 2))
-    expected = 2.0 * (density * signed_areas(mesh.points, mesh.triangles)).sum()
-    assert ours == pytest.approx(expected, rel=1e-11)
-
-
-@pytest.mark.parametrize("nu", [0.0, 0.2, 0.3, 1 / 3, 0.45, 0.49, 0.5])
-@pytest.mark.parametrize("mesh_type", ["structured", "free", "right", "alternating", "isosceles-0.5"])
-def test_delingette_at_rest_is_the_linear_triangle(mesh_type, nu):
-    mesh = MESH_TYPES[mesh_type](0.03, 0.01, 2e-3)
-    springs = delingette.springs(mesh, Material(1.0, nu, name="unit"), 1.0)
-    ours = Network(mesh, np.zeros(mesh.points.shape, bool), springs.relative, springs.energies).tangent().toarray()
-    elasticity = np.array([[1, nu, 0], [nu, 1, 0], [0, 0, (1 - nu) / 2]]) / (1 - nu**2)
-    expected = np.zeros(ours.shape)
-    for corners, area in zip(mesh.triangles, signed_areas(mesh.points, mesh.triangles)):
-        slopes = np.linalg.inv(np.column_stack([np.ones(3), mesh.points[corners]]))[1:]
-        strain = np.zeros((3, 6))
-        strain[0, ::2] = strain[2, 1::2] = slopes[0]
-        strain[1, 1::2] = strain[2, ::2] = slopes[1]
-        places = np.stack([2 * corners, 2 * corners + 1], axis=1).ravel()
-        expected[np.ix_(places, places)] += area * strain.T @ elasticity @ strain
-    assert np.linalg.norm(ours - expected) <= 1e-12 * np.linalg.norm(expected)
-
-
 @pytest.mark.parametrize("name", ["area", "angular", "delingette", "neo-hooke", "patch-area", "flechon"])
 @pytest.mark.parametrize("nu", [0.0, 0.3, 0.5])
 def test_free_networks_have_three_rigid_motions_and_no_other(name, nu):
@@ -210,8 +166,3 @@ def test_free_networks_have_three_rigid_motions_and_no_other(name, nu):
     eigenvalues = np.linalg.eigvalsh(network.tangent().toarray())
     assert np.abs(eigenvalues[:3]).max() <= 1e-12 * eigenvalues[-1]
     assert eigenvalues[3] >= 1e-5 * eigenvalues[-1]
-
-
-def test_angles_sum_up():
-    mesh = MESH_TYPES["free"](0.03, 0.01, 2.5e-3)
-    assert np.allclose(corner_angles(mesh.points, mesh.triangles).sum(axis=1), np.pi, rtol=1e-14)

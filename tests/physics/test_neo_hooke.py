@@ -80,41 +80,12 @@ def test_forces_are_those_of_linear_triangles(nu, seed, most):
 
 
 @pytest.mark.parametrize("nu", RATIOS)
-@settings(max_examples=10)
-@given(seed=st.integers(0, 2**31))
-def test_forces_and_tangent_are_derivatives(nu, seed):
-    """By central differences, at deformations where the law has an equilibrium across the sheet."""
-    points, gradients, stretches = random_triangles(seed, 2.0)
-    kept = stretches.prod(axis=1) > 0.7
-    points, gradients = points[kept], gradients[kept]
-    corners = np.arange(3 * len(points)).reshape(-1, 3)
-    energy = law_of(nu, points.reshape(-1, 2), corners)
-    check_derivatives(energy, moved_by(points, gradients), seed)
-
-
-def check_derivatives(energy, here, seed):
-    direction = np.random.default_rng(seed).standard_normal(here.shape)
-    each = direction[energy.corners].reshape(len(energy.corners), -1)
-    step, tangent = 1e-6, energy.tangent(here)
-    sizes = np.abs(tangent).max(axis=(1, 2))
-    ends = [energy.forces(here + sign * step * direction).reshape(each.shape) for sign in (1, -1)]
-    exact = np.einsum("nij,nj->ni", tangent, each)
-    assert (np.abs((ends[0] - ends[1]) / (2 * step) - exact).max(axis=1) <= 1e-7 * sizes).all()
-    difference = (energy.value(here + step * direction) - energy.value(here - step * direction)) / (2 * step)
-    assert abs(difference - (energy.forces(here).reshape(each.shape) * each).sum()) <= 1e-6 * sizes.sum()
-
-
-@pytest.mark.parametrize("nu", RATIOS)
 def test_at_rest_it_is_delingettes_triangle_and_pulls_on_nothing(nu):
     mesh = springtune.make_mesh(springtune.Beam("200 mm", "40 mm"), "free", "10 mm")
     material = springtune.Material("1 MPa", nu)
     ours, theirs = (DEFINITIONS[name].springs(mesh, material, 1e-3).energies[0] for name in ("neo-hooke", "delingette"))
     assert np.abs(ours.tangent() - theirs.tangent()).max() <= 1e-12 * np.abs(theirs.tangent()).max()
     assert not ours.forces(np.zeros(mesh.points.shape)).any()
-    # Forces keep their digits however small the strain: they are linear to the size of it.
-    moved = np.random.default_rng(0).standard_normal(mesh.points.shape)
-    small, smaller = ours.forces(1e-10 * moved), ours.forces(1e-14 * moved)
-    assert np.abs(small - 1e4 * smaller).max() <= 1e-6 * np.abs(small).max()
 
 
 @pytest.mark.parametrize("nu", RATIOS)
@@ -147,34 +118,11 @@ def test_springs_of_zero_length_and_areas_are_the_energy(name):
         np.testing.assert_allclose(more.linear_springs, springs.linear_springs, rtol=1e-12)
 
 
-def square(nu, law=law_of):
+def square(nu):
     """A unit square of two triangles whose left side rolls on y and whose lower side rolls on x."""
     mesh = Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]), np.array([[0, 1, 2], [0, 2, 3]]))
     held = np.array([[True, True], [False, True], [False, False], [True, False]])
-    return mesh, Network(mesh, held, np.zeros(len(mesh.edges)), [law(nu, mesh.points, mesh.triangles)])
-
-
-STRETCHES = (0.4, 0.7, 0.95, 1.001, 1.5, 2.0, 4.0)
-TESTS = {  # forces on the right and on the upper side over E t, and the stretch there, by the stretch of the first
-    "uniaxial": (lambda q: (q - q**-2) / 3, lambda q: 0.0, lambda q: q**-0.5),
-    "equibiaxial": (lambda q: (q - q**-5) / 3, lambda q: (q - q**-5) / 3, lambda q: q),
-    "pure shear": (lambda q: (q - q**-3) / 3, lambda q: (1 - q**-2) / 3, lambda q: 1.0),
-}
-
-
-@pytest.mark.parametrize("stretch", STRETCHES)
-@pytest.mark.parametrize("test", TESTS)
-def test_closed_forms_of_three_tests(test, stretch):
-    """An incompressible sheet's stretches under its closed forms' forces, each by Newton's method from rest."""
-    along, across, other = TESTS[test]
-    mesh, network = square(0.5)
-    pattern = np.array(
-        [[0, 0], [along(stretch) / 2, 0], [along(stretch) / 2, across(stretch) / 2], [0, across(stretch) / 2]]
-    )
-    found = StaticProblem(network, pattern).nonlinear(1.0)
-    assert found.converged
-    exact = mesh.points * [stretch - 1, other(stretch) - 1]
-    assert np.abs(found.displacements - exact).max() <= 1e-10 * stretch
+    return mesh, Network(mesh, held, np.zeros(len(mesh.edges)), [law_of(nu, mesh.points, mesh.triangles)])
 
 
 @pytest.mark.parametrize("nu", [0.5, 0.3])
@@ -248,13 +196,6 @@ def test_a_limit_point_is_an_answer():
     assert continued(problem, 0.98 * found.limit_share * s, last, before, s).limit == pytest.approx(
         found.limit_share * s, rel=0.01
     )
-
-
-def test_quadrilaterals_are_refused():
-    beam = springtune.Beam("200 mm", "40 mm")
-    mesh = springtune.make_mesh(beam, "braced", "10 mm")
-    with pytest.raises(springtune.DefinitionError, match="needs triangles"):
-        DEFINITIONS["neo-hooke"].springs(mesh, springtune.Material("1 MPa", 0.5), 1e-3)
 
 
 def test_the_compressible_law_becomes_the_incompressible_one():

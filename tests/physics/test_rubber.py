@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import springtune
-from springtune.mechanics.energies import YeohEnergy
 from springtune.mechanics.network import Network
 from springtune.mechanics.statics import StaticProblem
 from springtune.mesh import Mesh
@@ -58,45 +57,30 @@ def test_treloars_rubber():
     assert spread == pytest.approx({"uniaxial": 0.023, "equibiaxial": 0.180, "pure shear": 0.107}, abs=2e-3)
 
 
-@pytest.mark.parametrize("stretch", [1.05, 1.5, 3.0, 6.0])
+@pytest.mark.parametrize("stretch", [0.4, 0.95, 1.05, 1.5, 3.0, 6.0])
 @pytest.mark.parametrize("test", RUBBER_TESTS)
-def test_a_network_answers_with_the_fitted_stress(test, stretch):
+@pytest.mark.parametrize(
+    ("definition", "material", "rubber"),
+    [
+        ("yeoh", Rubber((2e5, -5e2, 40.0)), Rubber((2e5, -5e2, 40.0))),
+        ("neo-hooke", springtune.Material("0.6 MPa", 0.5), Rubber((1e5,))),
+    ],
+    ids=["yeoh", "neo-hooke"],
+)
+def test_a_network_answers_with_the_stress_of_its_law(definition, material, rubber, test, stretch):
     """A square of two triangles, pulled as in each of the tests, by Newton's method; to 1e-10 of its stretch."""
-    rubber = Rubber((2e5, -5e2, 40.0))
     mesh = Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]), np.array([[0, 1, 2], [0, 2, 3]]))
     held = np.array([[True, True], [False, True], [False, False], [True, False]])
-    springs = DEFINITIONS["yeoh"].springs(mesh, rubber, 1e-3)
+    springs = DEFINITIONS[definition].springs(mesh, material, 1e-3)
     along = float(rubber.stress(test, stretch)) * 1e-3 / springs.reference
     other = {"uniaxial": stretch**-0.5, "equibiaxial": stretch, "pure shear": 1.0}[test]
     across = along if test == "equibiaxial" else 0.0
-    if test == "pure shear":
-        held[2:, 1] = True
+    held[2:, 1] = test == "pure shear"
     pattern = np.array([[0, 0], [along / 2, 0], [along / 2, across / 2], [0, across / 2]])
     found = StaticProblem(Network(mesh, held, springs.relative, springs.energies), pattern).nonlinear(1.0)
     assert found.converged
     exact = mesh.points * [stretch - 1, other - 1]
     assert np.abs(found.displacements - exact).max() <= 1e-10 * stretch
-
-
-@given(st.integers(0, 2**31))
-def test_forces_and_tangent_are_derivatives(seed):
-    random = np.random.default_rng(seed)
-    mesh = springtune.make_mesh(springtune.Beam("20 mm", "10 mm"), "free", "5 mm")
-    energy = YeohEnergy(
-        mesh.points, mesh.triangles, random.uniform([0.1, -0.01, 0.0], [1, 0.05, 0.01], (len(mesh.triangles), 3))
-    )
-    here, direction = 5e-4 * random.standard_normal(mesh.points.shape), random.standard_normal(mesh.points.shape)
-    step = 1e-7  # 2e-5 of an edge, squared, and rounding over it
-    each = direction[energy.corners].reshape(len(energy.corners), -1)
-    ends = [energy.forces(here + sign * step * direction).reshape(each.shape) for sign in (1, -1)]
-    tangent = energy.tangent(here)
-    assert (
-        np.abs((ends[0] - ends[1]) / (2 * step) - np.einsum("nij,nj->ni", tangent, each)).max()
-        <= 1e-6 * np.abs(tangent).max()
-    )
-    slope = (energy.value(here + step * direction) - energy.value(here - step * direction)) / (2 * step)
-    exact = (energy.forces(here).reshape(each.shape) * each).sum()
-    assert abs(slope - exact) <= 1e-6 * np.abs(tangent).max() * 5e-3 * np.linalg.norm(direction)
 
 
 def test_an_answer_beyond_the_data_says_so():
