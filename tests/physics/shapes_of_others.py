@@ -2,6 +2,8 @@
 
 from math import log, pi
 
+import numpy as np
+
 from springtune.problem.materials import Material
 from springtune.problem.shapes import LoadCase, Pressure, Quantity, Segment, Shape, Support, Traction
 
@@ -53,6 +55,23 @@ def holed_plate(size=0.05, radius=0.01):
     load = LoadCase("pull", supports, (Traction("right", (force, 0.0)),), quantities=quantities)
     points = {"top-of-the-hole": (0.0, radius), "side-of-the-hole": (radius, 0.0)}
     return Shape("plate-with-a-hole", 1e-3, outline, points=points, loads={"pull": load}), Material(210e9, 0.3)
+
+
+def kirsch(points, radius, tension, material):
+    """Displacements and stresses (xx, yy, xy) beside a hole in a plate without end, pulled along x (Kirsch 1898)."""
+    r, theta = np.hypot(*points.T), np.arctan2(points[:, 1], points[:, 0])
+    nu = material.poisson_ratio
+    shear, kappa, s = material.young_modulus / (2 * (1 + nu)), (3 - nu) / (1 + nu), radius / r
+    c, cc, ccc = np.cos(theta), np.cos(2 * theta), np.cos(3 * theta)
+    n, nn, nnn = np.sin(theta), np.sin(2 * theta), np.sin(3 * theta)
+    c4, n4 = np.cos(4 * theta), np.sin(4 * theta)
+    x = (kappa + 1) * c / s + 2 * s * ((1 + kappa) * c + ccc) - 2 * s**3 * ccc
+    y = (kappa - 3) * n / s + 2 * s * ((1 - kappa) * n + nnn) - 2 * s**3 * nnn
+    displacements = tension * radius / (8 * shear) * np.stack([x, y], axis=1)
+    xx = 1 - s**2 * (1.5 * cc + c4) + 1.5 * s**4 * c4
+    yy = -(s**2) * (0.5 * cc - c4) - 1.5 * s**4 * c4
+    xy = -(s**2) * (0.5 * nn + n4) + 1.5 * s**4 * n4
+    return displacements, tension * np.stack([xx, yy, xy], axis=1)
 
 
 def nafems_le1():
