@@ -465,16 +465,6 @@ def test_cells_that_are_in_no_part_are_the_main_one():
     assert list(cells_of_parts(everything)) == ["all"]
 
 
-def test_energies_of_different_parts_are_told_apart():
-    mesh = MESH_TYPES["braced"](0.04, 0.012, 2e-3)
-    third, fifth = Material(1.0, 1 / 3), Material(1.0, 0.2)
-    keys = {
-        derive_by_parts(DEFINITIONS["area"], halves(mesh, 0), {"": one, "far": other}, THICKNESS).energies[0].key
-        for one, other in ((third, fifth), (fifth, third))
-    }
-    assert len(keys) == 2
-
-
 def test_energies_of_one_kind_are_one_of_all_parts():
     mesh = MESH_TYPES["right"](0.04, 0.012, 2e-3)
     far = mesh.points[mesh.triangles][..., 0].mean(axis=1) > 0.03  # fewer cells than the other part

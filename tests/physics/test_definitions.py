@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import nnls
 
-from springtune.mechanics.moduli import axial_moduli, ends, mean_gradient, shear_modulus
+from springtune.mechanics.moduli import axial_moduli, shear_modulus
 from springtune.mechanics.network import Network
 from springtune.mesh import MESH_TYPES, ROW_HEIGHT, Mesh, lattice, signed_areas
 from springtune.problem.geometry import Beam
@@ -250,24 +250,6 @@ def test_least_squares_of_cells_are_those_of_lawson_and_hanson(seed, springs):
 
 
 # -- patch tests -------------------------------------------------------------------------------------------------------
-
-
-@given(gradient=st.tuples(*[st.floats(-1, 1)] * 4))
-@settings(max_examples=20)
-def test_mean_gradient_of_an_affine_field(gradient):
-    gradient = np.reshape(gradient, (2, 2))
-    for mesh_type in ("free", "braced"):
-        mesh = MESH_TYPES[mesh_type](0.03, 0.01, 2e-3)
-        assert np.allclose(mean_gradient(mesh, mesh.points @ gradient.T), gradient, atol=1e-12)
-
-
-def test_ends_of_straight_and_staggered_meshes():
-    mesh = lattice(5, 3)
-    left, right = ends(mesh)
-    assert left.tolist() == [0, 6, 12, 18] and right.tolist() == [5, 11, 17, 23]
-    mesh = MESH_TYPES["free"](0.03, 0.01, 2e-3)
-    for found, x in zip(ends(mesh), (0.0, 0.03)):
-        assert found.tolist() == np.flatnonzero(mesh.points[:, 0] == x).tolist()
 
 
 # -- refusals ----------------------------------------------------------------------------------------------------------

@@ -111,12 +111,6 @@ def test_load_steps_under_a_follower_pressure_are_stable_where_its_own_share_of_
     assert problem.judge(-s, found)[0] is Status.SOLVED
 
 
-def test_few_newton_steps_under_follower_pressure():
-    problem, s, _ = block("area", 0.49, size=5e-3, follower=True)
-    found = problem.newton(s, s * problem.slope)
-    assert found.converged and found.iterations <= 12
-
-
 def column(definition, length, height, size, follower, mesh_type="structured"):
     """A sheet that stands on its lower side, and the force over stiffness that would strain it by 1."""
     mesh = MESH_TYPES[mesh_type](length, height, size)

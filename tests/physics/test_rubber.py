@@ -184,15 +184,3 @@ def test_another_material_and_terms_are_refused():
         SpringLaw.fitted(TRELOAR / "uniaxial.csv", 0)
     with pytest.raises(TestDataError, match="needs? more|need more than"):
         SpringLaw.fitted(TensileTest(np.array([1.5, 3.0, 4.0, 5.0]), np.array([1.0, 2, 3, 4])), 1)
-
-
-def test_a_net_of_fitted_springs_is_read_as_it_was_written(tmp_path):
-    rubber = Rubber((2e5, -5e2, 40.0))
-    beam = springtune.Beam("100 mm", "20 mm", thickness="2 mm")
-    mesh = springtune.make_mesh(beam, "free", "5 mm")
-    scene = springtune.Scene(beam, mesh, rubber, "traction", "1 N", definition="yeoh")
-    springtune.SpringNet.from_scene(scene, errors=False).write(tmp_path / "net.csv")
-    (terms,) = springtune.SpringNet.read(tmp_path / "net.csv").energies
-    assert terms.kind == "incompressible" and terms.units["c2"] == "N/m"
-    for name, coefficient in zip(("c1", "c2", "c3"), rubber.coefficients):
-        assert terms.values[name] == pytest.approx(2e-3 * coefficient, rel=1e-12)

@@ -373,14 +373,6 @@ class TestQuantities:
         np.testing.assert_allclose(shares @ mesh.points[mesh.cells[count][cell]], point, atol=1e-12)
         assert shares.min() > -1e-9
 
-    def test_a_particle_is_itself(self):
-        mesh = MESH_TYPES["free"](LENGTH, HEIGHT, 9e-3)
-        inside = int(np.argmin(np.abs(mesh.points - [0.05, 0.02]).sum(axis=1)))
-        grouped = GroupedMesh(mesh, points={"here": mesh.points[inside]})
-        field = displacement_weights(grouped, st.Quantity("u", "displacement", "here", "y"))
-        assert field[inside, 1] == 1.0
-        assert np.abs(field).sum() == 1.0
-
     def test_a_mean_is_by_length(self):
         """Of a field that is linear along a side whose edges differ."""
         mesh = MESH_TYPES["right"](LENGTH, HEIGHT, 9e-3)

@@ -134,17 +134,6 @@ def test_a_file_alone_balances_the_scene(definition, mesh_type, ending, tmp_path
     assert unbalanced(net, net.points + 1.001 * found.displacements) > 1e-5
 
 
-@pytest.mark.parametrize("definition", ["lattice", "delingette", "area"])
-def test_forces_of_small_displacements_balance_linear_kinematics(definition):
-    """The mean of what two opposite displacements resist with is linear but for their third power."""
-    scene = scene_of(definition, force="1 N", kinematics="linear")
-    net, moved = net_of(scene), 1e4 * scene.solve().displacements
-    slope = 0.5 * (forces_of(net, net.points + moved) - forces_of(net, net.points - moved)) / 1e4
-    missing = np.where(net.held, 0.0, net.forces - slope)
-    # Strain of the trial to the second: 10 kN / (20 mm 2 mm 210 GPa) = 1.2e-3, whose square is 1.4e-6.
-    assert np.linalg.norm(missing) < 3e-5 * np.linalg.norm(net.forces)
-
-
 @pytest.mark.parametrize("ending", ENDINGS)
 @pytest.mark.parametrize(("definition", "mesh_type"), [("delingette", "free"), ("flechon", "braced")])
 def test_what_is_read_is_what_was_written(definition, mesh_type, ending, tmp_path):
@@ -231,31 +220,15 @@ def test_terms_of_one_kind_are_one():
 
 
 class TestHeader:
-    def test_errors_are_those_of_a_solve(self):
-        """With linear kinematics an error does not depend on the force."""
-        scene = scene_of("area")
-        header = st.SpringNet.from_scene(scene).header
-        assert set(header["expected_error"]) == {"traction", "bending", "shear"}
-        for load, error in header["expected_error"].items():
-            solved = scene_of("area", load=load, force="1 N", kinematics="linear").solve()
-            assert error == pytest.approx(solved.error, abs=1e-9), load
-
-    def test_errors_are_those_of_a_prediction(self):
-        mesh = scene_of("patch").mesh
-        choices = {choice.definition: choice for choice in st.predict(BEAM, mesh, STEEL)}
-        for name in ("patch", "area", "delingette"):
-            errors = st.SpringNet.from_mesh(mesh, STEEL, name, beam=BEAM).header["expected_error"]
-            for load, error in errors.items():
-                assert error == pytest.approx(choices[name].errors[load], abs=1e-9), (name, load)
-
-    @pytest.mark.parametrize("load", ["pressure", "compression", "follower-pressure"])
-    def test_error_under_the_load_of_a_scene(self, load):
-        """Also where it holds as another one does, or turns with its side, which linear kinematics do not see."""
-        errors = st.SpringNet.from_scene(scene_of("lattice", load=load, force="100 N")).header["expected_error"]
-        assert list(errors) == ["traction", "bending", "shear", load]
-        steady = load.removeprefix("follower-")
-        solved = scene_of("lattice", load=steady, force="1 N", kinematics="linear").solve()
-        assert errors[load] == pytest.approx(solved.error, abs=1e-9)
+    @pytest.mark.parametrize("load", ["traction", "pressure", "compression", "follower-pressure"])
+    def test_errors_are_those_of_a_solve(self, load):
+        """With linear kinematics an error depends neither on the force nor on what turns with its side."""
+        errors = st.SpringNet.from_scene(scene_of("area", load=load, force="100 N")).header["expected_error"]
+        assert list(errors) == list(dict.fromkeys(["traction", "bending", "shear", load]))
+        for name, error in errors.items():
+            steady = name.removeprefix("follower-")
+            solved = scene_of("area", load=steady, force="1 N", kinematics="linear").solve()
+            assert error == pytest.approx(solved.error, abs=1e-9), name
 
     def test_errors_are_of_the_loads_asked_for(self):
         mesh, loads = scene_of("patch").mesh, ["pressure", "compression"]
@@ -302,14 +275,6 @@ class TestHeader:
 
 
 class TestScene:
-    @pytest.mark.parametrize("ending", ENDINGS)
-    def test_springs_of_a_scene_write_themselves(self, ending, tmp_path):
-        scene = scene_of("area")
-        scene.springs.write(tmp_path / f"net{ending}", mesh_name="structured 5 mm")
-        net = st.SpringNet.read(tmp_path / f"net{ending}")
-        assert (net.stiffness == scene.springs.reference * scene.springs.relative).all()
-        assert net.header["mesh"]["name"] == "structured 5 mm" and net.header["load"]["force"] == 20e3
-
     def test_springs_that_were_changed_are_written_as_they_are(self, tmp_path):
         scene = scene_of("lattice")
         replace(scene.springs, reference=2 * scene.springs.reference).write(tmp_path / "net.json")

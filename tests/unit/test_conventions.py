@@ -1,8 +1,7 @@
-"""What holds for the whole source: imports, words, and what tests may touch."""
+"""What holds for the whole source: imports, stages of study kinds, and what tests may touch."""
 
 import ast
 import subprocess
-from collections import defaultdict
 from pathlib import Path
 
 import pytest
@@ -13,20 +12,6 @@ from springtune.studies.config.kind import kinds
 REPOSITORY = Path(__file__).parents[2]
 SOURCE = REPOSITORY / "src/springtune"
 PARSED = {path: ast.parse(path.read_bytes()) for path in sorted(SOURCE.rglob("*.py"))}
-
-VAGUE = {"asked", "whole", "race", "laid", "tasks", "work", "code", "files", "source", "problems", "unit"}
-"""Names of modules that say nothing to a reader who does not know the house."""
-
-
-OWN = {"MAX_EVALUATIONS", "MAX_HALVINGS", "MAX_ITERATIONS", "SMALLEST_STEP", "TOLERANCE"}
-OWN |= {"KIND", "OUTPUTS", "PAGE", "PLOTS", "STAGE", "STAGES", "VIEWS"}
-"""Constants that say the same of each solver or each study kind, and that each has its own value of."""
-
-
-def place(path):
-    """Parts of a module's name from the package on."""
-    parts = path.relative_to(SOURCE).with_suffix("").parts
-    return parts[:-1] if len(parts) > 1 and parts[-1] == "__init__" else parts
 
 
 def test_imports_keep_the_contracts_of_pyproject():
@@ -44,39 +29,6 @@ def test_modules_are_imported_by_text_in_one_place():
         if {"import_module", "__import__", "exec", "eval"} & {getattr(node, "id", ""), getattr(node, "attr", "")}
     ]
     assert set(found) == {"registry.py"}
-
-
-def test_modules_have_names_that_say_something():
-    assert not [str(path.relative_to(SOURCE)) for path in PARSED if VAGUE & set(place(path))]
-
-
-def test_nothing_is_chosen_by_globals():
-    found = [
-        f"{path.relative_to(REPOSITORY)}:{node.lineno}"
-        for path, tree in PARSED.items()
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "globals"
-    ]
-    assert not found
-
-
-def test_a_constant_has_one_meaning():
-    """Constants of one name and different values read as one to whoever knows the other."""
-    values = defaultdict(dict)
-    for path, tree in PARSED.items():
-        for node in tree.body:
-            targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
-            for target in targets if isinstance(node, ast.Assign | ast.AnnAssign) and node.value else ():
-                names, parts = (
-                    (target.elts, getattr(node.value, "elts", []))
-                    if isinstance(target, ast.Tuple)
-                    else ([target], [node.value])
-                )
-                for name, value in zip(names, parts):
-                    if isinstance(name, ast.Name) and name.id.isupper():
-                        values[name.id].setdefault(ast.dump(value), str(path.relative_to(SOURCE)))
-    several = {name: sorted(found.values()) for name, found in values.items() if len(found) > 1 and name not in OWN}
-    assert not several, "\n".join(f"{name}: {', '.join(found)}" for name, found in several.items())
 
 
 def package_names(tree):

@@ -167,22 +167,6 @@ def test_what_writes_draws_or_reads_studies_is_in_no_key_of_a_result(stage):
     assert not packages & (WRITING | {package for _, package in dependencies.NOT_COUNTED})
 
 
-@pytest.mark.parametrize(
-    ("module", "packages"),
-    [
-        ("studies.kinds.scenes.mesh", {"numpy", "scipy"}),
-        ("studies.kinds.scenes.solve", {"numpy", "scipy", "cvxopt", "pyamg"}),
-        ("studies.kinds.scenes.sensitivity", {"numpy", "scipy", "cvxopt", "pyamg"}),
-        ("studies.kinds.scenes.reference", {"numpy", "scipy", "cvxopt", "skfem"}),
-        ("studies.kinds.moduli.solve", {"numpy", "scipy", "cvxopt", "pyamg"}),
-        ("studies.kinds.stability.solve", {"numpy", "scipy", "cvxopt", "pyamg", "numba"}),
-        ("studies.kinds.benchmark.solve", {"numpy", "scipy", "cvxopt", "pyamg", "numba", "skfem"}),
-    ],
-)
-def test_packages_are_those_that_are_imported(module, packages):
-    assert set(dependencies.stage_closure(module).packages) == packages
-
-
 def test_packages_that_are_carried_are_imported_where_it_is_said():
     for place, package in dependencies.NOT_COUNTED:
         assert package in dependencies.OURS.closure(dependencies.PACKAGE / place, counted=package).packages
@@ -295,15 +279,6 @@ def test_an_extra_that_is_not_there_or_not_wanted_is_none(monkeypatch):
         missing = _keys()
     forget()
     assert unwanted == missing
-
-
-def test_pythons_minor_version_counts(monkeypatch):
-    before = _keys()
-    monkeypatch.setattr(sys, "version_info", (3, 99, 0, "final", 0))
-    after = _keys()
-    monkeypatch.undo()
-    forget()
-    assert all(after[name] != before[name] for name in before)
 
 
 def test_of_pythons_version_what_is_before_the_patch_level_counts(monkeypatch):

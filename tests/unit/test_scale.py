@@ -130,22 +130,3 @@ def test_the_page_of_tables_shows_so_many_rows_and_says_so():
     assert len(table["lines"]) == page.MOST_ROWS
     assert table["beyond"] == "The first 1000 of 1001 rows; the file has all of them: "
     assert page.shown({"stem": "few", "title": "Few", "note": "", "rows": rows[:-1]})["beyond"] == ""
-
-
-def test_numbers_are_extrapolated_by_their_exponent(tool):
-    for power in (0.5, 1.0, 1.3):
-        found, further = tool.extrapolated({size: 2.0 + 1e-3 * size**power for size in (40, 1_000, 10_000, 100_000)})
-        assert found == pytest.approx(power, abs=1e-9)
-        least, most = (2.0 + 1e-3 * size**power for size in (40, 100_000))
-        linear = least + (most - least) * 100  # what scenes shared so far they need not share further on
-        assert further(10_000_000) == pytest.approx(max(linear, 2.0 + 1e-3 * 10_000_000**power), rel=1e-9)
-    assert tool.extrapolated({40: 6.0, 1_000: 6.0, 10_000: 6.0, 100_000: 6.0})[1](10_000_000) == 6.0
-    steps = dict.fromkeys((step for _, step, _, _ in tool.ROWS))
-    measured = {
-        size: {step: dict.fromkeys(("s", "MB", "jobs", "files", "file"), 1e-3 * size) for step in steps}
-        for size in tool.SIZES
-    }
-    del measured[100_000]["solve"]
-    lines = tool.table(measured).splitlines()
-    assert len({line.count("|") for line in lines}) == 1
-    assert "| solving, meshes of 100 to 1,000 particles | 1 s | 10 s | *100 s* | 1.00 |" in lines[5]

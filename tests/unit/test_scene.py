@@ -46,10 +46,6 @@ class TestSixLines:
         moved = [scene(force=force, kinematics=kinematics).solve().displacement for force in forces]
         assert (moved[1] == pytest.approx(2 * moved[0], rel=1e-12)) == (kinematics == "linear")
 
-    def test_quadrilaterals(self):
-        result = scene("braced", definition="lattice").solve()
-        assert result.status is st.Status.SOLVED and len(result.scene.mesh.quads) and abs(result.error) < 0.02
-
     def test_a_mesh_file(self, tmp_path):
         mesh = st.make_mesh(BEAM, "free", "5 mm")
         from springtune.mesh import Mesh, write_mesh

@@ -18,7 +18,6 @@ from springtune.studies.kinds import collect
 from springtune.studies.kinds.scenes import stored
 from springtune.studies.kinds.shapes.checks import READ_AT_ONCE
 from springtune.studies.kinds.shapes.plan import mesh_key, reference_task, scene_task
-from springtune.studies.kinds.shapes.reference import rounds_of
 from springtune.studies.kinds.shapes.task_values import ONE_LOAD, geometry, named, shape_of
 from springtune.studies.kinds.shapes.task_values import load as values_of
 from springtune.studies.output import page
@@ -138,15 +137,6 @@ def test_a_mesh_is_stored_with_its_groups(tmp_path):
     assert all(np.array_equal(again.sides[name], edges) for name, edges in grouped.sides.items())
     assert np.array_equal(again.points["corner"], grouped.points["corner"])
     assert all(np.array_equal(again.parts["core"][3], masks[3]) for masks in grouped.parts.values())
-
-
-def test_rounds_follow_each_other():
-    edges = np.array([[0, 1], [2, 0], [1, 2], [5, 4], [3, 4], [5, 6], [6, 3]])
-    found = rounds_of(edges)
-    assert [sorted(one.tolist()) for one in found] == [[0, 1, 2], [3, 4, 5, 6]]
-    for one in found:
-        pairs = {frozenset(pair) for pair in zip(one.tolist(), np.roll(one, -1).tolist())}
-        assert pairs <= {frozenset(edge) for edge in edges.tolist()}
 
 
 # -- what becomes of it ------------------------------------------------------------------------------------------------

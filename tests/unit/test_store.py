@@ -5,7 +5,6 @@ import subprocess
 import sys
 from types import ModuleType
 
-import h5py
 import numpy as np
 import pytest
 
@@ -38,15 +37,6 @@ def test_adding_keeps_what_was_there_and_leaves_nothing_half_written(tmp_path):
     assert path.read_bytes() == before
     store.add(path, {})
     assert path.read_bytes() == before
-
-
-def test_broken_file_holds_nothing_and_is_replaced(tmp_path):
-    path = tmp_path / "results.h5"
-    path.write_text("not HDF5")
-    assert store.stored(path) == set()
-    store.add(path, {"one": {"value": 1.0}})
-    assert store.stored(path) == {"one"}
-    assert h5py.is_hdf5(path)
 
 
 def test_a_folder_in_the_place_of_a_file_is_set_aside(tmp_path):

@@ -3,7 +3,6 @@
 import csv
 import itertools
 import math
-from collections import Counter
 from functools import partial
 from pathlib import Path
 
@@ -438,11 +437,6 @@ class TestPrinted:
         text = with_printed()
         (tmp_path / "printed.csv").write_bytes(b"\xff\xfe")
         assert "printed: 'printed.csv' cannot be read: not UTF-8 text; give" in refusal(text)
-
-
-def test_remarks_of_the_paper_are_few():
-    counted = Counter(bool(cell.remark) for cell in load_study(CONFIG / "paper.yaml").printed)
-    assert counted == {True: 12, False: 33}
 
 
 class TestPressureAndLaying:
