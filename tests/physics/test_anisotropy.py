@@ -412,14 +412,6 @@ def test_energies_of_parts_are_of_their_cells():
     assert network.tangent() @ direction.ravel() == pytest.approx(exact, abs=1e-6 * np.abs(exact).max())
 
 
-def test_uniform_springs_between_parts_have_the_mean():
-    mesh = MESH_TYPES["right"](0.04, 0.012, 2e-3)
-    springs = derive_by_parts(
-        DEFINITIONS["uniform"], halves(mesh, 1), {"": Material(1.0, 0.3), "far": Material(3.0, 0.3)}, THICKNESS
-    )
-    assert np.unique(springs.relative.round(12)).tolist() == [1.0, 2.0, 3.0]
-
-
 @pytest.mark.parametrize(
     ("materials", "message"),
     [

@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.sparse import csc_array
-from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from springtune.linalg.factors import (
     Analysis,
@@ -21,10 +20,9 @@ from springtune.linalg.factors import (
 from springtune.linalg.multigrid import IndefiniteError, Multigrid, bilinear
 from springtune.mechanics.arc_length import follow
 from springtune.mechanics.network import PINNED, FollowerPressure, Network, successor
-from springtune.mechanics.series import trace
 from springtune.mechanics.statics import StaticProblem
 from springtune.mesh import MESH_TYPES
-from springtune.problem.boundary import held, measured, weights
+from springtune.problem.boundary import held, weights
 from springtune.problem.loads import AXIAL
 from springtune.problem.status import Status
 from springtune.springs.lattice import half_weight
@@ -57,13 +55,6 @@ def test_scenes_have_the_same_answer(mesh_type):
     for one, other in zip(ours, theirs):
         # Condition numbers are some 1e4.
         assert np.abs(one.displacements - other.displacements).max() <= 1e-10 * np.abs(other.displacements).max()
-
-
-def test_curves_have_the_same_answer():
-    mesh = MESH_TYPES["structured"](0.1, 0.02, 4e-3)
-    targets = FORCE_OVER_STIFFNESS / np.linspace(0.4, 1.6, 31)
-    ours, theirs = both(lambda solver: trace(problem_on(mesh, solver=solver), measured(mesh, AXIAL), targets)[0])
-    assert np.abs(ours / theirs - 1).max() <= 1e-8  # the curves' own tolerance is 1e-7
 
 
 def test_negative_pivots_are_counted_where_there_is_no_cholesky_factor():
@@ -388,19 +379,7 @@ def test_the_order_is_of_all_particles_once(mesh_type):
     assert sorted(nested_dissection(mesh.points, mesh.edges).tolist()) == list(range(len(mesh.points)))
 
 
-@pytest.mark.parametrize("mesh_type", MESH_TYPES)
-def test_a_network_fills_in_less_than_in_orders_of_narrow_bands(mesh_type):
-    network = sheet(mesh_type, 2.5e-3)
-    tangent = network.tangent()
-    for order in (np.arange(network.unknowns), reverse_cuthill_mckee(tangent.tocsr(), symmetric_mode=True)):
-        banded = csc_array(tangent[order][:, order])
-        banded.sort_indices()
-        assert network.rest_factor.fill < 0.9 * SuperLUFactor(banded, order).fill
-
-
-@pytest.mark.parametrize(
-    ("mesh_type", "size"), [("structured", 1e-3), ("free", 0.8e-3), ("braced", 1e-3), ("isosceles-0.3", 1e-3)]
-)
-def test_a_large_network_fills_in_less_than_in_an_order_of_minimum_degree(mesh_type, size):
-    network = sheet(mesh_type, size)  # squares with one diagonal have to be larger still
+@pytest.mark.parametrize("mesh_type", ["structured", "braced", "isosceles-0.3"])
+def test_a_large_network_fills_in_less_than_in_an_order_of_minimum_degree(mesh_type):
+    network = sheet(mesh_type, 1e-3)  # squares with one diagonal have to be larger still
     assert network.rest_factor.fill < SuperLUFactor(network.tangent()).fill

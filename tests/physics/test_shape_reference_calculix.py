@@ -92,33 +92,6 @@ def test_cook():
     np.testing.assert_allclose(ours.at(points), theirs, rtol=0, atol=1e-4 * np.abs(theirs).max())
 
 
-def test_nafems_le1():
-    shape, material = others.nafems_le1()
-    load_case = shape.loads["pull"]
-
-    def place(s, t):
-        """Along the inner ellipse and the outer one."""
-        angle = (1 - s) * np.pi / 2
-        inner = np.stack([2 * np.cos(angle), np.sin(angle)])
-        outer = np.stack([3.25 * np.cos(angle), 2.75 * np.sin(angle)])
-        return (inner + t * (outer - inner)).T
-
-    points, elements, square = mapped(60, 40, place)
-    held = np.zeros(points.shape, dtype=bool)
-    held[on(square, 0, 1.0), 1] = held[on(square, 0, 0.0), 0] = True
-    outer = on(square, 1, 1.0)[::-1]  # counter-clockwise: outwards is to the right of the way
-    load = pressed(points, outer, lambda way: 10e6 * shape.thickness * np.array([way[1], -way[0]]))
-    theirs = displaced(shape, points, elements, material, load, held)
-    ours = solve_shape(shape, load_case, material)
-    np.testing.assert_allclose(ours.at(points), theirs, rtol=0, atol=1e-4 * np.abs(theirs).max())
-    assert ours.values["D"] == pytest.approx(theirs[on(square, 0, 1.0)[0], 0], rel=1e-4)
-    # The stress at D by the displacements along the inner ellipse and the free edge's condition, sigma_xx = 0.
-    inner = on(square, 1, 0.0)[::-1]
-    s, moved = (1 - square[inner, 0]) * np.pi / 2, theirs[inner, 1]
-    strain = odd_slope(s, moved)  # d u_y / d y, y = sin s
-    assert material.young_modulus * strain == pytest.approx(ours.values["stress-at-D"], rel=1e-3)
-
-
 def test_a_plate_with_a_hole():
     shape, material = others.holed_plate()
     load_case = shape.loads["pull"]

@@ -339,8 +339,9 @@ def test_fields_of_a_study_are_those_of_a_result(definition, mesh_type, kinemati
     scene = scene_of(definition, mesh_type, kinematics=kinematics)
     task = {"definition": definition, "material": asdict(STEEL), "kind": scene.kind.name, "follower": False}
     task |= {"force": scene.force, "kinematics": kinematics, "keep_fields": True}
-    stored = unpacked(packed(solved(scene.sheet, task)))
-    result = scene.solve()
+    made, result = solved(scene.sheet, task), scene.solve()
+    stored = unpacked(packed(made))
+    assert (made["displacement"], made["status"]) == (result.displacement, result.status)
     assert (stored["spring_stiffnesses"] == result.stiffness.astype("float32")).all()
     assert np.allclose(stored["spring_forces"], result.spring_forces, rtol=1e-6, atol=1e-6 * 20e3)
     assert result.stiffness.any() == (definition != "delingette")  # whose law is all an energy

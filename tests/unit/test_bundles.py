@@ -145,13 +145,6 @@ def test_stages_of_a_bundle_have_its_seconds(planned):
     assert made.needs["mesh", "0"].most_memory == made.limits["memory"]
 
 
-def test_two_new_tasks_run_two_bundles_again():
-    costs = {str(number): 1.0 for number in range(400)}
-    before = plan.share_out(costs, 2, 0.5, {})
-    after = plan.share_out(costs | {"new": 1.0, "newer": 1.0}, 2, 0.5, before)
-    assert sum(after[label] != before.get(label) for label in after) == 2
-
-
 def test_costs_follow_what_the_machine_measures(tmp_path):
     path, done = tmp_path / "costs.json", tmp_path / "done_0.json"
     assert plan.Costs(path, USUAL).of("reference") == USUAL["reference"][0]

@@ -107,15 +107,6 @@ class TestPredict:
         with pytest.raises(ValueError, match="'peak' has no reference, so no error of it can be kept: "):
             st.find_mesh(angle, soft, "1 %")
 
-    def test_of_a_laminate_springs_alone_are_tried_that_can_be_one(self):
-        end = st.Quantity("end", "displacement", "right", "x")
-        pull = st.LoadCase("pull", [st.Support("left", 0, 0)], [st.Traction("right", (1.0, 0))], quantities=[end])
-        plate = st.Shape.rectangle("40 mm", "20 mm", loads={"pull": pull})
-        ply = st.AnisotropicMaterial.orthotropic("12 GPa", "4 GPa", 0.3, "2 GPa")
-        choices = {one.definition: one for one in st.predict(plate, st.mesh_shape(plate, "5 mm"), ply)}
-        assert set(choices) == {"delingette", "element-fit", "energy-fit"}
-        assert not any(choice.failures for choice in choices.values())
-
 
 class TestSprings:
     def test_springs_are_those_of_the_scene(self, here, tmp_path):

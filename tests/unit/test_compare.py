@@ -6,11 +6,8 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from springtune.problem.compare import best_stiffness, deformation_error
-from springtune.problem.geometry import Beam
-from springtune.problem.materials import Material
 from springtune.problem.status import Status
 from springtune.springs.calibrated import calibrate
-from springtune.springs.lattice import predicted_stiffness
 
 
 def test_deformation_error_is_signed_by_direction():
@@ -89,9 +86,3 @@ def test_calibration_is_the_mean_and_refuses_a_missing_curve():
         calibrate([])
     with pytest.raises(ValueError, match="curve of fine has no best stiffness: it is unstable there"):
         calibrate([("coarse", 1.0, ""), ("fine", np.nan, "it is unstable there")])
-
-
-@pytest.mark.parametrize(("size", "expected"), [(1e-3, 176.8e6), (2e-3, 171.9e6), (5e-3, 158.9e6)])
-def test_predicted_stiffness_of_the_calibration_beam(size, expected):
-    steel, beam = Material(210e9, 0.3, name="steel"), Beam(0.2, 0.03, 1e-3, "200x30")
-    assert predicted_stiffness(steel, beam, size) == pytest.approx(expected, rel=5e-4)

@@ -2,16 +2,12 @@
 
 import subprocess
 import sys
-from dataclasses import asdict
 
 import numpy as np
 import pytest
 
 import springtune as st
-from springtune.problem.loads import LOADS
-from springtune.reference.answers import unit_problem, unit_scales
 from springtune.scene.sheet import Sheet
-from springtune.studies.kinds.scenes.solve import solved
 
 BEAM, STEEL = st.Beam("100 mm", "20 mm"), st.Material("210 GPa", 0.3, density="7850 kg/m^3", name="steel")
 
@@ -74,23 +70,6 @@ class TestSixLines:
         fitted = st.Scene(BEAM, mesh, STEEL, "bending", "200 N", definition="evolved", kinematics="linear").solve()
         plain = st.Scene(BEAM, mesh, STEEL, "bending", "200 N", definition="lattice", kinematics="linear").solve()
         assert abs(fitted.error) < abs(plain.error)
-
-
-class TestSameAsThePipeline:
-    @pytest.mark.parametrize(("load", "force"), [("traction", 20e3), ("bending", 200.0), ("pressure", 10.0)])
-    @pytest.mark.parametrize("kinematics", ["linear", "nonlinear"])
-    def test_error_and_displacement(self, load, force, kinematics):
-        found = scene(load=load, force=force, definition="area", kinematics=kinematics)
-        kind, signed = found.kind, LOADS[load].sign * force
-        task = {"material": asdict(STEEL), "kind": kind.name, "follower": False, "force": signed, "definition": "area",
-                "kinematics": kinematics, "reference": None}  # fmt: skip
-        stored = solved(Sheet(found.mesh, BEAM.thickness), task)
-        result = found.solve()
-        assert (result.displacement, result.status) == (stored["displacement"], stored["status"])
-        from springtune.reference.small_strain import solve_unit
-
-        unit = solve_unit(*unit_problem(BEAM, STEEL, kind)).displacement * unit_scales(BEAM, STEEL, kind)[1]
-        assert result.error == pytest.approx((stored["displacement"] - signed * unit) / abs(signed * unit), rel=1e-9)
 
 
 class TestEquilibrium:

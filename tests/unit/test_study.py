@@ -165,7 +165,7 @@ def study_of(path, asked):
     return load_study(path)
 
 
-@settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=12, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(grids(), min_size=1, max_size=3), st.randoms(use_true_random=False))
 def test_expansion_is_complete_without_duplicates_and_in_one_order(tmp_path, asked, random):
     study = study_of(tmp_path / "study.yaml", asked)
@@ -241,17 +241,6 @@ class TestPaper:
             by_hand = cell.force * length / (modulus[cell.material] * height * 1e-3)
             fits &= abs(by_hand / cell.reference_displacement - 1) < 0.02
             assert fits == (not cell.remark), row
-
-    def test_first_cell(self, study):
-        cell = study.printed[0]
-        assert (cell.table, cell.displacement, cell.reference_displacement) == (1, 9.57e-3, 9.49e-3)
-        assert cell.deformation_error == 0.0078
-
-    def test_calibration_and_thickness(self, study):
-        assert study.calibration == ("200x30", "traction")
-        assert {mesh.beam.thickness for mesh in study.meshes} == {1e-3}
-        assert study.stiffness_ratios[0] == pytest.approx(0.4 * LATTICE)
-        assert study.stiffness_ratios[-1] == pytest.approx(1.6 * LATTICE)
 
 
 def _printed_range(text):
@@ -365,7 +354,7 @@ ANYTHING = st.recursive(
 )
 
 
-@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
 def test_any_value_anywhere_is_read_or_refused(load, data):
     """No other error than a StudyError, whatever stands in place of one value of a study."""
