@@ -1,5 +1,8 @@
 """Small boundary-value problems that several tests solve."""
 
+import numpy as np
+
+from springtune.mechanics.network import Network
 from springtune.mesh import MESH_TYPES
 from springtune.problem.loads import AXIAL
 from springtune.scene.sheet import Sheet
@@ -12,3 +15,8 @@ def beam_problem(mesh_type="structured", length=0.1, height=0.02, size=5e-3, rel
     mesh = MESH_TYPES[mesh_type](length, height, size)
     sheet = Sheet(mesh, 1.0)
     return sheet.problem(kind, Springs(1.0, (relative or uniform)(mesh))), sheet.weights(kind)
+
+
+def free_network(mesh, springs):
+    """The network of springs on a mesh of which nothing is held."""
+    return Network(mesh, np.zeros(mesh.points.shape, dtype=bool), springs.relative, springs.energies)

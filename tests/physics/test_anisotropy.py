@@ -8,7 +8,6 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from springtune.mechanics.moduli import affine_stiffness, axial_moduli, outline_stiffness
-from springtune.mechanics.network import Network
 from springtune.mesh import MESH_TYPES, Mesh, lattice, signed_areas
 from springtune.mesh.groups import GroupedMesh
 from springtune.prediction import predict
@@ -17,7 +16,9 @@ from springtune.problem.materials import AnisotropicMaterial, Material, Rubber
 from springtune.scene.moduli import moduli
 from springtune.scene.single import Scene
 from springtune.springs import DEFINITIONS, DefinitionError
-from springtune.springs.parts import cells_of_parts, derive_by_parts
+from springtune.springs.parts import derive_by_parts
+
+from problems import free_network
 
 THICKNESS = 2e-3
 PLY = AnisotropicMaterial.orthotropic("140 GPa", "10 GPa", 0.3, "5 GPa", name="ply")
@@ -81,8 +82,7 @@ def test_delingette_at_rest_is_the_linear_triangle_of_any_material(seed):
     generator = np.random.default_rng(seed)
     mesh, elasticity = random_mesh(generator), random_stiffness(generator)
     springs = DEFINITIONS["delingette"].springs(mesh, AnisotropicMaterial.of(elasticity), THICKNESS)
-    free = np.zeros(mesh.points.shape, dtype=bool)
-    ours = springs.reference * Network(mesh, free, springs.relative, springs.energies).tangent().toarray()
+    ours = springs.reference * free_network(mesh, springs).tangent().toarray()
     expected = np.zeros(ours.shape)
     for corners, area in zip(mesh.triangles, signed_areas(mesh.points, mesh.triangles)):
         sides = mesh.points[corners[[2, 0, 1]]] - mesh.points[corners[[1, 2, 0]]]
@@ -331,6 +331,11 @@ def halves(mesh, axis):
     return GroupedMesh(mesh, parts={"far": far})
 
 
+def derived(name, grouped, main, far):
+    """Springs of a definition on two parts of other materials."""
+    return derive_by_parts(DEFINITIONS[name], grouped, {"": main, "far": far}, THICKNESS)
+
+
 ADDITIVE = [name for name, one in DEFINITIONS.items() if not one.needs and not one.uniaxial]
 NOT_ADDITIVE = {"density", "oriented", "adjoint", *(name for name in DEFINITIONS if name.startswith("patch"))}
 """Definitions that count or test the springs of each part alone."""
@@ -348,10 +353,7 @@ def test_parts_of_equal_materials_are_one_body(name):
         mesh = MESH_TYPES["braced"](0.04, 0.0104, 2e-3)
     whole = DEFINITIONS[name].springs(mesh, one, THICKNESS)
     parts = derive_by_parts(DEFINITIONS[name], halves(mesh, 1), {"": one, "far": other}, THICKNESS)
-    free = np.zeros(mesh.points.shape, dtype=bool)
-    ours, theirs = (
-        one.reference * Network(mesh, free, one.relative, one.energies).tangent().toarray() for one in (parts, whole)
-    )
+    ours, theirs = (one.reference * free_network(mesh, one).tangent().toarray() for one in (parts, whole))
     wrong = np.linalg.norm(ours - theirs) / np.linalg.norm(theirs)
     assert wrong <= (0.5 if name in NOT_ADDITIVE else 1e-12)
     assert (parts.linear_springs is None) == (whole.linear_springs is None)
@@ -362,39 +364,29 @@ def test_parts_of_equal_materials_are_one_body(name):
     assert (same.relative == whole.relative).all() and same.reference == whole.reference
 
 
-@pytest.mark.parametrize("name", ["delingette", "area", "orthotropic"])
-@pytest.mark.parametrize("nu", [0.0, 0.3])
-def test_strips_side_by_side_share_a_pull_by_their_stiffness(name, nu):
-    """Of one Poisson's ratio two strips strain alike, so E is the mean by height: exact on any mesh of these."""
-    mesh = MESH_TYPES["right" if name == "delingette" else "braced"](0.04, 0.012, 2e-3)
-    springs = derive_by_parts(
-        DEFINITIONS[name], halves(mesh, 1), {"": Material(1.0, nu), "far": Material(7.0, nu)}, THICKNESS
-    )
+STRIPS = {name: MESH_TYPES[name](0.04, 0.012, 2e-3) for name in ("right", "braced")}
+STIFF = AnisotropicMaterial(7.0, 3.0, 0.0, 2.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "mesh", "axis", "main", "far", "moduli"),
+    [
+        # Side by side strips of one Poisson's ratio strain alike, so E is the mean by height.
+        ("delingette", STRIPS["right"], 1, Material(1.0, 0.0), Material(7.0, 0.0), (4.0, 0.0)),
+        ("delingette", STRIPS["right"], 1, Material(1.0, 0.3), Material(7.0, 0.3), (4.0, 0.3)),
+        ("area", STRIPS["braced"], 1, Material(1.0, 0.3), Material(7.0, 0.3), (4.0, 0.3)),
+        ("orthotropic", STRIPS["braced"], 1, Material(1.0, 0.3), Material(7.0, 0.3), (4.0, 0.3)),
+        # A row between two materials has the mean of theirs.
+        ("lattice", lattice(20, 8, 1e-3), 1, Material(1.0, 0.2), Material(7.0, 0.3), (4.0, 1 / 3)),
+        # End to end they give way one after the other.
+        ("delingette", STRIPS["right"], 0, Material(1.0, 0.0), STIFF, (2 / (1 / 1 + 1 / 7), 0.0)),
+        ("orthotropic", STRIPS["braced"], 0, Material(1.0, 0.0), STIFF, (2 / (1 / 1 + 1 / 7), 0.0)),
+    ],
+)
+def test_strips_of_two_materials_have_the_moduli_of_both(name, mesh, axis, main, far, moduli):
+    springs = derived(name, halves(mesh, axis), main, far)
     young, ratio = axial_moduli(mesh, springs)
-    assert (young * springs.reference / THICKNESS, ratio) == pytest.approx((4.0, nu), abs=1e-9)
-
-
-@pytest.mark.parametrize("name", ["delingette", "orthotropic"])
-def test_bars_end_to_end_give_way_one_after_the_other(name):
-    mesh = MESH_TYPES["right" if name == "delingette" else "braced"](0.04, 0.012, 2e-3)
-    materials = {"": Material(1.0, 0.0), "far": AnisotropicMaterial(7.0, 3.0, 0.0, 2.0)}
-    springs = derive_by_parts(DEFINITIONS[name], halves(mesh, 0), materials, THICKNESS)
-    young, _ = axial_moduli(mesh, springs)
-    assert young * springs.reference / THICKNESS == pytest.approx(2 / (1 / 1 + 1 / 7), rel=1e-9)
-
-
-def test_half_weight_of_the_lattice_adds_up_between_materials():
-    """A row between two materials has the mean of theirs, so strips of a lattice have the mean modulus, exactly."""
-    mesh = lattice(20, 8, 1e-3)
-    grouped = halves(mesh, 1)
-    springs = derive_by_parts(
-        DEFINITIONS["lattice"], grouped, {"": Material(1.0, 0.2), "far": Material(7.0, 0.3)}, THICKNESS
-    )
-    young, ratio = axial_moduli(mesh, springs)
-    assert (young * springs.reference / THICKNESS, ratio) == pytest.approx((4.0, 1 / 3), rel=1e-9)
-    heights = mesh.points[mesh.edges, 1]
-    between = np.abs(heights - heights.max() / 2).max(axis=1) < 1e-9
-    assert springs.reference * springs.relative[between] == pytest.approx(np.sqrt(3) / 4 * 8 * THICKNESS, rel=1e-12)
+    assert (young * springs.reference / THICKNESS, ratio) == pytest.approx(moduli, abs=1e-8)
 
 
 def test_energies_of_parts_are_of_their_cells():
@@ -402,12 +394,11 @@ def test_energies_of_parts_are_of_their_cells():
     mesh = MESH_TYPES["braced"](0.04, 0.012, 2e-3)
     grouped = halves(mesh, 0)
     third, fifth = Material(1.0, 1 / 3), Material(1.0, 0.2)
-    springs = derive_by_parts(DEFINITIONS["area"], grouped, {"": third, "far": fifth}, THICKNESS)
+    springs = derived("area", grouped, third, fifth)
     (energy,) = springs.energies
     assert np.array_equal(energy.corners, mesh.quads[grouped.parts["far"][4]])
-    free = np.zeros(mesh.points.shape, dtype=bool)
     direction = np.random.default_rng(1).standard_normal(mesh.points.shape)
-    network = Network(mesh, free, springs.relative, springs.energies)
+    network = free_network(mesh, springs)
     exact = (network.resistance(1e-9 * direction) - network.resistance(-1e-9 * direction)) / 2e-9
     assert network.tangent() @ direction.ravel() == pytest.approx(exact, abs=1e-6 * np.abs(exact).max())
 
@@ -447,14 +438,6 @@ def test_parts_of_one_material_are_told_what_the_whole_body_is():
     one = Material(1.0, 0.3)
     springs = derive_by_parts(DEFINITIONS["paper"], grouped, {"": one, "far": one}, THICKNESS, 1e6)
     assert springs.reference == 1e6 and (springs.relative == 1).all()
-
-
-def test_cells_that_are_in_no_part_are_the_main_one():
-    grouped = halves(MESH_TYPES["braced"](0.02, 0.01, 5e-3), 0)
-    found = cells_of_parts(grouped)
-    assert list(found) == ["", "far"] and not (found[""][4] & found["far"][4]).any()
-    everything = GroupedMesh(grouped.mesh, parts={"all": {4: np.ones(len(grouped.mesh.quads), dtype=bool)}})
-    assert list(cells_of_parts(everything)) == ["all"]
 
 
 def test_energies_of_one_kind_are_one_of_all_parts():
