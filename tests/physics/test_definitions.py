@@ -66,11 +66,31 @@ def test_springs_alone_on_the_lattice(name, nu):
     assert ratio == pytest.approx(1 / 3, rel=1e-9)  # Cauchy's relation: whatever was asked
 
 
+EXACT = [
+    *((name, "structured") for name in ("area", "angular", "delingette", "neo-hooke", "patch-area")),
+    *(("delingette", mesh_type) for mesh_type in ("free", "right", "alternating", "isosceles-0.3")),
+    ("area", "braced"),
+]
+
+
 @pytest.mark.parametrize("nu", EVERY_RATIO)
-@pytest.mark.parametrize("name", ["area", "angular", "delingette", "neo-hooke", "patch-area"])
-def test_any_poisson_ratio_is_exact_on_the_lattice(name, nu):
-    young, ratio, shear = errors(name, patch("structured"), nu)
+@pytest.mark.parametrize(("name", "mesh_type"), EXACT)
+def test_any_poisson_ratio_is_exact(name, mesh_type, nu):
+    """On the lattice, on any mesh, or on squares with both diagonals."""
+    young, ratio, shear = errors(name, patch(mesh_type), nu)
     assert (young, ratio, shear) == pytest.approx((0, nu, 0), abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("mesh_type", "nu"),
+    [
+        *(("braced", nu) for nu in (0.2, 0.3, 1 / 3, 0.45, 0.49, 0.5)),
+        *(("isosceles-0.3", 0.3), ("isosceles-0.5", 0.5), ("structured", 1 / 3)),
+    ],
+)
+def test_axis_exact_on_squares_and_on_rows_made_for_it(mesh_type, nu):
+    young, ratio, shear = errors("axis-exact", patch(mesh_type), nu)
+    assert (young, ratio, 1 + shear) == pytest.approx((0, nu, 2 * nu / (1 - nu)), abs=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -133,19 +153,6 @@ def test_definitions_are_what_they_are_declared_to_be():
     assert lawful == {name for name, one in asked.items() if one.finite_strain}
 
 
-@pytest.mark.parametrize("nu", EVERY_RATIO)
-@pytest.mark.parametrize("mesh_type", ["free", "right", "alternating", "isosceles-0.3"])
-def test_delingette_is_exact_on_every_mesh(mesh_type, nu):
-    young, ratio, shear = errors("delingette", patch(mesh_type), nu)
-    assert (young, ratio, shear) == pytest.approx((0, nu, 0), abs=1e-9)
-
-
-@pytest.mark.parametrize("nu", EVERY_RATIO)
-def test_area_is_exact_on_squares_with_both_diagonals(nu):
-    young, ratio, shear = errors("area", patch("braced"), nu)
-    assert (young, ratio, shear) == pytest.approx((0, nu, 0), abs=1e-9)
-
-
 @settings(max_examples=15)
 @given(nu=st.floats(0, 0.5), shape=st.floats(0.75, 1.33))
 def test_rectangles(nu, shape):
@@ -159,18 +166,6 @@ def test_rectangles(nu, shape):
     assert shear == pytest.approx(0, abs=1e-9)
     young, ratio, _ = errors("lattice", stretched, nu)
     assert (young, ratio) == pytest.approx((0, 1 / 3), abs=1e-9)
-
-
-@pytest.mark.parametrize("nu", [0.2, 0.3, 1 / 3, 0.45, 0.49, 0.5])
-def test_axis_exact_on_squares(nu):
-    young, ratio, shear = errors("axis-exact", patch("braced"), nu)
-    assert (young, ratio, 1 + shear) == pytest.approx((0, nu, 2 * nu / (1 - nu)), abs=1e-9)
-
-
-@pytest.mark.parametrize(("mesh_type", "nu"), [("isosceles-0.3", 0.3), ("isosceles-0.5", 0.5), ("structured", 1 / 3)])
-def test_axis_exact_on_rows_made_for_it(mesh_type, nu):
-    young, ratio, shear = errors("axis-exact", patch(mesh_type), nu)
-    assert (young, ratio, 1 + shear) == pytest.approx((0, nu, 2 * nu / (1 - nu)), abs=1e-9)
 
 
 @pytest.mark.parametrize("name", ["uniform", "lattice", "van-gelder", "element-fit", "delingette-tensile", "patch"])
@@ -254,40 +249,77 @@ def test_least_squares_of_cells_are_those_of_lawson_and_hanson(seed, springs):
 # -- refusals ----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", [name for name, definition in DEFINITIONS.items() if definition.cells != (3, 4)])
-def test_cells_that_a_definition_cannot_have_are_refused(name):
-    definition = DEFINITIONS[name]
-    mesh = MESH_TYPES["braced" if definition.cells == (3,) else "structured"](0.03, 0.01, 2e-3)
-    with pytest.raises(DefinitionError, match="needs (triangles|rectangles).*mesh type"):
-        definition.springs(mesh, Material(1.0, 0.3, name="unit"), 1.0)
+def slender(ratio, turn=((1, 0), (0, 1))):
+    """Squares with both diagonals made longer along x, and turned."""
+    mesh = MESH_TYPES["braced"](0.04, 0.01, 2e-3)
+    return Mesh(mesh.points * [ratio, 1] @ turn, mesh.triangles, mesh.quads)
 
 
-@pytest.mark.parametrize("thickness", [0.0, -1.0, True, "1 mm", np.nan, np.inf])
-def test_what_is_no_thickness_is_refused(thickness):
-    with pytest.raises(DefinitionError, match="thickness: .* is not a number above zero"):
-        DEFINITIONS["lattice"].springs(lattice(2, 2), Material(1.0, 0.3), thickness)
+@pytest.mark.parametrize(
+    ("name", "mesh", "nu", "message"),
+    [
+        *(
+            (
+                name,
+                MESH_TYPES["braced" if one.cells == (3,) else "structured"](0.03, 0.01, 2e-3),
+                0.3,
+                "needs (triangles|rectangles).*mesh type",
+            )
+            for name, one in DEFINITIONS.items()
+            if one.cells != (3, 4)
+        ),
+        *((name, slender(2.5), 0.3, "negative stiffness") for name in ("baudet", "flechon", "lattice", "axis-exact")),
+        ("lloyd", slender(2.5), 0.3, r"needs squares.*of 5 x 2 mm"),
+        *(("lloyd", slender(ratio), 0.3, "needs squares") for ratio in (1.025, 0.975)),
+        ("axis-exact", slender(1, [[0.8, 0.6], [-0.6, 0.8]]), 0.3, "sides along x and y"),
+        ("axis-exact", patch("braced"), 0.0, "above 0"),
+        ("axis-exact", MESH_TYPES["free"](0.03, 0.01, 2e-3), 0.3, "isosceles"),
+        (
+            "axis-exact",
+            lattice(5, 4, 1e-3),
+            0.49,
+            r"nu = 0.333 and the material 0.49; use rows of height 0.7143 mm",
+        ),
+        ("van-gelder-general", lattice(6, 4, row_height=0.3), 0.5, "negative stiffness.*obtuse"),
+    ],
+)
+def test_meshes_that_a_definition_cannot_have_are_refused(name, mesh, nu, message):
+    with pytest.raises(DefinitionError, match=message):
+        DEFINITIONS[name].springs(mesh, Material(1.0, nu, name="unit"), 1.0)
 
 
-@pytest.mark.parametrize("reference", [0.0, np.inf, np.nan, True, "1 N/m"])
-def test_what_is_no_reference_stiffness_is_refused(reference):
-    with pytest.raises(DefinitionError, match="reference stiffness .* is not a number above zero"):
-        Springs(reference, np.ones(3))
+def test_lloyds_squares_may_be_off_by_two_percent():
+    assert DEFINITIONS["lloyd"].springs(slender(1.015), Material(1.0, 0.3, name="unit"), 1.0).relative.min() > 0
 
 
-@pytest.mark.parametrize("relative", [[1.0], np.ones((2, 1)), np.array([1.0, np.nan]), np.array([np.inf])], ids=repr)
-def test_what_are_no_relative_stiffnesses_is_refused(relative):
-    with pytest.raises(DefinitionError, match=r"(?s)relative stiffnesses .* are not finite"):
-        Springs(1.0, relative)
+@pytest.mark.parametrize(
+    ("make", "values", "message"),
+    [
+        (
+            lambda thickness: DEFINITIONS["lattice"].springs(lattice(2, 2), Material(1.0, 0.3), thickness),
+            (0.0, -1.0, True, "1 mm", np.nan, np.inf),
+            "thickness: .* is not a number above zero",
+        ),
+        (
+            lambda reference: Springs(reference, np.ones(3)),
+            (0.0, np.inf, np.nan, True, "1 N/m"),
+            "reference stiffness .* is not a number above zero",
+        ),
+        (
+            lambda relative: Springs(1.0, relative),
+            ([1.0], np.ones((2, 1)), np.array([1.0, np.nan]), np.array([np.inf])),
+            r"(?s)relative stiffnesses .* are not finite",
+        ),
+    ],
+)
+def test_what_is_no_stiffness_or_thickness_is_refused(make, values, message):
+    for value in values:
+        with pytest.raises(DefinitionError, match=message):
+            make(value)
 
 
-UNIFORM = {"paper", "calibrated", "uniform", "density", "oriented"}
-
-
-def test_what_definitions_without_a_word_can_do():
-    """All that the decorator takes for granted, and that a wrong default would change without a word."""
+def test_what_the_decorator_takes_for_granted():
     assert DEFINITIONS["lattice"].cells == (3, 4)
-    assert {name for name, one in DEFINITIONS.items() if one.finite_strain} == {"neo-hooke", "yeoh"}
-    assert {name for name, one in DEFINITIONS.items() if one.uniform} == UNIFORM
     assert all(DEFINITIONS[name].anisotropic for name in ("adjoint", "annealed", "evolved", "paper"))
 
 
@@ -339,16 +371,6 @@ def test_quadrilaterals_that_are_no_rectangles_are_refused(corner):
             DEFINITIONS["baudet"].springs(Mesh(points, np.zeros((0, 3), int), quads), Material(1.0, 0.3), 1.0)
 
 
-def test_slender_rectangles_are_refused():
-    mesh = MESH_TYPES["braced"](0.04, 0.01, 2e-3)
-    slender = Mesh(mesh.points * [2.5, 1], mesh.triangles, mesh.quads)
-    for name in ("baudet", "flechon", "lattice", "axis-exact"):
-        with pytest.raises(DefinitionError, match="negative stiffness"):
-            DEFINITIONS[name].springs(slender, Material(1.0, 0.3, name="unit"), 1.0)
-    with pytest.raises(DefinitionError, match=r"needs squares.*of 5 x 2 mm"):
-        DEFINITIONS["lloyd"].springs(slender, Material(1.0, 0.3, name="unit"), 1.0)
-
-
 @pytest.mark.parametrize(
     ("name", "nu", "ratio"), [("lattice", 0.3, 3**0.5), ("baudet", 0.5, 3.5**0.5), ("axis-exact", 0.25, 2.0)]
 )
@@ -359,39 +381,6 @@ def test_sides_without_stiffness_are_not_refused_by_rounding(name, nu, ratio):
         scaled = Mesh(mesh.points * [ratio * factor, factor], mesh.triangles, mesh.quads)
         made = DEFINITIONS[name].springs(scaled, Material(1.0, nu, name="unit"), 1.0)
         assert (made.relative == 0).sum() == 20 * 6  # the edges along x
-
-
-@pytest.mark.parametrize(("ratio", "taken"), [(1.015, True), (1.025, False), (0.975, False)])
-def test_lloyds_squares_may_be_off_by_two_percent(ratio, taken):
-    mesh = MESH_TYPES["braced"](0.04, 0.01, 2e-3)
-    nearly = Mesh(mesh.points * [ratio, 1], mesh.triangles, mesh.quads)
-    if taken:
-        assert DEFINITIONS["lloyd"].springs(nearly, Material(1.0, 0.3, name="unit"), 1.0).relative.min() > 0
-    else:
-        with pytest.raises(DefinitionError, match="needs squares"):
-            DEFINITIONS["lloyd"].springs(nearly, Material(1.0, 0.3, name="unit"), 1.0)
-
-
-def test_axis_exact_refuses_rectangles_that_are_turned():
-    mesh = patch("braced")
-    turned = Mesh(mesh.points @ [[0.8, 0.6], [-0.6, 0.8]], mesh.triangles, mesh.quads)
-    with pytest.raises(DefinitionError, match="sides along x and y"):
-        DEFINITIONS["axis-exact"].springs(turned, Material(1.0, 0.3, name="unit"), 1.0)
-
-
-def test_obtuse_triangles_are_refused_where_they_make_a_spring_negative():
-    mesh = lattice(6, 4, row_height=0.3)
-    with pytest.raises(DefinitionError, match="negative stiffness.*obtuse"):
-        DEFINITIONS["van-gelder-general"].springs(mesh, Material(1.0, 0.5, name="unit"), 1.0)
-
-
-def test_axis_exact_names_the_rows_that_it_needs():
-    with pytest.raises(DefinitionError, match=r"nu = 0.333 and the material 0.49; use rows of height 0.7143 mm"):
-        DEFINITIONS["axis-exact"].springs(lattice(5, 4, 1e-3), Material(1.0, 0.49, name="unit"), 1.0)
-    with pytest.raises(DefinitionError, match="isosceles"):
-        DEFINITIONS["axis-exact"].springs(MESH_TYPES["free"](0.03, 0.01, 2e-3), Material(1.0, 0.3, name="unit"), 1.0)
-    with pytest.raises(DefinitionError, match="above 0"):
-        DEFINITIONS["axis-exact"].springs(patch("braced"), Material(1.0, 0.0, name="unit"), 1.0)
 
 
 def test_axis_exact_names_the_row_that_is_furthest_off():
