@@ -9,8 +9,9 @@ from springtune.studies.kinds import collect, load_study
 from springtune.studies.kinds.scenes import plan as scenes
 from springtune.studies.output import present, reading
 from springtune.studies.output.browse import page as browse
-from springtune.studies.runs import rerun, run_tasks
+from springtune.studies.runs import driver, rerun, run_tasks
 from springtune.studies.runs.plan import plan
+from springtune.studies.runs.task_costs import TaskCosts
 
 
 def load_text(folder, text, name="study.yaml"):
@@ -24,6 +25,15 @@ def refusal(folder, text, name="study.yaml"):
     with pytest.raises(StudyError) as caught:
         load_text(folder, text, name)
     return str(caught.value).replace(f"{folder}/", "")
+
+
+def do_stages(study, folder, *stages):
+    """Run the jobs of a study, or of some of its stages, and assert that no task is broken."""
+    for job in plan(study, folder, 1).jobs.values():
+        if not stages or job.stage.name in stages:
+            costs = TaskCosts()
+            driver.run(job.stage.module, job.content, costs)
+            assert not costs.broken, costs.broken
 
 
 class Campaign:

@@ -2,6 +2,7 @@
 
 import ast
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -29,6 +30,38 @@ def test_modules_are_imported_by_text_in_one_place():
         if {"import_module", "__import__", "exec", "eval"} & {getattr(node, "id", ""), getattr(node, "attr", "")}
     ]
     assert set(found) == {"registry.py"}
+
+
+@pytest.mark.parametrize(
+    ("program", "heavy"),
+    [
+        ("import springtune; dir(springtune)", "numpy scipy xarray pint matplotlib"),
+        ("import springtune as st; st.Beam('1 m', '1 m'); st.Material(1, 0.3)", "numpy"),
+        (
+            "import springtune as st; st.Scene, st.sensitivity, st.moduli",
+            "skfem xarray pint matplotlib numba pydantic h5py",
+        ),
+        (
+            "import springtune as st; st.Shape.rectangle(1, 1, holes=[st.Hole.ellipse((.5, .5), .1, .2)])",
+            "scipy meshio netgen",
+        ),
+        (
+            "from springtune.studies.kinds.scenes import mesh, sensitivity, solve, reference",
+            "snakemake xarray matplotlib pandas pydantic pint",
+        ),
+        (
+            "from springtune.studies.kinds import load_study; load_study('config/paper.yaml')",
+            "springtune.problem.shapes springtune.mesh.sides "
+            + " ".join(
+                f"springtune.studies.kinds.shapes.{one}" for one in ("sections", "checks", "expand", "described")
+            ),
+        ),
+    ],
+)
+def test_what_is_used_alone_does_not_import_what_is_heavy(program, heavy):
+    program = f"import sys; {program}; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", program], cwd=REPOSITORY, capture_output=True, text=True, check=True)
+    assert not set(heavy.split()) & set(done.stdout.split())
 
 
 def package_names(tree):

@@ -1,7 +1,5 @@
 """Which references of a study come from interpolants, and what is made of them."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -14,7 +12,8 @@ from springtune.studies.kinds.scenes.plan import reference_of, solved_reference
 from springtune.studies.kinds.scenes.summary import summary
 from springtune.studies.runs import driver, store
 from springtune.studies.runs.plan import plan
-from springtune.studies.runs.task_costs import TaskCosts
+
+from campaigns import do_stages
 
 MANY, FEW = 32, 20
 
@@ -52,16 +51,6 @@ def load(tmp_path):
 
 def references(study):
     return [reference_of(study, one.beam, one.material, one.load) for one in study.references]
-
-
-def run(study, folder, *stages):
-    for job in plan(study, folder, 1).jobs.values():
-        if job.stage.name in stages:
-            spent = TaskCosts()
-            driver.run(job.stage.module, job.content, spent)
-            assert not spent.broken
-            for path in job.products:
-                assert Path(path).exists()
 
 
 def test_few_references_are_solved_by_themselves(load):
@@ -108,11 +97,11 @@ def test_boxes_hold_what_they_are_made_of():
 
 def test_the_dataset_is_that_of_references_solved_by_themselves(load, tmp_path):
     study = load(lengths(MANY))
-    run(study, tmp_path / "results", "reference", "mesh", "solve")
+    do_stages(study, tmp_path / "results", "reference", "mesh", "solve")
     root = kinds()[0].module("collect").groups(study, tmp_path / "results")["/"]
     # Two of them, in a study of their own.
     few = load({number: lengths(MANY)[number] for number in (3, 17)})
-    run(few, tmp_path / "few", "reference", "mesh", "solve")
+    do_stages(few, tmp_path / "few", "reference", "mesh", "solve")
     alone = kinds()[0].module("collect").groups(few, tmp_path / "few")["/"]
     for name in ("reference_displacement", "deformation_error"):
         there = root[name].sel(beam=alone.beam).squeeze()
@@ -135,11 +124,11 @@ def test_what_cannot_be_interpolated_is_solved_by_itself(load, tmp_path):
     store.add(path, {task["key"]: {"message": "no interpolant", "seconds": 1.0, "asked": MANY}})
     before = any_reference.read(path.parent, references(study)[0])
     assert before == {"message": "no interpolant", "seconds": 0.0}
-    run(study, tmp_path, "reference")
+    do_stages(study, tmp_path, "reference")
     found = [any_reference.read(path.parent, one) for one in references(study)]
     assert all(one["error_estimate"] <= 1e-4 and "solves" not in one for one in found)
     few = load({0: lengths(MANY)[0]})
-    run(few, tmp_path / "few", "reference")
+    do_stages(few, tmp_path / "few", "reference")
     alone = any_reference.read(tmp_path / "few" / "references", references(few)[0])
     assert {name: value for name, value in found[0].items() if name != "seconds"} == {
         name: value for name, value in alone.items() if name != "seconds"

@@ -10,10 +10,9 @@ from springtune.problem.materials import Material
 from springtune.reference.finite_strain import solve_neo_hooke
 from springtune.reference.small_strain import solve_small_strain
 from springtune.scene.sheet import Sheet
-from springtune.studies.runs import driver, plan, store
-from springtune.studies.runs.task_costs import TaskCosts
+from springtune.studies.runs import plan, store
 
-from campaigns import load_text
+from campaigns import do_stages, load_text
 from tables import STUDIES
 
 LIFT = loads.LoadKind("lift", loaded=TOP, axis=1, held=((BOTTOM, BOTH),))
@@ -77,8 +76,7 @@ def test_a_new_kind_in_the_references(lift):
 def test_a_new_kind_through_a_study(lift, tmp_path):
     study = load_text(tmp_path, STUDIES["loads"])
     jobs = plan.plan(study, tmp_path, 1).jobs
-    for name in ("mesh_0", "reference_0", "solve_0"):
-        driver.run(jobs[name].stage.module, jobs[name].content, TaskCosts())
+    do_stages(study, tmp_path, "mesh", "reference", "solve")
     tasks = jobs["solve_0"].content
     (family,) = tasks["files"]
     (scene,) = family["tasks"]

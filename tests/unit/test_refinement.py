@@ -14,9 +14,8 @@ from springtune.studies.kinds.refinement.collect import groups, write
 from springtune.studies.output.comparison import compare
 from springtune.studies.runs import driver, store
 from springtune.studies.runs.plan import plan
-from springtune.studies.runs.task_costs import TaskCosts
 
-from campaigns import load_text
+from campaigns import do_stages, load_text
 from tables import STUDIES, study_text
 
 
@@ -28,15 +27,16 @@ def load(tmp_path):
 UNITS = {"mesh_size": "m", "force": "N", "thickness": "m", "young_modulus": "Pa", "poisson_ratio": "1"}
 
 
+def solved(folder):
+    """How many values are stored."""
+    return sum(len(store.stored(path)) for path in (folder / "refinement").glob("*.h5"))
+
+
 def run(study, folder):
     """Run the stage; the number of values that were solved."""
-    before = sum(len(store.stored(path)) for path in (folder / "refinement").glob("*.h5"))
-    for job in plan(study, folder, 1).jobs.values():
-        if job.stage.name == "refinement":
-            spent = TaskCosts()
-            driver.run(job.stage.module, job.content, spent)
-            assert not spent.broken
-    return sum(len(store.stored(path)) for path in (folder / "refinement").glob("*.h5")) - before
+    before = solved(folder)
+    do_stages(study, folder, "refinement")
+    return solved(folder) - before
 
 
 def collected(study, folder):

@@ -1,7 +1,5 @@
 """Studies of shapes: what they may hold, what they expand to, and what their dataset says."""
 
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -28,7 +26,7 @@ from springtune.studies.runs.plan import plan, table_files
 from springtune.studies.runs.task_costs import TaskCosts
 from springtune.studies.runs.workload import results_of
 
-from campaigns import load_text
+from campaigns import do_stages, load_text
 from tables import STUDIES
 
 REPOSITORY = Path(__file__).parents[2]
@@ -37,10 +35,7 @@ COOK = STUDIES["shapes"]
 
 def done(study, folder):
     """Tree of the dataset of a study, its groups and its folder; all stages run in this process."""
-    for job in plan(study, folder, 1).jobs.values():
-        spent = TaskCosts()
-        driver.run(job.stage.module, job.content, spent)
-        assert not spent.broken, spent.broken
+    do_stages(study, folder)
     made, told = collect.run(study.path, folder, folder / "dataset.nc")
     with xr.open_datatree(made, engine="netcdf4") as tree:
         tree.load()
@@ -304,19 +299,6 @@ def test_a_large_file_costs_its_own_scenes(load, plate, tmp_path):
     tree, _ = done(load(yaml.safe_dump(PLATE)), tmp_path / "results/broken")
     cell = tree["shapes"].to_dataset().squeeze(drop=True)
     assert STATUS[int(cell.status)] == "failed" and cell.message.item().startswith("mesh: ")
-
-
-def test_studies_of_beams_pay_nothing_for_shapes():
-    program = (
-        "import sys; from springtune.studies.kinds import load_study; load_study('config/paper.yaml');"
-        "heavy = 'springtune.studies.kinds.shapes', 'springtune.problem';"
-        "print(*(name for name in sys.modules if name.startswith(heavy)))"
-    )
-    run = subprocess.run([sys.executable, "-c", program], cwd=REPOSITORY, capture_output=True, text=True, check=True)
-    found = set(run.stdout.split())
-    assert "springtune.studies.kinds.shapes.kind" in found
-    heavy = {f"springtune.studies.kinds.shapes.{name}" for name in ("sections", "checks", "expand", "described")}
-    assert not (heavy | {"springtune.problem.shapes", "springtune.mesh.sides"}) & found
 
 
 def test_figures_of_two_loads_never_share_a_name(refusal):

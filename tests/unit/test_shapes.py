@@ -227,16 +227,3 @@ def test_what_is_no_shape_is_refused(name):
     with pytest.raises(ValueError) as caught:
         make()
     assert says in str(caught.value)
-
-
-def test_shapes_cost_no_heavy_import():
-    """A study's shapes are checked each time that it is read."""
-    import subprocess
-    import sys
-
-    code = (
-        "import sys; from springtune.problem.shapes import Hole, Shape; "
-        "Shape.rectangle(1, 1, holes=[Hole.ellipse((.5, .5), .1, .2)]); "
-        "print({'scipy', 'meshio', 'netgen'} & set(sys.modules))"
-    )
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "set()\n"

@@ -1,7 +1,6 @@
 """The store of results and the digest of code."""
 
 import hashlib
-import subprocess
 import sys
 from types import ModuleType
 
@@ -88,14 +87,6 @@ def test_definitions_belong_to_their_own_keys_and_to_no_stage():
     digests = {name: code.definition_closure(name).digest for name in ("angular", "delingette", "patch", "lattice")}
     assert len(set(digests.values())) == len(digests)
     assert str(code.PACKAGE / "springs/angular.py") not in code.modules("studies.kinds.scenes.solve")
-
-
-def test_physics_imports_no_workflow_dataset_or_plots():
-    """A job of these pays for numpy, scipy.sparse, h5py and its own libraries only."""
-    stages = [f"springtune.studies.kinds.scenes.{stage}" for stage in ("mesh", "sensitivity", "solve", "reference")]
-    program = f"import sys, {', '.join(stages)}; print(*sys.modules)"
-    loaded = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout.split()
-    assert not {"snakemake", "xarray", "matplotlib", "pandas", "pydantic", "pint"} & set(loaded)
 
 
 def test_tasks_are_done_until_their_result_is_stored(tmp_path, monkeypatch):
