@@ -39,7 +39,7 @@ MODULES = ("springs/*.py", "mechanics/energies.py", "mechanics/newton.py", "mech
 """What is mutated: where a wrong sign gives a wrong number that looks like a right one."""
 
 TESTS = ("tests/physics", *(f"tests/unit/test_{name}.py" for name in (
-    "dependencies", "labels", "materials", "places", "scene", "store")))  # fmt: skip
+    "dependencies", "labels", "materials", "places", "records", "scene")))  # fmt: skip
 """What may find a mutant: tests that are not slow, and that run in one process."""
 
 OPERATORS = (

@@ -37,11 +37,6 @@ def spring_forces(x, k, rest):
     return np.stack([-pull, pull], axis=1)
 
 
-def spring_energy(x, k, rest):
-    d = x[:, 1] - x[:, 0]
-    return 0.5 * k * (np.sqrt(dot(d, d)) - rest) ** 2
-
-
 def area_of(x):
     """Area of polygons by the shoelace formula."""
     following = np.roll(x, -1, axis=1)
@@ -53,10 +48,6 @@ def area_forces(x, modulus, rest):
     across = 0.5 * (np.roll(x, -1, axis=1) - np.roll(x, 1, axis=1))
     slope = np.stack([across[..., 1], -across[..., 0]], axis=2)
     return (modulus * (area_of(x) - rest) / rest)[:, None, None] * slope
-
-
-def area_energy(x, modulus, rest):
-    return 0.5 * modulus * (area_of(x) - rest) ** 2 / rest
 
 
 def angles_of(x):
@@ -76,10 +67,6 @@ def angle_forces(x, modulus, rest):
     return np.roll(by_next, 1, axis=1) + np.roll(by_last, -1, axis=1) - by_next - by_last
 
 
-def angle_energy(x, modulus, rest):
-    return 0.5 * modulus * ((angles_of(x)[0] - rest) ** 2).sum(axis=1)
-
-
 def _sides(x):
     return np.roll(x, 1, axis=1) - np.roll(x, -1, axis=1)
 
@@ -91,17 +78,9 @@ def squares_forces(x, k, rest):
     return np.roll(pull, -1, axis=1) - np.roll(pull, 1, axis=1)
 
 
-def squares_energy(x, k, rest):
-    return (0.25 * k * (dot(_sides(x), _sides(x)) - rest) ** 2).sum(axis=1)
-
-
 def _gradient(x, inverse):
     """Deformation gradient of linear triangles."""
     return np.stack([x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]], axis=2) @ inverse
-
-
-def _green(gradient):
-    return 0.5 * (gradient.swapaxes(1, 2) @ gradient - np.eye(2))
 
 
 def _second(green, first, second):
@@ -113,14 +92,9 @@ def _second(green, first, second):
 def element_forces(x, inverse, area, first, second):
     """Derivative of the St. Venant-Kirchhoff energy of linear triangles, which Delingette's springs equal."""
     gradient = _gradient(x, inverse)
-    nominal = gradient @ _second(_green(gradient), first, second)
+    nominal = gradient @ _second(0.5 * (gradient.swapaxes(1, 2) @ gradient - np.eye(2)), first, second)
     columns = area[:, None, None] * nominal @ inverse.swapaxes(1, 2)
     return np.stack([-columns.sum(axis=2), columns[..., 0], columns[..., 1]], axis=1)
-
-
-def element_energy(x, inverse, area, first, second):
-    green = _green(_gradient(x, inverse))
-    return 0.5 * area * (green * _second(green, first, second)).sum(axis=(1, 2))
 
 
 def rubber_forces(x, inverse, area, shear, bulk):

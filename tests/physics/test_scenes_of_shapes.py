@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import mujoco
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -572,14 +571,6 @@ class TestAgainstReferences:
         np.testing.assert_allclose(net.forces.sum(axis=0), [4e3, 0.0], atol=1e-8)
         assert net.masses.sum() == pytest.approx(7850 * 1e-3 * self.grouped.mesh.area, rel=1e-12)
         net.write(tmp_path / "net.csv")
-        scene = result.scene
-        scene.springs.write(tmp_path / "net.xml", errors=False)
-        model = mujoco.MjModel.from_xml_path(str(tmp_path / "net.xml"))
-        data = mujoco.MjData(model)
-        mujoco.mj_resetDataKeyframe(model, data, 0)
-        mujoco.mj_forward(model, data)
-        # At our equilibrium its forces balance the load.
-        assert np.abs(data.qacc * model.body_mass[model.dof_bodyid]).max() < 1e-9 * 4e3
 
     def test_prescribed_displacements_are_in_no_file_of_springs(self, tmp_path):
         stretch = load(supports=(*CLAMP, st.Support("right", x=1e-4)))

@@ -1,9 +1,13 @@
-"""The page of licences is that of the lock files, and only the extra that says so is under the GPL."""
+"""Licences of all packages, of which only the extra that says so is under the GPL; and one version in all places."""
 
 import importlib.util
+import re
 from pathlib import Path
 
 import pytest
+import yaml
+
+import springtune
 
 PROGRAM = Path(__file__).parents[2] / "tools/licences.py"
 
@@ -26,3 +30,21 @@ def test_the_gpl_comes_with_one_extra_only(licences):
     assert licences.licence_of("cvxopt").startswith("GPL")
     names = parts["run"] | parts["export"] | parts["paper"]
     assert not {name for name in names if licences.licence_of(name).startswith(("GPL", "AGPL"))}
+
+
+REPOSITORY = Path(__file__).parents[2]
+CITATION = yaml.safe_load((REPOSITORY / "CITATION.cff").read_text())
+VERSION, DATE = re.search(r"^## (\S+) \((.*)\)$", (REPOSITORY / "CHANGELOG.md").read_text(), re.MULTILINE).groups()
+"""Of the newest entry of the changelog."""
+
+
+def test_version_of_citation_and_changelog():
+    assert CITATION["version"] == VERSION == springtune.__version__
+    assert re.fullmatch(r"\d+\.\d+\.\d+", VERSION)
+
+
+def test_a_release_has_its_date_in_both():
+    """`(unreleased)` until it is released; then the day, and CITATION.cff has the same."""
+    released = str(CITATION.get("date-released", "unreleased"))
+    assert released == DATE
+    assert DATE == "unreleased" or re.fullmatch(r"\d{4}-\d{2}-\d{2}", DATE)

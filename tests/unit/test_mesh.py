@@ -16,7 +16,6 @@ from springtune.mesh import (
     MESH_TYPES,
     Mesh,
     MeshError,
-    alternating,
     braced,
     free,
     isosceles,
@@ -24,7 +23,6 @@ from springtune.mesh import (
     quality,
     read_beam_mesh,
     read_mesh,
-    right,
     signed_areas,
     structured,
     write_mesh,
@@ -332,15 +330,6 @@ class TestSlits:
         with pytest.raises(MeshError, match="cover 200 % .* edges with two cells on the same side: .*; remove one"):
             read_beam_mesh(path, 0.1, 0.02)
 
-    def test_an_overlap_that_makes_up_for_a_hole(self, tmp_path):
-        mesh = self.MESH
-        places = mesh.points[mesh.triangles].mean(axis=1)
-        lost, doubled = (np.argmin(np.linalg.norm(places - at, axis=1)) for at in ([0.03, 0.01], [0.07, 0.01]))
-        triangles = mesh.triangles.copy()
-        triangles[lost] = triangles[doubled]
-        with pytest.raises(MeshError, match=": edges with two cells on the same side: 3, the first"):
-            read_beam_mesh(save(tmp_path / "shifted.vtu", mesh.points, {3: triangles}), 0.1, 0.02)
-
     def test_dented_quadrilateral(self, tmp_path):
         mesh = MESH_TYPES["braced"](0.03, 0.03, 0.01)
         points = mesh.points.copy()
@@ -440,18 +429,6 @@ def test_isosceles_rows_have_the_shape_for_their_poisson_ratio(nu):
     slanted = (x > 1e-9) & (y > 1e-9)
     # Rows and cells are whole numbers: 22 and 28 rows, 100 cells.
     assert (x[slanted] / y[slanted]) ** 2 == pytest.approx(nu, rel=0.02)
-
-
-def test_springs_of_squares():
-    mesh = right(0.03, 0.02, 0.01)
-    assert (len(mesh.points), len(mesh.triangles), len(mesh.edges)) == (12, 12, 23)
-    falling = mesh.points[mesh.edges[:, 1]] - mesh.points[mesh.edges[:, 0]]
-    assert not ((falling > 1e-9).any(axis=1) & (falling < -1e-9).any(axis=1)).any()  # all diagonals rise
-    mixed = alternating(0.03, 0.02, 0.01)
-    degree = np.bincount(mixed.edges.ravel())
-    assert sorted(set(degree)) == [2, 3, 5, 8] or set(degree) <= {2, 3, 4, 5, 8}
-    both = braced(0.03, 0.02, 0.01)
-    assert (len(both.quads), len(both.edges), both.on_outline.sum()) == (6, 17 + 12, 10)
 
 
 def test_quads_turn_inside_out_corner_by_corner():

@@ -1,8 +1,9 @@
-"""Studies: expansion, names, order, and what bad input gets."""
+"""Studies: expansion, names, order, and what bad input gets (more cases are in refused_studies.yaml)."""
 
 import csv
 import itertools
 import math
+import shutil
 from functools import partial
 from pathlib import Path
 
@@ -470,3 +471,23 @@ class TestBenchmark:
         assert dict(zip(case.approaches, case.finest))["relaxation"] == 2e-3
         assert {size for name, size in zip(case.approaches, case.finest) if name != "relaxation"} == {5e-3}
         assert set(load(STUDIES["benchmark"]).parts["benchmark"][0].finest) == {2e-3}
+
+
+HERE = Path(__file__).parent
+REFUSED = {
+    f"{study}: {name}": (study, *case)
+    for study, cases in yaml.safe_load((HERE / "refused_studies.yaml").read_text()).items()
+    for name, case in cases.items()
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_a_study_is_refused_with_line_key_and_remedy(refusal, tmp_path, case):
+    study, old, new, *parts = REFUSED[case]
+    for path in (HERE.parents[1] / "config/treloar").glob("*.csv"):
+        shutil.copy(path, tmp_path)
+    (tmp_path / "own.msh").write_text("any")
+    message = refusal(new if old is None else study_text(study, (old, new)))
+    assert all(line.isprintable() and line.startswith("study.yaml:") for line in message.splitlines())
+    for part in parts:
+        assert message.startswith(part) if part.startswith("study.yaml") else part in message

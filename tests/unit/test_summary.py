@@ -19,7 +19,6 @@ from snakemake_logger_plugin_springtune import LogHandler
 from snakemake_logger_plugin_springtune.display import Display
 from springtune.problem.status import Status
 from springtune.studies.kinds import load_study
-from springtune.studies.kinds.scenes.plan import curves_by_mesh
 from springtune.studies.kinds.scenes.variables import ROOT, SENSITIVITY
 from springtune.studies.output import summary
 from springtune.studies.output.dataset import Filler
@@ -158,19 +157,6 @@ def test_notes_that_are_another_ones_are_as_good_as_none(planned):
     page = found[rerun.BROWSE]
     records.write(page.record, page.digest, page.products, read="")
     assert not rerun.fault(page, found)
-
-
-def test_planning_adds_no_mesh_to_those_that_have_curves(tmp_path):
-    first, second = (
-        "mesh_type: structured, mesh_size: [2 mm, 5 mm]",
-        "mesh_type: right, mesh_size: 2 mm, sensitivity: false",
-    )
-    other = STUDY[STUDY.index("  one:") :].replace("one:", "two:").replace(first, second)
-    (tmp_path / "some.yaml").write_text(STUDY + other)
-    study = load_study(tmp_path / "some.yaml")
-    plan.plan(study, tmp_path / "results/some", 1)
-    groups = curves_by_mesh(study)
-    assert len(groups) == 2 < len(study.meshes) and all(groups.values())
 
 
 def test_outputs_without_files_have_no_job(planned, tmp_path):
