@@ -389,20 +389,6 @@ def test_strips_of_two_materials_have_the_moduli_of_both(name, mesh, axis, main,
     assert (young * springs.reference / THICKNESS, ratio) == pytest.approx(moduli, abs=1e-8)
 
 
-def test_energies_of_parts_are_of_their_cells():
-    """A part whose energy vanishes has none, and the network is what both parts are."""
-    mesh = MESH_TYPES["braced"](0.04, 0.012, 2e-3)
-    grouped = halves(mesh, 0)
-    third, fifth = Material(1.0, 1 / 3), Material(1.0, 0.2)
-    springs = derived("area", grouped, third, fifth)
-    (energy,) = springs.energies
-    assert np.array_equal(energy.corners, mesh.quads[grouped.parts["far"][4]])
-    direction = np.random.default_rng(1).standard_normal(mesh.points.shape)
-    network = free_network(mesh, springs)
-    exact = (network.resistance(1e-9 * direction) - network.resistance(-1e-9 * direction)) / 2e-9
-    assert network.tangent() @ direction.ravel() == pytest.approx(exact, abs=1e-6 * np.abs(exact).max())
-
-
 @pytest.mark.parametrize(
     ("materials", "message"),
     [

@@ -13,7 +13,7 @@ from springtune.mechanics.arc_length import follow
 from springtune.mechanics.network import Network
 from springtune.mechanics.statics import StaticProblem
 from springtune.mechanics.stress import cell_stresses, particle_stresses
-from springtune.mesh import MESH_TYPES, lattice
+from springtune.mesh import MESH_TYPES
 from springtune.mesh.groups import GroupedMesh
 from springtune.problem.boundary import (
     cell_at,
@@ -336,17 +336,6 @@ class TestStress:
         for values in (found[3], particle_stresses(mesh, found)):
             np.testing.assert_allclose(springs.reference / 1e-3 * values, np.broadcast_to(expected, values.shape),
                                        atol=1e-10 * scale)  # fmt: skip
-
-    @pytest.mark.parametrize("mesh", [lattice(12, 8), MESH_TYPES["braced"](1.0, 0.4, 0.1)], ids=["lattice", "squares"])
-    def test_of_springs_alone(self, mesh):
-        """Exact on equilateral triangles and on squares, outline included, at nu = 1/3."""
-        gradient = 1e-3 * np.array([[1.0, 0.3], [-0.4, 0.7]])
-        springs = DEFINITIONS["lattice"].springs(mesh, THIRD, 1.0)
-        network = free_network(mesh, springs)
-        found = cell_stresses(network, mesh.points @ gradient.T, True)
-        expected = THIRD.plane_stress @ [1e-3, 0.7e-3, -0.1e-3]
-        for values in (*found.values(), particle_stresses(mesh, found)):
-            np.testing.assert_allclose(springs.reference * values, np.broadcast_to(expected, values.shape), rtol=1e-11)
 
     def test_parts_are_recovered_apart(self):
         """Stress that jumps from one part to the next is constant in either."""

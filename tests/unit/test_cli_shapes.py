@@ -88,25 +88,6 @@ class TestPredict:
         assert len(net.points) == len(st.read_shape("own.msh").mesh.points)
         assert net.forces.sum(axis=0) == pytest.approx([10, 0]) and net.header["shape"] == "own"
 
-    def test_quantities_without_a_reference_say_why(self):
-        """Stress at a re-entrant corner has no bound."""
-        corner = st.Quantity("peak", "stress", "corner", "yy")
-        end = st.Quantity("end", "displacement", "foot", "y")
-        load = st.LoadCase("pull", [st.Support("top", 0, 0)], [st.Traction("foot", (0, 1.0))], quantities=[end, corner])
-        places = [(0, 0), (0.02, 0), (0.02, 0.01), (0.01, 0.01), (0.01, 0.02), (0, 0.02)]
-        groups = ["", "foot", "", "", "top", ""]
-        sides = [st.Segment(place, group=group) for place, group in zip(places, groups, strict=True)]
-        angle = st.Shape("angle", 1e-3, tuple(sides), points={"corner": (0.01, 0.01)}, loads={"pull": load})
-        grouped, soft = st.mesh_shape(angle, "4 mm"), st.Material("1 MPa", 0.3)
-        choices = st.predict(angle, grouped, soft)
-        assert np.isfinite(choices[0].worst) and np.isnan(choices[0].errors["peak"])
-        best = choices[0].definition
-        header = st.SpringNet.from_scene(st.Scene(angle, grouped, soft, "pull", definition=best)).header
-        assert header["expected_error"]["end"] == pytest.approx(choices[0].errors["end"], abs=1e-4)
-        assert header["expected_error"]["peak"].startswith("not computed: ")
-        with pytest.raises(ValueError, match="'peak' has no reference, so no error of it can be kept: "):
-            st.find_mesh(angle, soft, "1 %")
-
 
 class TestSprings:
     def test_springs_are_those_of_the_scene(self, here, tmp_path):

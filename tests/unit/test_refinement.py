@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from springtune.studies.kinds.refinement.batches import Rule, crossings, refine
 from springtune.studies.kinds.refinement.collect import groups, write
-from springtune.studies.output.comparison import compare
 from springtune.studies.runs import driver, store
 from springtune.studies.runs.plan import plan
 
@@ -142,20 +141,6 @@ def test_raising_most_computes_what_is_new_and_nothing_else(load, tmp_path):
     np.testing.assert_array_equal(collected(more, tmp_path).deformation_error, data.deformation_error)
     shared = few.sizes["point"]
     np.testing.assert_array_equal(few.refined_stiffness_scale, data.refined_stiffness_scale[..., :shared])
-
-
-def test_raising_most_is_new_cells_and_no_changed_ones(load, tmp_path):
-    trees = []
-    for most in (9, 17):
-        study = load(("most: 24", f"most: {most}"))
-        run(study, tmp_path)
-        trees.append(xr.DataTree.from_dict({"/refinement": collected(study, tmp_path)}))
-    (group,) = [one for one in compare(*trees).groups if one.name.endswith("refinement")]
-    assert [one.count for one in group.cells] == [0, 2 * 8]
-    changed = {one.name for one in (*group.values, *group.flags) if one.changed}
-    # How many there are, and by how much a crossing is enclosed, does change.
-    assert {"value_count", "halved"} <= changed
-    assert all(name in ("value_count", "halved") or name.startswith("crossing_") for name in changed)
 
 
 def test_a_value_beyond_its_limits_is_a_hole_and_the_others_are_not(load, tmp_path):
