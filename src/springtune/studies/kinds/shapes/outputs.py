@@ -93,34 +93,29 @@ VIEWS = (
 LABEL_COLUMNS = ("shape", "load", "quantity", "definition", "kinematics", "material", "mesh_type")
 """First columns: what a value is of."""
 
+ERRORS_SHOWN = ("error", "expected_error", "reference_error_estimate")
+
 
 def tables(tree: "xr.DataTree") -> list[dict[str, Any]]:
     """Tables of the page, see `springtune.studies.kinds.scenes.tables.tables`."""
     # Here, since a plan does without xarray.
     from ...output.dataset import STATUS
-    from ...output.selection import cells
+    from ...output.selection import records
 
     if "shapes" not in tree:
         return []
-    data, rows, sources = tree["shapes"].to_dataset(), [], {}
-    for place in cells(data.status != 0, SCENE_AXES):
-        cell = data.sel(place)
-        for name in (one for one in data.quantity.values.tolist() if cell.quantity_kind.sel(quantity=one).item()):
-            one = cell.sel(quantity=name)
-            if one.source.item():
-                sources[f"{place['shape']}, {name}: {one.source.item()}"] = None
-            about = place | {"quantity": name}
-            rows.append(
-                {key: about[key] for key in LABEL_COLUMNS}
-                | {"mesh_size_mm": 1e3 * place["mesh_size"], "particles": float(one.particles)}
-                | {"value": float(one.value), "reference": float(one.reference_value)}
-                | {"expected": float(one.expected_value), "units": str(one.quantity_units.item())}
-                | {
-                    f"{error}_percent": 100 * float(one[error])
-                    for error in ("error", "expected_error", "reference_error_estimate")
-                }
-                | {"status": STATUS[int(one.status)], "message": str(one.message.item())}
-            )
+    data = tree["shapes"].to_dataset()
+    present = (data.status != 0).transpose(*SCENE_AXES) & (data.quantity_kind != "")
+    values = ("value", "reference_value", "expected_value", "quantity_units", *ERRORS_SHOWN, "status", "message")
+    rows, sources = [], {}
+    for one in records(data, present.transpose(*SCENE_AXES, "quantity"), ("particles", "source", *values)):
+        if one["source"]:
+            sources[f"{one['shape']}, {one['quantity']}: {one['source']}"] = None
+        row = {name: one[name] for name in LABEL_COLUMNS} | {"mesh_size_mm": 1e3 * one["mesh_size"]}
+        row |= {"particles": one["particles"], "value": one["value"], "reference": one["reference_value"]}
+        row |= {"expected": one["expected_value"], "units": one["quantity_units"]}
+        row |= {f"{error}_percent": 100 * one[error] for error in ERRORS_SHOWN}
+        rows.append(row | {"status": STATUS[int(one["status"])], "message": one["message"]})
     note = (
         "Quantities of interest of the networks, in SI units; the reference is small-strain plane stress by converged "
         "finite elements on the same shape, and errors are signed: (network − reference) / |reference|, and the same "
