@@ -231,7 +231,7 @@ def clean(study: Path | None, remove: bool) -> None:
     were taken out, their meshes and stored results, files of jobs that are no more, and what a run that was stopped
     left unfinished. Results that an edit of the code made stale are among them.
     """
-    from ..studies.runs.orphans import orphans
+    from ..studies.runs.rerun import orphans
 
     chosen = list(studies(study, "; nothing is listed or removed"))
     found = {folder: orphans(one, folder) for one, folder in chosen}

@@ -17,8 +17,7 @@ from springtune.safe_io.escapes import markdown
 from ..output.browse import page as browse
 from ..output.reading import attributes
 from ..runs import provenance, records, rerun
-from ..runs.dependencies import OURS, PACKAGE
-from ..runs.keys import installed
+from ..runs.keys import OURS, PACKAGE, installed
 from ..runs.plan import plan
 from ..runs.workload import COMMANDS_FILE
 from .parts import ELSEWHERE
