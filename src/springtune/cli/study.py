@@ -165,15 +165,8 @@ def split(config: Path, count: int, by: str, out: Path | None, most: int | None)
     """
     allow(most)
     from ..studies.archive.parts import share_table, write_parts  # here, so that --help does not wait for it
-    from ..studies.config.messages import StudyError
 
-    study = loaded(config)
-    try:
-        written = write_parts(study, count, by, config.parent if out is None else out)
-    except StudyError as error:
-        raise click.ClickException(str(error)) from None
-    except OSError as error:
-        raise click.ClickException(f"{error.filename}: cannot be written: {error.strerror}") from None
+    written = write_parts(loaded(config), count, by, config.parent if out is None else out)
     click.echo(aligned(share_table(written), left=0, right=(1, 2, 3)))
     results = " ".join(f"results/{one.study.name}" for one in written)
     click.echo(f"\nspringtune run {written[0].path}   # and so on, each where it is to run; then, with all results in "
@@ -197,14 +190,11 @@ def merge(config: Path, results: tuple[Path, ...], incomplete: bool) -> None:
     code, packages and Python; nothing is written before all fits. `st.merge` in Python joins datasets of different
     studies.
     """
-    from ..studies.archive.parts import MergeError, merge_sites, merge_text  # here, so that --help does not wait for it
-    from ..studies.runs.locks import LockedError
+    from ..studies.archive.parts import merge_sites, merge_text  # here, so that --help does not wait for it
 
     study = loaded(config)
     try:
         merged = merge_sites(study, results, incomplete)
-    except (MergeError, LockedError) as error:
-        raise click.ClickException(str(error)) from None
     except OSError as error:
         raise click.ClickException(f"{error.filename}: {error.strerror}; the same command goes on from here") from None
     click.echo(merge_text(merged, results))

@@ -56,11 +56,8 @@ ELSEWHERE = f"{TASKS}/elsewhere.json"
 """Note of files with results of other machines."""
 
 
-class MergeError(Exception):
+class MergeError(StudyError):
     """Results that do not fit together; the message names them and the remedy."""
-
-    def __init__(self, *lines: str) -> None:
-        super().__init__("\n".join(map(shown, lines)))
 
 
 class _NotStoredError(Exception):
