@@ -18,7 +18,6 @@ from html.parser import HTMLParser
 from pathlib import Path
 from types import SimpleNamespace
 
-import click
 import h5py
 import jinja2
 import meshio

@@ -72,7 +72,7 @@ COMMANDS = {
         RESULTS, "results", "archive", "Pack a finished study into one file, to be cited and computed again."
     ),
     "clean": Row(RESULTS, "results", "clean", "List what no study asks for any more, and remove it."),
-    "schema": Row(HOUSE, "study", "schema", "Print the JSON schema of studies, or renew it and the manual."),
+    "schema": Row(HOUSE, "study", "schema", "Print the JSON schema of studies, for editors."),
 }
 """Commands by name, in the order of the help; each is imported when it is called."""
 
