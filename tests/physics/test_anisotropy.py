@@ -11,7 +11,7 @@ from springtune.mechanics.moduli import PatchTest, affine_stiffness
 from springtune.mechanics.network import Network
 from springtune.mesh import MESH_TYPES, Mesh, lattice, signed_areas
 from springtune.mesh.groups import GroupedMesh
-from springtune.prediction import predict
+from springtune.prediction.choices import predict
 from springtune.problem.geometry import Beam
 from springtune.problem.materials import AnisotropicMaterial, Material, Rubber
 from springtune.scene.moduli import moduli

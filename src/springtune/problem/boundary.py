@@ -38,11 +38,6 @@ def side_edges(mesh: Mesh, side: Side) -> np.ndarray:
     return mesh.outline_edges(side.axis, side.place(*mesh.points.max(axis=0)))
 
 
-def loaded_edges(mesh: Mesh, kind: LoadKind) -> tuple[np.ndarray, int]:
-    """Return the edges (n, 2) of the loaded side of a box, and the axis of the force."""
-    return side_edges(mesh, kind.loaded), kind.along
-
-
 def held(mesh: Mesh, kind: LoadKind) -> np.ndarray:
     """Return the directions that a kind of load holds, see `springtune.problem.loads`."""
     return supported(box(mesh, (side for side, _ in kind.held)), kind.case)[0]
