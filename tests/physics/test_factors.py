@@ -18,7 +18,7 @@ from springtune.linalg.factors import (
     spread,
 )
 from springtune.linalg.multigrid import IndefiniteError, Multigrid, bilinear
-from springtune.mechanics.arc_length import follow
+from springtune.mechanics.continuation import follow
 from springtune.mechanics.network import PINNED, FollowerPressure, Network, successor
 from springtune.mechanics.statics import StaticProblem
 from springtune.mesh import MESH_TYPES

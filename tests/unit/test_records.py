@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from springtune.studies.runs import checked_json, driver, records, run_tasks, store
-from springtune.studies.runs import dependencies as code
+from springtune.studies.runs import keys as code
 from springtune.studies.runs.checked_json import ASIDE, DamagedError, hash_of
 from springtune.studies.runs.task_costs import TaskCosts, Watch
 
