@@ -161,16 +161,6 @@ def test_what_is_solved_lies_on_the_stable_path_from_rest(definition, kind, mesh
         assert np.linalg.norm(near.displacements - found.displacements) <= 1e-6 * size
 
 
-@pytest.mark.parametrize("length, kind", [(20.0, AXIAL), (20.0, BENDING), (4.0, BENDING)])
-def test_a_small_residual_of_an_ill_conditioned_network_is_not_taken_for_a_small_error(length, kind):
-    """Beams 200 and 1000 times as long as high: in the first of them a residual of 1e-10 goes with an error of 3e-5."""
-    mesh = MESH_TYPES["structured"](length, 0.02, 5e-3)
-    problem = StaticProblem(Network(mesh, held(mesh, kind), 0.5 * mesh.cells_per_edge), weights(mesh, kind))
-    found = problem.linear(1e-6)
-    assert found.converged and problem.judge(1e-6, found)[0] is Status.SOLVED
-    assert relative_error(problem, 1e-6, found) <= 2 * max(found.error_estimate, 1e-12)
-
-
 @pytest.mark.parametrize("contrast", [1e3, 1e6, 1e9, 1e12, 1e15])
 @pytest.mark.parametrize("kind", [AXIAL, BENDING])
 def test_stiffness_contrast_is_solved_or_reported(contrast, kind):

@@ -447,19 +447,6 @@ def test_searches_are_repeatable_and_better_than_their_start(name):
     assert misfit(np.log(first.relative / misfit.start)) < misfit(np.zeros(len(mesh.edges)))
 
 
-@pytest.mark.slow
-def test_adjoint_reaches_in_two_seconds_what_annealing_does_not_in_3000_evaluations():
-    mesh, material = MESH_TYPES["free"](0.04, 0.01, 1.15e-3), Material(1.0, 0.3, name="unit")
-    cases = patch_cases(mesh, material, 1.0)
-    misfit = Misfit(mesh, material, 1.0, cases)
-    found = {
-        "adjoint": DEFINITIONS["adjoint"].springs(mesh, material, 1.0),
-        "annealed": DEFINITIONS["annealed"].function(mesh, material, 1.0, cases, 3000),
-    }
-    left = {name: misfit(np.log(springs.relative / misfit.start)) for name, springs in found.items()}
-    assert left["adjoint"] < 0.5 * left["annealed"]
-
-
 # -- the stage ---------------------------------------------------------------------------------------------------------
 
 

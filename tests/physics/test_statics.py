@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import root
 
 from springtune.linalg.factors import SingularError
-from springtune.mechanics.network import FollowerPressure, Network
+from springtune.mechanics.network import Network
 from springtune.mechanics.newton import TOLERANCE
 from springtune.mechanics.statics import SMALLEST_STEP, StaticProblem
 from springtune.mesh import Mesh
@@ -47,18 +47,6 @@ def test_nonlinear_equals_an_independent_solver(mesh_type, s):
     assert np.abs(best.fun).max() <= 1e-10
     assert found.converged and found.residual <= TOLERANCE
     assert np.abs(found.displacements[free] - size * best.x).max() <= 1e-8 * size
-
-
-def test_newton_converges_quadratically():
-    """With a new tangent in each step the digits double, which only an exact tangent gives."""
-    problem, _ = beam_problem("free")
-    start = problem.linear(STRONG).displacements
-    residuals = [problem.newton(STRONG, start, max_factorizations=n, keep_tangent=0.0).residual for n in (1, 2)]
-    initial = problem.network.resistance(start) - STRONG * problem.load
-    first = np.linalg.norm(initial) / (STRONG * problem.load_norm)
-    digits = -np.log10([first, *residuals])
-    assert digits[0] > 0.5
-    assert digits[1] > 1.8 * digits[0] and digits[2] > 1.6 * digits[1]
 
 
 def test_load_steps_grow_and_start_where_the_path_points():
@@ -220,17 +208,6 @@ def test_a_path_is_unstable_from_its_first_negative_or_singular_tangent_on(told,
     np.testing.assert_equal(found.unstable_share, share)
 
 
-def test_a_mode_under_a_follower_pressure_is_its_stiffness_over_its_mass():
-    """An arch pressed flat resists by 2 (1 - L0) under a third of the mass; the pressure's pull on it is even."""
-    network = arch().network
-    follower = FollowerPressure(network.mesh, np.array([[1, 2], [2, 0]]), 3.0)
-    problem = StaticProblem(network, follower.forces(np.zeros((3, 2))), follower)
-    flat = np.array([[0.0, 0.0], [0.0, 0.0], [0.0, -0.1]])
-    factor = problem.factorize_tangent(1.0, flat)
-    np.testing.assert_allclose(problem.modes(1.0, flat, factor), [3 * 2 * (1 - np.hypot(1, 0.1))], rtol=1e-9)
-    assert problem.stability(1.0, flat, factor) == (1, False)
-
-
 def test_a_linear_residual_is_over_the_load():
     """A power of two times the load changes no digit of it."""
     one, _ = beam_problem("free")
@@ -251,17 +228,6 @@ def test_newton_starts_from_the_series_about_rest():
     assert errors[0] / errors[1] == pytest.approx(16, rel=0.1)
     assert linear[0] / linear[1] == pytest.approx(4, rel=0.1)
     assert errors[0] < 1e-2 * linear[0]
-
-
-def test_a_followers_load_at_rest_is_the_pattern():
-    """What stays as it is besides it is not lost, nor counted twice."""
-    network = arch().network
-    follower = FollowerPressure(network.mesh, np.array([[1, 2], [2, 0]]), 3.0)
-    rest, dead = np.zeros((3, 2)), np.array([[0.0, 0.0], [0.0, 0.0], [0.0, 5.0]])
-    problem = StaticProblem(network, follower.forces(rest) + dead, follower, dead=dead)
-    np.testing.assert_allclose(problem.load_at(rest), problem.load, rtol=1e-15)
-    alone = StaticProblem(network, follower.forces(rest), follower)
-    np.testing.assert_allclose(alone.load_at(rest), problem.load - network.reduce(dead), rtol=1e-15)
 
 
 @pytest.mark.parametrize(("stretch", "in_steps"), [(0.14, False), (0.16, True), (0.4, True)])
