@@ -392,30 +392,18 @@ class Body:
     def critical(self, force, judge=None):
         """Load nearest to rest, of the sign of `force`, at which the path loses its stability; None where it does not.
 
-        `force` is a guess from above. Between the last good point of the path and the first bad one the root of the
-        smallest eigenvalue is sought, within bounds; where there is none, at a limit point or where `judge` is asked
-        instead, the place is bisected.
+        `force` is a guess from above. Between the last good point of the path and the first bad one it is bisected.
         """
-        last, done, why = self.follow(force, judge=judge)
+        judge = judge or self.stable
+        last, low, why = self.follow(force, judge=judge)
         if not why:
             return None
-        low, high, here, there = done, min(1.0, done + 2 * CROSSED), None, None
-        small = 1e-10 * abs(self.lowest(np.zeros(self.size, LONG), 0.0)[0])
+        high = min(1.0, low + 2 * CROSSED)
         while high - low > 1e-9 * high:
             middle = 0.5 * (low + high)
-            if here is not None and there is not None:
-                middle = low + (high - low) * min(0.98, max(0.02, here / (here - there)))
-            found, value = self.newton(last, force * middle), None
-            if found is not None and self.change(found - last) <= 0.1:
-                if judge is None:
-                    value = self.lowest(found, force * middle)[0]
-                    if abs(value) <= small:
-                        return force * middle
-                elif judge(found, force * middle):
-                    low, last = middle, found
-                    continue
-            if value is not None and value > 0:
-                low, here, last = middle, value, found
+            found = self.newton(last, force * middle)
+            if found is not None and self.change(found - last) <= 0.1 and judge(found, force * middle):
+                low, last = middle, found
             else:
-                high, there = middle, value
+                high = middle
         return force * 0.5 * (low + high)
