@@ -9,12 +9,13 @@ from springtune.mechanics.continuation import buckling, follow, smallest_share
 from springtune.mechanics.network import Network
 from springtune.mechanics.statics import StaticProblem
 from springtune.mesh import MESH_TYPES, Mesh
-from springtune.problem.boundary import held, weights
+from springtune.problem.boundary import weights
 from springtune.problem.loads import AXIAL, BENDING, FACE, SHEAR
 from springtune.problem.materials import Material
 from springtune.problem.status import Status
 from springtune.reference.answers import elastica
-from springtune.springs import DEFINITIONS
+from springtune.scene.sheet import Sheet
+from springtune.springs import DEFINITIONS, Springs
 
 HEIGHT = 0.02
 
@@ -33,9 +34,8 @@ def scene(definition, kind, mesh_type, aspect, strain, nu, rows):
     length = aspect * HEIGHT
     mesh = MESH_TYPES[mesh_type](length, HEIGHT, HEIGHT / rows)
     springs = DEFINITIONS[definition].springs(mesh, Material(1e6, nu, name="sheet"), 1e-3)
-    network = Network(mesh, held(mesh, kind), springs.relative, springs.energies)
     side = {AXIAL: HEIGHT, BENDING: HEIGHT**2 / length / 6, FACE: length, SHEAR: length}[kind]
-    return StaticProblem(network, weights(mesh, kind)), strain * 1e6 * 1e-3 * side / springs.reference
+    return Sheet(mesh, 1e-3).problem(kind, springs), strain * 1e6 * 1e-3 * side / springs.reference
 
 
 def test_a_path_goes_through_a_limit_point():
@@ -56,9 +56,8 @@ def test_a_slender_column_buckles_at_eulers_load(definition):
     """Clamped-free, 200 x 10 mm in ten rows: linear triangles are 1 % too stiff in bending."""
     mesh = MESH_TYPES["structured"](0.2, 0.01, 1e-3)
     springs = DEFINITIONS[definition].springs(mesh, Material(210e9, 0.3, name="steel"), 1e-3)
-    network = Network(mesh, held(mesh, AXIAL), springs.relative, springs.energies)
     euler = np.pi**2 * 210e9 * 1e-3 * 0.01**3 / 12 / (4 * 0.2**2)
-    found, restriction = buckling(StaticProblem(network, weights(mesh, AXIAL)), -euler / springs.reference)
+    found, restriction = buckling(Sheet(mesh, 1e-3).problem(AXIAL, springs), -euler / springs.reference)
     assert found * springs.reference == pytest.approx(-euler, rel=0.02) and not restriction
 
 
@@ -168,7 +167,7 @@ def test_stiffness_contrast_is_solved_or_reported(contrast, kind):
     mesh = MESH_TYPES["structured"](0.1, 0.02, 5e-3)
     middle = mesh.points[mesh.edges].mean(axis=1)[:, 0]
     stiffness = 0.5 * mesh.cells_per_edge * np.where(middle // 0.02 % 2 == 0, 1.0, contrast)
-    problem = StaticProblem(Network(mesh, held(mesh, kind), stiffness), weights(mesh, kind))
+    problem = Sheet(mesh, 1.0).problem(kind, Springs(1.0, stiffness))
     found = problem.linear(1e-6)
     assert found.converged == (contrast <= 1e12)
     if found.converged:
@@ -242,7 +241,7 @@ def test_a_slender_cantilever_is_an_elastica(definition, slenderness, ratio):
     mesh = MESH_TYPES["structured"](length, height, height / 4)
     springs = DEFINITIONS[definition].springs(mesh, Material(1e6, 0.3, name="sheet"), 1e-3)
     pattern = weights(mesh, BENDING)
-    problem = StaticProblem(Network(mesh, held(mesh, BENDING), springs.relative, springs.energies), pattern)
+    problem = Sheet(mesh, 1e-3).problem(BENDING, springs)
     linear = float(np.tensordot(problem.slope, pattern, axes=2))
     s = ratio * length / (3 * linear)  # deflection F L^3 / 3 EI
     found = problem.nonlinear(s)

@@ -5,28 +5,39 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from springtune.mechanics.network import FollowerPressure, Network
+from springtune.mechanics.network import FollowerPressure
 from springtune.mechanics.newton import MODES
-from springtune.mechanics.statics import FAR, StaticProblem
+from springtune.mechanics.statics import FAR
 from springtune.mesh import MESH_TYPES
-from springtune.problem.boundary import held, measured, side_edges, weights
+from springtune.problem.boundary import measured
 from springtune.problem.geometry import Beam
 from springtune.problem.loads import FACE
 from springtune.problem.materials import Material
 from springtune.problem.status import Status
 from springtune.reference.small_strain import solve_small_strain
+from springtune.scene.sheet import Sheet
 from springtune.springs import DEFINITIONS
 
 BLOCK = Beam(0.2, 0.04, 1e-3, "200x40")
 FORCE = -20.0  # .1 MPa on 200 x 1 mm
 
 
-def block(definition, nu=0.5, size=2e-3, stiffness=None, mesh_type="structured", follower=False):
-    mesh = MESH_TYPES[mesh_type](0.2, 0.04, size)
+def pressed(definition, length, height, size, nu=0.3, stiffness=None, mesh_type="structured", follower=False):
+    """A sheet that stands on its lower side pressed from above, its mesh, and its reference stiffness."""
+    mesh = MESH_TYPES[mesh_type](length, height, size)
     springs = DEFINITIONS[definition].springs(mesh, Material(1e6, nu, name="rubber"), 1e-3, stiffness)
-    network = Network(mesh, held(mesh, FACE), springs.relative, springs.energies)
-    turning = FollowerPressure.of_side(mesh, side_edges(mesh, FACE.loaded), FACE.along) if follower else None
-    return StaticProblem(network, weights(mesh, FACE), turning), FORCE / springs.reference, measured(mesh, FACE)
+    return Sheet(mesh, 1e-3).problem(FACE, springs, follower), mesh, springs.reference
+
+
+def block(definition, nu=0.5, size=2e-3, **options):
+    problem, mesh, reference = pressed(definition, 0.2, 0.04, size, nu, **options)
+    return problem, FORCE / reference, measured(mesh, FACE)
+
+
+def column(definition, length, height, size, follower, mesh_type="structured"):
+    """A sheet that stands on its lower side, and the force over stiffness that would strain it by 1."""
+    problem, _, reference = pressed(definition, length, height, size, mesh_type=mesh_type, follower=follower)
+    return problem, -1e6 * 1e-3 * length / reference
 
 
 def middle(found, field):
@@ -101,15 +112,6 @@ def test_load_steps_under_a_follower_pressure_are_stable_where_its_own_share_of_
     assert problem.network.largest_change(found.displacements) > FAR
     assert found.converged and np.isnan(found.unstable_share)
     assert problem.judge(-s, found)[0] is Status.SOLVED
-
-
-def column(definition, length, height, size, follower, mesh_type="structured"):
-    """A sheet that stands on its lower side, and the force over stiffness that would strain it by 1."""
-    mesh = MESH_TYPES[mesh_type](length, height, size)
-    springs = DEFINITIONS[definition].springs(mesh, Material(1e6, 0.3, name="rubber"), 1e-3)
-    network = Network(mesh, held(mesh, FACE), springs.relative, springs.energies)
-    turning = FollowerPressure.of_side(mesh, side_edges(mesh, FACE.loaded), FACE.along) if follower else None
-    return StaticProblem(network, weights(mesh, FACE), turning), -1e6 * 1e-3 * length / springs.reference
 
 
 def frequencies(problem, s, displacements):
