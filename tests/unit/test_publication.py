@@ -34,7 +34,7 @@ CELL = {"beam": "200x40", "mesh_type": "free", "mesh_size": 2e-3, "material": "r
 CURVE = {"beam": "200x40", "mesh_type": "free", "material": "rubber", "load": "traction"}
 
 
-def write(path, change=lambda tree: None, **attributes):
+def write(path, **attributes):
     """A dataset of a study of all kinds, with a cell of each status."""
     tree = synthetic.dataset()
     data = tree.to_dataset()
@@ -46,7 +46,6 @@ def write(path, change=lambda tree: None, **attributes):
     data.mesh_size.attrs["units"] = "m"
     tree.dataset = data
     tree.attrs = ATTRIBUTES | attributes
-    change(tree)
     tree.to_netcdf(path, engine="h5netcdf")
     return path
 
@@ -150,17 +149,16 @@ def test_what_is_wrong_with_a_number_is_told_with_its_name(datasets, entry, told
 
 
 def test_values_of_mixed_kinds_are_shown_in_the_units_of_those_that_are_chosen(tmp_path):
-    def mixed(tree):
-        data = xr.Dataset(
-            {
-                "value": ("quantity", [0.024, 92.7e6, np.nan], {"units": "1", "units_variable": "quantity_units"}),
-                "quantity_units": ("quantity", ["m", "Pa", ""]),
-            },
-            {"quantity": ["tip", "stress", "nothing"]},
-        )
-        tree["mixed"] = xr.DataTree(data)
-
-    there = read([write(tmp_path / "mine.nc", mixed)])
+    data = xr.Dataset(
+        {
+            "value": ("quantity", [0.024, 92.7e6, np.nan], {"units": "1", "units_variable": "quantity_units"}),
+            "quantity_units": ("quantity", ["m", "Pa", ""]),
+        },
+        {"quantity": ["tip", "stress", "nothing"]},
+    )
+    tree = xr.DataTree.from_dict({"/": xr.Dataset(attrs=ATTRIBUTES), "/mixed": data})
+    tree.to_netcdf(tmp_path / "mine.nc", engine="h5netcdf")
+    there = read([tmp_path / "mine.nc"])
     share = {"variable": "mixed/value", "digits": 1}
     assert number(there, **share, unit="mm", at={"quantity": "tip"}) == "24.0"
     assert number(there, **share, unit="MPa", at={"quantity": "stress"}) == "92.7"
