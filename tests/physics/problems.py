@@ -3,7 +3,8 @@
 import numpy as np
 
 from springtune.mechanics.network import Network
-from springtune.mesh import MESH_TYPES
+from springtune.mechanics.statics import StaticProblem
+from springtune.mesh import MESH_TYPES, Mesh
 from springtune.problem.loads import AXIAL
 from springtune.scene.sheet import Sheet
 from springtune.springs import Springs
@@ -20,3 +21,11 @@ def beam_problem(mesh_type="structured", length=0.1, height=0.02, size=5e-3, rel
 def free_network(mesh, springs):
     """The network of springs on a mesh of which nothing is held."""
     return Network(mesh, np.zeros(mesh.points.shape, dtype=bool), springs.relative, springs.energies)
+
+
+def arch(stiffness=1.0, rise=0.1):
+    """Two springs from supports 2 m apart to a particle in the middle, so high above them (von Mises' truss)."""
+    mesh = Mesh(np.array([[-1.0, 0.0], [1.0, 0.0], [0.0, rise]]), np.array([[0, 1, 2]]))
+    held = np.array([[True, True], [True, True], [True, False]])
+    network = Network(mesh, held, stiffness * (mesh.edges != [0, 1]).any(axis=1))
+    return StaticProblem(network, np.array([[0.0, 0.0], [0.0, 0.0], [0.0, 1.0]]))

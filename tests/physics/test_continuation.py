@@ -17,16 +17,9 @@ from springtune.reference.answers import elastica
 from springtune.scene.sheet import Sheet
 from springtune.springs import DEFINITIONS, Springs
 
+from problems import arch
+
 HEIGHT = 0.02
-
-
-def truss(rise=0.2):
-    """Two springs that meet in a shallow apex, pushed down (von Mises)."""
-    mesh = Mesh(np.array([[-1.0, 0.0], [1.0, 0.0], [0.0, rise]]), np.array([[0, 1, 2]]))
-    pattern = np.zeros((3, 2))
-    pattern[2, 1] = 1.0
-    directions = np.array([[True, True], [True, True], [True, False]])
-    return StaticProblem(Network(mesh, directions, np.ones(3)), pattern)
 
 
 def scene(definition, kind, mesh_type, aspect, strain, nu, rows):
@@ -41,7 +34,7 @@ def scene(definition, kind, mesh_type, aspect, strain, nu, rows):
 def test_a_path_goes_through_a_limit_point():
     """F(w) = 2 k (l - L)/l (h + w): its largest value is where l^3 = b^2 L, and the tangent changes sign there."""
     rise = 0.2
-    path = follow(truss(rise), -1.0, increment=0.01, limit=0.19)
+    path = follow(arch(rise=rise), -1.0, increment=0.01, limit=0.19)
     w = path.displacements[:, 2, 1]
     rest = np.hypot(1.0, rise)
     length = np.hypot(1.0, rise + w)

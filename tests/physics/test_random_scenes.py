@@ -24,12 +24,6 @@ def wrong_snaps(seed, numbers):
     return {number: texts for number, texts in found.items() if texts}
 
 
-def quick(number):
-    """Whether a scene takes no second: neither springs by optimisation nor a critical load from whole spectra."""
-    scene = audit.draw(2, number)
-    return scene.definition != "adjoint" and (scene.load, scene.way) != ("follower-pressure", "critical")
-
-
 def test_scenes_that_were_wrong():
     assert wrong(1, FOUND) == {}
 
@@ -41,11 +35,6 @@ def test_a_few_snaps():
 @pytest.mark.slow
 def test_many_snaps():
     assert wrong_snaps(1, range(500)) == {}
-
-
-@pytest.mark.slow
-def test_few():
-    assert wrong(2, filter(quick, range(50))) == {}
 
 
 @pytest.mark.slow

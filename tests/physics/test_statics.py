@@ -14,7 +14,7 @@ from springtune.mechanics.statics import SMALLEST_STEP, StaticProblem
 from springtune.mesh import Mesh
 from springtune.problem.status import Status
 
-from problems import beam_problem
+from problems import arch, beam_problem
 
 STRONG = 400e3 / 181.87e6  # F/k of the paper's heaviest load [m]
 
@@ -72,14 +72,6 @@ def test_load_steps_grow_and_start_where_the_path_points():
         assert np.abs(start - end.displacements).max() <= 1e-3 * np.abs(end.displacements).max()
     assert found.iterations == sum(end.iterations for _, _, end in watched.calls)
     assert (found.displacements == steps[-1][2].displacements).all() and np.isnan(found.unstable_share)
-
-
-def arch(stiffness=1.0, rise=0.1):
-    """Two springs from supports 2 m apart to a particle in the middle, so high above them (von Mises' truss)."""
-    mesh = Mesh(np.array([[-1.0, 0.0], [1.0, 0.0], [0.0, rise]]), np.array([[0, 1, 2]]))
-    held = np.array([[True, True], [True, True], [True, False]])
-    network = Network(mesh, held, stiffness * (mesh.edges != [0, 1]).any(axis=1))
-    return StaticProblem(network, np.array([[0.0, 0.0], [0.0, 0.0], [0.0, 1.0]]))
 
 
 @pytest.mark.parametrize("beyond", [1.02, 1.3, 4.0])
