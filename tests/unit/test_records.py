@@ -10,7 +10,7 @@ from types import ModuleType, SimpleNamespace
 import h5py
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from springtune.studies.runs import checked_json, driver, records, run_tasks, store
@@ -38,6 +38,7 @@ def folder(tmp_path_factory):
 
 
 class TestSealed:
+    @settings(max_examples=40)
     @given(content=st.dictionaries(st.text(), JSON, max_size=4))
     def test_what_goes_in_comes_out(self, folder, content):
         checked_json.write(folder / "note.json", content)
