@@ -81,15 +81,6 @@ def test_outline_tests_are_exact_for_linear_triangles(nu, name):
     assert isotropic_moduli(np.linalg.inv(sheet)) == pytest.approx((1, nu), abs=1e-9)
 
 
-@pytest.mark.parametrize("name", SHAPES)
-def test_tractions_are_no_stiffer_than_displacements(name):
-    """Hill's bounds, of the same springs."""
-    mesh = shape(name, 4)
-    found = DEFINITIONS["lattice"].springs(mesh, UNIT, 1.0)
-    difference = PatchTest(mesh).stiffness(found) - np.linalg.inv(PatchTest(mesh).compliance(found))
-    assert np.linalg.eigvalsh(difference).min() > 0
-
-
 @pytest.mark.parametrize("definition", ["patch", "patch-area"])
 @pytest.mark.parametrize("name", SHAPES)
 def test_patch_makes_young_modulus_exact_on_any_outline(name, definition):
@@ -107,11 +98,6 @@ def test_springs_turn_with_the_mesh(angle, scale, definition):
     turned = Mesh(mesh.points @ turn + [3, -7], mesh.triangles)
     first, second = (DEFINITIONS[definition].springs(one, UNIT, 1.0) for one in (mesh, turned))
     assert second.reference * second.relative == pytest.approx(first.reference * first.relative, rel=1e-9)
-
-
-def test_patch_on_cooks_membrane():
-    """It once gave 15.1 for 24.0."""
-    assert abs(error("cook", 2, "patch")) < 0.025
 
 
 # -- springs fitted to them --------------------------------------------------------------------------------------------
