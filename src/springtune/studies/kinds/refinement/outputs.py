@@ -74,7 +74,7 @@ OUTPUTS = (
         figures=lambda study: {"refinement": {}},
         plot="studies.kinds.refinement.figures:refinement",
         tables=lambda study: REFINEMENT_TABLES,
-        write="studies.kinds.refinement.collect",
+        write="studies.kinds.refinement.collect:write",
         lack=needs("refinement", "shows refinements and the study has none; add a section 'refine'"),
     ),
 )
