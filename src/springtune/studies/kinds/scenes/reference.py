@@ -21,20 +21,27 @@ OF_TESTED = "has a uniaxial_test, and so Yeoh's law: its reference is 'yeoh-plan
 
 def run(content, costs):
     """Solve the missing references of a bundle."""
-    driver.solve_files(sys.modules[__name__], content, costs)
-    for task in content.get("interpolants", ()):
+    interpolants, others = _divided(content)
+    driver.solve_files(sys.modules[__name__], others, costs)
+    for task in interpolants:
         make_interpolant(Path(content["folder"]) / f"{task['key']}.h5", task, costs)
 
 
 def gone(content, key, why, limits):
     """Store the failed result of a reference beyond its limits."""
-    if driver.gone_of_files(sys.modules[__name__], content, key, why, limits):
-        return
+    interpolants, others = _divided(content)
+    driver.gone_of_files(sys.modules[__name__], others, key, why, limits)
     # What an interpolant cannot do goes into its own file.
-    for task in content.get("interpolants", ()):
+    for task in interpolants:
         if key in (task["key"], *task["problems"]):
             noted = failed(task, why) | {store.LIMITS: limits}
             store.add(Path(content["folder"]) / f"{task['key']}.h5", {key: noted})
+
+
+def _divided(content):
+    """Tasks of interpolants, and the content of a job without them."""
+    tasks = [task for file in content["files"] for task in file["tasks"] if "box" in task]
+    return tasks, content | {"files": [file for file in content["files"] if "box" not in file["tasks"][0]]}
 
 
 def solve(task):
