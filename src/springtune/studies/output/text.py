@@ -127,6 +127,12 @@ def markdown_table(heads: list[str], rows: Iterable[list[str]], left: int = 1) -
     return [f"| {' | '.join(line)} |" for line in (heads, rule, *rows)]
 
 
+def cell_number(value: SupportsFloat, form: str = ".3g", scale: float = 1.0, unit: str = "") -> str:
+    """Format a number of a table; empty if missing."""
+    number = scale * float(value)
+    return "" if math.isnan(number) else f"{number:{form}}{unit}".replace("-", "−")
+
+
 def decimals(values: Iterable[float], digits: int = 4, most: int = 8) -> int | None:
     """Decimals that show so many significant digits of a column; NaN is a missing number.
 

@@ -71,7 +71,7 @@ def _check(config, problems):
     if section.beam in config.beams:
         beam = config.beams[section.beam]
         check_particles(problems, ("stability", "mesh_size"), section.mesh_size, beam.length, beam.height)
-        side = min(config.beams[section.beam].length, config.beams[section.beam].height)
+        side = min(beam.length, beam.height)
         if max(section.mesh_size) > 0.3 * side:
             message = f"{1e3 * max(section.mesh_size):g} mm leaves few particles inside; give at most {300 * side:g} mm"
             problems.add(("stability", "mesh_size"), message)
@@ -82,16 +82,10 @@ def _expand(config, declared):
     section = config.stability
     if not section:
         return ()
+    beam, material = declared.beams[section.beam], declared.materials[section.material]
+    sizes = tuple(sorted(section.mesh_size))
     return tuple(
-        Experiment(
-            name,
-            declared.beams[section.beam],
-            declared.materials[section.material],
-            section.force,
-            definition,
-            section.mesh_type,
-            tuple(sorted(section.mesh_size)),
-        )
+        Experiment(name, beam, material, section.force, definition, section.mesh_type, sizes)
         for name in EXPERIMENTS
         if name in section.experiment
         for definition in (section.definition[:1] if name in ONCE else section.definition)
