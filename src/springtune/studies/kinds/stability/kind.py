@@ -1,13 +1,11 @@
 """Experiments on numerical stability: a study's section ``stability``."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Annotated
 
 from pydantic import Field
 
 from springtune.mesh import MESH_TYPES
-from springtune.problem.geometry import Beam
-from springtune.problem.materials import Material
 
 from ...config.checks import check_beam_material, check_density, check_for_triangles, check_known, check_particles
 from ...config.fields import BeamName, DefinitionName, Force, Length, MaterialName, MeshType, OneOrMore, one_of
@@ -16,7 +14,7 @@ from ...config.sections import Section, optional
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key
 from ...runs.stages import Task, stage
 from ..division import by_task
-from . import AXES, EXPERIMENTS, ONCE
+from . import AXES, EXPERIMENTS, ONCE, Experiment
 from .outputs import OUTPUTS
 
 ExperimentName = Annotated[str, one_of("experiment", EXPERIMENTS)]
@@ -41,19 +39,6 @@ class StabilityConfig(Section):
         validate_default=False,
         description="; ".join(f"`{name}`: {text}" for name, text in EXPERIMENTS.items()) + ". All of them without.",
     )
-
-
-@dataclass(frozen=True)
-class Experiment:
-    """An experiment on numerical stability, under a traction [N], on ascending edge lengths [m]."""
-
-    name: str
-    beam: Beam
-    material: Material
-    force: float
-    definition: str
-    mesh_type: str
-    mesh_sizes: tuple[float, ...]
 
 
 def _check(config, problems):
