@@ -19,8 +19,7 @@ from click.testing import CliRunner
 
 import springtune
 from springtune.cli import main
-from springtune.studies.output.browse.page import page
-from springtune.studies.output.browse.payload import packed
+from springtune.studies.output.browse.page import packed, page
 from springtune.studies.output.browse.server import Server
 
 from synthetic import dataset

@@ -26,7 +26,7 @@ from springtune.studies.kinds.samples.designs import DESIGNS, blocks
 from springtune.studies.kinds.samples.figures import plot_effects, plot_sobol
 from springtune.studies.kinds.samples.kind import MOST_SOLVED
 from springtune.studies.runs import store
-from springtune.studies.runs.orphans import orphans
+from springtune.studies.runs.rerun import orphans
 from springtune.studies.runs.stages import products
 from springtune.studies.runs.task_costs import TaskCosts
 

@@ -7,8 +7,7 @@ from springtune.problem.parameters import SWEPT
 from ...config.kind import distinct
 from ...output import labels, style
 from ...output.drawing import fitted, in_words
-from ...output.own_law import of_own_law
-from ...output.selection import at, cells, group, labelled_beam, labels_of, last_swept
+from ...output.selection import at, cells, group, labelled_beam, labels_of, last_swept, of_own_law
 from .figures import USUAL, by_beam, each, named, swept_words
 from .outputs import SCENE_LABELS, SWEPT_SHOWN
 

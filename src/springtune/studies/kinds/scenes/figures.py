@@ -8,8 +8,7 @@ from springtune.problem.parameters import with_unit
 from ...config.kind import distinct
 from ...output import labels, style
 from ...output.drawing import extent, fitted, in_words, largest, magnification, plane, spring_ends
-from ...output.own_law import own_law
-from ...output.selection import at, cells, choose, group, labelled_beam, labels_of, last_swept, shown_swept
+from ...output.selection import at, cells, choose, group, labelled_beam, labels_of, last_swept, own_law, shown_swept
 from .outputs import SCENE_LABELS, SENSITIVITY_LABELS
 
 # -- sensitivity curves ------------------------------------------------------------------------------------------------

@@ -7,8 +7,7 @@ from springtune.problem.loads import LOADS
 from springtune.problem.parameters import SWEPT
 
 from ...output.dataset import STATUS
-from ...output.own_law import OWN_LAWS, of_own_law
-from ...output.selection import records
+from ...output.selection import OWN_LAWS, of_own_law, records
 from .outputs import SWEPT_SHOWN, TABLE, stem
 
 ROW = ("beam", "mesh_size")
