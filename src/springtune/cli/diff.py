@@ -208,7 +208,7 @@ def _of_group(group: "GroupChanges", sides: Sequence[str], most: int | None) -> 
 
 
 def _place(group: "GroupChanges", labels: "Mapping[str, str | float]") -> str:
-    return cell_text(labels, {name: one.units for name, one in group.axes.items()})
+    return cell_text(labels, group.units)
 
 
 def _changes(found: "Comparison", changes: "list[Change]", sides: Sequence[str], most: int | None) -> list[str]:
@@ -270,7 +270,7 @@ def _name(group: str, variable: str) -> str:
 
 def _telling(group: "GroupChanges", labels: "dict[str, str | float]") -> "dict[str, str | float]":
     """Labels of dimensions with several labels."""
-    return {name: label for name, label in labels.items() if len(group.axes[name].labels) > 1}
+    return {name: label for name, label in labels.items() if group.sizes[name] > 1}
 
 
 def _value(value: float | str) -> str:

@@ -13,7 +13,7 @@ import click
 from click.core import ParameterSource
 
 from ..problem.parameters import MOST_SCENES, MOST_SCENES_VARIABLE
-from . import mesh_types
+from . import FAILED, WRONG, mesh_types
 
 if TYPE_CHECKING:
     from ..mesh import Mesh
@@ -26,15 +26,6 @@ if TYPE_CHECKING:
 
 SAID_FROM = 1_000_000
 """Number of particles above which a message says that the mesh is being made, which takes seconds."""
-
-WRONG, FAILED = 2, 1
-"""Exit codes: an option is wrong; the request cannot be met."""
-
-
-class WrongCall(click.ClickException):
-    """A command was called with wrong options."""
-
-    exit_code = WRONG
 
 
 class Unmet(ValueError):

@@ -9,8 +9,8 @@ import click
 from ..registry import NAME, NAME_RULE
 from ..safe_io.atomic import write_text
 from ..studies.output.text import aligned
-from . import examples, studies_here
-from .options import CONFIG_FOLDER, WrongCall, allow, loaded, max_scenes
+from . import WrongCall, examples, studies_here
+from .options import CONFIG_FOLDER, allow, loaded, max_scenes
 from .run import checkout_here, checkout_of_run, how_to_get_one
 
 
