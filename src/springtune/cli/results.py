@@ -1,6 +1,5 @@
 """Commands for results: info, export, clean, verify, browse and archive."""
 
-import json
 import tempfile
 from collections import defaultdict
 from collections.abc import Iterator
@@ -13,7 +12,7 @@ from click.core import ParameterSource
 
 from ..problem.status import Status
 from ..safe_io.escapes import shown
-from ..studies.output.text import aligned, bytes_text, label_text, paragraphs, without_numbers
+from ..studies.output.text import aligned, bytes_text, from_json, label_text, paragraphs, without_numbers
 from . import examples
 from .options import idle, studies
 
@@ -21,7 +20,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from ..studies.archive.contents import Contents
-    from ..studies.archive.reproduction import Checked, Reproduced
+    from ..studies.archive.reproduction import Reproduced
     from ..studies.config.model import Study
 
 REASONS = 5
@@ -154,20 +153,13 @@ def _provenance(tree: "xr.DataTree") -> list[str]:
         )
         files = f", {changed} changed files in git_diff" if changed else ""
         lines.append(f"  commit {attributes['git_commit']}{files}")
-    software = _json(attributes.get("software"))
+    software = from_json(attributes.get("software"))
     if software:
         lines.append("  " + ", ".join(f"{name} {version}" for name, version in software.items() if version != "none"))
     if attributes.get("host"):
         lines.append(f"  on {attributes['host']}")
-    lines += [f"  sha256 {digest}  {name}" for name, digest in _json(attributes.get("inputs")).items()]
+    lines += [f"  sha256 {digest}  {name}" for name, digest in from_json(attributes.get("inputs")).items()]
     return lines
-
-
-def _json(text: str | None) -> dict[str, str]:
-    try:
-        return dict(json.loads(text or "{}"))
-    except ValueError:
-        return {}
 
 
 @click.command(
@@ -429,10 +421,10 @@ def archive(
     if target.exists() and not force:
         raise click.ClickException(f"{target}: is there already; give --force, or another name by --out")
     if with_store:
-        click.echo(f"the store: {_size(stored_size(found, folder))} more, before it is packed")
+        click.echo(f"the store: {bytes_text(stored_size(found, folder))} more, before it is packed")
     chosen = {name: True for name, given in (("no_diff", no_diff), ("no_host", no_host)) if given}
     digest = write(found, folder, target, with_store, untracked, chosen, _tell_contents)
-    click.echo(f"{target}: {_size(target.stat().st_size)}, sha256 {digest}")
+    click.echo(f"{target}: {bytes_text(target.stat().st_size)}, sha256 {digest}")
     click.echo(f"check it: springtune verify {target}; compute it again: springtune verify {target} --reproduce")
 
 
@@ -440,7 +432,7 @@ def _tell_contents(found: "Contents") -> None:
     """Print what is packed, and what matters for computing it again."""
     from ..studies.archive.contents import DIFF, FOLDERS
 
-    click.echo(f"{found.folder}: packing {len(found.files)} files, {_size(found.size)}")
+    click.echo(f"{found.folder}: packing {len(found.files)} files, {bytes_text(found.size)}")
     code = found.code
     if not code.commit:
         endings = "; ".join(f"{name}/ {', '.join(known)}" for name, known in FOLDERS.items())
@@ -463,10 +455,6 @@ def _tell_contents(found: "Contents") -> None:
         click.echo("  computed on other machines, at least in part, of which no cores and no processor are told")
 
 
-def _size(count: int) -> str:
-    return f"{count / 1e6:.1f} MB" if count < 1e9 else f"{count / 1e9:.1f} GB"
-
-
 TOLD = 20
 """Most faulty files that are listed."""
 
@@ -479,8 +467,14 @@ def verified(path: Path, again: bool, fresh: bool) -> bool:
         found = check(path)
     except OSError as error:
         raise ValueError(f"{path}: cannot be read ({error.strerror}); give an archive") from None
-    _tell_checked(found)
+    click.echo(shown(f"{found.path}: {found.title}, study {found.study}, springtune {found.version}"))
+    click.echo(f"  sha256 {found.sha256}")
+    click.echo(f"  {found.files} files compared with their checksums, faults: {len(found.faults)}")
     if found.faults:
+        rows = [[name, why] for name, why in sorted(found.faults.items())]
+        click.echo(aligned(rows[:TOLD], 4))
+        if len(rows) > TOLD:
+            click.echo(f"    and {len(rows) - TOLD} more")
         if again:
             click.echo("  it is not computed again: it is not what was packed; get it again")
         return False
@@ -495,17 +489,6 @@ def verified(path: Path, again: bool, fresh: bool) -> bool:
             return _compared(reproduce(found, Path(folder), fresh, click.echo))
     except (OSError, ValueError) as error:
         raise ValueError(f"{path}: not reproduced: {error}") from None
-
-
-def _tell_checked(found: "Checked") -> None:
-    click.echo(shown(f"{found.path}: {found.title}, study {found.study}, springtune {found.version}"))
-    click.echo(f"  sha256 {found.sha256}")
-    click.echo(f"  {found.files} files compared with their checksums, faults: {len(found.faults)}")
-    rows = [[name, why] for name, why in sorted(found.faults.items())]
-    if rows:
-        click.echo(aligned(rows[:TOLD], 4))
-        if len(rows) > TOLD:
-            click.echo(f"    and {len(rows) - TOLD} more")
 
 
 def _compared(made: "Reproduced") -> bool:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import json
 from collections.abc import Collection, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
@@ -16,7 +15,7 @@ from springtune.problem.quantities import nearest
 
 from .alignment import joined, on_common_axes
 from .dataset import NOT_REQUESTED, flag_words, is_flagged
-from .text import NUMBER, without_numbers
+from .text import NUMBER, from_json, variable_name, without_numbers
 
 RELATIVE = 1e-6
 """Default relative tolerance."""
@@ -193,17 +192,6 @@ def compare(
     kept = {name: text for name, text in after.attrs.items() if not part or name in before.attrs}
     attributes, config = _attributes(before.attrs, kept)
     return Comparison(found, alone, attributes, config)
-
-
-def variable_name(group: str, variable: str) -> str:
-    """Name of a variable with its group; the root's name is left out.
-
-    Examples
-    --------
-    >>> variable_name("/", "force"), variable_name("/sensitivity", "displacement")
-    ('force', 'sensitivity/displacement')
-    """
-    return f"{group.strip('/')}/{variable}".lstrip("/")
 
 
 @dataclass(frozen=True)
@@ -485,7 +473,7 @@ def _attributes(
         (name, before.get(name, ""), after.get(name, "")) for name in TOLD_ATTRIBUTES
     ]
     for name in ("software", "inputs"):
-        parts = [_json(attributes.get(name)) for attributes in (before, after)]
+        parts = [from_json(attributes.get(name)) for attributes in (before, after)]
         names = {*parts[0]} & {*parts[1]} if name == "inputs" else {*parts[0], *parts[1]}
         pairs += [(one, parts[0].get(one, ""), parts[1].get(one, "")) for one in sorted(names)]
     further = sorted({str(name) for name in (*before, *after)} - UNTOLD - set(TOLD_ATTRIBUTES))
@@ -495,10 +483,3 @@ def _attributes(
             found[name] = str(old), str(new)
     texts = [str(attributes.get("config", "")).splitlines() for attributes in (before, after)]
     return found, list(difflib.unified_diff(texts[0], texts[1], "before", "after", lineterm=""))
-
-
-def _json(text: object) -> dict[str, object]:
-    try:
-        return dict(json.loads(str(text or "{}")))
-    except ValueError:
-        return {}

@@ -20,9 +20,9 @@ from springtune.safe_io.inputs import fault
 
 from . import dataset, reading
 from .alignment import on_common_axes
-from .comparison import MEASURED, OF_CELLS, RELATIVE, Tolerance, cell_dimensions, variable_name
+from .comparison import MEASURED, OF_CELLS, RELATIVE, Tolerance, cell_dimensions
 from .dataset import flag_words, is_flagged
-from .text import NUMBER, place_text
+from .text import NUMBER, place_text, variable_name
 
 DEFAULTS = {
     "/": ("status", "displacement", "deformation_error", "stiffness"),

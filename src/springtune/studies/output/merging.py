@@ -12,7 +12,7 @@ import xarray as xr
 from .alignment import joined, on_common_axes
 from .comparison import MEASURED, Tolerance, Values
 from .dataset import STATUS, nothing
-from .text import cell_text, number_text
+from .text import cell_text, number_text, variable_name
 
 SAME_VALUE = 1e-9
 """Relative difference below which values of a scene agree."""
@@ -120,6 +120,7 @@ class _Merger:
     def _variable(self, path: str, name: str, held: dict[int, xr.Dataset]) -> xr.Variable:
         arrays = {number: data[name] for number, data in held.items() if name in data}
         first_number, first = next(iter(arrays.items()))
+        full = variable_name(path, name)
         for number, array in arrays.items():
             for what, one, other in (
                 ("the dimensions", ", ".join(sorted(map(str, first.dims))), ", ".join(sorted(map(str, array.dims)))),
@@ -128,12 +129,12 @@ class _Merger:
             ):
                 if one != other:
                     raise ValueError(
-                        f"{_full(path, name)} has {what} ({one}) in {self.names[first_number]} and ({other}) in "
+                        f"{full} has {what} ({one}) in {self.names[first_number]} and ({other}) in "
                         f"{self.names[number]}; sweep the same parameters in both studies, and run them again"
                     )
         dims = [str(one) for one in first.dims]
         shape = [len(self.axes[path, one]) for one in dims]
-        self._check_size(path, name, dims, shape)
+        _check_size(full, dims, shape)
         empty, dtype = nothing([*arrays.values()])
         values = np.full(shape, empty, dtype)
         source = np.full(shape, -1, dtype="int32")
@@ -154,7 +155,7 @@ class _Merger:
                     at = tuple(int(one) for one in np.argwhere(both & (excess > 1.0))[0])
                     labels = {one: self.axes[path, one][own[n]] for one, own, n in zip(dims, places, at)}
                     said = (of_both.said(0, known[at]), of_both.said(1, own[at]))
-                    self._refuse(path, name, labels, (int(source[place][at]), number), said, of_both.units)
+                    self._refuse(path, full, labels, (int(source[place][at]), number), said, of_both.units)
             new = there & ~both
             values[place] = np.where(new, own, known)
             source[place] = np.where(new, number, source[place])
@@ -169,7 +170,7 @@ class _Merger:
     def _refuse(
         self,
         path: str,
-        name: str,
+        full: str,
         labels: dict[str, object],
         numbers: tuple[int, int],
         values: tuple[float | str, float | str],
@@ -182,21 +183,12 @@ class _Merger:
         if len(labels) == 1:
             (one,) = labels
             raise ValueError(
-                f"{one} '{at}' is two things: {_full(path, name)} is {two}; give one of them another label in its study"
+                f"{one} '{at}' is two things: {full} is {two}; give one of them another label in its study"
             )
         raise ValueError(
-            f"{_full(path, name)}{f' of {at}' if at else ''} is {two}; give what differs another label in its study, "
+            f"{full}{f' of {at}' if at else ''} is {two}; give what differs another label in its study, "
             f"leave the group out with tree.drop_nodes, or allow more than relative={self.relative:g}"
         )
-
-    def _check_size(self, path: str, name: str, dims: Sequence[str], shape: Sequence[int]) -> None:
-        size = 8.0 * float(np.prod(np.array(shape, dtype=float)))
-        if size > MOST_BYTES:
-            sizes = ", ".join(f"{one} {count}" for one, count in zip(dims, shape))
-            raise ValueError(
-                f"{_full(path, name)}: {size / 1e9:.3g} GB over all labels together ({sizes}); select what is needed "
-                "of each dataset first"
-            )
 
     def _group_attributes(self, path: str, held: dict[int, xr.Dataset], first: xr.Dataset) -> dict[str, object]:
         found: dict[str, object] = {}
@@ -231,8 +223,14 @@ class _Merger:
         return found
 
 
-def _full(path: str, name: str) -> str:
-    return name if path == "/" else f"{path[1:]}/{name}"
+def _check_size(full: str, dims: Sequence[str], shape: Sequence[int]) -> None:
+    size = 8.0 * float(np.prod(np.array(shape, dtype=float)))
+    if size > MOST_BYTES:
+        sizes = ", ".join(f"{one} {count}" for one, count in zip(dims, shape))
+        raise ValueError(
+            f"{full}: {size / 1e9:.3g} GB over all labels together ({sizes}); select what is needed of each dataset "
+            "first"
+        )
 
 
 def _value(value: float | str, units: str) -> str:
