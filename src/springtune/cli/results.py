@@ -3,6 +3,7 @@
 import tempfile
 from collections import defaultdict
 from collections.abc import Iterator
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,7 +13,7 @@ from click.core import ParameterSource
 
 from ..problem.status import Status
 from ..safe_io.escapes import shown
-from ..studies.output.text import aligned, bytes_text, from_json, label_text, paragraphs, without_numbers
+from ..studies.output.text import aligned, bytes_text, from_json, paragraphs, place_text, without_numbers
 from . import examples
 from .options import idle, studies
 
@@ -108,29 +109,19 @@ def _errors(tree: "xr.DataTree") -> list[str]:
     if "reference_applies" in root:
         counted = counted & (root.reference_applies == 1)
     error = root.deformation_error.where(counted).transpose(*root.deformation_error.dims)
-    several = error.sizes.get("kinematics", 1) > 1
-    rows: list[list[object]] = [
-        ["  definition", *(["kinematics"] if several else []), "cells", "median", "worst", "at"]
-    ]
-    for definition in error.definition.values:
-        for number in range(error.sizes.get("kinematics", 1)):
-            here = error.sel(definition=definition)
-            here = here.isel(kinematics=number) if "kinematics" in here.dims else here
-            values = here.values
-            if not np.isfinite(values).any():
-                continue
-            sizes = np.abs(values[np.isfinite(values)])
-            worst = np.unravel_index(np.nanargmax(np.abs(values)), values.shape)
-            axes = [(here[name], number) for name, number in zip(here.dims, worst)]
-            place = ", ".join(
-                label_text(str(one.name), one.values[at], one.attrs.get("units", "1")) for one, at in axes
-            )
-            kind = [str(error.kinematics.values[number])] if several else []
-            numbers = [len(sizes), f"{100 * np.median(sizes):.3g} %", f"{100 * values[worst]:+.3g} %"]
-            rows.append([f"  {definition}", *kind, *numbers, place])
-    right = range(1 + several, 4 + several)
+    by = [name for name in ("definition", "kinematics") if name in error.dims]
+    named = [name for name in by if name == "definition" or error.sizes[name] > 1]
+    rows: list[list[object]] = [["  definition", *named[1:], "cells", "median", "worst", "at"]]
+    for labels in product(*(error[name].values for name in by)):
+        here = error.sel(dict(zip(by, labels)))
+        sizes = np.abs(here.values[np.isfinite(here.values)])
+        if len(sizes):
+            worst = np.unravel_index(np.nanargmax(np.abs(here.values)), here.shape)
+            numbers = [len(sizes), f"{100 * np.median(sizes):.3g} %", f"{100 * here.values[worst]:+.3g} %"]
+            place = place_text(root, here.dims, map(int, worst))
+            rows.append([f"  {labels[0]}", *labels[1 : len(named)], *numbers, place])
     head = "errors, (network - reference) / |reference|, of scenes that are solved and within their reference's reach"
-    return [head, *aligned(rows, 0, right).splitlines()] if rows[1:] else []
+    return [head, *aligned(rows, 0, range(len(named), len(named) + 3)).splitlines()] if rows[1:] else []
 
 
 def _groups(tree: "xr.DataTree") -> list[str]:
