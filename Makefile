@@ -11,6 +11,8 @@ export STUDY
 VENV := .venv
 # Rules call `python`: it is to be the one that has springtune.
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
+# Jobs and tests are many processes: Python is to keep what it compiles.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: study report paper test test-browser test-faults test-fuzz test-versions test-reruns release-check slow lint licences docs site pictures lock test-slurm test-archive test-storage scale test-container million mutants clean
 

@@ -112,7 +112,7 @@ class TestPage:
         from springtune.studies.kinds.samples.collect import EFFECTS, SAMPLES, SOBOL
         from springtune.studies.kinds.samples.designs import PARAMETERS
         from springtune.studies.kinds.scenes.variables import BLOCK, FIELDS, FINITE_STRAIN, ROOT, SENSITIVITY
-        from springtune.studies.kinds.shapes.variables import SHAPE_FIELDS, SHAPES
+        from springtune.studies.kinds.shapes.collect import SHAPE_FIELDS, SHAPES
         from springtune.studies.kinds.stability.collect import STABILITY
         from springtune.studies.output.browse.page import views
 

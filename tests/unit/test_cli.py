@@ -23,7 +23,7 @@ from springtune.cli.recommendation import beam_subject, prediction_json, predict
 from springtune.handover.formats import ENDINGS, FOR_SIMULATORS
 from springtune.mesh import MESH_TYPES, Mesh, braced, write_mesh
 from springtune.mesh.types import MeshType
-from springtune.prediction import find_mesh
+from springtune.prediction.search import find_mesh
 from springtune.problem.geometry import AssumptionWarning, Beam
 from springtune.problem.materials import Material
 from springtune.reference.small_strain import solve_small_strain

@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     from ..handover.net import SpringNet
     from ..mesh import Mesh
     from ..mesh.groups import GroupedMesh
-    from ..prediction import Choice, MeshSearch
+    from ..prediction.choices import Choice
+    from ..prediction.search import MeshSearch
     from ..problem.geometry import Beam
     from ..problem.materials import Material
     from .options import AskedShape
@@ -118,8 +119,7 @@ class _Answer(NamedTuple):
 
 def _asked_beam(sheet: SheetOptions, loads: str | None) -> "tuple[Beam, Material, tuple[str, ...]]":
     """Beam, material and loads of the options."""
-    from ..prediction import CASES, check_beam
-    from ..prediction.choices import check_loads
+    from ..prediction.choices import CASES, check_beam, check_loads
 
     beam, material = sheet.asked_beam()
     try:
@@ -140,7 +140,8 @@ def _on_beam(
     """Recommend a definition for a mesh of a beam."""
     from ..handover.net import SpringNet
     from ..mesh import MESH_TYPES
-    from ..prediction import SOLVED, SOLVED_FROM_FILE, extrapolate, predict, references
+    from ..prediction.bands import extrapolate
+    from ..prediction.choices import SOLVED, SOLVED_FROM_FILE, predict, references
     from .recommendation import beam_subject, prediction_json, prediction_text, recommended
 
     mesh_type, edge = sheet.mesh_or_file, sheet.edge(beam)
@@ -182,7 +183,7 @@ def _on_beam(
 
 def _on_shape(asked: "AskedShape", springs_alone: bool) -> _Answer:
     """Recommend a definition for a mesh of a shape."""
-    from ..prediction import SOLVED_FROM_FILE, predict, shape_references
+    from ..prediction.choices import SOLVED_FROM_FILE, predict, shape_references
     from ..scene.statements import ShapeStatement
     from .recommendation import prediction_json, prediction_text, recommended, shape_subject
 
@@ -223,7 +224,7 @@ def _find_on_beam(
     """Find the mesh of a beam that keeps an error."""
     from ..handover.net import SpringNet
     from ..mesh import MESH_TYPES
-    from ..prediction import find_mesh
+    from ..prediction.search import find_mesh
     from .recommendation import beam_subject, search_json, search_text, size_text
 
     if sheet.size is not None:
@@ -253,7 +254,7 @@ def _find_on_beam(
 
 def _find_on_shape(asked: "AskedShape", error: str, springs_alone: bool) -> _Answer:
     """Find the mesh of a shape that keeps an error."""
-    from ..prediction import find_shape_mesh
+    from ..prediction.search import find_shape_mesh
     from ..scene.statements import ShapeStatement
     from .recommendation import search_json, search_text, shape_subject
 

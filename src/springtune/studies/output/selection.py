@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -123,6 +123,19 @@ def cells(present: xr.DataArray, names: Collection[str]) -> list[dict[str, Label
     there = present.any([dimension for dimension in present.dims if dimension not in names]).transpose(*names)
     labels = [there[name].values.tolist() for name in names]
     return [{name: labels[axis][place[axis]] for axis, name in enumerate(names)} for place in np.argwhere(there.values)]
+
+
+def records(data: xr.Dataset, present: xr.DataArray, names: Iterable[str]) -> list[dict[str, Any]]:
+    """Labels and variables of the present cells, the last dimension of `present` fastest.
+
+    Plain arrays: selecting each cell of a dataset takes a thousand times as long.
+    """
+    places = dict(zip(map(str, present.dims), np.nonzero(present.values)))
+    columns = {name: present[name].values[numbers].tolist() for name, numbers in places.items()}
+    for name in names:
+        dimensions = [str(one) for one in data[name].dims]
+        columns[name] = data[name].values[tuple(places[one] for one in dimensions)].tolist()
+    return [dict(zip(columns, row)) for row in zip(*columns.values())]
 
 
 def _listed(labels: Iterable[object]) -> str:

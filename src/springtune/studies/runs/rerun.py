@@ -160,7 +160,7 @@ def _browse_digest(study: "Study") -> str:
     }
     return hash_of(
         linked(study),
-        [stage_key(name) for name in ("studies.output.browse.page", *modules("outputs", "views"))],
+        [stage_key(name) for name in ("studies.output.browse.page", *modules("outputs"))],
         assets,
     )
 

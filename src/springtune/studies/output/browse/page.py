@@ -43,7 +43,7 @@ LIBRARY = ("bokeh", "bokeh-api")
 def views() -> dict[str, View]:
     """Views that the study kinds declare."""
     found: dict[str, View] = {}
-    for name in modules("outputs", "views"):
+    for name in modules("outputs"):
         found |= {view.group: view for view in getattr(imported(name), "VIEWS", ())}
     return found
 
