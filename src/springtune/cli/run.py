@@ -190,7 +190,10 @@ def _unlock(studies: "list[Study]", command: list[str]) -> None:
 
 
 def _remove_records(studies: "list[Study]", left_empty: dict[str, bool], remove: bool = True) -> bool:
-    """Remove the records of outdated jobs, so that Snakemake runs them; return whether there is nothing to do."""
+    """Remove the records of outdated jobs, so that Snakemake runs them; return whether there is nothing to do.
+
+    Without `remove`, as in a dry run, damaged files are named and all records stay.
+    """
     from ..studies.runs import rerun
 
     done = True
