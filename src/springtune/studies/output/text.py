@@ -2,10 +2,11 @@
 
 import csv
 import io
+import json
 import math
 import re
 from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, SupportsFloat
+from typing import TYPE_CHECKING, Any, SupportsFloat
 
 from springtune.problem.parameters import SWEPT, with_unit
 from springtune.safe_io.escapes import shown
@@ -94,6 +95,25 @@ NUMBER = re.compile(r"[+-]?[0-9][0-9.]*(e[+-]?[0-9]+)?")
 def without_numbers(text: str) -> str:
     """Replace numbers, so that messages that differ only in them are equal."""
     return NUMBER.sub("#", text)
+
+
+def variable_name(group: str, variable: str) -> str:
+    """Name of a variable with its group; the root's name is left out.
+
+    Examples
+    --------
+    >>> variable_name("/", "force"), variable_name("/sensitivity", "displacement")
+    ('force', 'sensitivity/displacement')
+    """
+    return f"{group.strip('/')}/{variable}".lstrip("/")
+
+
+def from_json(text: object) -> dict[str, Any]:
+    """Content of an attribute with JSON; empty if it has none."""
+    try:
+        return dict(json.loads(str(text or "{}")))
+    except ValueError:
+        return {}
 
 
 # -- tables ------------------------------------------------------------------------------------------------------------
