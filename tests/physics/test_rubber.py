@@ -15,6 +15,7 @@ from springtune.mesh import Mesh
 from springtune.problem.materials import RUBBER_TESTS, Rubber
 from springtune.problem.rubber import TensileTest, TestDataError, fit_rubber
 from springtune.springs import DEFINITIONS
+from springtune.springs.rubber import FLAT, SpringLaw
 
 TRELOAR = Path(__file__).parents[2] / "config/treloar"
 
@@ -52,6 +53,9 @@ def test_treloars_rubber():
     assert spread == pytest.approx({"uniaxial": 0.074, "equibiaxial": 0.225, "pure shear": 0.070}, abs=2e-3)
     one_term = fit_rubber(treloar("uniaxial"), terms=1)
     assert float(np.sqrt((errors(one_term, "uniaxial") ** 2).mean())) > 0.25
+    springs = SpringLaw.fitted(treloar("uniaxial"), 2)
+    spread = {test: float(np.sqrt((errors(springs, test, springs.largest) ** 2).mean())) for test in RUBBER_TESTS}
+    assert spread == pytest.approx({"uniaxial": 0.023, "equibiaxial": 0.180, "pure shear": 0.107}, abs=2e-3)
 
 
 @pytest.mark.parametrize("stretch", [1.05, 1.5, 3.0, 6.0])
@@ -112,6 +116,52 @@ def test_an_answer_beyond_the_data_says_so():
     assert said["120 N"].startswith("extrapolated: ") and "the data end at 55" in said["120 N"]
 
 
+def test_springs_alone_on_a_lattice():
+    """A lattice pulled along a row carries by its rows alone; equally in all directions 1.5 times that."""
+    law = SpringLaw.fitted(treloar("uniaxial"), 2)
+    q = np.linspace(1.05, 1.9, 10)
+    assert law.stress("equibiaxial", q) == pytest.approx(1.5 * law.stress("uniaxial", q))
+    assert np.isnan(law.stress("uniaxial", FLAT)) and law.largest < FLAT
+    # At small strain nu = 1/3: E, E / (1 - nu) and E / (1 - nu^2) of a lattice.
+    slopes = [float(law.stress(test, 1 + 1e-6)) for test in RUBBER_TESTS]
+    assert slopes[1] / slopes[0] == pytest.approx(3 / 2, rel=1e-4)
+    assert slopes[2] / slopes[0] == pytest.approx(9 / 8, rel=1e-4)
+
+
+def test_a_row_of_springs_gives_back_its_law():
+    """Three terms s - s^-p, of p = 2, 5 and 8, from a test that goes on after the lattice lies flat."""
+    terms, q = np.array([0.3e6, 0.2e6, 0.1e6]), np.linspace(1.02, 2.4, 70)
+    stress = terms @ [q - q**-2, q - q**-5, q - q**-8]
+    law = SpringLaw.fitted(TensileTest(q, stress))
+    assert law.coefficients == pytest.approx(terms, rel=1e-6) and law.largest == q[q < 2].max()
+    soft = SpringLaw.fitted(TensileTest(q, 1e-6 * stress))  # what is stable is so in any unit
+    assert soft.coefficients == pytest.approx(1e-6 * terms, rel=1e-6)
+    four, three = ([*range(count), -2, -1] for count in (4, 3))  # and two beyond
+    assert len(SpringLaw.fitted(TensileTest(q[four], stress[four])).coefficients) == 3
+    with pytest.raises(TestDataError, match="3 terms need more than 3 points below a stretch of 2,"):
+        SpringLaw.fitted(TensileTest(q[three], stress[three]))
+    with pytest.raises(TestDataError, match="the law of 2 terms is unstable"):
+        SpringLaw.fitted(TensileTest(q, 1e6 * np.exp(-3 * q)), 2)
+    with pytest.raises(TestDataError, match="the law of 2 terms is unstable"):
+        SpringLaw.fitted(TensileTest(q, np.exp(-3 * q)), 2)
+
+
+@pytest.mark.parametrize(("test", "across"), [("equibiaxial", 1.0), ("pure shear", 0.0)])
+def test_stress_of_a_lattice_is_the_derivative_of_its_springs_energy(test, across):
+    """A row spring and two oblique ones for each particle; the rows apart by the other stretch."""
+    law, q, step = SpringLaw((0.3, 0.2, 0.1)), np.linspace(1.1, 1.9, 5), 1e-5
+
+    def energy(along, other):
+        lengths = np.array([along, *2 * [np.sqrt(along**2 + 3 * other**2) / 2]])
+        return sum(
+            a * (lengths**2 / 2 + lengths ** (1 - p) / (p - 1)).sum(0) for a, p in zip((0.3, 0.2, 0.1), (2, 5, 8))
+        )
+
+    other = 1 + across * (q - 1)
+    slope = (energy(q + step, other) - energy(q - step, other)) / (2 * step)
+    assert law.stress(test, q) == pytest.approx(slope, rel=1e-8)
+
+
 HEAD = "stretch,nominal stress [MPa]\n"
 
 
@@ -146,6 +196,10 @@ def test_another_material_and_terms_are_refused():
         DEFINITIONS["yeoh"].springs(mesh, springtune.Material("1 MPa", 0.5, name="cork"), 1e-3)
     with pytest.raises(ValueError, match="terms: 4"):
         fit_rubber(TRELOAR / "uniaxial.csv", terms=4)
+    with pytest.raises(ValueError, match="terms: 0"):
+        SpringLaw.fitted(TRELOAR / "uniaxial.csv", 0)
+    with pytest.raises(TestDataError, match="needs? more|need more than"):
+        SpringLaw.fitted(TensileTest(np.array([1.5, 3.0, 4.0, 5.0]), np.array([1.0, 2, 3, 4])), 1)
 
 
 def test_a_net_of_fitted_springs_is_read_as_it_was_written(tmp_path):

@@ -99,6 +99,32 @@ def told(test: TensileTest | str | Path) -> TensileTest:
     return test if isinstance(test, TensileTest) else TensileTest.read(test)
 
 
+def _weights(test: TensileTest) -> np.ndarray:
+    """Of relative errors."""
+    size = np.abs(test.stress)
+    return 1 / np.maximum(size, LEAST_SHARE * size.max())
+
+
+def fit(columns: np.ndarray, test: TensileTest) -> tuple[float, ...]:
+    """Return coefficients of stress `columns` (n, n_terms) by least squares of relative errors."""
+    weights = _weights(test)
+    scaled = columns * weights[:, None]
+    sizes = np.linalg.norm(scaled, axis=0)
+    found = np.linalg.lstsq(scaled / sizes, test.stress * weights, rcond=None)[0] / sizes
+    return tuple(float(f"{one:.{FIT_DIGITS}g}") for one in found)
+
+
+def relative_error(stress: np.ndarray, test: TensileTest) -> float:
+    """Root mean square of the relative errors of a law's stresses at the stretches of a test [1], to six digits."""
+    return float(f"{np.sqrt(((stress / test.stress - 1) ** 2).mean()):.6g}")
+
+
+def check_terms(terms: object, most: int) -> None:
+    """Refuse what is no number of terms."""
+    if isinstance(terms, bool) or not isinstance(terms, int) or not 1 <= terms <= most:
+        raise ValueError(f"terms: {terms!r} is not a number of terms; give 1 to {most}")
+
+
 def fit_rubber(
     uniaxial: TensileTest | str | Path,
     *,
@@ -157,18 +183,11 @@ def fit_rubber(
     solved: 108 mm
     """
     test = told(uniaxial)
-    if isinstance(terms, bool) or not isinstance(terms, int) or not 1 <= terms <= MOST_TERMS:
-        raise ValueError(f"terms: {terms!r} is not a number of terms; give 1 to {MOST_TERMS}")
+    check_terms(terms, MOST_TERMS)
     q = test.stretch
     excess = Rubber.excess("uniaxial", q)
     columns = np.stack([2 * (q - q**-2) * n * excess ** (n - 1) for n in range(1, terms + 1)], axis=1)
-    # Least squares of relative errors.
-    size = np.abs(test.stress)
-    weights = 1 / np.maximum(size, LEAST_SHARE * size.max())
-    scaled = columns * weights[:, None]
-    sizes = np.linalg.norm(scaled, axis=0)
-    fitted = np.linalg.lstsq(scaled / sizes, test.stress * weights, rcond=None)[0] / sizes
-    found = tuple(float(f"{one:.{FIT_DIGITS}g}") for one in fitted)
+    found = fit(columns, test)
     if not found[0] > 0:
         raise TestDataError(f"{test.name}: fits a modulus that is not above zero; give points of small stretches, too")
     law = Rubber(found, float(f"{excess.max():.{FIT_DIGITS}g}"), (), density, name)
@@ -178,8 +197,7 @@ def fit_rubber(
         for kind, other in (("equibiaxial", equibiaxial), ("pure shear", pure_shear))
         if other is not None
     }
-    relative = {kind: law.stress(kind, one.stretch) / one.stress - 1 for kind, one in data.items()}
-    errors = tuple((kind, float(f"{np.sqrt((error**2).mean()):.6g}")) for kind, error in relative.items())
+    errors = tuple((kind, relative_error(law.stress(kind, one.stretch), one)) for kind, one in data.items())
     return replace(law, test_errors=errors)
 
 
