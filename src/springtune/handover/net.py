@@ -493,7 +493,8 @@ def _in_words(errors: dict[str, float | str], known: Mapping[str, Any]) -> dict[
 def _errors_on_shape(scene: Scene, springs: Springs) -> dict[str, float | str]:
     """Error by quantity, linear kinematics against the reference of small strain; or why it is not computed."""
     # Here, since finite elements take half a second to import.
-    from ..prediction.choices import QuantityReference, ReferenceNotConvergedError, errors_under, shape_references
+    from ..prediction.choices import QuantityReference, errors_under, shape_references
+    from ..reference.small_strain import ReferenceNotConvergedError
 
     if why := _too_many(scene.sheet):
         return dict.fromkeys([one.name for one in scene.case.quantities], why)
