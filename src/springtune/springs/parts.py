@@ -12,7 +12,7 @@ with equal materials they give nearly what one material gives.
 """
 
 from collections.abc import Mapping
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,9 +26,6 @@ from .base import DefinitionError, Springs
 
 if TYPE_CHECKING:
     from ..mechanics.energies import Energy
-
-CELL_FIELDS = "points", "corners"
-"""Fields of an energy that say where its cells are."""
 
 
 def derive_by_parts(
@@ -110,8 +107,7 @@ def _law(energy: "Energy") -> tuple[object, ...]:
 
     Rubber laws may differ in their terms and in their range of data.
     """
-    names = [part.name for part in fields(energy) if part.name not in (*CELL_FIELDS, "coefficients", "largest")]
-    values = [getattr(energy, name) for name in names]
+    values = [value for name, value in energy.moduli.items() if name not in ("coefficients", "largest")]
     return tuple(value.shape[1:] if isinstance(value, np.ndarray) else value for value in values if value is not None)
 
 
@@ -123,18 +119,17 @@ def _joined(mesh: Mesh, parts: "list[tuple[Energy, np.ndarray, float]]") -> "Ene
     cells = np.concatenate([where for _, where, _ in parts])
     order = np.argsort(cells)
     moduli: dict[str, Any] = {}
-    for part in fields(first):
-        own = [getattr(energy, part.name) for energy, _, _ in parts]
-        if part.name == "largest":  # a range of data, not a modulus
+    for name in first.moduli:
+        own = [energy.moduli[name] for energy, _, _ in parts]
+        if name == "largest":  # a range of data, not a modulus
             own = [np.broadcast_to(one, len(where)) for one, (_, where, _) in zip(own, parts)]
-            moduli[part.name] = np.concatenate(own)[order]
+        elif own[0] is None:  # and so in all parts, see `_law`
             continue
-        if part.name in CELL_FIELDS or not isinstance(own[0], np.ndarray):  # which is none in all parts, see `_law`
-            continue
-        if part.name == "coefficients":  # of laws with fewer terms the others are zero
+        else:  # what an energy has besides its cells is in proportion to its stiffness
+            own = [scale * one for one, (_, _, scale) in zip(own, parts)]
+        if name == "coefficients":  # of laws with fewer terms the others are zero
             most = max(one.shape[1] for one in own)
             own = [np.pad(one, ((0, 0), (0, most - one.shape[1]))) for one in own]
-        # What an energy has besides its cells is in proportion to its stiffness.
-        moduli[part.name] = np.concatenate([scale * one for one, (_, _, scale) in zip(own, parts)])[order]
+        moduli[name] = np.concatenate(own)[order]
     corners = mesh.cells[first.corners.shape[1]][cells[order]]
     return replace(first, points=mesh.points, corners=corners, **moduli)
