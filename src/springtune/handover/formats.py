@@ -348,10 +348,6 @@ LINE_NAMES = {"rest_lengths": "rest_length", "stiffness": "stiffness"}
 """Names of arrays in ParaView."""
 
 
-def _write_vtu(path: Path, net: Net) -> None:
-    write_vtu_with(path, net, {}, {})
-
-
 def write_vtu_with(
     path: str | Path,
     net: Net,
@@ -480,13 +476,10 @@ def _read_h5(path: Path) -> Read:
 def _for_simulator(program: str, text: Callable[[Net], str]) -> "_Format":
     """Format of a simulator, which is not read."""
 
-    def write_it(path: Path, net: Net) -> None:
-        write_text(path, text(net))
-
     def refuse(path: Path) -> Read:
         raise ValueError(f"it is for {program}; read the springs from .json, .h5, .csv or .vtu")
 
-    return _Format(write_it, refuse)
+    return _Format(lambda path, net: write_text(path, text(net)), refuse)
 
 
 class _Format(NamedTuple):
@@ -499,7 +492,7 @@ class _Format(NamedTuple):
 _FORMATS = {
     ".csv": _Format(_write_csv, _read_csv),
     ".json": _Format(_write_json, _read_json),
-    ".vtu": _Format(_write_vtu, _read_vtu),
+    ".vtu": _Format(lambda path, net: write_vtu_with(path, net, {}, {}), _read_vtu),
     ".h5": _Format(_write_h5, _read_h5),
 }
 
