@@ -11,6 +11,8 @@ export STUDY
 VENV := .venv
 # Rules call `python`: it is to be the one that has springtune.
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
+# Jobs and tests are many processes: Python is to keep what it compiles.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: study report paper test test-browser test-faults test-fuzz test-versions test-reruns release-check slow lint licences docs site pictures lock test-slurm test-archive test-storage scale test-container million mutants clean
 
@@ -106,7 +108,7 @@ licences: $(VENV)/.test
 
 # The configuration's schema and manual, from the models that validate it.
 docs: $(VENV)/.run
-	springtune schema --write
+	python tools/manual.py
 
 # The pages, the names' docstrings and the examples as a site: build/site/index.html. An example reads the quick study.
 site: $(VENV)/.test results/quick/dataset.nc

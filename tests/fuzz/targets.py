@@ -18,7 +18,6 @@ from html.parser import HTMLParser
 from pathlib import Path
 from types import SimpleNamespace
 
-import click
 import h5py
 import jinja2
 import meshio
@@ -542,10 +541,10 @@ def read_archive(made):
     path, rewritten = made
     try:
         whole = verified(path, again=False, fresh=False)
-    except click.ClickException as error:
-        if "\n" in error.message:
-            raise Wrong(f"is refused in several lines: {error.message[:300]!r}") from None
-        raise Refused(error.message) from None
+    except ValueError as error:
+        if "\n" in str(error):
+            raise Wrong(f"is refused in several lines: {str(error)[:300]!r}") from None
+        raise Refused(str(error)) from None
     if whole and not rewritten:
         with zipfile.ZipFile(path) as archive, zipfile.ZipFile(io.BytesIO(_archive())) as sound:
             if any(archive.read(name) != sound.read(name) for name in sound.namelist()):

@@ -181,10 +181,7 @@ def _unlock(studies: "list[Study]", command: list[str]) -> None:
     disk = os.statvfs(here)
     if disk.f_blocks and not disk.f_bavail:
         raise click.ClickException(f"{here}: the disk is full; make room, then call the same command again")
-    try:
-        killed = [one.name for one in studies if locks.check_idle(_results(one))]
-    except locks.LockedError as error:
-        raise click.ClickException(str(error)) from None
+    killed = [one.name for one in studies if locks.check_idle(_results(one))]
     if killed:
         subprocess.run(command, check=False, capture_output=True)
         locks.forget()
