@@ -17,7 +17,7 @@ Examples
 
 from .cells import Mesh, MeshError, corner_angles, quality, signed_areas
 from .formats import read_beam_mesh, read_mesh, write_mesh
-from .outlines import free
+from .free import free
 from .rows import ROW_HEIGHT, alternating, braced, isosceles, lattice, right, row_height, structured
 from .types import MESH_TYPES, MeshType, mesh_type
 

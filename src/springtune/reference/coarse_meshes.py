@@ -18,8 +18,8 @@ import numpy as np
 from scipy import spatial
 
 from ..mesh.cells import signed_areas
+from ..mesh.free import triangulate, upright
 from ..mesh.groups import GroupedMesh
-from ..mesh.outlines import triangulate, upright
 from ..mesh.sides import OutlineSide, Point
 from ..problem.shapes import Shape
 from .small_strain import ELEMENT_GROWTH, SHRINKAGE
