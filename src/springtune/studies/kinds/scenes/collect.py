@@ -141,7 +141,7 @@ def _scenes(study, folder, root, block, fields, objections):
     arrays, known = ["face_profile"] * (block is not None), set(root.data.data_vars)
     shown = plan.shown_scenes(study) if fields else ()
     for mesh, scenes in plan.scenes_by_mesh(study).items():
-        names = plan.solved_keys(study, mesh, calibration)
+        names = plan.solved_keys(study, mesh, calibration)  # in the store a result's name is its key
         path = folder / "solutions" / f"{plan.stem(mesh)}.h5"
         results = store.read(path, set(names), arrays)
         kept = {fields_key(name) for scene, name in zip(scenes, names) if scene in shown}
