@@ -53,18 +53,15 @@ def solve(task):
 def _finite(task):
     """Result at finite strain."""
     # Here, since few studies need it.
-    from springtune.reference.finite_strain import FiniteStrainError, IncompressibleError, solve_neo_hooke, solve_yeoh
+    from springtune.reference.finite_strain import FiniteStrainError, solve_finite_strain
 
     beam, material, kind = Beam(**task["beam"]), material_of(task["material"]), LOAD_KINDS[task["load"]]
     tested = isinstance(material, Rubber)
     if tested != (task["law"] == "yeoh"):
         return {"message": f"material {OF_TESTED if tested else NOT_TESTED}"}
     try:
-        if tested:
-            solution = solve_yeoh(beam, material, task["force"], kind, task["follower"])
-        else:
-            solution = solve_neo_hooke(beam, material, task["force"], kind, task["plane"], task["follower"])
-    except (FiniteStrainError, IncompressibleError) as error:
+        solution = solve_finite_strain(beam, material, task["force"], kind, task["plane"], task["follower"])
+    except FiniteStrainError as error:
         return {"message": str(error)}
     names = ("displacement", "mean_displacement", "error_estimate", "positions", "profile")
     return {name: getattr(solution, name) for name in names} | {"message": ""}
