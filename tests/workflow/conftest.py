@@ -1,5 +1,6 @@
 """A study run through Snakemake in a folder of its own."""
 
+import json
 import os
 import shutil
 import subprocess
@@ -17,22 +18,19 @@ class Run:
     """Where a study runs, and how."""
 
     folder: Path
+    forks: subprocess.Popen
 
     def snakemake(self, config, *arguments):
         """Exit code and output of a run of the repository's workflow in this folder."""
-        command = [
-            sys.executable,
-            "-m",
-            "snakemake",
-            "--snakefile",
-            REPOSITORY / "Snakefile",
-            "--directory",
-            self.folder,
-        ]
-        command += ["--workflow-profile", REPOSITORY / "workflow/profiles/default", "--cores", "2"]
+        command = ["--snakefile", REPOSITORY / "Snakefile", "--directory", self.folder, "--cores", "2"]
+        command += ["--workflow-profile", REPOSITORY / "workflow/profiles/default"]
         command += ["--configfile", self.folder / config, *arguments]
-        done = subprocess.run(list(map(str, command)), cwd=self.folder, capture_output=True, text=True)
-        return done.returncode, done.stdout + done.stderr
+        log = self.folder / "output.log"
+        log.unlink(missing_ok=True)
+        told = {"arguments": list(map(str, command)), "folder": str(self.folder), "log": str(log)}
+        self.forks.stdin.write(json.dumps(told | {"environment": dict(os.environ)}) + "\n")
+        self.forks.stdin.flush()
+        return int(self.forks.stdout.readline()), log.read_text()
 
     def springtune(self, config, *arguments):
         """Exit code and output of `springtune run` in this folder, on two cores."""
@@ -50,12 +48,21 @@ class Run:
         return {str(path.relative_to(self.folder)): path.stat().st_mtime_ns for path in self.folder.glob(pattern)}
 
 
+@pytest.fixture(scope="session")
+def forks():
+    """A process that has imported Snakemake."""
+    command = [sys.executable, Path(__file__).with_name("forks.py")]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as server:
+        yield server
+        server.stdin.close()
+
+
 @pytest.fixture(scope="module")
-def run(tmp_path_factory):
+def run(tmp_path_factory, forks):
     """An empty folder to run studies in, with the printed values beside them."""
     folder = tmp_path_factory.mktemp("run")
     shutil.copy(REPOSITORY / "config/paper_tables.csv", folder)
-    return Run(folder)
+    return Run(folder, forks)
 
 
 @pytest.fixture(scope="session")
