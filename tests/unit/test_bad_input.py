@@ -10,6 +10,7 @@ import zlib
 
 import numpy as np
 import pytest
+import xarray as xr
 from click.testing import CliRunner
 
 import springtune as st
@@ -30,7 +31,9 @@ from springtune.mesh.formats import read_shape
 from springtune.safe_io.inputs import virtual_memory
 from springtune.studies.output import reading
 from springtune.studies.output.browse.page import page
+from springtune.studies.output.dataset import write
 
+from synthetic import dataset
 from tables import STUDIES
 
 BEAM, STEEL = st.Beam("100 mm", "20 mm"), st.Material("210 GPa", 0.3)
@@ -505,15 +508,17 @@ class TestOfOtherKinds:
 
 
 class TestDatasets:
+    @pytest.fixture(scope="class")
+    def sound(self, tmp_path_factory):
+        """A dataset of two groups."""
+        path = tmp_path_factory.mktemp("sound") / "dataset.nc"
+        groups = {node.path: node.to_dataset(inherit=False) for node in dataset("fields", "moduli").subtree}
+        write(path, groups, {"springtune_version": "1", "study": "x"})
+        return path
+
     @pytest.fixture
-    def path(self, tmp_path):
-        from springtune.studies.output.dataset import write
-
-        from synthetic import dataset
-
-        groups = {node.path: node.to_dataset(inherit=False) for node in dataset().subtree}
-        write(tmp_path / "dataset.nc", groups, {"springtune_version": "1", "study": "x"})
-        return tmp_path / "dataset.nc"
+    def path(self, sound, tmp_path):
+        return shutil.copy(sound, tmp_path / "dataset.nc")
 
     def test_links_that_are_none_are_refused(self, path):
         """The library of netCDF ended the process by SIGSEGV on it."""
@@ -631,8 +636,12 @@ class TestDatasets:
                     call(path)
 
     @pytest.mark.parametrize("count", [pytest.param(20_000, marks=pytest.mark.slow), 140_000])
-    def test_texts_that_are_one_text_many_times_take_no_more_than_a_gigabyte(self, path, count):
-        """In HDF5 a text is a place in the file, and many cells may have the same: 0.2 MB stood for gigabytes."""
+    def test_texts_that_are_one_text_many_times_take_no_more_than_is_allowed(self, path, count, monkeypatch):
+        """In HDF5 a text is a place in the file, and many cells may have the same: 0.2 MB stood for gigabytes.
+
+        The limit is a fifth of the usual one here.
+        """
+        monkeypatch.setattr(reading, "MOST_HELD", 2e8)
         import h5py
 
         h5netcdf = pytest.importorskip("h5netcdf")
@@ -641,22 +650,18 @@ class TestDatasets:
                 file.dimensions[f"n_{name}"] = length
                 file.create_variable(name, (f"n_{name}",), h5py.string_dtype(), chunks=(length,))
         with h5py.File(path, "r+") as file:
-            file["one"][0] = "x" * (2_500_000_000 // count)
+            file["one"][0] = "x" * (500_000_000 // count)
             _, place = file["one"].id.read_direct_chunk((0,))
             file["many"].id.write_direct_chunk((0,), place * count)
         before = virtual_memory()
-        with pytest.raises(ValueError, match="more than 1 GB|cannot be read"), st.open(path) as tree:
+        with pytest.raises(ValueError, match="more than 0.2 GB|cannot be read"), st.open(path) as tree:
             tree["many"].load()
-        with pytest.raises(ValueError, match="more than 1 GB|cannot be read|is damaged"):
+        with pytest.raises(ValueError, match="more than 0.2 GB|cannot be read|is damaged"):
             page(path)
-        assert virtual_memory() < before + 1.2e9
+        assert virtual_memory() < before + 0.3e9
 
     def test_a_large_dataset_of_texts_and_fields_opens_at_once(self, tmp_path):
         """As it was opened, each text took the room of the longest one: 2 GB for a file of 28 MB."""
-        import xarray as xr
-
-        from springtune.studies.output.dataset import write
-
         count = 150_000
         texts = np.full(count, "", dtype=object)
         texts[::1000] = "x" * 2000  # 1.2 GB at one width

@@ -13,6 +13,13 @@ import pytest
 REPOSITORY = Path(__file__).parents[2]
 
 
+def called(command, folder, **environment):
+    """Exit code and output of a module that is a program, in a folder."""
+    command = list(map(str, [sys.executable, "-m", *command]))
+    done = subprocess.run(command, cwd=folder, env=os.environ | environment, capture_output=True, text=True)
+    return done.returncode, done.stdout + done.stderr
+
+
 @dataclass
 class Run:
     """Where a study runs, and how."""
@@ -20,24 +27,25 @@ class Run:
     folder: Path
     forks: subprocess.Popen
 
-    def snakemake(self, config, *arguments):
-        """Exit code and output of a run of the repository's workflow in this folder."""
+    def snakemake(self, config, *arguments, package=None):
+        """Exit code and output of a run of the repository's workflow in this folder; with the package of another one."""
         command = ["--snakefile", REPOSITORY / "Snakefile", "--directory", self.folder, "--cores", "2"]
         command += ["--workflow-profile", REPOSITORY / "workflow/profiles/default"]
         command += ["--configfile", self.folder / config, *arguments]
-        log = self.folder / "output.log"
+        command = list(map(str, command))
+        if package:
+            return called(["snakemake", *command], self.folder, PYTHONPATH=str(package))
+        log = self.folder.with_suffix(".log")
         log.unlink(missing_ok=True)
-        told = {"arguments": list(map(str, command)), "folder": str(self.folder), "log": str(log)}
+        told = {"arguments": command, "folder": str(self.folder), "log": str(log)}
         self.forks.stdin.write(json.dumps(told | {"environment": dict(os.environ)}) + "\n")
         self.forks.stdin.flush()
         return int(self.forks.stdout.readline()), log.read_text()
 
     def springtune(self, config, *arguments):
         """Exit code and output of `springtune run` in this folder, on two cores."""
-        command = [sys.executable, "-m", "springtune", "run", config, "--cores", "2", *arguments]
-        environment = os.environ | {"SPRINGTUNE_WORKFLOW": str(REPOSITORY)}
-        done = subprocess.run(list(map(str, command)), cwd=self.folder, env=environment, capture_output=True, text=True)
-        return done.returncode, done.stdout + done.stderr
+        command = ["springtune", "run", config, "--cores", "2", *arguments]
+        return called(command, self.folder, SPRINGTUNE_WORKFLOW=str(REPOSITORY))
 
     def write(self, name, text):
         """Write a study."""
