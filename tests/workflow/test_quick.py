@@ -28,7 +28,7 @@ SCENE = ("beam", "mesh_type", "mesh_size", "material", "load", "definition", "ki
 
 @pytest.fixture(scope="module")
 def tree(run, repository):
-    """By its jobs in this process, which are Snakemake's, see below; tests/unit/test_figures.py draws the other figures."""
+    """By its jobs in this process; tests/unit/test_figures.py draws the other figures."""
     content = yaml.safe_load((repository / "config/quick.yaml").read_text())
     content["outputs"] = ["sensitivity", "size", "deformed", "paraview", "tables", "block"]
     content["stability"]["experiment"].remove("slivers")  # tests/unit/test_stability.py has them
@@ -318,7 +318,7 @@ def test_snakemake_runs_the_same_jobs(run, tree):
     assert code == 0, output
     with contextlib.chdir(run.folder):
         here = Campaign("quick.yaml", cores=2)
-    jobs = {(str(here.plan.tasks(name)), str(here.jobs[name].record), here.jobs[name].digest) for name in here.plan.jobs}
+    jobs = {(str(here.plan.tasks(one)), str(here.jobs[one].record), here.jobs[one].digest) for one in here.plan.jobs}
     assert set(re.findall(r"kinds\.collect|present|browse", output)) == {"kinds.collect", "present", "browse"}
     assert len(jobs) > 10 and set(re.findall(r"run_tasks (\S+) (\S+) (\S+) > ", output)) == jobs
 
