@@ -507,15 +507,16 @@ class TestOfOtherKinds:
             read_beam_mesh(odd, 0.1, 0.02)
 
 
-class TestDatasets:
-    @pytest.fixture(scope="class")
-    def sound(self, tmp_path_factory):
-        """A dataset of two groups."""
-        path = tmp_path_factory.mktemp("sound") / "dataset.nc"
-        groups = {node.path: node.to_dataset(inherit=False) for node in dataset("fields", "moduli").subtree}
-        write(path, groups, {"springtune_version": "1", "study": "x"})
-        return path
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory):
+    """A dataset of two groups."""
+    path = tmp_path_factory.mktemp("sound") / "dataset.nc"
+    groups = {node.path: node.to_dataset(inherit=False) for node in dataset("fields", "moduli").subtree}
+    write(path, groups, {"springtune_version": "1", "study": "x"})
+    return path
 
+
+class TestDatasets:
     @pytest.fixture
     def path(self, sound, tmp_path):
         return shutil.copy(sound, tmp_path / "dataset.nc")

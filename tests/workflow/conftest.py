@@ -28,7 +28,7 @@ class Run:
     forks: subprocess.Popen
 
     def snakemake(self, config, *arguments, package=None):
-        """Exit code and output of the repository's workflow in this folder, with the package of another one if given."""
+        """Exit code and output of the workflow in this folder, with the package of another one if given."""
         command = ["--snakefile", REPOSITORY / "Snakefile", "--directory", self.folder, "--cores", "2"]
         command += ["--workflow-profile", REPOSITORY / "workflow/profiles/default"]
         command += ["--configfile", self.folder / config, *arguments]
