@@ -92,7 +92,7 @@ def plan_and_note(config: str) -> None:
     """Plan a study, write its tasks and note what later steps are called with."""
     from springtune.studies.kinds import load_study
     from springtune.studies.runs import rerun
-    from springtune.studies.runs.dependencies import CODE_FILE, OURS
+    from springtune.studies.runs.keys import CODE_FILE, OURS
     from springtune.studies.runs.plan import plan
 
     loaded = load_study(config)
@@ -221,7 +221,7 @@ ROWS = (
 
 
 LARGEST_PAGE = "at most 5 MB"
-"""Size of a page to browse, see `springtune.studies.output.browse.payload`."""
+"""Size of a page to browse, see `springtune.studies.output.browse.page`."""
 
 
 def extrapolated(known: dict[int, float]) -> tuple[float, Callable[[int], float]]:

@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from springtune.mechanics.arc_length import follow
+from springtune.mechanics.continuation import follow
 from springtune.mechanics.network import FollowerPressure, Network
 from springtune.mechanics.statics import StaticProblem
 from springtune.mesh import MESH_TYPES, Mesh

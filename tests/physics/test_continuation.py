@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from springtune.mechanics.arc_length import buckling, follow, smallest_share
+from springtune.mechanics.continuation import buckling, follow, smallest_share
 from springtune.mechanics.network import Network
 from springtune.mechanics.statics import StaticProblem
 from springtune.mesh import MESH_TYPES, Mesh

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from springtune.mechanics import stepping
-from springtune.mechanics.arc_length import buckling
+from springtune.mechanics.continuation import buckling
 from springtune.mechanics.dynamics import Motion, masses, relax
 from springtune.mechanics.integrators import EXPLICIT, INTEGRATORS, BackwardEuler
 from springtune.mechanics.moduli import ends

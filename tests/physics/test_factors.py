@@ -19,7 +19,7 @@ from springtune.linalg.factors import (
     spread,
 )
 from springtune.linalg.multigrid import IndefiniteError, Multigrid, bilinear
-from springtune.mechanics.arc_length import follow
+from springtune.mechanics.continuation import follow
 from springtune.mechanics.network import PINNED, FollowerPressure, Network, successor
 from springtune.mechanics.series import trace
 from springtune.mechanics.statics import StaticProblem

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from springtune.mechanics.arc_length import follow, smallest_share
+from springtune.mechanics.continuation import follow, smallest_share
 from springtune.mechanics.expansion import ORDER, Expansion
 from springtune.mechanics.network import Network
 from springtune.mechanics.series import StablePath, left_out, trace

@@ -12,7 +12,8 @@ from springtune.linalg.factors import SingularError
 from springtune.mechanics.network import Network
 from springtune.mesh import MESH_TYPES
 from springtune.mesh.types import MeshType
-from springtune.prediction import CASES, PREDICTED, extrapolate, predict, references
+from springtune.prediction.bands import extrapolate
+from springtune.prediction.choices import CASES, PREDICTED, predict, references
 from springtune.problem.boundary import held, weights
 from springtune.problem.geometry import Beam
 from springtune.problem.loads import LOADS

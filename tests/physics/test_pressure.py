@@ -9,7 +9,7 @@ from springtune.mechanics.network import FollowerPressure, Network
 from springtune.mechanics.newton import MODES
 from springtune.mechanics.statics import FAR, StaticProblem
 from springtune.mesh import MESH_TYPES
-from springtune.problem.boundary import held, loaded_edges, measured, weights
+from springtune.problem.boundary import held, measured, side_edges, weights
 from springtune.problem.geometry import Beam
 from springtune.problem.loads import FACE
 from springtune.problem.materials import Material
@@ -25,7 +25,7 @@ def block(definition, nu=0.5, size=2e-3, stiffness=None, mesh_type="structured",
     mesh = MESH_TYPES[mesh_type](0.2, 0.04, size)
     springs = DEFINITIONS[definition].springs(mesh, Material(1e6, nu, name="rubber"), 1e-3, stiffness)
     network = Network(mesh, held(mesh, FACE), springs.relative, springs.energies)
-    turning = FollowerPressure.of_side(mesh, *loaded_edges(mesh, FACE)) if follower else None
+    turning = FollowerPressure.of_side(mesh, side_edges(mesh, FACE.loaded), FACE.along) if follower else None
     return StaticProblem(network, weights(mesh, FACE), turning), FORCE / springs.reference, measured(mesh, FACE)
 
 
@@ -122,7 +122,7 @@ def column(definition, length, height, size, follower, mesh_type="structured"):
     mesh = MESH_TYPES[mesh_type](length, height, size)
     springs = DEFINITIONS[definition].springs(mesh, Material(1e6, 0.3, name="rubber"), 1e-3)
     network = Network(mesh, held(mesh, FACE), springs.relative, springs.energies)
-    turning = FollowerPressure.of_side(mesh, *loaded_edges(mesh, FACE)) if follower else None
+    turning = FollowerPressure.of_side(mesh, side_edges(mesh, FACE.loaded), FACE.along) if follower else None
     return StaticProblem(network, weights(mesh, FACE), turning), -1e6 * 1e-3 * length / springs.reference
 
 

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as some
 
 import springtune as st
-from springtune.mechanics.arc_length import follow
+from springtune.mechanics.continuation import follow
 from springtune.mechanics.network import Network
 from springtune.mechanics.statics import StaticProblem
 from springtune.mechanics.stress import cell_stresses, particle_stresses

@@ -5,7 +5,7 @@ import pytest
 
 import springtune as st
 from arches import Arch, draw, limit
-from springtune.mechanics.arc_length import follow
+from springtune.mechanics.continuation import follow
 from springtune.mechanics.dynamics import relax
 from springtune.problem.status import Status
 

@@ -15,7 +15,7 @@ from rows import CODE, STORED, STUDY, VERSIONS
 
 import springtune
 from springtune.studies.kinds.scenes import plan
-from springtune.studies.runs import dependencies, keys, records, rerun
+from springtune.studies.runs import keys, records, rerun
 
 ROWS = STUDY | STORED
 
@@ -185,7 +185,7 @@ def test_another_version_of_a_package_computes_again_what_it_computes(distributi
         keys.installed,
         keys.code_key,
         keys.stage_key,
-        dependencies.distribution,
+        keys.distribution,
         plan.mesh_key,
         plan.solved_reference,
         plan.interpolant_key,

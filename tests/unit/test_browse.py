@@ -19,8 +19,7 @@ from click.testing import CliRunner
 
 import springtune
 from springtune.cli import main
-from springtune.studies.output.browse.page import page
-from springtune.studies.output.browse.payload import packed
+from springtune.studies.output.browse.page import packed, page
 from springtune.studies.output.browse.server import Server
 
 from synthetic import dataset
@@ -119,7 +118,7 @@ class TestPage:
         from springtune.studies.kinds.samples.collect import EFFECTS, SAMPLES, SOBOL
         from springtune.studies.kinds.samples.designs import PARAMETERS
         from springtune.studies.kinds.scenes.variables import BLOCK, FIELDS, FINITE_STRAIN, ROOT, SENSITIVITY
-        from springtune.studies.kinds.shapes.variables import SHAPE_FIELDS, SHAPES
+        from springtune.studies.kinds.shapes.collect import SHAPE_FIELDS, SHAPES
         from springtune.studies.kinds.stability.collect import STABILITY
         from springtune.studies.output.browse.page import views
 

@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import runpy
 import subprocess
 import sys
 from dataclasses import fields, replace
@@ -19,24 +20,26 @@ from counting import counted
 from springtune import prediction
 from springtune.cli import COMMANDS, main
 from springtune.cli.recommendation import beam_subject, prediction_json, prediction_text
-from springtune.cli.study import BEGIN, END, MANUAL, SCHEMA, manual_text, schema_text
 from springtune.handover.formats import ENDINGS, FOR_SIMULATORS
 from springtune.mesh import MESH_TYPES, Mesh, braced, write_mesh
 from springtune.mesh.types import MeshType
-from springtune.prediction import find_mesh
+from springtune.prediction.search import find_mesh
 from springtune.problem.geometry import AssumptionWarning, Beam
 from springtune.problem.materials import Material
 from springtune.reference.small_strain import solve_small_strain
 from springtune.scene.sheet import Sheet
 from springtune.springs import DEFINITIONS
 from springtune.studies.config.kind import kinds
-from springtune.studies.config.sections import sections, study_model
+from springtune.studies.config.sections import schema_text, study_model
 from springtune.studies.kinds import load_study
 
 from tables import STUDIES, refused_calls
 
 CONFIG = Path(__file__).parents[2] / "config"
-RENEW = "run `springtune schema --write`"
+RENEW = "run `make docs`"
+TOOL = runpy.run_path(str(Path(__file__).parents[2] / "tools/manual.py"))
+BEGIN, END, MANUAL, SCHEMA = (TOOL[name] for name in ("BEGIN", "END", "MANUAL", "SCHEMA"))
+manual_text, sections = TOOL["manual_text"], TOOL["sections"]
 
 
 def run(*arguments):
@@ -199,7 +202,7 @@ class TestSchema:
 
     def test_write_renews_both_and_keeps_the_frame(self, tmp_path):
         (tmp_path / MANUAL).write_text(f"before\n{BEGIN}stale\n{END}after\n")
-        assert run("schema", "--write", "--folder", tmp_path).exit_code == 0
+        TOOL["main"](tmp_path)
         text = (tmp_path / MANUAL).read_text()
         assert text.startswith("before\n")
         assert text.endswith("after\n")
@@ -208,13 +211,10 @@ class TestSchema:
         assert json.loads((tmp_path / SCHEMA).read_text()) == json.loads(schema_text())
         assert sorted(os.listdir(tmp_path)) == [MANUAL, SCHEMA]
 
-    @pytest.mark.parametrize("manual", [None, "no marks here"])
-    def test_write_refuses_a_manual_without_marks(self, tmp_path, manual):
-        if manual:
-            (tmp_path / MANUAL).write_text(manual)
-        result = run("schema", "--write", "--folder", tmp_path)
-        assert result.exit_code == 1
-        assert MANUAL in result.stderr
+    def test_write_refuses_a_manual_without_marks(self, tmp_path):
+        (tmp_path / MANUAL).write_text("no marks here")
+        with pytest.raises(SystemExit, match=MANUAL):
+            TOOL["main"](tmp_path)
         assert not (tmp_path / SCHEMA).exists()
 
     @pytest.mark.parametrize("study", sorted(CONFIG.glob("*.yaml")), ids=lambda path: path.stem)

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from springtune.mesh import MESH_TYPES
 from springtune.springs import DEFINITIONS, Springs, definition
-from springtune.studies.runs import checked_json, dependencies, keys
-from springtune.studies.runs.dependencies import read
+from springtune.studies.runs import checked_json, keys
+from springtune.studies.runs.keys import read
 from springtune.studies.runs.plan import stages
 
 TABLES = yaml.safe_load(Path(__file__).with_name("code_changes.yaml").read_text())
@@ -41,7 +41,7 @@ def test_every_change_of_code_is_in_a_digest(change):
     assert digest_of(changed) != digest_of(MODULE)
 
 
-PATHS = sorted(dependencies.PACKAGE.rglob("*.py"))
+PATHS = sorted(keys.PACKAGE.rglob("*.py"))
 
 
 @settings(max_examples=30)
@@ -98,7 +98,7 @@ def package(tmp_path):
             path = folder / (name.replace("__in_", "/") + ".py")
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text)
-        found = dependencies.Code(folder).closure(folder / f"{start}.py")
+        found = keys.Code(folder).closure(folder / f"{start}.py")
         return {path.relative_to(folder).as_posix() for path in found.files}, set(found.packages), found.digest
 
     return closure
@@ -131,7 +131,7 @@ def test_what_was_read_is_taken_from_a_note_where_it_is_the_same(tmp_path):
         (folder / f"{name}.py").write_text(text)
 
     def closure(recall=True):
-        code = dependencies.Code(folder)
+        code = keys.Code(folder)
         if recall:
             code.recall(note)
         found = code.closure(folder / "a.py")
@@ -163,8 +163,8 @@ WRITING = {"xarray", "matplotlib", "h5netcdf", "netCDF4", "bokeh", "rich", "typs
 
 @pytest.mark.parametrize("stage", stages(), ids=lambda stage: stage.name)
 def test_what_writes_draws_or_reads_studies_is_in_no_key_of_a_result(stage):
-    packages = set(dependencies.stage_closure(stage.module).packages)
-    assert not packages & (WRITING | {package for _, package in dependencies.NOT_COUNTED})
+    packages = set(keys.stage_closure(stage.module).packages)
+    assert not packages & (WRITING | {package for _, package in keys.NOT_COUNTED})
 
 
 @pytest.mark.parametrize(
@@ -180,18 +180,18 @@ def test_what_writes_draws_or_reads_studies_is_in_no_key_of_a_result(stage):
     ],
 )
 def test_packages_are_those_that_are_imported(module, packages):
-    assert set(dependencies.stage_closure(module).packages) == packages
+    assert set(keys.stage_closure(module).packages) == packages
 
 
 def test_packages_that_are_carried_are_imported_where_it_is_said():
-    for place, package in dependencies.NOT_COUNTED:
-        assert package in dependencies.OURS.closure(dependencies.PACKAGE / place, counted=package).packages
+    for place, package in keys.NOT_COUNTED:
+        assert package in keys.OURS.closure(keys.PACKAGE / place, counted=package).packages
 
 
 def test_meshers_count_with_their_meshes():
-    assert "netgen" in dependencies.mesh_type_closure("free").packages
-    assert not any("netgen" in dependencies.mesh_type_closure(name).packages for name in set(MESH_TYPES) - {"free"})
-    assert "meshio" in dependencies.mesh_file_closure().packages
+    assert "netgen" in keys.mesh_type_closure("free").packages
+    assert not any("netgen" in keys.mesh_type_closure(name).packages for name in set(MESH_TYPES) - {"free"})
+    assert "meshio" in keys.mesh_file_closure().packages
 
 
 LOOKED_UP = (
@@ -205,20 +205,20 @@ LOOKED_UP = (
 
 def test_distributions_of_packages_are_those_that_are_installed():
     known = importlib.metadata.packages_distributions()
-    used = {name for stage in stages() for name in dependencies.stage_closure(stage.module).packages}
-    used |= {name for one in DEFINITIONS for name in dependencies.definition_closure(one).packages} | {"netgen"}
-    used |= {name for module in LOOKED_UP for name in dependencies.stage_closure(module).packages}
+    used = {name for stage in stages() for name in keys.stage_closure(stage.module).packages}
+    used |= {name for one in DEFINITIONS for name in keys.definition_closure(one).packages} | {"netgen"}
+    used |= {name for module in LOOKED_UP for name in keys.stage_closure(module).packages}
     for package in used & set(known):
-        assert dependencies.distribution(package).lower() in map(str.lower, known[package])
+        assert keys.distribution(package).lower() in map(str.lower, known[package])
     # Whatever is known by itself costs nothing to look up.
     for package in used & set(known):
-        assert package in dependencies.DISTRIBUTIONS or importlib.metadata.version(package)
-    assert dependencies.distribution("no_such_package") == "no_such_package"
+        assert package in keys.DISTRIBUTIONS or importlib.metadata.version(package)
+    assert keys.distribution("no_such_package") == "no_such_package"
 
 
 def forget():
     """Forget keys; of the same code, versions may be others."""
-    for one in (keys.stage_key, keys.code_key, keys.installed, dependencies.distribution):
+    for one in (keys.stage_key, keys.code_key, keys.installed, keys.distribution):
         one.cache_clear()
 
 
@@ -338,7 +338,7 @@ def own(tmp_path, monkeypatch):
         name = f"own_{tmp_path.name}_{next(number)}"
         (tmp_path / f"{name}.py").write_text(text)
         importlib.import_module(name)
-        found = dependencies.definition_closure("own", dependencies.Code())
+        found = keys.definition_closure("own", keys.Code())
         DEFINITIONS.discard("own")
         sys.modules.pop(name)
         return found
@@ -382,7 +382,7 @@ def test_modules_of_ones_own_elsewhere_on_the_path_count(own, tmp_path, monkeypa
     monkeypatch.syspath_prepend(tmp_path / "elsewhere")
     tried = "try:\n    import had_by_nobody\nexcept ImportError:\n    import decimal\n"
     found = own(f"import apart_from_it, boxed_up.json, json\n{tried}{OWN}")
-    others = {path for path in found.files if not path.is_relative_to(dependencies.PACKAGE)}
+    others = {path for path in found.files if not path.is_relative_to(keys.PACKAGE)}
     elsewhere = {path.relative_to(tmp_path / "elsewhere") for path in others if path.parent != tmp_path}
     assert {path.as_posix() for path in elsewhere} == {"apart_from_it.py", "boxed_up/json.py"}
     assert set(found.packages) == {"had_by_nobody", "numba", "numpy", "scipy"}
@@ -407,7 +407,7 @@ def test_a_definition_of_a_notebook_is_its_function(monkeypatch):
         monkeypatch.setattr(inspect, "getsource", lambda function, text=text: text)
         definition("own")(space["springs"])
         assert DEFINITIONS["own"].file is None
-        found.append(dependencies.definition_closure("own"))
+        found.append(keys.definition_closure("own"))
         DEFINITIONS.discard("own")
     assert found[0].digest == found[1].digest != found[2].digest
     assert found[0].packages == ("scipy",) and not found[0].files
@@ -419,7 +419,7 @@ def test_a_definition_of_a_prompt_without_a_text_has_a_digest():
         space = {"Springs": Springs, "__name__": "prompt"}
         exec(f"springs = lambda mesh, material, thickness: Springs({factor}, mesh.edge_lengths)", space)
         definition("own")(space["springs"])
-        digests.add(dependencies.definition_closure("own").digest)
+        digests.add(keys.definition_closure("own").digest)
         DEFINITIONS.discard("own")
     assert len(digests) == 2
 
@@ -429,5 +429,5 @@ def test_a_file_keeps_its_digest_wherever_it_is(tmp_path):
     for folder in (tmp_path / "one", tmp_path / "two"):
         folder.mkdir()
         (folder / "own.py").write_text(MODULE)
-        texts.append(dependencies.OURS.closure(folder / "own.py").digest)
+        texts.append(keys.OURS.closure(folder / "own.py").digest)
     assert texts[0] == texts[1]

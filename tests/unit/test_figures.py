@@ -24,7 +24,7 @@ from springtune.studies.kinds.scenes.figures import NETWORK_LINE, draw_curve
 from springtune.studies.kinds.stability.figures import PLOTS
 from springtune.studies.output import present, style
 from springtune.studies.output.style import png_and_pdf
-from springtune.studies.runs.dependencies import modules
+from springtune.studies.runs.keys import modules
 
 from synthetic import BEAMS, DEFINITIONS, LOADS, SIZES, TYPES, dataset, moduli
 

@@ -9,8 +9,13 @@ from springtune.reference.interpolant import TOLERANCE
 from springtune.studies.config.kind import kinds
 from springtune.studies.kinds import load_study
 from springtune.studies.kinds.scenes import any_reference
-from springtune.studies.kinds.scenes.interpolated import box_of, expected_solves, interpolants
-from springtune.studies.kinds.scenes.plan import reference_of, solved_reference
+from springtune.studies.kinds.scenes.plan import (
+    box_of,
+    expected_solves,
+    interpolants,
+    reference_of,
+    solved_reference,
+)
 from springtune.studies.kinds.scenes.summary import summary
 from springtune.studies.runs import driver, store
 from springtune.studies.runs.plan import plan

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from springtune.problem.geometry import Beam
-from springtune.problem.materials import CONSTANTS, AnisotropicMaterial, Material, engineering_constants, material_of
+from springtune.problem.materials import CONSTANTS, AnisotropicMaterial, Material, material_of
 from springtune.studies.config.expand import declared
 from springtune.studies.config.kind import kinds
 from springtune.studies.config.sections import study_model
@@ -64,7 +64,7 @@ def test_turning_is_counter_clockwise():
 @given(nu=st.floats(-0.9, 0.5), angle=st.floats(-7, 7))
 def test_isotropic_constants_are_the_same_at_every_angle(nu, angle):
     steel = Material(210e9, nu)
-    found = engineering_constants(steel.plane_stress, angle)
+    found = AnisotropicMaterial.of(steel.plane_stress).constants_at(angle)
     assert found[:4] == pytest.approx((210e9, 210e9, nu, 210e9 / (2 * (1 + nu))), rel=1e-9, abs=1e-9)
 
 

@@ -20,7 +20,7 @@ from springtune.problem.boundary import held, weights
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import Material
 from springtune.springs import DEFINITIONS, Springs, definition
-from springtune.studies.runs import dependencies
+from springtune.studies.runs import keys
 
 from tables import STUDIES
 
@@ -86,8 +86,8 @@ class TestOutsideThePackage:
         one = DEFINITIONS["twice"]
         assert one.summary.startswith("Springs twice as stiff") and one.file == tmp_path / "own_springs.py"
         assert displacement("twice") == pytest.approx(displacement("lattice") / 2, rel=1e-12)
-        digest = dependencies.definition_closure("twice").digest
-        assert digest not in {dependencies.definition_closure(name).digest for name in set(names) - {"twice"}}
+        digest = keys.definition_closure("twice").digest
+        assert digest not in {keys.definition_closure(name).digest for name in set(names) - {"twice"}}
 
     def test_a_mesh_type(self, outside):
         outside("own_mesh", outside_package("mesh/left.py"))
@@ -98,8 +98,8 @@ class TestOutsideThePackage:
         mesh = one(0.1, 0.02, 5e-3)
         assert mesh.area == pytest.approx(2e-3)
         assert displacement("lattice", "left") == pytest.approx(displacement("lattice", "right"), rel=0.01)
-        digest = dependencies.mesh_type_closure("left").digest
-        assert digest not in {dependencies.mesh_type_closure(name).digest for name in set(names) - {"left"}}
+        digest = keys.mesh_type_closure("left").digest
+        assert digest not in {keys.mesh_type_closure(name).digest for name in set(names) - {"left"}}
 
     def test_what_a_file_imports_from_beside_it_is_part_of_its_digest(self, tmp_path, monkeypatch):
         text, digests = outside_package("springs/twice.py"), set()
@@ -111,7 +111,7 @@ class TestOutsideThePackage:
             (folder / f"own{number}.py").write_text(text)
             monkeypatch.syspath_prepend(folder)
             importlib.import_module(f"own{number}")
-            digests.add(dependencies.definition_closure("twice").digest)
+            digests.add(keys.definition_closure("twice").digest)
             DEFINITIONS.discard("twice")
             sys.modules.pop(f"own{number}")
         assert len(digests) == 2
@@ -148,20 +148,20 @@ class TestOutsideThePackage:
 
 REPORT = """
 import json, sys
-from springtune.studies.runs import dependencies
+from springtune.studies.runs import keys
 from springtune.mesh import MESH_TYPES
 from springtune.springs import DEFINITIONS
 import springtune
 found = {
     "place": springtune.__file__,
-    "DEFINITIONS": {name: dependencies.definition_closure(name).digest for name in DEFINITIONS},
-    "MESH_TYPES": {name: dependencies.mesh_type_closure(name).digest for name in MESH_TYPES},
+    "DEFINITIONS": {name: keys.definition_closure(name).digest for name in DEFINITIONS},
+    "MESH_TYPES": {name: keys.mesh_type_closure(name).digest for name in MESH_TYPES},
     "light": not {"scipy", "h5py", "meshio", "netgen", "xarray", "pydantic"} & set(sys.modules),
 }
 from springtune.studies.runs import plan
 stages = [one.module for one in plan.stages()]
-found["stages"] = {stage: dependencies.stage_closure(stage).digest for stage in stages}
-found["modules"] = {stage: dependencies.modules(stage) for stage in stages}
+found["stages"] = {stage: keys.stage_closure(stage).digest for stage in stages}
+found["modules"] = {stage: keys.modules(stage) for stage in stages}
 print(json.dumps(found))
 """
 

@@ -23,7 +23,7 @@ from springtune.studies.kinds.scenes import paraview
 from springtune.studies.kinds.scenes.variables import FIELDS, ROOT, SENSITIVITY
 from springtune.studies.output import dataset, present
 from springtune.studies.runs import checked_json, locks
-from springtune.studies.runs.orphans import orphans
+from springtune.studies.runs.rerun import orphans
 
 from tables import STUDIES, refused_calls
 

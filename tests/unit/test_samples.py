@@ -21,12 +21,12 @@ from springtune.scene.sheet import Sheet
 from springtune.springs import DEFINITIONS
 from springtune.studies.config.kind import kinds
 from springtune.studies.kinds.samples import designs, interpolate, solve
+from springtune.studies.kinds.samples.collect import main_effect, sobol_indices
 from springtune.studies.kinds.samples.designs import DESIGNS, blocks
 from springtune.studies.kinds.samples.figures import plot_effects, plot_sobol
-from springtune.studies.kinds.samples.indices import main_effect, sobol_indices
 from springtune.studies.kinds.samples.kind import MOST_SOLVED
 from springtune.studies.runs import store
-from springtune.studies.runs.orphans import orphans
+from springtune.studies.runs.rerun import orphans
 from springtune.studies.runs.stages import products
 from springtune.studies.runs.task_costs import TaskCosts
 

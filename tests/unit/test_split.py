@@ -394,44 +394,44 @@ def test_a_scene_of_two_answers_is_refused(there):
 
 
 def test_packs_are_compared(there):
-    from springtune.studies.archive import object_storage
+    from springtune.studies.archive import parts
 
     folder = Path(PARTS[1])
     done = sorted(folder.glob("done/solve_*.json"))
-    object_storage.pack(folder, done, Path("one.tar"))
-    object_storage.pack(folder, done, Path("other.tar"))
+    parts.pack(folder, done, Path("one.tar"))
+    parts.pack(folder, done, Path("other.tar"))
     assert Path("one.tar").read_bytes() == Path("other.tar").read_bytes()
-    names = object_storage.unpack(Path("one.tar"), Path("out"))
+    names = parts.unpack(Path("one.tar"), Path("out"))
     assert names and all((Path("out") / name).read_bytes() == (folder / name).read_bytes() for name in names)
     whole = Path("one.tar").read_bytes()
     for size in (0, 100, len(whole) // 2):
         Path("half.tar").write_bytes(whole[:size])
-        with pytest.raises(object_storage.PackError, match="half.tar: is not whole.*publish it again"):
-            object_storage.unpack(Path("half.tar"), Path("out"))
+        with pytest.raises(parts.PackError, match="half.tar: is not whole.*publish it again"):
+            parts.unpack(Path("half.tar"), Path("out"))
     place = whole.index(store.MAGIC) + 1000
     Path("half.tar").write_bytes(whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :])
-    with pytest.raises(object_storage.PackError, match="is not what was packed"):
-        object_storage.unpack(Path("half.tar"), Path("out"))
+    with pytest.raises(parts.PackError, match="is not what was packed"):
+        parts.unpack(Path("half.tar"), Path("out"))
     spoiled(stored_file())
-    with pytest.raises(object_storage.PackError, match="is not what its job made"):
-        object_storage.pack(folder, done, Path("third.tar"))
+    with pytest.raises(parts.PackError, match="is not what its job made"):
+        parts.pack(folder, done, Path("third.tar"))
     assert not Path("third.tar").exists() and records.checksum("one.tar") == records.checksum("other.tar")
 
 
 def test_fetched_results_are_adopted(there):
-    from springtune.studies.archive import object_storage
+    from springtune.studies.archive import parts
 
     assert run("merge", "config/many.yaml", *PARTS).exit_code == 0
     campaign, made = Campaign("config/many.yaml"), []
     for stage in dict.fromkeys(job.stage.name for job in campaign.plan.jobs.values()):
         made.append(Path(f"{stage}.tar"))
-        object_storage.pack(campaign.folder, sorted(campaign.folder.glob(f"done/{stage}_*.json")), made[-1])
+        parts.pack(campaign.folder, sorted(campaign.folder.glob(f"done/{stage}_*.json")), made[-1])
     assert len(checked_json.read(campaign.folder / of_parts.ELSEWHERE)["files"]) == len(
         [*campaign.folder.glob("*/*.h5")]
     ) + len([*campaign.folder.glob("meshes/*")])
     campaign.folder.rename("results/before")
-    told = object_storage.fetch("config/many.yaml", made[:2])
+    told = parts.fetch("config/many.yaml", made[:2])
     assert "jobs are left for `springtune run config/many.yaml`" in told
-    assert "all that it asks for is here" in object_storage.fetch("config/many.yaml", made)
+    assert "all that it asks for is here" in parts.fetch("config/many.yaml", made)
     assert not set(Campaign("config/many.yaml").due()) & set(campaign.plan.jobs)
-    assert not Path("results/many", object_storage.UNPACKED).exists()
+    assert not Path("results/many", parts.UNPACKED).exists()

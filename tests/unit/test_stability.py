@@ -10,8 +10,8 @@ from springtune.studies.kinds.stability import AXES, EXPERIMENTS, ONCE
 from springtune.studies.kinds.stability import solve as stability
 from springtune.studies.kinds.stability.collect import STABILITY
 from springtune.studies.output.dataset import DIMENSIONS
-from springtune.studies.runs import dependencies as code
 from springtune.studies.runs import driver, store
+from springtune.studies.runs import keys as code
 from springtune.studies.runs.task_costs import TaskCosts
 
 from tables import STUDIES

@@ -9,8 +9,8 @@ import h5py
 import numpy as np
 import pytest
 
-from springtune.studies.runs import dependencies as code
 from springtune.studies.runs import driver, store
+from springtune.studies.runs import keys as code
 from springtune.studies.runs.checked_json import hash_of
 from springtune.studies.runs.task_costs import TaskCosts
 

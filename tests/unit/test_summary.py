@@ -24,7 +24,7 @@ from springtune.studies.kinds.scenes.variables import ROOT, SENSITIVITY
 from springtune.studies.output import summary
 from springtune.studies.output.dataset import Filler
 from springtune.studies.runs import checked_json, plan, records, rerun, workload
-from springtune.studies.runs.dependencies import CODE_FILE, Code
+from springtune.studies.runs.keys import CODE_FILE, Code
 
 from tables import STUDIES
 

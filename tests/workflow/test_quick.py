@@ -19,7 +19,7 @@ from cf import complaints
 from springtune.cli import main
 from springtune.studies.kinds import load_study
 from springtune.studies.output import dataset
-from springtune.studies.runs.orphans import orphans
+from springtune.studies.runs.rerun import orphans
 
 from campaigns import Campaign
 

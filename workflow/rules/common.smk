@@ -13,7 +13,7 @@ from springtune.studies.config.kind import FORMATS
 from springtune.studies.config.messages import StudyError
 from springtune.studies.kinds import load_study
 from springtune.studies.runs import locks, rerun, workload
-from springtune.studies.runs.dependencies import CODE_FILE, OURS
+from springtune.studies.runs.keys import CODE_FILE, OURS
 from springtune.studies.runs.plan import plan, stages
 
 

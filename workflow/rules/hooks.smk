@@ -51,6 +51,7 @@ def log_end(how):
     """Unlock the studies and log their summary, see `springtune.studies.output.summary`."""
     from springtune.studies.output import summary  # here: only a run needs it
 
+    end_timers()
     locks.end()
     text = getattr(summary, how)(*READ[0], BEGUN)
     text += "".join(summary.beside(*one, BEGUN) for one in READ[1:])

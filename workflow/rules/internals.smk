@@ -4,6 +4,7 @@
 """
 
 import sys
+import threading
 
 WORDS = sys.argv[1:]
 """Words of the command. Snakemake has its targets only after reading the Snakefile, and some cost seconds to prepare."""
@@ -35,6 +36,13 @@ def jobs_to_run():
         ]
     except AttributeError:
         return []
+
+
+def end_timers():
+    """End the timers of the scheduler, for which Snakemake would wait up to a second before it exits."""
+    for one in threading.enumerate():
+        if isinstance(one, threading.Timer):
+            one.cancel()
 
 
 def noted_job():

@@ -1,4 +1,7 @@
-"""Scenes of beams: meshes, references, sensitivity curves, calibration, and networks in equilibrium."""
+"""Scenes of beams: meshes, references, sensitivity curves, calibration, and networks in equilibrium.
+
+All rules run `run_tasks`: which module does a job, such as kinds/scenes/solve.py, stands in its file of tasks.
+"""
 
 
 rule mesh:

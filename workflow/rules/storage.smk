@@ -5,7 +5,7 @@ What stages store is no output that Snakemake knows of, so a stage is one pack; 
 
 from importlib.util import find_spec
 
-from springtune.studies.archive.object_storage import ENDING
+from springtune.studies.archive.parts import ENDING
 
 PLUGIN = "snakemake_storage_plugin_s3"
 STORAGE = str(config.get("storage", "")).rstrip("/")
@@ -55,7 +55,7 @@ if "fetch" in WORDS:  # what makes packs is not to be asked for them; targets ar
         benchmark:
             RESULTS / "benchmarks/fetch.tsv"
         shell:
-            "python -m springtune.studies.archive.object_storage fetch {params.config:q} {input:q}"
+            "python -m springtune.studies.archive.parts fetch {params.config:q} {input:q}"
 
 else:
 
@@ -85,7 +85,7 @@ else:
             benchmark:
                 RESULTS / f"benchmarks/pack_{stage}.tsv"
             shell:
-                "python -m springtune.studies.archive.object_storage pack {params.folder:q} {output:q} {input:q} > {log:q} 2>&1"
+                "python -m springtune.studies.archive.parts pack {params.folder:q} {output:q} {input:q} > {log:q} 2>&1"
 
     rule upload:
         message:
@@ -99,4 +99,4 @@ else:
         benchmark:
             RESULTS / "benchmarks/upload.tsv"
         shell:
-            "python -m springtune.studies.archive.object_storage copy {output:q} {input:q} > {log:q} 2>&1"
+            "python -m springtune.studies.archive.parts copy {output:q} {input:q} > {log:q} 2>&1"

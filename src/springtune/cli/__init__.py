@@ -1,6 +1,5 @@
 """Command line: `springtune COMMAND`."""
 
-import io
 import os
 import sys
 import warnings
@@ -61,7 +60,7 @@ COMMANDS = {
     "split": Row(STUDIES, "study", "split", "Write the parts of a study for several sites."),
     "definitions": Row(STUDIES, "study", "definitions", "List the definitions of spring stiffness."),
     "predict": Row(STUDIES, "predict", "predict", "Recommend a definition for one mesh, or a mesh for one error."),
-    "springs": Row(STUDIES, "springs", "springs", "Write the springs of one mesh for another program."),
+    "springs": Row(STUDIES, "predict", "springs", "Write the springs of one mesh for another program."),
     "browse": Row(RESULTS, "results", "browse", "Browse the results of a study."),
     "info": Row(RESULTS, "results", "info", "Say what a dataset holds, and where it comes from."),
     "diff": Row(RESULTS, "diff", "diff", "Say what changed from one dataset to another, scene by scene."),
@@ -73,7 +72,7 @@ COMMANDS = {
         RESULTS, "results", "archive", "Pack a finished study into one file, to be cited and computed again."
     ),
     "clean": Row(RESULTS, "results", "clean", "List what no study asks for any more, and remove it."),
-    "schema": Row(HOUSE, "study", "schema", "Print the JSON schema of studies, or renew it and the manual."),
+    "schema": Row(HOUSE, "study", "schema", "Print the JSON schema of studies, for editors."),
 }
 """Commands by name, in the order of the help; each is imported when it is called."""
 
@@ -86,38 +85,19 @@ COMPLETION = "_SPRINGTUNE_COMPLETE"
 """Environment variable by which a shell asks click for completions."""
 
 
-class Shown(io.TextIOBase):
+class Shown:
     """Stream that escapes all control characters except line breaks and tabs."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
-
-    @property
-    def encoding(self) -> str:  # type: ignore[override]  # typeshed has an attribute
-        """Encoding of the stream."""
-        return self._stream.encoding
-
-    @property
-    def errors(self) -> str | None:  # type: ignore[override]
-        """Error handling of the encoding."""
-        return self._stream.errors
 
     def write(self, text: str) -> int:
         """Write a text, and return its length."""
         self._stream.write(UNSEEN.sub(lambda one: one[0] if one[0] in "\n\t" else shown(one[0]), text))
         return len(text)
 
-    def flush(self) -> None:
-        """Flush the stream."""
-        self._stream.flush()
-
-    def isatty(self) -> bool:
-        """Whether the stream is a terminal."""
-        return self._stream.isatty()
-
-    def fileno(self) -> int:
-        """Number of the stream's file."""
-        return self._stream.fileno()
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
 
 
 class Commands(click.Group):
@@ -127,8 +107,24 @@ class Commands(click.Group):
         """Run a command."""
         if COMPLETION in os.environ:  # bytes, and for a shell
             return super().main(*arguments, **keywords)
-        with redirect_stdout(Shown(sys.stdout)), redirect_stderr(Shown(sys.stderr)):
+        with redirect_stdout(Shown(sys.stdout)), redirect_stderr(Shown(sys.stderr)):  # type: ignore[type-var]
             return super().main(*arguments, **keywords)
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run a command; its refusal is a message, with exit code 1, or 2 for an option."""
+        try:
+            return super().invoke(ctx)
+        except BrokenPipeError:
+            raise
+        except OSError as error:
+            raise click.ClickException(
+                shown(f"{error.filename}: {error.strerror}" if error.strerror else error)
+            ) from None
+        except ValueError as error:
+            lines = error.args if all(isinstance(one, str) for one in error.args) else (error,)
+            refused = click.ClickException("\n".join(map(shown, lines)))
+            refused.exit_code = getattr(error, "exit_code", 2 if str(error).startswith("--") else 1)
+            raise refused from None
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Names of the commands."""

@@ -12,7 +12,7 @@ import click
 from ..safe_io.escapes import shown
 from ..studies.output.text import aligned, cell_text, paragraphs
 from . import examples
-from .options import CONFIG_FOLDER, RESULTS_FOLDER, WrongCall, dataset_path
+from .options import CONFIG_FOLDER, RESULTS_FOLDER, dataset_path
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -392,12 +392,7 @@ def accept(
     if results is None:
         raise click.UsageError("name the results to accept: springtune accept results/mine")
     names = [name.strip() for name in variables.split(",") if name.strip()]
-    try:
-        _accept(dataset_path(results), target, names, relative, absolute, unsolved)
-    except (OSError, ValueError) as error:
-        if str(error).startswith("--"):  # an option names something missing
-            raise WrongCall(shown(error)) from None
-        raise click.ClickException(shown(error)) from None
+    _accept(dataset_path(results), target, names, relative, absolute, unsolved)
 
 
 def _accept(

@@ -417,29 +417,26 @@ DATASET = "dataset.nc"
 
 
 def loaded(path: Path, consequence: str = "") -> "Study":
-    """Load a study; its mistakes end the command with exit code 1."""
+    """Load a study; `consequence` follows the message on its mistakes."""
     from ..studies.config.messages import StudyError
     from ..studies.kinds import load_study
 
     try:
         return load_study(path)
     except StudyError as error:
-        raise click.ClickException(f"{error}{consequence}") from None
+        raise StudyError(*f"{error}{consequence}".splitlines()) from None
 
 
 def studies(given: Path | None, consequence: str = "") -> "Iterator[tuple[Study, Path]]":
     """Studies and the folders of their results."""
-    from ..studies.runs.locks import LockedError, check_claim, claimed
+    from ..studies.runs.locks import check_claim, claimed
 
     if given is not None and not given.is_dir():
         study = loaded(given, consequence)
         folder = RESULTS_FOLDER / study.name
         if not folder.is_dir():
             raise click.ClickException(f"{folder}: there is no such folder; run the study, or go to where it was run")
-        try:
-            check_claim(folder, given)
-        except LockedError as error:
-            raise click.ClickException(str(error)) from None
+        check_claim(folder, given)
         yield study, folder
         return
     if given is None and not RESULTS_FOLDER.is_dir():

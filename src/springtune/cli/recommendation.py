@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 from .. import __version__
 
 if TYPE_CHECKING:
-    from ..prediction import Choice, MeshChoice, MeshSearch, Number, References, ShapeReferences
+    from ..prediction.choices import Choice, Number, References, ShapeReferences
+    from ..prediction.search import MeshChoice, MeshSearch
     from ..problem.geometry import Beam
     from ..problem.materials import Material
     from ..scene.statements import ShapeStatement

@@ -15,7 +15,7 @@ from ..problem.status import Status
 from ..safe_io.escapes import shown
 from ..studies.output.text import aligned, bytes_text, label_text, paragraphs, without_numbers
 from . import examples
-from .options import WrongCall, idle, studies
+from .options import idle, studies
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -37,12 +37,9 @@ def info(path: Path) -> None:
     """
     from ..studies.output import reading
 
-    try:
-        reading.check_opens(path)
-        with reading.open(path) as tree, reading.guarded(path):
-            click.echo(info_text(tree, path / "dataset.nc" if path.is_dir() else path))
-    except (OSError, ValueError) as error:
-        raise click.ClickException(shown(error)) from None
+    reading.check_opens(path)
+    with reading.open(path) as tree, reading.guarded(path):
+        click.echo(info_text(tree, path / "dataset.nc" if path.is_dir() else path))
 
 
 def info_text(tree: "xr.DataTree", path: Path) -> str:
@@ -203,18 +200,13 @@ def export(path: Path, target: Path, group: str, variables: str, pairs: tuple[st
     PATH is results/<study>, or its dataset.nc.
     """
     from ..studies.output import reading
-    from ..studies.output.export import RequestError, selected
     from ..studies.output.export import export as write
+    from ..studies.output.export import selected
 
     names = [name.strip() for name in variables.split(",") if name.strip()]
-    try:
-        reading.check_opens(path)
-        with reading.open(path) as tree, reading.guarded(path):
-            click.echo(write(tree, target, group, names, selected(pairs), force))
-    except RequestError as error:
-        raise WrongCall(shown(error)) from None
-    except (OSError, ValueError) as error:
-        raise click.ClickException(shown(error)) from None
+    reading.check_opens(path)
+    with reading.open(path) as tree, reading.guarded(path):
+        click.echo(write(tree, target, group, names, selected(pairs), force))
 
 
 LISTED = 12
@@ -231,7 +223,7 @@ def clean(study: Path | None, remove: bool) -> None:
     were taken out, their meshes and stored results, files of jobs that are no more, and what a run that was stopped
     left unfinished. Results that an edit of the code made stale are among them.
     """
-    from ..studies.runs.orphans import orphans
+    from ..studies.runs.rerun import orphans
 
     chosen = list(studies(study, "; nothing is listed or removed"))
     found = {folder: orphans(one, folder) for one, folder in chosen}
@@ -323,7 +315,6 @@ def _verified(study: "Study", folder: Path, scenes: int, seed: int, set_aside: b
     if place.resolve() != Path.cwd():
         raise click.ClickException(f"{folder}: files are named from where the study was run; call it there: cd {place}")
     from ..studies.archive import verify
-    from ..studies.config.messages import StudyError
 
     found = verify.files(study, folder)
     click.echo(f"{folder}: {found.compared} files compared with their checksums, faults: {len(found.faults)}")
@@ -346,7 +337,7 @@ def _verified(study: "Study", folder: Path, scenes: int, seed: int, set_aside: b
         return len(found.faults)
     try:
         made = list(verify.again(folder, study.path.parent, scenes, seed))
-    except (StudyError, ValueError, OSError) as error:
+    except (ValueError, OSError) as error:
         click.echo(f"no scene is computed again: {shown(error)}")
         return len(found.faults) + 1
     wrong = [one for one in made if not one.agrees]
@@ -377,11 +368,8 @@ def browse(dataset: Path, port: int, no_open: bool) -> None:
     from ..studies.output.browse.server import Server  # here, so that --help does not wait for it
     from ..studies.output.reading import check_opens
 
-    try:
-        check_opens(dataset)
-        server = Server(dataset, port)
-    except (OSError, ValueError) as error:
-        raise click.ClickException(shown(error)) from None
+    check_opens(dataset)
+    server = Server(dataset, port)
     try:
         with server:
             click.echo(f"{server.address}\nCtrl-C ends it.")
@@ -432,25 +420,18 @@ def archive(
         raise click.ClickException(
             "the library rocrate is missing; install the extra: pip install 'springtune[archive]'"
         ) from None
-    from ..studies.archive.contents import ArchiveError, stored_size
-    from ..studies.archive.crate import CitationError, write
+    from ..studies.archive.contents import stored_size
+    from ..studies.archive.crate import write
 
     target = out or folder.with_name(f"{folder.name}.crate.zip")
     if target.is_dir() or target.suffix != ".zip":
         raise click.UsageError(f"--out: {target} is no name of a zip file; give one such as {folder.name}.zip")
     if target.exists() and not force:
         raise click.ClickException(f"{target}: is there already; give --force, or another name by --out")
-    try:
-        if with_store:
-            click.echo(f"the store: {_size(stored_size(found, folder))} more, before it is packed")
-        chosen = {name: True for name, given in (("no_diff", no_diff), ("no_host", no_host)) if given}
-        digest = write(found, folder, target, with_store, untracked, chosen, _tell_contents)
-    except (ArchiveError, CitationError) as error:
-        raise click.ClickException(str(error)) from None
-    except OSError as error:
-        raise click.ClickException(
-            f"{error.filename or target}: cannot be written: {error.strerror or error}"
-        ) from None
+    if with_store:
+        click.echo(f"the store: {_size(stored_size(found, folder))} more, before it is packed")
+    chosen = {name: True for name, given in (("no_diff", no_diff), ("no_host", no_host)) if given}
+    digest = write(found, folder, target, with_store, untracked, chosen, _tell_contents)
     click.echo(f"{target}: {_size(target.stat().st_size)}, sha256 {digest}")
     click.echo(f"check it: springtune verify {target}; compute it again: springtune verify {target} --reproduce")
 
@@ -492,14 +473,12 @@ TOLD = 20
 
 def verified(path: Path, again: bool, fresh: bool) -> bool:
     """Verify an archive; return whether it is sound, and reproduced if requested."""
-    from ..studies.archive.reproduction import ReproductionError, check, reproduce
+    from ..studies.archive.reproduction import check, reproduce
 
     try:
         found = check(path)
-    except ReproductionError as error:
-        raise click.ClickException(shown(error)) from None
     except OSError as error:
-        raise click.ClickException(shown(f"{path}: cannot be read ({error.strerror}); give an archive")) from None
+        raise ValueError(f"{path}: cannot be read ({error.strerror}); give an archive") from None
     _tell_checked(found)
     if found.faults:
         if again:
@@ -514,8 +493,8 @@ def verified(path: Path, again: bool, fresh: bool) -> bool:
     try:
         with tempfile.TemporaryDirectory() as folder:
             return _compared(reproduce(found, Path(folder), fresh, click.echo))
-    except (ReproductionError, OSError, ValueError) as error:
-        raise click.ClickException(shown(f"{path}: not reproduced: {error}")) from None
+    except (OSError, ValueError) as error:
+        raise ValueError(f"{path}: not reproduced: {error}") from None
 
 
 def _tell_checked(found: "Checked") -> None:

@@ -181,10 +181,7 @@ def _unlock(studies: "list[Study]", command: list[str]) -> None:
     disk = os.statvfs(here)
     if disk.f_blocks and not disk.f_bavail:
         raise click.ClickException(f"{here}: the disk is full; make room, then call the same command again")
-    try:
-        killed = [one.name for one in studies if locks.check_idle(_results(one))]
-    except locks.LockedError as error:
-        raise click.ClickException(str(error)) from None
+    killed = [one.name for one in studies if locks.check_idle(_results(one))]
     if killed:
         subprocess.run(command, check=False, capture_output=True)
         locks.forget()
@@ -193,7 +190,10 @@ def _unlock(studies: "list[Study]", command: list[str]) -> None:
 
 
 def _remove_records(studies: "list[Study]", left_empty: dict[str, bool], remove: bool = True) -> bool:
-    """Remove the records of outdated jobs, so that Snakemake runs them; return whether there is nothing to do."""
+    """Remove the records of outdated jobs, so that Snakemake runs them; return whether there is nothing to do.
+
+    Without `remove`, as in a dry run, damaged files are named and all records stay.
+    """
     from ..studies.runs import rerun
 
     done = True

@@ -71,7 +71,7 @@ def write(path: str | Path, net: Net, mujoco: int | None = None) -> list[Path]:
                 f"mujoco: {mujoco!r} is of no use to {path.name}; leave it out, or give a name ending in .xml or .mjcf"
             )
         form = _for_simulator("MuJoCo", partial(mjcf, version=mujoco))
-    return form.write(path, replace(net, header=net.header | {"thickness": float(net.thickness)}))
+    return form.write(path, replace(net, header=net.header | {"thickness": float(net.thickness)})) or [path]
 
 
 def read(path: str | Path) -> Net:
@@ -347,11 +347,10 @@ def as_json(net: Net) -> dict[str, Any]:
     }
 
 
-def _write_json(path: Path, net: Net) -> list[Path]:
+def _write_json(path: Path, net: Net) -> None:
     # An array a line: rows of their own would make most of the file blanks.
     parts = [f" {json.dumps(key)}: {json.dumps(value)}" for key, value in as_json(net).items()]
     write_text(path, "{\n" + ",\n".join(parts) + "\n}\n")
-    return [path]
 
 
 def _read_json(path: Path) -> Read:
@@ -379,9 +378,8 @@ LINE_NAMES = {"rest_lengths": "rest_length", "stiffness": "stiffness"}
 """Names of arrays in ParaView."""
 
 
-def _write_vtu(path: Path, net: Net) -> list[Path]:
+def _write_vtu(path: Path, net: Net) -> None:
     write_vtu_with(path, net, {}, {})
-    return [path]
 
 
 def write_vtu_with(
@@ -446,7 +444,7 @@ def _read_vtu(path: Path) -> Read:
 # -- HDF5 ----------------------------------------------------------------------------------------------------------
 
 
-def _write_h5(path: Path, net: Net) -> list[Path]:
+def _write_h5(path: Path, net: Net) -> None:
     import h5py
 
     with replacing(path) as unfinished, h5py.File(unfinished, "w", track_order=True) as file:
@@ -462,7 +460,6 @@ def _write_h5(path: Path, net: Net) -> list[Path]:
             )
             for name, values in terms.values.items():
                 group.create_dataset(name, data=values).attrs["units"] = terms.units[name]
-    return [path]
 
 
 def _put_header(group: Any, header: Mapping[str, Any]) -> None:
@@ -513,9 +510,8 @@ def _read_h5(path: Path) -> Read:
 def _for_simulator(program: str, text: Callable[[Net], str]) -> "_Format":
     """Format of a simulator, which is not read."""
 
-    def write_it(path: Path, net: Net) -> list[Path]:
+    def write_it(path: Path, net: Net) -> None:
         write_text(path, text(net))
-        return [path]
 
     def refuse(path: Path) -> Read:
         raise ValueError(f"it is for {program}; read the springs from .json, .h5, .csv or .vtu")
@@ -526,7 +522,7 @@ def _for_simulator(program: str, text: Callable[[Net], str]) -> "_Format":
 class _Format(NamedTuple):
     """How a net is written in a format, and read."""
 
-    write: Callable[[Path, Net], list[Path]]
+    write: Callable[[Path, Net], list[Path] | None]
     read: Callable[[Path], Read]
 
 

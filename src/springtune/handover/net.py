@@ -14,10 +14,10 @@ the quadratic form of its second derivative at rest.
 
 import inspect
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -27,20 +27,21 @@ from ..mechanics.energies import AngleEnergy, AreaEnergy, BiquadraticEnergy, Ene
 from ..mechanics.integrators import IMPLICIT, INTEGRATORS
 from ..mesh import Mesh, corner_angles, signed_areas
 from ..mesh.cells import rows_of
-from ..problem.compare import quantity_errors
 from ..problem.geometry import Beam
-from ..problem.loads import LOADS, LoadKind
+from ..problem.loads import LOADS
 from ..problem.materials import AnyMaterial, Material
 from ..problem.quantities import positive
-from ..problem.status import Status
 from ..scene.meshes import A_BEAM, A_MATERIAL, A_MESH, check_filled, is_a
 from ..scene.motion import stable_steps
 from ..scene.sheet import AnyDefinition, Sheet, check_stiffness, definition_of, named
 from ..scene.single import Scene
-from ..scene.statements import ShapeStatement
+from ..scene.statements import BeamStatement, ShapeStatement
 from ..springs import Definition, DefinitionError, Springs
 from .formats import read, write
 from .terms import Net, Terms
+
+if TYPE_CHECKING:
+    from ..prediction.choices import ShapeReferences
 
 UNITS = {
     "points": "m",
@@ -165,9 +166,9 @@ class SpringNet(Net):
         }
         header |= {"beam": _beam(scene.beam)} if scale is None else {"shape": about.body}
         if errors and scale is not None:
-            header |= {"expected_error": _errors_on_shape(scene), "expected_error_means": MEANING_ON_SHAPES}
+            header |= {"expected_error": _errors_on_shape(scene, springs), "expected_error_means": MEANING_ON_SHAPES}
         elif errors:
-            from ..prediction import CASES  # here, since finite elements take half a second to import
+            from ..prediction.choices import CASES  # here, since finite elements take half a second to import
 
             loads = tuple(dict.fromkeys((*CASES, scene.load)))
             header["expected_error"] = _expected_errors(
@@ -450,72 +451,61 @@ def _expected_errors(
 ) -> dict[str, float | str]:
     """Error by load, linear kinematics against the reference of small strain; or why it is not computed."""
     # Here, since finite elements take half a second to import.
-    from ..prediction.choices import PREDICTED, SOLVED, displacement_of, error_of, references
+    from ..prediction.choices import errors_under, references
 
-    count = len(sheet.mesh.points)
-    if count > SOLVED:
-        why = f"{NOT_COMPUTED}: {count} particles, and at most {SOLVED} are solved for a header"
+    if why := _too_many(sheet):
         return dict.fromkeys(loads, why)
-    refused = f"{NOT_COMPUTED}: definition '{definition.name}' is not for this load"
-    solved = [name for name in loads if LOADS[name].kind.uniaxial or not definition.uniaxial]
+    errors: dict[str, float | str] = dict.fromkeys(
+        loads, f"{NOT_COMPUTED}: definition '{definition.name}' is not for this load"
+    )
     # In linear kinematics a load that turns with its side equals the one that does not.
-    steady = {name: name if name in PREDICTED else _steady(name) for name in solved}
-    known = references(beam, material, steady.values()) if solved else {}
-    displacements: dict[LoadKind, float | str] = {}
-    errors: dict[str, float | str] = dict.fromkeys(loads, refused)
-    for name in solved:
-        kind, reference = LOADS[name].kind, known[steady[name]]
-        if isinstance(reference, str):
-            errors[name] = f"{NOT_COMPUTED}: {reference}"
-            continue
-        if kind not in displacements:
-            displacements[kind] = displacement_of(sheet, springs, kind)
-        error = error_of(displacements[kind], springs, name, reference)
-        errors[name] = f"{NOT_COMPUTED}: {error}" if isinstance(error, str) else error
+    steady = {
+        name: next(other for other, one in LOADS.items() if one == replace(LOADS[name], follower=False))
+        for name in loads
+        if LOADS[name].kind.uniaxial or not definition.uniaxial
+    }
+    solved = references(beam, material, steady.values()) if steady else {}
+    for name, other in steady.items():
+        known = {name: solved[other]}
+        statement = BeamStatement(beam, sheet.mesh, material, name, 1.0, "linear")
+        errors |= _in_words(errors_under(statement, sheet, springs, known), known)
     return errors
 
 
-def _steady(load: str) -> str:
-    """The same load with a fixed direction."""
-    return next(name for name, one in LOADS.items() if one == replace(LOADS[load], follower=False))
+def _too_many(sheet: Sheet) -> str:
+    """Return why expected errors are not computed on so large a mesh, or an empty string."""
+    from ..prediction.choices import SOLVED
+
+    count = len(sheet.mesh.points)
+    return f"{NOT_COMPUTED}: {count} particles, and at most {SOLVED} are solved for a header" if count > SOLVED else ""
 
 
-def _errors_on_shape(scene: Scene) -> dict[str, float | str]:
+def _in_words(errors: dict[str, float | str], known: Mapping[str, Any]) -> dict[str, float | str]:
+    """Errors, and for what has none why: it has no reference, or the network fails."""
+    found: dict[str, float | str] = {}
+    for name, error in errors.items():
+        why = known[name] if isinstance(known[name], str) else "the reference is zero"
+        failed = isinstance(error, str) or not np.isfinite(error)
+        found[name] = f"{NOT_COMPUTED}: {error if isinstance(error, str) else why}" if failed else error
+    return found
+
+
+def _errors_on_shape(scene: Scene, springs: Springs) -> dict[str, float | str]:
     """Error by quantity, linear kinematics against the reference of small strain; or why it is not computed."""
     # Here, since finite elements take half a second to import.
-    from ..prediction import ReferenceNotConvergedError
-    from ..prediction.choices import SOLVED, shape_references
+    from ..prediction.choices import QuantityReference, ReferenceNotConvergedError, errors_under, shape_references
 
-    names, count = [one.name for one in scene.case.quantities], len(scene.mesh.points)
-    if count > SOLVED:
-        return dict.fromkeys(names, f"{NOT_COMPUTED}: {count} particles, and at most {SOLVED} are solved for a header")
-    linear = Scene(
-        scene.shape,
-        scene.grouped,
-        scene.by_part,
-        scene.load,
-        definition=scene.definition,
-        kinematics="linear",
-        stiffness=scene.uniform_stiffness,
-        scale=scene.scale,
-        sheet=scene.sheet,
-    )
-    found = linear.solve()
-    why = dict.fromkeys(names, found.message or "the reference is zero")
-    errors: dict[str, float] = {}
+    if why := _too_many(scene.sheet):
+        return dict.fromkeys([one.name for one in scene.case.quantities], why)
+    linear = ShapeStatement(scene.shape, scene.grouped, scene.by_part, scene.load, scene.scale, "linear")
+    known: ShapeReferences
     try:
-        errors = found.errors if found.status is Status.SOLVED else {}
+        values = linear.reference_values(scene.sheet)
+        known = {name: QuantityReference(value, np.nan) for name, value in values.items()}
     except (ReferenceNotConvergedError, ValueError):
         # One quantity without a reference, such as stress at a corner, does not cost the others theirs.
-        assert isinstance(linear.statement, ShapeStatement)
-        references = shape_references(linear.statement)
-        why |= {name: one for name, one in references.items() if isinstance(one, str)}
-        known = {name: one.value for name, one in references.items() if not isinstance(one, str)}
-        errors = quantity_errors(found.values, known)
-    return {
-        name: errors[name] if np.isfinite(errors.get(name, np.nan)) else f"{NOT_COMPUTED}: {why[name]}"
-        for name in names
-    }
+        known = shape_references(linear)
+    return _in_words(errors_under(linear, scene.sheet, springs, known), known)
 
 
 def _stable_steps(

@@ -95,7 +95,8 @@ def simulate(net: Net, program: str, laws: Iterable[str] = ()) -> Simulation:
         # Fronts of waves stretch springs as far as the loaded mode would swing under the damping of small loads.
         ratio = min(lowest / loaded, 1.0)
         beyond = np.exp(-np.pi * ratio / np.sqrt(1 - ratio**2)) if ratio < 1 else 0.0
-        stiffest = max(_highest_frequency(motion, share * displacements) for share in (1.0, 1.0 + beyond))
+        tangents = (network.tangent(share * displacements) for share in (1.0, 1.0 + beyond))
+        stiffest = max(map(motion.highest_frequency, tangents))
         stable = min(stable, 2 / stiffest)
     step = STEP_SHARE * stable
     return Simulation(net.masses, force, largest, step, lowest, loaded, damping, displacements, why)
@@ -120,18 +121,6 @@ def load_in_words(load: Mapping[str, Any]) -> str:
     if "force" in load:
         return f"{load['name']} of {abs(load['force']):g} N"
     return load["name"] + ("" if load["scale"] == 1 else f" times {load['scale']:g}")
-
-
-def _highest_frequency(motion: Motion, displacements: np.ndarray) -> float:
-    """Highest frequency about displacements [rad/s], by Lanczos' method; `Motion.omega_max` is that at rest."""
-    root = diags_array(1 / np.sqrt(motion.mass))
-    matrix = root @ motion.network.tangent(displacements) @ root
-    size = matrix.shape[0]
-    if size < 40:
-        return float(np.sqrt(np.linalg.eigvalsh(matrix.toarray())[-1]))
-    start = np.random.default_rng(0).standard_normal(size)
-    (square,) = eigsh(matrix, 1, which="LA", v0=start, tol=1e-6, ncv=min(size - 1, 40), return_eigenvectors=False)
-    return float(np.sqrt(square))
 
 
 def _lowest_frequency(motion: Motion, displacements: np.ndarray | None = None) -> float:

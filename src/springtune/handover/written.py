@@ -8,7 +8,7 @@ import numpy as np
 
 from ..mechanics.dynamics import Motion, Run
 from ..mechanics.integrators import BackwardEuler
-from ..prediction import ReferenceNotConvergedError
+from ..reference.small_strain import ReferenceNotConvergedError
 from ..safe_io.atomic import check_folder
 from ..scene.single import Result, Scene
 from ..springs import Springs

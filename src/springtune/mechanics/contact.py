@@ -28,6 +28,7 @@ from scipy.sparse.linalg import splu
 
 from ..linalg.factors import SingularError, factorize
 from ..mesh.cells import Mesh
+from ..mesh.sheets import outline_of
 from .network import FollowerPressure, Network
 
 REACH = 2.0
@@ -78,12 +79,8 @@ class ContactError(RuntimeError):
 
 def oriented_outline(mesh: Mesh) -> np.ndarray:
     """Sides of the outline, the body on their left, shape (n, 2)."""
-    sides = np.concatenate(
-        [corners[:, [i, (i + 1) % count]] for count, corners in mesh.cells.items() for i in range(count)]
-    )
-    codes = np.sort(sides, axis=1) @ [len(mesh.points), 1]
-    _, first, counts = np.unique(codes, return_index=True, return_counts=True)
-    return sides[first[counts == 1]]
+    sides, _ = outline_of(mesh)
+    return sides[np.argsort(np.sort(sides, axis=1) @ [len(mesh.points), 1])]
 
 
 def neighbours(outline: np.ndarray) -> np.ndarray:

@@ -93,9 +93,13 @@ class Motion(Moving):
 
     @cached_property
     def omega_max(self) -> float:
-        """Highest frequency at rest [rad/s], by Lanczos' method: nothing is factorized."""
+        """Highest frequency at rest [rad/s]."""
+        return self.highest_frequency(self.stiffness_matrix)
+
+    def highest_frequency(self, stiffness: sparray) -> float:
+        """Highest frequency of a tangent [rad/s], by Lanczos' method: nothing is factorized."""
         root = diags_array(1.0 / np.sqrt(self.mass))
-        return float(np.sqrt(_largest(root @ self.stiffness_matrix @ root)[0]))
+        return float(np.sqrt(_largest(root @ stiffness @ root)[0]))
 
     def step_limit(self, integrator: str) -> float:
         r"""Return the largest stable step about rest [s]; infinite for implicit schemes.

@@ -188,7 +188,11 @@ class PatchTest:
         return free_body(self.mesh), np.stack([outline_forces(self.mesh, np.array(stress)) for stress in UNIT_STRESSES])
 
     def compliance(self, springs: Elastic) -> np.ndarray:
-        """Compliance under even tractions, see `outline_compliance`."""
+        """Return the plane-stress compliance under even tractions on the outline and the rims of holes, the body free.
+
+        Shape (3, 3), over the thickness times the reference stiffness [1]; columns are the mean strains under unit
+        stresses xx, yy and xy. No test of the same mesh is softer.
+        """
         held, forces = self._free_body
         network = self._network("free body", held, springs)
         loads = [network.reduce(force) for force in forces]
@@ -196,14 +200,23 @@ class PatchTest:
         return 0.5 * (work + work.T)
 
     def stiffness(self, springs: Elastic) -> np.ndarray:
-        """Stiffness under affine displacements of the outline, see `outline_stiffness`."""
+        """Return the plane-stress stiffness under affine displacements of the outline and the rims of holes.
+
+        Shape (3, 3), times the thickness over the reference stiffness [1]; Voigt: xx, yy, shear angle xy. A continuum
+        has the same even strain inside, so the test is exact on any mesh. No test of the same mesh is stiffer (Hill's
+        bounds), and none is softer than `compliance`.
+        """
         held = self._frame[0]
         network = self._network("frame", held, springs)
         fields = unit_fields(self.mesh)
         return work_of(fields, [network.linear_forces(self._relaxed(network, field)) for field in fields], self.mesh)
 
     def axial(self, springs: Elastic) -> tuple[float, float]:
-        """Young's modulus and Poisson's ratio, see `axial_moduli`."""
+        """Return E t over the reference stiffness and nu [1]: along x between rollers for a strip.
+
+        Other meshes, see `strip_fault`, have no axis: their moduli are means over all directions of `stiffness`, see
+        `isotropic_moduli`.
+        """
         if self.strip_fault:
             if springs.lateral:
                 raise MeshError(
@@ -225,7 +238,7 @@ class PatchTest:
         return stress / strain[0, 0], -strain[1, 1] / strain[0, 0]
 
     def shear(self, springs: Elastic) -> float:
-        """Shear modulus, see `shear_modulus`."""
+        """Return G t over the reference stiffness [1] under even shear of the whole outline."""
         held, given = self._frame
         network = self._network("frame", held, springs)
         return float((network.linear_forces(self._relaxed(network, given)) * given).sum()) / self.mesh.area
@@ -234,26 +247,12 @@ class PatchTest:
 def affine_stiffness(mesh: Mesh, springs: Elastic) -> np.ndarray:
     """Return the plane-stress stiffness if all particles followed an even strain (Cauchy and Born).
 
-    For springs ``C_ijkl t = 1/A sum k L^2 n_i n_j n_k n_l``, with C12 = C66; an upper bound of `outline_stiffness` in
+    For springs ``C_ijkl t = 1/A sum k L^2 n_i n_j n_k n_l``, with C12 = C66; an upper bound of `PatchTest.stiffness` in
     its shape and unit, which a lattice attains.
     """
     network = Network(mesh, np.ones(mesh.points.shape, dtype=bool), springs.relative, springs.energies)
     fields = unit_fields(mesh)
     return work_of(fields, [network.linear_forces(field) for field in fields], mesh)
-
-
-def axial_moduli(mesh: Mesh, springs: Elastic) -> tuple[float, float]:
-    """Return E t over the reference stiffness and nu [1]: along x between rollers for a strip.
-
-    Other meshes, see `strip_fault`, have no axis: their moduli are means over all directions of `outline_stiffness`,
-    see `isotropic_moduli`.
-    """
-    return PatchTest(mesh).axial(springs)
-
-
-def shear_modulus(mesh: Mesh, springs: Elastic) -> float:
-    """Return G t over the reference stiffness [1] under even shear of the whole outline."""
-    return PatchTest(mesh).shear(springs)
 
 
 def lateral_forces(mesh: Mesh) -> np.ndarray:
@@ -275,25 +274,6 @@ def outline_forces(mesh: Mesh, stress: np.ndarray) -> np.ndarray:
         pull = 0.5 * np.stack([side[..., 1], -side[..., 0]], axis=2) @ stress.T
         np.add.at(total, corners, pull + np.roll(pull, 1, axis=1))
     return total
-
-
-def outline_stiffness(mesh: Mesh, springs: Elastic) -> np.ndarray:
-    """Return the plane-stress stiffness under affine displacements of the outline and the rims of holes.
-
-    Shape (3, 3), times the thickness over the reference stiffness [1]; Voigt: xx, yy, shear angle xy. A continuum has
-    the same even strain inside, so the test is exact on any mesh. No test of the same mesh is stiffer (Hill's
-    bounds), and none is softer than `outline_compliance`.
-    """
-    return PatchTest(mesh).stiffness(springs)
-
-
-def outline_compliance(mesh: Mesh, springs: Elastic) -> np.ndarray:
-    """Return the plane-stress compliance under even tractions on the outline and the rims of holes, the body free.
-
-    Shape (3, 3), over the thickness times the reference stiffness [1]; columns are the mean strains under unit
-    stresses xx, yy and xy. No test of the same mesh is softer.
-    """
-    return PatchTest(mesh).compliance(springs)
 
 
 def isotropic_moduli(compliance: np.ndarray) -> tuple[float, float]:

@@ -199,6 +199,16 @@ class LoadedNetwork:
         """Factorize the tangent of resistance less load, see `Network.factorize_tangent`."""
         return self.network.factorize_tangent(displacements, self._follower_at(s))
 
+    def newton(
+        self,
+        s: float,
+        start: np.ndarray,
+        max_factorizations: int = MAX_FACTORIZATIONS,
+        keep_tangent: float = KEEP_TANGENT,
+    ) -> Equilibrium:
+        """Run Newton's method from displacements [m], shape (n_points, 2), see `Newton`."""
+        return Newton(self, s, max_factorizations, keep_tangent).solve(self.moved(s, start))
+
     def _follower_at(self, s: float) -> tuple[float, FollowerPressure] | None:
         return None if self.follower is None else (s, self.follower)
 
@@ -212,13 +222,7 @@ class Newton:
     new one costs ten such steps.
     """
 
-    def __init__(
-        self,
-        problem: LoadedNetwork,
-        s: float,
-        max_factorizations: int = MAX_FACTORIZATIONS,
-        keep_tangent: float = KEEP_TANGENT,
-    ) -> None:
+    def __init__(self, problem: LoadedNetwork, s: float, max_factorizations: int, keep_tangent: float) -> None:
         self.problem, self.network, self.s = problem, problem.network, s
         self.max_factorizations, self.keep_tangent = max_factorizations, keep_tangent
 

@@ -16,7 +16,7 @@ from ..linalg.factors import SingularError as SingularError
 from ..problem.status import Status
 from .continuation import continued
 from .expansion import Expansion
-from .newton import KEEP_TANGENT, MAX_FACTORIZATIONS, Equilibrium, LoadedNetwork, Newton, uncertainty
+from .newton import Equilibrium, LoadedNetwork, uncertainty
 
 FAR = 0.15
 """Stretch of a spring beyond which an equilibrium is sought along the path from rest."""
@@ -200,16 +200,6 @@ class StaticProblem(LoadedNetwork):
             return self.stability(s, found.displacements, found.factor)[0] > 0
         except SingularError:
             return True
-
-    def newton(
-        self,
-        s: float,
-        start: np.ndarray,
-        max_factorizations: int = MAX_FACTORIZATIONS,
-        keep_tangent: float = KEEP_TANGENT,
-    ) -> Equilibrium:
-        """Run Newton's method from displacements [m], shape (n_points, 2); see `springtune.mechanics.newton.Newton`."""
-        return Newton(self, s, max_factorizations, keep_tangent).solve(self.moved(s, start))
 
     def _in_steps(self, s: float, direct: Equilibrium, iterations: int) -> Equilibrium:
         """Load steps from rest, each started from the last two equilibria, halved where Newton's method fails."""

@@ -18,8 +18,7 @@ Examples
 from .cells import Mesh, MeshError, corner_angles, quality, signed_areas
 from .formats import read_beam_mesh, read_mesh, write_mesh
 from .free import free
-from .rows import ROW_HEIGHT, isosceles, lattice, row_height, structured
-from .squares import alternating, braced, right
+from .rows import ROW_HEIGHT, alternating, braced, isosceles, lattice, right, row_height, structured
 from .types import MESH_TYPES, MeshType, mesh_type
 
 __all__ = [

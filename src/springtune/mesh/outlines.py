@@ -3,7 +3,7 @@
 import math
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from numbers import Real
 from typing import Any
 
@@ -46,6 +46,10 @@ class _Stretch:
     high: float
     inner: int
     outer: int
+
+    def cut(self, parameters: Sequence[float]) -> list["_Stretch"]:
+        """Stretches between parameters, of which the first and the last are its ends."""
+        return [replace(self, low=low, high=high) for low, high in zip(parameters, parameters[1:])]
 
 
 def mesh_shape(
@@ -95,7 +99,7 @@ def mesh_shape(
         for number, stretch in enumerate(stretches):
             shares = made.divided.get(number, []) if stretch.side.arc else []
             cuts = [stretch.low + share * (stretch.high - stretch.low) for share in (0.0, *shares)] + [stretch.high]
-            again += [_Stretch(stretch.side, *pair, stretch.inner, stretch.outer) for pair in zip(cuts, cuts[1:])]
+            again += stretch.cut(cuts)
         stretches = again
     else:
         raise MeshError(f"{what}: netgen divides its arcs on and on at {size:g} m; give another size")
@@ -165,7 +169,7 @@ def _divided(
                     turn = abs(side.arc[3]) * (end - begin)
                     count = max(count, math.ceil(LEAST_AROUND * turn / (2 * math.pi) * (1 - 1e-9)))
                 ends = side.divided(max(count, 1), begin, end)
-                stretches += [_Stretch(side, *pair, inner, outer) for pair in zip(ends, ends[1:])]
+                stretches += _Stretch(side, begin, end, inner, outer).cut(ends)
     fine |= {point: sizes.get(name, sizes[""]) for name, point in inside.items()}
     return _apart(stretches, shape.name), _lines(shape, {point: fine[point] for point in inside.values()}), fine
 
@@ -184,7 +188,7 @@ def _apart(stretches: list[_Stretch], name: str) -> list[_Stretch]:
         found = []
         for number, stretch in enumerate(stretches):
             ends = stretch.side.divided(2 if number in halved else 1, stretch.low, stretch.high)
-            found += [_Stretch(stretch.side, *pair, stretch.inner, stretch.outer) for pair in zip(ends, ends[1:])]
+            found += stretch.cut(ends)
         stretches = found
     raise MeshError(f"shape '{name}': arcs are too near to others to be meshed; keep them apart")
 

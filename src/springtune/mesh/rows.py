@@ -1,11 +1,11 @@
-"""Rows of isosceles triangles fitted to a box: equilateral ones (`structured`) and others (`isosceles`)."""
+"""Meshes in rows: near-equilateral and other isosceles triangles, and squares with one diagonal or both."""
 
 import math
 from numbers import Integral, Real
 
 import numpy as np
 
-from .cells import Mesh, MeshError
+from .cells import Mesh, MeshError, no_cells
 from .types import MOST_MESHED, check_box, mesh_type, nearest_counts, nearest_whole
 
 ROW_HEIGHT = math.sqrt(3) / 2
@@ -119,3 +119,64 @@ def _joined(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     j = np.concatenate([[0], np.cumsum(upper)])[:-1]
     above = np.stack([np.zeros_like(upper), upper, np.ones_like(upper)], axis=1)
     return np.stack([i, np.where(upper, j + 1, i + 1), j], axis=1), above
+
+
+@mesh_type("right", order=30)
+def right(length: float, height: float, size: float) -> Mesh:
+    r"""Squares cut by parallel diagonals.
+
+    Their edges have about `size` [m]; they are stretched to fit the box.
+
+    ::
+
+        +---+---+
+        | / | / |
+        +---+---+
+        | / | / |
+        +---+---+
+    """
+    points, a, b, c, d = _grid(length, height, size)
+    return Mesh(points, np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)]))
+
+
+@mesh_type("alternating", order=40)
+def alternating(length: float, height: float, size: float) -> Mesh:
+    r"""Squares whose diagonals alternate like a chequerboard.
+
+    ::
+
+        +---+---+
+        | \ | / |
+        +---+---+
+        | / | \ |
+        +---+---+
+    """
+    points, a, b, c, d = _grid(length, height, size)
+    columns, rows = nearest_counts(length, height, size)
+    falling = np.add.outer(np.arange(columns), np.arange(rows)).ravel() % 2 == 1
+    first = np.where(falling[:, None], np.stack([a, b, d], axis=1), np.stack([a, b, c], axis=1))
+    second = np.where(falling[:, None], np.stack([b, c, d], axis=1), np.stack([a, c, d], axis=1))
+    return Mesh(points, np.concatenate([first, second]))
+
+
+@mesh_type("braced", order=50, corners=4)
+def braced(length: float, height: float, size: float) -> Mesh:
+    r"""Squares with both diagonals.
+
+    ::
+
+        +---+---+
+        | X | X |     the diagonals of a square do not meet: there is no particle between them
+        +---+---+
+    """
+    points, *corners = _grid(length, height, size)
+    return Mesh(points, no_cells(3), np.stack(corners, axis=1))
+
+
+def _grid(length: float, height: float, size: float) -> tuple[np.ndarray, ...]:
+    """Points column by column, and the four corners of each square, counter-clockwise from the lower left."""
+    columns, rows = nearest_counts(length, height, size)
+    x, y = np.meshgrid(np.linspace(0, length, columns + 1), np.linspace(0, height, rows + 1), indexing="ij")
+    a = np.add.outer(np.arange(columns) * (rows + 1), np.arange(rows)).ravel()
+    b = a + rows + 1
+    return np.stack([x.ravel(), y.ravel()], axis=1), a, b, b + 1, a + 1

@@ -359,22 +359,23 @@ def shape_references(statement: ShapeStatement) -> ShapeReferences:
     return {one.name: found[one.name] for one in case.quantities}
 
 
-def displacement_of(sheet: Sheet, springs: Springs, kind: LoadKind) -> float | str:
-    """Displacement [1] under the springs' reference stiffness times 1 m, linear kinematics; or why it is missing."""
+def errors_under(
+    statement: Statement, sheet: Sheet, springs: Springs, known: Mapping[str, Any]
+) -> dict[str, float | str]:
+    """Errors [1] by load of a beam or quantity of a shape; NaN without a reference, or why the network fails."""
+    labels = [statement.load] if isinstance(statement, BeamStatement) else list(known)
     try:
-        found = sheet.solve(kind, springs, springs.reference, "linear")
+        found = statement.solve(sheet, springs)
     except SingularError as error:
-        return f"unstable: {error}"
-    return found.displacement if found.status is Status.SOLVED else found.message
-
-
-def error_of(displacement: float | str, springs: Springs, load: str, known: ReferenceSolution | str) -> float | str:
-    """Error under a load [1], NaN without a reference; or why the network has no displacement."""
-    if isinstance(displacement, str):
-        return displacement
-    if isinstance(known, str):
-        return nan
-    return float(LOADS[load].sign * (displacement / (springs.reference * known.displacement) - 1))
+        return dict.fromkeys(labels, f"unstable: {error}")
+    if found.status is not Status.SOLVED:
+        return dict.fromkeys(labels, found.message)
+    values = statement.values(springs, found)
+    if isinstance(statement, BeamStatement):
+        wanted = {load: statement.force * one.displacement for load, one in known.items() if not isinstance(one, str)}
+        return dict(quantity_errors({statement.load: found.displacement}, wanted))
+    wanted = {name: one.value for name, one in known.items() if not isinstance(one, str)}
+    return dict(quantity_errors({name: values[name] for name in known}, wanted))
 
 
 class Trial:
@@ -393,9 +394,8 @@ class Trial:
     ) -> None:
         self.statements, self.known, first = statements, known, statements[0]
         self.mesh, self.materials, self.thickness = first.mesh, first.materials, first.thickness
-        # Loads that hold the same follow each other.
-        self._sheet = Sheet(self.mesh, self.thickness, networks=1)
-        self._displacements: dict[tuple[LoadKind, tuple[bytes, ...]], float | str] = {}
+        # Definitions that differ by a scalar follow each other: networks under the loads are kept for the next one.
+        self._sheet = Sheet(self.mesh, self.thickness, networks=len({one.loading.held.tobytes() for one in statements}))
         self._errors: dict[str, dict[str, float | str]] = {}
         self._moduli: dict[tuple[bytes, ...], tuple[float, float] | str] = {}
         self._test = PatchTest(self.mesh) if isinstance(first, BeamStatement) else None
@@ -426,30 +426,10 @@ class Trial:
         """Errors of a definition [1] by load or quantity; NaN without a reference, or why the network fails."""
         if name not in self._errors:
             springs = self._springs[name]
-            found = [self._errors_under(statement, springs) for statement in self.statements]
-            self._errors[name] = {label: error for one in found for label, error in one.items()}
+            self._errors[name] = {}
+            for statement in self.statements:
+                self._errors[name] |= errors_under(statement, self._sheet, springs, self.known)
         return self._errors[name]
-
-    def _errors_under(self, statement: Statement, springs: Springs) -> dict[str, float | str]:
-        load = statement.load
-        if isinstance(statement, BeamStatement):
-            key = statement.kind, key_of(springs)
-            if key not in self._displacements:
-                self._displacements[key] = displacement_of(self._sheet, springs, statement.kind)
-            return {load: error_of(self._displacements[key], springs, load, cast(References, self.known)[load])}
-        why, values = "", statement.none()
-        try:
-            found = statement.solve(self._sheet, springs)
-        except SingularError as error:
-            why = f"unstable: {error}"
-        else:
-            why = "" if found.status is Status.SOLVED else found.message
-            values = values if why else statement.values(springs, found)
-        known = cast(ShapeReferences, self.known)
-        if why:
-            return dict.fromkeys(known, why)
-        wanted = {name: one.value for name, one in known.items() if not isinstance(one, str)}
-        return dict(quantity_errors({name: values[name] for name in known}, wanted))
 
     def choice(self, name: str) -> Choice:
         """Choice of a definition that was tried; one without springs has NaN for all numbers."""

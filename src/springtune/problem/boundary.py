@@ -38,11 +38,6 @@ def side_edges(mesh: Mesh, side: Side) -> np.ndarray:
     return mesh.outline_edges(side.axis, side.place(*mesh.points.max(axis=0)))
 
 
-def loaded_edges(mesh: Mesh, kind: LoadKind) -> tuple[np.ndarray, int]:
-    """Return the edges (n, 2) of the loaded side of a box, and the axis of the force."""
-    return side_edges(mesh, kind.loaded), kind.along
-
-
 def held(mesh: Mesh, kind: LoadKind) -> np.ndarray:
     """Return the directions that a kind of load holds, see `springtune.problem.loads`."""
     return supported(box(mesh, (side for side, _ in kind.held)), kind.case)[0]
@@ -101,14 +96,8 @@ def even(grouped: GroupedMesh, group: str, axis: int) -> np.ndarray:
 
     Each edge gives half of its share to either particle.
     """
-    mesh, field = grouped.mesh, np.zeros(grouped.mesh.points.shape)
-    if group not in grouped.sides:
-        field[particles_of(grouped, group), axis] = 1.0
-        return field
-    edges = grouped.sides[group]
-    apart = mesh.points[edges[:, 1]] - mesh.points[edges[:, 0]]
-    halves = 0.5 * np.sqrt(apart[:, 0] ** 2 + apart[:, 1] ** 2)
-    np.add.at(field[:, axis], edges, halves[:, None])
+    field = np.zeros(grouped.mesh.points.shape)
+    field[:, axis] = _lengths(grouped, group)
     return field / field.sum()
 
 
@@ -215,14 +204,14 @@ def reaction_weights(grouped: GroupedMesh, case: LoadCase, quantity: Quantity) -
 
 
 def _lengths(grouped: GroupedMesh, group: str) -> np.ndarray:
-    """Length of a group at each particle [m]; 1 of a point."""
+    """Length of a group at each particle [m], half of each edge's; 1 of a point."""
     field = np.zeros(len(grouped.mesh.points))
     if group not in grouped.sides:
         field[particles_of(grouped, group)] = 1.0
         return field
     edges = grouped.sides[group]
     apart = grouped.mesh.points[edges[:, 1]] - grouped.mesh.points[edges[:, 0]]
-    np.add.at(field, edges, 0.5 * np.hypot(*apart.T)[:, None])
+    np.add.at(field, edges, 0.5 * np.sqrt(apart[:, 0] ** 2 + apart[:, 1] ** 2)[:, None])
     return field
 
 

@@ -90,7 +90,7 @@ class LoadKind:
 
     @property
     def normal(self) -> int:
-        """Axis across the loaded side."""
+        """Axis normal to the loaded side."""
         return self.loaded.axis
 
     @property
@@ -100,7 +100,7 @@ class LoadKind:
 
     @property
     def direct(self) -> bool:
-        """Whether the force acts across the loaded side, in tension or compression, rather than along it."""
+        """Whether the force is normal to the loaded side, in tension or compression, rather than along it."""
         return self.axis == self.normal
 
     @property
@@ -115,9 +115,9 @@ class LoadKind:
 
     @property
     def mirrored(self) -> bool:
-        """Whether the supports are symmetric across the middle of the loaded side.
+        """Whether the supports are symmetric about the middle of the loaded side.
 
-        At small strain displacements along the force are then even across it, those across the force odd.
+        At small strain displacements along the force are then even about this middle, those normal to the force odd.
         """
         held = {(side, *directions) for side, directions in self.held}
         across = ((side.opposite if side.axis == self.along else side, *axes) for side, axes in self.held)
@@ -135,7 +135,7 @@ class LoadKind:
 
     @property
     def half_held(self) -> tuple[tuple[Side, tuple[int, ...]], ...]:
-        """Supports of the half model, as `held`: on the axis of symmetry nothing moves across the force."""
+        """Supports of the half model, as `held`: on the axis of symmetry nothing moves normal to the force."""
         return (*((side, axes) for side, axes in self.held if side != self.cut), (self.cut, (1 - self.axis,)))
 
     @cached_property
@@ -164,9 +164,9 @@ FACE = LoadKind("face", loaded=TOP, axis=1, held=((BOTTOM, BOTH),), pressed=True
 
 @dataclass(frozen=True)
 class Load:
-    """Load of a `kind`; `sign` is positive in tension.
+    """Load of a `kind`; `sign` is 1 where the force acts along its axis, -1 against it. A study gives its size.
 
-    A `follower` force turns and grows with its side in nonlinear kinematics; its kind must load across the side.
+    A `follower` force turns and grows with its side in nonlinear kinematics; its kind must be `LoadKind.direct`.
     """
 
     kind: LoadKind

@@ -535,7 +535,12 @@ class AnisotropicMaterial:
         10 deg: E = 79.8 GPa, nu = 0.378
         45 deg: E = 13.2 GPa, nu = 0.321
         """
-        return engineering_constants(self.plane_stress, quantity(angle, "angle", "angle"))
+        import numpy as np  # here: making a material needs none
+
+        turn = quantity(angle, "angle", "angle")
+        compliance = np.linalg.inv(rotated(self.plane_stress, -turn) if turn else self.plane_stress)
+        (along, coupled, sheared), across, shear = compliance[0].tolist(), compliance[1, 1], compliance[2, 2]
+        return EngineeringConstants(1 / along, float(1 / across), -coupled / along, float(1 / shear), sheared / along)
 
 
 CONSTANTS = ("C11", "C22", "C12", "C66", "C16", "C26")
@@ -564,15 +569,6 @@ class EngineeringConstants(NamedTuple):
     poisson_ratio_xy: float
     shear_modulus: float
     shear_by_x: float
-
-
-def engineering_constants(stiffness: np.ndarray, angle: float = 0.0) -> EngineeringConstants:
-    """Return engineering constants of a stiffness in plane stress (3, 3) [Pa], along axes turned by `angle` [rad]."""
-    import numpy as np  # here: making a material needs none
-
-    compliance = np.linalg.inv(rotated(stiffness, -angle) if angle else stiffness)
-    (along, coupled, sheared), across, shear = compliance[0].tolist(), float(compliance[1, 1]), float(compliance[2, 2])
-    return EngineeringConstants(1 / along, 1 / across, -coupled / along, 1 / shear, sheared / along)
 
 
 def rotated(stiffness: np.ndarray, angle: float) -> np.ndarray:

@@ -385,40 +385,29 @@ def _polygons(grouped: GroupedMesh) -> tuple[tuple[str, ...], list[_Piece]]:
     for name, edges in grouped.sides.items():
         for first, second in np.sort(edges, axis=1).tolist():
             groups[first, second] = (*groups.get((first, second), ()), name)
-    # From each point on: where to, and what is beside the way.
-    leaving: dict[int, list[tuple[int, tuple[tuple[str, ...], int, int]]]] = {}
-    arriving: dict[int, int] = {}
-    for row in np.flatnonzero(outer | between):
+    leaving: dict[int, list[int]] = {}
+    arriving: dict[int, list[int]] = {}
+    keys: dict[int, tuple[tuple[str, ...], int, int]] = {}  # what is beside a way
+    for row in np.flatnonzero(outer | between).tolist():
         first, second = way[row].tolist()
         right = 0 if outer[row] else int(part[other[row]]) + 1
-        key = groups.get((min(first, second), max(first, second)), ()), int(part[row]) + 1, right
-        leaving.setdefault(first, []).append((second, key))
-        arriving[second] = arriving.get(second, 0) + 1
-
-    def goes_on(before: int, here: int, key: object) -> tuple[int, object] | None:
-        """Where a straight way goes on to; None where it ends."""
-        if arriving.get(here) != 1 or len(leaving.get(here, ())) != 1 or leaving[here][0][1] != key:
-            return None
-        there = leaving[here][0][0]
-        one, two = mesh.points[here] - mesh.points[before], mesh.points[there] - mesh.points[here]
-        return (there, key) if abs(one[0] * two[1] - one[1] * two[0]) <= STRAIGHT * (one @ two) else None
-
-    continued = {
-        (here, goes_on(first, here, key)[0])  # type: ignore[index]
-        for first, ways_on in leaving.items()
-        for here, key in ways_on
-        if goes_on(first, here, key)
-    }
+        keys[row] = groups.get((min(first, second), max(first, second)), ()), int(part[row]) + 1, right
+        leaving.setdefault(first, []).append(row)
+        arriving.setdefault(second, []).append(row)
+    following: dict[int, int] = {}  # where a way goes on straight
+    for here, rows in leaving.items():
+        if len(rows) == len(arriving.get(here, ())) == 1 and keys[rows[0]] == keys[arriving[here][0]]:
+            before, there = way[arriving[here][0], 0], way[rows[0], 1]
+            one, two = mesh.points[here] - mesh.points[before], mesh.points[there] - mesh.points[here]
+            if abs(one[0] * two[1] - one[1] * two[0]) <= STRAIGHT * (one @ two):
+                following[arriving[here][0]] = rows[0]
     pieces = []
-    for first, ways_on in leaving.items():
-        for second, key in ways_on:
-            if (first, second) in continued:
-                continue
-            before, here = first, second
-            while (on := goes_on(before, here, key)) is not None:
-                before, here = here, on[0]
-            start, end = (tuple(mesh.points[point].tolist()) for point in (first, here))
-            pieces.append(_Piece(OutlineSide(start, end), (0.0, 1.0), *key))
+    for row in [row for rows in leaving.values() for row in rows if row not in set(following.values())]:
+        last = row
+        while last in following:
+            last = following[last]
+        start, end = (tuple(mesh.points[point].tolist()) for point in (way[row, 0], way[last, 1]))
+        pieces.append(_Piece(OutlineSide(start, end), (0.0, 1.0), *keys[row]))
     return names, pieces
 
 

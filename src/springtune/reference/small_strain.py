@@ -479,7 +479,8 @@ def _element_ends(length: float, layers: int, kind: LoadKind) -> tuple[np.ndarra
     """Ends of the elements of half a beam along x and along y."""
     if kind.along == 0:  # the left half, from y = 0 to 2
         return _graded(length / 2, min(length / 2, 1.0), layers), _graded_both(2.0, layers)
-    # The upper half; its free edge, where corners are, is at y = 1. An end that is pulled evenly has none.
+    # The upper half; its free edge, where corners are, is at y = 1. At an end that is pulled evenly and not held there
+    # is no singularity to grade towards.
     reach = min(length, 1.0)
     pulled = kind.direct and all(side == LEFT for side, _ in kind.held)
     along = _graded(length, reach, layers) if pulled else _graded_both(length, layers)

@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..mechanics.moduli import PatchTest, outline_stiffness
+from ..mechanics.moduli import PatchTest
 from ..mesh import Mesh
 from ..problem.materials import ANY_MATERIAL, AnyMaterial, Material
 from ..springs import DefinitionError, Springs
@@ -64,7 +64,7 @@ class Moduli:
         """Stiffness in plane stress [Pa], shape (3, 3), as of `Material.plane_stress`; NaN where loads change it.
 
         The whole outline is strained evenly, on any mesh and of any anisotropy: see
-        `springtune.mechanics.moduli.outline_stiffness`.
+        `springtune.mechanics.moduli.PatchTest.stiffness`.
 
         Examples
         --------
@@ -81,7 +81,7 @@ class Moduli:
         """
         if self.springs.lateral:
             return np.full((3, 3), np.nan)
-        return outline_stiffness(self.mesh, self.springs) * self.springs.reference
+        return PatchTest(self.mesh).stiffness(self.springs) * self.springs.reference
 
     @property
     def stiffness_error(self) -> float:

@@ -17,7 +17,7 @@ from ..mechanics.newton import Equilibrium
 from ..mechanics.statics import StaticProblem
 from ..mesh import Mesh
 from ..mesh.groups import GroupedMesh
-from ..problem.boundary import held, loaded_edges, measured, weights
+from ..problem.boundary import held, measured, side_edges, weights
 from ..problem.loads import LoadKind
 from ..problem.materials import AnyMaterial
 from ..problem.quantities import nearest
@@ -93,7 +93,7 @@ class Loading:
 
 def box_loading(mesh: Mesh, kind: LoadKind, follower: bool = False) -> Loading:
     """Load of 1 N on a box; with `follower` it turns with its side."""
-    turning = FollowerPressure.of_side(mesh, *loaded_edges(mesh, kind)) if follower else None
+    turning = FollowerPressure.of_side(mesh, side_edges(mesh, kind.loaded), kind.along) if follower else None
     return Loading((kind, follower), held(mesh, kind), weights(mesh, kind), follower=turning)
 
 
@@ -154,7 +154,6 @@ class Sheet:
 
     def __init__(self, mesh: Mesh, thickness: float, networks: int = NETWORKS, like: "Sheet | None" = None) -> None:
         self.mesh, self.thickness, self.deriving = mesh, thickness, 0.0
-        self.held = cache(lambda kind: held(mesh, kind))
         self.weights = cache(lambda kind: weights(mesh, kind))
         self.measured = cache(lambda kind: measured(mesh, kind))
         self.loading = cache(lambda kind, follower=False: box_loading(mesh, kind, follower))

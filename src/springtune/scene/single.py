@@ -537,7 +537,7 @@ class Scene:
         Notes
         -----
         By linear buckling analyses about equilibria shortly below it, proved by the tangent's pivots in equilibria on
-        both sides; see `springtune.mechanics.arc_length.buckling`.
+        both sides; see `springtune.mechanics.continuation.buckling`.
 
         Examples
         --------
@@ -550,7 +550,7 @@ class Scene:
         >>> print(f"{scene.buckling_load():.0f} N; a slender column, by Euler: {euler:.0f} N")
         285 N; a slender column, by Euler: 276 N
         """
-        from ..mechanics.arc_length import buckling
+        from ..mechanics.continuation import buckling
 
         if self.problem.given is not None:
             raise ValueError(f"load: {self.load!r} prescribes displacements, and buckling loads are of forces")

@@ -35,9 +35,9 @@ class Springs:
     Attributes
     ----------
     reference : float
-        Reference stiffness [N/m].
+        Reference stiffness [N/m], of which `relative` gives multiples.
     relative : ndarray of float, shape (n_edges,)
-        Stiffness of each spring over the reference stiffness [1].
+        Stiffness of each spring over the reference stiffness [1], in the order of `Mesh.edges`.
     energies : tuple
         Other energies of `springtune.mechanics.energies`, with moduli over the reference stiffness.
     lateral : float
@@ -104,7 +104,7 @@ class Definition(Declared):
     uniaxial : bool
         Whether it supports only loads along the beam, see `LoadKind.uniaxial`.
     needs : str
-        Fourth argument: ``"stiffness"``, ``"cases"`` or none.
+        Fourth argument: ``"stiffness"``, a given one; ``"cases"``, loads with displacements to match; or none.
     anisotropic : bool
         Whether it supports anisotropic materials.
     finite_strain : bool

@@ -7,13 +7,14 @@ bilinear rectangle (four Gauss points). After Natsupakpong and Cavusoglu (Graph.
 It matches the constrained modulus rather than E: on an equilateral triangle E is wrong by 8 / (9 (1 - nu^2)).
 """
 
+from itertools import combinations
+
 import numpy as np
 
 from ..mesh import Mesh, signed_areas
 from ..mesh.cells import DIAGONALS, SIDES
 from ..problem.materials import AnyMaterial, Material
 from .base import Springs, definition, membrane_stiffness
-from .fitting import least_squares
 
 
 @definition("element-fit", order=140, anisotropic=True)
@@ -74,3 +75,32 @@ def _fit(here: np.ndarray, pairs: tuple[tuple[int, int], ...], matrices: np.ndar
     products = np.einsum("npi,nqi->npq", springs, springs) ** 2
     wanted = np.einsum("npi,nij,npj->np", springs, matrices, springs)
     return least_squares(products, wanted)
+
+
+def least_squares(products: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """Return the non-negative springs k of each cell that minimise ``k . products . k - 2 wanted . k``.
+
+    `products` (n_cells, n_springs, n_springs) are scalar products of unit springs' effects, `wanted` (n_cells,
+    n_springs) those with the wanted effect.
+    """
+    pairs = wanted.shape[1]
+    # All sets of springs that may be other than zero are few: the best one with no negative stiffness is the answer.
+    best, cost = np.zeros(wanted.shape), np.zeros(len(wanted))
+    open_cells = np.arange(len(wanted))
+    for size in range(pairs, 0, -1):
+        for chosen in combinations(range(pairs), size):
+            places = np.array(chosen)
+            found = np.linalg.solve(
+                products[open_cells][:, places[:, None], places], wanted[open_cells][:, places, None]
+            )[..., 0]
+            trial = -(found * wanted[open_cells][:, places]).sum(axis=1)
+            better = (found >= 0).all(axis=1) & (trial < cost[open_cells])
+            where = open_cells[better]
+            cost[where] = trial[better]
+            best[where] = 0.0
+            best[where[:, None], places] = found[better]
+            if size == pairs:  # without a constraint at work no other set is better
+                open_cells = open_cells[~better]
+                if not len(open_cells):
+                    return best
+    return best

@@ -23,7 +23,7 @@ import numpy as np
 from ..mesh import Mesh, signed_areas
 from ..problem.materials import AnyMaterial
 from .base import Springs, definition, membrane_stiffness, rectangles_only
-from .fitting import least_squares
+from .element_fit import least_squares
 
 
 @definition("energy-fit", order=145, anisotropic=True)

@@ -32,9 +32,9 @@ def with_area(mesh: Mesh, material: Material, thickness: float) -> Springs:
 
 
 def _scaled(found: Springs, mesh: Mesh, material: Material, thickness: float) -> Springs:
-    from ..mechanics.moduli import axial_moduli  # here: see `springtune.springs`
+    from ..mechanics.moduli import PatchTest  # here: see `springtune.springs`
 
     # The modulus in units of the reference stiffness: the scalar is a ratio of the two.
-    stiffness, _ = axial_moduli(mesh, found)
+    stiffness, _ = PatchTest(mesh).axial(found)
     scalar = material.young_modulus * thickness / (stiffness * found.reference)
     return replace(found, reference=scalar * found.reference, evaluations=1)

@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Any
 from springtune.safe_io.atomic import write_text
 from springtune.safe_io.escapes import markdown
 
+from ..config.messages import StudyError
 from ..output.browse import page as browse
 from ..output.reading import attributes
 from ..runs import provenance, records, rerun
-from ..runs.dependencies import OURS, PACKAGE
-from ..runs.keys import installed
+from ..runs.keys import OURS, PACKAGE, installed
 from ..runs.plan import plan
 from ..runs.workload import COMMANDS_FILE
 from .parts import ELSEWHERE
@@ -72,7 +72,7 @@ MOST_FILES, MOST_TEXT = 100_000, 2**24
 MOST_TOLD = 5
 
 
-class ArchiveError(ValueError):
+class ArchiveError(StudyError):
     """A study cannot be archived; the message names the reason and the remedy."""
 
 
@@ -162,7 +162,7 @@ def gather(
     checkout = _checkout(folder)
     checked = verified(study, folder)
     if checked.faults or checked.stale:
-        raise ArchiveError(_unfinished(study, folder, checked.faults, checked.stale))
+        raise ArchiveError(*_unfinished(study, folder, checked.faults, checked.stale))
     made = plan(study, folder, 1)
     jobs, untold = rerun.jobs(study, made), rerun.untold(folder, chosen)
     given = provenance.input_files(study)
@@ -237,15 +237,15 @@ def _other_library(packed: Path) -> str:
     return min(others + lacking, default="")
 
 
-def _unfinished(study: "Study", folder: Path, faults: Iterable[tuple[str, str]], stale: Iterable[str]) -> str:
+def _unfinished(study: "Study", folder: Path, faults: Iterable[tuple[str, str]], stale: Iterable[str]) -> list[str]:
     said = [f"{name}: {why}" for name, why in faults]
     said += [f"{name}: the study or the program changed since" for name in stale]
     shown = said[:MOST_TOLD] + ([f"and {len(said) - MOST_TOLD} more"] if len(said) > MOST_TOLD else [])
     remedy = f"springtune run {study.path}"
     if any(why.endswith(records.DAMAGED) for _, why in faults):
         remedy = f"springtune verify {study.path} --set-aside, then {remedy}"
-    lines = [f"{folder}: is not what the study asks for now, and is not archived", *shown, f"make it: {remedy}"]
-    return "\n  ".join(lines)
+    head = f"{folder}: is not what the study asks for now, and is not archived"
+    return [head, *(f"  {line}" for line in (*shown, f"make it: {remedy}"))]
 
 
 def _code(study: "Study", checkout: Path, given: set[Path], untracked: bool) -> Code:

@@ -129,6 +129,7 @@ PoissonRatio = Annotated[float, number("a number from 0 to 0.5, such as 0.3", 0,
 Ratio = Annotated[float, number("a number above 0", 0, math.inf, above=True)]
 Terms = Annotated[int, number(f"a whole number from 1 to {MOST_TERMS}", 1, MOST_TERMS, whole=True)]
 Points = Annotated[int, number(f"a whole number from 2 to {MOST_POINTS}, such as 61", 2, MOST_POINTS, whole=True)]
+# Mesh types, beams and materials may be names that a study declares: a type takes any text, `checks` looks it up.
 MeshType = Annotated[
     str, Scalar(str, {"type": "string", "examples": list(MESH_TYPES)}, "a mesh type such as 'structured'")
 ]

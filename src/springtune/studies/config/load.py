@@ -16,10 +16,9 @@ from .checks import check_counts, check_definitions, check_meshes, check_names
 from .csv_files import with_rows
 from .expand import build, expand, files_of_meshes, files_of_tests
 from .kind import Kind
-from .messages import Key, Problems, StudyError, show
+from .messages import Key, Problems, StudyError, read_study, read_yaml, show
 from .model import Part, Study
 from .sections import StudyConfig, study_model
-from .yaml_lines import read_study, read_yaml
 
 
 def load(path: str | Path, kinds: Sequence[Kind], beside: Path | None = None) -> Study:

@@ -1,6 +1,7 @@
 """Models of the sections of a study; the JSON schema and the tables of config/README.md are generated from them."""
 
-from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+import json
+from collections.abc import Container, Iterable, Mapping, Sequence
 from pathlib import Path
 from types import NoneType
 from typing import Annotated, Any, ClassVar, NamedTuple, Self, get_args, get_origin
@@ -51,7 +52,7 @@ from .fields import (
     number,
     one_of,
 )
-from .kind import Kind, Output
+from .kind import Kind, Output, kinds
 from .messages import refuse, show
 
 MOST_PARTS = 1000
@@ -588,25 +589,7 @@ def study_model(kinds: Sequence[Kind], given: Container[object] | None = None) -
     return model
 
 
-def sections(model: type[Section], place: str = "") -> dict[str, type[Section]]:
-    """Model of each section of a study, by its place."""
-    found = {place: model}
-    for name, field in model.model_fields.items():
-        for inside, ending in _models(field.annotation):
-            found |= sections(inside, f"{place}.{name}".lstrip(".") + ending)
-    return found
-
-
-def _models(annotation: object, ending: str = "") -> Iterator[tuple[type[Section], str]]:
-    """Sections inside an annotation, and what follows the key in their place."""
-    if isinstance(annotation, type) and issubclass(annotation, Section):
-        yield annotation, ending
-    origin = get_origin(annotation)
-    ending += ".<name>" if origin is dict else "[]" if origin is list else ""
-    for part in get_args(annotation):
-        yield from _models(part, ending)
-
-
-def json_schema(model: type[StudyConfig]) -> dict[str, Any]:
-    """JSON schema of a study, for editors."""
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema"} | model.model_json_schema()
+def schema_text() -> str:
+    """JSON schema of studies, for editors."""
+    schema = study_model(kinds()).model_json_schema()
+    return json.dumps({"$schema": "https://json-schema.org/draft/2020-12/schema"} | schema, indent=2) + "\n"

@@ -13,7 +13,7 @@ from springtune.safe_io import atomic
 from ..config.kind import kinds, outputs
 from ..output import dataset, summary
 from ..runs import provenance, records, rerun
-from ..runs.dependencies import CODE_FILE, OURS
+from ..runs.keys import CODE_FILE, OURS
 from ..runs.plan import COSTS_FILE, plan, remember_costs, usual_costs
 from ..runs.run_tasks import RECORDS, with_repair
 from ..runs.stages import results

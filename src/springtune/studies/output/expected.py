@@ -337,7 +337,7 @@ class _Yaml:
     """YAML file of expected values; faults name their place."""
 
     def __init__(self, path: Path) -> None:
-        from ..config.yaml_lines import read_yaml
+        from ..config.messages import read_yaml
 
         self.path = path
         try:

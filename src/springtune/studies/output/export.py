@@ -31,6 +31,8 @@ EXTRA = "install what is missing with `pip install springtune[export]`"
 class RequestError(ValueError):
     """The request does not fit the dataset, or names an unknown format."""
 
+    exit_code = 2
+
 
 @dataclass(frozen=True)
 class Column:

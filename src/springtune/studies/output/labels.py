@@ -161,6 +161,9 @@ def swatches(colours: Mapping[str, str]) -> list[Patch]:
     return [Patch(facecolor=colour, edgecolor="0.3", linewidth=0.4, label=text) for text, colour in colours.items()]
 
 
+Drawn = tuple[list[End], str, str]
+"""What a panel is finished with: ends of its lines, a note, and the reason if there are no lines."""
+
 TITLE_LINE = 0.13
 """Height of a line of a panel's title [inch]."""
 
@@ -184,6 +187,26 @@ def settle(figure: Figure | SubFigure | None, axes: np.ndarray, place: Mapping[s
     left = max(room_left(panel) for panel in axes[:, 0])
     between = max((room_left(panel) for panel in axes[:, 1:].flat if panel.get_visible()), default=0.0)
     arrange(figure, axes, **{**place, "left": left, "across": place.get("across", 0.0) + between})
+
+
+def finish(
+    figure: Figure | SubFigure | None,
+    axes: np.ndarray,
+    place: Mapping[str, Any],
+    drawn: Mapping[Axes, Drawn],
+    height: float = 0.0,
+) -> None:
+    """Settle panels, name their lines and write their notes below; a new figure of a `height` [inch] grows by these."""
+    under = LINE * max((lines_of(said) for _, said, _ in drawn.values()), default=0)
+    if height and figure is not None:
+        figure.set_size_inches(style.size(figure)[0], height + len(axes) * under)
+    settle(figure, axes, {**place, "bottom": place["bottom"] + under, "down": place.get("down", 0.0) + under})
+    for panel, (ends, said, why) in drawn.items():
+        name_lines(panel, ends)
+        if why:
+            say(panel, why)
+        else:
+            note(panel, said)
 
 
 @contextmanager

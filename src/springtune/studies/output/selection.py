@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
 
 from springtune.problem.geometry import beam_label
 from springtune.problem.parameters import OF_BODIES, SWEPT, shown_order
+
+from ..config.model import FINITE_STRAIN_REFERENCE, TESTED_REFERENCE
 
 if TYPE_CHECKING:
     from .dataset import Label
@@ -123,6 +125,19 @@ def cells(present: xr.DataArray, names: Collection[str]) -> list[dict[str, Label
     return [{name: labels[axis][place[axis]] for axis, name in enumerate(names)} for place in np.argwhere(there.values)]
 
 
+def records(data: xr.Dataset, present: xr.DataArray, names: Iterable[str]) -> list[dict[str, Any]]:
+    """Labels and variables of the present cells, the last dimension of `present` fastest.
+
+    Plain arrays: selecting each cell of a dataset takes a thousand times as long.
+    """
+    places = dict(zip(map(str, present.dims), np.nonzero(present.values)))
+    columns = {name: present[name].values[numbers].tolist() for name, numbers in places.items()}
+    for name in names:
+        dimensions = [str(one) for one in data[name].dims]
+        columns[name] = data[name].values[tuple(places[one] for one in dimensions)].tolist()
+    return [dict(zip(columns, row)) for row in zip(*columns.values())]
+
+
 def _listed(labels: Iterable[object]) -> str:
     return ", ".join(repr(label) for label in labels) or "nothing"
 
@@ -134,3 +149,35 @@ def labelled_beam(data: xr.Dataset, name: str) -> str:
     found = data[["beam_length", "beam_height"]]
     found = found.sel(beam=name) if "beam" in found.dims else found
     return beam_label(str(name), float(found.beam_length), float(found.beam_height))
+
+
+# -- references at finite strain: Yeoh's law of a material with a uniaxial test, else neo-Hooke's ---------------------
+
+OWN_LAWS = (TESTED_REFERENCE, FINITE_STRAIN_REFERENCE)
+"""Plane-stress references of own laws, by priority."""
+
+
+def of_own_law(finite: xr.Dataset) -> xr.Dataset | None:
+    """Select plane-stress references of each material's own law."""
+    neo_hooke, tested = (
+        finite.sel(reference=kind, drop=True) if kind in finite.reference.values else None
+        for kind in (FINITE_STRAIN_REFERENCE, TESTED_REFERENCE)
+    )
+    if neo_hooke is None or tested is None:
+        return tested if neo_hooke is None else neo_hooke
+    # A material has one of the two; where neither is there, each says why.
+    there = tested.reference_displacement.notnull()
+    if not there.any():
+        return neo_hooke
+    found = neo_hooke.copy()
+    for name, array in tested.items():
+        own = there.broadcast_like(array).transpose(*array.dims) if set(there.dims) <= set(array.dims) else there
+        found[name] = array.where(own, neo_hooke[name])
+    return found
+
+
+def own_law(cell: xr.Dataset, name: str) -> str | None:
+    """Label of one material's plane-stress reference; an unsolved requested one counts last, None without any."""
+    kinds = [kind for kind in OWN_LAWS if kind in cell.reference.values]
+    there = [kind for kind in kinds if np.isfinite(cell[name].sel(reference=kind).values).any()]
+    return next(iter(there or kinds[::-1]), None)

@@ -19,7 +19,7 @@ from ..runs import checked_json, rerun
 from ..runs.checked_json import ASIDE
 from ..runs.plan import Plan
 from ..runs.workload import clock, computed, results_of
-from .own_law import of_own_law
+from .selection import of_own_law
 from .text import aligned, place_text, without_numbers
 
 if TYPE_CHECKING:

@@ -3,18 +3,19 @@
 Jobs of stages come from `springtune.studies.runs.plan`; the jobs after them are defined here.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, is_dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from springtune.safe_io.atomic import UNFINISHED
+
 from ..config.kind import FORMATS, kinds, modules, outputs
 from ..config.model import keeps_fields
 from . import checked_json, records
-from .checked_json import hash_of
-from .dependencies import CODE_FILE, OURS, PACKAGE
-from .keys import stage_key
-from .plan import BUNDLES_FILE, Plan, plan, table_files
+from .checked_json import ASIDE, hash_of
+from .keys import CODE_FILE, OURS, PACKAGE, stage_key
+from .plan import BUNDLES_FILE, Plan, plan, stages, table_files
 from .provenance import inputs
 from .run_tasks import RECORDS
 
@@ -159,7 +160,7 @@ def _browse_digest(study: "Study") -> str:
     }
     return hash_of(
         linked(study),
-        [stage_key(name) for name in ("studies.output.browse.page", *modules("outputs", "views"))],
+        [stage_key(name) for name in ("studies.output.browse.page", *modules("outputs"))],
         assets,
     )
 
@@ -213,3 +214,63 @@ def _is_up_to_date(job: Job, before: Job) -> bool:
 def is_damage(why: str) -> bool:
     """Return whether a reason is a damaged or missing file, which a user should know."""
     return why.endswith((records.DAMAGED, records.MISSING))
+
+
+# -- files that no job of a study makes any more -----------------------------------------------------------------------
+
+JOB_FILES = {"tasks": ".json", "done": ".json", "logs": ".log", "benchmarks": ".tsv"}
+
+COLLECTED, PIECE = ".pvd", ".vtu"
+"""Endings of ParaView collections, and of their files in a folder beside."""
+
+OUTPUT_FILES = {
+    "figures": tuple(f".{ending}" for ending in FORMATS),
+    "tables": (".csv", ".html", ".md"),
+    "paraview": (COLLECTED,),
+}
+
+STORED = ".h5"
+"""Ending of what stages store, see `springtune.studies.runs.store`."""
+
+
+def orphans(study: "Study", folder: Path) -> list[Path]:
+    """Files of earlier runs that the next run neither makes nor reads."""
+    from springtune.handover.paraview import pieces_of  # here: few commands need it
+
+    planned = plan(study, folder, 1)
+    found = jobs(study, planned)
+    products = [Path(path) for job in found.values() for path in job.products]
+    kept = {folder / BUNDLES_FILE, *products}
+    kept |= {piece for path in products if path.suffix == COLLECTED for piece in pieces_of(path)}
+    kept |= {folder / name / f"{job}{ending}" for name, ending in JOB_FILES.items() for job in found}
+    return sorted({*_candidates(folder)} - kept)
+
+
+def _candidates(folder: Path) -> Iterator[Path]:
+    """Files of the kinds that runs make, in a study's folder and those directly in it that are no links elsewhere."""
+    names = tuple(f"{name}_" for name in (*(stage.name for stage in stages()), PRESENT))
+    stores = {stage.folder for stage in stages()}
+    for path in _files(folder):
+        if _is_left(path):
+            yield path
+    for below in sorted(folder.iterdir()):
+        if below.is_symlink() or not below.is_dir():
+            continue
+        if below.name in OUTPUT_FILES and COLLECTED in OUTPUT_FILES[below.name]:
+            yield from (path for path in sorted(below.glob(f"*/*{PIECE}")) if path.is_file() and not path.is_symlink())
+        for path in _files(below):
+            made = path.suffix in OUTPUT_FILES.get(below.name, ())
+            made |= below.name in JOB_FILES and path.name.startswith(names)
+            made |= below.name in stores and path.suffix == STORED
+            made |= below.name == "meshes" and path.suffix in (".vtu", ".json")
+            if made or _is_left(path):
+                yield path
+
+
+def _is_left(path: Path) -> bool:
+    """Whether a file was being written, or was set aside."""
+    return UNFINISHED in path.name or path.name.endswith(ASIDE)
+
+
+def _files(folder: Path) -> Iterator[Path]:
+    return (path for path in folder.iterdir() if path.is_file() and not path.is_symlink())

@@ -26,7 +26,7 @@ class Task:
     values : dict
         Argument of ``solve``, without labels, so that a new label computes nothing again.
     also : sequence
-        Further parts of its key: keys of definitions and mesh types.
+        Further parts of its key: code that its values choose, by `keys.definition_key` and `keys.mesh_type_key`.
     labels : dict
         Labels of its cell of the dataset; a label may be several.
     of : object

@@ -7,6 +7,7 @@ from springtune.safe_io.escapes import no_mathematics
 
 from ...output import labels, style
 from ...output.dataset import most_requested
+from ...output.drawing import fitted
 from ...output.selection import choose, group, labelled_beam, labels_of, unswept
 from .outputs import figures
 
@@ -50,27 +51,13 @@ def _by_mesh_type(ax, present, title, draw):
     columns = min(2, max(1, len(types)))
     figure, axes, flat, height = style.multiples(ax, len(types), columns, 1.95)
     title = labels.wrapped(title, (style.PAGE if columns > 1 else style.COLUMN) - 0.1, 8.5)
-    place = {"left": 0.5, "right": 0.06, "bottom": 0.4, "top": 0.36 + 0.14 * labels.lines_of(title), "across": 0.5,
-             "down": 0.68, "title": title}  # fmt: skip
-    style.arrange(figure, axes, **place)
-    drawn = [draw(panel, name) for panel, name in zip(flat, types)]
+    place = {"left": 0.5, "right": 0.06, "bottom": 0.4, "top": 0.36 + 0.14 * labels.lines_of(title), "down": 0.68}
+    style.arrange(figure, axes, across=0.5, title=title, **place)
+    drawn = {panel: draw(panel, name) for panel, name in zip(flat, types)}
     for panel, name in zip(flat, types):
         panel.set_title(name)
-    under = labels.LINE * max((labels.lines_of(said) for _, said, _ in drawn), default=0)
-    if ax is None and drawn:  # a figure of our own grows by its notes
-        figure.set_size_inches(style.size(figure)[0], height + len(axes) * under)
-    labels.settle(figure, axes, place | {"bottom": 0.4 + under, "across": 0.1, "down": 0.68 + under})
-    for panel, (ends, said, why) in zip(flat, drawn):
-        labels.name_lines(panel, ends)
-        labels.note(panel, said)
-        if why:
-            labels.say(panel, why)
+    labels.finish(figure, axes, place | {"across": 0.1, "title": title}, drawn, height if ax is None else 0.0)
     return flat
-
-
-def _room(panel):
-    """Width of a panel [inch]."""
-    return panel.get_window_extent().width / panel.figure.dpi
 
 
 def _statuses(flags):
@@ -132,7 +119,7 @@ def _moduli(panel, here):
     bottom, top = np.clip([np.nanmin(values) - 0.03, np.nanmax(values) + 0.03], -0.45, 0.75)
     panel.set_ylim(min(bottom, low - 0.03), max(top, high + 0.03))
     ends = labels.lines(panel, wanted, curves, 0.012)
-    said = labels.wrapped(f"no moduli: {', '.join(lacking)}", _room(panel)) if lacking and ends else ""
+    said = fitted(panel, [f"no moduli: {', '.join(lacking)}"]) if lacking and ends else ""
     return ends, said, "" if ends else f"No definition has moduli here: {_statuses(here.status.values)}."
 
 
@@ -226,7 +213,7 @@ def _field_errors(panel, error, status):
         without = sizes[~there & (flag > 0)]
         if there.any() and len(without):
             said.append(f"no error: {name} at {', '.join(f'{size:g}' for size in without)} mm")
-    return ends, "\n".join(labels.wrapped(text, _room(panel)) for text in said), ""
+    return ends, fitted(panel, said), ""
 
 
 @style.styled

@@ -1,7 +1,5 @@
 """Tables that compare definitions: all scenes, all moduli, and which definition to use."""
 
-import csv
-import io
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +8,8 @@ import xarray as xr
 from springtune.safe_io.atomic import write_text
 
 from ...output.dataset import STATUS, most_requested
-from ...output.selection import unswept
-from ...output.text import markdown_section, markdown_table
+from ...output.selection import records, unswept
+from ...output.text import csv_text, markdown_section, markdown_table
 from ..scenes.variables import SCENE
 from .outputs import TABLES
 
@@ -31,18 +29,12 @@ def write(tree, folder):
 
 def _csv(data, dimensions, values):
     """One row for each cell that was asked for."""
-    status = data.status.transpose(*dimensions).values
-    labels = [data[name].values.tolist() for name in dimensions]
-    columns = [data[name].transpose(*dimensions).values for name in (*values, "message")]
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([*dimensions, "status", *values, "message"])
-    for place in map(tuple, np.argwhere(status != 0)):
-        row = [label[i] for label, i in zip(labels, place)]
-        found = [column[place] for column in columns]
-        numbers = ["" if np.isnan(value) else f"{value:.6g}" for value in found[:-1]]
-        writer.writerow([*row, STATUS[status[place]], *numbers, found[-1]])
-    return text.getvalue()
+    present = (data.status != 0).transpose(*dimensions)
+    rows = records(data, present, ("status", *values, "message"))
+    for row in rows:
+        row["status"] = STATUS[row["status"]]
+        row |= {name: "" if np.isnan(row[name]) else f"{row[name]:.6g}" for name in values}
+    return csv_text(rows)
 
 
 # -- which definition to use -------------------------------------------------------------------------------------------

@@ -8,6 +8,7 @@ import numpy as np
 from springtune.safe_io.atomic import write_text
 
 from ...output.dataset import STATUS, Filler, Group
+from ...output.selection import records
 from ...output.text import csv_text
 from ...runs import store
 from .batches import crossings, refine, value_key
@@ -134,16 +135,15 @@ def write(tree, folder):
         cell = data.sel(refinement=name, definition=definition)
         parameter = str(cell.parameter.item())
         labels = {"refinement": name, "definition": definition, "parameter": parameter, "unit": VARIED[parameter].unit}
-        refined, of = cell[f"refined_{parameter}"].values, f"crossing_{parameter}"
-        for point in np.argsort(refined, kind="stable")[: int(cell.value_count)]:  # NaN comes last
-            one = cell.isel(point=point)
-            row = labels | {"value": float(refined[point]), "batch": int(one.batch)}
-            row |= {result: float(one[result]) for result in VALUE_NUMBERS}
-            values.append(row | {"status": STATUS[int(one.status)], "message": str(one.message.item())})
-        for number in np.flatnonzero(np.isfinite(cell.crossing_level.values)):
-            one = cell.isel(crossing=number)
-            variables = {"error": "crossing_level", "value": of, "width": f"{of}_width", "change": "crossing_change"}
-            found.append(labels | {column: float(one[variable]) for column, variable in variables.items()})
+        refined, of = cell[f"refined_{parameter}"], f"crossing_{parameter}"
+        cell = cell.isel(point=np.argsort(refined.values, kind="stable")[: int(cell.value_count)])  # NaN comes last
+        numbers = (refined.name, "batch", *VALUE_NUMBERS)
+        for one in records(cell, cell.point.notnull(), (*numbers, "status", "message")):
+            row = {"value": one[refined.name]} | {key: one[key] for key in numbers[1:]}
+            values.append(labels | row | {"status": STATUS[int(one["status"])], "message": one["message"]})
+        columns = {"error": "crossing_level", "value": of, "width": f"{of}_width", "change": "crossing_change"}
+        for one in records(cell, cell.crossing_level.notnull(), columns.values()):
+            found.append(labels | {column: one[variable] for column, variable in columns.items()})
     # A file without rows has its columns.
     for name, rows in zip(REFINEMENT_TABLES, (values, found or [dict.fromkeys(CROSSING_COLUMNS, "")])):
         write_text(Path(folder) / name, csv_text(rows))

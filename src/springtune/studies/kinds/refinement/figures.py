@@ -5,6 +5,7 @@ import numpy as np
 from springtune.problem.status import Status
 
 from ...output import labels, style
+from ...output.drawing import fitted
 from ...output.selection import choose, group
 from .outputs import SPACINGS, VARIED
 
@@ -60,9 +61,8 @@ def plot_refinement(data, ax=None, *, refinement=None):
     ends = [_panel(panel, data.sel(refinement=name)) for panel, name in zip(flat, names)]
     labels.settle(figure, axes, place)
     for panel, name, (found, said) in zip(flat, names, ends):
-        room = panel.get_window_extent().width / panel.figure.dpi
         labels.note(panel, said)
-        _entitle(panel, name, labels.wrapped(str(data.scene.sel(refinement=name).item()), room))
+        _entitle(panel, name, fitted(panel, [str(data.scene.sel(refinement=name).item())]))
         if found:
             labels.name_lines(panel, found)
         else:

@@ -3,8 +3,6 @@
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from ...config.kind import Output, needs, stem
 from ...output.browse import Plot, View
 from .designs import SOBOL_INDICES
@@ -88,20 +86,18 @@ VIEWS = (
 
 def tables(tree: "xr.DataTree") -> list[dict[str, Any]]:
     """Tables of the page, see `springtune.studies.kinds.scenes.tables.tables`."""
+    from ...output.selection import records  # here, since a plan does without xarray
+
     if "sobol" not in tree:
         return []
     found = tree["sobol"].to_dataset()
     rows: dict[tuple[str, ...], dict[str, Any]] = {}
-    for place in np.argwhere(found.base_samples.values > 0):
-        cell = found.isel(dict(zip(found.base_samples.dims, place)))
-        quantity, load, definition = (str(cell[name].values) for name in ("quantity", "load", "definition"))
-        definition = "" if quantity == "best_stiffness" else definition  # it is the same for all definitions
-        for parameter in found.parameter.values:
-            one = cell.sel(parameter=parameter)
-            labels = {"quantity": quantity, "load": load, "definition": definition, "parameter": parameter}
-            orders = [f"{order}_order{end}" for order in ("first", "total") for end in ("", "_low", "_high")]
-            values = {name: float(one[name]) for name in orders}
-            rows.setdefault(tuple(labels.values()), labels | values | {"base_samples": int(cell.base_samples)})
+    orders = [f"{order}_order{end}" for order in ("first", "total") for end in ("", "_low", "_high")]
+    for one in records(found, (found.base_samples > 0) & (found.parameter != ""), (*orders, "base_samples")):
+        if one["quantity"] == "best_stiffness":  # it is the same for all definitions
+            one["definition"] = ""
+        row = {name: one[name] for name in ("quantity", "load", "definition", "parameter", *orders, "base_samples")}
+        rows.setdefault(tuple(row.values())[:4], row)
     first, second, third = QUANTITIES.values()
     note = (
         f"{first.capitalize()}, {second} and {third}: shares of their variance by each parameter alone (first order) "

@@ -20,7 +20,7 @@ from ...runs import checked_json, store
 from . import any_reference, plan, stored
 from .outputs import pressed
 from .stored import PACKED, fields_key, unpacked
-from .variables import BLOCK, CELL, FIELDS, FINITE_STRAIN, ROOT, SENSITIVITY, fields_of, swept
+from .variables import BLOCK, CELL, FIELDS, FINITE_STRAIN, OF_PRINT, ROOT, SENSITIVITY, fields_of, swept
 
 SMALL_STRAIN = "small-strain-plane-stress"
 """Name of the reference that all studies have."""
@@ -54,9 +54,8 @@ def groups(study, folder):
     if study.further_references:
         found[FINITE_STRAIN.name] = _finite_strain(study, folder, axes, data.displacement)
     if block:
-        pressed_faces = block.data
-        _compare(pressed_faces.face_error, pressed_faces.face_displacement, pressed_faces.reference_face_displacement)
-        found[BLOCK.name] = pressed_faces
+        faces = found[BLOCK.name] = block.data
+        _compare(faces.face_error, faces.face_displacement, faces.reference_face_displacement)
     if fields:
         found[FIELDS.name] = fields.data
     return found
@@ -66,13 +65,9 @@ def _bodies(study, root):
     """Write materials and beams; the fit of a rubber goes into a comment."""
     fits = {}
     for material in {scene.material for scene in study.scenes}:
-        values = {
-            "material_young_modulus": material.young_modulus,
-            "material_poisson_ratio": material.poisson_ratio,
-            "material_density": np.nan if material.density is None else material.density,
-        }
-        labels = {"young_modulus": material.young_modulus, "poisson_ratio": material.poisson_ratio}
-        root.put(values, material=material.name, **labels)
+        labels = {name: getattr(material, name) for name in ("young_modulus", "poisson_ratio")}
+        values = labels | {"density": np.nan if material.density is None else material.density}
+        root.put({f"material_{name}": value for name, value in values.items()}, material=material.name, **labels)
         if isinstance(material, Rubber):
             fits[material.name] = material
     if fits:
@@ -83,7 +78,7 @@ def _bodies(study, root):
             for name, law in sorted(fits.items())
         )
     for beam in {scene.mesh.beam for scene in study.scenes}:
-        body = {"beam_length": beam.length, "beam_height": beam.height, "beam_thickness": beam.thickness}
+        body = {f"beam_{name}": getattr(beam, name) for name in ("length", "height", "thickness")}
         root.put(body, beam=beam.name, thickness=beam.thickness)
 
 
@@ -94,11 +89,6 @@ def _reference_of(scene):
 
 def _mesh_labels(mesh):
     return {"beam": mesh.beam.name, "mesh_type": mesh.mesh_type, "mesh_size": mesh.mesh_size}
-
-
-def _calibration(study, folder):
-    """Calibrated stiffnesses by group; none where no scene is calibrated."""
-    return checked_json.demand(plan.calibration_path(folder)) if plan.calibrated(study) else {}
 
 
 def _meshes(study, folder, root):
@@ -117,10 +107,8 @@ def _references(study, folder, root):
         for kinematics in study.axes["kinematics"]:
             objections[one, kinematics] = found = objection(result, one.force, kinematics)
             root.put({"reference_applies": not found}, kinematics=kinematics, **labels)
-        values = {
-            "reference_seconds": result["seconds"],
-            "reference_message": objection(result, one.force, "nonlinear"),
-        }
+        values = {"reference_seconds": result["seconds"]}
+        values["reference_message"] = objection(result, one.force, "nonlinear")
         if "force" in root.data.data_vars:
             values["force"] = one.force
         if "displacement" in result:
@@ -149,27 +137,25 @@ def _reference(study, folder, one, fields=()):
 def _scenes(study, folder, root, block, fields, objections):
     """Write the results of the scenes into the root and the groups; each file is read once."""
     compared = set()  # places of fields that have their reference
-    calibration = _calibration(study, folder)
+    calibration = checked_json.demand(plan.calibration_path(folder)) if plan.calibrated(study) else {}
     arrays, known = ["face_profile"] * (block is not None), set(root.data.data_vars)
     shown = plan.shown_scenes(study) if fields else ()
     for mesh, scenes in plan.scenes_by_mesh(study).items():
-        names = plan.solved_keys(study, mesh, calibration)
+        names = plan.solved_keys(study, mesh, calibration)  # in the store a result's name is its key
         path = folder / "solutions" / f"{plan.stem(mesh)}.h5"
         results = store.read(path, set(names), arrays)
         kept = {fields_key(name) for scene, name in zip(scenes, names) if scene in shown}
         of_fields = store.read(path, kept, [PACKED]) if kept else {}
         labels = [study.labels(scene) for scene in scenes]
-        against = {}
-        for scene in scenes:
-            one = id(scene.material), scene.load, scene.force, scene.kinematics
-            if one not in against:
-                against[one] = objections[_reference_of(scene), scene.kinematics]
-        rows = []
+        against, rows = {}, []
         for scene, name in zip(scenes, names):
             result = results[name]
             values = {name: value for name, value in result.items() if name in known}
-            why = against[id(scene.material), scene.load, scene.force, scene.kinematics]
-            values["message"] = with_objection(result, result.get("message", ""), why)
+            # By its place: hashing materials for each of 100,000 scenes is slow.
+            one = id(scene.material), scene.load, scene.force, scene.kinematics
+            if one not in against:
+                against[one] = objections[_reference_of(scene), scene.kinematics]
+            values["message"] = with_objection(result, result.get("message", ""), against[one])
             rows.append(values | {"solve_seconds": result["seconds"]})
         root.put_each(rows, labels)
         for scene, name, place in zip(scenes, names, labels) if block or of_fields else ():
@@ -207,19 +193,9 @@ def _at_particles(study, folder, scene, fields):
 
 def _printed(study, root):
     for cell in study.printed:
-        labels = {name: getattr(cell, name) for name in CELL}
+        values = {name: getattr(cell, name.removeprefix(OF_PRINT)) for name in root.data if name.startswith(OF_PRINT)}
         try:
-            root.put(
-                {
-                    "paper_displacement": cell.displacement,
-                    "paper_reference_displacement": cell.reference_displacement,
-                    "paper_deformation_error": cell.deformation_error,
-                    "paper_stiffness": cell.stiffness,
-                    "paper_table": cell.table,
-                    "paper_remark": cell.remark,
-                },
-                **labels,
-            )
+            root.put(values, **{name: getattr(cell, name) for name in CELL})
         except KeyError:
             continue  # a cell that this study does not ask for
 
@@ -235,21 +211,12 @@ def _sensitivity(study, folder, displacements, axes):
             reference = displacements.get(_reference_of(curve), np.nan)
             status = np.where(result["stable"], Status.SOLVED, Status.UNSTABLE)
             status = np.where(np.isnan(displacement), result.get("status", Status.NOT_CONVERGED), status)
-            curves.put(
-                {
-                    "stiffness": stiffness,
-                    "displacement": displacement,
-                    "deformation_error": deformation_error(displacement, reference),
-                    "status": status,
-                    "message": result["message"],
-                    "best_stiffness": result["best_stiffness"],
-                    "best_stiffness_status": result["best_status"],
-                    "best_stiffness_message": result["best_message"],
-                    "predicted_stiffness": predicted_stiffness(curve.material, mesh.beam, mesh.mesh_size, curve.load),
-                    "curve_seconds": result["seconds"],
-                },
-                **study.labels(curve),
-            )
+            values = {name: result[name] for name in ("displacement", "message", "best_stiffness")}
+            values |= {f"best_stiffness_{name}": result[f"best_{name}"] for name in ("status", "message")}
+            values |= {"stiffness": stiffness, "status": status, "curve_seconds": result["seconds"]}
+            values["deformation_error"] = deformation_error(displacement, reference)
+            predicted = predicted_stiffness(curve.material, mesh.beam, mesh.mesh_size, curve.load)
+            curves.put(values | {"predicted_stiffness": predicted}, **study.labels(curve))
     return curves.data
 
 
@@ -258,11 +225,8 @@ def _block(study, folder, axes):
     kinds = (SMALL_STRAIN, *study.further_references)
     block = Filler(swept(BLOCK, study).empty(axes | {"reference": kinds, "face_position": tuple(FACE_POSITIONS)}))
     for one in study.references:
-        if not LOADS[one.load].kind.pressed:
-            continue
-        labels = study.labels(one)
-        for kind in kinds:
-            block.put(_face_reference(study, folder, one, kind), reference=kind, **labels)
+        for kind in kinds if LOADS[one.load].kind.pressed else ():
+            block.put(_face_reference(study, folder, one, kind), reference=kind, **study.labels(one))
     return block
 
 
@@ -273,10 +237,8 @@ def _finite_strain(study, folder, axes, displacement):
         labels = study.labels(one)
         for kind in study.further_references:
             result = _finite_reference(folder, one, kind)
-            values = {"reference_message": result["message"]}
-            if "displacement" in result:
-                values["reference_displacement"] = result["displacement"]
-                values["reference_error_estimate"] = result["error_estimate"]
+            known = ("message", "displacement", "error_estimate")
+            values = {f"reference_{name}": result[name] for name in known if name in result}
             finite.put(values, reference=kind, **labels)
     _compare(finite.data.deformation_error, displacement, finite.data.reference_displacement)
     return finite.data

@@ -7,8 +7,7 @@ from springtune.problem.parameters import SWEPT
 from ...config.kind import distinct
 from ...output import labels, style
 from ...output.drawing import fitted, in_words
-from ...output.own_law import of_own_law
-from ...output.selection import at, cells, group, labelled_beam, labels_of, last_swept
+from ...output.selection import at, cells, group, labelled_beam, labels_of, last_swept, of_own_law
 from .figures import USUAL, by_beam, each, named, swept_words
 from .outputs import SCENE_LABELS, SWEPT_SHOWN
 
@@ -55,27 +54,19 @@ def _multiples(ax, shown, draw, title, swept):
     """Small multiples of deformation errors, shape (n_panels,): ``draw`` returns a title, ends of lines and a note."""
     columns = min(3, len(shown)) if len(shown) != 4 else 2
     figure, axes, flat, height = style.multiples(ax, len(shown), columns, 2.1, sharey=True)
-    place = {"left": 0.55, "right": 0.06, "top": 0.48, "across": 0.12, "title": title}
-    style.arrange(figure, axes, bottom=0.4, down=0.7, **place)
-    drawn = []
+    place = {"left": 0.55, "right": 0.06, "top": 0.48, "bottom": 0.4, "across": 0.12, "down": 0.7, "title": title}
+    style.arrange(figure, axes, **place)
+    drawn = {}
     for panel, one in zip(flat, shown):
         words, ends, said = draw(panel, one)
-        drawn.append((ends, fitted(panel, said)))
+        said = fitted(panel, said)
+        drawn[panel] = ends, said, "" if ends else "no errors: " + said.replace("\n", "; ")
         panel.set_title(fitted(panel, [words], 8))
-    under = labels.LINE * max(labels.lines_of(said) for _, said in drawn)
     over = labels.TITLE_LINE * (max(labels.lines_of(panel.get_title("left")) for panel in flat) - 1) if swept else 0.0
-    if ax is None:
-        figure.set_size_inches(style.size(figure)[0], height + len(axes) * (under + over))
     for panel in axes[:, 0]:
         panel.set_ylabel("Deformation error [%]")
-    place |= {"top": 0.48 + over, "bottom": 0.4 + under, "down": 0.7 + under + over, "across": 0.06}
-    labels.settle(figure, axes, place)
-    for panel, (ends, said) in zip(flat, drawn):
-        labels.name_lines(panel, ends)
-        if ends:
-            labels.note(panel, said)
-        else:
-            labels.say(panel, "no errors: " + said.replace("\n", "; "))
+    place |= {"top": 0.48 + over, "down": 0.7 + over, "across": 0.06}
+    labels.finish(figure, axes, place, drawn, height + len(axes) * over if ax is None else 0.0)
     return flat
 
 
@@ -89,10 +80,7 @@ def _lines(panel, x, here, looks, listed, gaps):
         cell = here.sel(definition=name)
         error, flags = 100 * cell.deformation_error.values, cell.status.values
         known, drawn = np.isfinite(error), (flags != 0) | gaps
-        if known.any():
-            panel.plot(x[drawn], error[drawn], label=name, **look)
-            last = np.flatnonzero(known)[-1]
-            ends.append((x[last], error[last], name, look["color"]))
+        ends += labels.line(panel, x[drawn], error[drawn], look, name)
         doubtful, lost = known & (flags > 1), {}
         if doubtful.any():
             panel.plot(x[doubtful], error[doubtful], linestyle="", marker=look["marker"], color=look["color"],

@@ -8,8 +8,7 @@ from springtune.problem.parameters import with_unit
 from ...config.kind import distinct
 from ...output import labels, style
 from ...output.drawing import extent, fitted, in_words, largest, magnification, plane, spring_ends
-from ...output.own_law import own_law
-from ...output.selection import at, cells, choose, group, labelled_beam, labels_of, last_swept, shown_swept
+from ...output.selection import at, cells, choose, group, labelled_beam, labels_of, last_swept, own_law, shown_swept
 from .outputs import SCENE_LABELS, SENSITIVITY_LABELS
 
 # -- sensitivity curves ------------------------------------------------------------------------------------------------
@@ -436,25 +435,17 @@ def plot_block(data, ax=None, *, beam=None, mesh_type=None, mesh_size=None, mate
     values = last_swept(here.status != 0)
     words = [labelled_beam(root, chosen["beam"]), f"{chosen['mesh_type']} {size:g} mm", chosen["material"]]
     words += swept_words({name: value.sel(load=load) for name, value in values.items()})
-    place = {"left": 0.45, "right": 0.06, "top": 0.62, "across": 0.55, "title": ", ".join(words)}
-    style.arrange(figure, axes, bottom=0.4, **place)
+    place = {"left": 0.45, "right": 0.06, "bottom": 0.4, "top": 0.62, "across": 0.55, "title": ", ".join(words)}
+    style.arrange(figure, axes, **place)
     left, right = axes[0]
     curves = group(data, "sensitivity").sel(chosen) if "sensitivity" in data.children else None
     here, faces = at(here, values), at(faces.sel(chosen), values)
     curves = None if curves is None else at(curves, values)
-    drawn = [_stiffness(left, curves, here), _profile(right, faces, here, load)]
-    under = labels.LINE * max(labels.lines_of(said) for _, said, _ in drawn)
-    if ax is None:
-        figure.set_size_inches(style.PAGE, 3.0 + under)
-    labels.settle(figure, axes, {**place, "bottom": 0.4 + under, "across": 0.15})
-    for panel, (ends, said, why) in zip((left, right), drawn):
-        labels.name_lines(panel, ends)
-        labels.note(panel, said)
-        if why:
-            labels.say(panel, why)
-    if drawn[0][0]:
+    drawn = {left: _stiffness(left, curves, here), right: _profile(right, faces, here, load)}
+    labels.finish(figure, axes, place | {"across": 0.15}, drawn, 3.0 if ax is None else 0.0)
+    if drawn[left][0]:
         _marks(left, curves, here)
-    return np.array([left, right])
+    return axes[0]
 
 
 def _stiffness(panel, curves, root):
@@ -483,9 +474,8 @@ def _stiffness(panel, curves, root):
     for number, (load, x, error) in enumerate(lines):
         look = style.line(number) | {"marker": ""}
         within = (x >= low) & (x <= high)
-        panel.plot(x[within], error[within], label=load, **look)
+        ends += labels.line(panel, x[within], error[within], look, load)
         highest = max(highest, error[within].max(initial=0.0))
-        ends.append((x[within][-1], error[within][-1], load, look["color"]))
     for number, definition in enumerate(name for name in ENERGIES if name in root.definition.values):
         cells = root.sel(definition=definition, kinematics="linear", load=loads)
         errors = 100 * np.abs(cells.deformation_error.values)
@@ -497,8 +487,8 @@ def _stiffness(panel, curves, root):
         if known.any():
             look = style.line(len(lines) + number) | {"marker": ""}
             worst = errors[known].max()
-            panel.plot([low, high], [worst, worst], label=definition, **look)
-            ends.append((high, worst, f"{definition}, worst: {worst:.2g} %", look["color"]))
+            words = f"{definition}, worst: {worst:.2g} %"
+            ends += labels.line(panel, np.array([low, high]), np.full(2, worst), look, definition, words)
     panel.set(xlim=(low, high), ylim=(0, min(40.0, 1.05 * highest)))
     return ends, fitted(panel, said), ""
 
@@ -571,8 +561,7 @@ def _profile(panel, block, root, load):
             said.append(f"{definition}: {words}")
     for number, (definition, kinematics, profile) in enumerate(shown[:MOST_FACES]):
         look, name = style.line(number) | {"marker": ""}, f"{definition}, {kinematics}"
-        panel.plot(x, profile, label=name, **look)
-        ends.append((x[-1], profile[-1], name, look["color"]))
+        ends += labels.line(panel, x, profile, look, name)
         highest.append(profile)
     if not finite and any(kinematics != "linear" for _, kinematics, _ in shown[:MOST_FACES]):
         said.append("the reference is of small strain, not all networks are: add further_references")

@@ -13,7 +13,7 @@ from . import stored
 
 
 def make(source):
-    """Mesh from ``length``, ``height`` and ``mesh_type`` and ``mesh_size``, or ``file`` and its ``unit``."""
+    """Mesh of a box ``length`` by ``height``: by ``mesh_type`` and ``mesh_size``, or of a ``file`` and its ``unit``."""
     box = source["length"], source["height"]
     if "file" in source:
         check_unchanged(source)

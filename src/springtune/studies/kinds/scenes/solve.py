@@ -33,7 +33,10 @@ def tasks(family, content):
 
 
 def prepare(family, content):
-    """Sheet of a mesh, and a function that reads the fields of references on it for 1 N [m]."""
+    """Sheet of a mesh, and a function that reads the fields of references on it for 1 N [m].
+
+    ``family`` is a file of the job's content (`springtune.studies.runs.driver`): the scenes of one mesh.
+    """
     mesh, labels = stored.prepared(content["meshes"], family["name"]).mesh, ("x", "y", "displacements")
 
     @cache

@@ -8,7 +8,7 @@ from springtune.springs import DEFINITIONS
 
 from ...config.model import SceneSpec, Study
 from ...output.text import aligned
-from .interpolated import expected_solves, interpolants
+from .plan import expected_solves, interpolants
 
 SCENE_DIMENSIONS = ("beam", "mesh_type", "mesh_size", "material", "load", "definition", "kinematics")
 """Dimensions of every dataset."""

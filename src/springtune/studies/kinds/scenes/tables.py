@@ -1,12 +1,13 @@
 """Tables of scenes: a row a beam and mesh size, a column a definition."""
 
 import numpy as np
+import xarray as xr
 
 from springtune.problem.loads import LOADS
 from springtune.problem.parameters import SWEPT
 
 from ...output.dataset import STATUS
-from ...output.own_law import OWN_LAWS, of_own_law
+from ...output.selection import OWN_LAWS, of_own_law, records
 from .outputs import SWEPT_SHOWN, TABLE, stem
 
 ROW = ("beam", "mesh_size")
@@ -134,54 +135,22 @@ def _swept(labels):
     return {column: unit * labels[name] for name, (_, column, unit) in SWEPT_SHOWN.items() if name in labels}
 
 
-# Selecting each cell by its labels takes a thousand times as long as taking all of them by their numbers.
-
-
-def _places(values, dimensions):
-    """Indices of the cells that have a value, by dimension."""
-    return dict(zip(dimensions, np.argwhere(np.isfinite(values.transpose(*dimensions).values)).T))
-
-
-def _at(places, array):
-    """Values of an array at such indices."""
-    return array.values[tuple(places[name] for name in array.dims)].tolist()
-
-
-def _labels(data, places):
-    """Labels by dimension of each such cell."""
-    columns = [map(data[name].values.tolist().__getitem__, numbers) for name, numbers in places.items()]
-    return (dict(zip(places, labels)) for labels in zip(*columns))
-
-
-def _own_laws(references, places):
-    """Index of the plane-stress reference of each cell's own law; 0 without any."""
-    known = references.reference.values.tolist()
-    kinds = [known.index(kind) for kind in OWN_LAWS if kind in known]
-    found = np.full(len(places["beam"]), kinds[-1] if kinds else 0)
-    for kind in reversed(kinds):
-        found[np.isfinite(_at(places | {"reference": np.full(len(found), kind)}, references))] = kind
-    return found
-
-
-def _rows(data, places, names, arrays):
-    """Rows of networks beside references, from cells at some places."""
-    values = (_at(places, array) for array in arrays)
-    for place, network, reference, error in zip(_labels(data, places), *values):
-        row = {name: place[name] for name in names} | _swept(place)
-        row |= {"mesh_size_mm": 1e3 * place["mesh_size"], "network_mm": 1e3 * network}
-        yield row | {"reference_mm": 1e3 * reference, "error_percent": 100 * error}
+def _rows(data, present, names, network, reference, error):
+    """Rows of networks beside references, from present cells."""
+    for one in records(data, present, dict.fromkeys((*names, network, reference, error))):
+        row = {name: one[name] for name in names} | _swept(one)
+        row |= {"mesh_size_mm": 1e3 * one["mesh_size"], "network_mm": 1e3 * one[network]}
+        yield row | {"reference_mm": 1e3 * one[reference], "error_percent": 100 * one[error]}
 
 
 def _finite_strain(finite, root):
     """Networks of nonlinear kinematics against references at finite strain."""
-    dimensions = ("material", "load", "beam", "mesh_type", "mesh_size", "definition", "reference", "kinematics")
-    swept = [name for name in SWEPT if name in finite.deformation_error.dims]
     nonlinear = {"kinematics": np.flatnonzero(finite.kinematics.values != "linear")}
-    finite, root = finite.isel(nonlinear), root[["displacement"]].isel(nonlinear)
-    places = _places(finite.deformation_error, (*dimensions, *swept))
-    arrays = root.displacement, finite.reference_displacement, finite.deformation_error
+    finite = finite.isel(nonlinear).assign(displacement=root.displacement.isel(nonlinear))
     names = ("material", "load", "beam", "mesh_type", "definition", "reference")
-    rows = list(_rows(finite, places, names, arrays))
+    order = ("material", "load", "beam", "mesh_type", "mesh_size", "definition", "reference", "kinematics")
+    present = finite.deformation_error.notnull().transpose(*order, ...)
+    rows = list(_rows(finite, present, names, "displacement", "reference_displacement", "deformation_error"))
     note = (
         "Networks of nonlinear kinematics against finite elements of rubber: neo-Hookean ones, or of the law that is "
         "fitted to a uniaxial test. At finite strain an error holds the difference of two material laws, where "
@@ -194,15 +163,18 @@ def _finite_strain(finite, root):
 
 
 def _block(block, root):
-    """Middle of the pressed face, every definition, mesh, material and kinematics."""
-    dimensions = ("material", "load", "mesh_type", "mesh_size", "definition", "kinematics", "beam")
-    swept = [name for name in SWEPT if name in block.face_displacement.dims]
-    places = _places(block.face_displacement, (*dimensions, *swept))
-    linear = (block.kinematics.values == "linear")[places["kinematics"]]
-    places["reference"] = np.where(linear, 0, _own_laws(block.reference_face_displacement, places))
-    arrays = block.face_displacement, block.reference_face_displacement, block.face_error
+    """Middle of the pressed face, every definition, mesh, material and kinematics, beside its own law."""
+    known, references = block.reference.values.tolist(), block.reference_face_displacement
+    laws = [known.index(kind) for kind in OWN_LAWS if kind in known] or [0]
+    chosen = xr.full_like(references.isel(reference=0, drop=True), laws[-1], int)
+    for law in reversed(laws):
+        chosen = chosen.where(references.isel(reference=law, drop=True).isnull(), law)
+    chosen = xr.where(block.kinematics == "linear", 0, chosen)
+    values = ("face_displacement", "reference_face_displacement", "face_error")
+    block = block[[*values]].isel(reference=chosen)
     names = ("beam", "material", "load", "mesh_type", "definition", "kinematics", "reference")
-    rows = list(_rows(block, places, names, arrays))
+    order = ("material", "load", "mesh_type", "mesh_size", "definition", "kinematics", "beam")
+    rows = list(_rows(block, block.face_displacement.notnull().transpose(*order, ...), names, *values))
     note = (
         "Displacement of the middle of the pressed face along the load. Networks of nonlinear kinematics are compared "
         "with the reference at finite strain in plane stress where the study has it, linear ones with that of small "

@@ -1,18 +1,82 @@
-"""Shapes, gathered in the group ``/shapes``."""
+"""Shapes, gathered in the groups ``/shapes`` and ``/shape_fields``."""
 
 import numpy as np
 
 from springtune.problem.compare import deformation_error
 from springtune.reference.answers import beyond_linear
 
-from ...output.dataset import Filler
+from ...output.dataset import OF_PARTICLES, OF_SPRINGS, UGRID, Filler
 from ...runs import store
 from ..scenes import stored
-from ..scenes.collect import with_objection
-from ..scenes.variables import MESH_ROWS, SCENE_ROWS
+from ..scenes import variables as shared
+from ..scenes.collect import fields_on, put_outline, with_objection
+from ..scenes.stored import PACKED, fields_key, unpacked
+from ..scenes.variables import declared, topology
 from . import plan
+from .outputs import CASE_AXES, DRAWING, MESH_AXES, SCENE_AXES
 from .task_values import named, quantity_key
-from .variables import SHAPES
+
+MIXED: dict[str, object] = {"comment": "in SI units: quantity_units says which", "units_variable": "quantity_units"}
+
+SEVEN_DIGITS = {name: (*row, np.float32(np.nan)) for name, row in shared.DISPLACEMENT_ROWS.items()}
+
+SHAPES = declared(
+    "/shapes",
+    {
+        (*SCENE_AXES, "quantity"): {
+            "value": ("1", "quantity of interest, network"),
+            "error": ("1", "signed error, (network - reference) / |reference|"),
+            "expected_error": ("1", "signed difference, (network - expected) / |expected|"),
+        },
+        (*CASE_AXES, "quantity"): {
+            "reference_value": ("1", "quantity of interest, reference"),
+            **shared.ESTIMATE_ROW,
+            "reference_expected_error": ("1", "signed difference, (reference - expected) / |expected|"),
+        },
+        ("shape", "load", "quantity"): {
+            "expected_value": ("1", "quantity of interest, as others give it"),
+            "quantity_kind": ("1", "what the quantity is", ""),
+            "quantity_component": ("1", "its component", ""),
+            "quantity_of": ("1", "the group or point that it is of", ""),
+            "quantity_units": ("1", "units of its values", ""),
+            "source": ("1", "who gives the expected value", ""),
+        },
+        SCENE_AXES: shared.SCENE_ROWS,
+        MESH_AXES: shared.MESH_ROWS,
+        CASE_AXES: {
+            **shared.REFERENCE_ROWS,
+            "reference_seconds": ("s", "time to solve the reference"),
+            "reference_unknowns": ("1", "unknowns of the finest reference"),
+        },
+        (*CASE_AXES, "kinematics"): shared.APPLIES_ROW,
+        ("shape",): {"shape_thickness": ("m", "thickness of the shape")},
+    },
+    dimensions={"shape": "shape, by name", "quantity": "quantity of interest, by name"},
+    flags=shared.YES_OR_NO,
+    further=dict.fromkeys(("value", "reference_value", "expected_value"), MIXED),
+)
+
+SHAPE_FIELDS = declared(
+    "/shape_fields",
+    topology(("case",), "case")
+    | {
+        ("case",): {
+            f"{name}_name": ("1", name.replace("_", " "), "") for name in (*CASE_AXES, "kinematics", "mesh_type")
+        }
+        | {"case_mesh_size": ("m", "asked length of an edge; 0 where the mesh is that of a file")},
+        ("case", "definition", "particle"): SEVEN_DIGITS,
+        ("case", "definition", "spring"): shared.SPRING_FORCE_ROW,
+        ("case", "outline_point"): {
+            "outline_round": ("1", "number of the round that a point is of, from 0", -1),
+            **shared.OUTLINE_ROWS,
+            **shared.OUTLINE_DISPLACEMENT_ROWS,
+        },
+    },
+    dimensions={"case": "shape and load"},
+    further=UGRID | dict.fromkeys(("displacement_x", "displacement_y"), OF_PARTICLES) | {"spring_force": OF_SPRINGS},
+)
+"""Networks that are drawn, each shape's and load's on its finest mesh of a size that can be: they are there to be
+looked at, their displacements and forces with seven digits."""
 
 QUANTITY_UNITS = {"displacement": "m", "stress": "Pa", "reaction": "N", "area": "m2", "energy": "J"}
 """Units of the values in the dataset."""
@@ -30,7 +94,8 @@ def groups(study, folder):
         results = store.read(folder / "solutions" / f"{plan.file_name(scenes[0])}.h5", set(keys.values()))
         for one, key in keys.items():
             _scene(part, one, results[key], references, found)
-    return {SHAPES.name: found.data}
+    drawn = DRAWING in study.outputs and not study.part
+    return {SHAPES.name: found.data} | (_fields(study, folder) if drawn else {})
 
 
 def _quantities(part, found):
@@ -80,13 +145,13 @@ def _references(study, part, folder, found):
 def _mesh(one, folder, found):
     notes = stored.read_notes(folder / "meshes", plan.file_name(one))
     labels = {"shape": one.shape, "mesh_type": one.mesh_type, "mesh_size": one.mesh_size}
-    found.put({name: notes[name] for name in MESH_ROWS if name in notes}, **labels)
+    found.put({name: notes[name] for name in shared.MESH_ROWS if name in notes}, **labels)
 
 
 def _scene(part, one, result, references, found):
     labels = vars(one)
     reference, objections = references.get((one.shape, one.material, one.load), ({}, {}))
-    values = {name: result[name] for name in SCENE_ROWS if name in result} | {"solve_seconds": result["seconds"]}
+    values = {name: result[name] for name in shared.SCENE_ROWS if name in result} | {"solve_seconds": result["seconds"]}
     case = part.shape[one.shape].loads[one.load]
     whys = [reference.get("message", ""), *reference.get("lacking", {}).values()]
     whys = [f"no reference: {named(why, part.shape[one.shape], case)}" for why in whys if why]
@@ -107,3 +172,52 @@ def _scene(part, one, result, references, found):
 def _error(value, reference):
     """Signed relative error; NaN where there is nothing to divide by."""
     return deformation_error(value, reference) if reference else np.nan
+
+
+OUTLINE_ARRAYS = ("outline_points", "outline_displacements", "outline_lengths")
+
+
+def _fields(study, folder):
+    """Group of the drawn networks."""
+    part = study.parts["shapes"]
+    cases = {}
+    drawn = plan.shown(part)
+    for one in (one for one in part.scenes if one in drawn):
+        cases.setdefault((one.shape, one.load), []).append(one)
+    meshes = {case: stored.read(folder / "meshes", plan.file_name(scenes[0])) for case, scenes in cases.items()}
+    outlines = {case: _outline(part, scenes[0], folder) for case, scenes in cases.items()}
+    there = [({"case": ", ".join(case)}, found.mesh) for case, found in meshes.items() if found]
+    axes = study.axes | {"case": tuple(map(", ".join, cases))}
+    found = fields_on(SHAPE_FIELDS, axes, there, [points for points, *_ in outlines.values()])
+    for case, scenes in cases.items():
+        label, one = ", ".join(case), scenes[0]
+        about = {"shape_name": one.shape, "load_name": one.load, "material_name": one.material}
+        about |= {"kinematics_name": one.kinematics, "mesh_type_name": one.mesh_type, "case_mesh_size": one.mesh_size}
+        found.put(about, case=label)
+        points, moved, rounds = outlines[case]
+        put_outline(found, points, moved, case=label)
+        found.put_rows({"outline_round": rounds}, case=label)
+        if not meshes[case]:
+            continue
+        path = folder / "solutions" / f"{plan.file_name(one)}.h5"
+        keys = {scene: fields_key(plan.scene_task(part, scene)["key"]) for scene in scenes}
+        results = store.read(path, set(keys.values()), [PACKED])
+        for scene, key in keys.items():
+            kept = unpacked(results[key])
+            if kept:
+                x, y = kept["displacements"].T
+                values = {"displacement_x": x, "displacement_y": y, "spring_force": kept["spring_forces"]}
+                found.put_rows(values, case=label, definition=scene.definition)
+    return {SHAPE_FIELDS.name: found.data}
+
+
+def _outline(part, one, folder):
+    """Points of the outline, their displacements in the reference, and the number of their round."""
+    case = one.shape, one.material, one.load
+    if case in part.referred:
+        key = plan.reference_task(part, *case)["key"]
+        found = store.read_one(folder / "shape_references", key, OUTLINE_ARRAYS)
+        if not found["message"]:
+            points, moved, sizes = (found[name] for name in OUTLINE_ARRAYS)
+            return points, moved, np.repeat(np.arange(len(sizes)), sizes)
+    return np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0, dtype=int)

@@ -1,14 +1,22 @@
-"""Scenes of shapes that a study asks for."""
+"""Scenes of shapes that a study asks for, and checks of its shapes and their grids."""
 
+import re
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
+from pathlib import Path
 
+import numpy as np
+
+from springtune.mesh import MeshError
 from springtune.problem.loads import KINEMATICS
 from springtune.problem.materials import Material
+from springtune.problem.quantities import nearest
 from springtune.problem.shapes import Hole, LoadCase, Pressure, Quantity, Segment, Shape, Support, Traction
 from springtune.springs import DEFINITIONS
 
+from ...config.checks import FEWER, check_density, check_for_triangles, check_known, check_particles
+from ...config.expand import file_fault
 from .plan import OWN_FILE, mesh_name
 from .sections import OUTLINED
 
@@ -145,3 +153,238 @@ def expand(config, declared):
         tuple(dict.fromkeys(key for one in scenes for key in [(one.shape, one.material, one.load)] if key in referred)),
         {name: dict(one.refined) for name, one in config.shapes.items()},
     )
+
+
+MOST_SHAPE_SCENES = 100_000
+"""Most scenes of shapes of a study."""
+
+READ_AT_ONCE = 1_000_000
+"""Size of a mesh file up to which its groups are looked at as a study is read [B]."""
+
+
+def check(config, problems):
+    """Add what is wrong, see `springtune.studies.config.kind.Kind`."""
+    if bool(config.shapes) != bool(config.shape_grids):
+        here, lacking = ("shapes", "shape_grids") if config.shapes else ("shape_grids", "shapes")
+        problems.add((here,), f"'{lacking}' is missing; add it: shape_grids say what is computed of the shapes")
+        return
+    for name, shape in (config.shapes or {}).items():
+        path = "shapes", name
+        for part, material in shape.parts.items():
+            check_known(problems, (*path, "parts", part), "material", material, config.materials)
+            if any(any(case.gravity) for case in shape.loads.values()):
+                check_density(config, material, (*path, "parts", part), problems)
+        for load, case in shape.loads.items():
+            _check_something(case, (*path, "loads", load), problems)
+        if shape.file is not None:
+            fault = file_fault(problems.folder / shape.file)
+            if fault:
+                problems.add((*path, "file"), f"'{problems.folder / shape.file}' {fault}")
+            elif problems.nothing:
+                _check_file(name, shape, path, problems)
+            continue
+        _check_outlines(shape, path, problems)
+        _check_names(shape, path, problems)
+        if problems.nothing:
+            try:
+                made = shape_of_config(name, shape, problems.folder)
+            except ValueError as error:  # what sides do to each other
+                message = str(error).removeprefix(f"shape '{name}': ")
+                problems.add((*path, *_place(message)), message)
+            else:
+                _check_held(made, path, problems)
+    _check_stems(config, problems)
+    for name, grid in (config.shape_grids or {}).items() if problems.nothing else ():
+        _check_grid(config, grid, ("shape_grids", name), problems)
+
+
+def _check_file(name, shape, path, problems):
+    """Check the groups of a small mesh file; faults of large files show in their scenes."""
+    file = problems.folder / shape.file
+    if file.stat().st_size > READ_AT_ONCE:
+        return
+    # Here, since few studies have files, and reading one takes scipy.
+    from springtune.mesh.formats import read_shape
+    from springtune.problem.boundary import check_case
+
+    try:
+        grouped = read_shape(file, shape.unit)
+    except MeshError as error:
+        problems.add((*path, "file"), str(error))
+        return
+    for part in sorted(set(grouped.parts) - set(shape.parts)):
+        problems.add(
+            (*path, "parts"), f"part '{part}' of {file} has no material; add it, such as {{{part}: <material>}}"
+        )
+    for part in sorted(set(shape.parts) - set(grouped.parts)):
+        there = nearest(part, grouped.parts) if grouped.parts else "the file has none"
+        problems.add((*path, "parts", part), f"unknown part '{part}'; {there}")
+    try:
+        made = shape_of_config(name, shape, problems.folder)
+    except ValueError as error:
+        problems.add(path, str(error).removeprefix(f"shape '{name}': "))
+        return
+    for label, case in made.loads.items():
+        try:
+            check_case(grouped, case)
+        except ValueError as error:
+            problems.add((*path, "loads", label), str(error).removeprefix(f"load '{label}', "))
+
+
+def _check_something(case, path, problems):
+    """Check that a load moves or pulls the body."""
+    moved = any(one.x or one.y for one in case.supports.values())
+    pressed = any(one.pressure for one in case.pressures.values())
+    if not (moved or pressed or any(case.gravity) or any(map(any, case.forces.values()))):
+        problems.add(path, "nothing moves or pulls the body; give it forces, pressures, gravity, or a support that is "
+                     "moved, such as {end: {x: 1 mm}}")  # fmt: skip
+
+
+def _place(message):
+    """Keys in the section of a shape that a message on its geometry is about."""
+    if found := re.match(r"point '([^']+)'", message):
+        return "points", found[1]
+    if found := re.match(r"hole (\d+)\b", message):
+        return "holes", int(found[1]) - 1
+    if found := re.match(r"outline, side (\d+)", message):
+        return "outline", int(found[1]) - 1
+    return ("outline",) if message.startswith("outline") else ()
+
+
+def _check_stems(config, problems):
+    """Check that joined names of files differ."""
+    stems = {}
+    for name, shape in config.shapes.items():
+        for load in shape.loads:
+            other = stems.setdefault(f"{name}_{load}".casefold(), (name, load))
+            if other != (name, load):
+                message = (
+                    f"figures of shape '{name}' under '{load}' and of '{other[0]}' under '{other[1]}' would have one "
+                    "name; rename a shape or a load"
+                )
+                problems.add(("shapes", name, "loads", load), message)
+
+
+def _check_held(shape, path, problems):
+    """Check that supports hold a body against all rigid motions."""
+    (left, low), (right, top) = shape.extent
+    size = max(right - left, top - low)
+    for name, case in shape.loads.items():
+        rows = []
+        for support in case.supports:
+            places = [shape.points[support.group]] if support.group in shape.points else []
+            sides = [side for one in shape.rounds for side in one.sides if side.group == support.group]
+            places += [side.at(share) for side in sides for share in (0.0, 0.5, 1.0)]
+            for x, y in places:
+                x, y = (x - left) / size, (y - low) / size
+                rows += [(1.0, 0.0, -y)] * (support.x is not None) + [(0.0, 1.0, x)] * (support.y is not None)
+        if not rows or np.linalg.matrix_rank(np.array(rows), tol=1e-9) < 3:
+            message = "leave the body free to move, or to turn; hold it against both, such as {left: fixed}"
+            problems.add((*path, "loads", name, "supports"), message)
+
+
+def _check_outlines(shape, path, problems):
+    """Check the numbers of sides, and the parts."""
+    rounds = [((*path, "outline"), shape.outline)]
+    rounds += [
+        ((*path, "holes", number, "outline"), hole.outline) for number, hole in enumerate(shape.holes) if hole.outline
+    ]
+    for place, segments in rounds:
+        if len(segments) < (2 if any(one.centre for one in segments) else 3):
+            problems.add(place, f"{len(segments)} sides are no outline; give three or more, or two with an arc")
+    parts = {hole.part for hole in shape.holes if hole.part}
+    for part in sorted(parts - set(shape.parts)):
+        problems.add((*path, "holes"), f"part '{part}' has no material; add it under 'parts'")
+    for part in sorted(set(shape.parts) - parts):
+        what = f"{nearest(part, parts)}; or give it to what fills a hole" if parts else "no hole has a 'part'; add it"
+        problems.add((*path, "parts", part), f"unknown part '{part}'; {what}")
+
+
+def _groups(shape):
+    """Groups of sides of a shape with an outline, without those of parts in its holes."""
+    sides = [*shape.outline]
+    found = [hole.group for hole in shape.holes if hole.circle and not hole.part]
+    for hole in shape.holes:
+        sides += hole.outline if hole.outline and not hole.part else []
+    return list(dict.fromkeys(filter(None, [*(side.group for side in sides), *found])))
+
+
+def _check_names(shape, path, problems):
+    """Check the groups and points that supports, loads and quantities name."""
+    groups, points = _groups(shape), list(shape.points)
+    for number, hole in enumerate(shape.holes):
+        if hole.part and (hole.group or any(side.group for side in hole.outline or ())):
+            message = f"part '{hole.part}' is inside of the body, and groups are of its outline; leave the group out"
+            problems.add((*path, "holes", number), message)
+    for point in points:
+        if point in groups:
+            problems.add((*path, "points", point), f"'{point}' is a group of sides, too; rename one")
+
+    def check(place, what, name, known):
+        if name in known:
+            return
+        if known:
+            why = f"unknown {what} '{name}'; {nearest(name, known)}"
+        else:
+            why = f"unknown {what} '{name}', and the shape has none; give one a name by 'group', or under 'points'"
+        problems.add((*path, *place), why)
+
+    for name in shape.refined:
+        check(("refined", name), "group, point or part", name, [*groups, *points, *shape.parts])
+    for load, case in shape.loads.items():
+        place = "loads", load
+        for key, what, known in (
+            ("supports", "group or point", [*groups, *points]),
+            ("forces", "group or point", [*groups, *points]),
+            ("pressures", "group", groups),
+        ):
+            for name in getattr(case, key):
+                check((*place, key, name), what, name, known)
+        for name, quantity in case.quantities.items():
+            if quantity.at is not None:
+                check((*place, "quantities", name, "at"), "point", quantity.at, points)
+            if quantity.of is not None:
+                held = [one for one in case.supports if one in groups or one in points]
+                known, what = (held, "support") if quantity.reaction else (groups, "group")
+                check((*place, "quantities", name, "of"), what, quantity.of, known)
+
+
+def _check_grid(config, grid, path, problems):
+    for material in grid.material:
+        check_known(problems, (*path, "material"), "material", material, config.materials)
+    check_for_triangles(grid.definition, (*path, "definition"), problems)
+    for name in grid.definition:
+        if DEFINITIONS[name].uniaxial:
+            problems.add((*path, "definition"), f"'{name}' is for beams that are stretched alone; choose another one")
+    shapes = {}
+    for name in grid.shape:
+        check_known(problems, (*path, "shape"), "shape", name, config.shapes)
+        if name in config.shapes:
+            shapes[name] = config.shapes[name]
+    for name, shape in shapes.items():
+        for load in grid.load or ():
+            if load not in shape.loads:
+                problems.add((*path, "load"), f"shape '{name}' has no load '{load}'; {nearest(load, shape.loads)}")
+    if any(any(shape.loads[load].gravity) for shape in shapes.values() for load in grid.load or shape.loads
+           if load in shape.loads):  # fmt: skip
+        for material in grid.material:
+            check_density(config, material, (*path, "material"), problems)
+    made = {name: shape for name, shape in shapes.items() if shape.file is None}
+    if made and grid.mesh_size is None:
+        problems.add((*path, "mesh_size"), "'mesh_size' is missing; give a length such as '5 mm', a list, or a range")
+    elif made and problems.nothing:
+        for name, shape in made.items():
+            (left, low), (right, top) = shape_of_config(name, shape, Path()).extent
+            wide, high = right - left, top - low
+            if max(grid.mesh_size) > min(wide, high) > 0:
+                most = f"{1e3 * min(wide, high):.4g} mm"
+                problems.add((*path, "mesh_size"), f"is larger than shape '{name}'; give at most {most}")
+            check_particles(problems, (*path, "mesh_size"), grid.mesh_size, wide, high)
+    for name in shapes.keys() - made.keys() if grid.mesh_size or grid.mesh_type else ():
+        key = "mesh_size" if grid.mesh_size else "mesh_type"
+        problems.add((*path, key), f"shape '{name}' is a mesh file, which has its own; remove it, or give '{name}' a "
+                     "grid of its own")  # fmt: skip
+    count = len(grid.definition) * len(grid.kinematics) * len(grid.material) * len(grid.mesh_size or "1")
+    count *= sum(len(grid.load or shape.loads) for shape in shapes.values())
+    if count > MOST_SHAPE_SCENES:
+        problems.add(path, f"{count} scenes; a study has at most {MOST_SHAPE_SCENES} of shapes: {FEWER}")

@@ -152,10 +152,9 @@ def _errors_of(panels, cut, name, points):
     for number, (definition, (*places, errors, counted)) in enumerate(points.items()):
         look = style.line(number)
         for panel, along, found in zip(panels, places, ends):
-            panel.plot(along, errors, label=definition, **look)
+            found += labels.line(panel, along, errors, look, definition)
             hollow = look | {"linestyle": "", "markerfacecolor": "white"}
             panel.plot(along[~counted], errors[~counted], **hollow)
-            found += [(along[-1], errors[-1], definition, look["color"])] if len(errors) else []
     for panel, words in zip(panels, ("Particles", "Seconds, springs and solve")):
         against = "error" if _against(cut, name) == "error" else "difference to expected"
         panel.set(xlabel=words, ylabel=f"|{against[0].upper()}{against[1:]}| [%]")

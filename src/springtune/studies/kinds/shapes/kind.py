@@ -15,7 +15,7 @@ from .plan import STAGES, pieces, take
 
 def _check(config, problems):
     if config.shapes or config.shape_grids:
-        from .checks import check
+        from .expand import check
 
         check(config, problems)
 
@@ -75,6 +75,7 @@ KIND = Kind(
     stages=STAGES,
     outputs=OUTPUTS,
     tables=stems,
+    tables_by="outputs",
     pieces=pieces,
     take=take,
     costs={"shape_mesh": (2e-2, 2.5e-5), "shape_reference": (2.0, 0.0), "shape_scene": (5e-3, 2e-5)},

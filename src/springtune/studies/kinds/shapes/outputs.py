@@ -1,11 +1,19 @@
-"""Outputs of shapes."""
+"""Figures and table of shapes, and what the page to browse shows of them."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ...config.kind import Output, stem
+from ...output.browse import Plot, View
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from ...config.model import Study
+
+MESH_AXES = ("shape", "mesh_type", "mesh_size")
+CASE_AXES = ("shape", "material", "load")
+SCENE_AXES = (*MESH_AXES, "material", "load", "definition", "kinematics")
+"""Dimensions of the group ``/shapes``."""
 
 DRAWING = "shapes"
 """Output that is made of whole networks."""
@@ -42,8 +50,76 @@ OUTPUTS = (
         "figures of shapes: errors of their quantities, and their deformed networks (and the group `/shape_fields` "
         "behind them)",
         figures=lambda study: figures(_cases(study)),
-        collect="studies.kinds.shapes.fields",
         plot="studies.kinds.shapes.figures:shapes",
         usual=True,
     ),
 )
+
+
+VIEWS = (
+    View(
+        "/shapes",
+        "Shapes",
+        "Quantities of interest of bodies of any outline: networks beside converged references on the same shape, and "
+        "beside the numbers of others.",
+        (
+            Plot("error over particles", "error", "particles", "definition", along="mesh_size", ascending=True,
+                 log="xy"),
+            Plot("error over seconds", "error", "solve_seconds", "definition", along="mesh_size", ascending=True,
+                 log="xy"),
+            Plot("errors of definitions by quantity", "error", "quantity", "definition", "map"),
+            Plot("errors of definitions on shapes", "error", "shape", "definition", "map"),
+            Plot("difference to what others give", "expected_error", "particles", "definition", along="mesh_size",
+                 ascending=True, log="xy"),
+            Plot("what became of the scenes", "status", "mesh_size", "definition", "map"),
+        ),
+    ),
+    View(
+        "/shape_fields",
+        "Networks of shapes",
+        "Positions and displacements of all particles, of each shape and load.",
+        (
+            Plot(
+                "places of the particles at rest", "y", "x", shows="points", along="particle", equal=True,
+                beside=(("outline_x", "outline_y", "outline"),),
+            ),
+            Plot("displacements along x", "displacement_x", "x", "definition", "points", "particle"),
+            Plot("displacements along y", "displacement_y", "x", "definition", "points", "particle"),
+        ),
+    ),
+)  # fmt: skip
+
+
+LABEL_COLUMNS = ("shape", "load", "quantity", "definition", "kinematics", "material", "mesh_type")
+"""First columns: what a value is of."""
+
+ERRORS_SHOWN = ("error", "expected_error", "reference_error_estimate")
+
+
+def tables(tree: "xr.DataTree") -> list[dict[str, Any]]:
+    """Tables of the page, see `springtune.studies.kinds.scenes.tables.tables`."""
+    # Here, since a plan does without xarray.
+    from ...output.dataset import STATUS
+    from ...output.selection import records
+
+    if "shapes" not in tree:
+        return []
+    data = tree["shapes"].to_dataset()
+    present = (data.status != 0).transpose(*SCENE_AXES) & (data.quantity_kind != "")
+    values = ("value", "reference_value", "expected_value", "quantity_units", *ERRORS_SHOWN, "status", "message")
+    rows, sources = [], {}
+    for one in records(data, present.transpose(*SCENE_AXES, "quantity"), ("particles", "source", *values)):
+        if one["source"]:
+            sources[f"{one['shape']}, {one['quantity']}: {one['source']}"] = None
+        row = {name: one[name] for name in LABEL_COLUMNS} | {"mesh_size_mm": 1e3 * one["mesh_size"]}
+        row |= {"particles": one["particles"], "value": one["value"], "reference": one["reference_value"]}
+        row |= {"expected": one["expected_value"], "units": one["quantity_units"]}
+        row |= {f"{error}_percent": 100 * one[error] for error in ERRORS_SHOWN}
+        rows.append(row | {"status": STATUS[int(one["status"])], "message": one["message"]})
+    note = (
+        "Quantities of interest of the networks, in SI units; the reference is small-strain plane stress by converged "
+        "finite elements on the same shape, and errors are signed: (network − reference) / |reference|, and the same "
+        "against the expected values that others give."
+    )
+    told = "; ".join(sources)
+    return [{"stem": "shapes", "title": "Shapes", "note": f"{note} Sources: {told}." if told else note, "rows": rows}]

@@ -102,11 +102,10 @@ def _limits(data, left, right):
         exact = predicted.sel(definition=name, integrator="central-difference", damper="mass", damping_ratio=0.0)
         steps = 1e9 * exact.sel(mesh_size=size).values
         bound = 1e9 * data.dt_particle_bound.sel(definition=name, mesh_size=size).values
-        right.plot(1e3 * size, steps, **look, label=name)
+        ends += labels.line(right, 1e3 * size, steps, look, name)
         # A single size has no line, so that its bound is a mark.
         alone = {"marker": "_", "markersize": 9} if len(size) == 1 else {}
         right.plot(1e3 * size, bound, color=look["color"], linewidth=0.8, linestyle=":", **alone)
-        ends += [(1e3 * size[-1], steps[-1], name, look["color"])] if len(size) else []
     left.set_ylim(-2 * furthest, 2 * furthest)
     sizes = 1e3 * np.array(labels_of(data.omega_max.notnull(), "mesh_size"))
     right.set_xlim(sizes.min() / 1.15, sizes.max() * 1.15)

@@ -12,8 +12,8 @@ from itertools import product
 
 import numpy as np
 
-from springtune.mechanics.arc_length import buckling as critical_load
-from springtune.mechanics.arc_length import follow
+from springtune.mechanics.continuation import buckling as critical_load
+from springtune.mechanics.continuation import follow
 from springtune.mechanics.dynamics import Motion, relax
 from springtune.mechanics.integrators import BEHAVIOURS, EXPLICIT, INTEGRATORS, BackwardEuler
 from springtune.mechanics.moduli import PatchTest

@@ -10,7 +10,7 @@ from springtune.safe_io.atomic import write_text
 from springtune.safe_io.escapes import markdown
 
 from ...output.dataset import STATUS
-from ...output.selection import cells, labels_of
+from ...output.selection import cells, labels_of, records
 from ...output.text import markdown_section, markdown_table
 from .outputs import PAGE
 
@@ -195,10 +195,10 @@ def _buckling(data):
 def _scenes(root):
     """Static scenes of the study that are not solved, and why; and how many are."""
     flags, rows = root.status.values, []
-    for place in cells(root.status > 1, root.status.dims):
-        cell, size = root.sel(place), {"mesh_size": f"{1e3 * place['mesh_size']:g} mm"}
-        words = ", ".join(map(str, (place | size).values()))
-        rows.append([words, STATUS[int(cell.status)], markdown(cell.message.item())])
+    for one in records(root, root.status > 1, ("status", "message")):
+        labels = {str(name): one[name] for name in root.status.dims} | {"mesh_size": f"{1e3 * one['mesh_size']:g} mm"}
+        words = ", ".join(map(str, labels.values()))
+        rows.append([words, STATUS[int(one["status"])], markdown(one["message"])])
     if not rows:
         return []
     said = f"{int((flags == 1).sum())} of {int((flags != 0).sum())} scenes are solved; the others:"

@@ -1,6 +1,6 @@
 """The page to browse a dataset with: one file that needs neither a server nor a network.
 
-Study kinds declare the views of their groups in ``outputs`` or ``views``.
+Study kinds declare the views of their groups in ``outputs``.
 """
 
 from __future__ import annotations
