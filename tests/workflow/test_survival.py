@@ -16,7 +16,6 @@ import xarray as xr
 
 import springtune
 from springtune.safe_io.atomic import this_host
-from springtune.scene.sheet import Sheet
 from springtune.studies.runs import checked_json, store
 
 from campaigns import Campaign
@@ -123,25 +122,30 @@ def test_a_broken_program_ends_the_run_when_the_other_scenes_are_stored(run, tmp
     assert len(store.stored(run.folder / "results/broken/solutions/50x20_structured_5mm.h5")) == 2
 
 
-def test_a_scene_beyond_limits_is_a_hole_and_tried_again_with_others(run, monkeypatch):
-    """Scenes in compression have no end."""
+@pytest.fixture
+def endless():
+    """A definition without an end."""
 
-    def solve(sheet, kind, springs, force, *rest):
-        while force < 0:
+    @springtune.definition("endless")
+    def springs(mesh, material, thickness):
+        while True:
             pass
-        return solved(sheet, kind, springs, force, *rest)
 
-    solved = Sheet.solve
-    monkeypatch.setattr(Sheet, "solve", solve)
+    yield
+    springtune.DEFINITIONS.discard("endless")
+
+
+def test_a_scene_beyond_limits_is_a_hole_and_tried_again_with_others(run, endless, monkeypatch):
     monkeypatch.chdir(run.folder)
-    text = STUDY.replace("[10 mm, 5 mm]", "10 mm").replace("[lattice, delingette]", "lattice")
+    text = STUDY.replace("[10 mm, 5 mm]", "10 mm").replace("[traction, compression]", "traction")
+    text = text.replace("delingette", "endless")
     # Again with another limit: the other scene is stored.
     for seconds, done in ((1, {"linear": 1, "beyond limits": 1}), (2, {"beyond limits": 1})):
         run.write("limits.yaml", text.replace("grids:", f"limits: {{seconds: {seconds}, memory: 1 GB}}\ngrids:"))
         campaign = Campaign("limits.yaml")
         campaign.finish("collect")
         summary = (campaign.folder / "summary.txt").read_text()
-        why = "scenes, failed: 1 of 2\n  small, structured, 10 mm, steel, compression, lattice, linear: not done"
+        why = "scenes, failed: 1 of 2\n  small, structured, 10 mm, steel, traction, endless, linear: not done"
         assert why in summary and f"at most {seconds} s and 1 GB for each (`limits` of the study)" in summary
         work = checked_json.read(campaign.jobs["solve_0"].record)["work"]
         assert {name: work[name][0] for name in work.keys() - {"lattice"}} == done
