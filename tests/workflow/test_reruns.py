@@ -64,6 +64,14 @@ def test_only_what_is_new_is_computed(grown, monkeypatch):
     assert dataset(run, "grow").mesh_size.values.tolist() == [5e-3, 10e-3]
 
 
+def test_a_dry_run_lists_what_snakemake_has_no_notes_of(grown):
+    """As after results were copied from elsewhere: here no job was Snakemake's."""
+    grown.write("grow.yaml", study(force="30 kN"))
+    code, listed = grown.springtune("grow.yaml", "-n", "--cores", "1")
+    grown.write("grow.yaml", study())
+    assert code == 0 and {"sensitivity", "solve", "collect"} <= set(listed.split()), listed
+
+
 def test_what_a_removed_value_left_is_removed_on_request(grown, monkeypatch):
     """The size of the test before, and files of jobs if it had a bundle of its own; nothing has to be made again."""
     monkeypatch.chdir(grown.folder)

@@ -112,10 +112,16 @@ def run(
         study = study if path == shown else load_study(path)  # its files are seen from here
         studies = [study, *(_read_for_paper(path, study) if "paper" in options else ())]
     if _plans(options):
-        _remove_records(studies, left_empty, remove=False)
+        # A dry run removes no records. An option of the user's, which comes later, replaces this one.
+        found = _outdated(studies, left_empty, "a run makes it again") or {}
+        forced = ["--forcerun", *map(str, found)] if found else []
+        command = [*_snakemake(), *forced, *command[len(_snakemake()) :]]
     elif _computes(options):
         _unlock(studies, [*_snakemake(), *workflow, "--unlock", f"--configfile={path}"])
-        if _remove_records(studies, left_empty) and _asks_for_all(options):
+        found = _outdated(studies, left_empty, "it is made again")
+        for record in found or {}:
+            record.unlink()
+        if found == {} and _asks_for_all(options):
             from ..studies.output.summary import reminder
 
             click.echo(f"Nothing to be done: {_results(study)} is complete.\n{reminder(_results(study))}", nl=False)
@@ -189,23 +195,15 @@ def _unlock(studies: "list[Study]", command: list[str]) -> None:
         click.echo(f"{which}: the run before was killed and left its lock; the lock is removed", err=True)
 
 
-def _remove_records(studies: "list[Study]", left_empty: dict[str, bool], remove: bool = True) -> bool:
-    """Remove the records of outdated jobs, so that Snakemake runs them; return whether there is nothing to do.
-
-    Without `remove`, as in a dry run, damaged files are named and all records stay.
-    """
+def _outdated(studies: "list[Study]", left_empty: dict[str, bool], remedy: str) -> dict[Path, str] | None:
+    """Records of outdated jobs, with the reasons; None if a job was never done. Damaged files are printed."""
     from ..studies.runs import rerun
 
-    done = True
-    for study in studies:
-        found = rerun.outdated(study, _results(study), left_empty)
-        done = done and found == {}
-        for record, why in (found or {}).items():
-            if rerun.is_damage(why):
-                click.echo(f"{why}; it is made again" if remove else f"{why}; a run makes it again", err=True)
-            if remove:
-                record.unlink()
-    return done
+    each = [rerun.outdated(study, _results(study), left_empty) for study in studies]
+    found = {record: why for one in each for record, why in (one or {}).items()}
+    for why in filter(rerun.is_damage, found.values()):
+        click.echo(f"{why}; {remedy}", err=True)
+    return found if found or None not in each else None
 
 
 def _strictly(strict: bool, study: "Study") -> int:

@@ -4,14 +4,13 @@ Jobs of stages come from `springtune.studies.runs.plan`; the jobs after them are
 """
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import asdict, dataclass, is_dataclass
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from springtune.safe_io.atomic import UNFINISHED
 
 from ..config.kind import FORMATS, kinds, modules, outputs
-from ..config.model import keeps_fields
 from . import checked_json, records
 from .checked_json import ASIDE, hash_of
 from .keys import CODE_FILE, OURS, PACKAGE, stage_key
@@ -100,46 +99,11 @@ def jobs(study: "Study", plan: Plan, chosen: Mapping[str, bool] | None = None) -
 
 
 def _collect_digest(study: "Study", plan: Plan) -> str:
-    """Digest of a study's dataset: of the expanded study, its input files and the code."""
-    collected = [made for made in outputs().values() if made.collect and made.name in study.outputs]
-    code = [stage_key("studies.kinds.collect")]
-    code += [stage_key(name) for name in modules("kind", "collect")]
-    code += [stage_key(made.collect) for made in collected]
-    about = [
-        study.name,
-        study.title,
-        study.axes,
-        study.swept,
-        study.stiffness_ratios,
-        study.further_references,
-        study.calibration,
-    ]
-    # Stored scenes have neither their own labels nor those of their beams.
-    of_scenes = [[*study.labels(scene).values(), scene.force] for scene in study.scenes]
-    bodies = {scene.mesh.beam for scene in study.scenes}, {scene.material for scene in study.scenes}
-    named = [sorted((_plain(one) for one in group), key=str) for group in bodies]
-    parts = {name: _plain(part) for name, part in study.parts.items() if name != "scenes"}
-    printed = [_plain(cell) for cell in study.printed]
+    """Digest of a study's dataset: of the study's files, the jobs of its stages and the code."""
+    code = [stage_key(name) for name in ("studies.kinds.collect", *modules("kind", "collect"))]
+    code += [stage_key(made.collect) for made in outputs().values() if made.collect and made.name in study.outputs]
     stages = [job.digest for job in plan.jobs.values()]
-    return hash_of(
-        about,
-        of_scenes,
-        named,
-        parts,
-        [made.name for made in collected],
-        keeps_fields(study),
-        printed,
-        stages,
-        code,
-        inputs(study, study.path.resolve().parent),
-    )
-
-
-def _plain(part: Any) -> Any:
-    """Part of a study as dicts and lists."""
-    if is_dataclass(part) and not isinstance(part, type):
-        return asdict(part)
-    return [_plain(one) for one in part] if isinstance(part, tuple | list) else part
+    return hash_of(study.name, inputs(study, study.path.resolve().parent), stages, code)
 
 
 def _present_digest(members: "Iterable[Output]", files: list[str]) -> str:
