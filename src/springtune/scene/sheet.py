@@ -133,7 +133,7 @@ class Sheet:
 
     Attributes
     ----------
-    held, weights, measured, loading : callable
+    weights, measured, loading : callable
         Of a kind of load, see `springtune.problem.boundary`; each computed once.
     deriving : float
         Seconds spent on deriving springs so far.
