@@ -389,25 +389,6 @@ def test_strips_of_two_materials_have_the_moduli_of_both(name, mesh, axis, main,
     assert (young * springs.reference / THICKNESS, ratio) == pytest.approx(moduli, abs=1e-8)
 
 
-@pytest.mark.parametrize(
-    ("materials", "message"),
-    [
-        ({"": Material(1.0, 0.3)}, "part 'far' of the body has no material; add one of the name 'far'"),
-        ({"far": Material(1.0, 0.3)}, "the main part of the body has no material"),
-        (
-            {"": Material(1.0, 0.3), "far": BOARD, "fat": BOARD},
-            "part 'fat': the body has no such part; did you mean 'far'",
-        ),
-        ({"": Material(1.0, 0.3), "far": "steel"}, "material of part 'far': 'steel' is none"),
-    ],
-)
-def test_materials_that_do_not_go_with_the_parts_are_refused(materials, message):
-    with pytest.raises(DefinitionError, match=message):
-        derive_by_parts(
-            DEFINITIONS["delingette"], halves(MESH_TYPES["right"](0.02, 0.01, 5e-3), 0), materials, THICKNESS
-        )
-
-
 def test_definitions_that_know_one_body_refuse_parts():
     grouped = halves(MESH_TYPES["right"](0.02, 0.01, 5e-3), 0)
     two = {"": Material(1.0, 0.3), "far": Material(2.0, 0.3)}

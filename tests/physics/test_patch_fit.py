@@ -77,7 +77,6 @@ def test_outline_tests_are_exact_for_linear_triangles(nu, name):
     found = DEFINITIONS["delingette"].springs(mesh, Material(1.0, nu, name="unit"), 1.0)
     sheet = np.array([[1, nu, 0], [nu, 1, 0], [0, 0, (1 - nu) / 2]]) / (1 - nu**2)
     assert PatchTest(mesh).stiffness(found) * found.reference == pytest.approx(sheet, abs=1e-9)
-    assert PatchTest(mesh).compliance(found) / found.reference == pytest.approx(np.linalg.inv(sheet), abs=1e-9)
     assert isotropic_moduli(np.linalg.inv(sheet)) == pytest.approx((1, nu), abs=1e-9)
 
 

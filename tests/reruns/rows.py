@@ -43,6 +43,11 @@ class Row:
     solved: dict
     cores: int = 1
 
+    @property
+    def computes(self):
+        """Whether the change itself runs the study."""
+        return getattr(self.change, "func", None) is replace_twice
+
 
 def row(change, jobs="", solved=None, cores=1):
     """Row of the table, its capitals written out."""

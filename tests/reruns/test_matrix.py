@@ -43,6 +43,21 @@ def changed(complete, tmp_path, monkeypatch, request):
     return row
 
 
+@pytest.fixture
+def planned(complete, tmp_path, monkeypatch, request):
+    """The same for what is only planned: results are copied where a change computes some."""
+    row = STUDY[request.param]
+    if row.computes:
+        shutil.copytree(complete, tmp_path / "study")
+    else:
+        ignored = shutil.ignore_patterns("results")
+        shutil.copytree(complete, tmp_path / "study", ignore=ignored)
+        (tmp_path / "study/results").symlink_to(complete / "results")
+    monkeypatch.chdir(tmp_path / "study")
+    row.change()
+    return row
+
+
 @pytest.fixture(scope="session")
 def fresh(tmp_path_factory, complete):
     """The dataset of a study that is run in a new folder, by its text."""
@@ -67,10 +82,10 @@ def fresh(tmp_path_factory, complete):
     return of
 
 
-@pytest.mark.parametrize("changed", STUDY, indirect=True)
-def test_exactly_these_jobs_are_to_run(changed):
-    run = driver.Run(changed.cores)
-    assert {run.called(name) for name in run.due()} == changed.jobs
+@pytest.mark.parametrize("planned", STUDY, indirect=True)
+def test_exactly_these_jobs_are_to_run(planned):
+    run = driver.Run(planned.cores)
+    assert {run.called(name) for name in run.due()} == planned.jobs
 
 
 @pytest.mark.parametrize("changed", STORED, indirect=True)

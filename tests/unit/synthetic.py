@@ -1,5 +1,7 @@
 """A dataset with every group, of which each number is told from the others; for tests and examples of figures."""
 
+from functools import cache
+
 import numpy as np
 import xarray as xr
 
@@ -240,8 +242,18 @@ def shape_fields():
     return data.assign(outline_round=xr.zeros_like(data.outline_x, dtype=int))
 
 
-def dataset():
-    """The tree of a study of all kinds: every label that the groups share is in each of them, and all is solved."""
+def dataset(*names):
+    """The tree of a study of all kinds: every label that the groups share is in each of them, and all is solved.
+
+    With names the root has these groups alone.
+    """
+    made = _dataset()
+    kept = {f"/{name}": made[name] for name in names or made.children}
+    return xr.DataTree.from_dict({"/": made.to_dataset()} | kept).copy(deep=True)
+
+
+@cache
+def _dataset():
     groups = {"sensitivity": sensitivity, "fields": fields, "block": block, "moduli": moduli, "laying": laying}
     groups |= {"stability": stability, "benchmark": benchmark, "refinement": refinement}
     groups |= {"shapes": shapes, "shape_fields": shape_fields}

@@ -126,9 +126,10 @@ def made(tmp_path_factory):
         patch.setattr(platform, "node", lambda: HOST)
         make_checkout(folder)
         config = write_study(folder / "config")
-        git("init", "-q")
+        git("init", "-q", "--template=")
         git("add", ".")
         git("commit", "-q", "-m", "All of it")
+        git("gc", "-q")  # few files: they are copied for each test
         do(config.relative_to(folder))
         result = run("archive", "results/one")
         assert result.exit_code == 0, result.output

@@ -10,6 +10,7 @@ import zlib
 
 import numpy as np
 import pytest
+import xarray as xr
 from click.testing import CliRunner
 
 import springtune as st
@@ -30,7 +31,9 @@ from springtune.mesh.formats import read_shape
 from springtune.safe_io.inputs import virtual_memory
 from springtune.studies.output import reading
 from springtune.studies.output.browse.page import page
+from springtune.studies.output.dataset import write
 
+from synthetic import dataset
 from tables import STUDIES
 
 BEAM, STEEL = st.Beam("100 mm", "20 mm"), st.Material("210 GPa", 0.3)
@@ -504,16 +507,19 @@ class TestOfOtherKinds:
             read_beam_mesh(odd, 0.1, 0.02)
 
 
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory):
+    """A dataset of two groups."""
+    path = tmp_path_factory.mktemp("sound") / "dataset.nc"
+    groups = {node.path: node.to_dataset(inherit=False) for node in dataset("fields", "moduli").subtree}
+    write(path, groups, {"springtune_version": "1", "study": "x"})
+    return path
+
+
 class TestDatasets:
     @pytest.fixture
-    def path(self, tmp_path):
-        from springtune.studies.output.dataset import write
-
-        from synthetic import dataset
-
-        groups = {node.path: node.to_dataset(inherit=False) for node in dataset().subtree}
-        write(tmp_path / "dataset.nc", groups, {"springtune_version": "1", "study": "x"})
-        return tmp_path / "dataset.nc"
+    def path(self, sound, tmp_path):
+        return shutil.copy(sound, tmp_path / "dataset.nc")
 
     def test_links_that_are_none_are_refused(self, path):
         """The library of netCDF ended the process by SIGSEGV on it."""
@@ -653,10 +659,6 @@ class TestDatasets:
 
     def test_a_large_dataset_of_texts_and_fields_opens_at_once(self, tmp_path):
         """As it was opened, each text took the room of the longest one: 2 GB for a file of 28 MB."""
-        import xarray as xr
-
-        from springtune.studies.output.dataset import write
-
         count = 150_000
         texts = np.full(count, "", dtype=object)
         texts[::1000] = "x" * 2000  # 1.2 GB at one width

@@ -27,19 +27,24 @@ from synthetic import dataset
 TITLE = "<script>alert('&')</script>"
 
 
-@pytest.fixture(scope="module")
-def path(tmp_path_factory):
-    """Dataset of a study of all kinds, and a group that nobody knows."""
-    tree = dataset()
+def write(folder, *groups):
+    """Write the dataset of a study, and a group that nobody knows."""
+    tree = dataset(*groups)
     tree["weather"] = xr.DataTree(xr.Dataset({"rain": (("town", "day"), [[1.0, 2.0]])}, {"town": ["here"]}))
     tree.attrs = {"springtune_version": springtune.__version__, "study": "mine", "title": TITLE, "note": float("nan")}
-    folder = tmp_path_factory.mktemp("mine")
     tree.to_netcdf(folder / "dataset.nc", engine="h5netcdf")
+    return folder / "dataset.nc"
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    """A dataset of two groups, and what was made of it."""
+    folder = tmp_path_factory.mktemp("mine")
     for name in ("figures/one.png", "figures/one.txt", "tables/index.html", "secret.txt"):
         (folder / name).parent.mkdir(exist_ok=True)
         (folder / name).write_text(name)
     (folder / "figures/link.png").symlink_to(folder / "secret.txt")
-    return folder / "dataset.nc"
+    return write(folder, "fields", "moduli")
 
 
 def content(text):
@@ -68,8 +73,9 @@ class TestPage:
         assert "unsafe-inline" not in policy.partition("script-src")[2].partition(";")[0]
         assert not re.search(r"(src|href)=\"?(https?:)?//", text)
 
-    def test_every_group_and_variable_is_in_it(self, path, text):
-        groups = {group["path"]: group for group in content(text)["groups"]}
+    def test_every_group_and_variable_is_in_it(self, tmp_path):
+        path = write(tmp_path)
+        groups = {group["path"]: group for group in content(page(path))["groups"]}
         with xr.open_datatree(path, engine="h5netcdf") as tree:
             for node in tree.subtree:
                 held = {row["name"] for row in groups[node.path]["variables"]}

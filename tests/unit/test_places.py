@@ -193,7 +193,7 @@ def copy(tmp_path_factory):
     """A copy of the package that tests may write to, and what it says of itself."""
     folder = tmp_path_factory.mktemp("copy")
     source = Path(springtune.__file__).parent
-    shutil.copytree(source, folder / "springtune", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(source, folder / "springtune")  # with what is compiled
     return folder, report(folder)
 
 

@@ -1,5 +1,6 @@
 """A study run through Snakemake in a folder of its own."""
 
+import json
 import os
 import shutil
 import subprocess
@@ -12,34 +13,39 @@ import pytest
 REPOSITORY = Path(__file__).parents[2]
 
 
+def called(command, folder, **environment):
+    """Exit code and output of a module that is a program, in a folder."""
+    command = list(map(str, [sys.executable, "-m", *command]))
+    done = subprocess.run(command, cwd=folder, env=os.environ | environment, capture_output=True, text=True)
+    return done.returncode, done.stdout + done.stderr
+
+
 @dataclass
 class Run:
     """Where a study runs, and how."""
 
     folder: Path
+    forks: subprocess.Popen
 
-    def snakemake(self, config, *arguments):
-        """Exit code and output of a run of the repository's workflow in this folder."""
-        command = [
-            sys.executable,
-            "-m",
-            "snakemake",
-            "--snakefile",
-            REPOSITORY / "Snakefile",
-            "--directory",
-            self.folder,
-        ]
-        command += ["--workflow-profile", REPOSITORY / "workflow/profiles/default", "--cores", "2"]
+    def snakemake(self, config, *arguments, package=None):
+        """Exit code and output of the workflow in this folder, with the package of another one if given."""
+        command = ["--snakefile", REPOSITORY / "Snakefile", "--directory", self.folder, "--cores", "2"]
+        command += ["--workflow-profile", REPOSITORY / "workflow/profiles/default"]
         command += ["--configfile", self.folder / config, *arguments]
-        done = subprocess.run(list(map(str, command)), cwd=self.folder, capture_output=True, text=True)
-        return done.returncode, done.stdout + done.stderr
+        command = list(map(str, command))
+        if package:
+            return called(["snakemake", *command], self.folder, PYTHONPATH=str(package))
+        log = self.folder.with_suffix(".log")
+        log.unlink(missing_ok=True)
+        told = {"arguments": command, "folder": str(self.folder), "log": str(log)}
+        self.forks.stdin.write(json.dumps(told | {"environment": dict(os.environ)}) + "\n")
+        self.forks.stdin.flush()
+        return int(self.forks.stdout.readline()), log.read_text()
 
     def springtune(self, config, *arguments):
         """Exit code and output of `springtune run` in this folder, on two cores."""
-        command = [sys.executable, "-m", "springtune", "run", config, "--cores", "2", *arguments]
-        environment = os.environ | {"SPRINGTUNE_WORKFLOW": str(REPOSITORY)}
-        done = subprocess.run(list(map(str, command)), cwd=self.folder, env=environment, capture_output=True, text=True)
-        return done.returncode, done.stdout + done.stderr
+        command = ["springtune", "run", config, "--cores", "2", *arguments]
+        return called(command, self.folder, SPRINGTUNE_WORKFLOW=str(REPOSITORY))
 
     def write(self, name, text):
         """Write a study."""
@@ -50,12 +56,21 @@ class Run:
         return {str(path.relative_to(self.folder)): path.stat().st_mtime_ns for path in self.folder.glob(pattern)}
 
 
+@pytest.fixture(scope="session")
+def forks():
+    """A process that has imported Snakemake."""
+    command = [sys.executable, Path(__file__).with_name("forks.py")]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as server:
+        yield server
+        server.stdin.close()
+
+
 @pytest.fixture(scope="module")
-def run(tmp_path_factory):
+def run(tmp_path_factory, forks):
     """An empty folder to run studies in, with the printed values beside them."""
     folder = tmp_path_factory.mktemp("run")
     shutil.copy(REPOSITORY / "config/paper_tables.csv", folder)
-    return Run(folder)
+    return Run(folder, forks)
 
 
 @pytest.fixture(scope="session")

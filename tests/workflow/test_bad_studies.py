@@ -133,7 +133,7 @@ def test_a_strict_run_tells_holes_by_its_exit_code(tmp_path, repository):
     (tmp_path / "hole.yaml").write_text(text)
 
     def run(*arguments):
-        command = [sys.executable, "-m", "springtune", "run", "hole.yaml", *arguments]
+        command = [sys.executable, "-m", "springtune", "run", "hole.yaml", "--until", "collect", *arguments]
         done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
         return done.returncode, done.stdout + done.stderr
 

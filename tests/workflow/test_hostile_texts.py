@@ -67,11 +67,20 @@ def test_the_dataset_has_them_as_they_are(results):
         assert HOSTILE in tree.paper_remark.values
 
 
-def test_the_report_has_no_link_script_or_formula_of_theirs(run, results):
+def test_the_report_has_all_results_and_no_link_script_or_formula_of_theirs(run, results):
+    """Every figure once, every table; nothing is loaded from elsewhere (the template's own links are only shown)."""
     code, output = run.snakemake("hostile.yaml", "--report", run.folder / "report.zip")
     assert code == 0 and "WARNING" not in output and "(ERROR" not in output, output
     with zipfile.ZipFile(run.folder / "report.zip") as archive:
+        names = archive.namelist()
         content = archive.read("report/report.html").decode()
+    made = [path for path in results.glob("*/*") if path.parent.name in ("figures", "tables") and path.suffix != ".pdf"]
+    held = [name.rpartition("/")[2] for name in names if name.startswith("report/data/")]
+    assert sorted(held) == sorted(["summary.txt", "index.html", *(path.name for path in made)])
+    assert "Deformation error against mesh size" in content and '"runtime"' in content
+    assert '"mesh type": "structured"' in content
+    assert "One of the results of this study" not in content, "an output without a caption of its own"
+    assert not re.search(r'<(script|link|img)[^>]+(src|href)="https?:', content)
     described = json.loads(re.search(r"workflow_desc = (\".*\");?$", content, re.MULTILINE)[1])
     found = Tags(described)
     assert HOSTILE in "".join(found.texts).replace("\n", " ")

@@ -35,9 +35,10 @@ def everything(folder):
 
 @pytest.fixture(scope="module")
 def finished(run):
+    """By its jobs in this process."""
     run.write("survival.yaml", STUDY)
-    code, output = run.snakemake("survival.yaml")
-    assert code == 0, output
+    with contextlib.chdir(run.folder):
+        Campaign("survival.yaml").finish()
     return run
 
 
@@ -104,25 +105,15 @@ def test_a_run_that_is_killed_goes_on_by_the_same_command(finished):
     assert not list(run.folder.rglob("*.unfinished"))
 
 
-LINE = "        problem = self.problem(kind, springs, follower)\n"
-"""Of the package, in `springtune.scene.sheet.Sheet.solve`."""
-
-
-def edited(folder, more):
-    """A copy of the package in which solving a scene begins with more than it does."""
-    shutil.copytree(Path(springtune.__file__).parent, folder / "springtune")
-    path = folder / "springtune/scene/sheet.py"
-    assert path.read_text().count(LINE) == 1
-    path.write_text(path.read_text().replace(LINE, f"{LINE}        {more}\n"))
-    return str(folder)
-
-
-def test_a_broken_program_ends_the_run_when_the_other_scenes_are_stored(run, tmp_path, monkeypatch):
+def test_a_broken_program_ends_the_run_when_the_other_scenes_are_stored(run, tmp_path):
     """The package in a copy, with an error that scenes in traction run into."""
+    line = "        problem = self.problem(kind, springs, follower)\n"
+    shutil.copytree(Path(springtune.__file__).parent, tmp_path / "springtune")
+    path = tmp_path / "springtune/scene/sheet.py"
+    assert path.read_text().count(line) == 1
+    path.write_text(path.read_text().replace(line, f"{line}        None if force < 0 else None + force\n"))
     run.write("broken.yaml", STUDY)
-    with monkeypatch.context() as patch:
-        patch.setenv("PYTHONPATH", edited(tmp_path, "None if force < 0 else None + force"))
-        code, output = run.snakemake("broken.yaml")
+    code, output = run.snakemake("broken.yaml", package=tmp_path)
     assert code == 1 and "Traceback" not in output
     broken = re.findall(r"\n  (\d) of this job's tasks could not be done: TypeError: unsupported op", output)
     assert sum(map(int, broken)) == 4, output
@@ -131,20 +122,33 @@ def test_a_broken_program_ends_the_run_when_the_other_scenes_are_stored(run, tmp
     assert len(store.stored(run.folder / "results/broken/solutions/50x20_structured_5mm.h5")) == 2
 
 
-def test_a_scene_beyond_limits_is_a_hole_and_tried_again_with_others(run, tmp_path, monkeypatch):
-    """The package in a copy, in which scenes in compression have no end."""
-    text = STUDY.replace("[10 mm, 5 mm]", "10 mm").replace("[lattice, delingette]", "lattice")
-    monkeypatch.setenv("PYTHONPATH", edited(tmp_path, "while force < 0: pass"))
-    run.write("limits.yaml", text.replace("grids:", "limits: {seconds: 1, memory: 1 GB}\ngrids:"))
-    code, output = run.snakemake("limits.yaml", "--until", "collect")
-    assert code == 0, output
-    assert "scenes, failed: 1 of 2\n  small, structured, 10 mm, steel, compression, lattice, linear: not done" in output
-    assert "at most 1 s and 1 GB for each (`limits` of the study)" in output
-    assert "solve 2 of 2" in output
-    run.write("limits.yaml", text.replace("grids:", "limits: {seconds: 2, memory: 1 GB}\ngrids:"))
-    code, output = run.snakemake("limits.yaml", "--until", "collect")
-    assert code == 0 and "at most 2 s and 1 GB" in output, output
-    assert "new      solve 1 of 2; the others were stored before" in output
+@pytest.fixture
+def endless():
+    """A definition without an end."""
+
+    @springtune.definition("endless")
+    def springs(mesh, material, thickness):
+        while True:
+            pass
+
+    yield
+    springtune.DEFINITIONS.discard("endless")
+
+
+def test_a_scene_beyond_limits_is_a_hole_and_tried_again_with_others(run, endless, monkeypatch):
+    monkeypatch.chdir(run.folder)
+    text = STUDY.replace("[10 mm, 5 mm]", "10 mm").replace("[traction, compression]", "traction")
+    text = text.replace("delingette", "endless")
+    # Again with another limit: the other scene is stored.
+    for seconds, done in ((1, {"linear": 1, "beyond limits": 1}), (2, {"beyond limits": 1})):
+        run.write("limits.yaml", text.replace("grids:", f"limits: {{seconds: {seconds}, memory: 1 GB}}\ngrids:"))
+        campaign = Campaign("limits.yaml")
+        campaign.finish("collect")
+        summary = (campaign.folder / "summary.txt").read_text()
+        why = "scenes, failed: 1 of 2\n  small, structured, 10 mm, steel, traction, endless, linear: not done"
+        assert why in summary and f"at most {seconds} s and 1 GB for each (`limits` of the study)" in summary
+        work = checked_json.read(campaign.jobs["solve_0"].record)["work"]
+        assert {name: work[name][0] for name in work.keys() - {"lattice"}} == done
 
 
 def test_a_study_that_is_edited_during_its_run_makes_no_dataset_of_another_one(run):

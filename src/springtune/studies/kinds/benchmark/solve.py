@@ -23,7 +23,7 @@ from springtune.mechanics.network import Network
 from springtune.mechanics.series import trace
 from springtune.mechanics.stepping import make_stepper
 from springtune.mesh import MESH_TYPES
-from springtune.problem.boundary import weights
+from springtune.problem.boundary import held, weights
 from springtune.problem.compare import assured, unbeaten
 from springtune.problem.geometry import Beam
 from springtune.problem.loads import LOADS
@@ -356,7 +356,7 @@ def _solver(alarm, scene, mesh, name):
     seconds = []
     coarse = MESH_TYPES["structured"](scene.beam.length, scene.beam.height, scene.beam.height / 2)
     for one in (coarse, mesh):  # with the first one libraries are read
-        springs = Network(one, Sheet(one, 1.0).held(scene.kind), half_weight(one), solver=name)
+        springs = Network(one, held(one, scene.kind), half_weight(one), solver=name)
         matrix, right = springs.tangent(), np.ones(springs.unknowns)
         for _ in range(2):
             alarm.set()

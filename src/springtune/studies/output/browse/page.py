@@ -184,10 +184,12 @@ def _described(
     parts: list[bytes] = []
     sizes: dict[str, int] = {}
     for name, (dimensions, attributes) in read.items():
-        sizes |= zip(dimensions, group.variables[name].shape)
         if dimensions == (name,):
+            sizes[name] = len(labels[name]["labels"])
             continue
-        row, content = _variable(_values(group.variables[name], attributes))  # each read, packed and forgotten
+        values = _values(group.variables[name], attributes)  # each read, packed and forgotten
+        sizes |= zip(dimensions, values.shape)
+        row, content = _variable(values)
         row |= {"name": name, "dims": list(dimensions)}
         row |= _words_on(attributes)
         if "flag_meanings" in attributes:
