@@ -22,36 +22,14 @@ class LogHandler(LogHandlerBase):
     with ``--dry-run``, ``--printshellcmds``, ``--verbose``, ``--debug-dag`` or ``--quiet`` get Snakemake's own lines.
     """
 
+    writes_to_stream = True
+    writes_to_file = has_filter = has_formatter = needs_rulegraph = False
+
     def __post_init__(self) -> None:
         Handler.__init__(self)  # the interface before 2.0 leaves it out
         self.display: Display | None = None
         self.plain: Handler | None = None
         self.wanted = self._wanted()
-
-    @property
-    def writes_to_stream(self) -> bool:
-        """Whether it replaces Snakemake's stream handler."""
-        return True
-
-    @property
-    def writes_to_file(self) -> bool:
-        """Whether it writes a file."""
-        return False
-
-    @property
-    def has_filter(self) -> bool:
-        """Whether it filters records; Snakemake handles ``--quiet``."""
-        return False
-
-    @property
-    def has_formatter(self) -> bool:
-        """Whether it formats records."""
-        return False
-
-    @property
-    def needs_rulegraph(self) -> bool:
-        """Whether it needs the rule graph."""
-        return False
 
     def emit(self, record: LogRecord) -> None:
         """Show a record."""

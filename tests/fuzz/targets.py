@@ -45,7 +45,7 @@ from springtune.studies.archive import reproduction
 from springtune.studies.archive.contents import METADATA, SUMS
 from springtune.studies.config.kind import kinds
 from springtune.studies.kinds import load_study
-from springtune.studies.kinds.scenes.summary import summary
+from springtune.studies.kinds.scenes.kind import summary
 from springtune.studies.output import reading
 from springtune.studies.output.browse.page import page
 from springtune.studies.output.comparison import compare

@@ -17,7 +17,7 @@ from springtune.problem.materials import AnisotropicMaterial, Material, Rubber
 from springtune.scene.moduli import moduli
 from springtune.scene.single import Scene
 from springtune.springs import DEFINITIONS, DefinitionError
-from springtune.springs.parts import cells_of_parts, derive_by_parts
+from springtune.springs.parts import derive_by_parts
 
 THICKNESS = 2e-3
 PLY = AnisotropicMaterial.orthotropic("140 GPa", "10 GPa", 0.3, "5 GPa", name="ply")
@@ -420,25 +420,6 @@ def test_uniform_springs_between_parts_have_the_mean():
     assert np.unique(springs.relative.round(12)).tolist() == [1.0, 2.0, 3.0]
 
 
-@pytest.mark.parametrize(
-    ("materials", "message"),
-    [
-        ({"": Material(1.0, 0.3)}, "part 'far' of the body has no material; add one of the name 'far'"),
-        ({"far": Material(1.0, 0.3)}, "the main part of the body has no material"),
-        (
-            {"": Material(1.0, 0.3), "far": BOARD, "fat": BOARD},
-            "part 'fat': the body has no such part; did you mean 'far'",
-        ),
-        ({"": Material(1.0, 0.3), "far": "steel"}, "material of part 'far': 'steel' is none"),
-    ],
-)
-def test_materials_that_do_not_go_with_the_parts_are_refused(materials, message):
-    with pytest.raises(DefinitionError, match=message):
-        derive_by_parts(
-            DEFINITIONS["delingette"], halves(MESH_TYPES["right"](0.02, 0.01, 5e-3), 0), materials, THICKNESS
-        )
-
-
 def test_definitions_that_know_one_body_refuse_parts():
     grouped = halves(MESH_TYPES["right"](0.02, 0.01, 5e-3), 0)
     two = {"": Material(1.0, 0.3), "far": Material(2.0, 0.3)}
@@ -455,14 +436,6 @@ def test_parts_of_one_material_are_told_what_the_whole_body_is():
     one = Material(1.0, 0.3)
     springs = derive_by_parts(DEFINITIONS["paper"], grouped, {"": one, "far": one}, THICKNESS, 1e6)
     assert springs.reference == 1e6 and (springs.relative == 1).all()
-
-
-def test_cells_that_are_in_no_part_are_the_main_one():
-    grouped = halves(MESH_TYPES["braced"](0.02, 0.01, 5e-3), 0)
-    found = cells_of_parts(grouped)
-    assert list(found) == ["", "far"] and not (found[""][4] & found["far"][4]).any()
-    everything = GroupedMesh(grouped.mesh, parts={"all": {4: np.ones(len(grouped.mesh.quads), dtype=bool)}})
-    assert list(cells_of_parts(everything)) == ["all"]
 
 
 def test_energies_of_different_parts_are_told_apart():

@@ -302,17 +302,6 @@ def test_free_decay_of_a_mode(integrator, damping, number, linear):
     assert (errors[1] <= {1: 30, 2: 60}[order] / (2 * coarse) ** order).all()
 
 
-def test_stiffness_damping_of_backward_euler_is_that_of_dampers():
-    """Rayleigh's beta and a damper of beta times the stiffness on each spring are the same matrix."""
-    motion = beam(size=0.01, length=0.04)
-    beta = 0.4 / modes(motion)[0][0]
-    for linear in (True, False):
-        moving = with_(motion, linear=linear, load=1e-6 * motion.load)
-        ours = moving.run(BackwardEuler(stiffness_damping=beta), 1e-5, 50).displacements
-        springs = with_(moving, dampers=beta * motion.network.stiffness).run("backward-euler", 1e-5, 50).displacements
-        assert np.abs(ours - springs).max() <= 1e-5 * np.abs(ours).max()
-
-
 @cache
 def spinning():
     """A body with dampers along its springs, its velocities, and where it is when it has turned by a radian."""

@@ -105,17 +105,7 @@ def test_outline_tests_are_exact_for_linear_triangles(nu, name):
     found = DEFINITIONS["delingette"].springs(mesh, Material(1.0, nu, name="unit"), 1.0)
     sheet = np.array([[1, nu, 0], [nu, 1, 0], [0, 0, (1 - nu) / 2]]) / (1 - nu**2)
     assert PatchTest(mesh).stiffness(found) * found.reference == pytest.approx(sheet, abs=1e-9)
-    assert PatchTest(mesh).compliance(found) / found.reference == pytest.approx(np.linalg.inv(sheet), abs=1e-9)
     assert isotropic_moduli(np.linalg.inv(sheet)) == pytest.approx((1, nu), abs=1e-9)
-
-
-@pytest.mark.parametrize("name", SHAPES)
-def test_tractions_are_no_stiffer_than_displacements(name):
-    """Hill's bounds, of the same springs."""
-    mesh = shape(name, 4)
-    found = DEFINITIONS["lattice"].springs(mesh, UNIT, 1.0)
-    difference = PatchTest(mesh).stiffness(found) - np.linalg.inv(PatchTest(mesh).compliance(found))
-    assert np.linalg.eigvalsh(difference).min() > 0
 
 
 @pytest.mark.parametrize("definition", ["patch", "patch-area"])

@@ -9,6 +9,7 @@ from springtune.reference.interpolant import TOLERANCE
 from springtune.studies.config.kind import kinds
 from springtune.studies.kinds import load_study
 from springtune.studies.kinds.scenes import any_reference
+from springtune.studies.kinds.scenes.kind import summary
 from springtune.studies.kinds.scenes.plan import (
     box_of,
     expected_solves,
@@ -16,7 +17,6 @@ from springtune.studies.kinds.scenes.plan import (
     reference_of,
     solved_reference,
 )
-from springtune.studies.kinds.scenes.summary import summary
 from springtune.studies.runs import driver, store
 from springtune.studies.runs.plan import plan
 from springtune.studies.runs.task_costs import TaskCosts
@@ -133,7 +133,7 @@ def test_the_dataset_is_that_of_references_solved_by_themselves(load, tmp_path):
 def test_what_cannot_be_interpolated_is_solved_by_itself(load, tmp_path):
     study = load(lengths(MANY))
     (content,) = [job.content for job in plan(study, tmp_path, 1).jobs.values() if job.stage.name == "reference"]
-    (task,) = content["interpolants"]
+    (task,) = (task for file in content["files"] for task in file["tasks"])
     # What a build that is not certified stores.
     path = tmp_path / "references" / f"{task['key']}.h5"
     path.parent.mkdir(parents=True)
@@ -154,6 +154,6 @@ def test_what_cannot_be_interpolated_is_solved_by_itself(load, tmp_path):
 def test_one_that_is_beyond_its_limits_is_a_hole(load, tmp_path):
     study = load(lengths(MANY))
     (job,) = [job for job in plan(study, tmp_path, 1).jobs.values() if job.stage.name == "reference"]
-    (task,) = job.content["interpolants"]
+    (task,) = (task for file in job.content["files"] for task in file["tasks"])
     driver.gone(job.stage.module, job.content, task["key"], "too slow", "at most 1 s")
     assert any_reference.read(tmp_path / "references", references(study)[0])["message"] == "too slow"

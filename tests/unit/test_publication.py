@@ -13,8 +13,7 @@ import xarray as xr
 import yaml
 
 from springtune.studies.paper import PaperError
-from springtune.studies.paper.build import run, typed_numbers
-from springtune.studies.paper.figures import draw
+from springtune.studies.paper.build import draw, run, typed_numbers
 from springtune.studies.paper.numbers import numbers, read, table
 
 import synthetic

@@ -17,7 +17,7 @@ from springtune.studies.config.kind import outputs
 from springtune.studies.kinds import collect
 from springtune.studies.kinds.scenes import stored
 from springtune.studies.kinds.shapes.expand import READ_AT_ONCE
-from springtune.studies.kinds.shapes.plan import mesh_key, reference_task, scene_task
+from springtune.studies.kinds.shapes.kind import mesh_key, reference_task, scene_task
 from springtune.studies.kinds.shapes.reference import rounds_of
 from springtune.studies.kinds.shapes.task_values import ONE_LOAD, geometry, named, shape_of
 from springtune.studies.kinds.shapes.task_values import load as values_of

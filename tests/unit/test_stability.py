@@ -43,7 +43,7 @@ def test_every_variable_has_its_dimensions_described():
 @pytest.mark.parametrize("name", ["contrast", "slivers", "perturbation", "poisson", "strains", "buckling"])
 def test_results_have_the_shapes_of_the_dataset(name):
     setup = stability.Setup(
-        Beam(0.06, 0.02, 1e-3, "b"), Material(210e9, 0.3, 7850.0, "steel"), 2e4, "lattice", "structured", (5e-3,)
+        name, Beam(0.06, 0.02, 1e-3, "b"), Material(210e9, 0.3, 7850.0, "steel"), 2e4, "lattice", "structured", (5e-3,)
     )
     for variable, values in stability.RUN[name](setup).items():
         dimensions = [one for one in STABILITY.variables[variable][0] if one not in ("definition", "mesh_size")]

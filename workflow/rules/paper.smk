@@ -1,7 +1,6 @@
 """The paper: `snakemake paper` runs the studies that it reads, where they are missing or out of date, and sets it."""
 
-from springtune.studies.paper import PaperError
-from springtune.studies.paper.build import check_typst
+from springtune.studies.paper import PaperError, check_typst
 
 PAPER_SOURCE = Path(workflow.basedir, "workflow/paper")
 PAPER_DATASETS = [Path("results") / name / rerun.DATASET for name in rerun.PAPER_STUDIES]

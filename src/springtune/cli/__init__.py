@@ -42,6 +42,16 @@ def mesh_types(context: click.Context, parameter: click.Parameter, begun: str) -
     return chosen or [CompletionItem(begun, type="file")]
 
 
+WRONG, FAILED = 2, 1
+"""Exit codes: an option is wrong; the request cannot be met."""
+
+
+class WrongCall(click.ClickException):
+    """A command was called with wrong options."""
+
+    exit_code = WRONG
+
+
 class Row(NamedTuple):
     """A command: its heading in the help, module, function and meaning."""
 
@@ -107,7 +117,7 @@ class Commands(click.Group):
         """Run a command."""
         if COMPLETION in os.environ:  # bytes, and for a shell
             return super().main(*arguments, **keywords)
-        with redirect_stdout(Shown(sys.stdout)), redirect_stderr(Shown(sys.stderr)):  # type: ignore[type-var]
+        with redirect_stdout(Shown(sys.stdout)), redirect_stderr(Shown(sys.stderr)):
             return super().main(*arguments, **keywords)
 
     def invoke(self, ctx: click.Context) -> Any:
@@ -122,9 +132,8 @@ class Commands(click.Group):
             ) from None
         except ValueError as error:
             lines = error.args if all(isinstance(one, str) for one in error.args) else (error,)
-            refused = click.ClickException("\n".join(map(shown, lines)))
-            refused.exit_code = getattr(error, "exit_code", 2 if str(error).startswith("--") else 1)
-            raise refused from None
+            refused = WrongCall if getattr(error, "wrong_call", str(error).startswith("--")) else click.ClickException
+            raise refused("\n".join(map(shown, lines))) from None
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Names of the commands."""

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..safe_io.escapes import shown
-from ..studies.output.text import aligned, cell_text, paragraphs
+from ..safe_io.escapes import clipped, shown
+from ..studies.output.text import aligned, cell_text, paragraphs, variable_name
 from . import examples
 from .options import CONFIG_FOLDER, RESULTS_FOLDER, dataset_path
 
@@ -184,8 +184,7 @@ def _of_group(group: "GroupChanges", sides: Sequence[str], most: int | None) -> 
     for side, alone in zip(sides, group.cells):
         if alone.count:
             lines = [f"  {_place(group, _telling(group, labels))}" for labels in alone.rows]
-            more = [f"  and {alone.count - len(lines)} more; --all shows them"] if alone.count > len(lines) else []
-            yield [f"{what} only {side}: {alone.count}", *lines, *more]
+            yield [f"{what} only {side}: {alone.count}", *lines, *_more(alone.count - len(lines))]
     lines = [f"  {name} only {side}" for side, own in zip(sides, group.variables) for name in own]
     lines += [f"  {name} {why}" for name, why in group.unlike.items()]
     if lines:
@@ -199,23 +198,22 @@ def _of_group(group: "GroupChanges", sides: Sequence[str], most: int | None) -> 
                 ]
                 for row in one.rows
             ]
-            more = [f"  and {one.changed - len(rows)} more; --all shows them"] if one.changed > len(rows) else []
             yield [
-                f"{_name(group.name, one.name)} changed: {one.changed} of {one.compared}",
+                f"{variable_name(group.name, one.name)} changed: {one.changed} of {one.compared}",
                 *aligned(rows, 0).splitlines(),
-                *more,
+                *_more(one.changed - len(rows)),
             ]
 
 
 def _place(group: "GroupChanges", labels: "Mapping[str, str | float]") -> str:
-    return cell_text(labels, {name: one.units for name, one in group.axes.items()})
+    return cell_text(labels, group.units)
 
 
 def _changes(found: "Comparison", changes: "list[Change]", sides: Sequence[str], most: int | None) -> list[str]:
     """Number of changes by variable, and the largest changes."""
     head = ["  variable", "cells", "changed", "largest change"]
     counts = [
-        [f"  {_name(group.name, one.name)}", one.compared, one.changed, _largest(one.rows)]
+        [f"  {variable_name(group.name, one.name)}", one.compared, one.changed, _largest(one.rows)]
         for group in found.groups
         for one in group.values
         if one.changed
@@ -226,13 +224,13 @@ def _changes(found: "Comparison", changes: "list[Change]", sides: Sequence[str],
         group = axes[row.group]
         at = _place(group, _telling(group, row.labels) | row.point)
         rows.append(
-            [f"  {_name(row.group, row.variable)}", _value(row.before), _value(row.after), _difference(row), at]
+            [f"  {variable_name(row.group, row.variable)}", _value(row.before), _value(row.after), _difference(row), at]
         )
     total = sum(one.changed for group in found.groups for one in group.values)
-    more = [f"  and {total - len(rows) + 1} more; --all shows them"] if total > len(rows) - 1 else []
     return [
         "values that changed", *aligned([head, *counts], 0, (1, 2)).splitlines(), "",
-        "the largest changes, measured by the tolerance", *aligned(rows, 0, (1, 2, 3)).splitlines(), *more,
+        "the largest changes, measured by the tolerance", *aligned(rows, 0, (1, 2, 3)).splitlines(),
+        *_more(total - len(rows) + 1),
     ]  # fmt: skip
 
 
@@ -255,22 +253,18 @@ def _told(found: "Comparison", config: bool) -> list[str]:
     return lines
 
 
-LONGEST_ATTRIBUTE = 60
-"""Most characters of an attribute."""
-
-
 def _short(text: str) -> str:
-    text = " ".join(text.split()) or "none"
-    return text if len(text) <= LONGEST_ATTRIBUTE else f"{text[: LONGEST_ATTRIBUTE - 3]}..."
+    return clipped(" ".join(text.split()) or "none")
 
 
-def _name(group: str, variable: str) -> str:
-    return variable if group == "/" else f"{group[1:]}/{variable}"
+def _more(count: int) -> list[str]:
+    """Line on rows that are left out, if any."""
+    return [f"  and {count} more; --all shows them"] if count > 0 else []
 
 
 def _telling(group: "GroupChanges", labels: "dict[str, str | float]") -> "dict[str, str | float]":
     """Labels of dimensions with several labels."""
-    return {name: label for name, label in labels.items() if len(group.axes[name].labels) > 1}
+    return {name: label for name, label in labels.items() if group.sizes[name] > 1}
 
 
 def _value(value: float | str) -> str:
@@ -437,7 +431,7 @@ def _usual_target(study: str) -> Path:
 
 def _names(tree: "xr.DataTree") -> list[str]:
     """Names of accepted variables."""
-    from ..studies.output.comparison import OF_CELLS, variable_name
+    from ..studies.output.comparison import OF_CELLS
 
     nodes = [(node.path, str(name)) for node in tree.subtree for name in node.data_vars]
     return [variable_name(path, name) for path, name in nodes if name != OF_CELLS]

@@ -2,7 +2,7 @@
 
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
 from functools import reduce, wraps
@@ -13,7 +13,8 @@ import click
 from click.core import ParameterSource
 
 from ..problem.parameters import MOST_SCENES, MOST_SCENES_VARIABLE
-from . import mesh_types
+from ..registry import imported
+from . import FAILED, WRONG, mesh_types
 
 if TYPE_CHECKING:
     from ..mesh import Mesh
@@ -26,15 +27,6 @@ if TYPE_CHECKING:
 
 SAID_FROM = 1_000_000
 """Number of particles above which a message says that the mesh is being made, which takes seconds."""
-
-WRONG, FAILED = 2, 1
-"""Exit codes: an option is wrong; the request cannot be met."""
-
-
-class WrongCall(click.ClickException):
-    """A command was called with wrong options."""
-
-    exit_code = WRONG
 
 
 class Unmet(ValueError):
@@ -272,11 +264,9 @@ def _materials(
     return {one: replace(other, density=heavy) if other.density is None else other for one, other in found.items()}
 
 
-def names_from(
-    known: Callable[[], Iterable[str]],
-) -> Callable[[click.Context, click.Parameter, str], list[str]]:
+def names_from(known: str) -> Callable[[click.Context, click.Parameter, str], list[str]]:
     """Completion of a name; the names are imported when a shell asks."""
-    return lambda context, parameter, begun: [name for name in known() if name.startswith(begun)]
+    return lambda context, parameter, begun: [name for name in imported(known) if name.startswith(begun)]
 
 
 AnyCommand = Callable[..., None]
@@ -392,7 +382,7 @@ def sheet_options(
         click.option("--unit", default="1 m", show_default=True, help="Unit of the coordinates in a mesh file."),
         click.option(
             "--material",
-            shell_complete=names_from(lambda: MATERIALS),
+            shell_complete=names_from("cli.options:MATERIALS"),
             help=f"One of {', '.join(MATERIALS)}; or give --young and --poisson; of a shape one of its study.",
         ),
         click.option("--young", help="Young's modulus, such as '210 GPa'."),

@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from ..prediction.search import MeshSearch
     from ..problem.geometry import Beam
     from ..problem.materials import Material
-    from ..scene.statements import ShapeStatement
     from .options import AskedShape
 
 
@@ -135,11 +134,6 @@ def _kept(choices: "list[Choice]", springs_alone: bool) -> "list[Choice]":
     return [choice for choice in choices if not (springs_alone and choice.energies)]
 
 
-def _first(choices: "list[Choice]") -> str | None:
-    """The best definition that is solved."""
-    return next((choice.definition for choice in choices if choice.worst < float("inf")), None)
-
-
 def _on_beam(
     sheet: SheetOptions, beam: "Beam", material: "Material", loads: tuple[str, ...], springs_alone: bool
 ) -> _Answer:
@@ -148,7 +142,7 @@ def _on_beam(
     from ..mesh import MESH_TYPES
     from ..prediction.bands import extrapolate
     from ..prediction.choices import SOLVED, SOLVED_FROM_FILE, predict, references
-    from .recommendation import beam_subject, prediction_json, prediction_text
+    from .recommendation import beam_subject, prediction_json, prediction_text, recommended
 
     mesh_type, edge = sheet.mesh_or_file, sheet.edge(beam)
     name = sheet.mesh_name(edge)
@@ -180,7 +174,7 @@ def _on_beam(
     return _Answer(
         lambda: prediction_text(subject, name, about, found, sizes),
         lambda: prediction_json(subject, mesh_json, found, sizes),
-        _first(found),
+        recommended(found)[0],
         lambda definition: SpringNet.from_mesh(
             solved or make(), material, definition, beam=beam, mesh_name=name, loads=loads
         ),
@@ -190,7 +184,8 @@ def _on_beam(
 def _on_shape(asked: "AskedShape", springs_alone: bool) -> _Answer:
     """Recommend a definition for a mesh of a shape."""
     from ..prediction.choices import SOLVED_FROM_FILE, predict, shape_references
-    from .recommendation import prediction_json, prediction_text, shape_subject
+    from ..scene.statements import ShapeStatement
+    from .recommendation import prediction_json, prediction_text, recommended, shape_subject
 
     grouped = asked.mesh()
     about = {"particles": len(grouped.mesh.points), "springs": len(grouped.mesh.edges)}
@@ -200,7 +195,7 @@ def _on_shape(asked: "AskedShape", springs_alone: bool) -> _Answer:
             f"{option}: {about['particles']} particles, more than the {SOLVED_FROM_FILE} that are solved here; give a "
             "coarser mesh, or run its study"
         )
-    statement = _statement(asked, grouped)
+    statement = ShapeStatement(asked.shape, grouped, asked.materials, asked.load, 1.0, "linear")
     known = shape_references(statement)
     found = _kept(predict(asked.shape, grouped, asked.materials, known, load=asked.load), springs_alone)
     file = asked.shape.file if asked.size is None else None
@@ -209,15 +204,9 @@ def _on_shape(asked: "AskedShape", springs_alone: bool) -> _Answer:
     return _Answer(
         lambda: prediction_text(subject, asked.mesh_name, about, found),
         lambda: prediction_json(subject, mesh_json, found),
-        _first(found),
+        recommended(found)[0],
         lambda definition: net_of_shape(asked, definition),
     )
-
-
-def _statement(asked: "AskedShape", grouped: "GroupedMesh") -> "ShapeStatement":
-    from ..scene.statements import ShapeStatement
-
-    return ShapeStatement(asked.shape, grouped, asked.materials, asked.load, 1.0, "linear")
 
 
 def _find(find: "Callable[[], MeshSearch]") -> "MeshSearch":
@@ -266,6 +255,7 @@ def _find_on_beam(
 def _find_on_shape(asked: "AskedShape", error: str, springs_alone: bool) -> _Answer:
     """Find the mesh of a shape that keeps an error."""
     from ..prediction.search import find_shape_mesh
+    from ..scene.statements import ShapeStatement
     from .recommendation import search_json, search_text, shape_subject
 
     if asked.shape.file:
@@ -282,7 +272,8 @@ def _find_on_shape(asked: "AskedShape", error: str, springs_alone: bool) -> _Ans
     search = _find(lambda: find_shape_mesh(asked.shape, asked.materials, error, load=asked.load, make=make))
     best = search.best_springs if springs_alone else search.best
     size = best.size if best else search.tried[-1].size
-    subject = shape_subject(_statement(asked, make(size)), search.known)  # type: ignore[arg-type]  # of quantities
+    statement = ShapeStatement(asked.shape, make(size), asked.materials, asked.load, 1.0, "linear")
+    subject = shape_subject(statement, search.known)  # type: ignore[arg-type]  # of quantities
     return _Answer(
         lambda: search_text(subject, search, springs_alone),
         lambda: search_json(subject, search, springs_alone),
@@ -295,18 +286,6 @@ def _find_on_shape(asked: "AskedShape", error: str, springs_alone: bool) -> _Ans
 
 OPTIONS = re.compile(r"^(?=(load|force|scale|definition|stiffness|density|mujoco)\b)")
 """Begin of messages with the name of an argument, which is an option here."""
-
-
-def _definitions() -> Iterable[str]:
-    from .. import DEFINITIONS
-
-    return DEFINITIONS
-
-
-def _loads() -> Iterable[str]:
-    from ..problem.loads import LOADS
-
-    return LOADS
 
 
 @click.command(
@@ -324,13 +303,13 @@ def _loads() -> Iterable[str]:
     "--definition",
     default="patch",
     show_default=True,
-    shell_complete=names_from(_definitions),
+    shell_complete=names_from("springs:DEFINITIONS"),
     help="Rule for the stiffness; `springtune definitions` lists them, `springtune predict` recommends one.",
 )
 @click.option("--stiffness", help="Uniform stiffness, such as '170e6 N/m', for definitions that are told one.")
 @click.option(
     "--load",
-    shell_complete=names_from(_loads),
+    shell_complete=names_from("problem.loads:LOADS"),
     help="What holds and pulls the beam, nothing without; or a shape, its only load without.",
 )
 @click.option("--force", help="Size of the force on a beam, such as '400 kN'.")

@@ -1,9 +1,9 @@
 """Commands for results: info, export, clean, verify, browse and archive."""
 
-import json
 import tempfile
 from collections import defaultdict
 from collections.abc import Iterator
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,7 +13,7 @@ from click.core import ParameterSource
 
 from ..problem.status import Status
 from ..safe_io.escapes import shown
-from ..studies.output.text import aligned, bytes_text, label_text, paragraphs, without_numbers
+from ..studies.output.text import aligned, bytes_text, from_json, paragraphs, place_text, without_numbers
 from . import examples
 from .options import idle, studies
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from ..studies.archive.contents import Contents
-    from ..studies.archive.reproduction import Checked, Reproduced
+    from ..studies.archive.reproduction import Reproduced
     from ..studies.config.model import Study
 
 REASONS = 5
@@ -109,29 +109,19 @@ def _errors(tree: "xr.DataTree") -> list[str]:
     if "reference_applies" in root:
         counted = counted & (root.reference_applies == 1)
     error = root.deformation_error.where(counted).transpose(*root.deformation_error.dims)
-    several = error.sizes.get("kinematics", 1) > 1
-    rows: list[list[object]] = [
-        ["  definition", *(["kinematics"] if several else []), "cells", "median", "worst", "at"]
-    ]
-    for definition in error.definition.values:
-        for number in range(error.sizes.get("kinematics", 1)):
-            here = error.sel(definition=definition)
-            here = here.isel(kinematics=number) if "kinematics" in here.dims else here
-            values = here.values
-            if not np.isfinite(values).any():
-                continue
-            sizes = np.abs(values[np.isfinite(values)])
-            worst = np.unravel_index(np.nanargmax(np.abs(values)), values.shape)
-            axes = [(here[name], number) for name, number in zip(here.dims, worst)]
-            place = ", ".join(
-                label_text(str(one.name), one.values[at], one.attrs.get("units", "1")) for one, at in axes
-            )
-            kind = [str(error.kinematics.values[number])] if several else []
-            numbers = [len(sizes), f"{100 * np.median(sizes):.3g} %", f"{100 * values[worst]:+.3g} %"]
-            rows.append([f"  {definition}", *kind, *numbers, place])
-    right = range(1 + several, 4 + several)
+    by = [name for name in ("definition", "kinematics") if name in error.dims]
+    named = [name for name in by if name == "definition" or error.sizes[name] > 1]
+    rows: list[list[object]] = [["  definition", *named[1:], "cells", "median", "worst", "at"]]
+    for labels in product(*(error[name].values for name in by)):
+        here = error.sel(dict(zip(by, labels)))
+        sizes = np.abs(here.values[np.isfinite(here.values)])
+        if len(sizes):
+            worst = np.unravel_index(np.nanargmax(np.abs(here.values)), here.shape)
+            numbers = [len(sizes), f"{100 * np.median(sizes):.3g} %", f"{100 * here.values[worst]:+.3g} %"]
+            place = place_text(root, here.dims, map(int, worst))
+            rows.append([f"  {labels[0]}", *labels[1 : len(named)], *numbers, place])
     head = "errors, (network - reference) / |reference|, of scenes that are solved and within their reference's reach"
-    return [head, *aligned(rows, 0, right).splitlines()] if rows[1:] else []
+    return [head, *aligned(rows, 0, range(len(named), len(named) + 3)).splitlines()] if rows[1:] else []
 
 
 def _groups(tree: "xr.DataTree") -> list[str]:
@@ -154,20 +144,13 @@ def _provenance(tree: "xr.DataTree") -> list[str]:
         )
         files = f", {changed} changed files in git_diff" if changed else ""
         lines.append(f"  commit {attributes['git_commit']}{files}")
-    software = _json(attributes.get("software"))
+    software = from_json(attributes.get("software"))
     if software:
         lines.append("  " + ", ".join(f"{name} {version}" for name, version in software.items() if version != "none"))
     if attributes.get("host"):
         lines.append(f"  on {attributes['host']}")
-    lines += [f"  sha256 {digest}  {name}" for name, digest in _json(attributes.get("inputs")).items()]
+    lines += [f"  sha256 {digest}  {name}" for name, digest in from_json(attributes.get("inputs")).items()]
     return lines
-
-
-def _json(text: str | None) -> dict[str, str]:
-    try:
-        return dict(json.loads(text or "{}"))
-    except ValueError:
-        return {}
 
 
 @click.command(
@@ -429,10 +412,10 @@ def archive(
     if target.exists() and not force:
         raise click.ClickException(f"{target}: is there already; give --force, or another name by --out")
     if with_store:
-        click.echo(f"the store: {_size(stored_size(found, folder))} more, before it is packed")
+        click.echo(f"the store: {bytes_text(stored_size(found, folder))} more, before it is packed")
     chosen = {name: True for name, given in (("no_diff", no_diff), ("no_host", no_host)) if given}
     digest = write(found, folder, target, with_store, untracked, chosen, _tell_contents)
-    click.echo(f"{target}: {_size(target.stat().st_size)}, sha256 {digest}")
+    click.echo(f"{target}: {bytes_text(target.stat().st_size)}, sha256 {digest}")
     click.echo(f"check it: springtune verify {target}; compute it again: springtune verify {target} --reproduce")
 
 
@@ -440,7 +423,7 @@ def _tell_contents(found: "Contents") -> None:
     """Print what is packed, and what matters for computing it again."""
     from ..studies.archive.contents import DIFF, FOLDERS
 
-    click.echo(f"{found.folder}: packing {len(found.files)} files, {_size(found.size)}")
+    click.echo(f"{found.folder}: packing {len(found.files)} files, {bytes_text(found.size)}")
     code = found.code
     if not code.commit:
         endings = "; ".join(f"{name}/ {', '.join(known)}" for name, known in FOLDERS.items())
@@ -463,10 +446,6 @@ def _tell_contents(found: "Contents") -> None:
         click.echo("  computed on other machines, at least in part, of which no cores and no processor are told")
 
 
-def _size(count: int) -> str:
-    return f"{count / 1e6:.1f} MB" if count < 1e9 else f"{count / 1e9:.1f} GB"
-
-
 TOLD = 20
 """Most faulty files that are listed."""
 
@@ -479,8 +458,14 @@ def verified(path: Path, again: bool, fresh: bool) -> bool:
         found = check(path)
     except OSError as error:
         raise ValueError(f"{path}: cannot be read ({error.strerror}); give an archive") from None
-    _tell_checked(found)
+    click.echo(shown(f"{found.path}: {found.title}, study {found.study}, springtune {found.version}"))
+    click.echo(f"  sha256 {found.sha256}")
+    click.echo(f"  {found.files} files compared with their checksums, faults: {len(found.faults)}")
     if found.faults:
+        rows = [[name, why] for name, why in sorted(found.faults.items())]
+        click.echo(aligned(rows[:TOLD], 4))
+        if len(rows) > TOLD:
+            click.echo(f"    and {len(rows) - TOLD} more")
         if again:
             click.echo("  it is not computed again: it is not what was packed; get it again")
         return False
@@ -495,17 +480,6 @@ def verified(path: Path, again: bool, fresh: bool) -> bool:
             return _compared(reproduce(found, Path(folder), fresh, click.echo))
     except (OSError, ValueError) as error:
         raise ValueError(f"{path}: not reproduced: {error}") from None
-
-
-def _tell_checked(found: "Checked") -> None:
-    click.echo(shown(f"{found.path}: {found.title}, study {found.study}, springtune {found.version}"))
-    click.echo(f"  sha256 {found.sha256}")
-    click.echo(f"  {found.files} files compared with their checksums, faults: {len(found.faults)}")
-    rows = [[name, why] for name, why in sorted(found.faults.items())]
-    if rows:
-        click.echo(aligned(rows[:TOLD], 4))
-        if len(rows) > TOLD:
-            click.echo(f"    and {len(rows) - TOLD} more")
 
 
 def _compared(made: "Reproduced") -> bool:

@@ -244,22 +244,11 @@ def is_checkout(folder: Path) -> bool:
     return all((folder / file).is_file() for file in WORKFLOW)
 
 
-def checkout_here() -> bool:
-    """Return whether the current folder is a checkout."""
-    return is_checkout(Path())
-
-
-def _library_checkout() -> Path | None:
-    """Checkout of the library; None if it is installed without one."""
-    folder = Path(__file__).parents[3]
-    return folder if is_checkout(folder) else None
-
-
 def checkout_of_run() -> Path | None:
     """Folder of the workflow: the named one, the current one, or that of the library; None if there is none."""
     named = os.environ.get(NAMED_BY)
     if not named:
-        return Path.cwd() if checkout_here() else _library_checkout()
+        return next(filter(is_checkout, (Path.cwd(), Path(__file__).parents[3])), None)
     folder = Path(named).absolute()
     if not is_checkout(folder):
         raise click.ClickException(f"{NAMED_BY}: {named} has no Snakefile of springtune; name the folder of its source")

@@ -9,9 +9,9 @@ import click
 from ..registry import NAME, NAME_RULE
 from ..safe_io.atomic import write_text
 from ..studies.output.text import aligned
-from . import examples, studies_here
-from .options import CONFIG_FOLDER, WrongCall, allow, loaded, max_scenes
-from .run import checkout_here, checkout_of_run, how_to_get_one
+from . import WrongCall, examples, studies_here
+from .options import CONFIG_FOLDER, allow, loaded, max_scenes
+from .run import checkout_of_run, how_to_get_one, is_checkout
 
 
 @click.command(
@@ -56,7 +56,7 @@ def _path(given: str) -> Path:
         if not path.name:
             return path
         path = path.with_name(f"{path.name}.yaml")
-        path = CONFIG_FOLDER / path if given == path.stem and checkout_here() else path
+        path = CONFIG_FOLDER / path if given == path.stem and is_checkout(Path()) else path
     return path
 
 
@@ -102,7 +102,7 @@ def scenes(config: Path, most: int | None) -> None:
     from ..studies.config.kind import kinds
     from ..studies.config.messages import StudyError
     from ..studies.kinds import load_study  # here, so that --help does not wait for it
-    from ..studies.kinds.scenes.summary import summary
+    from ..studies.kinds.scenes.kind import summary
 
     try:
         study = load_study(config)

@@ -204,7 +204,7 @@ def _write_csv(path: Path, net: Net) -> list[Path]:
         for count, name in CELL_ARRAYS.items()
         if others[name] in tables
     ]
-    said += [f"# {line}" for line in _header_lines(net.header)]
+    said += [f"# {line}" for line in json.dumps(net.header, indent=1, ensure_ascii=False).splitlines()]
     texts = {other: _csv_text(table) for other, table in tables.items()}
     texts[path] = "\n".join([*said, ""]) + _csv_text(_table(arrays, SPRING_COLUMNS))
     with ExitStack() as unfinished:  # the last one gets its name first: if that fails, none gets one
@@ -250,7 +250,8 @@ def _csv_text(table: Mapping[str, np.ndarray]) -> str:
 
 def _read_csv(path: Path) -> Read:
     lines = path.read_text(encoding="utf-8").splitlines()
-    header = _header_of(line[2:] for line in lines if line.startswith("#"))
+    comments = [line[2:] for line in lines if line.startswith("#")]
+    header = json.loads("\n".join(comments[comments.index("{") :]))
     others = companions(path)
     for said, length in _counts(header).items():
         if length and said in others and not others[said].is_file():
@@ -292,37 +293,6 @@ def _joined(table: Mapping[str, tuple[str, ...]], count: int) -> dict[str, np.nd
                 values = np.array([[float(text) for text in table[title]] for title in titles]).T
                 found[full] = values if name in OF_CORNERS else values[:, 0]
     return found
-
-
-def _header_lines(header: Mapping[str, Any], before: str = "") -> Iterable[str]:
-    """Header as lines ``key: value``, values as in JSON; a text of several lines follows its key, behind bars."""
-    for key, value in header.items():
-        if isinstance(value, dict):
-            yield from _header_lines(value, f"{before}{key}.")
-        elif isinstance(value, str) and "\n" in value:
-            yield f"{before}{key}:"
-            yield from (f"| {line}" for line in value.split("\n"))
-        else:
-            yield f"{before}{key}: {json.dumps(value, ensure_ascii=False)}"
-
-
-def _header_of(lines: Iterable[str]) -> dict[str, Any]:
-    """Header from the lines of `_header_lines`; others are left out."""
-    header: dict[str, Any] = {}
-    here, last = header, ""
-    for line in lines:
-        if line.startswith("| ") or line == "|":
-            here[last] = line[2:] if here[last] is None else f"{here[last]}\n{line[2:]}"
-            continue
-        path, colon, value = line.partition(":")
-        if not colon or " " in path:
-            continue
-        *parents, last = path.split(".")
-        here = header
-        for parent in parents:
-            here = here.setdefault(parent, {})
-        here[last] = json.loads(value) if value else None
-    return header
 
 
 # -- JSON ----------------------------------------------------------------------------------------------------------
@@ -376,10 +346,6 @@ def _read_json(path: Path) -> Read:
 POINT_NAMES = {"masses": "mass", "held": "held", "forces": "load"}
 LINE_NAMES = {"rest_lengths": "rest_length", "stiffness": "stiffness"}
 """Names of arrays in ParaView."""
-
-
-def _write_vtu(path: Path, net: Net) -> None:
-    write_vtu_with(path, net, {}, {})
 
 
 def write_vtu_with(
@@ -510,13 +476,10 @@ def _read_h5(path: Path) -> Read:
 def _for_simulator(program: str, text: Callable[[Net], str]) -> "_Format":
     """Format of a simulator, which is not read."""
 
-    def write_it(path: Path, net: Net) -> None:
-        write_text(path, text(net))
-
     def refuse(path: Path) -> Read:
         raise ValueError(f"it is for {program}; read the springs from .json, .h5, .csv or .vtu")
 
-    return _Format(write_it, refuse)
+    return _Format(lambda path, net: write_text(path, text(net)), refuse)
 
 
 class _Format(NamedTuple):
@@ -529,7 +492,7 @@ class _Format(NamedTuple):
 _FORMATS = {
     ".csv": _Format(_write_csv, _read_csv),
     ".json": _Format(_write_json, _read_json),
-    ".vtu": _Format(_write_vtu, _read_vtu),
+    ".vtu": _Format(lambda path, net: write_vtu_with(path, net, {}, {}), _read_vtu),
     ".h5": _Format(_write_h5, _read_h5),
 }
 

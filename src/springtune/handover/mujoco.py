@@ -72,9 +72,11 @@ def mjcf(net: Net, version: int = VERSIONS[-1]) -> str:
     accelerations = np.abs(np.where(net.held, 0, net.forces)).max(axis=1) / simulation.masses
     keep = ' autoreset="disable"' if accelerations.max() > LARGEST_ACCELERATION else ""
     said = f"the one here is {simulation.step / simulation.largest_step:.2g} of it"
+    load = net.header.get("load")
+    title = net.header["definition"] + (f", {load_in_words(load)}" if load else "")
     flex = [_flex(net, terms, size, version) for terms in net.energies]
     lines = [
-        f"<mujoco model={quoteattr(_model(net))}>",
+        f"<mujoco model={quoteattr(title)}>",
         *commented([*about(net, simulation, said), f"Written {for_versions(net.energies, version)}."], "  "),
         f'  <option timestep="{simulation.step!r}" integrator="Euler" gravity="0 0 0">',
         f'    <flag contact="disable"{keep}/>',
@@ -113,11 +115,6 @@ def for_versions(energies: Sequence[Terms], version: int | None = None) -> str:
     [other] = set(VERSIONS) - {version}
     refused = f"MuJoCo {other}, whose flex has other constants, refuses it"
     return f"for MuJoCo {version}; {refused}: write one with mujoco {other} for that"
-
-
-def _model(net: Net) -> str:
-    load = net.header.get("load")
-    return net.header["definition"] + (f", {load_in_words(load)}" if load else "")
 
 
 def _particles(net: Net, simulation: Simulation, bodies: bool) -> list[str]:

@@ -15,7 +15,7 @@ the quadratic form of its second derivative at rest.
 import inspect
 import sys
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -348,11 +348,10 @@ def _everywhere(energy: Energy, mesh: Mesh) -> Energy:
     if len(energy.corners) == len(cells):
         return energy
     rows, moduli = rows_of(cells, energy.corners), {}
-    for part in fields(energy):
-        own = getattr(energy, part.name)
-        if isinstance(own, np.ndarray) and part.name not in ("points", "corners"):
-            moduli[part.name] = np.zeros((len(cells), *own.shape[1:]))
-            moduli[part.name][rows] = own
+    for name, own in energy.moduli.items():
+        if isinstance(own, np.ndarray):
+            moduli[name] = np.zeros((len(cells), *own.shape[1:]))
+            moduli[name][rows] = own
     return replace(energy, corners=cells, **moduli)
 
 
@@ -493,7 +492,8 @@ def _in_words(errors: dict[str, float | str], known: Mapping[str, Any]) -> dict[
 def _errors_on_shape(scene: Scene, springs: Springs) -> dict[str, float | str]:
     """Error by quantity, linear kinematics against the reference of small strain; or why it is not computed."""
     # Here, since finite elements take half a second to import.
-    from ..prediction.choices import QuantityReference, ReferenceNotConvergedError, errors_under, shape_references
+    from ..prediction.choices import QuantityReference, errors_under, shape_references
+    from ..reference.small_strain import ReferenceNotConvergedError
 
     if why := _too_many(scene.sheet):
         return dict.fromkeys([one.name for one in scene.case.quantities], why)

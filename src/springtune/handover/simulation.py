@@ -31,6 +31,10 @@ WORDS = {
 """Words for energies besides springs, by kind."""
 
 
+PERIOD = 50
+"""Implicit steps of the slowest period that the load excites."""
+
+
 class EquilibriumWarning(UserWarning):
     """Warning of a net without an equilibrium, or with one that is far away."""
 
@@ -55,6 +59,11 @@ class Simulation:
     mass_damping: float
     displacements: np.ndarray | None
     why: str
+
+    @property
+    def implicit_step(self) -> float:
+        """Step of schemes that are stable in any: a share `PERIOD` of the slowest period that the load excites [s]."""
+        return float(2 * np.pi / self.loaded_frequency / PERIOD) if self.loaded_frequency else self.step
 
 
 def simulate(net: Net, program: str, laws: Iterable[str] = ()) -> Simulation:

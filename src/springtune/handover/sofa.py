@@ -12,11 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .simulation import Simulation, about, commented, numbers, simulate
+from .simulation import PERIOD, Simulation, about, commented, numbers, simulate
 from .terms import Net
-
-PERIOD = 50
-"""Steps of the slowest period that the load excites: backward Euler damps it by 6 % of the critical damping."""
 
 BACKWARD_EULER = (
     ("Sofa.Component.ODESolver.Backward", "EulerImplicitSolver"),
@@ -145,7 +142,6 @@ def _rows(components: list[Component]) -> str:
 
 def _scene(net: Net) -> SofaScene:
     simulation = simulate(net, "SOFA")
-    step = float(2 * np.pi / simulation.loaded_frequency / PERIOD) if simulation.loaded_frequency else simulation.step
     there = net.stiffness != 0
     springs = " ".join(
         f"{first} {second} {stiffness!r} 0 {length!r}"
@@ -189,7 +185,7 @@ def _scene(net: Net) -> SofaScene:
         Component("DefaultAnimationLoop", {}),
         Component("VisualStyle", {"displayFlags": "showBehaviorModels showForceFields"}),
     ]
-    return SofaScene(step, about(net, simulation, said), root, sheet, predicted)
+    return SofaScene(simulation.implicit_step, about(net, simulation, said), root, sheet, predicted)
 
 
 def _positions(points: np.ndarray) -> str:

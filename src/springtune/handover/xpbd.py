@@ -50,7 +50,6 @@ def xpbd(net: Net) -> str:
         )
     there = net.stiffness > 0
     whole = np.asarray(net.held.all(axis=1))
-    step = 2 * np.pi / simulation.loaded_frequency / 50 if simulation.loaded_frequency else simulation.step
     displacements = simulation.displacements
     content: dict[str, Any] = {
         "header": dict(net.header) | {"springs_without_stiffness_left_out": int((~there).sum())},
@@ -64,7 +63,7 @@ def xpbd(net: Net) -> str:
             "rest_lengths": net.rest_lengths[there].tolist(),
             "compliance": (1 / net.stiffness[there]).tolist(),
         },
-        "time_step": float(step),
+        "time_step": simulation.implicit_step,
         "mass_damping": simulation.mass_damping,
         "displacements": None if displacements is None else displacements.tolist(),
     }

@@ -11,6 +11,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass, fields
 from functools import cached_property
 from hashlib import sha256
+from typing import Any
 
 import numpy as np
 
@@ -103,10 +104,14 @@ class Energy(ABC):
         return ""
 
     @property
+    def moduli(self) -> dict[str, Any]:
+        """What it has besides the cells, by name."""
+        return {one.name: getattr(self, one.name) for one in fields(self)[2:]}
+
+    @property
     def key(self) -> bytes:
         """Bytes that distinguish energies of one mesh."""
-        moduli = (getattr(self, one.name) for one in fields(self)[2:])
-        content = (np.ascontiguousarray(part).tobytes() for part in moduli if part is not None)
+        content = (np.ascontiguousarray(part).tobytes() for part in self.moduli.values() if part is not None)
         return type(self).__name__.encode() + self._cells + b"".join(content)
 
     @cached_property

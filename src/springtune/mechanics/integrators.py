@@ -28,10 +28,9 @@ BEHAVIOURS = ("stable", "decaying", "growing", "nan")
 class BackwardEuler:
     """Options of the scheme ``backward-euler``, in place of its name.
 
-    `stiffness_damping` is Rayleigh's beta [s]. `iterations` are conjugate-gradient iterations a step, or None to
+    `iterations` are conjugate-gradient iterations a step, or None to
     factorize; `tolerance` is their relative residual, by default SOFA's.
     """
 
-    stiffness_damping: float = 0.0
     iterations: int | None = None
     tolerance: float = 1e-5

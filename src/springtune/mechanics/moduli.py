@@ -50,9 +50,6 @@ def ends(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
     return np.unique(edges[left]), np.unique(edges[~left])
 
 
-UNIT_STRESSES = (((1.0, 0.0), (0.0, 0.0)), ((0.0, 0.0), (0.0, 1.0)), ((0.0, 1.0), (1.0, 0.0)))
-"""Unit stresses xx, yy and xy [1]."""
-
 UNIT_STRAINS = (((1.0, 0.0), (0.0, 0.0)), ((0.0, 0.0), (0.0, 1.0)), ((0.0, 0.5), (0.5, 0.0)))
 """Unit strains xx, yy and shear angle xy [1]."""
 
@@ -182,29 +179,12 @@ class PatchTest:
         held[self.mesh.edges[self.mesh.on_outline]] = True
         return held, self.mesh.points[:, ::-1] * [1.0, 0.0]
 
-    @cached_property
-    def _free_body(self) -> tuple[np.ndarray, np.ndarray]:
-        """Directions held against rigid motions alone, and forces of three even stresses, shape (3, n_points, 2)."""
-        return free_body(self.mesh), np.stack([outline_forces(self.mesh, np.array(stress)) for stress in UNIT_STRESSES])
-
-    def compliance(self, springs: Elastic) -> np.ndarray:
-        """Return the plane-stress compliance under even tractions on the outline and the rims of holes, the body free.
-
-        Shape (3, 3), over the thickness times the reference stiffness [1]; columns are the mean strains under unit
-        stresses xx, yy and xy. No test of the same mesh is softer.
-        """
-        held, forces = self._free_body
-        network = self._network("free body", held, springs)
-        loads = [network.reduce(force) for force in forces]
-        work = np.array(loads) @ np.array([network.rest_factor.solve(load) for load in loads]).T / self.mesh.area
-        return 0.5 * (work + work.T)
-
     def stiffness(self, springs: Elastic) -> np.ndarray:
         """Return the plane-stress stiffness under affine displacements of the outline and the rims of holes.
 
         Shape (3, 3), times the thickness over the reference stiffness [1]; Voigt: xx, yy, shear angle xy. A continuum
         has the same even strain inside, so the test is exact on any mesh. No test of the same mesh is stiffer (Hill's
-        bounds), and none is softer than `compliance`.
+        bounds).
         """
         held = self._frame[0]
         network = self._network("frame", held, springs)

@@ -162,12 +162,7 @@ class Network:
 
     def resistance(self, displacements: np.ndarray) -> np.ndarray:
         """Return the force against displacements over the reference stiffness [m], shape (unknowns,)."""
-        resistance = np.zeros(self.unknowns)
-        if self.has_springs:
-            resistance -= self.gather(self._pulls(displacements))
-        for energy in self.energies:
-            resistance += self.reduce(self._pattern.sum_cells(energy.corners, energy.forces(displacements)))
-        return resistance
+        return self.reduce(self.forces(displacements))
 
     def forces(self, displacements: np.ndarray) -> np.ndarray:
         """As `resistance`, with held directions [m], shape (n_points, 2)."""

@@ -111,7 +111,7 @@ class StablePath:
     def value(self, s: float) -> float:
         """Return the weighted displacement [m] at a load [m] on the stable path, or NaN beyond it."""
         load = abs(s)
-        if not self._serves(load):
+        if not self._series or load > self._series[-1][1]:
             return self._reach(load)
         if not self._is_stable(load):
             return np.nan
@@ -163,10 +163,6 @@ class StablePath:
                 return number, point
             number -= 1 + number // 8
         return 0, None
-
-    def _serves(self, load: float) -> bool:
-        """Whether a series serves a load."""
-        return bool(self._series) and load <= self._series[-1][1]
 
     def _series_of(self, load: float) -> Expansion:
         """The first series that serves a load."""
@@ -315,11 +311,6 @@ class StablePath:
             return value
         return self._solved(s, series.at(sigma)[1])
 
-    def _missed(self, displacements: np.ndarray, guess: np.ndarray) -> float:
-        """Relative error of the weighted displacement of a guess."""
-        value = np.tensordot(displacements, self.weights, axes=2)
-        return float(abs(np.tensordot(guess, self.weights, axes=2) / value - 1.0))
-
     def _solve(self, s: float, guess: np.ndarray) -> tuple[np.ndarray | None, Factor | None]:
         """Return displacements (n_points, 2) and factor of the equilibrium next to a guess; None if there is none."""
         network = self.problem.network
@@ -377,7 +368,8 @@ class StablePath:
             s, guess = series.at(farthest)
             displacements, factor = self._solve(s, guess) if farthest else (None, None)
             if displacements is not None and factor is not None:
-                self._pieces.append((series, farthest, abs(s), self._missed(displacements, guess)))
+                value, guessed = (np.tensordot(one, self.weights, axes=2) for one in (displacements, guess))
+                self._pieces.append((series, farthest, abs(s), float(abs(guessed / value - 1.0))))
                 self._last, self.stable_to = (s, displacements, factor), abs(s)
                 break
             if displacements is not None:

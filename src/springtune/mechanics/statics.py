@@ -151,7 +151,12 @@ class StaticProblem(LoadedNetwork):
             if found.converged:
                 change = self.network.largest_change(found.displacements)  # never below the stretch
                 near = change <= FAR or change <= TURNED and self.network.largest_stretch(found.displacements) <= FAR
-                if near and (change <= UNSNAPPED or self._reached(s, found.displacements) or self._unstable(s, found)):
+                rest = np.zeros(found.displacements.shape)
+                if near and (
+                    change <= UNSNAPPED
+                    or self._joined(0.0, rest, s, found.displacements, s * self.slope)
+                    or self._unstable(s, found)
+                ):
                     return replace(found, iterations=iterations)
                 break
         return self._in_steps(s, found, iterations)
@@ -167,10 +172,6 @@ class StaticProblem(LoadedNetwork):
             apart = network.largest_change(displacements - found.displacements) > SURPRISE
             return "the path from rest leads to another stable equilibrium" if apart else ""
         return message if found.limit_share < 1 else ""
-
-    def _reached(self, s: float, displacements: np.ndarray) -> bool:
-        """Whether no snap lies between rest and an equilibrium."""
-        return self._joined(0.0, np.zeros(displacements.shape), s, displacements, s * self.slope)
 
     def _joined(
         self, s: float, here: np.ndarray, to: float, there: np.ndarray, guess: np.ndarray, bend: float = 0.25

@@ -333,18 +333,18 @@ class _BackwardEulerSteps(Stepper):
         self.solve: Callable[[np.ndarray], np.ndarray] | None = None
 
     def advance(self, steps: int) -> None:
-        motion, network, h, beta = self.motion, self.motion.network, self.step, self.options.stiffness_damping
+        motion, network, h = self.motion, self.motion.network, self.step
         for _ in range(steps):
             if self.solve is None or not motion.linear:
                 self.stiffness = motion.stiffness_matrix if motion.linear else network.tangent(self.u)
                 self.damping = motion.damper_tangent(self.u)
                 mass = diags_array(motion.mass * (1 + h * motion.mass_damping))
-                matrix = mass + h * (h + beta) * self.stiffness
+                matrix = mass + h * h * self.stiffness
                 if self.damping is not None:
                     matrix = matrix + h * self.damping
                 self.solve = self._solver(csc_array(matrix))
             v = network.reduce(self.v)
-            right = motion.missing(self.u) - (h + beta) * (self.stiffness @ v)
+            right = motion.missing(self.u) - h * (self.stiffness @ v)
             right -= motion.mass_damping * motion.mass * v
             if self.damping is not None:
                 right -= self.damping @ v

@@ -129,11 +129,6 @@ class OutlineSide:
         norm = math.hypot(x, y)
         return x / norm, y / norm
 
-    def normal(self, parameter: float) -> Point:
-        """Unit vector to the right of the side at a parameter: out of the body on the sides of an outline."""
-        x, y = self.tangent(parameter)
-        return y, -x
-
     def _length(self, low: float, high: float) -> float:
         """Length between two parameters that are near each other."""
         return (high - low) * sum(

@@ -67,27 +67,23 @@ class Side:
     span: tuple[float, float] = (0.0, 1.0)
 
 
+@dataclass(eq=False)
 class CoarseMesh:
     """Triangles and their sides on the outline and between parts.
 
     `points` (n_points, 2) [m], `triangles` (n, 3) counter-clockwise, `parts` (n,) numbers of their parts.
     """
 
-    def __init__(
-        self,
-        points: np.ndarray,
-        triangles: np.ndarray,
-        parts: np.ndarray,
-        names: tuple[str, ...],
-        sides: dict[_Ends, Side],
-        named: dict[str, int],
-    ) -> None:
-        self.points, self.triangles, self.parts, self.names = points, triangles, parts, names
-        self.sides, self.named = sides, named
+    points: np.ndarray
+    triangles: np.ndarray
+    parts: np.ndarray
+    names: tuple[str, ...]
+    sides: dict[_Ends, Side]
+    named: dict[str, int]
 
     def copy(self) -> "CoarseMesh":
         """A mesh that may be cut for itself."""
-        return CoarseMesh(self.points, self.triangles, self.parts, self.names, dict(self.sides), self.named)
+        return replace(self, sides=dict(self.sides))
 
     def curve(self, ends: _Ends, along: np.ndarray) -> np.ndarray:
         """Points of a side, shape (n, 2) [m], from -1 at the corner of the lower number to 1."""
@@ -152,7 +148,16 @@ class CoarseMesh:
 
     def part_sides(self) -> dict[_Ends, list[tuple[int, bool]]]:
         """Triangles at each side of `sides`: number, and whether they go along it from the lower number."""
-        return _triangles_at(self.triangles, self.sides)
+        wanted: dict[_Ends, list[tuple[int, bool]]] = {ends: [] for ends in self.sides}
+        corners = np.zeros(self.triangles.max() + 1, dtype=bool)
+        corners[[end for ends in wanted for end in ends]] = True
+        for i in range(3):
+            starts, ends = self.triangles[:, i], self.triangles[:, (i + 1) % 3]
+            for row in np.flatnonzero(corners[starts] & corners[ends]):
+                start, end = int(starts[row]), int(ends[row])
+                if (found := wanted.get((min(start, end), max(start, end)))) is not None:
+                    found.append((int(row), start < end))
+        return wanted
 
     def isolate(self, corners: Iterable[int]) -> None:
         """Bisect sides until no triangle has two of some corners."""
@@ -207,20 +212,6 @@ def _shapely(points: np.ndarray, triangles: np.ndarray) -> bool:
     """Whether triangles are counter-clockwise and not flat."""
     sides = points[triangles] - points[np.roll(triangles, 1, axis=1)]
     return bool((signed_areas(points, triangles) > 0.1 * (sides**2).sum(axis=(1, 2)) / 3).all())
-
-
-def _triangles_at(triangles: np.ndarray, sides: Iterable[_Ends]) -> dict[_Ends, list[tuple[int, bool]]]:
-    """Triangles at some sides, see `CoarseMesh.part_sides`."""
-    wanted: dict[_Ends, list[tuple[int, bool]]] = {ends: [] for ends in sides}
-    corners = np.zeros(triangles.max() + 1, dtype=bool)
-    corners[[end for ends in wanted for end in ends]] = True
-    for i in range(3):
-        starts, ends = triangles[:, i], triangles[:, (i + 1) % 3]
-        for row in np.flatnonzero(corners[starts] & corners[ends]):
-            start, end = int(starts[row]), int(ends[row])
-            if (found := wanted.get((min(start, end), max(start, end)))) is not None:
-                found.append((int(row), start < end))
-    return wanted
 
 
 def _points(side: OutlineSide, span: tuple[float, float], shares: np.ndarray) -> np.ndarray:

@@ -56,10 +56,6 @@ BENT = 0.1
 """As `springtune.mechanics.statics.BENT`."""
 
 
-class IncompressibleError(ValueError):
-    """A material that needs more than displacements as unknowns."""
-
-
 class FiniteStrainError(ReferenceNotConvergedError):
     """A reference did not converge; the message gives the reached load."""
 
@@ -92,28 +88,11 @@ class FiniteStrainSolution:
         return interpolate(self.x, self.y, self.displacements, points)
 
 
-def solve_neo_hooke(
+def solve_finite_strain(
     beam: Beam, material: Material, force: float, kind: LoadKind = FACE, plane: str = "stress", follower: bool = False
 ) -> FiniteStrainSolution:
-    """Solve for the displacements of a neo-Hookean beam under a `force` [N], positive outwards."""
-    nu = material.poisson_ratio
-    if plane == "strain" and nu >= 0.5:
-        raise IncompressibleError(
-            f"plane strain of '{material.name}' needs a Poisson's ratio below 0.5, such as 0.4999"
-        )
-    return _solve(beam, material, force, kind, NeoHooke(nu, plane), follower)
-
-
-def solve_yeoh(
-    beam: Beam, material: Rubber, force: float, kind: LoadKind = FACE, follower: bool = False
-) -> FiniteStrainSolution:
-    """Displacements of a beam of Yeoh's law in plane stress under a load."""
-    return _solve(beam, material, force, kind, Yeoh(material), follower)
-
-
-def _solve(
-    beam: Beam, material: Material, force: float, kind: LoadKind, law: "_PlaneLaw", follower: bool
-) -> FiniteStrainSolution:
+    """Solve for the displacements of a beam of rubber, see `law_of`, under a `force` [N], positive outwards."""
+    law = law_of(material, plane)
     stress = force / (kind.side_length(beam) * beam.thickness * material.young_modulus)
     sheets = [_Sheet(beam.length / beam.height, law, count, kind, follower) for count in COUNTS]
     name = f"{beam.name}, {material.name}"
@@ -438,8 +417,8 @@ class _PlaneLaw(ABC):
 class Yeoh(_PlaneLaw):
     """Yeoh's law of an incompressible sheet in plane stress, with E = 1."""
 
-    def __init__(self, material: Rubber) -> None:
-        self.coefficients = [one / material.young_modulus for one in material.coefficients]
+    def __init__(self, coefficients: Sequence[float]) -> None:
+        self.coefficients = coefficients
 
     def derivatives(self, trace: np.ndarray, d: np.ndarray) -> _Derivatives:
         """As of `_PlaneLaw`, of W = sum_n c_n x^n with x = t + 1/d - 3."""
@@ -453,24 +432,15 @@ class Yeoh(_PlaneLaw):
 
 
 class NeoHooke(_PlaneLaw):
-    """Neo-Hookean energy of a sheet with E = 1; `nu` is Poisson's ratio at small strain."""
+    """Compressible neo-Hookean energy of a sheet with E = 1; `nu` < 0.5 is Poisson's ratio at small strain."""
 
     def __init__(self, nu: float, plane: str) -> None:
         self.shear = 1 / (2 * (1 + nu))
-        self.bulk = np.inf if nu >= 0.5 else 1 / (3 * (1 - 2 * nu))
+        self.bulk = 1 / (3 * (1 - 2 * nu))
         self.plane = plane
 
     def derivatives(self, trace: np.ndarray, d: np.ndarray) -> _Derivatives:
-        """As of `_PlaneLaw`."""
-        return (self._incompressible if np.isinf(self.bulk) else self._compressible)(trace, d)
-
-    def _incompressible(self, trace: np.ndarray, d: np.ndarray) -> _Derivatives:
-        """First derivatives by t and d, and second ones by tt, td, dd, of W = mu/2 (t + 1/d - 3)."""
-        none = np.zeros_like(trace)
-        return (none + self.shear / 2, -self.shear / 2 / d**2), (none, none, self.shear / d**3)
-
-    def _compressible(self, trace: np.ndarray, d: np.ndarray) -> _Derivatives:
-        """The same of the module's docstring's energy, the stretch z across eliminated in plane stress."""
+        """As of `_PlaneLaw`, of the module's energy; in plane stress the stretch z across is eliminated."""
         z = np.ones_like(d)
         if self.plane == "stress":
             z = 1 / np.sqrt(d)
@@ -503,6 +473,18 @@ class NeoHooke(_PlaneLaw):
             "dz": half * p / (3 * d) * (2 / (3 * z) * trace - 2 * z) + bulk * (volume + growth) * volume / (2 * d * z),
             "zz": half * p * (10 / (9 * z**2) * trace - 8 / 3 + 2) + bulk * (volume / z) ** 2,
         }
+
+
+def law_of(material: Material, plane: str = "stress") -> _PlaneLaw:
+    """Return Yeoh's law of a tested rubber, else the neo-Hookean law: one term of Yeoh's where nu = 1/2."""
+    modulus, nu = material.young_modulus, material.poisson_ratio
+    if isinstance(material, Rubber):
+        return Yeoh([one / modulus for one in material.coefficients])
+    if nu < 0.5:
+        return NeoHooke(nu, plane)
+    if plane == "strain":
+        raise FiniteStrainError(f"plane strain of '{material.name}' needs a Poisson's ratio below 0.5, such as 0.4999")
+    return Yeoh([1 / (4 * (1 + nu))])
 
 
 @dataclass(frozen=True)

@@ -235,7 +235,7 @@ class UnitLevel:
     """
 
     def __init__(self, length: float, nu: float, degree: int, kind: LoadKind = AXIAL) -> None:
-        self._grid = grid = _grid(length, degree, kind)
+        self._grid = grid = _Grid(length, degree, kind)
         solution, energy, measured, self.round_off = grid.solve(nu)
         self.displacement = energy / (length / 2 if kind.along == 0 else 1.0)  # over the half of the side
         self.unknowns = len(solution)
@@ -257,12 +257,7 @@ class UnitLevel:
         return np.stack([sign * part for sign, part in zip(signs, parts)], axis=2)
 
 
-@lru_cache(maxsize=2 * LAST_LEVEL)
-def _grid(length: float, degree: int, kind: LoadKind) -> "_Grid":
-    """Grids are shared by references that differ in Poisson's ratio alone."""
-    return _Grid(length, degree, kind)
-
-
+@lru_cache(maxsize=2 * LAST_LEVEL)  # grids are shared by references that differ in Poisson's ratio alone
 class _Grid:
     """Elements of one level, and the parts of its matrix and load that do not depend on Poisson's ratio."""
 

@@ -20,6 +20,14 @@ def shown(text: object) -> str:
     return UNSEEN.sub(lambda found: ascii(found[0])[1:-1], str(text))
 
 
+LONGEST_SHOWN = 60
+
+
+def clipped(text: str, longest: int = LONGEST_SHOWN) -> str:
+    """Return a text as `shown`, shortened for a message."""
+    return shown(text if len(text) <= longest else f"{text[: longest - 3]}...")
+
+
 def rst(text: str) -> str:
     r"""Return a text escaped for reStructuredText.
 

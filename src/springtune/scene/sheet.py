@@ -154,6 +154,7 @@ class Sheet:
 
     def __init__(self, mesh: Mesh, thickness: float, networks: int = NETWORKS, like: "Sheet | None" = None) -> None:
         self.mesh, self.thickness, self.deriving = mesh, thickness, 0.0
+        self.held = cache(lambda kind: held(mesh, kind))
         self.weights = cache(lambda kind: weights(mesh, kind))
         self.measured = cache(lambda kind: measured(mesh, kind))
         self.loading = cache(lambda kind, follower=False: box_loading(mesh, kind, follower))

@@ -29,7 +29,7 @@ from ..problem.boundary import (
 )
 from ..problem.geometry import Beam, warn_of_thickness
 from ..problem.loads import LOADS, LoadKind
-from ..problem.materials import ANY_MATERIAL, AnyMaterial, Material, Rubber
+from ..problem.materials import ANY_MATERIAL, AnyMaterial, Material
 from ..problem.quantities import positive
 from ..problem.shapes import LoadCase, Quantity, Shape
 from ..reference.answers import beyond_linear
@@ -434,11 +434,9 @@ def _solve_unit(aspect_ratio: float, nu: float, kind: LoadKind) -> "ReferenceSol
 def _solve_finite(
     beam: Beam, material: Material, force: float, kind: LoadKind, follower: bool
 ) -> "FiniteStrainSolution":
-    from ..reference.finite_strain import solve_neo_hooke, solve_yeoh  # here: as of `_solve_unit`
+    from ..reference.finite_strain import solve_finite_strain  # here: as of `_solve_unit`
 
-    if isinstance(material, Rubber):
-        return solve_yeoh(beam, material, force, kind, follower)
-    return solve_neo_hooke(beam, material, force, kind, follower=follower)
+    return solve_finite_strain(beam, material, force, kind, follower=follower)
 
 
 def unit_reference(beam: Beam, material: Material, kind: LoadKind, force: float) -> "ReferenceSolution":

@@ -12,7 +12,7 @@ with equal materials they give nearly what one material gives.
 """
 
 from collections.abc import Mapping
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,56 +20,12 @@ import numpy as np
 from ..mesh import Mesh
 from ..mesh.cells import no_cells
 from ..mesh.groups import GroupedMesh
-from ..problem.materials import ANY_MATERIAL, AnyMaterial
-from ..problem.quantities import nearest
+from ..problem.boundary import part_names
+from ..problem.materials import AnyMaterial
 from .base import DefinitionError, Springs
 
 if TYPE_CHECKING:
     from ..mechanics.energies import Energy
-
-MAIN_PART = ""
-"""Name of the part that has no other."""
-
-
-CELL_FIELDS = "points", "corners"
-"""Fields of an energy that say where its cells are."""
-
-
-def cells_of_parts(grouped: GroupedMesh) -> dict[str, dict[int, np.ndarray]]:
-    """Return the cells of each part, the main one included, by part and number of corners; empty parts are left out."""
-    rest = {count: np.ones(len(corners), dtype=bool) for count, corners in grouped.mesh.cells.items()}
-    found: dict[str, dict[int, np.ndarray]] = {MAIN_PART: rest}
-    for name, chosen in grouped.parts.items():
-        own = {}
-        for count, everything in rest.items():
-            own[count] = np.asarray(chosen.get(count, np.zeros(len(everything))), dtype=bool)
-            everything &= ~own[count]
-        found[name] = own
-    return {name: cells for name, cells in found.items() if any(mask.any() for mask in cells.values())}
-
-
-def check_materials(grouped: GroupedMesh, materials: Mapping[str, AnyMaterial]) -> None:
-    """Refuse materials that do not match the parts of a body.
-
-    Examples
-    --------
-    >>> from springtune.mesh import right
-    >>> from springtune.problem.materials import Material
-    >>> check_materials(GroupedMesh(right(0.02, 0.01, 5e-3)), {"rim": Material(210e9, 0.3)})
-    Traceback (most recent call last):
-    ...
-    springtune.springs.base.DefinitionError: the main part of the body has no material; add one of the name ''
-    """
-    parts = cells_of_parts(grouped)
-    for name in parts:
-        if name not in materials:
-            what = f"part {name!r}" if name else "the main part"
-            raise DefinitionError(f"{what} of the body has no material; add one of the name {name!r}")
-    for name, material in materials.items():
-        if not isinstance(material, ANY_MATERIAL):
-            raise DefinitionError(f"material of part {name!r}: {material!r} is none; give a springtune.Material")
-        if name and name not in grouped.parts:
-            raise DefinitionError(f"material of part {name!r}: the body has no such part; {nearest(name, parts)}")
 
 
 def derive_by_parts(
@@ -81,13 +37,13 @@ def derive_by_parts(
 ) -> Springs:
     """Return the springs of a body with parts of several materials; `thickness` in m.
 
-    `definition` is one of the package or the user's own.
+    `definition` is one of the package or the user's own; `materials` has one for each part that has cells.
     """
-    check_materials(grouped, materials)
-    mesh, parts = grouped.mesh, cells_of_parts(grouped)
+    mesh, labels = grouped.mesh, part_names(grouped)
     groups: dict[AnyMaterial, list[str]] = {}
-    for name in parts:
-        groups.setdefault(materials[name], []).append(name)
+    for name in ("", *grouped.parts):
+        if any((names == name).any() for names in labels.values()):
+            groups.setdefault(materials[name], []).append(name)
     if len(groups) == 1:
         return definition.springs(mesh, next(iter(groups)), thickness, given)
     if definition.needs or definition.uniaxial:
@@ -98,7 +54,7 @@ def derive_by_parts(
         )
     found: list[tuple[Springs, np.ndarray, dict[int, np.ndarray]]] = []
     for material, names in groups.items():
-        cells = {count: np.any([parts[name][count] for name in names], axis=0) for count in mesh.cells}
+        cells = {count: np.isin(labels[count], names) for count in mesh.cells}
         part, edges = _part(mesh, cells)
         try:
             found.append((definition.springs(part, material, thickness), edges, cells))
@@ -151,8 +107,7 @@ def _law(energy: "Energy") -> tuple[object, ...]:
 
     Rubber laws may differ in their terms and in their range of data.
     """
-    names = [part.name for part in fields(energy) if part.name not in (*CELL_FIELDS, "coefficients", "largest")]
-    values = [getattr(energy, name) for name in names]
+    values = [value for name, value in energy.moduli.items() if name not in ("coefficients", "largest")]
     return tuple(value.shape[1:] if isinstance(value, np.ndarray) else value for value in values if value is not None)
 
 
@@ -164,18 +119,17 @@ def _joined(mesh: Mesh, parts: "list[tuple[Energy, np.ndarray, float]]") -> "Ene
     cells = np.concatenate([where for _, where, _ in parts])
     order = np.argsort(cells)
     moduli: dict[str, Any] = {}
-    for part in fields(first):
-        own = [getattr(energy, part.name) for energy, _, _ in parts]
-        if part.name == "largest":  # a range of data, not a modulus
+    for name in first.moduli:
+        own = [energy.moduli[name] for energy, _, _ in parts]
+        if name == "largest":  # a range of data, not a modulus
             own = [np.broadcast_to(one, len(where)) for one, (_, where, _) in zip(own, parts)]
-            moduli[part.name] = np.concatenate(own)[order]
+        elif own[0] is None:  # and so in all parts, see `_law`
             continue
-        if part.name in CELL_FIELDS or not isinstance(own[0], np.ndarray):  # which is none in all parts, see `_law`
-            continue
-        if part.name == "coefficients":  # of laws with fewer terms the others are zero
+        else:  # what an energy has besides its cells is in proportion to its stiffness
+            own = [scale * one for one, (_, _, scale) in zip(own, parts)]
+        if name == "coefficients":  # of laws with fewer terms the others are zero
             most = max(one.shape[1] for one in own)
             own = [np.pad(one, ((0, 0), (0, most - one.shape[1]))) for one in own]
-        # What an energy has besides its cells is in proportion to its stiffness.
-        moduli[part.name] = np.concatenate([scale * one for one, (_, _, scale) in zip(own, parts)])[order]
+        moduli[name] = np.concatenate(own)[order]
     corners = mesh.cells[first.corners.shape[1]][cells[order]]
     return replace(first, points=mesh.points, corners=corners, **moduli)

@@ -21,11 +21,11 @@ import numpy as np
 
 from springtune.registry import NAME, NAME_RULE
 from springtune.safe_io import atomic
-from springtune.safe_io.escapes import shown
+from springtune.safe_io.escapes import clipped, shown
 from springtune.safe_io.inputs import check_alone
 
 from ..config.load import digest_of, is_part, named_files, part_text, whole_text
-from ..config.messages import StudyError, clipped, read_yaml
+from ..config.messages import StudyError, read_yaml
 from ..config.model import Part
 from ..kinds import load_study
 from ..kinds.division import dealt, part_of, taken

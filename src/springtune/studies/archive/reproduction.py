@@ -23,7 +23,7 @@ from urllib.parse import unquote
 from springtune.safe_io.inputs import fault
 
 from ..output import reading
-from ..runs import rerun
+from ..runs import records, rerun
 from . import contents
 from .contents import CODE, METADATA, MOST_FILES, MOST_TEXT, OF_RESULTS, SUMS, several
 
@@ -70,8 +70,7 @@ def check(path: Path) -> Checked:
     why = fault(path)
     if why:
         raise ReproductionError(f"{path}: cannot be read ({why}); give an archive")
-    with open(path, "rb") as file:
-        digest = hashlib.file_digest(file, "sha256").hexdigest()
+    digest = records.checksum(path)
     with _Bounded(FileIO(path)) as file:
         try:
             archive = zipfile.ZipFile(file)

@@ -15,7 +15,7 @@ from ..config.kind import kinds
 from ..config.model import SceneSpec
 from ..kinds import load_study
 from ..kinds.scenes.plan import of_scenes
-from ..kinds.shapes.plan import of_shape_scenes
+from ..kinds.shapes.kind import of_shape_scenes
 from ..output import reading
 from ..output.summary import SCENES
 from ..runs import checked_json, driver, records, rerun, store

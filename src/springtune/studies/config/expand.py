@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -12,15 +13,15 @@ from springtune.problem.geometry import Beam
 from springtune.problem.loads import KINEMATICS, LOADS
 from springtune.problem.materials import AnyMaterial, Material, Rubber, only_isotropic
 from springtune.problem.parameters import SWEPT
+from springtune.safe_io.escapes import clipped
 from springtune.springs import DEFINITIONS
 from springtune.springs.lattice import COEFFICIENT
 
 from .checks import check_cells, check_files, check_numbers, mesh_type_names, stated_rows
-from .combinations import Combination, combinations
-from .csv_files import read_printed
+from .combinations import combinations, read_printed
 from .fields import RANGE_DIGITS
 from .kind import Kind
-from .messages import Problems, clipped
+from .messages import Problems
 from .model import (
     FURTHER_REFERENCES,
     CurveSpec,
@@ -151,41 +152,33 @@ def swept(config: StudyConfig) -> tuple[str, ...]:
     return tuple(name for name in SWEPT if name in found)
 
 
-class _Bodies:
-    """Create each beam, material and mesh of a study once."""
+def _bodies(
+    config: StudyConfig, files: MeshFiles, folder: Path
+) -> tuple[Callable[..., Beam], Callable[..., Material], Callable[..., MeshSpec | None]]:
+    """Functions that make each beam, material and mesh of a study once; a mesh is None if its file is missing."""
+    known = declared(config, folder)
 
-    def __init__(self, config: StudyConfig, mesh_files: MeshFiles, folder: Path) -> None:
-        self._declared, self._files = declared(config, folder), mesh_files
-        self._beams: dict[tuple[str, float | None], Beam] = {}
-        self._materials: dict[tuple[str, float | None, float | None], Material] = {}
-        self._meshes: dict[tuple[Beam, str, float], MeshSpec | None] = {}
+    @cache
+    def beam(name: str, thickness: float | None) -> Beam:
+        return known.beams[name] if thickness is None else replace(known.beams[name], thickness=thickness)
 
-    def beam(self, one: Combination) -> Beam:
-        name, thickness = key = one["beam"], one.get("thickness")
-        if key not in self._beams:
-            beam = self._declared.beams[name]
-            self._beams[key] = beam if thickness is None else replace(beam, thickness=thickness)
-        return self._beams[key]
+    @cache
+    def material(name: str, young_modulus: float | None, poisson_ratio: float | None) -> Material:
+        found = only_isotropic(known.materials[name], "put the sheet under 'shapes'")
+        own: dict[str, Any] = {"young_modulus": young_modulus, "poisson_ratio": poisson_ratio}
+        own = {key: value for key, value in own.items() if value is not None}
+        # Rubber keeps the moduli of its law; `expand` refuses others.
+        return found if isinstance(found, Rubber) else replace(found, **own)
 
-    def material(self, one: Combination) -> Material:
-        key = one["material"], one.get("young_modulus"), one.get("poisson_ratio")
-        if key not in self._materials:
-            own = {name: one[name] for name in ("young_modulus", "poisson_ratio") if name in one}
-            material = only_isotropic(self._declared.materials[key[0]], "put the sheet under 'shapes'")
-            # Rubber keeps the moduli of its law; `expand` refuses others.
-            self._materials[key] = material if isinstance(material, Rubber) else replace(material, **own)
-        return self._materials[key]
+    @cache
+    def mesh(beam: Beam, mesh_type: str, size: float) -> MeshSpec | None:
+        if mesh_type in MESH_TYPES:
+            return MeshSpec(beam, mesh_type, size)
+        # A file is of a beam's extent; its thickness is the combination's.
+        found = files.get((mesh_type, beam.name, size))
+        return found if found is None or found.beam == beam else replace(found, beam=beam)
 
-    def mesh(self, beam: Beam, one: Combination) -> MeshSpec | None:
-        """Mesh of a combination; None if its file is missing."""
-        mesh_type, size = one["mesh_type"], one["mesh_size"]
-        key = beam, mesh_type, size
-        if key not in self._meshes:
-            made = mesh_type in MESH_TYPES
-            found = MeshSpec(*key) if made else self._files.get((mesh_type, beam.name, size))
-            # A file is of a beam's extent; its thickness is the combination's.
-            self._meshes[key] = found if found is None or found.beam == beam else replace(found, beam=beam)
-        return self._meshes[key]
+    return beam, material, mesh
 
 
 def _force(pressure: float, beam: Beam) -> float:
@@ -195,7 +188,8 @@ def _force(pressure: float, beam: Beam) -> float:
 
 def expand(config: StudyConfig, mesh_files: MeshFiles, problems: Problems) -> tuple[Grid, ...]:
     """Expand grids into scenes and curves."""
-    bodies, several = _Bodies(config, mesh_files, problems.folder), "force" in swept(config)
+    make_beam, make_material, make_mesh = _bodies(config, mesh_files, problems.folder)
+    several = "force" in swept(config)
     forces: dict[tuple[Beam, Material, str], tuple[float, str]] = {}
     grids = []
     for name, grid in config.grids.items():
@@ -204,7 +198,8 @@ def expand(config: StudyConfig, mesh_files: MeshFiles, problems: Problems) -> tu
         absent = set()
         signs = {load: (LOADS[load].sign, LOADS[load].follower) for load in grid.load}
         for one in combinations(name, grid, problems):
-            beam, material, load = bodies.beam(one), bodies.material(one), one["load"]
+            beam, load = make_beam(one["beam"], one.get("thickness")), one["load"]
+            material = make_material(one["material"], one.get("young_modulus"), one.get("poisson_ratio"))
             if isinstance(material, Rubber):
                 for key in ("young_modulus", "poisson_ratio"):
                     if key in one:
@@ -223,7 +218,7 @@ def expand(config: StudyConfig, mesh_files: MeshFiles, problems: Problems) -> tu
                         f"has {other:g} N; give both the same force, or both forces in a list: force is a dimension "
                         "then",
                     )
-            mesh = bodies.mesh(beam, one)
+            mesh = make_mesh(beam, one["mesh_type"], one["mesh_size"])
             if mesh is None:
                 absent.add((one["mesh_type"], beam.name, f"{1e3 * one['mesh_size']:g} mm"))
                 continue

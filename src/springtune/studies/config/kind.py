@@ -48,7 +48,7 @@ class Output:
     tables : callable, optional
         From a study to the file names of its tables.
     write : str
-        Module with ``write(tree, folder)``, which writes the tables and files that they name.
+        ``"module:function"`` of a tree and a folder, which writes the tables and files and returns their names.
     into : str
         Folder of the tables, within the study's folder.
     page : bool

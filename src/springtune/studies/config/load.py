@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from springtune.registry import NAME, NAME_RULE
 
 from .checks import check_counts, check_definitions, check_meshes, check_names
-from .csv_files import with_rows
+from .combinations import with_rows
 from .expand import build, expand, files_of_meshes, files_of_tests
 from .kind import Kind
 from .messages import Key, Problems, StudyError, read_study, read_yaml, show

@@ -7,13 +7,11 @@ from typing import Any
 import yaml
 from pydantic_core import PydanticCustomError
 
-from springtune.safe_io.escapes import UNSEEN, shown
+from springtune.safe_io.escapes import UNSEEN, clipped, shown
 from springtune.safe_io.inputs import BeyondSize, read
 
 Key = str | int
 """Step of a path into a file: a key or a list index."""
-
-LONGEST_SHOWN = 60
 
 SHOWN_PROBLEMS = 5
 """Problems that one message lists; the rest are counted."""
@@ -111,11 +109,6 @@ def show(value: object) -> str:
     if value is None:
         return "nothing"
     return f"'{clipped(str(value))}'"
-
-
-def clipped(text: str) -> str:
-    """Shorten a text for a message."""
-    return shown(text if len(text) <= LONGEST_SHOWN else f"{text[: LONGEST_SHOWN - 3]}...")
 
 
 def unseen(text: str) -> str:

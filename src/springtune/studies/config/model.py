@@ -262,17 +262,17 @@ def once_a_study(*names: str) -> Callable[[Callable[[Study], Answer]], Callable[
 
     def decorate(function: Callable[[Study], Answer]) -> Callable[[Study], Answer]:
         # Cache by id(): hashing 10,000 scenes is slow. The parts are kept, so that no new object gets their id.
-        known: list[tuple[list[int], Answer, list[Any]]] = []
+        known: dict[tuple[int, ...], tuple[Answer, list[Any]]] = {}
 
         @wraps(function)
         def answer(study: Study) -> Answer:
-            places = [id(getattr(study, name)) for name in names]
-            for before, found, _ in known:
-                if before == places:
-                    return found
-            known.insert(0, (places, function(study), [getattr(study, name) for name in names]))
-            del known[MOST_STUDIES:]
-            return known[0][1]
+            parts = [getattr(study, name) for name in names]
+            key = tuple(map(id, parts))
+            if key not in known:
+                known[key] = function(study), parts
+                if len(known) > MOST_STUDIES:
+                    del known[next(iter(known))]
+            return known[key][0]
 
         return answer
 

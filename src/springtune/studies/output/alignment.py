@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from collections import defaultdict
+from collections.abc import Collection, Hashable, Mapping, Sequence
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -17,89 +18,71 @@ SAME_NUMBER = 1e-9
 """Relative difference below which two numbers are one label."""
 
 
-@dataclass(frozen=True)
-class Axis:
-    """A dimension with the labels of all datasets; `places` are each dataset's own labels among them."""
-
-    name: str
-    labels: np.ndarray
-    places: tuple[np.ndarray, ...]
-    units: str
-    labelled: bool
-
-    def common(self) -> tuple[np.ndarray, ...]:
-        """Places of common labels: on the axis, then in each dataset."""
-        kept = set(range(len(self.labels))).intersection(*(found.tolist() for found in self.places))
-        among = np.array(sorted(kept), dtype=int)
-        own = []
-        for places in self.places:
-            back = np.full(len(self.labels), -1)
-            back[places] = np.arange(len(places))
-            own.append(back[among])
-        return among, *own
-
-    def alone(self, side: int) -> list[str | float]:
-        """Labels of only one of the datasets."""
-        others = np.concatenate([places for number, places in enumerate(self.places) if number != side])
-        found: list[str | float] = self.labels[np.setdiff1d(self.places[side], others)].tolist()
-        return found
-
-
-def axis(name: str, datasets: Sequence[xr.Dataset]) -> Axis:
-    """Join a dimension of several datasets.
+def joined(name: str, datasets: Sequence[xr.Dataset]) -> Any:
+    """Index of a dimension of all datasets: texts in their order, numbers sorted; numbers from 0 without labels.
 
     Examples
     --------
-    >>> import xarray as xr
-    >>> one, other = (xr.Dataset(coords={"mesh_size": sizes}) for sizes in ([2e-3, 5e-3], [5e-3 + 1e-18, 1e-3]))
-    >>> found = axis("mesh_size", [one, other])
-    >>> found.labels.tolist(), [places.tolist() for places in found.places]
-    ([0.001, 0.002, 0.005], [[1, 2], [2, 0]])
+    >>> one, other = (xr.Dataset(coords={"mesh_size": sizes}) for sizes in ([2e-3, 5e-3], [5e-3, 1e-3]))
+    >>> joined("mesh_size", [one, other]).tolist()
+    [0.001, 0.002, 0.005]
     """
     there = [data for data in datasets if name in data.sizes]
-    labelled = [name in data.coords for data in there]
-    if not all(labelled):
-        if any(labelled):
-            raise ValueError(f"dimension '{name}' has labels in one dataset and none in another; run the studies again")
-        places = tuple(np.arange(data.sizes.get(name, 0)) for data in datasets)
-        return Axis(name, np.arange(max(map(len, places))), places, "1", False)
-    values = [data[name].values if name in data.sizes else np.empty(0) for data in datasets]
-    numeric = {own.dtype.kind not in "OUS" for own in values if len(own)}
+    if len({name in data.indexes for data in there}) > 1:
+        raise ValueError(f"dimension '{name}' has labels in one dataset and none in another; run the studies again")
+    if name not in there[0].indexes:
+        return xr.DataArray(range(max(data.sizes[name] for data in there)), dims=name).to_index()
+    indexes = [data.indexes[name] for data in there]
+    numeric = {_is_numeric(data, name) for data in there if data.sizes[name]}
     if len(numeric) > 1:
         raise ValueError(f"dimension '{name}' has numbers in one dataset and texts in another; run the studies again")
-    labels, found = _numbers(values) if numeric == {True} else _texts(values)
-    for own, taken in zip(values, found):
-        if len(np.unique(taken)) != len(own):
-            twice = own[next(at for at in range(len(own)) if taken[at] in taken[:at])]
+    for index in indexes:
+        if not index.is_unique:
+            twice = index[index.duplicated()][0]
             raise ValueError(f"dimension '{name}' has the label {twice} twice; run the study again")
-    units = next((str(data[name].attrs["units"]) for data in there if "units" in data[name].attrs), "1")
-    return Axis(name, labels, found, units, True)
+    labels = reduce(lambda one, other: one.union(other, sort=False), indexes)
+    return labels.sort_values() if numeric == {True} else labels
 
 
-def _numbers(values: Sequence[np.ndarray]) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
-    together = np.concatenate(values).astype(float)
-    order = np.argsort(together, kind="stable")
-    ordered = together[order]
-    # The first of those that are one stands for all.
-    apart = np.abs(np.diff(ordered)) > SAME_NUMBER * np.maximum(np.abs(ordered[1:]), np.abs(ordered[:-1]))
-    numbers = np.empty(len(order), dtype=int)
-    numbers[order] = np.concatenate([[0], np.cumsum(apart)])[: len(order)]
-    labels = np.empty(int(numbers.max()) + 1 if len(numbers) else 0)
-    labels[numbers[::-1]] = together[::-1]
-    ends = np.cumsum([len(own) for own in values])[:-1]
-    return labels, tuple(np.split(numbers, ends))
+def _is_numeric(data: xr.Dataset, name: Hashable) -> bool:
+    return data[name].dtype.kind not in "OUS"
 
 
-def _texts(values: Sequence[np.ndarray]) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
-    known: dict[str, int] = {}
-    found = [np.array([known.setdefault(str(one), len(known)) for one in own], dtype=int) for own in values]
-    return np.array(list(known), dtype=object), tuple(found)
+def on_common_axes(trees: Sequence[xr.DataTree]) -> list[xr.DataTree]:
+    """Spell each number of a dimension alike, and add a dimension for each parameter that any dataset sweeps."""
+    made = _with_swept(trees)
+    labels: dict[Hashable, list[float]] = defaultdict(list)
+    for tree in made:
+        for node in tree.subtree:
+            data = node.to_dataset(inherit=False)
+            for name in data.indexes:
+                labels[name] += data.indexes[name].tolist() if _is_numeric(data, name) else []
+    spelling = {name: _spelling(np.array(known, dtype=float)) for name, known in labels.items() if known}
+    if all(label == spelt for known in spelling.values() for label, spelt in known.items()):
+        return made
+    return [tree.map_over_datasets(_spelt, kwargs={"spelling": spelling}) for tree in made]
+
+
+def _spelling(labels: np.ndarray) -> dict[float, float]:
+    """The first of several numbers that are one label, by each of them."""
+    order = np.argsort(labels, kind="stable")
+    ordered = labels[order]
+    apart = np.diff(ordered, prepend=-np.inf) > SAME_NUMBER * np.abs(ordered)
+    first = np.minimum.reduceat(order, np.flatnonzero(apart))[np.cumsum(apart) - 1]
+    return dict(zip(ordered.tolist(), labels[first].tolist()))
+
+
+def _spelt(data: xr.Dataset, spelling: Mapping[Hashable, Mapping[float, float]]) -> xr.Dataset:
+    known = {name: data.indexes[name].tolist() for name in data.indexes if _is_numeric(data, name)}
+    spelt = {name: [spelling[name][label] for label in labels] for name, labels in known.items()}
+    changed = {name: (name, labels, data[name].attrs) for name, labels in spelt.items() if labels != known[name]}
+    return data.assign_coords(changed) if changed else data
 
 
 # -- swept parameters --------------------------------------------------------------------------------------------------
 
 
-def with_swept(trees: Sequence[xr.DataTree]) -> list[xr.DataTree]:
+def _with_swept(trees: Sequence[xr.DataTree]) -> list[xr.DataTree]:
     """Add a dimension for each parameter that any dataset sweeps."""
     made = [*trees]
     for name in SWEPT:

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import difflib
-import json
 from collections.abc import Collection, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
+from typing import SupportsInt
 
 import numpy as np
 import xarray as xr
 
 from springtune.problem.quantities import nearest
 
-from .alignment import Axis, axis, with_swept
+from .alignment import joined, on_common_axes
 from .dataset import NOT_REQUESTED, flag_words, is_flagged
-from .text import NUMBER, without_numbers
+from .text import NUMBER, from_json, variable_name, without_numbers
 
 RELATIVE = 1e-6
 """Default relative tolerance."""
@@ -96,26 +96,18 @@ class Alone:
 
 @dataclass
 class GroupChanges:
-    """Changes of a group; `cells` counts those requested in one dataset only."""
+    """Changes of a group; `labels` and `cells` are those of only one dataset, `sizes` count the labels of both."""
 
     name: str
-    axes: dict[str, Axis]
+    sizes: dict[str, int]
+    units: dict[str, str]
+    labels: dict[str, tuple[list[str | float], list[str | float]]]
     cells: tuple[Alone, Alone] = (Alone(0, []), Alone(0, []))
     both: int = 0
     variables: tuple[list[str], list[str]] = ([], [])
     unlike: dict[str, str] = field(default_factory=dict)
     flags: list[VariableChanges] = field(default_factory=list)
     values: list[VariableChanges] = field(default_factory=list)
-
-    @property
-    def labels(self) -> dict[str, tuple[list[str | float], list[str | float]]]:
-        """Labels of only one dataset by common dimension."""
-        found = {
-            name: (one.alone(0), one.alone(1))
-            for name, one in self.axes.items()
-            if one.labelled and all(map(len, one.places))
-        }
-        return {name: (a, b) for name, (a, b) in found.items() if a or b}
 
     @property
     def different(self) -> bool:
@@ -178,7 +170,7 @@ def compare(
     >>> [(row.variable, row.labels["beam"], row.after / row.before) for row in compare(tree, other).changes]
     [('stiffness', '100x20', 2.0)]
     """
-    nodes = [{node.path: node.to_dataset() for node in tree.subtree} for tree in with_swept([before, after])]
+    nodes = [{node.path: node.to_dataset() for node in tree.subtree} for tree in on_common_axes([before, after])]
     held = sorted({str(name) for side in nodes for data in side.values() for name in data.variables})
     for pattern in ignored:
         if not any(fnmatchcase(name, pattern) for name in held):
@@ -202,17 +194,6 @@ def compare(
     return Comparison(found, alone, attributes, config)
 
 
-def variable_name(group: str, variable: str) -> str:
-    """Name of a variable with its group; the root's name is left out.
-
-    Examples
-    --------
-    >>> variable_name("/", "force"), variable_name("/sensitivity", "displacement")
-    ('force', 'sensitivity/displacement')
-    """
-    return f"{group.strip('/')}/{variable}".lstrip("/")
-
-
 @dataclass(frozen=True)
 class _How:
     tolerance: Tolerance
@@ -229,13 +210,33 @@ class _Group:
     def __init__(
         self, path: str, pair: tuple[xr.Dataset, xr.Dataset], roots: tuple[xr.Dataset, xr.Dataset], how: _How
     ) -> None:
-        self.path, self.pair, self.how = path, pair, how
-        self.axes = {name: axis(name, pair) for name in dict.fromkeys(str(one) for own in pair for one in own.sizes)}
+        self.path, self.how = path, how
+        self.axes = {name: joined(name, pair) for name in dict.fromkeys(str(one) for own in pair for one in own.sizes)}
         self.cell_dimensions = cell_dimensions(pair, roots)
-        self.asked = [_asked(data, root) for data, root in zip(pair, roots)]
+        self.labels = {}
+        for name in self.axes:
+            if all(data.sizes.get(name) and name in data.indexes for data in pair):
+                one, other = (data.indexes[name] for data in pair)
+                self.labels[name] = (
+                    one.difference(other, sort=False).tolist(),
+                    other.difference(one, sort=False).tolist(),
+                )
+        self.pair = [
+            data.assign_coords({name: np.arange(size) for name, size in data.sizes.items() if name not in data.indexes})
+            for data in pair
+        ]
+        self.asked = [_asked(data, root) for data, root in zip(self.pair, roots)]
 
     def compared(self) -> GroupChanges:
-        found = GroupChanges(self.path, self.axes)
+        units = {
+            name: str(data[name].attrs.get("units", "1"))
+            for data in reversed(self.pair)
+            for name in self.axes
+            if name in data.dims
+        }
+        sizes = {name: len(labels) for name, labels in self.axes.items()}
+        labels = {name: both for name, both in self.labels.items() if any(both)}
+        found = GroupChanges(self.path, sizes, units, labels)
         names = [[str(name) for name in data.variables if name not in data.dims] for data in self.pair]
         left_out = [name for own in names for name in own if any(fnmatchcase(name, one) for one in self.how.ignored)]
         left_out += [OF_CELLS]
@@ -274,23 +275,16 @@ class _Group:
         """Cells requested by one side only, and the number requested by both."""
         masks = [mask for mask in self.asked if mask is not None]
         names = [str(name) for name in masks[0].dims if name in self.cell_dimensions]
-        asked = [np.zeros([len(self.axes[name].labels) for name in names], dtype=bool) for _ in masks]
-        for side, mask in enumerate(masks):
-            own = mask.any(set(mask.dims) - set(names)).transpose(*names).values
-            asked[side][np.ix_(*(self.axes[name].places[side] for name in names))] = own
+        axes = {name: self.axes[name] for name in names}
+        asked = [
+            mask.any(set(mask.dims) - set(names)).reindex(axes, fill_value=False).transpose(*names) for mask in masks
+        ]
 
-        def alone(one: np.ndarray, other: np.ndarray) -> Alone:
-            places = np.argwhere(one & ~other)
-            return Alone(len(places), [self._labels(names, place) for place in places[: self.how.most]])
+        def alone(one: xr.DataArray, other: xr.DataArray) -> Alone:
+            places = np.argwhere((one & ~other).values)
+            return Alone(len(places), [_labels(one, names, place) for place in places[: self.how.most]])
 
         return (alone(*asked), alone(*reversed(asked))), int((asked[0] & asked[1]).sum())
-
-    def _labels(self, names: Sequence[str], place: Sequence[int]) -> Labels:
-        found: Labels = {}
-        for name, at in zip(names, place):
-            label = self.axes[name].labels[at]
-            found[name] = label if isinstance(label, str) else label.item()
-        return found
 
     def _arrays(self, name: str) -> tuple[xr.DataArray, xr.DataArray]:
         a, b = self.pair[0][name], self.pair[1][name]
@@ -304,8 +298,9 @@ class _Group:
         pair = self._arrays(name)
         names = sorted(map(str, pair[0].dims), key=lambda one: one not in self.cell_dimensions)  # cells, then points
         cells = sum(one in self.cell_dimensions for one in names)
-        common = [self.axes[one].common() for one in names]
-        if not all(len(among) for among, *_ in common):
+        a, b = (_bare(one).transpose(*names) for one in pair)
+        pair = xr.align(a, b, join="inner", copy=False)
+        if not pair[0].size:
             return VariableChanges(name, 0, 0, [])
         kind = Values(*pair, self.how.own.get(variable_name(self.path, name), self.how.tolerance))
         tolerances = self.pair[0].get(OF_CELLS)
@@ -313,16 +308,14 @@ class _Group:
         asked = [None if mask is None else mask.any(set(mask.dims) - set(names)) for mask in self.asked]
         compared = changed = 0
         rows: list[Change] = []
-        shape = [len(among) for among, *_ in common]
-        for longest, part in _blocks(shape, cells, max(8, pair[0].dtype.itemsize), self.how.block):
-            of_block = [tuple(one[part] for one in own) if at == longest else own for at, own in enumerate(common)]
-            among, *places = zip(*of_block) if of_block else ((), (), ())
-            values = [_values(array, names, own) for array, own in zip(pair, places)]
+        for part in _blocks(pair[0], cells, self.how.block):
+            here = [one.isel(part) for one in pair]
+            values = [one.values.astype(str) if one.dtype == object else one.values for one in here]
             excess, there = kind.excess(
                 values,
-                [_over(mask, names, own, True) for mask, own in zip(asked, places)],
+                [_over(mask, here[0], True) for mask in asked],
                 cells,
-                _over(tolerances, names, places[0], np.nan),
+                _over(tolerances, here[0], np.nan),
             )
             flat = excess.reshape(*excess.shape[:cells], -1)
             worst, largest = flat.argmax(axis=-1), flat.max(axis=-1)
@@ -333,13 +326,12 @@ class _Group:
             for at in map(tuple, beyond[order]):
                 point = np.unravel_index(int(worst[at]), excess.shape[cells:]) if names[cells:] else ()
                 where = (*at, *point)
-                label = [int(own[index]) for own, index in zip(among, where)]
                 rows.append(
                     Change(
                         self.path,
                         name,
-                        self._labels(names[:cells], label[:cells]),
-                        self._labels(names[cells:], label[cells:]),
+                        _labels(here[0], names[:cells], at),
+                        _labels(here[0], names[cells:], point),
                         kind.said(0, values[0][where]),
                         kind.said(1, values[1][where]),
                         kind.units,
@@ -350,15 +342,25 @@ class _Group:
         return VariableChanges(name, compared, changed, rows[: self.how.most])
 
 
-def _over(
-    array: xr.DataArray | None, names: Sequence[str], places: Sequence[np.ndarray], default: object
-) -> np.ndarray:
-    """Values of cells at chosen places, broadcastable to a variable with these dimensions; `default` without any."""
-    shared = [name for name in names if array is not None and name in array.dims]
+def _bare(array: xr.DataArray) -> xr.DataArray:
+    """An array with the labels of its dimensions alone."""
+    return array.drop_vars(set(array.coords) - set(array.dims))
+
+
+def _labels(array: xr.DataArray, names: Sequence[str], place: Sequence[SupportsInt]) -> Labels:
+    found = {name: array.indexes[name][int(at)] for name, at in zip(names, place)}
+    return {name: label if isinstance(label, str | int) else float(label) for name, label in found.items()}
+
+
+def _over(array: xr.DataArray | None, block: xr.DataArray, default: object) -> np.ndarray:
+    """Values of cells, broadcastable to a block; `default` without any."""
+    shared = [name for name in block.dims if array is not None and name in array.dims]
     if array is None or not shared:
-        return np.full([1] * len(names), default)
-    chosen = array.transpose(*shared).values[np.ix_(*(own for name, own in zip(names, places) if name in shared))]
-    found: np.ndarray = chosen[tuple(slice(None) if name in shared else np.newaxis for name in names)]
+        return np.array(default)
+    chosen = _bare(array).reindex({name: block.indexes[name] for name in shared})
+    found: np.ndarray = (
+        chosen.expand_dims([name for name in block.dims if name not in shared]).transpose(*block.dims).values
+    )
     return found
 
 
@@ -435,7 +437,7 @@ def _asked(data: xr.Dataset, root: xr.Dataset) -> xr.DataArray | None:
         return None
     words = flag_words(status) if is_flagged(status) else {0: NOT_REQUESTED}
     silent = [value for value, word in words.items() if word == NOT_REQUESTED]
-    return ~status.isin([*silent, np.nan]).compute()
+    return _bare(~status.isin([*silent, np.nan]).compute())
 
 
 def cell_dimensions(pair: Sequence[xr.Dataset], roots: Sequence[xr.Dataset]) -> set[str]:
@@ -451,31 +453,15 @@ def cell_dimensions(pair: Sequence[xr.Dataset], roots: Sequence[xr.Dataset]) -> 
     return found
 
 
-def _blocks(shape: Sequence[int], cells: int, itemsize: int, size: int) -> Iterator[tuple[int, slice]]:
-    """Axis and range of each block compared at once."""
+def _blocks(array: xr.DataArray, cells: int, size: int) -> Iterator[dict[Hashable, slice]]:
+    """Parts of an array that are compared at once, along its longest dimension of cells."""
     if not cells:
-        yield -1, slice(None)
+        yield {}
         return
-    longest = int(np.argmax(shape[:cells]))
-    row = itemsize * int(np.prod(shape)) // shape[longest]
-    step = max(1, size // max(1, row))
-    for start in range(0, shape[longest], step):
-        yield longest, slice(start, start + step)
-
-
-def _values(array: xr.DataArray, names: Sequence[str], places: Sequence[np.ndarray]) -> np.ndarray:
-    """Values at chosen places, dimensions in the given order; from files only their range is read."""
-    ranges, left = {}, []
-    for name, own in zip(names, places):
-        low, high = int(own.min()), int(own.max()) + 1
-        ranges[name] = slice(low, high)
-        left.append(own - low)
-    # A new array: what was read is not kept with the dataset.
-    part = array.variable.isel(ranges).transpose(*names)
-    values: np.ndarray = np.asarray(part.values)
-    if any(len(own) != size or (np.diff(own) != 1).any() for own, size in zip(left, values.shape)):
-        values = values[np.ix_(*left)]
-    return values.astype(str) if values.dtype == object else values
+    longest = int(np.argmax(array.shape[:cells]))
+    step = max(1, size // max(1, max(8, array.dtype.itemsize) * array.size // array.shape[longest]))
+    for start in range(0, array.shape[longest], step):
+        yield {array.dims[longest]: slice(start, start + step)}
 
 
 def _attributes(
@@ -487,7 +473,7 @@ def _attributes(
         (name, before.get(name, ""), after.get(name, "")) for name in TOLD_ATTRIBUTES
     ]
     for name in ("software", "inputs"):
-        parts = [_json(attributes.get(name)) for attributes in (before, after)]
+        parts = [from_json(attributes.get(name)) for attributes in (before, after)]
         names = {*parts[0]} & {*parts[1]} if name == "inputs" else {*parts[0], *parts[1]}
         pairs += [(one, parts[0].get(one, ""), parts[1].get(one, "")) for one in sorted(names)]
     further = sorted({str(name) for name in (*before, *after)} - UNTOLD - set(TOLD_ATTRIBUTES))
@@ -497,10 +483,3 @@ def _attributes(
             found[name] = str(old), str(new)
     texts = [str(attributes.get("config", "")).splitlines() for attributes in (before, after)]
     return found, list(difflib.unified_diff(texts[0], texts[1], "before", "after", lineterm=""))
-
-
-def _json(text: object) -> dict[str, object]:
-    try:
-        return dict(json.loads(str(text or "{}")))
-    except ValueError:
-        return {}

@@ -19,10 +19,10 @@ from springtune.safe_io.atomic import write_text
 from springtune.safe_io.inputs import fault
 
 from . import dataset, reading
-from .alignment import axis
-from .comparison import MEASURED, OF_CELLS, RELATIVE, Tolerance, cell_dimensions, variable_name
+from .alignment import on_common_axes
+from .comparison import MEASURED, OF_CELLS, RELATIVE, Tolerance, cell_dimensions
 from .dataset import flag_words, is_flagged
-from .text import NUMBER, place_text
+from .text import NUMBER, place_text, variable_name
 
 DEFAULTS = {
     "/": ("status", "displacement", "deformation_error", "stiffness"),
@@ -150,17 +150,12 @@ def with_tolerances_of(tree: xr.DataTree, former: xr.DataTree) -> xr.DataTree:
         if _known(array).any()
     }
     made = with_tolerances(tree, {name: one for name, one in tolerances(former).items() if name in {"", *held}})
+    made, former = on_common_axes([made, former])
     for node in former.subtree:
-        if OF_CELLS not in node.data_vars or (node.path != "/" and node.path[1:] not in made.children):
-            continue
-        here, own = made[node.path].to_dataset(), node.to_dataset()[OF_CELLS]
-        names = [str(name) for name in own.dims]
-        if not {*names} <= {*here.sizes}:
-            continue
-        axes = [axis(name, [here, node.to_dataset()]).common() for name in names]
-        kept = np.full([here.sizes[name] for name in names], np.nan)
-        kept[np.ix_(*(one[1] for one in axes))] = own.values[np.ix_(*(one[2] for one in axes))]
-        made[f"{node.path.rstrip('/')}/{OF_CELLS}"] = xr.DataArray(kept, dims=names)
+        if OF_CELLS in node.data_vars and (node.path == "/" or node.path[1:] in made.children):
+            here, own = made[node.path].to_dataset(), node.to_dataset()[OF_CELLS]
+            if {*own.dims} <= {*here.sizes}:
+                made[f"{node.path.rstrip('/')}/{OF_CELLS}"] = own.reindex({name: here[name] for name in own.dims})
     return made
 
 

@@ -31,7 +31,7 @@ EXTRA = "install what is missing with `pip install springtune[export]`"
 class RequestError(ValueError):
     """The request does not fit the dataset, or names an unknown format."""
 
-    exit_code = 2
+    wrong_call = True
 
 
 @dataclass(frozen=True)

@@ -198,7 +198,7 @@ def finish(
 ) -> None:
     """Settle panels, name their lines and write their notes below; a new figure of a `height` [inch] grows by these."""
     under = LINE * max((lines_of(said) for _, said, _ in drawn.values()), default=0)
-    if height and figure is not None:
+    if height and isinstance(figure, Figure):
         figure.set_size_inches(style.size(figure)[0], height + len(axes) * under)
     settle(figure, axes, {**place, "bottom": place["bottom"] + under, "down": place.get("down", 0.0) + under})
     for panel, (ends, said, why) in drawn.items():

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from fnmatch import fnmatchcase
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from .alignment import Axis, axis, with_swept
+from .alignment import joined, on_common_axes
 from .comparison import MEASURED, Tolerance, Values
 from .dataset import STATUS, nothing
-from .text import cell_text, number_text
+from .text import cell_text, number_text, variable_name
 
 SAME_VALUE = 1e-9
 """Relative difference below which values of a scene agree."""
@@ -72,7 +73,7 @@ class _Merger:
     """Aligned contents of several datasets."""
 
     def __init__(self, trees: Sequence[xr.DataTree], relative: float) -> None:
-        self.trees, self.relative = with_swept(trees), relative
+        self.trees, self.relative = on_common_axes(trees), relative
         names = [str(tree.attrs.get("study", "")) or f"number {number}" for number, tree in enumerate(trees, 1)]
         twice = {name for name in names if names.count(name) > 1}
         self.names = [f"{name} (number {number})" if name in twice else name for number, name in enumerate(names, 1)]
@@ -80,22 +81,13 @@ class _Merger:
         for number, tree in enumerate(self.trees):
             for node in tree.subtree:
                 self.held.setdefault(node.path, {})[number] = node.to_dataset()
-        self.axes: dict[tuple[str, str], Axis] = {}
-        self.places: dict[tuple[str, str, int], np.ndarray] = {}
-        of_roots = {str(name) for tree in self.trees for name in tree.to_dataset().coords if name in tree.sizes}
+        roots = self.held["/"]
+        self.axes: dict[tuple[str, str], Any] = {}
         for path, held in self.held.items():
             for name in dict.fromkeys(str(one) for data in held.values() for one in data.sizes):
-                if (path, name) not in self.axes:
-                    # Groups of a tree have the labels of its root.
-                    self._align(name, self.held if name in of_roots else {path: held})
-
-    def _align(self, name: str, groups: Mapping[str, Mapping[int, xr.Dataset]]) -> None:
-        held = {(path, number): data for path, own in groups.items() for number, data in own.items()}
-        held = {place: data for place, data in held.items() if name in data.sizes}
-        found = axis(name, [*held.values()])
-        for (path, number), places in zip(held, found.places):
-            self.axes[path, name] = found
-            self.places[path, name, number] = places
+                # Groups of a tree have the labels of its root.
+                of_root = any(name in data.indexes for data in roots.values())
+                self.axes[path, name] = joined(name, [*(roots if of_root else held).values()])
 
     def merged(self) -> xr.DataTree:
         """Merge all groups."""
@@ -115,9 +107,9 @@ class _Merger:
         used = dict.fromkeys(str(one) for data in held.values() for one in data.sizes)
         coordinates = {}
         for name in used:
-            if self.axes[path, name].labelled:
-                attributes = next(data[name].attrs for data in held.values() if name in data.coords)
-                coordinates[name] = xr.Variable(name, self._labels(path, name, held), attributes)
+            attributes = next((data[name].attrs for data in held.values() if name in data.indexes), None)
+            if attributes is not None:
+                coordinates[name] = xr.Variable(name, self.axes[path, name], attributes)
         found = xr.Dataset({name: made[name] for name in ranks}, coordinates)
         further = {str(name) for data in held.values() for name in data.coords if name not in data.dims}
         found = found.set_coords(sorted(further))
@@ -125,14 +117,10 @@ class _Merger:
             found.attrs = self._group_attributes(path, held, first)
         return found
 
-    def _labels(self, path: str, name: str, held: dict[int, xr.Dataset]) -> np.ndarray:
-        labels = self.axes[path, name].labels
-        whole = all(data[name].dtype.kind in "iu" for data in held.values() if name in data.coords)
-        return labels.astype(int) if whole else labels
-
     def _variable(self, path: str, name: str, held: dict[int, xr.Dataset]) -> xr.Variable:
         arrays = {number: data[name] for number, data in held.items() if name in data}
         first_number, first = next(iter(arrays.items()))
+        full = variable_name(path, name)
         for number, array in arrays.items():
             for what, one, other in (
                 ("the dimensions", ", ".join(sorted(map(str, first.dims))), ", ".join(sorted(map(str, array.dims)))),
@@ -141,17 +129,21 @@ class _Merger:
             ):
                 if one != other:
                     raise ValueError(
-                        f"{_full(path, name)} has {what} ({one}) in {self.names[first_number]} and ({other}) in "
+                        f"{full} has {what} ({one}) in {self.names[first_number]} and ({other}) in "
                         f"{self.names[number]}; sweep the same parameters in both studies, and run them again"
                     )
         dims = [str(one) for one in first.dims]
-        shape = [len(self.axes[path, one].labels) for one in dims]
-        self._check_size(path, name, dims, shape)
+        shape = [len(self.axes[path, one]) for one in dims]
+        _check_size(full, dims, shape)
         empty, dtype = nothing([*arrays.values()])
         values = np.full(shape, empty, dtype)
         source = np.full(shape, -1, dtype="int32")
         for number, array in arrays.items():
-            place = np.ix_(*(self.places[path, one, number] for one in dims))
+            places = [
+                self.axes[path, one].get_indexer(array.indexes[one]) if one in array.indexes else np.arange(size)
+                for one, size in zip(dims, array.transpose(*dims).shape)
+            ]
+            place = np.ix_(*places)
             own = np.asarray(array.transpose(*dims).values, dtype)
             known = np.asarray(values[place], dtype)
             of_both = Values(first, array, Tolerance(self.relative))
@@ -161,9 +153,9 @@ class _Merger:
                 excess, _ = of_both.excess((known, own), (there, there), own.ndim, np.array(np.nan))
                 if (both & (excess > 1.0)).any():
                     at = tuple(int(one) for one in np.argwhere(both & (excess > 1.0))[0])
-                    labels = {one: self.axes[path, one].labels[place[n].ravel()[at[n]]] for n, one in enumerate(dims)}
+                    labels = {one: self.axes[path, one][own[n]] for one, own, n in zip(dims, places, at)}
                     said = (of_both.said(0, known[at]), of_both.said(1, own[at]))
-                    self._refuse(path, name, labels, (int(source[place][at]), number), said, of_both.units)
+                    self._refuse(path, full, labels, (int(source[place][at]), number), said, of_both.units)
             new = there & ~both
             values[place] = np.where(new, own, known)
             source[place] = np.where(new, number, source[place])
@@ -178,7 +170,7 @@ class _Merger:
     def _refuse(
         self,
         path: str,
-        name: str,
+        full: str,
         labels: dict[str, object],
         numbers: tuple[int, int],
         values: tuple[float | str, float | str],
@@ -186,25 +178,17 @@ class _Merger:
     ) -> None:
         """Raise for a cell with two values."""
         two = " and ".join(f"{_value(value, units)} in {self.names[number]}" for number, value in zip(numbers, values))
-        at = cell_text(labels, {one: self.axes[path, one].units for one in labels})
+        held = [data[one] for one in labels for data in self.held[path].values() if one in data.indexes]
+        at = cell_text(labels, {str(one.name): str(one.attrs.get("units", "1")) for one in reversed(held)})
         if len(labels) == 1:
             (one,) = labels
             raise ValueError(
-                f"{one} '{at}' is two things: {_full(path, name)} is {two}; give one of them another label in its study"
+                f"{one} '{at}' is two things: {full} is {two}; give one of them another label in its study"
             )
         raise ValueError(
-            f"{_full(path, name)}{f' of {at}' if at else ''} is {two}; give what differs another label in its study, "
+            f"{full}{f' of {at}' if at else ''} is {two}; give what differs another label in its study, "
             f"leave the group out with tree.drop_nodes, or allow more than relative={self.relative:g}"
         )
-
-    def _check_size(self, path: str, name: str, dims: Sequence[str], shape: Sequence[int]) -> None:
-        size = 8.0 * float(np.prod(np.array(shape, dtype=float)))
-        if size > MOST_BYTES:
-            sizes = ", ".join(f"{one} {count}" for one, count in zip(dims, shape))
-            raise ValueError(
-                f"{_full(path, name)}: {size / 1e9:.3g} GB over all labels together ({sizes}); select what is needed "
-                "of each dataset first"
-            )
 
     def _group_attributes(self, path: str, held: dict[int, xr.Dataset], first: xr.Dataset) -> dict[str, object]:
         found: dict[str, object] = {}
@@ -239,8 +223,14 @@ class _Merger:
         return found
 
 
-def _full(path: str, name: str) -> str:
-    return name if path == "/" else f"{path[1:]}/{name}"
+def _check_size(full: str, dims: Sequence[str], shape: Sequence[int]) -> None:
+    size = 8.0 * float(np.prod(np.array(shape, dtype=float)))
+    if size > MOST_BYTES:
+        sizes = ", ".join(f"{one} {count}" for one, count in zip(dims, shape))
+        raise ValueError(
+            f"{full}: {size / 1e9:.3g} GB over all labels together ({sizes}); select what is needed of each dataset "
+            "first"
+        )
 
 
 def _value(value: float | str, units: str) -> str:

@@ -81,7 +81,7 @@ def _scenes(table: Mapping[str, Any], kinematics: list[str]) -> dict[str, Any]:
             errors.append(row.get(f"{name}_error_percent", np.nan))
     places = decimals(displacements), _of_errors(errors)
     marks: set[str] = set()
-    swept = {name: _short([row[name] for row in rows]) for name in table["swept"]}
+    swept = {name: [f"{row[name]:.6g}" for row in rows] for name in table["swept"]}
     lines = []
     for place, row in enumerate(rows[:MOST_ROWS]):
         own = [texts[place] for texts in swept.values()]
@@ -102,10 +102,6 @@ def _scenes(table: Mapping[str, Any], kinematics: list[str]) -> dict[str, Any]:
 def _beyond(rows: list[Mapping[str, Any]]) -> str:
     """Note on rows that are left out."""
     return f"The first {MOST_ROWS} of {len(rows)} rows; the file has all of them: " if len(rows) > MOST_ROWS else ""
-
-
-def _short(values: list[float]) -> list[str]:
-    return [f"{value:.6g}" for value in values]
 
 
 def _of_errors(values: list[float]) -> int:

@@ -37,7 +37,7 @@ def run(dataset: str | Path, folder: str | Path, *names: str) -> list[Path]:
 
                 made += [into / name for name in page.write(tree, into)]
             elif output.write:
-                made += [into / name for name in imported(output.write).write(tree, into)]
+                made += [into / name for name in imported(output.write)(tree, into)]
     return made
 
 

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from springtune.safe_io.escapes import clipped
 from springtune.safe_io.inputs import BeyondBound, bounded, check_alone
 
 if TYPE_CHECKING:
@@ -214,8 +215,7 @@ def guarded(path: str | os.PathLike[str]) -> Iterator[None]:
 def _said(error: Exception) -> str:
     for_people = isinstance(error, OSError | ValueError | BeyondBound)
     text = str(error) if for_people else f"{type(error).__name__}: {error}"
-    text = " ".join(text.split())
-    return text if len(text) <= LONGEST_REASON else f"{text[: LONGEST_REASON - 3]}..."
+    return clipped(" ".join(text.split()), LONGEST_REASON)
 
 
 def without_fields(data: "xarray.DataTree") -> str:

@@ -2,10 +2,11 @@
 
 import csv
 import io
+import json
 import math
 import re
 from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, SupportsFloat
+from typing import TYPE_CHECKING, Any, SupportsFloat
 
 from springtune.problem.parameters import SWEPT, with_unit
 from springtune.safe_io.escapes import shown
@@ -96,6 +97,25 @@ def without_numbers(text: str) -> str:
     return NUMBER.sub("#", text)
 
 
+def variable_name(group: str, variable: str) -> str:
+    """Name of a variable with its group; the root's name is left out.
+
+    Examples
+    --------
+    >>> variable_name("/", "force"), variable_name("/sensitivity", "displacement")
+    ('force', 'sensitivity/displacement')
+    """
+    return f"{group.strip('/')}/{variable}".lstrip("/")
+
+
+def from_json(text: object) -> dict[str, Any]:
+    """Content of an attribute with JSON; empty if it has none."""
+    try:
+        return dict(json.loads(str(text or "{}")))
+    except ValueError:
+        return {}
+
+
 # -- tables ------------------------------------------------------------------------------------------------------------
 
 
@@ -125,6 +145,12 @@ def markdown_table(heads: list[str], rows: Iterable[list[str]], left: int = 1) -
     """Markdown lines: the first columns left, others right."""
     rule = ["---"] * left + ["---:"] * (len(heads) - left)
     return [f"| {' | '.join(line)} |" for line in (heads, rule, *rows)]
+
+
+def cell_number(value: SupportsFloat, form: str = ".3g", scale: float = 1.0, unit: str = "") -> str:
+    """Format a number of a table; empty if missing."""
+    number = scale * float(value)
+    return "" if math.isnan(number) else f"{number:{form}}{unit}".replace("-", "−")
 
 
 def decimals(values: Iterable[float], digits: int = 4, most: int = 8) -> int | None:

@@ -1,5 +1,13 @@
 """Build a paper with Typst: numbers, tables and figures from datasets."""
 
+from importlib.util import find_spec
+
 
 class PaperError(Exception):
     """A fault of a paper's source or datasets."""
+
+
+def check_typst() -> None:
+    """Raise if Typst is not installed."""
+    if find_spec("typst") is None:
+        raise PaperError('the paper is set with Typst, which is not installed: pip install "springtune[paper]"')

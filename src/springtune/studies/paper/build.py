@@ -1,20 +1,30 @@
-"""Build a paper: numbers, tables, figures, then the PDF."""
+"""Build a paper: numbers, tables, figures, then the PDF.
 
+A figure is declared in ``figures.yaml``: it has panels, each a plot function with study and selection, or is drawn by a
+script of ``examples/``.
+"""
+
+import io
 import os
 import re
+import runpy
 import sys
-from collections.abc import Iterator, Mapping
-from importlib.util import find_spec
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import redirect_stdout
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict
 
 from springtune.safe_io import atomic
 
 from ..runs import records
-from . import PaperError
+from . import PaperError, check_typst, numbers
+from .numbers import HASH_SHOWN, Dataset, checked, chosen
 
 if TYPE_CHECKING:
-    from .numbers import Dataset
+    from matplotlib.figure import SubFigure
 
 MAIN = "main.typ"
 
@@ -24,9 +34,6 @@ def run(source: str | Path, folder: str | Path, output: str | Path, *paths: str 
     source, folder = Path(source), Path(folder)
     check_typst()
     _check_texts(source)
-    # Here, so that what is wrong with the source is told at once.
-    from . import figures, numbers
-
     declared, printed = numbers.load(source / "numbers.yaml"), numbers.load(source / "printed.yaml")
     datasets = numbers.read(paths)
     content = {
@@ -34,7 +41,7 @@ def run(source: str | Path, folder: str | Path, output: str | Path, *paths: str 
         "tables": {
             name: numbers.table(entry, datasets, f"table {name}") for name, entry in declared.get("tables", {}).items()
         },
-        "figures": figures.draw(
+        "figures": draw(
             numbers.load(source / "figures.yaml"), datasets, folder, source.resolve().parents[1] / "examples"
         ),
         "datasets": [one.origin() for one in datasets.values()],
@@ -67,12 +74,6 @@ def typeset(source: Path, folder: Path) -> bytes:
     return bytes(made)
 
 
-def check_typst() -> None:
-    """Raise if Typst is not installed."""
-    if find_spec("typst") is None:
-        raise PaperError('the paper is set with Typst, which is not installed: pip install "springtune[paper]"')
-
-
 def _check_texts(source: Path) -> None:
     if not (source / MAIN).is_file():
         raise PaperError(f"{source / MAIN}: there is no such file; give the folder of a paper's source")
@@ -86,7 +87,7 @@ def _check_texts(source: Path) -> None:
         raise PaperError("\n".join(found))
 
 
-def _labels(datasets: Mapping[str, "Dataset"]) -> list[str]:
+def _labels(datasets: Mapping[str, Dataset]) -> list[str]:
     """Labels of all dimensions."""
     found = {str(label) for one in datasets.values() for name in ("beam", "definition", "mesh_type", "material")
              if name in one.tree.coords for label in one.tree.coords[name].values}  # fmt: skip
@@ -144,6 +145,172 @@ def typed_numbers(text: str) -> Iterator[tuple[int, str]]:
         text = pattern.sub(_blank, text)
     for found in _NUMBER.finditer(text):
         yield text.count("\n", 0, found.start()) + 1, found.group().strip()
+
+
+# -- figures -----------------------------------------------------------------------------------------------------------
+
+
+class Panel(BaseModel):
+    """A panel; `plot` is a public plot function such as ``plot_sensitivity``, or of `SKETCHES`."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    plot: str
+    study: str
+    at: dict[str, Any] = {}
+
+
+class Drawing(BaseModel):
+    """Declaration of a figure.
+
+    `size` [inch] may be left out for one panel. `example` names a script whose ``main`` leaves one figure open, in
+    place of panels.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    size: tuple[float, float] | None = None
+    columns: int = 1
+    panels: list[Panel] = []
+    example: str = ""
+
+
+def draw(
+    declared: Mapping[str, Any], datasets: Mapping[str, Dataset], folder: Path, examples: Path = Path("examples")
+) -> dict[str, Any]:
+    """Draw the figures of a paper as PDF files."""
+    drawings = {name: checked(Drawing, entry, f"figure {name}") for name, entry in declared.items()}
+    for name, drawing in drawings.items():
+        atomic.write_bytes(folder / f"{name}.pdf", _pdf(drawing, datasets, f"figure {name}", examples))
+    return {name: _origin(drawing, datasets, f"figure {name}") for name, drawing in drawings.items()}
+
+
+def _pdf(drawing: Drawing, datasets: Mapping[str, Dataset], name: str, examples: Path) -> bytes:
+    import matplotlib
+    import matplotlib.pyplot as plt
+
+    from ..output.style import SETTINGS
+
+    def plotted(panel: Panel, part: "SubFigure | None") -> Any:
+        try:
+            return _plot(panel.plot, name)(chosen(datasets, panel.study, name).tree, part, **panel.at)
+        except (KeyError, TypeError, ValueError) as error:
+            raise PaperError(f"{name}: {panel.plot} of the study '{panel.study}': {error}") from None
+
+    # Fonts as publishers take them.
+    with matplotlib.rc_context(SETTINGS | {"pdf.fonttype": 42}):
+        if bool(drawing.example) == bool(drawing.panels):
+            raise PaperError(f"{name}: give panels, or the example that draws it, one of both")
+        if drawing.example:
+            figure = _drawn(examples / f"{drawing.example}.py", name)
+        elif drawing.size is None and len(drawing.panels) == 1:
+            figure = np.ravel(plotted(drawing.panels[0], None))[0].figure
+        elif drawing.size is None:
+            raise PaperError(f"{name}: several panels; give the figure a size, its width and height in inches")
+        else:
+            figure = plt.figure(figsize=drawing.size)
+            rows = -(-len(drawing.panels) // drawing.columns)
+            for panel, part in zip(drawing.panels, np.ravel(figure.subfigures(rows, drawing.columns, squeeze=False))):
+                plotted(panel, part)
+        content = io.BytesIO()
+        figure.savefig(content, format="pdf", metadata={"CreationDate": None})
+        plt.close(figure)
+    return content.getvalue()
+
+
+def _drawn(script: Path, name: str) -> Any:
+    """Figure that an example leaves open."""
+    import matplotlib.pyplot as plt
+
+    if not script.is_file():
+        raise PaperError(f"{name}: there is no {script}; give the stem of a script of this folder")
+    plt.close("all")
+    with redirect_stdout(io.StringIO()):
+        runpy.run_path(str(script))["main"]()
+    if len(plt.get_fignums()) != 1:
+        raise PaperError(f"{name}: {script} leaves {len(plt.get_fignums())} figures open; it has to leave one")
+    return plt.gcf()
+
+
+def _plot(plot: str, name: str) -> Callable[..., object]:
+    import springtune
+
+    if plot in SKETCHES:
+        return SKETCHES[plot]
+    if not plot.startswith("plot_") or plot not in springtune.__all__:
+        known = [one for one in springtune.__all__ if one.startswith("plot_")]
+        raise PaperError(f"{name}: nothing plots '{plot}'; give one of {', '.join([*SKETCHES, *known])}")
+    return getattr(springtune, plot)
+
+
+def _origin(drawing: Drawing, datasets: Mapping[str, Dataset], name: str) -> str:
+    """Panel selections by study with hashes of datasets, or the script."""
+    if drawing.example:
+        return f"none, drawn by examples/{drawing.example}.py"
+    told: dict[str, list[str]] = {}
+    for panel in drawing.panels:
+        labels = [_label(key, value) for key, value in panel.at.items()]
+        if ", ".join(labels) not in told.setdefault(panel.study, []):
+            told[panel.study].append(", ".join(labels))
+    parts = []
+    for study, labels in told.items():
+        selection = "; ".join(filter(None, labels))
+        sha256 = chosen(datasets, study, name).sha256[:HASH_SHOWN]
+        parts.append(f"{study}{': ' if selection else ''}{selection}, sha256 {sha256}")
+    return "; ".join(parts)
+
+
+def _label(key: str, value: object) -> str:
+    if key == "mesh_size" and isinstance(value, float):
+        return f"{1e3 * value:g} mm"
+    return f"{key.replace('_', ' ')} {value:g}" if isinstance(value, float) else str(value)
+
+
+# -- sketches of what is loaded and how --------------------------------------------------------------------------------
+
+
+def sketch_block(tree: Any, part: "SubFigure", *, beam: str) -> None:
+    """Draw a block, fixed below and pressed from above."""
+    root = tree.to_dataset().sel(beam=beam)
+    length, height = 1e3 * float(root.beam_length), 1e3 * float(root.beam_height)
+    panel = part.subplots()
+    panel.fill([0, length, length, 0], [0, 0, height, height], facecolor="0.88", edgecolor="0.3", linewidth=1.0)
+    panel.fill([0, length, length, 0], [0, 0, -0.12 * height, -0.12 * height], facecolor="none", edgecolor="0.3",
+               hatch="////", linewidth=0)  # fmt: skip
+    _draw_pressure(panel, 0, length, height, 1.45 * height)
+    panel.plot(length / 2, height, "o", color="#14213d", clip_on=False)
+    panel.text(length / 2, 0.8 * height, "displacement measured here", ha="center", va="top", fontsize=8)
+    panel.set(aspect="equal", xlim=(-0.05 * length, 1.05 * length), ylim=(-0.2 * height, 1.5 * height))
+    panel.set_title(f"{beam} mm, pressed on one long side")
+    panel.axis("off")
+
+
+def _draw_pressure(panel: Any, left: float, length: float, low: float, high: float) -> None:
+    """Draw arrows down onto a side."""
+    for x in np.linspace(left, left + length, 13):
+        panel.annotate("", (x, low), xytext=(x, high), arrowprops={"arrowstyle": "->", "color": "#b5382a"})
+
+
+def sketch_laying(tree: Any, part: "SubFigure") -> None:
+    """Draw a strip above the trapezoid that it is laid on."""
+    laid, root = tree["laying"].to_dataset(), tree.to_dataset()
+    x, y = 1e3 * laid.trapezoid_x.values, 1e3 * laid.trapezoid_y.values
+    length, height = 1e3 * float(root.beam_length.max()), 1e3 * float(root.beam_height.max())
+    panel = part.subplots()
+    panel.fill(x, y, facecolor="0.8", edgecolor="0.3", linewidth=1.0)
+    panel.plot([-0.56 * length, 0.56 * length], [0, 0], color="0.3", linewidth=1.2)
+    left, low = (x.min() + x.max() - length) / 2, y.max()
+    panel.fill([left, left + length, left + length, left], [low, low, low + height, low + height],
+               facecolor="#e09f3e", edgecolor="0.3", linewidth=1.0)  # fmt: skip
+    _draw_pressure(panel, left, length, low + height, low + 2.6 * height)
+    panel.text((x.min() + x.max()) / 2, y.mean(), "steel", ha="center", va="center", fontsize=8)
+    panel.text(left + length, low + 0.5 * height, "  rubber", ha="left", va="center", fontsize=8)
+    panel.set(aspect="equal", xlim=(-0.58 * length, 0.66 * length), ylim=(-1, low + 2.8 * height))
+    panel.set_title("A strip before it is laid")
+    panel.axis("off")
+
+
+SKETCHES: dict[str, Callable[..., object]] = {"sketch_block": sketch_block, "sketch_laying": sketch_laying}
 
 
 if __name__ == "__main__":

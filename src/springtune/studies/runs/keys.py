@@ -21,7 +21,6 @@ from collections.abc import Iterable, Mapping
 from dataclasses import asdict
 from functools import cache
 from importlib.util import find_spec
-from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -114,15 +113,8 @@ def _for_type_checkers(node: ast.If) -> bool:
     return "TYPE_CHECKING" in (getattr(test, "id", ""), getattr(test, "attr", ""))
 
 
-def _is_text(node: ast.expr) -> bool:
-    return isinstance(node, ast.Constant)
-
-
 class _Reader:
-    """Read a syntax tree as text that is the same in all versions of Python, and its imports.
-
-    Newer versions add fields, which are empty for older syntax: empty fields are left out.
-    """
+    """Read a syntax tree as text, and its imports."""
 
     SKIPPED = ("ctx", "kind", "type_comment")  # follow from the rest, or are said for readers
 
@@ -147,15 +139,6 @@ class _Reader:
             for one in node:  # type: ignore[attr-defined]
                 self.read(one)
             add("]")
-        elif isinstance(node, ast.JoinedStr):  # versions of Python cut its texts in different places
-            add("(f")
-            for is_text, values in groupby(node.values, key=_is_text):
-                if is_text:
-                    text = "".join(str(value.value) for value in values if isinstance(value, ast.Constant))
-                    self.parts += [f"={text!r}"] if text else []
-                else:
-                    self.read(list(values))
-            add(")")
         elif isinstance(node, ast.AST):
             if isinstance(node, ast.stmt):
                 if _says_nothing(node):

@@ -110,7 +110,7 @@ def _present_digest(members: "Iterable[Output]", files: list[str]) -> str:
     used = ["studies.output.present", *modules("outputs")]
     templates = []
     for one in members:
-        used += filter(None, (one.module, one.write))
+        used += filter(None, (name.partition(":")[0] for name in (one.plot, one.write)))
         if one.page:
             used += ["studies.output.page", *modules("kind")]
             used += [f"studies.kinds.{kind.name}.{kind.tables_by}" for kind in kinds() if kind.tables]

@@ -8,7 +8,8 @@ before HDF5 reads the rest.
 import hashlib
 import json
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -33,7 +34,17 @@ USER_BLOCK = 512
 """Length of the block before HDF5's own [bytes]."""
 
 
-def _checked(path: str | Path) -> None:
+@contextmanager
+def _opened(path: str | Path) -> "Iterator[tuple[h5py.File, dict[str, dict[str, Any]]]]":
+    """Context of a file whose checksum is right, and its scalars."""
+    _check(path)
+    import h5py  # here: a plan reads no results
+
+    with h5py.File(path) as file:
+        yield file, json.loads(file[SCALARS][()])
+
+
+def _check(path: str | Path) -> None:
     """Compare a file with its checksum."""
     try:
         content = Path(path).read_bytes()
@@ -55,29 +66,17 @@ def stored(path: str | Path, limits: str | None = None) -> set[str]:
     if not Path(path).exists():
         return set()
     try:
-        _checked(path)
+        with _opened(path) as (_, scalars):
+            pass
     except DamagedError as error:
         set_aside(error)
         return set()
-    import h5py  # here: a plan reads no results
-
-    with h5py.File(path) as file:
-        scalars = _scalars(file)
     return {name for name, result in scalars.items() if limits is None or result.get(LIMITS, limits) == limits}
-
-
-def _scalars(file: "h5py.File") -> dict[str, dict[str, Any]]:
-    scalars: dict[str, dict[str, Any]] = json.loads(file[SCALARS][()])
-    return scalars
 
 
 def read(path: str | Path, names: Iterable[str], fields: Sequence[str] = ()) -> dict[str, dict[str, Any]]:
     """Read results."""
-    _checked(path)
-    import h5py  # here: a plan reads no results
-
-    with h5py.File(path) as file:
-        scalars = _scalars(file)
+    with _opened(path) as (file, scalars):
         names = list(names)
         lacking = [name for name in names if name not in scalars]
         if lacking:
@@ -91,11 +90,7 @@ def read(path: str | Path, names: Iterable[str], fields: Sequence[str] = ()) -> 
 
 def contents(path: str | Path) -> dict[str, dict[str, Any]]:
     """All stored results, in the form that `add` takes."""
-    _checked(path)
-    import h5py  # here: a plan reads no results
-
-    with h5py.File(path) as file:
-        found = _scalars(file)
+    with _opened(path) as (file, found):
         for name, result in found.items():
             result |= {label: array[()] for label, array in file[name].items()} if name in file else {}
     return found
@@ -153,7 +148,8 @@ def add(path: str | Path, results: Mapping[str, Mapping[str, Any]]) -> None:
     with h5py.File("results", "w", driver="core", backing_store=False) as file:
         if stored(path):
             with h5py.File(path) as before:
-                scalars = {name: kept for name, kept in _scalars(before).items() if name not in results}
+                known = json.loads(before[SCALARS][()])
+                scalars = {name: kept for name, kept in known.items() if name not in results}
                 for name in before:
                     if name in scalars:
                         before.copy(name, file)

@@ -34,8 +34,8 @@ def named(data):
     """Approaches to name: those with an error in `SHOWN`, then as many others as fit, the most accurate first."""
     dimensions = [name for name in data.error.dims if name != "approach"]
     smallest = np.abs(data.error).min(dimensions)
-    there = [str(name) for name in data.approach.values[np.argsort(smallest.values)] if np.isfinite(smallest.sel(
-        approach=name))]  # fmt: skip
+    order = np.argsort(smallest.values)
+    there = data.approach.values[order[np.isfinite(smallest.values[order])]].tolist()
     chosen = [name for name in SHOWN if name in there]
     return chosen + [name for name in there if name not in chosen][: len(SHOWN) - len(chosen)]
 

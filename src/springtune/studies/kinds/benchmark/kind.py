@@ -118,12 +118,10 @@ def _check(config, problems):
         check_known(problems, ("benchmark", "second_beam"), "beam", section.second_beam, config.beams)
     for beam in dict.fromkeys([*(scene.beam for scene in section.scenes.values()), section.second_beam]):
         if beam in config.beams:
-            extent = config.beams[beam].length, config.beams[beam].height
+            extent, largest = (config.beams[beam].length, config.beams[beam].height), max(section.mesh_size)
             check_particles(problems, ("benchmark", "mesh_size"), section.mesh_size, *extent)
-            side = min(config.beams[beam].length, config.beams[beam].height)
-            if max(section.mesh_size) > side / 2:
-                large = f"{1e3 * max(section.mesh_size):g} mm"
-                message = f"{large} is too large for '{beam}'; give at most {500 * side:g} mm"
+            if largest > min(extent) / 2:
+                message = f"{1e3 * largest:g} mm is too large for '{beam}'; give at most {500 * min(extent):g} mm"
                 problems.add(("benchmark", "mesh_size"), message)
     for name, scene in section.scenes.items():
         place = ("benchmark", "scenes", name)

@@ -25,7 +25,7 @@ OUTPUTS = (
         figures=lambda study: figures(study.axes.get("scene", ())),
         plot="studies.kinds.benchmark.figures:benchmark",
         tables=lambda study: [PAGE],
-        write="studies.kinds.benchmark.tables",
+        write="studies.kinds.benchmark.tables:write",
         lack=needs("benchmark", "shows a benchmark and the study has none; add a section 'benchmark'"),
     ),
 )

@@ -10,7 +10,7 @@ from springtune.safe_io.atomic import write_text
 from springtune.safe_io.escapes import markdown
 
 from ...output.selection import labels_of
-from ...output.text import markdown_section, markdown_table
+from ...output.text import cell_number, markdown_section, markdown_table
 from . import PARTS
 from .outputs import PAGE
 
@@ -49,15 +49,6 @@ def page(tree: xr.DataTree) -> str:
 def _time(seconds):
     seconds = float(seconds)
     return "" if np.isnan(seconds) else f"{1e3 * seconds:.3g} ms" if seconds < 1 else f"{seconds:.3g} s"
-
-
-def _percent(value):
-    value = 100 * float(value)
-    return "" if np.isnan(value) else f"{value:+.2g} %".replace("-", "−")
-
-
-def _plain(value, digits):
-    return "" if np.isnan(float(value)) else f"{float(value):.{digits}f}"
 
 
 def _rule(data):
@@ -112,9 +103,10 @@ def _one_size(cells):
         if np.isnan(cell.seconds):
             continue
         rows.append([
-            f"`{cell.approach.item()}`", _percent(cell.error), _time(cell.seconds), _time(cell.cold_seconds),
-            *(_time(cell[f"{part}_seconds"]) for part in PARTS),
-            f"{float(cell.peak_memory) / 1e6:.0f}", _plain(cell.error_rate, 1), _plain(cell.cost_exponent, 2),
+            f"`{cell.approach.item()}`", cell_number(cell.error, "+.2g", 100, " %"),
+            *(_time(cell[name]) for name in ("seconds", "cold_seconds", *(f"{part}_seconds" for part in PARTS))),
+            *(cell_number(cell[name], form, scale) for name, form, scale in
+              (("peak_memory", ".0f", 1e-6), ("error_rate", ".1f", 1), ("cost_exponent", ".2f", 1))),
         ])  # fmt: skip
     heads = [f"at {1e3 * float(cells.mesh_size):g} mm", "error", "time", "cold", *PARTS, "memory [MB]", "order",
              "exponent of cost"]  # fmt: skip

@@ -14,7 +14,7 @@ floor.
 """
 
 import time
-from dataclasses import asdict, dataclass
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -31,26 +31,6 @@ RIGID = 1e4
 """Ratio of Young's moduli from which the trapezoid counts as rigid."""
 
 
-@dataclass(frozen=True)
-class Laid:
-    """A laid strip; names are those of the dataset.
-
-    `penetration` is over the mesh size, `contact_force_error` over the load (NaN for drawn ends). `outline` has shape
-    (n, 2) [m].
-    """
-
-    area_under_strip: float
-    elongation: float
-    penetration: float
-    contact_force_error: float
-    load_share: float
-    message: str
-    iterations: int
-    laying_seconds: float
-    skipped: str
-    outline: np.ndarray
-
-
 def solve(task):
     """Result of a strip; one that is not laid has a status and a message."""
     made = {
@@ -64,12 +44,16 @@ def solve(task):
         found = lay(**made, **{name: task[name] for name in ("definition", "loading", "pressure", "friction")})
     except DefinitionError as error:
         return {"status": Status.FAILED, "message": f"{task['definition']}: {error}"}
-    return asdict(found) | {"status": Status.NOT_CONVERGED if found.message else Status.SOLVED}
+    return vars(found) | {"status": Status.NOT_CONVERGED if found.message else Status.SOLVED}
 
 
 def lay(strip, trapezoid, material, support, definition, size, *, loading="pressure", pressure=0.02e6, friction=0.0,
         rigid=RIGID):  # fmt: skip
-    """Lay a strip on a trapezoid [m, Pa], which is rigid from a ratio `rigid` of Young's moduli on."""
+    """Lay a strip on a trapezoid [m, Pa], which is rigid from a ratio `rigid` of Young's moduli on.
+
+    Returns results by their names in the dataset: `penetration` over the mesh size, `contact_force_error` over the load
+    (NaN for drawn ends), `outline` of shape (n, 2) [m].
+    """
     begin = time.perf_counter()
     body, mesh = _strip(strip, trapezoid, material, definition, size, loading, pressure)
     skipped = ["unknowns of the floor"]
@@ -94,7 +78,7 @@ def lay(strip, trapezoid, material, support, definition, size, *, loading="press
     around = [0]
     while len(around) < len(outline):
         around.append(int(body.neighbours[0][around[-1]]))
-    return Laid(
+    return SimpleNamespace(
         area_under_strip=float(np.sum(0.5 * (fibre[1:, 1] + fibre[:-1, 1]) * np.diff(fibre[:, 0]))),
         elongation=float(lengths.sum() / strip.length - 1),
         penetration=contact.penetration / size,

@@ -23,7 +23,7 @@ OUTPUTS = (
         figures=lambda study: figures(study.axes["load"], study.axes["mesh_type"]),
         plot="studies.kinds.moduli.figures:definitions",
         tables=lambda study: list(TABLES),
-        write="studies.kinds.moduli.tables",
+        write="studies.kinds.moduli.tables:write",
         lack=needs("moduli", "compares moduli and no grid has them; add 'moduli: true' to a grid"),
     ),
 )

@@ -9,7 +9,7 @@ from springtune.safe_io.atomic import write_text
 
 from ...output.dataset import STATUS, most_requested
 from ...output.selection import records, unswept
-from ...output.text import csv_text, markdown_section, markdown_table
+from ...output.text import cell_number, csv_text, markdown_section, markdown_table
 from ..scenes.variables import SCENE
 from .outputs import TABLES
 
@@ -161,7 +161,7 @@ def _attained(root, moduli, mesh_type, beam, materials):
         patch, scene = patch.sel(mesh_size=size), scenes.sel(mesh_size=size)
         errors = scene.deformation_error.sel(load=loads, material=list(materials.values()))
         cells = [_signed(patch.young_modulus_error.sel(poisson_ratio=nu)) for nu in ratios]
-        cells += [_plain(patch.effective_poisson_ratio.sel(poisson_ratio=nu), 3) for nu in ratios]
+        cells += [cell_number(patch.effective_poisson_ratio.sel(poisson_ratio=nu), ".3f") for nu in ratios]
         cells += [_signed(error) for error in errors.transpose("load", "material").values.flat]
         seconds = float(scene.definition_seconds.max())
         cells.append(f"{1e3 * seconds:.0f} ms" if seconds >= 5e-4 else "< 1 ms")
@@ -199,11 +199,4 @@ def _paper_cells(root):
 
 
 def _signed(value):
-    value = 100 * float(value)
-    if np.isnan(value):
-        return ""
-    return f"{value:+.1f} %".replace("-", "−") if abs(value) >= 0.05 else "0.0 %"
-
-
-def _plain(value, digits):
-    return "" if np.isnan(float(value)) else f"{float(value):.{digits}f}".replace("-", "−")
+    return "0.0 %" if abs(100 * float(value)) < 0.05 else cell_number(value, "+.1f", 100, " %")

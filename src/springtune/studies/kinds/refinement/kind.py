@@ -2,9 +2,11 @@
 
 from collections import defaultdict
 from dataclasses import asdict, dataclass
+from math import inf
 from typing import Annotated
 
 from pydantic import Field
+from pydantic_core import PydanticCustomError
 
 from springtune.mesh import MESH_TYPES
 from springtune.problem.geometry import Beam, warn_of_thickness
@@ -26,6 +28,7 @@ from ...config.fields import (
     Scalar,
     number,
     one_of,
+    quantity,
 )
 from ...config.kind import Kind
 from ...config.messages import refuse, show
@@ -63,6 +66,16 @@ End = Annotated[
     Scalar(str, {"type": ["string", "number"], "examples": ["1 mm"]}, "a value of the parameter, such as '1 mm'"),
 ]
 Count = Annotated[int, number("a whole number from 2 to 10001, such as 33", 2, MOST_REFINED, whole=True)]
+ENDS = {
+    "mesh_size": quantity("length"),
+    "force": quantity("force"),
+    "thickness": quantity("length"),
+    "young_modulus": quantity("stress"),
+    "poisson_ratio": number("a value from 0 to 0.5, such as 0.3", 0, 0.5),
+    "stiffness_scale": number("a value above 0, such as 0.5", 0, inf, above=True),
+}
+"""How the ends of each parameter are read."""
+
 MadeType = Annotated[str, one_of("mesh type", MESH_TYPES)]
 ParameterName = Annotated[str, one_of("parameter", VARIED)]
 Spacing = Annotated[str, one_of("spacing", SPACINGS)]
@@ -152,12 +165,12 @@ def _check(config, problems):
 
 def _ends(section, path, problems):
     """Both ends of a refinement in SI units; none if they are wrong, which is noted."""
-    known, found = VARIED[section.parameter], []
+    found = []
     for key, text in (("from", section.start), ("to", section.stop)):
         try:
-            found.append(known.read(text))
-        except ValueError as error:
-            problems.add((*path, key), str(error))
+            found.append(ENDS[section.parameter].read(text))
+        except PydanticCustomError as error:
+            problems.add((*path, key), error.context["message"])
     if len(found) < 2:
         return []
     if not found[0] < found[1]:
@@ -190,8 +203,7 @@ def _check_definitions(section, path, problems):
 def _expand(config, declared):
     found = []
     for name, section in (config.refine or {}).items():
-        known = VARIED[section.parameter]
-        ends = known.read(section.start), known.read(section.stop)
+        ends = [ENDS[section.parameter].read(text) for text in (section.start, section.stop)]
         how = section.points, section.spacing == SPACINGS[1], section.tolerance, section.resolution, section.most
         beam, material = declared.beams[section.beam], declared.materials[section.material]
         if section.parameter == "thickness":

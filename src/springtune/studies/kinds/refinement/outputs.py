@@ -2,22 +2,17 @@
 
 from dataclasses import dataclass
 
-from springtune.units import UnitError, parse
-
 from ...config.kind import Output, needs
 from ...output.browse import Plot, View
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter of a scene: ``kind`` is of `springtune.units.QUANTITY_KINDS`, ``scales`` are units and SI sizes."""
+    """A parameter of a scene; ``scales`` are units and SI sizes."""
 
     meaning: str
     unit: str
-    kind: str = ""
     scales: tuple[tuple[str, float], ...] = (("", 1.0),)
-    most: float = float("inf")
-    zero: bool = False
 
     def scale(self, largest: float) -> tuple[str, float]:
         """Unit in which values are shown, and its size in SI.
@@ -29,33 +24,16 @@ class Parameter:
         """
         return next((one for one in self.scales if largest >= one[1]), self.scales[-1])
 
-    def read(self, text: str) -> float:
-        """Value of a text."""
-        if self.kind:
-            try:
-                value = parse(text, self.kind)
-            except UnitError as error:
-                raise ValueError(str(error)) from None
-        else:
-            try:
-                value = float(text)
-            except ValueError:
-                raise ValueError(f"'{text}' is not a number; give one such as 0.3") from None
-        if not (value >= 0 if self.zero else value > 0) or not value <= self.most or value == float("inf"):
-            most = f" to {self.most:g}" if self.most < float("inf") else ""
-            raise ValueError(f"'{text}' is out of range; give a value {'from' if self.zero else 'above'} 0{most}")
-        return value
-
 
 LENGTHS = (("mm", 1e-3),)
 """Units of lengths."""
 
 VARIED = {
-    "mesh_size": Parameter("asked length of an edge", "m", "length", LENGTHS),
-    "force": Parameter("size of the force", "N", "force", (("kN", 1e3), ("N", 1.0))),
-    "thickness": Parameter("thickness of the sheet", "m", "length", LENGTHS),
-    "young_modulus": Parameter("Young's modulus", "Pa", "stress", (("GPa", 1e9), ("MPa", 1e6), ("kPa", 1e3))),
-    "poisson_ratio": Parameter("Poisson's ratio", "1", most=0.5, zero=True),
+    "mesh_size": Parameter("asked length of an edge", "m", LENGTHS),
+    "force": Parameter("size of the force", "N", (("kN", 1e3), ("N", 1.0))),
+    "thickness": Parameter("thickness of the sheet", "m", LENGTHS),
+    "young_modulus": Parameter("Young's modulus", "Pa", (("GPa", 1e9), ("MPa", 1e6), ("kPa", 1e3))),
+    "poisson_ratio": Parameter("Poisson's ratio", "1"),
     "stiffness_scale": Parameter("factor on the stiffness that the definition gives", "1"),
 }
 """Parameters by name."""
@@ -74,7 +52,7 @@ OUTPUTS = (
         figures=lambda study: {"refinement": {}},
         plot="studies.kinds.refinement.figures:refinement",
         tables=lambda study: REFINEMENT_TABLES,
-        write="studies.kinds.refinement.collect",
+        write="studies.kinds.refinement.collect:write",
         lack=needs("refinement", "shows refinements and the study has none; add a section 'refine'"),
     ),
 )

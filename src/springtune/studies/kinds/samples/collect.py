@@ -1,6 +1,7 @@
 """Samples, gathered in the groups ``/samples``, ``/effects`` and ``/sobol``."""
 
 from dataclasses import dataclass
+from itertools import product
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,7 +12,7 @@ from springtune.problem.status import Status
 from springtune.reference.answers import beyond_linear, unit_scales
 from springtune.springs.lattice import COEFFICIENT
 
-from ...output.dataset import Group
+from ...output.dataset import Filler, Group
 from ...runs import store
 from ..scenes import any_reference
 from .designs import PARAMETERS, SOBOL_INDICES, blocks, roles
@@ -104,14 +105,12 @@ def groups(study, folder):
         "quantity": tuple(name for name in QUANTITIES if name != "best_stiffness" or sample.best_stiffness),
         "bin": tuple(range(min(MOST_BINS, max(4, points // BIN_POINTS)))),
     }
-    data = SAMPLES.empty(axes)
+    filler = Filler(SAMPLES.empty(axes))
     # Without a mesh, as beyond limits, a network has no particles; other definitions may have a mesh.
-    data["particles"].values[:] = np.max([found["particles"] for found in results.values()], axis=0)
-    _solved(sample, data, drawn, results)
-    _referred(sample, data, drawn, folder / "samples")
-    if sample.best_stiffness:
-        _fitted(sample, data, drawn, results)
-    data = _with_coordinates(data, sample, drawn, study.axes)
+    filler.put_arrays({"particles": np.max([found["particles"] for found in results.values()], axis=0)}, {})
+    for load in sample.loads:
+        _put_load(load, sample, filler, drawn, results, folder / "samples")
+    data = _with_coordinates(filler.data, sample, drawn, study.axes)
     found = {SAMPLES.name: data, EFFECTS.name: _effects(sample, data, drawn, axes)}
     if sample.design == SOBOL_INDICES:
         found[SOBOL.name] = _indices(sample, data, axes)
@@ -139,52 +138,34 @@ def _stored(sample, folder):
     return joined.pop(DRAWN), {key: found | {"messages": messages[key]} for key, found in joined.items()}
 
 
-def _loads(data, sample):
-    """Loads and their places in a group."""
-    places = data["load"].values.tolist()
-    return [(load, places.index(load)) for load in sample.loads]
-
-
-def _cells(data, sample):
-    """Loads and definitions, and their places in a group."""
-    places = data["definition"].values.tolist()
-    return [(load, name, i, places.index(name)) for load, i in _loads(data, sample) for name in sample.definitions]
-
-
-def _solved(sample, data, drawn, results):
-    """Put the results of networks."""
-    membrane = drawn["young_modulus"] * drawn["thickness"]
-    for load, name, i, j in _cells(data, sample):
-        # With linear kinematics results are for a force of one sign.
-        sign = LOADS[load].sign if sample.kinematics == "linear" else 1.0
-        found = results[result_key(sample, load, name)]
-        there = np.isin(found["status"], (Status.SOLVED, Status.LINEAR_ONLY, Status.UNSTABLE))
-        data.displacement.values[:, i, j] = np.where(there, sign * found["displacement"], np.nan)
-        data.status.values[:, i, j] = found["status"]
-        for row, text in found["messages"].items():
-            data.message.values[row, i, j] = text
-        if name == UNIFORM:
-            data.stiffness.values[:, i, j] = COEFFICIENT * membrane
-
-
-def _referred(sample, data, drawn, folder):
-    """Put references and errors."""
-    body, aspects = SimpleNamespace(**drawn), drawn["length"] / drawn["height"]
-    for load, i in _loads(data, sample):
-        kind = LOADS[load].kind
-        answers, data.reference_message.values[i] = _answers(sample, drawn, folder, kind, aspects)
-        length, scale = unit_scales(body, body, kind)
-        force, applies = LOADS[load].sign * drawn["force"], data.reference_applies.values
-        data.reference_displacement.values[:, i] = force * scale * answers.displacement
-        data.reference_error_estimate.values[:, i] = answers.error_estimate
-        if sample.kinematics == "linear":
-            applies[:, i] = np.isfinite(answers.displacement)
-            continue
+def _put_load(load, sample, filler, drawn, results, folder):
+    """Put references, networks, their errors, and the uniform stiffness without an error under a load."""
+    kind, sign, is_linear = LOADS[load].kind, LOADS[load].sign, sample.kinematics == "linear"
+    body, softness = SimpleNamespace(**drawn), COEFFICIENT * (drawn["young_modulus"] * drawn["thickness"])
+    answers, why = _answers(sample, drawn, folder, kind, drawn["length"] / drawn["height"])
+    length, scale = unit_scales(body, body, kind)
+    force = sign * drawn["force"]
+    reference, applies = force * scale * answers.displacement, np.isfinite(answers.displacement)
+    if not is_linear:
         per_force = np.abs(force) * scale / length
         pairs = zip((per_force * answers.rotation).tolist(), (per_force * answers.strain).tolist())
-        applies[:, i] = [np.isfinite(pair).all() and not beyond_linear(*pair) for pair in pairs]
-    wanted = data.reference_displacement.values[:, :, None]
-    data.deformation_error.values[:] = deformation_error(data.displacement.values, wanted)
+        applies = [np.isfinite(pair).all() and not beyond_linear(*pair) for pair in pairs]
+    values = {"reference_displacement": reference, "reference_error_estimate": answers.error_estimate}
+    values |= {"reference_applies": applies, "reference_message": why}
+    if sample.best_stiffness:  # the solved one times its displacement over the reference
+        found = results[result_key(sample, load, UNIFORM)]
+        solved = np.where(found["status"] == Status.SOLVED, sign * found["displacement"], np.nan)
+        values["best_stiffness"] = softness * (solved / reference)
+    filler.put_arrays(values, {"load": load})
+    for name in sample.definitions:
+        found = results[result_key(sample, load, name)]
+        there = np.isin(found["status"], (Status.SOLVED, Status.LINEAR_ONLY, Status.UNSTABLE))
+        # With linear kinematics results are for a force of one sign.
+        displacement = np.where(there, (sign if is_linear else 1.0) * found["displacement"], np.nan)
+        values = {"displacement": displacement, "deformation_error": deformation_error(displacement, reference)}
+        values |= {"status": found["status"], "stiffness": softness if name == UNIFORM else np.nan}
+        values["message"] = [found["messages"].get(row, "") for row in range(sample.rows)]
+        filler.put_arrays(values, {"load": load, "definition": name})
 
 
 def _answers(sample, drawn, folder, kind, aspects):
@@ -200,16 +181,6 @@ def _answers(sample, drawn, folder, kind, aspects):
     answers = SimpleNamespace(**{name: np.array([row.get(name, np.nan) for row in rows]) for name in names})
     reasons = [row["message"] for row in rows if row["message"]]
     return answers, f"{len(reasons)} of {len(rows)} points: {reasons[0]}" if reasons else ""
-
-
-def _fitted(sample, data, drawn, results):
-    """Put the uniform stiffness without an error: the solved one times its displacement over the reference."""
-    for load, i in _loads(data, sample):
-        found = results[result_key(sample, load, UNIFORM)]
-        membrane = drawn["young_modulus"] * drawn["thickness"]
-        solved = np.where(found["status"] == Status.SOLVED, LOADS[load].sign * found["displacement"], np.nan)
-        softer = solved / data.reference_displacement.values[:, i]
-        data.best_stiffness.values[:, i] = COEFFICIENT * membrane * softer
 
 
 def _with_coordinates(data, sample, drawn, dimensions):
@@ -246,57 +217,56 @@ def _policy(sample):
 
 
 def _values(sample, data):
-    """Each quantity, its places in a group, and its values by row, NaN where a scene is not solved stably."""
+    """Labels of each quantity, load and definition, and values by row, NaN where a scene is not solved stably."""
     quantities = [name for name in QUANTITIES if name != "best_stiffness" or sample.best_stiffness]
-    for q, quantity in enumerate(quantities):
-        for _, _, i, j in _cells(data, sample):
-            values = data[quantity].values[:, i]
-            if quantity != "best_stiffness":
-                values = np.where(data.status.values[:, i, j] == Status.SOLVED, values[:, j], np.nan)
-            yield quantity, (q, i, j), values
+    for quantity, load, name in product(quantities, sample.loads, sample.definitions):
+        one = data[[quantity, "status"]].sel(load=load, definition=name)
+        values = one[quantity].values
+        if quantity != "best_stiffness":
+            values = np.where(one.status.values == Status.SOLVED, values, np.nan)
+        yield {"quantity": quantity, "load": load, "definition": name}, values
 
 
 def _effects(sample, data, drawn, axes):
     """Means over each parameter alone, of rows that are independent of each other."""
-    effects = EFFECTS.empty(axes)
+    effects = Filler(EFFECTS.empty(axes))
     each, bins = sample.rows // sample.size, len(axes["bin"])
     alone = np.flatnonzero(np.arange(sample.rows) % each < 2)  # A and B
-    for p, parameter in enumerate(sample.varied):
-        at = drawn[parameter][alone]
-        effects["parameter_value"].values[p] = main_effect(at, at, bins)[0]
-        for _, (q, i, j), values in _values(sample, data):
+    for parameter in sample.varied:
+        of, at = {"parameter": parameter}, drawn[parameter][alone]
+        effects.put_arrays({"parameter_value": main_effect(at, at, bins)[0]}, of)
+        for labels, values in _values(sample, data):
             _, mean, error = main_effect(at, values[alone], bins)
-            effects["main_effect"].values[q, p, :, i, j] = mean
-            effects["main_effect_error"].values[q, p, :, i, j] = error
-    return effects
+            effects.put_arrays({"main_effect": mean, "main_effect_error": error}, labels | of)
+    return effects.data
 
 
 def _indices(sample, data, axes):
     """Sobol indices of each quantity, load and definition."""
-    found = SOBOL.empty(axes)
-    found.attrs = {
+    found = Filler(SOBOL.empty(axes))
+    found.data.attrs = {
         "estimators": "first order: Saltelli et al. 2010; total order: Jansen 1999",
         "bands": f"between percentiles of {RESAMPLES} bootstrap samples, {100 * LEVEL:g} %",
         "failures": _policy(sample),
     }
-    for quantity, (q, i, j), values in _values(sample, data):
+    for labels, values in _values(sample, data):
         rows = values.reshape(sample.size, -1).T
         there = np.isfinite(rows).all(axis=0)
         lacking = int((~there).sum())
-        found["base_samples_without"].values[q, i, j] = lacking
+        found.put_arrays({"base_samples_without": lacking}, labels)
         if lacking and sample.failures != DROP:
             continue
         kept = rows[:, there]
         # A variation below the reference's own error is no variation of the networks' errors.
-        known = data.reference_error_estimate.values[:, i]
-        least = float(np.nanmax(known, initial=0.0)) if quantity == "deformation_error" else 0.0
+        known = data.reference_error_estimate.sel(load=labels["load"]).values
+        least = float(np.nanmax(known, initial=0.0)) if labels["quantity"] == "deformation_error" else 0.0
         indices = sobol_indices(kept[0], kept[1], kept[2:], least)
-        found["base_samples"].values[q, i, j] = indices.rows
+        found.put_arrays({"base_samples": indices.rows}, labels)
         for order in ORDERS:
-            band = getattr(indices, f"{order}_band")
-            for end, row in (("", getattr(indices, order)), ("_low", band[0]), ("_high", band[1])):
-                found[f"{order}_order{end}"].values[q, :, i, j] = row
-    return found
+            low, high = getattr(indices, f"{order}_band")
+            values = {"order": getattr(indices, order), "order_low": low, "order_high": high}
+            found.put_arrays({f"{order}_{name}": value for name, value in values.items()}, labels)
+    return found.data
 
 
 RESAMPLES = 1000

@@ -37,11 +37,9 @@ def compared(root, selection):
     )
 
 
-def _by_beam(root, beam, mesh_type, material, load, kinematics):
-    """Data of a figure with one panel a beam, the beams, the selection, and the line style of each definition."""
-    root, beams, selection = by_beam(root, beam, mesh_type, material, load, kinematics)
-    looks = {name: style.line(number) for number, name in enumerate(labels_of(root.status != 0, "definition"))}
-    return root, beams, selection, looks
+def _looks(root):
+    """Line style of each definition."""
+    return {name: style.line(number) for number, name in enumerate(labels_of(root.status != 0, "definition"))}
 
 
 def _parts(present):
@@ -135,7 +133,8 @@ def plot_size(data, ax=None, *, beam=None, mesh_type=None, material=None, load=N
     >>> axes[0].get_xlabel(), axes[0].get_ylabel()
     ('Mesh size [mm]', 'Deformation error [%]')
     """
-    root, beams, selection, looks = _by_beam(like_with_like(data), beam, mesh_type, material, load, kinematics)
+    root, beams, selection = by_beam(like_with_like(data), beam, mesh_type, material, load, kinematics)
+    looks = _looks(root)
     values = last_swept(root.status != 0, "mesh_size")
     root = at(root, values)
     parts = {name: _parts(root.status.sel(beam=name) != 0) for name in beams}
@@ -248,7 +247,8 @@ def plot_sweep(
     if parameter not in swept:
         raise ValueError(f"parameter: {parameter!r} is not swept; the study sweeps {', '.join(swept) or 'nothing'}")
     root = root[["status", "deformation_error", "beam_length", "beam_height"]]
-    root, beams, selection, looks = _by_beam(root, beam, mesh_type, material, load, kinematics)
+    root, beams, selection = by_beam(root, beam, mesh_type, material, load, kinematics)
+    looks = _looks(root)
     several = [name for name in beams if _most((root.status != 0).sel(beam=[name]), parameter) > 1]
     shown = [_of_beam(root, name, parameter, mesh_size) for name in several or beams]
     shown = [(one, part) for one in shown for part in _parts(one.status != 0)]

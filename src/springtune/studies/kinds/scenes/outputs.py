@@ -1,6 +1,7 @@
 """Outputs of scenes, and what the page to browse shows of scenes, curves and references."""
 
 from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from springtune.problem.loads import LOADS
@@ -10,6 +11,8 @@ from ...config.model import once_a_study, shown, swept_value
 from ...output.browse import Plot, View
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from ...config.model import CurveSpec, SceneSpec, Study
 
 SENSITIVITY_LABELS = ("beam", "mesh_type", "material", "load")
@@ -81,6 +84,14 @@ def _sweeps(study: "Study") -> dict[str, Mapping[str, str]]:
     return found
 
 
+def write_paraview(tree: "xr.DataTree", folder: Path) -> list[Path]:
+    """Write a collection of scenes for ParaView, and its files."""
+    from ...output.export import write_scenes  # here, since a plan does without xarray
+
+    folder.mkdir(parents=True, exist_ok=True)
+    return [path.relative_to(folder) for path in write_scenes(tree, folder / COLLECTION)]
+
+
 def _too_many(study: "Study") -> str:
     from springtune.handover.paraview import MOST_PIECES  # here, since it needs numpy
 
@@ -126,7 +137,7 @@ OUTPUTS = (
         "deformed networks with displacements, their error, and stiffness and force of each spring, as files for "
         "ParaView (and the group `/fields` behind them)",
         tables=lambda study: [COLLECTION],
-        write="studies.kinds.scenes.paraview",
+        write="studies.kinds.scenes.outputs:write_paraview",
         into="paraview",
         job="scenes",
         lack=_too_many,

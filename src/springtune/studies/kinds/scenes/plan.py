@@ -386,7 +386,7 @@ def mesh_products(content):
 
 
 def _reference_tasks(study):
-    """Tasks of references that are not interpolated; those that share elements are in one job."""
+    """Tasks of references, of which those that share elements are in one job, and of interpolants."""
     found = {}
     for one in study.references:
         body = one.beam, one.material, one.load
@@ -400,40 +400,14 @@ def _reference_tasks(study):
             values = {"law": law, "plane": plane, "load": load.kind.name, "force": one.force, "follower": load.follower}
             values |= {"beam": beam_key(one.beam), "material": material_key(one.material)}
             found[key] = Task(values, costs=[("finite", 0)], name=hash_of(kind, _finite_problem(one)), key=key)
-    return found.values()
-
-
-_REFERENCE_STAGE = stage(
-    "reference",
-    "studies.kinds.scenes.reference",
-    "Solving the finite-element references",
-    _reference_tasks,
-    "references",
-)
-
-
-def _reference_members(study, costs):
-    """References, and interpolants with the unit problems that are asked of them."""
-    members = dict(_REFERENCE_STAGE.members(study, costs))
+    yield from found.values()
     asked = {(one.beam, one.material, one.load) for one in study.references}
     for kind, (box, problems) in interpolants(study).items():
         if not asked.isdisjoint(problems):  # a part of a study may ask for none
             key = interpolant_key(kind, box)
             keys = {solved_reference(*body)["key"]: problem for body, problem in problems.items()}
-            task = {"key": key, "kind": kind, "box": box, "problems": keys}
-            members[key] = costs.of("interpolant", expected_solves(box)), task
-    return members
-
-
-def _references(study, folder, members):
-    interpolated = [one for one in members if isinstance(one, dict)]
-    content = _REFERENCE_STAGE.content(study, folder, [one for one in members if not isinstance(one, dict)])
-    return content | ({"interpolants": interpolated} if interpolated else {})
-
-
-def _reference_products(content):
-    interpolants = content.get("interpolants", ())
-    return products(content) + [Path(content["folder"]) / f"{one['key']}.h5" for one in interpolants]
+            values = {"kind": kind, "box": box, "problems": keys}
+            yield Task(values, costs=[("interpolant", expected_solves(box))], name=key, key=key)
 
 
 def _curve(study, curve):
@@ -617,7 +591,13 @@ def _seconds(one, costs):
 
 
 STAGES = (
-    replace(_REFERENCE_STAGE, content=_references, products=_reference_products, members=_reference_members),
+    stage(
+        "reference",
+        "studies.kinds.scenes.reference",
+        "Solving the finite-element references",
+        _reference_tasks,
+        "references",
+    ),
     mesh_stage("mesh", "studies.kinds.scenes.mesh", "Meshing", _meshes, _mesh_members),
     stage_on_meshes(
         "sensitivity",

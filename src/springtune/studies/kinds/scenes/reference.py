@@ -21,20 +21,27 @@ OF_TESTED = "has a uniaxial_test, and so Yeoh's law: its reference is 'yeoh-plan
 
 def run(content, costs):
     """Solve the missing references of a bundle."""
-    driver.solve_files(sys.modules[__name__], content, costs)
-    for task in content.get("interpolants", ()):
+    interpolants, others = _divided(content)
+    driver.solve_files(sys.modules[__name__], others, costs)
+    for task in interpolants:
         make_interpolant(Path(content["folder"]) / f"{task['key']}.h5", task, costs)
 
 
 def gone(content, key, why, limits):
     """Store the failed result of a reference beyond its limits."""
-    if driver.gone_of_files(sys.modules[__name__], content, key, why, limits):
-        return
+    interpolants, others = _divided(content)
+    driver.gone_of_files(sys.modules[__name__], others, key, why, limits)
     # What an interpolant cannot do goes into its own file.
-    for task in content.get("interpolants", ()):
+    for task in interpolants:
         if key in (task["key"], *task["problems"]):
             noted = failed(task, why) | {store.LIMITS: limits}
             store.add(Path(content["folder"]) / f"{task['key']}.h5", {key: noted})
+
+
+def _divided(content):
+    """Tasks of interpolants, and the content of a job without them."""
+    tasks = [task for file in content["files"] for task in file["tasks"] if "box" in task]
+    return tasks, content | {"files": [file for file in content["files"] if "box" not in file["tasks"][0]]}
 
 
 def solve(task):
@@ -46,18 +53,15 @@ def solve(task):
 def _finite(task):
     """Result at finite strain."""
     # Here, since few studies need it.
-    from springtune.reference.finite_strain import FiniteStrainError, IncompressibleError, solve_neo_hooke, solve_yeoh
+    from springtune.reference.finite_strain import FiniteStrainError, solve_finite_strain
 
     beam, material, kind = Beam(**task["beam"]), material_of(task["material"]), LOAD_KINDS[task["load"]]
     tested = isinstance(material, Rubber)
     if tested != (task["law"] == "yeoh"):
         return {"message": f"material {OF_TESTED if tested else NOT_TESTED}"}
     try:
-        if tested:
-            solution = solve_yeoh(beam, material, task["force"], kind, task["follower"])
-        else:
-            solution = solve_neo_hooke(beam, material, task["force"], kind, task["plane"], task["follower"])
-    except (FiniteStrainError, IncompressibleError) as error:
+        solution = solve_finite_strain(beam, material, task["force"], kind, task["plane"], task["follower"])
+    except FiniteStrainError as error:
         return {"message": str(error)}
     names = ("displacement", "mean_displacement", "error_estimate", "positions", "profile")
     return {name: getattr(solution, name) for name in names} | {"message": ""}

@@ -12,7 +12,7 @@ from ..scenes import variables as shared
 from ..scenes.collect import fields_on, put_outline, with_objection
 from ..scenes.stored import PACKED, fields_key, unpacked
 from ..scenes.variables import declared, topology
-from . import plan
+from . import kind
 from .outputs import CASE_AXES, DRAWING, MESH_AXES, SCENE_AXES
 from .task_values import named, quantity_key
 
@@ -88,10 +88,10 @@ def groups(study, folder):
     found = Filler(SHAPES.empty(study.axes))
     _quantities(part, found)
     references = _references(study, part, folder, found)
-    for scenes in plan.by_mesh(part).values():
+    for scenes in kind.by_mesh(part).values():
         _mesh(scenes[0], folder, found)
-        keys = {one: plan.scene_task(part, one)["key"] for one in scenes}
-        results = store.read(folder / "solutions" / f"{plan.file_name(scenes[0])}.h5", set(keys.values()))
+        keys = {one: kind.scene_task(part, one)["key"] for one in scenes}
+        results = store.read(folder / "solutions" / f"{kind.file_name(scenes[0])}.h5", set(keys.values()))
         for one, key in keys.items():
             _scene(part, one, results[key], references, found)
     drawn = DRAWING in study.outputs and not study.part
@@ -114,7 +114,7 @@ def _references(study, part, folder, found):
     """Write references; return result and objections by shape, material and load."""
     answers = {}
     for shape, material, load in part.referred:
-        task = plan.reference_task(part, shape, material, load)
+        task = kind.reference_task(part, shape, material, load)
         result = store.read_one(folder / "shape_references", task["key"])
         labels = {"shape": shape, "material": material, "load": load}
         case = part.shape[shape].loads[load]
@@ -143,7 +143,7 @@ def _references(study, part, folder, found):
 
 
 def _mesh(one, folder, found):
-    notes = stored.read_notes(folder / "meshes", plan.file_name(one))
+    notes = stored.read_notes(folder / "meshes", kind.file_name(one))
     labels = {"shape": one.shape, "mesh_type": one.mesh_type, "mesh_size": one.mesh_size}
     found.put({name: notes[name] for name in shared.MESH_ROWS if name in notes}, **labels)
 
@@ -181,10 +181,10 @@ def _fields(study, folder):
     """Group of the drawn networks."""
     part = study.parts["shapes"]
     cases = {}
-    drawn = plan.shown(part)
+    drawn = kind.shown(part)
     for one in (one for one in part.scenes if one in drawn):
         cases.setdefault((one.shape, one.load), []).append(one)
-    meshes = {case: stored.read(folder / "meshes", plan.file_name(scenes[0])) for case, scenes in cases.items()}
+    meshes = {case: stored.read(folder / "meshes", kind.file_name(scenes[0])) for case, scenes in cases.items()}
     outlines = {case: _outline(part, scenes[0], folder) for case, scenes in cases.items()}
     there = [({"case": ", ".join(case)}, found.mesh) for case, found in meshes.items() if found]
     axes = study.axes | {"case": tuple(map(", ".join, cases))}
@@ -199,8 +199,8 @@ def _fields(study, folder):
         found.put_rows({"outline_round": rounds}, case=label)
         if not meshes[case]:
             continue
-        path = folder / "solutions" / f"{plan.file_name(one)}.h5"
-        keys = {scene: fields_key(plan.scene_task(part, scene)["key"]) for scene in scenes}
+        path = folder / "solutions" / f"{kind.file_name(one)}.h5"
+        keys = {scene: fields_key(kind.scene_task(part, scene)["key"]) for scene in scenes}
         results = store.read(path, set(keys.values()), [PACKED])
         for scene, key in keys.items():
             kept = unpacked(results[key])
@@ -215,7 +215,7 @@ def _outline(part, one, folder):
     """Points of the outline, their displacements in the reference, and the number of their round."""
     case = one.shape, one.material, one.load
     if case in part.referred:
-        key = plan.reference_task(part, *case)["key"]
+        key = kind.reference_task(part, *case)["key"]
         found = store.read_one(folder / "shape_references", key, OUTLINE_ARRAYS)
         if not found["message"]:
             points, moved, sizes = (found[name] for name in OUTLINE_ARRAYS)

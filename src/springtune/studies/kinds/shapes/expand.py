@@ -17,7 +17,7 @@ from springtune.springs import DEFINITIONS
 
 from ...config.checks import FEWER, check_density, check_for_triangles, check_known, check_particles
 from ...config.expand import file_fault
-from .plan import OWN_FILE, mesh_name
+from .outputs import OWN_FILE, mesh_name
 from .sections import OUTLINED
 
 

@@ -80,20 +80,17 @@ def plot_shape_errors(data, ax=None, *, shape=None, load=None, material=None, ki
     names, definitions = _quantities(cut), labels_of(cut.status != 0, "definition")
     rows = max(1, len(names))
     tall = max(2.25, 0.72 + 0.16 * len(definitions))  # a line of names for each
-    figure, axes = style.panels(ax, rows, 2, figsize=(style.PAGE, 0.35 + tall * rows), sharey=False)
     title = ", ".join([selection["shape"], selection["load"], selection["material"], selection["kinematics"]])
     points = {name: {one: _points(cut, name, one) for one in definitions} for name in names}
     if not all(line[3].all() for lines in points.values() for line in lines.values()):
         title += "; hollow: unstable, or beyond the linear reference"
-    place = {"left": 0.6, "right": 0.08, "bottom": 0.42, "top": 0.52, "across": 0.2, "down": 0.72, "title": title}
-    style.arrange(figure, axes, **place)
-    ends = [_errors_of(panels, cut, name, points[name]) for panels, name in zip(axes, names)]
-    if not names:
-        for panel in axes.flat:
+    size = (style.PAGE, 0.35 + tall * rows)
+    place = {"bottom": 0.42, "top": 0.52, "across": 0.2, "down": 0.72, "title": title}
+    with labels.arranged(ax, rows, 2, figsize=size, **place) as (axes, ends):
+        for panels, name in zip(axes, names):
+            ends.update(zip(panels, _errors_of(panels, cut, name, points[name])))
+        for panel in axes.flat if not names else ():
             labels.say(panel, "No quantity was asked for.")
-    labels.settle(figure, axes, place)
-    for panel, found in zip(axes.flat, (one for pair in ends for one in pair)):
-        labels.name_lines(panel, found)
     return axes
 
 
@@ -361,7 +358,8 @@ def plot_shape(data, ax=None, *, shape=None, load=None, definition=None):
     rows = axes.shape[0]
     if ax is None:
         figure.set_size_inches(page, 0.5 + 0.75 + (tall + 0.3) * rows)
-    scale = _scale(case, wanted, max(width, height))
+    networks = case.sel(definition=[name for name in wanted if name in case.definition.values])
+    scale = _scale(case, networks, max(width, height))
     size = "mesh of the file" if not mesh["mesh_size"] else f"mesh {1e3 * mesh['mesh_size']:g} mm"
     said = [*about.values(), f"{size}, {float(cut.particles):.0f} particles", f"displaced × {scale:g}"]
     lost = [name for name in asked if STATUS[int(cut.status.sel(definition=name))] != "solved" and name not in wanted]
@@ -371,7 +369,7 @@ def plot_shape(data, ax=None, *, shape=None, load=None, definition=None):
     place = {"left": left, "right": 0.08, "bottom": 0.9, "top": 0.42 + 0.13 * labels.lines_of(title)}
     place |= {"down": 0.3, "across": 0.1, "title": title}
     style.arrange(figure, axes, **place)
-    most = _largest_force(case, wanted)
+    most = _largest_force(networks)
     drawn = [_network(panel, case, cut, name, scale, most) for panel, name in zip(flat, wanted)]
     for number, panel in enumerate(flat):
         panel.set(aspect="equal", adjustable="datalim")
@@ -398,19 +396,18 @@ def _few(cut, asked):
     return [name for name in asked if name in order[:MOST_NETWORKS]]
 
 
-def _scale(case, wanted, extent):
+def _scale(case, networks, extent):
     """Factor on displacements: the largest is about a twelfth of the body."""
     sizes = np.hypot(case.reference_displacement_x.values, case.reference_displacement_y.values)
     if not np.isfinite(sizes).any():
-        moved = case.sel(definition=[name for name in wanted if name in case.definition.values])
-        sizes = np.hypot(moved.displacement_x.values, moved.displacement_y.values)
+        sizes = np.hypot(networks.displacement_x.values, networks.displacement_y.values)
     factor = 0.08 * extent / (largest(sizes) or np.inf)
     return 1.0 if 0.4 < factor < 2 or not factor else magnification(factor)
 
 
-def _largest_force(case, wanted):
+def _largest_force(networks):
     """Force at the ends of the colour scale [N]; 3 % of the springs are beyond."""
-    forces = case.spring_force.sel(definition=[name for name in wanted if name in case.definition.values]).values
+    forces = networks.spring_force.values
     forces = np.abs(forces[np.isfinite(forces)])
     return float(np.quantile(forces, 0.97)) if len(forces) and forces.max() > 0 else 1.0
 

@@ -1,16 +1,232 @@
 """Shapes: a study's sections ``shapes`` and ``shape_grids``, one scene each combination of a grid.
 
-Most studies have none: their sections, checks and scenes are imported where one has.
+Stages with the tasks of their jobs, and keys of results. Most studies have no shapes: their sections, checks and scenes
+are imported where one has.
 """
 
+from collections import defaultdict
+from dataclasses import replace
+from operator import attrgetter
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from pydantic import Field
 
 from ...config.kind import Kind
 from ...config.sections import Later
-from .outputs import OUTPUTS, stems
-from .plan import STAGES, pieces, take
+from ...runs import driver
+from ...runs.checked_json import hash_of
+from ...runs.keys import definition_key, material_key, mesh_type_key, stage_key
+from ...runs.stages import Task, stage
+from ..scenes.plan import file_source, mesh_stage, on_meshes, parameters, particles_in, stage_on_meshes
+from .outputs import DRAWING, OUTPUTS, OWN_FILE, mesh_name, stems
+
+if TYPE_CHECKING:
+    from collections.abc import Collection
+
+    from ...config.model import Study
+
+MOST_DRAWN = 1500
+"""Particles, about, of the largest mesh that is drawn where a coarser one is there."""
+
+FILE_PARTICLES = 2000.0
+"""Particles of a mesh from a file, for costs, before it is read."""
+
+
+def file_name(one):
+    """Stem of its files, which differs from those of beams."""
+    return f"shape_{mesh_name(one)}"
+
+
+def particles(part, one):
+    """Approximate number of particles of a scene's mesh."""
+    shape = part.shape[one.shape]
+    return FILE_PARTICLES if shape.file else particles_in(shape.area, one.mesh_size)
+
+
+# -- keys --------------------------------------------------------------------------------------------------------------
+
+
+def _source(shape):
+    """Geometry of a shape, or its file."""
+    from .task_values import geometry  # here, as below: studies of beams read the stages as well
+
+    return geometry(shape) | (file_source(shape.file, shape.unit) if shape.file else {})
+
+
+def mesh_source(part, one):
+    """Source of a scene's mesh."""
+    source = _source(part.shape[one.shape])
+    if "file" in source:
+        return source
+    refined = {name: share * one.mesh_size for name, share in part.refined[one.shape].items()}
+    return source | {"mesh_type": one.mesh_type, "mesh_size": one.mesh_size, "refined": refined}
+
+
+def mesh_key(part, one):
+    """Key of a scene's mesh."""
+    return hash_of(
+        parameters(mesh_source(part, one)),
+        stage_key("studies.kinds.shapes.mesh"),
+        _reader(part.shape[one.shape]),
+    )
+
+
+def _reader(shape):
+    """Key of the code that reads the mesh file of a shape; empty without a file."""
+    return mesh_type_key(OWN_FILE) if shape.file else ""
+
+
+def _case(part, shape, material, name):
+    """Thickness, load and materials of a scene; densities only under gravity."""
+    from .task_values import load
+
+    case = part.shape[shape].loads[name]
+    weighs = any(case.gravity)
+    materials = {key: material_key(one, weighs) for key, one in part.materials_of(shape, material).items()}
+    return {"thickness": part.shape[shape].thickness, "load": load(case), "materials": materials}
+
+
+def reference_task(part, shape, material, name):
+    """Task of a reference."""
+    task = {"shape": _source(part.shape[shape])} | _case(part, shape, material, name)
+    code = stage_key("studies.kinds.shapes.reference", driver.DRIVER), _reader(part.shape[shape])
+    key = hash_of(task | {"shape": parameters(task["shape"])}, code)
+    return {"key": key} | task
+
+
+def scene_task(part, one, kept=()):
+    """Task of a scene."""
+    task = _case(part, one.shape, one.material, one.load)
+    task |= {"definition": one.definition, "kinematics": one.kinematics}
+    # Scenes of shapes have no reference at finite strain.
+    code = stage_key("studies.kinds.shapes.solve", without=("reference.finite_strain",)), definition_key(one.definition)
+    key = hash_of(mesh_key(part, one), task, code)
+    return {"key": key} | task | ({"keep_fields": True} if one in kept else {})
+
+
+def shown(part):
+    """Scenes whose networks are drawn: of a shape and load the finest mesh that is not too large, one material."""
+    cases, size = defaultdict(list), attrgetter("mesh_size")
+    for one in part.scenes:
+        cases[one.shape, one.load].append(one)
+    found = set()
+    for scenes in cases.values():
+        few = [one for one in scenes if particles(part, one) <= MOST_DRAWN]
+        mesh = min(few, key=size) if few else max(scenes, key=size)
+        alike = [one for one in scenes if mesh_name(one) == mesh_name(mesh)]
+        found |= {one for one in alike if (one.material, one.kinematics) == (alike[0].material, alike[0].kinematics)}
+    return found
+
+
+def by_mesh(part):
+    """Scenes by the name of their mesh."""
+    found = defaultdict(list)
+    for one in part.scenes:
+        found[mesh_name(one)].append(one)
+    return found
+
+
+# -- stages ------------------------------------------------------------------------------------------------------------
+
+
+def _mesh_members(study, costs):
+    """Meshes with their scenes, and the cost of both."""
+    part = study.parts["shapes"]
+    members = {}
+    for name, scenes in by_mesh(part).items() if part else ():
+        count = particles(part, scenes[0])
+        seconds = costs.of("shape_mesh", count)
+        seconds += sum(costs.of("shape_scene", count) + costs.of(one.definition, count) for one in scenes)
+        members[name] = seconds, scenes
+    return members
+
+
+def _meshes(study, folder, members):
+    part = study.parts["shapes"]
+    return {
+        "folder": str(folder / "meshes"),
+        "files": [{"name": file_name(one), "key": mesh_key(part, one)} | mesh_source(part, one) for one, *_ in members],
+    }
+
+
+def _reference_tasks(study):
+    part = study.parts["shapes"]
+    for one in part.referred if part else ():
+        task = reference_task(part, *one)
+        yield Task(task, costs=[("shape_reference", 0)], name="/".join(one), key=task["key"])
+
+
+def _solve(study, folder, members):
+    part = study.parts["shapes"]
+    kept = shown(part) if DRAWING in study.outputs else ()
+    files = [
+        {
+            "name": file_name(scenes[0]),
+            "shape": parameters(_source(part.shape[scenes[0].shape])),
+            "tasks": list({task["key"]: task for task in (scene_task(part, one, kept) for one in scenes)}.values()),
+        }
+        for scenes in members
+    ]
+    return on_meshes(folder, "solutions", files)
+
+
+# -- parts of a study --------------------------------------------------------------------------------------------------
+
+
+def pieces(study, costs, division):
+    """Seconds of each piece: of a shape under a load, which says what of it is drawn, or of all grids."""
+    part = study.parts["shapes"]
+    found = defaultdict(float)
+    for one in part.scenes:
+        count = particles(part, one)
+        found[one.shape, one.load] += costs.of("shape_scene", count) + costs.of(one.definition, count)
+    for shape, _, load in part.referred:
+        found[shape, load] += costs.of("shape_reference")
+    return division.of_section(found)
+
+
+def take(study, names):
+    """Study reduced to some pieces."""
+    wanted = set(names)
+    return of_shape_scenes(study, {one for one in study.parts["shapes"].scenes if (one.shape, one.load) in wanted})
+
+
+def of_shape_scenes(study: "Study", chosen: "Collection[object]") -> "Study":
+    """Study reduced to some scenes of shapes and what they need."""
+    part = study.parts["shapes"]
+    scenes = tuple(scene for scene in part.scenes if scene in chosen) if part else ()
+    if not scenes:
+        return replace(study, parts=study.parts | {"shapes": ()})
+    cases = {(one.shape, one.material, one.load) for one in scenes}
+    names = {one.shape for one in scenes}
+    found = replace(
+        part,
+        shapes=tuple(shape for shape in part.shapes if shape.name in names),
+        scenes=scenes,
+        referred=tuple(case for case in part.referred if case in cases),
+    )
+    return replace(study, parts=study.parts | {"shapes": found})
+
+
+STAGES = (
+    stage(
+        "shape_reference",
+        "studies.kinds.shapes.reference",
+        "Solving the references of shapes",
+        _reference_tasks,
+        "shape_references",
+    ),
+    mesh_stage("shape_mesh", "studies.kinds.shapes.mesh", "Meshing shapes", _meshes, _mesh_members),
+    stage_on_meshes(
+        "shape_solve",
+        "studies.kinds.shapes.solve",
+        "Solving the networks of shapes",
+        _solve,
+        "solutions",
+        "shape_mesh",
+    ),
+)
 
 
 def _check(config, problems):

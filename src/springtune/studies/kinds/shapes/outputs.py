@@ -15,6 +15,9 @@ CASE_AXES = ("shape", "material", "load")
 SCENE_AXES = (*MESH_AXES, "material", "load", "definition", "kinematics")
 """Dimensions of the group ``/shapes``."""
 
+OWN_FILE = "file"
+"""Mesh type of a shape whose mesh is that of its file."""
+
 DRAWING = "shapes"
 """Output that is made of whole networks."""
 
@@ -23,6 +26,11 @@ OVERVIEW = "shapes_overview"
 
 ERRORS, DEFORMED = "shapes_errors", "shapes_deformed"
 """First parts of the stems of the figures of a shape under a load."""
+
+
+def mesh_name(one: Any) -> str:
+    """Readable name of a scene's mesh."""
+    return f"{one.shape}_{one.mesh_type}" + ("" if one.mesh_type == OWN_FILE else f"_{1e3 * one.mesh_size:.9g}mm")
 
 
 def figures(cases: "list[dict[str, str]]") -> "dict[str, dict[str, str]]":
@@ -107,7 +115,7 @@ def tables(tree: "xr.DataTree") -> list[dict[str, Any]]:
     data = tree["shapes"].to_dataset()
     present = (data.status != 0).transpose(*SCENE_AXES) & (data.quantity_kind != "")
     values = ("value", "reference_value", "expected_value", "quantity_units", *ERRORS_SHOWN, "status", "message")
-    rows, sources = [], {}
+    rows, sources = [], dict[str, None]()
     for one in records(data, present.transpose(*SCENE_AXES, "quantity"), ("particles", "source", *values)):
         if one["source"]:
             sources[f"{one['shape']}, {one['quantity']}: {one['source']}"] = None

@@ -327,29 +327,31 @@ def plot_stability_meshes(data, ax=None):
     """
     data = _experiment(data, "slivers")
     perturbed = "perturbed_error" in data
-    figure, axes = style.panels(ax, ncols=1 + perturbed, figsize=(style.PAGE if perturbed else style.COLUMN, 2.4))
-    place = dict(left=0.45, right=0.08, bottom=0.4, top=0.28, across=0.55)
-    style.arrange(figure, axes, **place)
-    axes = axes[0]
     kinds = {"sliver": "sliver_angle", "perturbed": "perturbation"}
-    for panel, (kind, dimension) in zip(axes, kinds.items()):
-        limits = data[f"{kind}_step_limit"]
-        curves = {name: (limits.sel(definition=name) / limits.sel(definition=name).isel({dimension: 0})).values
-                  for name in labels_of(data[f"{kind}_step_limit"].notnull(), "definition")}  # fmt: skip
-        panel.set(ylabel="Stable step over the whole mesh's", ylim=(0, 1.1))
-        if kind == "sliver":
-            panel.set(xscale="log", xlabel="Smallest angle of one triangle [degree]", title="A sliver")
-        else:
-            panel.set(xlabel="Move of inner particles over mesh size", title="Particles moved at random")
-        ends = _curves(panel, data[dimension].values, curves)
-        if not ends:
-            labels.say(panel, "No definition has a largest step here.")
-            continue
-        if kind == "sliver":
-            panel.invert_xaxis()
-            style.plain(panel, "x")
-        labels.name_lines(panel, ends)
-    return axes
+    size = (style.PAGE if perturbed else style.COLUMN, 2.4)
+    with labels.arranged(ax, ncols=1 + perturbed, figsize=size, bottom=0.4) as (axes, ends):
+        for panel, (kind, dimension) in zip(axes[0], kinds.items()):
+            ends[panel] = _steps(panel, data, kind, dimension)
+    return axes[0]
+
+
+def _steps(panel, data, kind, dimension):
+    """Draw largest stable steps of meshes of a kind: ends of the lines."""
+    limits = data[f"{kind}_step_limit"]
+    of_names = {name: limits.sel(definition=name) for name in labels_of(limits.notnull(), "definition")}
+    curves = {name: (steps / steps.isel({dimension: 0})).values for name, steps in of_names.items()}
+    panel.set(ylabel="Stable step over the whole mesh's", ylim=(0, 1.1))
+    if kind == "sliver":
+        panel.set(xscale="log", xlabel="Smallest angle of one triangle [degree]", title="A sliver")
+    else:
+        panel.set(xlabel="Move of inner particles over mesh size", title="Particles moved at random")
+    ends = _curves(panel, data[dimension].values, curves)
+    if not ends:
+        labels.say(panel, "No definition has a largest step here.")
+    elif kind == "sliver":
+        panel.invert_xaxis()
+        style.plain(panel, "x")
+    return ends
 
 
 @style.styled

@@ -1,13 +1,11 @@
 """Experiments on numerical stability: a study's section ``stability``."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Annotated
 
 from pydantic import Field
 
 from springtune.mesh import MESH_TYPES
-from springtune.problem.geometry import Beam
-from springtune.problem.materials import Material
 
 from ...config.checks import check_beam_material, check_density, check_for_triangles, check_known, check_particles
 from ...config.fields import BeamName, DefinitionName, Force, Length, MaterialName, MeshType, OneOrMore, one_of
@@ -16,7 +14,7 @@ from ...config.sections import Section, optional
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key
 from ...runs.stages import Task, stage
 from ..division import by_task
-from . import AXES, EXPERIMENTS, ONCE
+from . import AXES, EXPERIMENTS, ONCE, Experiment
 from .outputs import OUTPUTS
 
 ExperimentName = Annotated[str, one_of("experiment", EXPERIMENTS)]
@@ -43,19 +41,6 @@ class StabilityConfig(Section):
     )
 
 
-@dataclass(frozen=True)
-class Experiment:
-    """An experiment on numerical stability, under a traction [N], on ascending edge lengths [m]."""
-
-    name: str
-    beam: Beam
-    material: Material
-    force: float
-    definition: str
-    mesh_type: str
-    mesh_sizes: tuple[float, ...]
-
-
 def _check(config, problems):
     if not config.stability:
         return
@@ -71,7 +56,7 @@ def _check(config, problems):
     if section.beam in config.beams:
         beam = config.beams[section.beam]
         check_particles(problems, ("stability", "mesh_size"), section.mesh_size, beam.length, beam.height)
-        side = min(config.beams[section.beam].length, config.beams[section.beam].height)
+        side = min(beam.length, beam.height)
         if max(section.mesh_size) > 0.3 * side:
             message = f"{1e3 * max(section.mesh_size):g} mm leaves few particles inside; give at most {300 * side:g} mm"
             problems.add(("stability", "mesh_size"), message)
@@ -82,16 +67,10 @@ def _expand(config, declared):
     section = config.stability
     if not section:
         return ()
+    beam, material = declared.beams[section.beam], declared.materials[section.material]
+    sizes = tuple(sorted(section.mesh_size))
     return tuple(
-        Experiment(
-            name,
-            declared.beams[section.beam],
-            declared.materials[section.material],
-            section.force,
-            definition,
-            section.mesh_type,
-            tuple(sorted(section.mesh_size)),
-        )
+        Experiment(name, beam, material, section.force, definition, section.mesh_type, sizes)
         for name in EXPERIMENTS
         if name in section.experiment
         for definition in (section.definition[:1] if name in ONCE else section.definition)

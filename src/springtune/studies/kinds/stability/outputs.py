@@ -32,7 +32,7 @@ OUTPUTS = (
         figures=lambda study: figures({one.name for one in study.parts["stability"]}),
         plot="studies.kinds.stability.figures:stability",
         tables=lambda study: [PAGE],
-        write="studies.kinds.stability.tables",
+        write="studies.kinds.stability.tables:write",
         lack=needs("stability", "shows experiments and the study has none; add a section 'stability'"),
     ),
 )

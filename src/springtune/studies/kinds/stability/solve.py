@@ -6,7 +6,7 @@ Each takes a `Setup` and returns arrays by the names of `STABILITY` in `collect`
 
 import time
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import fields, replace
 from functools import cached_property
 from itertools import product
 
@@ -28,7 +28,7 @@ from springtune.scene.motion import motion_of
 from springtune.scene.sheet import Sheet
 from springtune.springs import DefinitionError, Springs
 
-from . import AXES
+from . import AXES, Experiment
 
 GROWTH_STEPS = 2000
 """Steps of each run that measures a limit."""
@@ -41,10 +41,9 @@ def failed(task, why):
 
 def solve(task):
     """Result of an experiment."""
-    setup = Setup(
-        Beam(**task["beam"]), material_of(task["material"]), task["force"], task["definition"], task["mesh_type"],
-        tuple(task["mesh_sizes"]),
-    )  # fmt: skip
+    made = {"beam": Beam(**task["beam"]), "material": material_of(task["material"])}
+    made["mesh_sizes"] = tuple(task["mesh_sizes"])
+    setup = Setup(**{one.name: task[one.name] for one in fields(Setup)} | made)
     begin = time.perf_counter()
     found = {name: np.asarray(values) for name, values in RUN[task["name"]](setup).items()}
     # Texts are no arrays of a file.
@@ -52,16 +51,8 @@ def solve(task):
     return found | {"experiment_seconds": time.perf_counter() - begin}
 
 
-@dataclass(frozen=True)
-class Setup:
-    """What experiments share: the traction [N] and ascending edge lengths [m]."""
-
-    beam: Beam
-    material: Material
-    force: float
-    definition: str
-    mesh_type: str
-    mesh_sizes: tuple[float, ...]
+class Setup(Experiment):
+    """An experiment with its meshes, springs and problems."""
 
     @cached_property
     def coarse(self):

@@ -11,7 +11,7 @@ from springtune.safe_io.escapes import markdown
 
 from ...output.dataset import STATUS
 from ...output.selection import cells, labels_of, records
-from ...output.text import markdown_section, markdown_table
+from ...output.text import cell_number, markdown_section, markdown_table
 from .outputs import PAGE
 
 
@@ -41,10 +41,6 @@ def page(tree: xr.DataTree) -> str:
     return "\n".join(parts + _scenes(tree.to_dataset()))
 
 
-def _number(value, form=".3g", scale=1.0):
-    return "" if np.isnan(float(value)) else f"{scale * float(value):{form}}".replace("-", "−")
-
-
 def _by_definition(data, variable, heads, texts):
     """Table of a row a definition that has values of a variable; `texts` are those of its part of the dataset."""
     names = labels_of(data[variable].notnull(), "definition")
@@ -63,9 +59,9 @@ def _limits(data):
             [
                 f"`{place['definition']}`",
                 f"{1e3 * place['mesh_size']:g}",
-                _number(undamped, scale=1e9),
-                _number(cell.dt_particle_bound, scale=1e9),
-                *map(_number, lagged.values / float(undamped)),
+                cell_number(undamped, scale=1e9),
+                cell_number(cell.dt_particle_bound, scale=1e9),
+                *map(cell_number, lagged.values / float(undamped)),
             ]
         )
     heads = ["definition", "mesh [mm]", "2/ω_max [ns]", "bound from particles [ns]"]
@@ -80,7 +76,7 @@ def _limits(data):
 def _drift(data):
     kinds = ("energy_drift", "energy_swing", "momentum_drift")
     rows = [
-        [f"`{name}`", *(_number(data[kind].sel(integrator=name), ".2g") for kind in kinds)]
+        [f"`{name}`", *(cell_number(data[kind].sel(integrator=name), ".2g") for kind in kinds)]
         for name in data.integrator.values
     ]
     heads = ["integrator", "drift of energy", "swing of energy", "drift of momentum"]
@@ -98,7 +94,7 @@ def _rest(data):
         for count in data.cg_iterations.values:
             errors = data.truncated_error.sel(mesh_size=size, cg_iterations=count).values
             solver = str(count) if count else "direct"
-            rows.append([f"{1e3 * size:g} mm", solver, *(_number(error, ".2g") for error in errors)])
+            rows.append([f"{1e3 * size:g} mm", solver, *(cell_number(error, ".2g") for error in errors)])
     heads = ["mesh", "iterations", *(f"{n} steps" for n in data.implicit_steps.values)]
     distances = "Distance of backward Euler from the static solution, by iterations of its linear solver:"
     return markdown_section("To rest", said, distances) + markdown_table(heads, rows)
@@ -108,7 +104,7 @@ def _contrast(data):
     rows = []
     for contrast in data.stiffness_contrast.values:
         cell = data.sel(stiffness_contrast=contrast)
-        errors = (_number(one, ".2g") for one in (cell.contrast_error, cell.contrast_estimate))
+        errors = (cell_number(one, ".2g") for one in (cell.contrast_error, cell.contrast_estimate))
         rows.append([f"{contrast:.0e}", STATUS[int(cell.contrast_status)], *errors])
     return markdown_section("Stiff parts beside soft ones") + markdown_table(
         ["contrast", "status", "error", "estimated"], rows
@@ -117,7 +113,7 @@ def _contrast(data):
 
 def _poisson(data):
     def texts(cell):
-        return (_number(limit, scale=1e9) for limit in cell.poisson_step_limit.values)
+        return (cell_number(limit, scale=1e9) for limit in cell.poisson_step_limit.values)
 
     heads = [f"{nu:g}" for nu in data.stressed_poisson_ratio.values]
     title = "Largest step [ns] over Poisson's ratio"
@@ -128,8 +124,8 @@ def _sizes(data):
     rows = []
     for scale in data["scale"].values:
         cell = data.sel(scale=scale)
-        errors = (_number(error, ".2g") for error in cell.precision_error.values)
-        rows.append([f"{1e3 * scale:g}", _number(cell.scaled_step_limit), *errors])
+        errors = (cell_number(error, ".2g") for error in cell.precision_error.values)
+        rows.append([f"{1e3 * scale:g}", cell_number(cell.scaled_step_limit), *errors])
     heads = ["mesh [mm]", "step over mesh size [s/m]", *(f"error, {kind}" for kind in data.precision.values)]
     return markdown_section("Scale and precision") + markdown_table(heads, rows)
 
@@ -140,7 +136,7 @@ def _strains(data):
         "Status, in brackets the negative pivots, or flutter, or the share of the load that is reached: beyond it the "
         "path turns back at a limit point where it is unstable, else Newton's method found nothing.",
     )
-    heads = [_number(strain, "g", 100) + " %" for strain in data.strain.values]
+    heads = [cell_number(strain, "g", 100) + " %" for strain in data.strain.values]
 
     def texts(cell, load):
         cell = cell.sel(strain_load=load)
@@ -160,7 +156,7 @@ def _perturbation(data):
     heads = [*(f"{share:g} a" for share in data.perturbation.values), "inverted starts: right", "wrong"]
 
     def texts(cell):
-        yield from (_number(error, "+.2f", 100) + " %" if np.isfinite(error) else "hole" for error in
+        yield from (cell_number(error, "+.2f", 100) + " %" if np.isfinite(error) else "hole" for error in
                     cell.perturbed_error.values)  # fmt: skip
         yield from (f"{100 * float(cell[f'inverted_starts_{end}']):.0f} %" for end in ("right", "wrong"))
 
@@ -170,7 +166,7 @@ def _perturbation(data):
 
 def _slivers(data):
     def texts(cell):
-        return map(_number, cell.sliver_step_limit.values / cell.sliver_step_limit.values[0])
+        return map(cell_number, cell.sliver_step_limit.values / cell.sliver_step_limit.values[0])
 
     heads = [f"{angle:g}°" for angle in data.sliver_angle.values]
     title = "Largest step with a sliver, over that at 30 degrees"
@@ -183,7 +179,7 @@ def _buckling(data):
 
     def texts(cell):
         marks = np.where(cell.restricted.values, "*", "")
-        return [_number(ratio, "+.1f", 100) + f" %{mark}" for ratio, mark in zip(cell.ratio.values, marks)]
+        return [cell_number(ratio, "+.1f", 100) + f" %{mark}" for ratio, mark in zip(cell.ratio.values, marks)]
 
     heads = [f"{count} rows" for count in data.rows.values]
     why = dict.fromkeys(str(one) for one in data.buckling_message.values[data.restricted.values])
