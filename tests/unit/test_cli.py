@@ -17,12 +17,13 @@ from click.testing import CliRunner
 
 import springtune
 from counting import counted
-from springtune import prediction
 from springtune.cli import COMMANDS, main
 from springtune.cli.recommendation import beam_subject, prediction_json, prediction_text
 from springtune.handover.formats import ENDINGS, FOR_SIMULATORS
 from springtune.mesh import MESH_TYPES, Mesh, braced, write_mesh
 from springtune.mesh.types import MeshType
+from springtune.prediction import bands
+from springtune.prediction import choices as of_one_mesh
 from springtune.prediction.search import find_mesh
 from springtune.problem.geometry import AssumptionWarning, Beam
 from springtune.problem.materials import Material
@@ -256,9 +257,9 @@ class TestSchema:
 def choices():
     """Beam, material, references and choices of the command without its text."""
     beam, material = Beam(0.1, 0.02), Material(210e9, 0.3, name="steel")
-    known = prediction.references(beam, material)
+    known = of_one_mesh.references(beam, material)
     mesh = MESH_TYPES["structured"](beam.length, beam.height, 5e-3)
-    return beam, material, known, prediction.predict(beam, mesh, material, known)
+    return beam, material, known, of_one_mesh.predict(beam, mesh, material, known)
 
 
 ABOUT = {"particles": 105, "springs": 268}
@@ -293,7 +294,7 @@ class TestPredict:
         beam, material, known, _ = choices
         known = known | {"bending": "its error estimate is 1"}
         mesh = MESH_TYPES["structured"](beam.length, beam.height, 5e-3)
-        found = prediction.predict(beam, mesh, material, known)
+        found = of_one_mesh.predict(beam, mesh, material, known)
         lines = prediction_text(beam_subject(beam, material, known), "", ABOUT, found).splitlines()
         rows = [line for line in lines if line.startswith("  ")]
         assert len(rows) > 5 and all("no reference" in row for row in rows[1:])
@@ -302,7 +303,7 @@ class TestPredict:
     def test_unstable_networks_are_marked(self, choices):
         beam, material, known, found = choices
         numbers = dict.fromkeys(("young_modulus_error", "poisson_ratio"), np.nan)
-        numbers["errors"] = dict.fromkeys(prediction.CASES, np.nan)
+        numbers["errors"] = dict.fromkeys(of_one_mesh.CASES, np.nan)
         failed = numbers | {"extra": "", "failures": {"patch test": "unstable: the network is unstable at rest"}}
         found = [replace(one, **failed) if one.definition == "patch" else one for one in found]
         ordered = sorted(found, key=lambda one: one.worst)
@@ -425,22 +426,22 @@ class TestPredictAMesh:
         ]  # fmt: skip
         beam, material = Beam(0.1, 0.02), Material(210e9, 0.3)
         mesh = MESH_TYPES["structured"](0.1, 0.02, 5e-3)
-        choices = prediction.predict(beam, mesh, material, loads=["bending", "pressure"])
+        choices = of_one_mesh.predict(beam, mesh, material, loads=["bending", "pressure"])
         assert [one["definition"] for one in found["choices"]] == [one.definition for one in choices]
         assert [one["errors"] for one in found["choices"]] == [one.errors for one in choices]
         assert found["recommended"] == choices[0].definition
         assert found["mesh"] == {
             "type": "structured", "file": None, "size": 0.005, "particles": len(mesh.points), "springs": len(mesh.edges)
         }  # fmt: skip
-        assert {*found["choices"][0]} == {field.name for field in fields(prediction.Choice)} | {"worst"}
+        assert {*found["choices"][0]} == {field.name for field in fields(of_one_mesh.Choice)} | {"worst"}
         own = [one for one in found["choices"] if one["definition"] == "delingette"]
         assert own[0]["inside"] is None and found["extrapolated_from"] == []
         assert set(found["references"]["bending"]) == {"displacement_per_newton", "error_estimate"}
 
     def test_json_of_bands(self):
         beam, material = Beam(0.1, 0.02), Material(210e9, 0.3)
-        known = prediction.references(beam, material)
-        choices, sizes = prediction.extrapolate("braced", 1e-3, beam, material, known, most=600)
+        known = of_one_mesh.references(beam, material)
+        choices, sizes = bands.extrapolate("braced", 1e-3, beam, material, known, most=600)
         found = json.loads(prediction_json(beam_subject(beam, material, known), {"type": "braced"}, choices, sizes))
         low, high = found["choices"][0]["errors"]["bending"]
         assert low < high and found["extrapolated_from"] == sizes

@@ -31,7 +31,7 @@ def test_a_time_that_is_none_is_refused_by_its_name(run, minutes):
     assert re.search(f"job_minutes={minutes}: no number of minutes; the profile slurm has 5", output, re.IGNORECASE)
 
 
-def test_what_the_dataset_is_not_to_tell_reaches_the_job_that_writes_it(run, repository):
+def test_what_the_dataset_is_not_to_tell_reaches_the_job_that_writes_it(run):
     run.write("elsewhere.yaml", STUDY)
     code, output = run.snakemake("elsewhere.yaml", "-n", "-p", "--config", "no_diff=true", "no_host=true")
     assert code == 0 and re.search(r"kinds\.collect .* git_diff host > ", output), output
@@ -39,10 +39,8 @@ def test_what_the_dataset_is_not_to_tell_reaches_the_job_that_writes_it(run, rep
     assert code == 0 and re.search(r"kinds\.collect .* [0-9a-f]{24} +> ", output), output
     code, output = run.snakemake("elsewhere.yaml", "-n", "--config", "no_host=maybe")
     assert code == 1 and "--config no_host=maybe: neither true nor false; give one of them" in output, output
-    command = [sys.executable, "-m", "springtune", "run", "--no-host", "elsewhere.yaml", "-n", "-p", "--cores", "2"]
-    around = os.environ | {"SPRINGTUNE_WORKFLOW": str(repository)}
-    done = subprocess.run(command, cwd=run.folder, env=around, capture_output=True, text=True)
-    assert done.returncode == 0 and re.search(r"kinds\.collect .* host > ", done.stdout + done.stderr), done
+    code, output = run.springtune("elsewhere.yaml", "--no-host", "-n", "-p")
+    assert code == 0 and re.search(r"kinds\.collect .* host > ", output), output
 
 
 def test_rules_whose_jobs_go_elsewhere_have_a_benchmark(repository):

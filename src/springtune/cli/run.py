@@ -113,8 +113,8 @@ def run(
         studies = [study, *(_read_for_paper(path, study) if "paper" in options else ())]
     if _plans(options):
         # A dry run removes no records. An option of the user's, which comes later, replaces this one.
-        found = _outdated(studies, left_empty, "a run makes it again") or {}
-        forced = ["--forcerun", *map(str, found)] if found else []
+        outdated = _outdated(studies, left_empty, "a run makes it again")
+        forced = ["--forcerun", *map(str, outdated)] if outdated else []
         command = [*_snakemake(), *forced, *command[len(_snakemake()) :]]
     elif _computes(options):
         _unlock(studies, [*_snakemake(), *workflow, "--unlock", f"--configfile={path}"])

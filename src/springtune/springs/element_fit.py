@@ -13,14 +13,18 @@ import numpy as np
 
 from ..mesh import Mesh, signed_areas
 from ..mesh.cells import DIAGONALS, SIDES
-from ..problem.materials import AnyMaterial
+from ..problem.materials import AnyMaterial, Material
 from .base import Springs, definition, membrane_stiffness
 
 
 @definition("element-fit", order=140, anisotropic=True)
 def springs(mesh: Mesh, material: AnyMaterial, thickness: float) -> Springs:
     """Springs fitted by least squares to the stiffness matrix of each finite element, none negative."""
-    elasticity = material.plane_stress / membrane_stiffness(material, 1.0)
+    if isinstance(material, Material):
+        nu = material.poisson_ratio
+        elasticity = np.array([[1, nu, 0], [nu, 1, 0], [0, 0, (1 - nu) / 2]]) / (1 - nu**2)
+    else:
+        elasticity = material.plane_stress / membrane_stiffness(material, 1.0)
     parts = {}
     for count, corners in mesh.cells.items():
         here = mesh.points[corners] - mesh.points[corners[:, :1]]
