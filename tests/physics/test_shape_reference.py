@@ -76,6 +76,32 @@ def test_a_finer_solution_confirms_the_estimate(make, name):
         assert coarse.values[quantity.name] == pytest.approx(fine.values[quantity.name], rel=both)
 
 
+def test_lame_ring_to_a_millionth():
+    shape, material = others.ring()
+    load = shape.loads["pressure"]
+    found = solve_shape(shape, load, material, tolerance=1e-6)
+    for quantity in load.quantities:
+        assert found.values[quantity.name] == pytest.approx(quantity.expected, rel=1e-6)
+    # The whole field: u_r of r, in every direction.
+    radii, angles = np.meshgrid(np.linspace(0.5, 1.0, 7), np.linspace(0, np.pi / 2, 9))
+    ways = np.stack([np.cos(angles), np.sin(angles)], axis=-1).reshape(-1, 2)
+    nu, factor = material.poisson_ratio, 1e6 * 0.25 / 0.75 / material.young_modulus
+    r = radii.reshape(-1, 1)
+    exact = factor * ((1 - nu) * r + (1 + nu) / r) * ways
+    np.testing.assert_allclose(found.at(r * ways), exact, rtol=0, atol=1e-6 * np.abs(exact).max())
+
+
+def test_cook_to_five_digits():
+    """Values to which tolerances of 1e-5 and 1e-7 agree, whatever the coarse mesh."""
+    shape, material = others.cook()
+    found = solve_shape(shape, shape.loads["shear"], material, tolerance=1e-5)
+    assert found.values["tip"] == pytest.approx(23.9677, abs=2e-4)
+    assert found.values["mean-tip"] == pytest.approx(24.0416, abs=1e-4)
+    assert found.values["reaction"] == pytest.approx(-1.0, rel=1e-9)
+    # The mean displacement of the loaded side is twice the energy, over the force.
+    assert 2 * found.energy == pytest.approx(found.values["mean-tip"], rel=1e-10)
+
+
 def test_stress_inside():
     """At a named point within the ring, which becomes a corner of triangles."""
     shape, material = others.ring()

@@ -3,6 +3,7 @@
 import ast
 import subprocess
 import sys
+from collections import defaultdict
 from pathlib import Path
 
 import pytest
@@ -123,3 +124,37 @@ def test_stages_say_what_is_lost_to_limits(stage):
     own = hasattr(module, "run") and not hasattr(module, "tasks")
     assert own or callable(module.solve)
     assert hasattr(module, "gone") == (own and stage.name != "calibrate")
+
+
+OWN = {"MAX_EVALUATIONS", "MAX_HALVINGS", "MAX_ITERATIONS", "SMALLEST_STEP", "TOLERANCE"}
+OWN |= {"KIND", "OUTPUTS", "PAGE", "PLOTS", "STAGE", "STAGES", "VIEWS"}
+"""Constants that say the same of each solver or each study kind, and that each has its own value of."""
+
+
+def test_a_constant_has_one_meaning():
+    """Constants of one name and different values read as one to whoever knows the other."""
+    values = defaultdict(dict)
+    for path, tree in PARSED.items():
+        for node in tree.body:
+            targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
+            for target in targets if isinstance(node, ast.Assign | ast.AnnAssign) and node.value else ():
+                names, parts = (
+                    (target.elts, getattr(node.value, "elts", []))
+                    if isinstance(target, ast.Tuple)
+                    else ([target], [node.value])
+                )
+                for name, value in zip(names, parts):
+                    if isinstance(name, ast.Name) and name.id.isupper():
+                        values[name.id].setdefault(ast.dump(value), str(path.relative_to(SOURCE)))
+    several = {name: sorted(found.values()) for name, found in values.items() if len(found) > 1 and name not in OWN}
+    assert not several, "\n".join(f"{name}: {', '.join(found)}" for name, found in several.items())
+
+
+def test_nothing_is_chosen_by_globals():
+    found = [
+        f"{path.relative_to(REPOSITORY)}:{node.lineno}"
+        for path, tree in PARSED.items()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "globals"
+    ]
+    assert not found

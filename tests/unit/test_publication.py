@@ -399,3 +399,15 @@ def test_a_dataset_that_is_not_there_is_told(tmp_path):
         run(paper(tmp_path / "source"), tmp_path / "build", tmp_path / "paper.pdf", tmp_path / "lost.nc")
     with pytest.raises(PaperError, match=r"main.typ: there is no such file"):
         run(tmp_path / "nowhere", tmp_path / "build", tmp_path / "paper.pdf", tmp_path / "lost.nc")
+
+
+def test_every_reference_says_what_was_read():
+    references = yaml.safe_load((PAPER / "references.yml").read_text())
+    text = (PAPER / "main.typ").read_text()
+    cited = set(re.findall(r"@([\w-]+)", text)) - set(re.findall(r"<([\w-]+)>", text))
+    assert cited == set(references)
+    for name, one in references.items():
+        assert re.search(r"\bread\b|software", one["note"]), name
+        assert name == "original" or one["author"], name
+        doi = one.get("serial-number", {}).get("doi")
+        assert doi is None or re.fullmatch(r"10\.\d{4,}/\S+", doi), name

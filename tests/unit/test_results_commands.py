@@ -19,7 +19,7 @@ from click.testing import CliRunner
 import springtune as st
 from springtune.cli import main
 from springtune.studies.kinds import load_study
-from springtune.studies.kinds.scenes import paraview
+from springtune.studies.kinds.scenes.outputs import write_paraview
 from springtune.studies.kinds.scenes.variables import FIELDS, ROOT, SENSITIVITY
 from springtune.studies.output import dataset, present
 from springtune.studies.runs import checked_json, locks
@@ -351,7 +351,7 @@ class TestExport:
         with st.open(fields) as tree:
             tree.load()
         tree["fields"]["displacement_x"].values[...] = np.nan
-        assert paraview.write(tree, fields / "none") == [Path("scenes.pvd")]
+        assert write_paraview(tree, fields / "none") == [Path("scenes.pvd")]
         assert [path.name for path in (fields / "none").iterdir()] == ["scenes.pvd"]
 
     @pytest.mark.parametrize("ending", ["csv", "parquet", "zarr", "nc", "vtu", "pvd"])
