@@ -472,8 +472,9 @@ def test_a_reference_that_is_lost_is_lost_in_its_own_file(tmp_path):
     from springtune.studies.kinds.scenes import reference
     from springtune.studies.runs import store
 
-    tasks = {"folder": str(tmp_path), "files": [{"name": "a", "tasks": [{"key": "a"}]}]}
-    tasks["interpolants"] = [{"key": "i", "problems": {"a": (3.0, 0.3), "b": (3.0, 0.2)}}]
+    interpolant = {"key": "i", "box": [], "problems": {"a": (3.0, 0.3), "b": (3.0, 0.2)}}
+    files = [{"name": "a", "tasks": [{"key": "a"}]}, {"name": "i", "tasks": [interpolant]}]
+    tasks = {"folder": str(tmp_path), "files": files}
     for key, file in (("a", "a"), ("b", "i"), ("i", "i")):
         reference.gone(tasks, key, "took too long", "60 s")
         assert key in store.stored(tmp_path / f"{file}.h5", "60 s")

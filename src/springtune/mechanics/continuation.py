@@ -241,6 +241,7 @@ def buckling(problem: LoadedNetwork, guess: float) -> Buckling:
     A slender beam of the triangular lattice, ``E t = 2 / sqrt(3)``, clamped on the left and pressed on the right,
     over Euler's load:
 
+    >>> from springtune.mechanics.statics import StaticProblem
     >>> from springtune.mesh import MESH_TYPES
     >>> mesh = MESH_TYPES["structured"](0.2, 0.02, 0.01 / 27**0.5)  # six rows
     >>> x = mesh.points[:, 0]
