@@ -8,11 +8,11 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
-from springtune.springs.rubber import SpringLaw
 
 import springtune as st
 from springtune.problem.materials import RUBBER_TESTS
 from springtune.problem.rubber import TensileTest
+from springtune.springs.rubber import SpringLaw
 
 TRELOAR = Path(__file__).parents[1] / "config/treloar"
 
