@@ -185,8 +185,8 @@ def test_the_quick_study_is_the_same_under_two_kernels(tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PROCESSORS)
 def test_the_paper_study_is_the_same_on_every_processor(name, tmp_path):
-    # The tolerance is that of displacements. Errors, displacement / reference - 1, follow from what is compared; where a
-    # network is twice as soft they differ by twice as much.
+    # The tolerance is that of displacements. Errors, displacement / reference - 1, follow from what is compared; where
+    # a network is twice as soft they differ by twice as much.
     environments, follows = [{}, processor(name, tmp_path)], ["deformation_error"]
     assert_same_datasets(REPOSITORY / "config/paper.yaml", tmp_path, environments, CURVE_TOLERANCE, follows)
 
