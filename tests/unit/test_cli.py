@@ -1,5 +1,6 @@
 """The command line, the schema of studies and their manual."""
 
+import io
 import json
 import os
 import re
@@ -9,6 +10,7 @@ import sys
 from dataclasses import fields, replace
 from pathlib import Path
 
+import click
 import jsonschema
 import numpy as np
 import pytest
@@ -17,7 +19,7 @@ from click.testing import CliRunner
 
 import springtune
 from counting import counted
-from springtune.cli import COMMANDS, main
+from springtune.cli import COMMANDS, Commands, Shown, main
 from springtune.cli.recommendation import beam_subject, prediction_json, prediction_text
 from springtune.handover.formats import ENDINGS, FOR_SIMULATORS
 from springtune.mesh import MESH_TYPES, Mesh, braced, write_mesh
@@ -539,3 +541,22 @@ class TestPredictAMesh:
             assert not calls and result.exit_code == 2, (beam, size)
             assert result.stdout == "" and len(result.stderr.splitlines()) == 1, (beam, size)
             assert "; give " in result.stderr or "? give " in result.stderr or "beam theory" in result.stderr
+
+
+def test_no_way_of_writing_leaves_control_characters():
+    stream = io.StringIO()
+    Shown(stream).writelines(["red \x1b[31m\n"])
+    assert stream.getvalue() == "red \\x1b[31m\n"
+    assert not hasattr(Shown(sys.stdout), "buffer")
+
+
+def test_a_fault_of_the_system_without_a_file_is_told_without_one():
+    class One(Commands):
+        def get_command(self, ctx, name):
+            return click.Command(name, callback=full)
+
+    def full():
+        raise OSError(28, "No space left on device")
+
+    done = CliRunner().invoke(One(), ["any"])
+    assert (done.exit_code, done.output) == (1, "Error: [Errno 28] No space left on device\n")
