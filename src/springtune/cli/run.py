@@ -99,9 +99,7 @@ def run(
     workflow = [] if folder == checkout else ["--snakefile", str(checkout / "Snakefile")]
     left_empty = {name: True for name, given in (("no_diff", no_diff), ("no_host", no_host)) if given}
     os.environ |= {f"SPRINGTUNE_{name.upper()}": "true" for name in left_empty}
-    # A list of targets would take a path that follows it for one more of them, and so would --configfile. A path that
-    # begins with - is not an option behind =.
-    command = [*_snakemake(), *workflow, *options, f"--configfile={path}"]
+    forced: list[str] = []
     try:
         folder.mkdir(parents=True, exist_ok=True)
         os.chdir(folder)
@@ -115,7 +113,6 @@ def run(
         # A dry run removes no records. An option of the user's, which comes later, replaces this one.
         outdated = _outdated(studies, left_empty, "a run makes it again")
         forced = ["--forcerun", *map(str, outdated)] if outdated else []
-        command = [*_snakemake(), *forced, *command[len(_snakemake()) :]]
     elif _computes(options):
         _unlock(studies, [*_snakemake(), *workflow, "--unlock", f"--configfile={path}"])
         found = _outdated(studies, left_empty, "it is made again")
@@ -126,6 +123,9 @@ def run(
 
             click.echo(f"Nothing to be done: {_results(study)} is complete.\n{reminder(_results(study))}", nl=False)
             raise SystemExit(_strictly(strict, study))
+    # A list of targets would take a path that follows it for one more of them, and so would --configfile. A path that
+    # begins with - is not an option behind =.
+    command = [*_snakemake(), *forced, *workflow, *options, f"--configfile={path}"]
     if not strict or not _computes(options):
         os.execv(command[0], command)
     raise SystemExit(_called(command) or _strictly(strict, study))

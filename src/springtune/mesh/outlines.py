@@ -61,24 +61,7 @@ def mesh_shape(
     particles on the arc; edges are divided further near much shorter ones. Named points are particles. Inside, netgen
     makes near-equilateral triangles. Same input, same mesh.
 
-    Parameters
-    ----------
-    shape : Shape
-    size : float
-        Length of edges [m].
-    mesh_type : str, optional
-        Only ``"free"`` meshes an outline.
-    refined : mapping of str to float, optional
-        Shorter edges [m] at named groups of sides, points and parts; they grow from there.
-
-    Returns
-    -------
-    GroupedMesh
-
-    Raises
-    ------
-    MeshError
-        If the shape is a file's, the mesh type is another one, a size is absurd or not a number, or netgen fails.
+    Lengths are in m. Only "free" meshes an outline; `refined` has shorter edges at named groups, which grow from there.
     """
     what = f"shape '{shape.name}'"
     if not shape.rounds:

@@ -8,7 +8,7 @@ from springtune.problem.loads import LOADS
 
 from ...config.kind import Output, distinct
 from ...config.model import once_a_study, shown, swept_value
-from ...output.browse import Plot, View
+from ...output.browse import Plot, View, particle_plots
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -228,12 +228,7 @@ VIEWS = (
         "Fields",
         "Positions and displacements of all particles of the coarsest meshes; the view of cells draws the networks.",
         (
-            Plot(
-                "places of the particles at rest", "y", "x", shows="points", along="particle", equal=True,
-                beside=(("outline_x", "outline_y", "outline of the reference"),),
-            ),
-            Plot("displacements along x", "displacement_x", "x", "definition", "points", "particle"),
-            Plot("displacements along y", "displacement_y", "x", "definition", "points", "particle"),
+            *particle_plots("outline of the reference"),
             Plot("displacements of the outline", "reference_displacement_x", "outline_x", along="outline_point"),
         ),
     ),

@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING, Any
 
 from ...config.kind import Output, stem
-from ...output.browse import Plot, View
+from ...output.browse import Plot, View, particle_plots
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -86,14 +86,7 @@ VIEWS = (
         "/shape_fields",
         "Networks of shapes",
         "Positions and displacements of all particles, of each shape and load.",
-        (
-            Plot(
-                "places of the particles at rest", "y", "x", shows="points", along="particle", equal=True,
-                beside=(("outline_x", "outline_y", "outline"),),
-            ),
-            Plot("displacements along x", "displacement_x", "x", "definition", "points", "particle"),
-            Plot("displacements along y", "displacement_y", "x", "definition", "points", "particle"),
-        ),
+        particle_plots("outline"),
     ),
 )  # fmt: skip
 
