@@ -45,7 +45,7 @@ class Run:
     def springtune(self, config, *arguments):
         """Exit code and output of `springtune run` in this folder, on two cores."""
         command = ["springtune", "run", config, "--cores", "2", *arguments]
-        return called(command, self.folder, SPRINGTUNE_WORKFLOW=str(REPOSITORY))
+        return called(command, self.folder)
 
     def write(self, name, text):
         """Write a study."""

@@ -9,7 +9,7 @@ from snakemake.exceptions import WorkflowError
 
 from springtune.studies.runs import workload
 from springtune.studies.runs.run_tasks import STATE, source_state
-from springtune.studies.runs.source import USUAL_STUDY, study_file, workflow_folder
+from springtune.studies.runs.source import USUAL_STUDY, config_file, workflow_folder
 
 BEGUN = time.time()
 """Start of this run [s since the epoch]; newer files are its products."""
@@ -42,7 +42,7 @@ def chosen_config():
     named = [str(path) for path in workflow.configfiles]
     if len(named) > 1:
         raise WorkflowError(f"one study at a time: --configfile names {len(named)}: {', '.join(named)}")
-    path = Path(named[0]) if named else study_file(USUAL_STUDY)
+    path = Path(named[0]) if named else config_file(USUAL_STUDY)
     return path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path
 
 

@@ -27,7 +27,7 @@ if PAPER_WANTED or any(word.startswith(tuple(f"{name}_" for name in rerun.PAPER_
                 snakefile:
                     "../../Snakefile"
                 config:
-                    {"study": str(study_file(name, CONFIG.parent)), "paper": False}
+                    {"study": str(config_file(f"{name}.yaml", CONFIG.parent)), "paper": False}
 
             use rule * from name exclude all as prefix*
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..studies.runs.source import USUAL_STUDY, study_file, workflow_folder
+from ..studies.runs.source import USUAL_STUDY, config_file, workflow_folder
 from . import examples, studies_here
 from .options import allow, max_scenes
 
@@ -71,7 +71,7 @@ def run(
     if _wants_slurm(options) and not find_spec(SLURM):
         why = "the profile slurm needs Snakemake's plugin for Slurm, which is not installed"
         raise click.UsageError(f"{why}: python -m pip install --require-hashes -r requirements/slurm.txt")
-    shown = Path(arguments[0]) if named else study_file(USUAL_STUDY)
+    shown = Path(arguments[0]) if named else config_file(USUAL_STUDY)
     path = shown.absolute()
     try:
         with warnings.catch_warnings():
@@ -159,7 +159,7 @@ def _read_for_paper(config: Path, study: "Study") -> "list[Study]":
     from ..studies.kinds import load_study
     from ..studies.runs.rerun import PAPER_STUDIES
 
-    return [load_study(study_file(name, config.parent)) for name in PAPER_STUDIES if name != study.name]
+    return [load_study(config_file(f"{name}.yaml", config.parent)) for name in PAPER_STUDIES if name != study.name]
 
 
 def _unlock(studies: "list[Study]", command: list[str]) -> None:
@@ -222,7 +222,7 @@ def _is_study(argument: str) -> bool:
 
 def _meant(path: Path) -> str:
     """Suggestion of an existing study for a missing one, or an empty string."""
-    near = study_file(path.stem)
+    near = config_file(f"{path.stem}.yaml")
     return f"; did you mean {near}?" if not path.exists() and near != path and near.is_file() else ""
 
 

@@ -9,7 +9,7 @@ import click
 from ..registry import NAME, NAME_RULE
 from ..safe_io.atomic import write_text
 from ..studies.output.text import aligned
-from ..studies.runs.source import CONFIG_FOLDER, is_source_tree, workflow_folder
+from ..studies.runs.source import CONFIG_FOLDER, config_file, is_source_tree
 from . import WrongCall, examples, studies_here
 from .options import allow, loaded, max_scenes
 
@@ -61,7 +61,7 @@ def template_text(path: Path, body: str) -> str:
     """Text of a new study of a beam or of a shape."""
     from ..mesh import MESH_TYPES
 
-    schema = Path(os.path.relpath(workflow_folder() / CONFIG_FOLDER / SCHEMA, path.parent)).as_posix()
+    schema = Path(os.path.relpath(config_file(SCHEMA), path.parent)).as_posix()
     words = path.stem.replace("-", " ").replace("_", " ").strip() or path.stem
     template = Template(Path(__file__).with_name(f"study_of_a_{body}.yaml").read_text())
     text = template.substitute(

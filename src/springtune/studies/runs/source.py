@@ -6,7 +6,7 @@ PACKAGE = Path(__file__).parents[2]
 
 CONFIG_FOLDER = Path("config")
 
-USUAL_STUDY = "paper"
+USUAL_STUDY = "paper.yaml"
 """Study of a run without another one."""
 
 COPY = PACKAGE / "workflow"
@@ -36,7 +36,7 @@ def clone() -> Path | None:
     return root if (root / ".git").exists() else None
 
 
-def study_file(name: str, beside: Path = CONFIG_FOLDER) -> Path:
-    """File of a study by its name: beside another one, in the current folder's config, or that of the workflow."""
-    here = (folder / f"{name}.yaml" for folder in (beside, CONFIG_FOLDER))
-    return next(filter(Path.is_file, here), workflow_folder() / CONFIG_FOLDER / f"{name}.yaml")
+def config_file(name: str, beside: Path = CONFIG_FOLDER) -> Path:
+    """A study or another file: beside a study, in config/ of the current folder, or in that of the workflow."""
+    here = (folder / name for folder in (beside, CONFIG_FOLDER))
+    return next(filter(Path.is_file, here), workflow_folder() / CONFIG_FOLDER / name)
