@@ -42,8 +42,8 @@ def main(tasks: str, done: str, digest: str) -> None:
     note = checked_json.read(tasks)
     if note is None or note["digest"] != digest:
         raise SystemExit(
-            f"{tasks}: not what this job is to do; call the same command again, without --no-hooks, and it is written; a "
-            "workflow that has springtune as a module calls springtune.onstart() in its own `onstart:`"
+            f"{tasks}: not what this job is to do; call the same command again, it writes it anew, without "
+            "--no-hooks. Where springtune is a module, `onstart:` of the workflow has to call springtune.onstart()"
         )
     began_with = os.environ.get(STATE)
     if began_with and began_with != source_state():
