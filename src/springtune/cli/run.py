@@ -81,8 +81,9 @@ def run(
         click.echo(str(error) + _meant(shown), err=True)
         raise SystemExit(1) from None
     folder, source = results.absolute() if results else Path.cwd(), workflow_folder()
-    if folder != Path.cwd():
-        click.echo(f"results go to {folder / 'results' / study.name}", err=True)
+    if results and folder != Path.cwd():
+        where = f"{results / 'results' / study.name}; paths below are as seen from {results}"
+        click.echo(f"results go to {where}", err=True)
     path = path.relative_to(folder) if path.is_relative_to(folder) else path
     workflow = [] if folder == source else ["--snakefile", str(source / "Snakefile")]
     left_empty = {name: True for name, given in (("no_diff", no_diff), ("no_host", no_host)) if given}
