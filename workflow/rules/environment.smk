@@ -39,7 +39,8 @@ def chosen_config():
     named = [str(path) for path in workflow.configfiles]
     if len(named) > 1:
         raise WorkflowError(f"one study at a time: --configfile names {len(named)}: {', '.join(named)}")
-    path = Path(named[0] if named else "config/paper.yaml")
+    usual = Path("config/config.yaml")  # of workflows that others deploy
+    path = Path(named[0] if named else usual if usual.exists() else "config/paper.yaml")
     return path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path
 
 
