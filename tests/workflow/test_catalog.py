@@ -7,7 +7,8 @@ title: small
 beams: {short: {length: 60 mm, height: 20 mm}}
 materials: {steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}}
 grids:
-  grid: {beam: short, mesh_type: right, mesh_size: 10 mm, material: steel, load: traction, force: 1 kN, definition: lattice}
+  grid: {beam: short, mesh_type: right, mesh_size: 10 mm, material: steel, load: traction, force: 1 kN,
+         definition: lattice}
 """
 
 
@@ -24,8 +25,8 @@ def test_deployment_methods_change_nothing(run):
     assert code == 0 and "Nothing to be done" in told
 
 
-def test_the_linter_has_no_remark(run, repository):
-    """Of all rules: those of the paper come with it."""
+def test_the_linter_has_no_remark_on_the_paper(run, repository):
+    """tests/workflow/test_quick.py has the other rules."""
     code, told = run.snakemake(repository / "config/quick.yaml", "--lint", "text", "paper")
     assert (code, told.splitlines()[-1]) == (0, "Congratulations, your workflow is in a good condition!"), told
 
