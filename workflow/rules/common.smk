@@ -60,6 +60,13 @@ def left_empty():
     return chosen
 
 
+# Keys of results have the versions of the packages that Snakemake sees, so jobs must run on these.
+ENVIRONMENT = None if DEPLOYED else "../envs/springtune.yaml"
+"""What rules need, for readers and for `--lint`; see docs/how-to/use-conda.md."""
+
+if DEPLOYED and not IS_CHILD:
+    print("note: jobs run in the environment of Snakemake; --software-deployment-method is not used", file=sys.stderr)
+
 ON_CLUSTER = NODES is not None
 UNUSABLE_PATH = workload.refusal(CONFIG, Path.cwd(), SOURCE, Path(sys.executable), ON_CLUSTER)
 if UNUSABLE_PATH and not IS_CHILD:
