@@ -490,6 +490,7 @@ KIND = Kind(
     study_fields={
         "samples": optional(SamplesConfig, "Sampled scenes; they make the groups `/samples`, `/effects` and `/sobol`.")
     },
+    alone={"samples": ()},
     check=_check,
     expand=_expand,
     axes=lambda sample: {"load": set(sample.loads), "definition": set(sample.definitions)},
