@@ -23,15 +23,15 @@ def warn_of_thickness(thickness: float, sides: tuple[float, float], what: str) -
         )
 
 
-SHORTEST, LONGEST = 1e-5, 100.0
+LEAST_SIDE, MOST_SIDE = 1e-5, 100.0
 """Longer sides of bodies [m] beyond which a unit is likely to be missing."""
 
 
 def warn_of_size(sides: Iterable[float], what: str) -> None:
     """Warn if the longer side of a body [m] is so short or long that a unit is likely to be missing."""
     longer = max(sides)
-    if not SHORTEST <= longer <= LONGEST:
-        usual = f"more than {LONGEST:g} m" if longer > LONGEST else f"less than {1e6 * SHORTEST:g} um"
+    if not LEAST_SIDE <= longer <= MOST_SIDE:
+        usual = f"more than {MOST_SIDE:g} m" if longer > MOST_SIDE else f"less than {1e6 * LEAST_SIDE:g} um"
         warnings.warn(
             f"{what}: its longer side is {longer:.6g} m, {usual}; check the unit: numbers in Python are in m, a text "
             "such as '200 mm' has its own",
