@@ -27,7 +27,7 @@ def loaded_study():
     """The study; its warnings are printed by the run and not by its jobs, which read it, too."""
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore" if IS_CHILD else "default", AssumptionWarning)
+            warnings.simplefilter("ignore" if IS_CHILD else "once", AssumptionWarning)
             warnings.showwarning = lambda message, *where: print(f"warning: {message}", file=sys.stderr)
             return load_study(CONFIG)
     except StudyError as error:
