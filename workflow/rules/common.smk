@@ -27,7 +27,7 @@ def loaded_study():
     """The study; its warnings are printed by the run and not by its jobs, which read it, too."""
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore" if IS_CHILD else "default", AssumptionWarning)
+            warnings.simplefilter("ignore" if IS_CHILD else "once", AssumptionWarning)
             warnings.showwarning = lambda message, *where: print(f"warning: {message}", file=sys.stderr)
             return load_study(CONFIG)
     except StudyError as error:
@@ -59,6 +59,13 @@ def left_empty():
             os.environ[variable], chosen[option] = value, value == "true"
     return chosen
 
+
+# Keys of results have the versions of the packages that Snakemake sees, so jobs must run on these.
+ENVIRONMENT = None if DEPLOYED else "../envs/springtune.yaml"
+"""What rules need, for readers and for `--lint`; see docs/how-to/use-conda.md."""
+
+if DEPLOYED and not IS_CHILD:
+    print("note: jobs run in the environment of Snakemake; --software-deployment-method is not used", file=sys.stderr)
 
 ON_CLUSTER = NODES is not None
 UNUSABLE_PATH = workload.refusal(CONFIG, Path.cwd(), SOURCE, Path(sys.executable), ON_CLUSTER)

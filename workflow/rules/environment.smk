@@ -42,7 +42,8 @@ def chosen_config():
     named = [str(path) for path in workflow.configfiles]
     if len(named) > 1:
         raise WorkflowError(f"one study at a time: --configfile names {len(named)}: {', '.join(named)}")
-    path = Path(named[0]) if named else config_file(USUAL_STUDY)
+    deployed = Path("config/config.yaml")  # where workflows that others deploy have theirs
+    path = Path(named[0]) if named else deployed if deployed.is_file() else config_file(USUAL_STUDY)
     return path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path
 
 

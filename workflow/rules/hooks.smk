@@ -46,8 +46,10 @@ def log_begin():
         names += [study.name] if own or study is STUDY else []
         estimates |= workload.estimates(study, one, own)
     side_by_side = max(1, min(NODES, len(jobs))) if ON_CLUSTER else CORES
-    text = f"{', '.join(names)}: {workload.told(estimates, side_by_side)}"
-    logger.info(text, extra={"estimates": estimates, "cores": side_by_side})
+    load = 0.0 if ON_CLUSTER else os.getloadavg()[0]
+    slower = workload.slowdown(side_by_side, load, os.cpu_count() or 1)
+    text = f"{', '.join(names)}: {workload.told(estimates, side_by_side, slower, load)}"
+    logger.info(text, extra={"estimates": estimates, "cores": side_by_side, "slowdown": slower})
 
 
 def log_end(how):

@@ -25,6 +25,9 @@ IS_CHILD = not getattr(workflow, "is_main_process", True)
 NODES = getattr(workflow.resource_settings, "nodes", None)
 """Number of parallel jobs on other machines; None without a cluster."""
 
+DEPLOYED = bool(getattr(workflow.deployment_settings, "deployment_method", ()))
+"""Whether the command has --software-deployment-method."""
+
 
 def jobs_to_run():
     """Jobs of this run; an empty list if Snakemake does not tell."""

@@ -54,6 +54,8 @@ rule paper:
         "results/paper/logs/paper.log",
     benchmark:
         "results/paper/benchmarks/paper.tsv"
+    conda:
+        ENVIRONMENT
     shell:
         "python -m springtune.studies.paper.build {params.source:q} {params.folder:q} {output.paper:q}"
         " {output.done:q} {params.digest:q} {input.datasets:q} > {log:q} 2>&1"

@@ -13,7 +13,15 @@ from click.core import ParameterSource
 
 from ..problem.status import Status
 from ..safe_io.escapes import shown
-from ..studies.output.text import aligned, bytes_text, from_json, paragraphs, place_text, without_numbers
+from ..studies.output.text import (
+    aligned,
+    bytes_text,
+    from_json,
+    how_to_install,
+    paragraphs,
+    place_text,
+    without_numbers,
+)
 from . import examples
 from .options import idle, studies
 
@@ -402,9 +410,7 @@ def archive(
     try:
         import rocrate  # noqa: F401
     except ImportError:
-        raise click.ClickException(
-            "the library rocrate is missing; install the extra: pip install 'springtune[archive]'"
-        ) from None
+        raise click.ClickException(f"the library rocrate is missing; {how_to_install('archive')}") from None
     from ..studies.archive.contents import stored_size
     from ..studies.archive.crate import write
 
