@@ -261,4 +261,4 @@ class TestRun:
     def test_slurm_without_its_plugin_says_what_to_install(self, named):
         result = run("run", "config/one.yaml", *named)
         assert result.exit_code == 2 and "which is not installed" in result.stderr
-        assert "pip install --require-hashes -r requirements/slurm.txt" in result.stderr
+        assert "pip install '.[slurm]'" in result.stderr

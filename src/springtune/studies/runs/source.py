@@ -15,13 +15,10 @@ COPY = PACKAGE / "workflow"
 COMMIT_FILE = PACKAGE / "commit.txt"
 """The commit that the package was built from; a clone has no such file."""
 
-EXPECTED = ("Snakefile", "workflow/rules/common.smk")
-"""Files that every source tree has."""
-
 
 def is_source_tree(folder: Path) -> bool:
     """Return whether a folder has the workflow."""
-    return all((folder / file).is_file() for file in EXPECTED)
+    return (folder / "Snakefile").is_file() and (folder / "workflow/rules/common.smk").is_file()
 
 
 def workflow_folder() -> Path:
