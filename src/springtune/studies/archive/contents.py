@@ -56,7 +56,7 @@ CHECKOUT_FILES = (
 
 FOLDERS = {
     "src": (".css", ".html", ".js", ".py", ".pyi", ".typed", ".yaml"),
-    "workflow": (".csl", "README.md", ".rst", ".smk", ".typ", ".yaml", ".yml"),
+    "workflow": (".csl", "README.md", "Snakefile", ".rst", ".smk", ".typ", ".yaml", ".yml"),
     "requirements": (".in", ".txt"),
 }
 """Packed folders, and the endings used without git."""
