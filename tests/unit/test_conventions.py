@@ -1,6 +1,7 @@
 """What holds for the whole source: imports, stages of study kinds, and what tests may touch."""
 
 import ast
+import shutil
 import subprocess
 import sys
 from collections import defaultdict
@@ -20,6 +21,17 @@ def test_imports_keep_the_contracts_of_pyproject():
     """Rooms, their layers, what the library does not import, and no circles."""
     done = subprocess.run(["lint-imports", "--no-cache"], cwd=REPOSITORY, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout
+
+
+@pytest.mark.slow
+def test_the_environment_has_a_command_pip(tmp_path):
+    """Set up stops after it, where no lists of packages are."""
+    (tmp_path / "tools").mkdir()
+    shutil.copy(REPOSITORY / "tools/setup.sh", tmp_path / "tools")
+    done = subprocess.run(["tools/setup.sh", "run"], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 1 and "installing the packages" in done.stderr
+    told = subprocess.run([tmp_path / ".venv/bin/pip", "--version"], capture_output=True, text=True)
+    assert told.stdout.startswith("pip ") and str(tmp_path) in told.stdout
 
 
 def test_modules_are_imported_by_text_in_one_place():
