@@ -20,7 +20,7 @@ from .text import NUMBER, from_json, variable_name, without_numbers
 RELATIVE = 1e-6
 """Default relative tolerance."""
 
-MEASURED = (
+MEASURED: tuple[str, ...] = (
     "seconds", "*_seconds", "seconds_*", "solver", "peak_memory", "machine_load", "pareto", "cost_exponent",
     "explicit_steps", "spring_updates", "*_bandwidth",
 )  # fmt: skip
