@@ -147,9 +147,7 @@ def _provenance(tree: "xr.DataTree") -> list[str]:
     attributes = {str(name): str(value) for name, value in tree.attrs.items()}
     lines = ["made with", f"  springtune {attributes.get('springtune_version', 'unknown')}"]
     if attributes.get("git_commit"):
-        changed = attributes.get("git_diff", "").count("\ndiff --git ") + attributes.get("git_diff", "").startswith(
-            "diff"
-        )
+        changed = f"\n{attributes.get('git_diff', '')}".count("\ndiff --git ")
         files = f", {changed} changed files in git_diff" if changed else ""
         lines.append(f"  commit {attributes['git_commit']}{files}")
     if attributes.get("study_commit"):

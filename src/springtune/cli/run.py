@@ -84,8 +84,7 @@ def run(
         raise SystemExit(1) from None
     folder, source = results.absolute() if results else Path.cwd(), workflow_folder()
     if results and folder != Path.cwd():
-        where = f"{results / 'results' / study.name}; paths below are as seen from {results}"
-        click.echo(f"results go to {where}", err=True)
+        click.echo(f"results go to {results}/results/{study.name}; paths below are as seen from {results}", err=True)
     path = path.relative_to(folder) if path.is_relative_to(folder) else path
     workflow = [] if folder == source else ["--snakefile", str(source / "Snakefile")]
     left_empty = {name: True for name, given in (("no_diff", no_diff), ("no_host", no_host)) if given}

@@ -148,9 +148,8 @@ def git_diff(study: Study, *folders: Path) -> str:
 def difference(study: Study, folder: Path, *options: str) -> str:
     """Difference of package, rules and the study's files from the commit, without untracked files."""
     top, root = Path(git(folder, "rev-parse", "--show-toplevel").removesuffix("\n")), _checkout(folder)
-    files = {file.resolve() for file in input_files(study)} | (
-        {root / name for name in COMPARED_WITH_COMMIT} if root else set()
-    )
+    files = {file.resolve() for file in input_files(study)}
+    files |= {root / name for name in COMPARED_WITH_COMMIT if root}
     known = [str(file) for file in sorted(files) if file.is_relative_to(top)]
     command = ("--literal-pathspecs", "diff", "--no-color", "--no-ext-diff", *options, "HEAD", "--")
     return git(folder, *command, *known) if known else ""
