@@ -257,6 +257,7 @@ class Lines extends Chart {
         this.markWords.glyph.background_fill_color = ink("paper");
       };
       if (categories) this.ticks("below", categories);
+      else if (!logx) fig.below[0].ticker.desired_num_ticks = Math.max(3, Math.min(6, Math.floor(this.holder.clientWidth / 90)));
       if (xticks) {
         fig.below[0].ticker = new B.FixedTicker({ ticks: xticks });
         fig.below[0].major_label_overrides = new Map(xticks.map((one) => [one, number(one)]));

@@ -18,7 +18,7 @@ class Explorer {
     this.picture = element("div", { class: "chart" });
     this.under = element("div");
     this.numbers = element("div");
-    const single = Object.values(fields).filter((field) => !field.dims.length && !/^topology/.test(field.long_name));
+    const single = Object.values(fields).filter((field) => !field.dims.length && !/^topology/.test(field.long_name) && field.valueAt(0) !== "");
     const left = this.group.left_out;
     holder.append(element("h2", { text: this.view.title }), this.view.note ? element("p", { text: this.view.note }) : "",
       left.length ? element("p", { class: "none", text: `Too large for this page, and in dataset.nc only: ${left.join(", ")}.` }) : "",
