@@ -284,7 +284,7 @@ class TestWhatIsSo:
         browser.open(odd)
         assert text(browser, "#end").startswith("288 cells:")
         said = text(browser, "#holds")
-        assert "Samples: 16 samples" in said and "solved 96" in said and "Shapes: 2 shapes" in said
+        assert "Samples: 16 samples" in said and "solved 96" in said and "Shapes: 1 shape " in said
 
     def test_a_study_without_cells_opens_on_what_it_has(self, browser, samples_alone):
         browser.open(samples_alone)
@@ -309,6 +309,14 @@ class TestWhatIsSo:
         choose(browser, load=0, kinematics=0)
         points = browser.ask(hollow)
         assert points["fill"][0] == points["line"][0]
+
+    def test_rows_without_a_number_are_left_out(self, browser, odd):
+        browser.open(odd)
+        show(browser, "shapes")
+        rows = (
+            "return [...document.querySelectorAll('.view-shapes .plain-grid tbody th')].map((one) => one.textContent)"
+        )
+        assert browser.ask(rows) == ["as in file", "2"]
 
     def test_signs_are_said(self, browser, odd):
         browser.open(odd)

@@ -276,7 +276,7 @@ class Explorer {
       cells.push({ row, column, value });
       if (Number.isFinite(value)) values.push(value);
     }));
-    const words = ["hatched: nothing", this.sign(field), without].filter(Boolean);
+    const words = [cells.some((cell) => !there(cell.value)) && "hatched: nothing", this.sign(field), without].filter(Boolean);
     const key = element("span", { class: "soft", text: words.join(" · ") }), colours = field.flags ? null : colouring(field, values, key);
     for (const cell of cells) {
       if (field.flags) Object.assign(cell, category(field, cell.value));
@@ -394,5 +394,6 @@ function filled(across, down, there) {
   const columns = all(across).filter((i) => all(down).some((j) => there(i, j)));
   const rows = all(down).filter((j) => columns.some((i) => there(i, j)));
   const missing = [[across, columns], [down, rows]].flatMap(([dim, kept]) => all(dim).filter((i) => !kept.includes(i)).map((i) => labelText(dim, i)));
-  return [columns, rows, missing.length ? `with nothing here, left out: ${missing.join(", ")}` : ""];
+  const named = missing.length > 7 ? [...missing.slice(0, 6), `and ${missing.length - 6} more`] : missing;
+  return [columns, rows, missing.length ? `with nothing here, left out: ${named.join(", ")}` : ""];
 }

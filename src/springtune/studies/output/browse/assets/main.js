@@ -44,7 +44,7 @@ class Page {
     const badges = Object.entries(tally).filter(([word, count]) => count && word !== "not_requested")
       .map(([word, count]) => element("span", { class: "count" }, badge(word), ` ${count}`));
     return element("span", { class: "holds" }, element("a", { href: `#view=${group.path.slice(1)}`, text: title }),
-      several ? `: ${several}` : ":", badges);
+      several ? `: ${several} ` : ": ", badges);
   }
 
   head(root) {
@@ -195,7 +195,7 @@ class About {
 
   build(holder) {
     const about = this.page.groups["/"].attributes;
-    const plain = Object.entries(about).filter(([name]) => !["config", "software", "title"].includes(name));
+    const plain = Object.entries(about).filter(([name, value]) => value !== "" && !["config", "software", "title"].includes(name));
     let software = [];
     try {
       software = Object.entries(JSON.parse(about.software || "{}"));
