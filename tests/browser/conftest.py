@@ -164,7 +164,8 @@ def odd(tmp_path_factory):
     made["/shapes"].error[{"mesh_size": 2}] = np.nan
     made["/shapes"].error.attrs["long_name"] = "signed error, (network - reference) / |reference|"
     fields = made["/shape_fields"]
-    holed = fields.assign(outline_round=fields.outline_round + [0, 0, 1, 1])
+    moved = 100 * fields.displacement_x  # by more than the body is long
+    holed = fields.assign(outline_round=fields.outline_round + [0, 0, 1, 1], displacement_x=moved)
     return written(tmp_path_factory.mktemp("odd"), made | {"/": root, "/shape_fields": holed})
 
 

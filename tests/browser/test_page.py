@@ -309,6 +309,12 @@ class TestWhatIsSo:
         choose(browser, load=0, kinematics=0)
         points = browser.ask(hollow)
         assert points["fill"][0] == points["line"][0]
+        show(browser, "compare")
+        browser.ask("const v = springtune.views.compare; v.chosen.load = 1; v.render(); return v.drawn")
+        assert f"◇ {words}" in text(browser, ".view-compare")
+        assert all(
+            one.endswith(" ◇") for one in browser.ask("return springtune.charts['/ map'].sources.words.data.text")
+        )
 
     def test_rows_without_a_number_are_left_out(self, browser, odd):
         browser.open(odd)
@@ -375,6 +381,7 @@ class TestWhatIsSo:
             "return [n.springs.data.x0.length, n.lines.data.xs.map((one) => one.length)]"
         )
         assert network == [3, [7, 7]]  # both outlines: at rest, and of the reference
+        assert "× 0.0" in text(browser, "#panel-network")
         browser.driver.find_element(By.CSS_SELECTOR, "#panel-network [data-dim=definition]").send_keys("area")
         assert "tension positive" in text(browser, "#panel-network")
 
