@@ -7,7 +7,10 @@ from springtune.studies.runs.workload import READ
 
 
 def begin():
-    """Lock the studies and write the notes of their jobs; then log the expected work."""
+    """Lock the studies and write the notes of their jobs; then log the expected work. A second call does nothing."""
+    if workload.BEGUN:
+        return
+    workload.BEGUN.append(RESULTS)
     try:
         for _, one in READ:
             locks.check_idle(one.folder)
@@ -50,7 +53,10 @@ def log_begin():
 
 
 def log_end(how):
-    """Unlock the studies and log their summary, see `springtune.studies.output.summary`."""
+    """Unlock the studies and log their summary, see `springtune.studies.output.summary`; once for each begin."""
+    if not workload.BEGUN:
+        return
+    workload.BEGUN.clear()
     from springtune.studies.output import summary  # here: only a run needs it
 
     end_timers()

@@ -55,6 +55,8 @@ if "fetch" in WORDS:  # what makes packs is not to be asked for them; targets ar
             config=lambda wildcards: str(CONFIG),
         benchmark:
             RESULTS / "benchmarks/fetch.tsv"
+        conda:
+            ENVIRONMENT
         shell:
             "python -m springtune.studies.archive.parts fetch {params.config:q} {input:q}"
 
@@ -85,6 +87,8 @@ else:
                 RESULTS / f"logs/pack_{stage}.log",
             benchmark:
                 RESULTS / f"benchmarks/pack_{stage}.tsv"
+            conda:
+                ENVIRONMENT
             shell:
                 "python -m springtune.studies.archive.parts pack {params.folder:q} {output:q} {input:q} > {log:q} 2>&1"
 
@@ -99,5 +103,7 @@ else:
             RESULTS / "logs/upload.log",
         benchmark:
             RESULTS / "benchmarks/upload.tsv"
+        conda:
+            ENVIRONMENT
         shell:
             "python -m springtune.studies.archive.parts copy {output:q} {input:q} > {log:q} 2>&1"

@@ -152,6 +152,8 @@ def _provenance(tree: "xr.DataTree") -> list[str]:
         )
         files = f", {changed} changed files in git_diff" if changed else ""
         lines.append(f"  commit {attributes['git_commit']}{files}")
+    if attributes.get("study_commit"):
+        lines.append(f"  study: commit {attributes['study_commit']}")
     software = from_json(attributes.get("software"))
     if software:
         lines.append("  " + ", ".join(f"{name} {version}" for name, version in software.items() if version != "none"))

@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 READ: "list[tuple[Study, Plan]]" = []
 """Studies that this process runs: the requested one, and those that the paper reads."""
 
+BEGUN: list[Path] = []
+"""Results of the workflow that began the run; several modules of one workflow share the run."""
+
 PRESENTED = (1.5, 0.3)
 """Seconds of a job after the stages, before any is measured: fixed, and per file."""
 
