@@ -18,7 +18,7 @@ from .options import RESULTS_FOLDER, dataset_path
 if TYPE_CHECKING:
     import xarray as xr
 
-    from ..studies.output.comparison import Change, Comparison, GroupChanges
+    from ..studies.output.comparison import Change, Comparison, DefinitionErrors, GroupChanges
 
 ROWS = 20
 """Rows of a table."""
@@ -51,6 +51,7 @@ def tolerance(context: click.Context, parameter: click.Parameter, given: str | N
         "springtune diff results/before results/mine",
         "springtune diff before.nc mine --relative 1e-3 --group sensitivity",
         "springtune diff before.nc after.nc --json > changes.json",
+        "springtune diff before mine --definitions",
     )
 )
 @click.argument("before")
@@ -65,6 +66,7 @@ def tolerance(context: click.Context, parameter: click.Parameter, given: str | N
 @click.option("--all", "every", is_flag=True, help="All rows.")
 @click.option("--config", is_flag=True, help="Show the diff of the studies' files, too.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+@click.option("--definitions", "by_definition", is_flag=True, help="Compare the errors of definitions side by side.")
 def diff(
     before: str,
     after: str,
@@ -76,6 +78,7 @@ def diff(
     every: bool,
     config: bool,
     as_json: bool,
+    by_definition: bool,
 ) -> None:
     """Say what changed from one dataset to another beyond a tolerance, scene by scene.
 
@@ -83,6 +86,9 @@ def diff(
     whatever order. Numbers are the same within --relative or --absolute, and NaN is NaN; along a curve or over a field
     --relative is of its largest number. Seconds, what is measured of the machine, when and where a dataset was made are
     not compared; versions and the studies' files are told and make no difference.
+
+    With --definitions it says instead how many scenes of each definition have an error, and the median and the largest
+    of these without their sign, in both. Scenes of one dataset alone count, too.
 
     Exits with 0 if nothing changed, 1 if something did, and 2 if nothing could be compared.
     """
@@ -98,6 +104,15 @@ def diff(
                 raise ValueError(f"{paths[1]}: holds accepted values; give them first, and then results")
             if kept and (relative is not None or absolute is not None):
                 raise ValueError(f"{paths[0]}: has its own tolerances; leave --relative and --absolute out, or edit it")
+            if by_definition:
+                if kept:
+                    raise ValueError(f"{paths[0]}: holds accepted values; give two datasets")
+                errors = comparison.compare_definitions(one, other, groups)
+                if as_json:
+                    click.echo(json.dumps([_definition_dict(row) for row in errors], indent=1))
+                else:
+                    click.echo(definitions_text(errors, paths))
+                return
             given = comparison.Tolerance(comparison.RELATIVE if relative is None else relative, absolute)
             found = comparison.compare(
                 one, other, None if kept else given, groups, ignored, None if every else rows,
@@ -145,6 +160,31 @@ def comparison_text(
     if found.attributes or found.config:
         parts.append(_told(found, config))
     return paragraphs(parts)
+
+
+def definitions_text(errors: "Sequence[DefinitionErrors]", paths: Sequence[Path]) -> str:
+    """Errors of definitions in two datasets, side by side."""
+    parts = [[f"before: {paths[0]}", f"after:  {paths[1]}"]]
+    for group in dict.fromkeys(row.group for row in errors):
+        rows = [["  definition", "scenes", "after", "median", "after", "change", "worst", "after", "change"]]
+        for row in errors:
+            if row.group == group:
+                shares = (cell for pair in (row.median, row.worst) for cell in (*map(_percent, pair), _points(*pair)))
+                rows.append([f"  {row.definition}", *map(str, row.scenes), *shares])
+        what = "scenes" if group == "/" else group
+        parts.append([f"errors of {what} without their sign", *aligned(rows, 0, range(1, 9)).splitlines()])
+    if not errors:
+        parts.append(["neither has errors of definitions"])
+    return paragraphs(parts)
+
+
+def _percent(share: float) -> str:
+    return "none" if math.isnan(share) else f"{100 * share:.3g} %"
+
+
+def _points(before: float, after: float) -> str:
+    """Change of a share in percentage points."""
+    return "" if math.isnan(after - before) else f"{100 * (after - before):+.2g}"
 
 
 def _summary(found: "Comparison", sides: Sequence[str]) -> str:
@@ -299,6 +339,14 @@ def as_dict(found: "Comparison", paths: Sequence[Path], config: bool = False) ->
         "groups": {group.name: _group_dict(group) for group in found.groups},
         "attributes": {name: {"before": old, "after": new} for name, (old, new) in found.attributes.items()},
     } | ({"config": found.config} if config else {})
+
+
+def _definition_dict(row: "DefinitionErrors") -> dict[str, object]:
+    found: dict[str, object] = {"group": row.group, "definition": row.definition}
+    for name in ("scenes", "median", "worst"):
+        pair = (None if math.isnan(number) else number for number in getattr(row, name))
+        found[name] = dict(zip(("before", "after"), pair))
+    return found
 
 
 def _group_dict(group: "GroupChanges") -> dict[str, object]:

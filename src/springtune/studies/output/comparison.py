@@ -15,6 +15,7 @@ from springtune.problem.quantities import nearest
 
 from .alignment import joined, on_common_axes
 from .dataset import NOT_REQUESTED, flag_words, is_flagged
+from .selection import judged
 from .text import NUMBER, from_json, variable_name, without_numbers
 
 RELATIVE = 1e-6
@@ -192,6 +193,54 @@ def compare(
     kept = {name: text for name, text in after.attrs.items() if not part or name in before.attrs}
     attributes, config = _attributes(before.attrs, kept)
     return Comparison(found, alone, attributes, config)
+
+
+@dataclass(frozen=True)
+class DefinitionErrors:
+    """Absolute errors of a definition in a group: their number, median and largest; NaN where there are none."""
+
+    group: str
+    definition: str
+    scenes: tuple[int, int]
+    median: tuple[float, float]
+    worst: tuple[float, float]
+
+
+def compare_definitions(
+    before: xr.DataTree, after: xr.DataTree, groups: Collection[str] = ()
+) -> list[DefinitionErrors]:
+    """Compare the errors of definitions in two datasets, each over all its solved cells whose reference applies."""
+    wanted = {"/" + name.strip("/") for name in groups}
+    sides = [_of_definitions(tree) for tree in (before, after)]
+    known = dict.fromkeys(key for side in sides for key in side)
+    for name in sorted(wanted - {group for group, _ in known}):
+        raise ValueError(f"--group {name.strip('/')}: neither has errors of definitions there; leave --group out")
+    found = []
+    for group, definition in known:
+        pair = [side.get((group, definition), np.array([np.nan])) for side in sides]
+        if not wanted or group in wanted:
+            scenes, median, worst = (
+                tuple(of(one) for one in pair) for of in (lambda one: int(np.isfinite(one).sum()), np.median, np.max)
+            )
+            found.append(DefinitionErrors(group, definition, scenes, median, worst))
+    return found
+
+
+def _of_definitions(tree: xr.DataTree) -> dict[tuple[str, str], np.ndarray]:
+    """Absolute errors by group and definition."""
+    finite = tree["finite_strain"].to_dataset() if "finite_strain" in tree.children else None
+    found = {}
+    for node in tree.subtree:
+        data = node.to_dataset()
+        for name in {"deformation_error", "error"} & {*data} if {"status", "reference_applies"} <= {*data} else ():
+            if "definition" not in data[name].dims:
+                continue
+            errors = abs(judged(data, finite if node.path == "/" else None, name))
+            for definition in data.definition.values.tolist():
+                values = errors.sel(definition=definition).values
+                if np.isfinite(values).any():
+                    found[node.path, definition] = values[np.isfinite(values)]
+    return found
 
 
 @dataclass(frozen=True)
