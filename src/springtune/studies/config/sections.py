@@ -181,8 +181,9 @@ class MaterialConfig(Section):
     stiffness: StiffnessConfig | None = Field(None, description="Elastic constants in plane stress.")
     uniaxial_test: FileName | None = Field(
         None,
-        description="CSV file of a uniaxial test of rubber, relative to the study's folder: stretch and nominal stress "
-        "under a head such as `stretch,nominal stress [MPa]`. Definition `yeoh` uses the fitted law.",
+        description="CSV file of a uniaxial test of rubber, relative to the study's folder: stretch or strain and "
+        "nominal stress under a head such as `stretch,nominal stress [MPa]` or `strain [%],nominal stress [MPa]`. "
+        "Definition `yeoh` uses the fitted law.",
     )
     terms: Terms | None = Field(
         None, description="Number of terms of the fitted law; 3 by default, 1 is the neo-Hookean law."

@@ -232,7 +232,7 @@ def _of_definitions(tree: xr.DataTree) -> dict[tuple[str, str], np.ndarray]:
     found = {}
     for node in tree.subtree:
         data = node.to_dataset()
-        for name in {"deformation_error", "error"} & {*data} if {"status", "reference_applies"} <= {*data} else ():
+        for name in {"deformation_error", "error"} & {*data} if "status" in data else ():
             if "definition" not in data[name].dims:
                 continue
             errors = abs(judged(data, finite if node.path == "/" else None, name))

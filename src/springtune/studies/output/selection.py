@@ -183,7 +183,7 @@ def judged(data: xr.Dataset, finite: xr.Dataset | None = None, name: str = "defo
     Those of nonlinear networks are against references at `finite` strain where there are any.
     """
     solved = data.status == Status.SOLVED
-    errors = data[name].where(solved & (data.reference_applies == 1))
+    errors = data[name].where(solved & (data.get("reference_applies", 1) == 1))
     at_finite_strain = None if finite is None else of_own_law(finite)
     if at_finite_strain is not None:
         errors = errors.where(data.kinematics == "linear", at_finite_strain[name].where(solved))
