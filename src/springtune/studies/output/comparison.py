@@ -21,7 +21,7 @@ from .text import NUMBER, from_json, variable_name, without_numbers
 RELATIVE = 1e-6
 """Default relative tolerance."""
 
-MEASURED = (
+MEASURED: tuple[str, ...] = (
     "seconds", "*_seconds", "seconds_*", "solver", "peak_memory", "machine_load", "pareto", "cost_exponent",
     "explicit_steps", "spring_updates", "*_bandwidth",
 )  # fmt: skip
@@ -201,9 +201,9 @@ class DefinitionErrors:
 
     group: str
     definition: str
-    scenes: tuple[int, int]
-    median: tuple[float, float]
-    worst: tuple[float, float]
+    scenes: tuple[int, ...]
+    median: tuple[float, ...]
+    worst: tuple[float, ...]
 
 
 def compare_definitions(
