@@ -5,7 +5,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -18,7 +18,7 @@ from .options import RESULTS_FOLDER, dataset_path
 if TYPE_CHECKING:
     import xarray as xr
 
-    from ..studies.output.comparison import Change, Comparison, DefinitionErrors, GroupChanges
+    from ..studies.output.comparison import Change, Comparison, GroupChanges
 
 ROWS = 20
 """Rows of a table."""
@@ -108,10 +108,7 @@ def diff(
                 if kept:
                     raise ValueError(f"{paths[0]}: holds accepted values; give two datasets")
                 errors = comparison.compare_definitions(one, other, groups)
-                if as_json:
-                    click.echo(json.dumps([_definition_dict(row) for row in errors], indent=1))
-                else:
-                    click.echo(definitions_text(errors, paths))
+                click.echo(json.dumps(errors, indent=1) if as_json else definitions_text(errors, paths))
                 return
             given = comparison.Tolerance(comparison.RELATIVE if relative is None else relative, absolute)
             found = comparison.compare(
@@ -162,29 +159,21 @@ def comparison_text(
     return paragraphs(parts)
 
 
-def definitions_text(errors: "Sequence[DefinitionErrors]", paths: Sequence[Path]) -> str:
+def definitions_text(errors: "Sequence[Mapping[str, Any]]", paths: Sequence[Path]) -> str:
     """Errors of definitions in two datasets, side by side."""
     parts = [[f"before: {paths[0]}", f"after:  {paths[1]}"]]
-    for group in dict.fromkeys(row.group for row in errors):
+    for group in dict.fromkeys(row["group"] for row in errors):
         rows = [["  definition", "scenes", "after", "median", "after", "change", "worst", "after", "change"]]
-        for row in errors:
-            if row.group == group:
-                shares = (cell for pair in (row.median, row.worst) for cell in (*map(_percent, pair), _points(*pair)))
-                rows.append([f"  {row.definition}", *map(str, row.scenes), *shares])
+        for row in (one for one in errors if one["group"] == group):
+            texts = [f"  {row['definition']}", *(str(count or 0) for count in row["scenes"].values())]
+            for pair in (row["median"].values(), row["worst"].values()):
+                texts += ["none" if share is None else f"{100 * share:.3g} %" for share in pair]
+                old, new = pair
+                texts.append("" if None in pair else f"{100 * (new - old):+.2g}")
+            rows.append(texts)
         what = "scenes" if group == "/" else group
         parts.append([f"errors of {what} without their sign", *aligned(rows, 0, range(1, 9)).splitlines()])
-    if not errors:
-        parts.append(["neither has errors of definitions"])
-    return paragraphs(parts)
-
-
-def _percent(share: float) -> str:
-    return "none" if math.isnan(share) else f"{100 * share:.3g} %"
-
-
-def _points(before: float, after: float) -> str:
-    """Change of a share in percentage points."""
-    return "" if math.isnan(after - before) else f"{100 * (after - before):+.2g}"
+    return paragraphs([*parts, *([] if errors else [["neither has errors of definitions"]])])
 
 
 def _summary(found: "Comparison", sides: Sequence[str]) -> str:
@@ -339,14 +328,6 @@ def as_dict(found: "Comparison", paths: Sequence[Path], config: bool = False) ->
         "groups": {group.name: _group_dict(group) for group in found.groups},
         "attributes": {name: {"before": old, "after": new} for name, (old, new) in found.attributes.items()},
     } | ({"config": found.config} if config else {})
-
-
-def _definition_dict(row: "DefinitionErrors") -> dict[str, object]:
-    found: dict[str, object] = {"group": row.group, "definition": row.definition}
-    for name in ("scenes", "median", "worst"):
-        pair = (None if math.isnan(number) else number for number in getattr(row, name))
-        found[name] = dict(zip(("before", "after"), pair))
-    return found
 
 
 def _group_dict(group: "GroupChanges") -> dict[str, object]:

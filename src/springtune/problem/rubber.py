@@ -20,7 +20,10 @@ CHECKED = 400
 FIT_DIGITS = 10
 """Digits of what is fitted."""
 
-TWO_COLUMNS = "give two columns with a head such as 'stretch,nominal stress [MPa]' or 'strain [%],nominal stress [MPa]'"
+TWO_COLUMNS = (
+    "give two columns, stretch or engineering strain and nominal stress, with a head such as 'stretch,nominal stress "
+    "[MPa]' or 'strain [%],nominal stress [MPa]'"
+)
 
 
 class TestDataError(ValueError):
@@ -76,7 +79,17 @@ class TensileTest:
         if not rows:
             raise TestDataError(f"'{path}' is empty; {TWO_COLUMNS}")
         head = rows[0][1]
-        of_strain, scale = _units(head, f"'{path}', line {rows[0][0]}: ")
+        where, column = f"'{path}', line {rows[0][0]}: ", head[0].lower()
+        kinds = [kind for kind in ("stretch", "strain") if kind in column]
+        percent = "%" in column or "percent" in column
+        unit = head[1].partition("[")[2].partition("]")[0] if len(head) == 2 else ""
+        other = percent and kinds != ["strain"] or re.search("true|log|cauchy", ",".join(head).lower())
+        if len(kinds) != 1 or not unit or other:
+            raise TestDataError(f"{where}{','.join(head)!r} is no head of a test; {TWO_COLUMNS}")
+        try:
+            scale = positive(f"1 {unit}", "stress", "nominal stress")
+        except ValueError as error:
+            raise TestDataError(f"{where}{error}") from None
         found = []
         for number, row in rows[1:]:
             try:
@@ -87,8 +100,8 @@ class TensileTest:
                 ) from None
             found.append((stretch, scale * stress))
         stretches, stresses = np.array(found).reshape(-1, 2).T
-        if of_strain:
-            strains = of_strain * stretches
+        if kinds == ["strain"]:
+            strains = stretches / (100 if percent else 1)
             least = np.abs(strains[strains != 0]).min(initial=np.inf)
             if 1 <= least < np.inf:
                 raise TestDataError(
@@ -97,27 +110,6 @@ class TensileTest:
                 )
             stretches = 1 + strains
         return cls(stretches, stresses, str(path))
-
-
-def _units(head: list[str], where: str) -> tuple[float, float]:
-    """Units of a head's columns: of the strain, or 0 for a stretch, and of the stress [Pa]."""
-    said, text = f"{where}{','.join(head)!r}", ",".join(head).lower()
-    kinds = [word for word in ("stretch", "strain") if word in text]
-    unit = head[-1].partition("[")[2].partition("]")[0]
-    if len(kinds) == 2:
-        raise TestDataError(f"{said} has both a stretch and a strain; leave one of them out")
-    if len(head) != 2 or not kinds or kinds[0] not in head[0].lower() or not unit:
-        raise TestDataError(f"{said} is no head of a test; {TWO_COLUMNS}")
-    if re.search("true|log|cauchy", text):
-        raise TestDataError(f"{said} has a true strain or stress; give those over the length and section at rest")
-    percent = re.search("%|percent", head[0].lower())
-    if percent and kinds == ["stretch"]:
-        raise TestDataError(f"{said} has a stretch in percent; name it 'strain [%]' if it is 0 at rest, or divide it")
-    try:
-        scale = positive(f"1 {unit}", "stress", "nominal stress")
-    except ValueError as error:
-        raise TestDataError(f"{where}{error}") from None
-    return (0.01 if percent else 1.0) * (kinds == ["strain"]), scale
 
 
 def told(test: TensileTest | str | Path) -> TensileTest:

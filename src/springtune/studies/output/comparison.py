@@ -6,7 +6,7 @@ import difflib
 from collections.abc import Collection, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
-from typing import SupportsInt
+from typing import Any, SupportsInt
 
 import numpy as np
 import xarray as xr
@@ -195,35 +195,30 @@ def compare(
     return Comparison(found, alone, attributes, config)
 
 
-@dataclass(frozen=True)
-class DefinitionErrors:
-    """Absolute errors of a definition in a group: their number, median and largest; NaN where there are none."""
+def compare_definitions(before: xr.DataTree, after: xr.DataTree, groups: Collection[str] = ()) -> list[dict[str, Any]]:
+    """Compare the errors of definitions in two datasets, each over all its solved cells whose reference applies.
 
-    group: str
-    definition: str
-    scenes: tuple[int, ...]
-    median: tuple[float, ...]
-    worst: tuple[float, ...]
-
-
-def compare_definitions(
-    before: xr.DataTree, after: xr.DataTree, groups: Collection[str] = ()
-) -> list[DefinitionErrors]:
-    """Compare the errors of definitions in two datasets, each over all its solved cells whose reference applies."""
-    wanted = {"/" + name.strip("/") for name in groups}
-    sides = [_of_definitions(tree) for tree in (before, after)]
-    known = dict.fromkeys(key for side in sides for key in side)
+    A row has a group, a definition, and before and after the number of absolute errors, their median and the largest.
+    """
+    sides = {"before": _of_definitions(before), "after": _of_definitions(after)}
+    known = dict.fromkeys(key for side in sides.values() for key in side)
+    wanted = {"/" + name.strip("/") for name in groups} or {group for group, _ in known}
     for name in sorted(wanted - {group for group, _ in known}):
         raise ValueError(f"--group {name.strip('/')}: neither has errors of definitions there; leave --group out")
-    found = []
-    for group, definition in known:
-        pair = [side.get((group, definition), np.array([np.nan])) for side in sides]
-        if not wanted or group in wanted:
-            scenes, median, worst = (
-                tuple(of(one) for one in pair) for of in (lambda one: int(np.isfinite(one).sum()), np.median, np.max)
-            )
-            found.append(DefinitionErrors(group, definition, scenes, median, worst))
-    return found
+    return [
+        {"group": key[0], "definition": key[1]}
+        | {what: {name: of(side[key]) if key in side else None for name, side in sides.items()} for what, of in JUDGED}
+        for key in known
+        if key[0] in wanted
+    ]
+
+
+JUDGED = (
+    ("scenes", len),
+    ("median", lambda errors: float(np.median(errors))),
+    ("worst", lambda errors: float(errors.max())),
+)
+"""Numbers of the errors of a definition."""
 
 
 def _of_definitions(tree: xr.DataTree) -> dict[tuple[str, str], np.ndarray]:
