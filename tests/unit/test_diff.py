@@ -106,6 +106,8 @@ class TestDefinitions:
         assert re.search(r"patch +16 +0 +1.7 % +none +3.2 % +none\n", text) and re.search(r"area +0 +16 +none", text)
         result = run("diff", one, other, "--definitions", "--group", "samples")
         assert result.exit_code == 2 and "--group samples: neither has errors of definitions there" in result.stderr
+        result = run("diff", one, other, "--definitions", "--all")
+        assert result.exit_code == 2 and "--definitions goes with --group and --json alone" in result.stderr
 
 
 class TestSame:

@@ -94,6 +94,8 @@ def diff(
     """
     from ..studies.output import comparison, expected, reading
 
+    if by_definition and (ignored or every or config or relative is not None or absolute is not None):
+        raise click.UsageError("--definitions goes with --group and --json alone")
     try:
         paths = [dataset_path(before), dataset_path(after)]
         with ExitStack() as stack:
