@@ -575,7 +575,10 @@ def study_model(kinds: Sequence[Kind], given: Container[object] | None = None) -
             "Figures of scenes show nonlinear kinematics if a grid has them, otherwise linear ones.",
         ),
     )
-    alone = {name: needed for kind in kinds for name, needed in kind.alone.items()}
+    alone: dict[str, tuple[str, ...]] = {}
+    for kind in kinds:
+        optional_keys = (name for name, (_, field) in kind.study_fields.items() if field.default is None)
+        alone |= kind.alone or dict.fromkeys(optional_keys, GRIDS_NEED)
     own = ", ".join(f"`{name}`" for name in alone)
     study_fields["grids"] = (
         Annotated[dict[str, grid], Named("grid", for_files=False)],
