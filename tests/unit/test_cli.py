@@ -416,8 +416,10 @@ class TestPredictAMesh:
     def test_signs_are_told(self):
         size = (*self.STEEL, "--size", "5 mm", "--mesh", "right")
         text = run("predict", *size, "--loads", "compression,traction").stdout
-        assert "above zero where too soft, but under compression below: solved on this mesh," in text
-        assert "below zero where too soft: solved" in run("predict", *size, "--loads", "pressure").stdout
+        assert "Positive: too soft; under compression, where displacements are negative, negative is too soft." in text
+        assert "at worst: delingette" in text and "% (compression, too " in text
+        text = run("predict", *size, "--loads", "pressure").stdout
+        assert "\nNegative: too soft.\n" in text and "% (pressure, too stiff)" in text
 
     def test_json_of_a_prediction(self):
         result = run("predict", *self.STEEL, "--size", "5 mm", "--loads", "bending,pressure", "--json")

@@ -313,6 +313,16 @@ def test_the_page_has_both_kinematics_and_says_what_was_not_asked(tmp_path):
     assert "alu-bar, 120 x 25 mm, 2 mm thick" in html
 
 
+def test_the_page_says_once_what_a_sign_means(tmp_path):
+    tree = scenes()
+    tables_page.write(tree, tmp_path)
+    assert (tmp_path / "index.html").read_text().count("|reference|; positive: too soft. The reference") == 1
+    tree["reference_displacement"].loc[{"load": "compression"}] *= -1
+    tables_page.write(tree, tmp_path)
+    said = "; positive: too soft; under compression, where displacements are negative, negative is too soft."
+    assert (tmp_path / "index.html").read_text().count(said) == 1
+
+
 def test_the_page_speaks_of_the_paper_only_where_the_study_has_its_cells(tmp_path):
     tables_page.write(scenes(), tmp_path)
     html, _ = lines_of(tmp_path)
