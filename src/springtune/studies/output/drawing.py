@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 LARGEST_SHOWN = 100.0
 """Largest error of a curve in a plot [%]."""
 
+BEYOND = "beyond small strain"
+"""What a figure says of errors against references that do not apply, `reference_applies` false."""
+
 
 @style.styled
 def draw_springs(ax: Axes | None, mesh: "Mesh", displacements: np.ndarray, forces: np.ndarray, title: str) -> Axes:

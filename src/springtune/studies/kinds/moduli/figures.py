@@ -1,13 +1,14 @@
 """Definitions compared: effective against asked Poisson's ratio, error against mesh size, and errors by load."""
 
 import numpy as np
-from matplotlib.ticker import NullLocator
+from matplotlib.colors import LinearSegmentedColormap
 
 from springtune.safe_io.escapes import no_mathematics
 
 from ...output import labels, style
+from ...output.colours import ERROR_COLOURS, ERROR_RANGE
 from ...output.dataset import most_requested
-from ...output.drawing import fitted
+from ...output.drawing import BEYOND, fitted
 from ...output.selection import choose, group, labelled_beam, labels_of, unswept
 from .outputs import figures
 
@@ -169,7 +170,7 @@ def plot_definitions_size(data, ax=None, *, beam=None, material=None, load=None,
 
     def draw(panel, name):
         drawn = _field_errors(panel, root.field_error.sel(mesh_type=name), root.status.sel(mesh_type=name))
-        panel.set(xlabel="Mesh size [mm]", ylabel="Error [%]", ylim=limits)
+        panel.set(ylabel="Error [%]", ylim=limits)
         style.plain(panel, "y")
         return drawn
 
@@ -184,9 +185,8 @@ def _field_errors(panel, error, status):
     sizes, names = 1e3 * error.mesh_size.values, error.definition.values
     known = np.isfinite(every)
     curves = {str(name): 100 * np.maximum(row, FLOOR) for name, row, there in zip(names, every, known) if there.any()}
-    panel.set(xscale="log", yscale="log", xlim=(sizes.min() / 1.2, sizes.max() * 1.2))
-    panel.set_xticks(sizes, [f"{size:g}" for size in sizes])
-    panel.xaxis.set_minor_locator(NullLocator())
+    panel.set(yscale="log")
+    places = dict(zip(curves, labels.sizes_axis(panel, sizes, len(curves))))
     if not curves:
         return [], "", f"No definition has a field error here: {_statuses(flags)}."
     together = labels.alike({name: np.log(values) for name, values in curves.items()}, 0.01)
@@ -196,7 +196,7 @@ def _field_errors(panel, error, status):
         named[-1] = base
     others = [name for one in together if one not in named for name in one]
     for name in others:
-        panel.plot(sizes, curves[name], color="0.75", linewidth=0.6, marker=".", markersize=2, zorder=1)
+        panel.plot(places[name], curves[name], color="0.75", linewidth=0.6, marker=".", markersize=2, zorder=1)
     ends, order = [], names.tolist()
     for one in named:
         values, look = curves[one[0]], style.line(order.index(one[0]))
@@ -205,7 +205,7 @@ def _field_errors(panel, error, status):
         if len(there) > 1:
             rate = np.polyfit(np.log(sizes[there]), np.log(values[there]), 1)[0]
             label += f" ({rate:.1f})".replace("-0.0", "0.0").replace("-", "−")
-        ends += labels.line(panel, sizes, values, look, label)
+        ends += labels.line(panel, places[one[0]], values, look, label)
     said = [f"grey: {', '.join(others)}"] if others else []
     lacking = [str(name) for name, there, flag in zip(names, known, flags) if not there.any() and (flag > 0).any()]
     said += [f"no error: {', '.join(lacking)}"] if lacking else []
@@ -290,7 +290,7 @@ def plot_definitions_loads(data, ax=None, *, beam=None, mesh_type=None, material
         figure.colorbar(image, cax=bar, ticks=[-1, 0, 1, 2]).set_ticklabels(["0.1", "1", "10", "100"])
         flags = root.status.values
         said = ["×: no result"] * bool((flags > 1).any()) + ["–: not asked for"] * bool((flags == 0).any())
-        said += ["*: beyond small strain"] * doubted
+        said += [f"*: {BEYOND}"] * doubted
         figure.text(0.05 / width, 0.05 / height, "; ".join(said), fontsize=style.SMALL, color="0.25")
     return axes[0]
 
@@ -305,8 +305,9 @@ def _heat(panel, errors, flags, beyond):
     for values in 100 * errors[::-1]:  # the finest solved mesh comes last and stays
         error = np.where(np.isfinite(values), values, error)
     asked = (flags != 0).any(axis=0)
-    shade = np.log10(np.clip(np.abs(error), 0.1, 100))
-    image = panel.imshow(shade, cmap="YlOrBr", vmin=-1, vmax=2, aspect="auto")
+    shade, (low, high) = np.log10(np.clip(np.abs(error), *ERROR_RANGE)), np.log10(ERROR_RANGE)
+    colours = LinearSegmentedColormap.from_list("errors", ERROR_COLOURS)
+    image = panel.imshow(shade, cmap=colours, vmin=low, vmax=high, aspect="auto")
     for row, column in np.ndindex(error.shape):
         size = abs(error[row, column])
         text = f"{error[row, column]:+.{0 if size >= 9.95 else 1 if size >= 0.095 else 2}f}".replace("-", "−")

@@ -92,7 +92,7 @@ def _panel(panel, data):
     panel.set(xlabel=f"{known.meaning[0].upper()}{known.meaning[1:]}{unit}", ylabel="Deformation error [%]")
     if logarithmic:
         panel.set_xscale("log")
-    ends, hollow = [], False
+    ends, hollow, ticked = [], False, False
     data = data.isel(definition=np.flatnonzero(data.value_count))
     for number, definition in enumerate(data.definition.values.tolist()):
         cell = data.sel(definition=definition)
@@ -105,7 +105,9 @@ def _panel(panel, data):
         hollow |= bool(doubted.any())
         panel.plot(x[doubted], y[doubted], **small | {"markerfacecolor": "white", "linestyle": ""})
         zeros = cell[f"crossing_{parameter}"].values[cell.crossing_level.values == 0] / size
+        ticked |= bool(len(zeros))
         panel.plot(zeros, np.zeros(len(zeros)), "|", color=look["color"], markersize=9)
     if logarithmic:
         style.plain(panel, "x")
-    return ends, HOLLOW if hollow else ""
+    said = [f"grey: within the tolerance, {tolerance:g} %", "ticks: zeros" * ticked, HOLLOW * hollow]
+    return ends, "; ".join(filter(None, said))
