@@ -180,9 +180,9 @@ def assured(errors: np.ndarray, second: np.ndarray) -> np.ndarray:
 
 
 def unbeaten(errors: np.ndarray, seconds: np.ndarray) -> np.ndarray:
-    """Return whether no other case has a smaller error in no more time; False for NaN errors."""
+    """Return whether no other case has a smaller error in no more time; False for NaN errors or times."""
     best = np.zeros(errors.shape, dtype=bool)
-    for place in map(tuple, np.argwhere(np.isfinite(errors))):
+    for place in map(tuple, np.argwhere(np.isfinite(errors) & np.isfinite(seconds))):
         best[place] = not ((errors < errors[place]) & (seconds <= seconds[place])).any()
     return best
 

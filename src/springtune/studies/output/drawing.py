@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 LARGEST_SHOWN = 100.0
 """Largest error of a curve in a plot [%]."""
 
-BEYOND = "beyond small strain"
+BEYOND_SMALL_STRAIN = "beyond small strain"
 """What a figure says of errors against references that do not apply, `reference_applies` false."""
 
 

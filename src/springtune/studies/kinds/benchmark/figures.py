@@ -8,7 +8,7 @@ from springtune.problem.status import Status
 
 from ...output import labels, style
 from ...output.selection import choose, group
-from . import PARTS
+from . import BUSY, PARTS
 from .outputs import figures
 
 APPROACH_FAMILIES = {
@@ -104,7 +104,7 @@ def plot_benchmark(data, ax=None, *, scene=None):
     for ring, approach in zip(rings, map(str, case.approach.values)):
         here, kind = case.sel(approach=approach), family(approach)
         errors, seconds = 100 * np.abs(here.error.values), here.seconds.values
-        good, look = np.isfinite(errors) & (errors > 0), APPROACH_FAMILIES[kind]
+        good, look = np.isfinite(errors * seconds) & (errors > 0), APPROACH_FAMILIES[kind]
         if not good.any():
             continue
         thin = {} if approach in shown else {"linewidth": 0.3, "markersize": 1.5, "alpha": 0.4}
@@ -120,7 +120,7 @@ def plot_benchmark(data, ax=None, *, scene=None):
     panel.set_title(f"{case.scene.item()}: " + ("ringed: nothing assures less error in less time" if assured else
                     "nothing is ringed, since no second beam assures an error"))  # fmt: skip
     if not there:
-        labels.say(panel, f"No approach has an error: {_statuses(case)}.")
+        labels.say(panel, f"No approach has an error and a time: {_statuses(case)}.")
         return panel
     labels.note(panel, lost, below=0.64)
     estimate, seconds = 100 * float(case.reference_error_estimate), float(case.reference_seconds)
@@ -143,16 +143,24 @@ def _scene(data, scene):
 
 
 def _lost(case):
-    """How many cases were asked for and have no numbers, in words; empty where all have."""
+    """How many cases were asked for and have no numbers or times, in words; empty where all have."""
     flags = case.status.values if "status" in case else np.zeros(0, dtype=int)
     asked, lost = int((flags != 0).sum()), int(((flags != 0) & (flags != Status.SOLVED)).sum())
-    return f"{lost} of {asked} cases have no numbers ({_statuses(case)}); the dataset says why" if lost else ""
+    said = [f"{lost} of {asked} cases have no numbers ({_statuses(case)}); the dataset says why"] if lost else []
+    busy = _busy(case)
+    return "; ".join([*said, f"{busy} are {BUSY}"] if busy else said)
+
+
+def _busy(case):
+    """Number of cases that are solved and not timed."""
+    return int((case.error.notnull() & case.seconds.isnull()).sum())
 
 
 def _statuses(case):
     """What became of the cases of a scene that have no numbers, in words."""
     flags = case.status.values if "status" in case else np.zeros(0, dtype=int)
-    return ", ".join(labels.statuses(flags[flags != Status.SOLVED])) or "none was asked for"
+    words = [*labels.statuses(flags[flags != Status.SOLVED]), *([BUSY] if _busy(case) else [])]
+    return ", ".join(words) or "none was asked for"
 
 
 def _lines(data, panel, x, y, approaches):
@@ -361,6 +369,6 @@ def plot_benchmark_curve(data, ax=None):
         if found:
             style.plain(panel, "x", "y")
         else:
-            labels.say(panel, "The benchmark has timed no curve.")
+            labels.say(panel, str(np.asarray(data.get("curve_message", ""))) or "The benchmark has timed no curve.")
         ends[panel] = found
     return panel

@@ -8,7 +8,7 @@ from springtune.safe_io.escapes import no_mathematics
 from ...output import labels, style
 from ...output.colours import ERROR_COLOURS, ERROR_RANGE
 from ...output.dataset import most_requested
-from ...output.drawing import BEYOND, fitted
+from ...output.drawing import BEYOND_SMALL_STRAIN, fitted
 from ...output.selection import choose, group, labelled_beam, labels_of, unswept
 from .outputs import figures
 
@@ -290,7 +290,7 @@ def plot_definitions_loads(data, ax=None, *, beam=None, mesh_type=None, material
         figure.colorbar(image, cax=bar, ticks=[-1, 0, 1, 2]).set_ticklabels(["0.1", "1", "10", "100"])
         flags = root.status.values
         said = ["×: no result"] * bool((flags > 1).any()) + ["–: not asked for"] * bool((flags == 0).any())
-        said += [f"*: {BEYOND}"] * doubted
+        said += [f"*: {BEYOND_SMALL_STRAIN}"] * doubted
         figure.text(0.05 / width, 0.05 / height, "; ".join(said), fontsize=style.SMALL, color="0.25")
     return axes[0]
 

@@ -6,7 +6,7 @@ from springtune.problem.parameters import SWEPT
 
 from ...config.kind import distinct
 from ...output import labels, style
-from ...output.drawing import BEYOND, fitted, in_words
+from ...output.drawing import BEYOND_SMALL_STRAIN, fitted, in_words
 from ...output.selection import at, cells, group, labelled_beam, labels_of, last_swept, of_own_law
 from .figures import USUAL, by_beam, each, named, swept_words
 from .outputs import SCENE_LABELS, SWEPT_SHOWN
@@ -89,7 +89,7 @@ def _lines(panel, places, here, looks, listed, gaps):
             panel.plot(x[doubtful], error[doubtful], linestyle="", marker=look["marker"], color=look["color"],
                        markerfacecolor="white", markersize=4.5, zorder=4)  # fmt: skip
         doubts |= {in_words(flag) for flag in flags[doubtful] if flag > 1}
-        doubts |= {BEYOND} if (known & beyond).any() else set()
+        doubts |= {BEYOND_SMALL_STRAIN} if (known & beyond).any() else set()
         for place, flag in zip(np.flatnonzero(~known), flags[~known]):
             if flag:
                 lost.setdefault("no reference" if flag == 1 else in_words(flag), []).append(place)

@@ -7,7 +7,7 @@ from springtune.problem.parameters import with_unit
 
 from ...config.kind import distinct
 from ...output import labels, style
-from ...output.drawing import BEYOND, extent, fitted, in_words, largest, magnification, plane, spring_ends
+from ...output.drawing import BEYOND_SMALL_STRAIN, extent, fitted, in_words, largest, magnification, plane, spring_ends
 from ...output.selection import at, cells, choose, group, labelled_beam, labels_of, last_swept, own_law, shown_swept
 from .outputs import SCENE_LABELS, SENSITIVITY_LABELS
 
@@ -153,7 +153,7 @@ KEY = {
     "unstable": ("thin: unstable", {"linewidth": 0.5}),
     "not converged": ("gap: not converged", {"linestyle": ""}),
     "failed": ("gap: failed", {"linestyle": ""}),
-    "beyond": (f"{BEYOND}: not the network's error alone", {"linestyle": ""}),
+    "beyond": (f"{BEYOND_SMALL_STRAIN}: not the network's error alone", {"linestyle": ""}),
 }
 """What of a sensitivity figure is explained beside its curves, and how it looks."""
 
@@ -333,7 +333,7 @@ def _deformed(panel, fields, root, selection, beam):
     lacking = []
     if np.isfinite(there).any():
         panel.fill(*(outline + scale * there).T, facecolor="0.82", edgecolor="0.45", linewidth=0.8)
-        lacking += [f"reference {BEYOND}"] if int(root.get("reference_applies", 1)) == 0 else []
+        lacking += [f"reference {BEYOND_SMALL_STRAIN}"] if int(root.get("reference_applies", 1)) == 0 else []
     else:
         lacking.append("no reference")
     if len(outline):
