@@ -114,7 +114,9 @@ def at(data: xr.Dataset, values: Mapping[str, xr.DataArray]) -> xr.Dataset:
 
 
 def sign_of_errors(data: xr.Dataset) -> str:
-    """Sentence on which sign of a group's errors means too soft, from its references' displacements."""
+    """Sentence on which sign of a group's errors means too soft, from its references; empty without any."""
+    if "reference_displacement" not in data:
+        return ""
     known = data.reference_displacement
     loads = known["load"].values.tolist() if "load" in known.dims else [""]
     signs = {load: float(np.sign(known.sel(load=load) if load else known).sum()) for load in loads}

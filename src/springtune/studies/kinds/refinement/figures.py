@@ -6,7 +6,7 @@ from springtune.problem.status import Status
 
 from ...output import labels, style
 from ...output.drawing import fitted
-from ...output.selection import choose, group
+from ...output.selection import choose, group, sign_of_errors
 from .outputs import SPACINGS, VARIED
 
 HOLLOW = "hollow: unstable, or beyond the linear reference"
@@ -56,7 +56,7 @@ def plot_refinement(data, ax=None, *, refinement=None):
         data = data.sel(refinement=[refinement])
     names = data.refinement.values.tolist()
     figure, axes, flat, _ = style.multiples(ax, len(names), min(2, len(names)), 2.6)
-    place = {"left": 0.6, "right": 0.1, "bottom": 0.58, "top": 0.55, "across": 0.14, "down": 1.15}
+    place = {"left": 0.6, "right": 0.1, "bottom": 0.7, "top": 0.55, "across": 0.14, "down": 1.15}
     style.arrange(figure, axes, **place)
     ends = [_panel(panel, data.sel(refinement=name)) for panel, name in zip(flat, names)]
     labels.settle(figure, axes, place)
@@ -109,5 +109,6 @@ def _panel(panel, data):
         panel.plot(zeros, np.zeros(len(zeros)), "|", color=look["color"], markersize=9)
     if logarithmic:
         style.plain(panel, "x")
-    said = [f"grey: within the tolerance, {tolerance:g} %", "ticks: zeros" * ticked, HOLLOW * hollow]
+    said = [sign_of_errors(data), f"grey: within the tolerance, {tolerance:g} %"]
+    said += ["ticks: zeros" * ticked, HOLLOW * hollow]
     return ends, "; ".join(filter(None, said))

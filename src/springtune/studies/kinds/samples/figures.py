@@ -5,7 +5,7 @@ from functools import partial
 import numpy as np
 
 from ...output import labels, style
-from ...output.selection import choose, group, labels_of
+from ...output.selection import choose, group, labels_of, sign_of_errors
 
 PARAMETER_AXES = {
     "length": ("length", 1e3, "mm"),
@@ -258,22 +258,24 @@ def plot_effects(data, ax=None, *, load=None, quantity="deformation_error"):
     if figure is not None:
         handles, texts = flat[0].get_legend_handles_labels()
         figure.legend(handles, texts, loc="lower center", ncols=len(texts), borderaxespad=0.2)
-    _note_below(figure, _lacking(samples, load, definitions), 0.3)
+    _note_below(figure, _lacking(samples, load, definitions, quantity), 0.3)
     return flat
 
 
-def _lacking(samples, load, definitions):
+def _lacking(samples, load, definitions, quantity):
     """How many scenes the means lack, and of how many the reference does not apply; bands."""
     scenes = samples.sel(load=load, definition=definitions)
     unsolved, every = int((scenes.status != 1).sum()), scenes.status.size
     said = ["bands: two standard errors"]
+    if quantity == "deformation_error":
+        said.append(sign_of_errors(samples.sel(load=load)))
     if unsolved:
         said.append(f"without {unsolved} of {every} scenes, which are not solved")
     beyond = int((samples.reference_applies.sel(load=load) == 0).sum()) if "reference_applies" in samples else 0
     if beyond:
         said.append(f"{beyond} of {samples.sizes['sample']} points are beyond small strain or without a reference, "
                     "so that their error is not the network's alone")  # fmt: skip
-    return "; ".join(said)
+    return "; ".join(filter(None, said))
 
 
 def _each_load(name, plot, tree):

@@ -7,7 +7,7 @@ from springtune.problem.parameters import SWEPT
 from ...config.kind import distinct
 from ...output import labels, style
 from ...output.drawing import BEYOND_SMALL_STRAIN, fitted, in_words
-from ...output.selection import at, cells, group, labelled_beam, labels_of, last_swept, of_own_law
+from ...output.selection import at, cells, group, labelled_beam, labels_of, last_swept, of_own_law, sign_of_errors
 from .figures import USUAL, by_beam, each, named, swept_words
 from .outputs import SCENE_LABELS, SWEPT_SHOWN
 
@@ -52,8 +52,11 @@ def _parts(present):
     return [part.tolist() for part in np.array_split(asked, -(-len(asked) // MOST_LINES))]
 
 
-def _multiples(ax, shown, draw, title, swept):
-    """Small multiples of deformation errors, shape (n_panels,): ``draw`` returns a title, ends of lines and a note."""
+def _multiples(ax, shown, draw, title, swept, sign):
+    """Small multiples of deformation errors, shape (n_panels,): ``draw`` returns a title, ends of lines and a note.
+
+    The first note also has the meaning of a ``sign``.
+    """
     columns = min(3, len(shown)) if len(shown) != 4 else 2
     figure, axes, flat, height = style.multiples(ax, len(shown), columns, 2.1, sharey=True)
     place = {"left": 0.55, "right": 0.06, "top": 0.48, "bottom": 0.4, "across": 0.12, "down": 0.7, "title": title}
@@ -61,7 +64,7 @@ def _multiples(ax, shown, draw, title, swept):
     drawn = {}
     for panel, one in zip(flat, shown):
         words, ends, said = draw(panel, one)
-        said = fitted(panel, said)
+        said = fitted(panel, [*([sign] if sign and ends and not drawn else []), *said])
         drawn[panel] = ends, said, "" if ends else "no errors: " + said.replace("\n", "; ")
         panel.set_title(fitted(panel, [words], 8))
     over = labels.TITLE_LINE * (max(labels.lines_of(panel.get_title("left")) for panel in flat) - 1) if swept else 0.0
@@ -154,7 +157,9 @@ def plot_size(data, ax=None, *, beam=None, mesh_type=None, material=None, load=N
         here = {parameter: value.sel(beam=name) for parameter, value in values.items()}
         return ", ".join([labelled_beam(root, name) + part, *swept_words(here)]), *drawn
 
-    return _multiples(ax, shown, draw, compared(root, selection), bool(values))
+    return _multiples(
+        ax, shown, draw, compared(root, selection), bool(values), sign_of_errors(root.reference_displacement)
+    )
 
 
 def _over_sizes(panel, here, looks, first):
@@ -251,6 +256,7 @@ def plot_sweep(
     swept = [name for name in SWEPT if name in root.status.dims]
     if parameter not in swept:
         raise ValueError(f"parameter: {parameter!r} is not swept; the study sweeps {', '.join(swept) or 'nothing'}")
+    whole = root
     root = root[["status", "deformation_error", "beyond", "beam_length", "beam_height"]]
     root, beams, selection = by_beam(root, beam, mesh_type, material, load, kinematics)
     looks = _looks(root)
@@ -262,7 +268,8 @@ def plot_sweep(
         here, definitions = one
         return here.attrs["words"], *_over_values(panel, here, {name: looks[name] for name in definitions}, parameter)
 
-    return _multiples(ax, shown, draw, compared(root, selection), True)
+    sign = sign_of_errors(whole.sel(load=selection["load"]))
+    return _multiples(ax, shown, draw, compared(root, selection), True, sign)
 
 
 def _most(present, parameter):
