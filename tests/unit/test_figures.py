@@ -436,6 +436,19 @@ def test_what_is_beyond_the_reference_is_marked(tree, beyond):
         assert "beyond" not in " ".join(said(panel))
 
 
+def test_signed_errors_say_once_what_their_sign_means():
+    tree = dataset()
+    against = xr.where(tree["load"].isin(("compression", "pressure")), -1.0, 1.0)
+    tree.dataset = tree.to_dataset().assign(reference_displacement=against * abs(tree.reference_displacement))
+    for load, words in (("traction", "positive: too soft"), ("compression", "negative: too soft")):
+        panels = st.plot_size(tree, **SCENES | {"load": load})
+        signs = [text for text in said(panels[0]) if "too soft" in text]
+        assert len(signs) == 1 and signs[0].startswith(words), signs
+    panel = st.plot_definitions_loads(tree, beam="100x20", mesh_type="free", kinematics="linear")[0]
+    (text,) = (text.replace("\n", " ") for text in said(panel) if "too soft" in text)
+    assert text.startswith("positive: too soft; under compression and pressure, where displacements are negative, neg")
+
+
 @pytest.mark.parametrize("plot", [st.plot_size, st.plot_definitions_size])
 def test_one_mesh_size_is_no_column_of_dots(tree, plot):
     selection = EVERY_PLOT[plot][0]

@@ -157,9 +157,7 @@ def plot_size(data, ax=None, *, beam=None, mesh_type=None, material=None, load=N
         here = {parameter: value.sel(beam=name) for parameter, value in values.items()}
         return ", ".join([labelled_beam(root, name) + part, *swept_words(here)]), *drawn
 
-    return _multiples(
-        ax, shown, draw, compared(root, selection), bool(values), sign_of_errors(root.reference_displacement)
-    )
+    return _multiples(ax, shown, draw, compared(root, selection), bool(values), sign_of_errors(root))
 
 
 def _over_sizes(panel, here, looks, first):
