@@ -13,6 +13,7 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+import psutil
 import pytest
 import xarray as xr
 
@@ -27,7 +28,7 @@ from springtune.studies.kinds.scenes.variables import ROOT, SENSITIVITY
 from springtune.studies.output import dataset
 from springtune.studies.output.dataset import CHUNK, Group
 from springtune.studies.output.reading import lazily
-from springtune.studies.runs import provenance
+from springtune.studies.runs import provenance, source
 
 AXES = {
     "beam": ("a", "b"),
@@ -129,6 +130,32 @@ def test_texts_that_are_mostly_holes_take_no_room_and_read_the_same(tmp_path):
         assert str(tree.message[{"beam": -1, "mesh_size": -1}].values.ravel()[0]).endswith("\u03bb < 1")
 
 
+def test_a_dataset_with_large_texts_is_closed(tmp_path):
+    """It stayed open, and HDF5 2.2 crashed in a program that opened it again."""
+    dataset.write(
+        tmp_path / "dataset.nc",
+        {"/": ROOT.empty(AXES | {"mesh_size": tuple(1e-3 * (1 + np.arange(80000)))})},
+        {"springtune_version": "0"},
+    )
+    path = str((tmp_path / "dataset.nc").resolve())
+
+    def is_open():
+        return path in {file.path for file in psutil.Process().open_files()}
+
+    with st.open(tmp_path) as tree:
+        assert "values with dtype" in repr(tree.message.variable) and is_open()
+        assert not (tree.message[{"mesh_size": slice(10)}] != "").any()
+    assert not is_open()
+
+
+@pytest.mark.parametrize("order", [("h5py", "netCDF4"), ("netCDF4", "h5py")], ids=" first, ".join)
+def test_two_copies_of_hdf5_share_a_file(tmp_path, order):
+    """Each library brings one. `tests/versions` does the same with the oldest and newest of both."""
+    program = Path(__file__).parents[1] / "versions/two_hdf5.py"
+    done = subprocess.run([sys.executable, program, *order, tmp_path / "two.nc"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
 def test_texts_of_most_cells_are_stored_as_ever(tmp_path):
     root = ROOT.empty(AXES | {"mesh_size": tuple(1e-3 * (1 + np.arange(20000)))})
     root.solver[:] = "Cholesky"
@@ -170,6 +197,14 @@ class TestConventions:
         return path
 
 
+def committed(folder, message="a"):
+    """Make a clone of a folder, and return how git is called in it."""
+    git = ["git", "-C", folder, "-c", "user.name=a", "-c", "user.email=a@b.c"]
+    for command in (["init", "-q"], ["add", "."], ["commit", "-q", "-m", message]):
+        subprocess.run([*git, *command], check=True)
+    return git
+
+
 class TestProvenance:
     def test_inputs_are_named_without_the_machine(self, tmp_path):
         repository = tmp_path / "somewhere"
@@ -184,19 +219,62 @@ class TestProvenance:
         assert str(tmp_path) not in json.dumps(found)
         assert "references" not in found  # nothing printed
 
-    def test_changes_are_kept_where_there_are_some(self, tmp_path):
+    def test_changes_are_kept_where_there_are_some(self, tmp_path, monkeypatch):
         path = TestConventions().study(tmp_path)
-        git = ["git", "-C", tmp_path, "-c", "user.name=a", "-c", "user.email=a@b.c"]
-        for command in (["init", "-q"], ["add", "."], ["commit", "-q", "-m", "a"]):
-            subprocess.run([*git, *command], check=True)
+        monkeypatch.setattr(provenance, "clone", lambda: tmp_path)
+        committed(tmp_path)
         clean = provenance.attributes(load_study(path), path)
-        assert len(clean["git_commit"]) == 40 and clean["git_diff"] == ""
+        assert len(clean["git_commit"]) == 40 and clean["git_diff"] == "" and "study_commit" not in clean
         path.write_text(path.read_text().replace("Small", "Smaller"))
         dirty = provenance.attributes(load_study(path), path)
         assert dirty["git_commit"] == clean["git_commit"] + "+changes"
         assert "-title: Small\n+title: Smaller\n" in dirty["git_diff"]
 
-    def test_changes_are_those_of_package_rules_and_study_alone(self, tmp_path):
+    def test_a_study_in_a_checkout_of_its_own_has_two_commits(self, tmp_path, monkeypatch):
+        library, mine = tmp_path / "library", tmp_path / "mine"
+        (library / "src").mkdir(parents=True)
+        (library / "requirements").mkdir()
+        for name in ("src/one.py", "requirements/run.txt"):
+            (library / name).write_text("")
+        mine.mkdir()
+        path = TestConventions().study(mine)
+        monkeypatch.setattr(provenance, "clone", lambda: library)
+        outside = provenance.attributes(load_study(path), path)
+        assert outside["git_commit"] == "" and "study_commit" not in outside
+        committed(library)
+        outside = provenance.attributes(load_study(path), path)
+        assert len(outside["git_commit"]) == 40 and "study_commit" not in outside
+        committed(mine, "another")
+        (library / "src/one.py").write_text("changed code\n")
+        path.write_text(path.read_text() + "# changed study\n")
+        found = provenance.attributes(load_study(path), path)
+        assert found["git_commit"] == outside["git_commit"] + "+changes"
+        assert found["study_commit"].endswith("+changes") and found["study_commit"][:40] != outside["git_commit"]
+        added = [line for line in found["git_diff"].splitlines() if line.startswith("+") and "changed" in line]
+        assert added == ["+changed code", "+# changed study"]
+
+    def test_a_built_package_has_the_commit_that_it_was_built_from(self, tmp_path, monkeypatch):
+        """And not that of a folder above, such as of a project whose environment it is in."""
+        package = tmp_path / ".venv/springtune"
+        (package / "workflow/config").mkdir(parents=True)
+        path = TestConventions().study(package / "workflow/config")
+        committed(tmp_path)
+        for name, value in {
+            "PACKAGE": package,
+            "COMMIT_FILE": package / "commit.txt",
+            "COPY": package / "workflow",
+        }.items():
+            monkeypatch.setattr(source, name, value)
+            monkeypatch.setattr(provenance, name, value, raising=False)
+        assert source.workflow_folder() == package / "workflow" and source.clone() is None
+        unknown = provenance.attributes(load_study(path), path)
+        assert unknown["git_commit"] == unknown["git_diff"] == "" and "study_commit" not in unknown
+        (package / "commit.txt").write_text("f00d\n")
+        known = provenance.attributes(load_study(path), path)
+        assert known["git_commit"] == "f00d" and "study_commit" not in known
+
+    def test_changes_are_those_of_package_rules_and_study_alone(self, tmp_path, monkeypatch):
+        monkeypatch.setattr(provenance, "clone", lambda: tmp_path)
         (tmp_path / "config").mkdir()
         path = TestConventions().study(tmp_path / "config")
         kept = ["src/own.py", "Snakefile", "workflow/rules/a[b].smk", "workflow/report/a.rst"]
@@ -204,9 +282,7 @@ class TestProvenance:
         for name in (*kept, *others):
             (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
             (tmp_path / name).write_text("")
-        git = ["git", "-C", tmp_path, "-c", "user.name=a", "-c", "user.email=a@b.c"]
-        for command in (["init", "-q"], ["add", "."], ["commit", "-q", "-m", "a"]):
-            subprocess.run([*git, *command], check=True)
+        committed(tmp_path)
         for name in (*kept, *others):
             (tmp_path / name).write_text(f"changed {name}\n")
         path.write_text(path.read_text() + "# changed study\n")
@@ -219,9 +295,7 @@ class TestProvenance:
 
     def test_long_changes_are_cut_and_hashed(self, tmp_path):
         path = TestConventions().study(tmp_path)
-        git = ["git", "-C", tmp_path, "-c", "user.name=a", "-c", "user.email=a@b.c"]
-        for command in (["init", "-q"], ["add", "."], ["commit", "-q", "-m", "a"]):
-            subprocess.run([*git, *command], check=True)
+        git = committed(tmp_path)
         path.write_text(path.read_text() + "".join(f"# {number:050}\n" for number in range(2000)))
         whole = subprocess.run([*git, "diff", "HEAD"], check=True, capture_output=True).stdout
         kept = provenance.git_diff(load_study(path), tmp_path)

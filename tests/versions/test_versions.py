@@ -58,7 +58,8 @@ NEEDED = [one for one in NEEDED if not one.startswith("snakemake")]
 SNAKEMAKE = [one for one in DECLARED["dependencies"] if one.startswith("snakemake")]
 """Snakemake and the interface of its loggers."""
 
-TESTERS = [one for one in DECLARED["optional-dependencies"]["test"] if re.match("hypothesis|mujoco|pytest", one)]
+TESTERS = DECLARED["optional-dependencies"]["test"]
+TESTERS = [one for one in TESTERS if re.match("hypothesis|meshlane|mujoco|pytest", one)]
 
 PYTHONS = [one.rpartition(" ")[2] for one in DECLARED["classifiers"] if re.search(r":: 3\.\d+$", one)]
 """Versions of Python that are supported."""
@@ -246,6 +247,20 @@ def test_files_for_mujoco_3_hold_in_it(version, tmp_path):
     """The first that has a flex's elasticity, the last with wrong forces on its rollers, and the last of version 3."""
     python = environment(tmp_path / "venv", sys.executable, [*NEEDED, f"mujoco=={version}"])
     physics(python, "tests/physics/test_simulators.py")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("h5py", ["h5py==3.12.*", "h5py"])
+@pytest.mark.parametrize("netcdf4", ["netcdf4==1.7.0", "netcdf4"])
+def test_two_copies_of_hdf5_share_a_file(netcdf4, h5py, tmp_path):
+    """The oldest and newest wheels of both bring HDF5 1.10 to 2.2, whichever is imported first."""
+    python = environment(tmp_path / "venv", sys.executable, [*NEEDED, netcdf4, h5py])
+    for order in (("h5py", "netCDF4"), ("netCDF4", "h5py")):
+        call = [str(python), str(PROGRAM.with_name("two_hdf5.py")), *order, str(tmp_path / "two.nc")]
+        here = os.environ | {"PYTHONPATH": str(REPOSITORY / "src")}
+        done = subprocess.run(call, capture_output=True, text=True, env=here)
+        print(done.stdout)
+        assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.slow

@@ -11,8 +11,9 @@ import click
 
 from ..safe_io.escapes import clipped, shown
 from ..studies.output.text import aligned, cell_text, paragraphs, variable_name
+from ..studies.runs.source import CONFIG_FOLDER
 from . import examples
-from .options import CONFIG_FOLDER, RESULTS_FOLDER, dataset_path
+from .options import RESULTS_FOLDER, dataset_path
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..mesh.formats import LONGEST_SAID
+from ..mesh.formats import LONGEST_SAID, library
 from ..safe_io.atomic import check_folder, replacing, write_text
 from ..safe_io.inputs import DataElsewhere, check_alone
 from .mujoco import mjcf
@@ -168,7 +168,12 @@ def _terms(cells: np.ndarray, columns: Mapping[str, np.ndarray]) -> Iterable[Ter
         if found and len(found) < len(names):
             raise ValueError(f"{kind} terms without {', '.join(sorted(set(names) - set(found)))}")
         if found:
-            yield Terms(kind, cells, {name: np.ascontiguousarray(values, float) for name, values in found.items()})
+            yield _terms_of(kind, cells, found)
+
+
+def _terms_of(kind: str, cells: np.ndarray, values: Mapping[str, Any]) -> Terms:
+    """Terms of all values of a kind."""
+    return Terms(kind, cells, {name: np.ascontiguousarray(values[name], float) for name in VALUES[kind]})
 
 
 def _by_corners(energies: Iterable[Terms]) -> dict[int, dict[str, np.ndarray]]:
@@ -330,14 +335,7 @@ def _read_json(path: Path) -> Read:
         for name, one in ARRAYS.items()
         if found[name] is not None
     }
-    energies = tuple(
-        Terms(
-            one["kind"],
-            arrays[one["cells"]],
-            {name: np.array(one["values"][name], dtype=float) for name in VALUES[one["kind"]]},
-        )
-        for one in found["energies"]
-    )
+    energies = [_terms_of(one["kind"], arrays[one["cells"]], one["values"]) for one in found["energies"]]
     return arrays, energies, found["header"]
 
 
@@ -386,9 +384,7 @@ def _numbers(header: Mapping[str, Any]) -> dict[str, float]:
 
 
 def _read_vtu(path: Path) -> Read:
-    import meshio
-
-    grid = meshio.read(path)
+    grid = library().read(path)
     arrays: dict[str, np.ndarray] = {"points": grid.points[:, :2]}
     for old, new in POINT_NAMES.items():
         if new in grid.point_data:
@@ -459,14 +455,7 @@ def _read_h5(path: Path) -> Read:
     with h5py.File(path) as file:
         arrays = {name: file[name][()] for name in ARRAYS if name in file}
         groups = [file["energies"][str(number)] for number in range(len(file.get("energies", ())))]
-        energies = tuple(
-            Terms(
-                group.attrs["kind"],
-                arrays[group.attrs["cells"][1:]],
-                {name: group[name][()] for name in VALUES[group.attrs["kind"]]},
-            )
-            for group in groups
-        )
+        energies = [_terms_of(one.attrs["kind"], arrays[one.attrs["cells"][1:]], one) for one in groups]
         return arrays, energies, _header_in(file["header"])
 
 

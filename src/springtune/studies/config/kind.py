@@ -152,8 +152,8 @@ class Kind:
         Name of its package and of its part of a study in `Study.parts`.
     study_fields, grid_fields : dict of str to tuple
         Keys that it adds to a study and to grids, with type and pydantic field.
-    alone : tuple of str
-        Those of its keys that a study may have instead of beams and grids.
+    alone : dict of str to tuple
+        Those of its keys that a study may have instead of grids, and the keys that each needs.
     files : callable, optional
         From its part of a study to further input files.
     check : callable, optional
@@ -184,7 +184,7 @@ class Kind:
     name: str
     study_fields: dict[str, tuple[Any, Any]] = field(default_factory=dict)
     grid_fields: dict[str, tuple[Any, Any]] = field(default_factory=dict)
-    alone: tuple[str, ...] = ()
+    alone: dict[str, tuple[str, ...]] = field(default_factory=dict)
     files: Callable[[Any], Iterable[Path]] = lambda part: ()
     check: Callable[[Any, Problems], None] = lambda config, problems: None
     expand: Callable[[Any, Any], Any] = lambda config, declared: ()
