@@ -13,7 +13,15 @@ from click.core import ParameterSource
 
 from ..problem.status import Status
 from ..safe_io.escapes import shown
-from ..studies.output.text import aligned, bytes_text, from_json, paragraphs, place_text, without_numbers
+from ..studies.output.text import (
+    aligned,
+    bytes_text,
+    from_json,
+    paragraphs,
+    place_text,
+    sign_text,
+    without_numbers,
+)
 from . import examples
 from .options import idle, studies
 
@@ -111,7 +119,7 @@ def _errors(tree: "xr.DataTree") -> list[str]:
     error = root.deformation_error.where(counted).transpose(*root.deformation_error.dims)
     by = [name for name in ("definition", "kinematics") if name in error.dims]
     named = [name for name in by if name == "definition" or error.sizes[name] > 1]
-    rows: list[list[object]] = [["  definition", *named[1:], "cells", "median", "worst", "at"]]
+    rows: list[list[object]] = [["  definition", *named[1:], "cells", "median", "worst", "", "at"]]
     for labels in product(*(error[name].values for name in by)):
         here = error.sel(dict(zip(by, labels)))
         sizes = np.abs(here.values[np.isfinite(here.values)])
@@ -119,7 +127,8 @@ def _errors(tree: "xr.DataTree") -> list[str]:
             worst = np.unravel_index(np.nanargmax(np.abs(here.values)), here.shape)
             numbers = [len(sizes), f"{100 * np.median(sizes):.3g} %", f"{100 * here.values[worst]:+.3g} %"]
             place = place_text(root, here.dims, map(int, worst))
-            rows.append([f"  {labels[0]}", *labels[1 : len(named)], *numbers, place])
+            word = sign_text(root, float(here.values[worst]), here.dims, worst)
+            rows.append([f"  {labels[0]}", *labels[1 : len(named)], *numbers, word, place])
     head = "errors, (network - reference) / |reference|, of scenes that are solved and within their reference's reach"
     return [head, *aligned(rows, 0, range(len(named), len(named) + 3)).splitlines()] if rows[1:] else []
 
