@@ -110,6 +110,27 @@ class TestEquilibrium:
         assert run.status == "rest"
         assert np.abs(run.displacements - result.displacements).max() <= 1e-6 * abs(result.displacement)
 
+    def test_a_bent_beam_is_let_go(self):
+        """Energy in J, which the implicit midpoint keeps: half of force times displacement; and it comes to rest."""
+        bent = scene(load="bending", force="100 N", kinematics="linear")
+        result, motion = bent.solve(), bent.motion(released=True)
+        assert not motion.load.any()
+        start, step = result.displacements, 0.02 / bent.motion().loaded_frequency
+        run = motion.run("implicit-midpoint", step, 50, start=start, sample=10)
+        assert run.samples[:, 1] == pytest.approx(0.5 * bent.force * result.displacement, rel=1e-9)
+        assert run.samples[-1, 3] < 0  # N s: it was bent upwards
+        calm = bent.motion(released=True, mass_damping=bent.motion().critical_damping)
+        run = calm.run("backward-euler", 10 * step, 500, start=start, rest=1e-6)
+        assert run.status == "rest" and np.abs(run.displacements).max() < 1e-3 * result.displacement
+        with pytest.raises(ValueError, match="ask the motion under the load, without released=True"):
+            motion.critical_damping  # noqa: B018
+
+    def test_a_turning_load_is_let_go_of(self):
+        pressed = scene(load="follower-pressure", force="100 N")
+        with pytest.raises(ValueError, match="or let go of it by released=True"):
+            pressed.motion()
+        assert not pressed.motion(released=True).load.any()
+
 
 def test_networks_are_shared_between_scenes_of_a_sheet():
     first = scene(definition="paper", stiffness=1e8)

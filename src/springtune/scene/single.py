@@ -408,11 +408,13 @@ class Scene:
         """
         return "" if self.kinematics == "linear" else self.statement.objection(self.sheet, self.finite_strain)
 
-    def motion(self, **options: Any) -> "Motion":
+    def motion(self, released: bool = False, **options: Any) -> "Motion":
         """The scene in time, its force switched on at rest and kept; free of damping.
 
         Parameters
         ----------
+        released : bool, optional
+            Without the force: to let go of a loaded body, start a run from the displacements of its result.
         **options
             ``mass_damping``, ``dampers`` and others as `springtune.mechanics.dynamics.Motion` takes them.
 
@@ -424,6 +426,7 @@ class Scene:
         ------
         ValueError
             If the material has no density, or the load prescribes displacements or turns with the sides it acts on.
+            Turning loads can be released.
 
         Notes
         -----
@@ -437,6 +440,17 @@ class Scene:
         >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "5 mm"), steel, "traction", "1 kN")
         >>> print(f"{1e9 * scene.motion().step_limit('central-difference'):.0f} ns")
         622 ns
+
+        Let go of, a bent beam has the work of the force as energy, and comes back to rest where it is damped:
+
+        >>> scene = st.Scene(beam, scene.mesh, steel, "bending", "100 N", kinematics="linear")
+        >>> bent, motion = scene.solve(), scene.motion(released=True)
+        >>> energy = motion.energy(bent.displacements, 0 * bent.displacements)
+        >>> print(f"{1e3 * energy:.3f} mJ, {1e3 * scene.force * bent.displacement / 2:.3f} mJ")
+        11.449 mJ, 11.449 mJ
+        >>> calm = scene.motion(released=True, mass_damping=scene.motion().critical_damping)
+        >>> calm.run("backward-euler", 1e-5, 1000, start=bent.displacements, rest=1e-6).status
+        'rest'
         """
         inertia = self.statement.masses()
         if inertia is None:
@@ -446,15 +460,16 @@ class Scene:
             raise ValueError(
                 f"load: {self.load!r} prescribes displacements, and a motion is under forces; take another load"
             )
-        if self.problem.follower is not None:
+        if self.problem.follower is not None and not released:
             raise ValueError(
                 f"load: {self.load!r} turns with the side that it acts on, and forces of a motion do not; take one "
-                "that does not follow"
+                "that does not follow, or let go of it by released=True"
             )
         from ..mechanics.dynamics import Motion
 
         reference = self.springs.reference
-        known: dict[str, Any] = {"linear": self.kinematics == "linear", "load": self.forces / reference}
+        load = None if released else self.forces / reference
+        known: dict[str, Any] = {"linear": self.kinematics == "linear", "load": load, "reference": reference}
         return Motion(self.network, inertia / reference, **(known | options))
 
     def write_motion(
