@@ -195,7 +195,10 @@ def main() -> None:
     usual, said = warnings.showwarning, click.get_current_context().meta.setdefault(SAID, [])
 
     def show(message: Warning | str, category: type[Warning], *where: Any, **further: Any) -> None:
-        if category.__name__ == "AssumptionWarning":  # not imported, so that --help does not wait for it
+        if category.__name__ in (
+            "AssumptionWarning",
+            "PluginWarning",
+        ):  # not imported, so that --help does not wait for it
             said.append(f"warning: {shown(message)}")
         else:
             usual(message, category, *where, **further)

@@ -123,7 +123,12 @@ def definitions() -> None:
     from .. import DEFINITIONS
     from ..studies.output.text import aligned
 
-    click.echo(aligned([[name, definition.summary] for name, definition in DEFINITIONS.items()], left=2))
+    others = DEFINITIONS.packages
+    rows = [
+        [name, f"{one.summary} ({others[name]})" if name in others else one.summary]
+        for name, one in DEFINITIONS.items()
+    ]
+    click.echo(aligned(rows, left=2))
 
 
 BY = ("mesh", "grid")

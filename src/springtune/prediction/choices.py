@@ -31,10 +31,6 @@ from ..scene.sheet import Sheet
 from ..scene.statements import BeamStatement, ShapeStatement, Statement
 from ..springs import DEFINITIONS, DefinitionError, Springs
 
-PREDICTED = tuple(name for name, load in LOADS.items() if not load.follower)
-"""Loads that can be predicted, keys of `springtune.problem.loads.LOADS`: all but those that turn with the side that
-they act on, which linear kinematics do not tell from the others."""
-
 CASES = ("traction", "bending", "shear")
 """Loads that are predicted where none are named."""
 
@@ -163,16 +159,24 @@ def check_beam(beam: Beam) -> None:
         )
 
 
+def predicted() -> tuple[str, ...]:
+    """Loads that can be predicted, keys of `springtune.problem.loads.LOADS`.
+
+    All but those that turn with the side that they act on, which linear kinematics do not tell from the others.
+    """
+    return tuple(name for name, load in LOADS.items() if not load.follower)
+
+
 def check_loads(loads: Iterable[str]) -> tuple[str, ...]:
     """Loads, each once."""
     if isinstance(loads, str) or not isinstance(loads, Iterable):
         raise ValueError(f"loads: {loads!r} is no list of loads; give one such as {list(CASES)}")
     names = tuple(loads)
     for name in names:
-        if name not in PREDICTED:
-            raise ValueError(f"loads: {name!r} cannot be predicted; {nearest(str(name), PREDICTED)}")
+        if name not in LOADS or LOADS[name].follower:
+            raise ValueError(f"loads: {name!r} cannot be predicted; {nearest(str(name), predicted())}")
     if not names:
-        raise ValueError(f"loads: none; give some of {', '.join(PREDICTED)}")
+        raise ValueError(f"loads: none; give some of {', '.join(predicted())}")
     return tuple(dict.fromkeys(names))
 
 

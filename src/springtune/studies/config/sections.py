@@ -52,7 +52,7 @@ from .fields import (
     number,
     one_of,
 )
-from .kind import Kind, Output, kinds
+from .kind import RESERVED, Kind, Output, kinds
 from .messages import refuse, show
 
 MOST_PARTS = 1000
@@ -530,6 +530,9 @@ class StudyConfig(Section):
                 instead = "".join(f", or {way}" for way in ways)
                 found |= {"beams": "" if "grids" in given else instead, "grids": instead}
         return {name: found[name] for name in cls.model_fields if name in found}
+
+
+RESERVED.update(StudyConfig.model_fields, GridConfig.model_fields)
 
 
 def _beams_or(alone: Iterable[str]) -> dict[str, Any]:
