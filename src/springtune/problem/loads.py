@@ -18,8 +18,8 @@
 
 A load's displacement is the mean of the loaded side along the force; under pressure, that of the side's middle.
 
-To add a load, add a row to `OWN_LOADS`, and a `LoadKind` if its supports, side or direction are new. Other packages do so
-by an entry point in the group ``springtune.loads``.
+To add a load, add a row to `OWN_LOADS`, and a `LoadKind` if its supports, side or direction are new. Other packages
+have entry points in the group ``springtune.loads``.
 """
 
 import hashlib
