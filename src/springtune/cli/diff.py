@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import click
 
 from ..safe_io.escapes import clipped, shown
-from ..studies.output.text import aligned, cell_text, paragraphs, variable_name
+from ..safe_io.tables import aligned
+from ..studies.output.text import cell_text, paragraphs, variable_name
 from . import examples
 from .options import CONFIG_FOLDER, RESULTS_FOLDER, dataset_path
 

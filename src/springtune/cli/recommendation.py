@@ -2,14 +2,16 @@
 
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 from .. import __version__
+from ..problem.compare import error_text
+from ..safe_io.tables import TabledList, aligned
 
 if TYPE_CHECKING:
-    from ..prediction.choices import Choice, Number, References, ShapeReferences
+    from ..prediction.choices import Choice, References, ShapeReferences
     from ..prediction.search import MeshChoice, MeshSearch
     from ..problem.geometry import Beam
     from ..problem.materials import Material
@@ -98,20 +100,12 @@ def prediction_text(
     sizes: Sequence[float] = (),
 ) -> str:
     """Text of a prediction; `sizes` [m] are of the meshes that bands are extrapolated from."""
-    from ..studies.output.text import aligned
-
     columns, of_beam = list(subject.known), not subject.load
-    rows = [["definition", "springs inside", "on the outline", *columns, *(["E", "nu"] * of_beam), "besides springs"]]
+    heads, *rows = TabledList(choices).table()
+    kept = [place for place, head in enumerate(heads) if of_beam or head not in ("E", "nu")]
+    rows = [[row[place] for place in kept] for row in (heads, *rows)]
     notes = [f"{name}: no reference; {found}" for name, found in subject.known.items() if isinstance(found, str)]
     for choice in choices:
-        row = [choice.definition]
-        row += [_bounds(value, "{:.5g} N/m".format, "each its own") for value in (choice.inside, choice.outline)]
-        row += [_bounds(choice.errors[name], _percent, _missing(choice, subject.load or name)) for name in columns]
-        if of_beam:
-            missing = _missing(choice, "patch test")
-            row.append(_bounds(choice.young_modulus_error, _percent, missing))
-            row.append(_bounds(choice.poisson_ratio, _three_decimals, missing))
-        rows.append([*row, choice.extra])
         notes += [f"{choice.definition}, {part}: {reason}" for part, reason in choice.failures.items()]
     first, plain = (name or "none" for name in recommended(choices))
     particles, springs = about["particles"], about["springs"]
@@ -141,7 +135,7 @@ def prediction_text(
 
 def search_text(subject: Subject, search: "MeshSearch", springs_alone: bool = False) -> str:
     """Text of a search for a mesh."""
-    from ..studies.output.text import aligned
+    from ..prediction.choices import bounds_text
 
     where, steps = "in" if subject.load else "under", subject.dense
     wanted = f"{100 * search.error:.6g} %"
@@ -163,7 +157,7 @@ def search_text(subject: Subject, search: "MeshSearch", springs_alone: bool = Fa
             if one is None:
                 notes.append(f"{name}, {what}: {_nearest(search, name, alone)}")
                 continue
-            errors = [_bounds(one.choice.errors[load], _percent, "") for load in search.loads]
+            errors = [bounds_text(one.choice.errors[load], error_text, "") for load in search.loads]
             rows.append([name, size_text(one.size), one.choice.definition + ("" if one.confirmed else " *")])
             rows[-1] += [f"{number:,}" for number in (one.cells, one.particles, one.springs)]
             rows[-1] += [*errors, f"{1e3 * one.seconds:.3g} ms", *([f"{one.step_limit:.3g} s"] if steps else [])]
@@ -322,28 +316,3 @@ def _json(content: dict[str, Any]) -> str:
         return None if isinstance(value, float) and not math.isfinite(value) else value
 
     return json.dumps(plain(content), indent=2, ensure_ascii=False)
-
-
-def _missing(choice: "Choice", part: str) -> str:
-    """Word for a missing number."""
-    if "springs" in choice.failures:
-        return "refused"
-    reason = choice.failures.get(part) or choice.failures.get("patch test")
-    return "no reference" if reason is None else "unstable" if "unstable" in reason else "unsolved"
-
-
-def _bounds(value: "Number", form: Callable[[float], str], missing: str) -> str:
-    """A number, or the bounds of a band, as text."""
-    numbers = value if isinstance(value, tuple) else (value,)
-    texts = [missing if number != number else form(number) for number in numbers]
-    return texts[0] if len(set(texts)) == 1 else " to ".join(texts)
-
-
-def _three_decimals(value: float) -> str:
-    return f"{round(value, 3) + 0.0:.3f}"
-
-
-def _percent(value: float) -> str:
-    """Error with two decimals below 10 %, otherwise three digits."""
-    value = 100 * value
-    return f"{round(value, 2) + 0.0:+.2f} %" if abs(value) < 10 else f"{value:+.3g} %"

@@ -13,7 +13,8 @@ from click.core import ParameterSource
 
 from ..problem.status import Status
 from ..safe_io.escapes import shown
-from ..studies.output.text import aligned, bytes_text, from_json, paragraphs, place_text, without_numbers
+from ..safe_io.tables import aligned
+from ..studies.output.text import bytes_text, from_json, paragraphs, place_text, without_numbers
 from . import examples
 from .options import idle, studies
 

@@ -8,7 +8,7 @@ import click
 
 from ..registry import NAME, NAME_RULE
 from ..safe_io.atomic import write_text
-from ..studies.output.text import aligned
+from ..safe_io.tables import aligned
 from . import WrongCall, examples, studies_here
 from .options import CONFIG_FOLDER, allow, loaded, max_scenes
 from .run import checkout_of_run, how_to_get_one, is_checkout
@@ -121,7 +121,6 @@ def scenes(config: Path, most: int | None) -> None:
 def definitions() -> None:
     """List the definitions of spring stiffness."""
     from .. import DEFINITIONS
-    from ..studies.output.text import aligned
 
     others = DEFINITIONS.packages
     rows = [

@@ -8,6 +8,15 @@ from numpy.typing import ArrayLike
 
 from .status import Status
 
+
+def error_text(error: float) -> str:
+    """Deformation error in words: two decimals below 10 %, otherwise three digits."""
+    percent = 100 * error
+    if percent != percent:
+        return "no reference"
+    return f"{round(percent, 2) + 0.0:+.2f} %" if abs(percent) < 10 else f"{percent:+.3g} %"
+
+
 ROOT_TOLERANCE = 1e-10
 """Relative tolerance of a best stiffness, below that of the curve."""
 

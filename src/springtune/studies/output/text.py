@@ -5,7 +5,7 @@ import io
 import json
 import math
 import re
-from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, SupportsFloat
 
 from springtune.problem.parameters import SWEPT, with_unit
@@ -18,19 +18,6 @@ if TYPE_CHECKING:
 def paragraphs(parts: Iterable[Iterable[str]]) -> str:
     """Join paragraphs of lines, escaping line breaks in values."""
     return "\n\n".join("\n".join(map(shown, lines)) for lines in parts)
-
-
-def aligned(rows: Iterable[Iterable[object]], left: int, right: Collection[int] = ()) -> str:
-    """Align columns, those in `right` to the right."""
-    texts = [[shown(cell) for cell in row] for row in rows]
-    widths = [max(map(len, column)) for column in zip(*texts)]
-    lines = []
-    for row in texts:
-        cells = [
-            cell.rjust(width) if n in right else cell.ljust(width) for n, (cell, width) in enumerate(zip(row, widths))
-        ]
-        lines.append((" " * left + "  ".join(cells)).rstrip())
-    return "\n".join(lines)
 
 
 def bytes_text(number: float) -> str:
