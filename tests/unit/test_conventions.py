@@ -84,7 +84,7 @@ def root(node):
 
 
 def private(name):
-    return name.startswith("_") and not name.endswith("__") and name != "_"
+    return name.startswith("_") and not name.endswith("_")  # such as __init__ and _repr_html_ of notebooks
 
 
 TESTS = sorted((REPOSITORY / "tests").rglob("*.py"))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from .. import __version__
 from ..problem.compare import error_text
+from ..problem.shapes import QUANTITY_UNITS
 from ..safe_io.tables import TabledList, aligned
 
 if TYPE_CHECKING:
@@ -64,8 +65,7 @@ def beam_subject(beam: "Beam", material: "Material", known: "References") -> Sub
 
 def shape_subject(statement: "ShapeStatement", known: "ShapeReferences") -> Subject:
     """Shape of a prediction."""
-    units = {"displacement": "m", "reaction": "N", "stress": "Pa", "area": "m2", "energy": "J"}
-    unit = {one.name: units[one.kind] for one in statement.case.quantities}
+    unit = {one.name: QUANTITY_UNITS[one.kind] for one in statement.case.quantities}
     about = {
         "shape": statement.shape.name,
         "load": statement.load,
@@ -136,14 +136,15 @@ def prediction_text(
 def search_text(subject: Subject, search: "MeshSearch", springs_alone: bool = False) -> str:
     """Text of a search for a mesh."""
     from ..prediction.choices import bounds_text
+    from ..prediction.search import answer_text, size_text
 
     where, steps = "in" if subject.load else "under", subject.dense
     wanted = f"{100 * search.error:.6g} %"
     lines = [
         f"{subject.name}; {subject.made_of}; an error of at most {wanted} {where} {_listed(search.loads)}",
         "",
-        *([] if springs_alone else [f"recommended: {_answer(search.best)}"]),
-        f"with springs alone: {_answer(search.best_springs)}",
+        *([] if springs_alone else [f"recommended: {answer_text(search.best)}"]),
+        f"with springs alone: {answer_text(search.best_springs)}",
     ]
     heads = ["mesh", "size", "definition", "cells", "particles", "springs", *search.loads, "static solve"]
     heads += ["largest step"] if steps else []
@@ -231,17 +232,6 @@ def recommended(choices: "Sequence[Choice]") -> tuple[str | None, str | None]:
     return (solved[0].definition if solved else None), (plain[0].definition if plain else None)
 
 
-def size_text(size: float) -> str:
-    """Mesh size [m] as the option takes it.
-
-    Examples
-    --------
-    >>> size_text(0.00308)
-    '3.08 mm'
-    """
-    return f"{1e3 * size:.12g} mm"
-
-
 KINEMATICS_TEXT = "with linear kinematics (small strain), against the converged reference of small strain"
 """Kinematics and reference of the errors."""
 
@@ -264,13 +254,6 @@ def _listed(words: Sequence[str]) -> str:
     return " and ".join([", ".join(words[:-1]), words[-1]] if words[1:] else words)
 
 
-def _answer(one: "MeshChoice | None") -> str:
-    if one is None:
-        return "none"
-    sure = "" if one.confirmed else ", not confirmed by finer meshes"
-    return f"{one.mesh_type} {size_text(one.size)} with {one.choice.definition}, {one.particles:,} particles{sure}"
-
-
 def _order(one: "MeshChoice | None") -> tuple[bool, int]:
     return (not one.confirmed, one.particles) if one else (True, 0)
 
@@ -278,7 +261,7 @@ def _order(one: "MeshChoice | None") -> tuple[bool, int]:
 def _nearest(search: "MeshSearch", mesh_type: str, springs_alone: bool) -> str:
     """Reason why no mesh was found, and the nearest one."""
     from ..prediction.choices import NEED_ENERGIES, as_sure_as, in_order
-    from ..prediction.search import SPRINGS_ALONE
+    from ..prediction.search import SPRINGS_ALONE, size_text
 
     tried = [one for one in search.tried if one.mesh_type == mesh_type]
     names = [(one, name) for one in tried for name in one.errors if name in SPRINGS_ALONE or not springs_alone]

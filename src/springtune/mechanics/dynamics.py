@@ -10,7 +10,7 @@ A run can rest on an unstable equilibrium, such as a straight column above its b
 is factorized once, and its negative pivots are counted.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -22,6 +22,7 @@ from scipy.sparse.linalg import eigsh
 from ..linalg.factors import SingularError
 from ..mesh.cells import Mesh
 from ..mesh.sheets import free_motion
+from ..safe_io.tables import Tabled
 from .integrators import EXPLICIT, IMPLICIT, INTEGRATORS, LAGGED, PRECISIONS, BackwardEuler
 from .network import Network
 from .newton import TOLERANCE
@@ -44,8 +45,8 @@ def masses(mesh: Mesh, density: float, thickness: float) -> np.ndarray:
     return density * thickness * mesh.particle_areas
 
 
-@dataclass(frozen=True)
-class Run:
+@dataclass(frozen=True, repr=False)
+class Run(Tabled):
     """Result of a run.
 
     - `displacements`, `velocities` (n_points, 2): Final state [m], [m/s].
@@ -67,6 +68,12 @@ class Run:
     residual: float
     step_bound: float
     samples: np.ndarray
+
+    def _rows(self) -> Iterator[tuple[str, str]]:
+        yield "status", self.status
+        yield "reason", self.message
+        yield "time", f"{self.time:.4g} s, {self.steps} steps"
+        yield "residual", f"{self.residual:.2g}"
 
 
 class Motion(Moving):

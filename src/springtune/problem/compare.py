@@ -8,6 +8,12 @@ from numpy.typing import ArrayLike
 
 from .status import Status
 
+ROOT_TOLERANCE = 1e-10
+"""Relative tolerance of a best stiffness, below that of the curve."""
+
+HALVINGS = 12
+"""Bisections in search of a best stiffness where a curve ends."""
+
 
 def error_text(error: float) -> str:
     """Deformation error in words: two decimals below 10 %, otherwise three digits."""
@@ -15,13 +21,6 @@ def error_text(error: float) -> str:
     if percent != percent:
         return "no reference"
     return f"{round(percent, 2) + 0.0:+.2f} %" if abs(percent) < 10 else f"{percent:+.3g} %"
-
-
-ROOT_TOLERANCE = 1e-10
-"""Relative tolerance of a best stiffness, below that of the curve."""
-
-HALVINGS = 12
-"""Bisections in search of a best stiffness where a curve ends."""
 
 
 def deformation_error(displacement: ArrayLike, reference: ArrayLike) -> np.ndarray:

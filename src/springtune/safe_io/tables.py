@@ -20,13 +20,35 @@ def aligned(rows: Iterable[Iterable[object]], left: int, right: Collection[int] 
     return "\n".join(lines)
 
 
+def number_text(number: float, unit: str) -> str:
+    """Number with unit, lengths in mm.
+
+    Examples
+    --------
+    >>> number_text(0.005, "m"), number_text(0.3, "1"), number_text(4e5, "N")
+    ('5 mm', '0.3', '400000 N')
+    """
+    if unit == "m":
+        return f"{1e3 * number:.6g} mm"
+    return f"{number:.6g}" if unit in ("", "1") else f"{number:.6g} {unit}"
+
+
 def html_table(name: str, rows: Iterable[Sequence[object]], heads: Iterable[object] = ()) -> str:
     """HTML table below a name; the first cell of each row is its head."""
-    lines = "".join(f"<th>{escape(shown(head))}</th>" for head in heads) + "".join(
-        f"<tr><th>{escape(shown(first))}</th>{''.join(f'<td>{escape(shown(cell))}</td>' for cell in others)}</tr>"
-        for first, *others in rows
-    )
-    return f"<div><b>{escape(name)}</b><table>{lines}</table></div>"
+    lines = ["".join(_cell("th", head) for head in heads)]
+    lines += [_cell("th", first) + "".join(_cell("td", cell) for cell in others) for first, *others in rows]
+    table = "".join(f"<tr>{line}</tr>" for line in lines if line)
+    return f"<div><b>{escape(name)}</b><table>{table}</table></div>"
+
+
+WRAPPED = 30
+"""Characters from which a cell may have several lines."""
+
+
+def _cell(tag: str, content: object) -> str:
+    text = shown(content)
+    space = "normal" if len(text) >= WRAPPED else "nowrap"  # notebooks have styles of their own
+    return f'<{tag} style="text-align: left; vertical-align: top; white-space: {space}">{escape(text)}</{tag}>'
 
 
 class Tabled:
@@ -44,7 +66,7 @@ class Tabled:
         return [row for row in (*self._rows(), *self._computed_rows()) if row[1]]
 
     def __repr__(self) -> str:
-        return f"{type(self).__name__}({', '.join(f'{label} {text}' for label, text in self._rows() if text)})"
+        return f"{type(self).__name__}({'; '.join(f'{label}: {text}' for label, text in self._rows() if text)})"
 
     def __str__(self) -> str:
         return f"{type(self).__name__}\n{aligned(self._table(), left=2)}"

@@ -2,7 +2,7 @@
 
 import time
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
@@ -15,14 +15,15 @@ from ..mechanics.newton import Equilibrium
 from ..mechanics.statics import SingularError, StaticProblem
 from ..mesh import Mesh
 from ..mesh.groups import GroupedMesh
-from ..problem.compare import quantity_errors
+from ..problem.compare import error_text, quantity_errors
 from ..problem.geometry import AssumptionWarning, Beam
 from ..problem.loads import KINEMATICS
 from ..problem.materials import AnyMaterial
 from ..problem.quantities import positive
-from ..problem.shapes import Shape
+from ..problem.shapes import QUANTITY_UNITS, Shape
 from ..problem.status import Status
 from ..registry import hook
+from ..safe_io.tables import Tabled, number_text
 from ..springs import Springs
 from .meshes import is_a
 from .sheet import AnyDefinition, Sheet, check_stiffness, definition_of, named
@@ -38,7 +39,7 @@ if TYPE_CHECKING:
     from ..reference.small_strain import ReferenceSolution
 
 
-class Scene:
+class Scene(Tabled):
     """A boundary-value problem: a beam or a shape, meshed by springs of a definition, under a load.
 
     Parameters
@@ -182,6 +183,15 @@ class Scene:
             f"Scene({self.statement.body}, {len(self.mesh.points)} particles, {self.statement.named_materials}, "
             f"{self.statement.label}, {self.definition.name}, {self.kinematics})"
         )
+
+    def _rows(self) -> Iterator[tuple[str, str]]:
+        about = self.statement
+        yield "body", f"{about.body}, {1e3 * about.thickness:g} mm thick"
+        yield "mesh", f"{len(self.mesh.points)} particles, {len(self.mesh.edges)} springs"
+        yield "material", about.named_materials
+        yield "load", about.label
+        yield "definition", self.definition.name
+        yield "kinematics", self.kinematics
 
     @cached_property
     def _derived(self) -> tuple[Springs, float]:
@@ -588,8 +598,8 @@ class SceneSprings(Springs):
         return written
 
 
-@dataclass(frozen=True)
-class Result:
+@dataclass(frozen=True, repr=False)
+class Result(Tabled):
     """The answer of a scene.
 
     Attributes
@@ -642,6 +652,29 @@ class Result:
     seconds: float
     definition_seconds: float
     values: dict[str, float]
+
+    def _rows(self) -> Iterator[tuple[str, str]]:
+        about = self.scene.statement
+        yield "status", str(self.status)
+        yield "reason", self.message
+        yield "scene", f"{about.body}, {about.label}, {self.scene.definition.name}, {self.scene.kinematics}"
+        units = {one.name: QUANTITY_UNITS[one.kind] for one in about.case.quantities}
+        for name, value in self.values.items():
+            known = number_text(value, units[name]) if units[name] != "Pa" else f"{1e-6 * value:.6g} MPa"
+            yield name, known if value == value else "none"
+        yield "solved in", f"{1e3 * self.seconds:.3g} ms"
+
+    def _computed_rows(self) -> Iterator[tuple[str, str]]:
+        if self.equilibrium is None or not self.equilibrium.converged:
+            return
+        try:
+            errors, objection = self.errors, self.scene.objection
+        except (RuntimeError, ValueError) as why:  # there is no reference, or not of a quantity
+            yield "error", f"no reference: {why}"
+            return
+        for name, error in errors.items():
+            yield f"error of {name}", error_text(error)
+        yield "but", objection
 
     @property
     def displacements(self) -> np.ndarray:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, SupportsFloat
 
 from springtune.problem.parameters import SWEPT, with_unit
 from springtune.safe_io.escapes import shown
+from springtune.safe_io.tables import number_text
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -27,19 +28,6 @@ def bytes_text(number: float) -> str:
             return f"{number:.3g} {unit}"
         number /= 1000
     return f"{number:.3g} GB"
-
-
-def number_text(number: float, unit: str) -> str:
-    """Number with unit, lengths in mm.
-
-    Examples
-    --------
-    >>> number_text(0.005, "m"), number_text(0.3, "1"), number_text(4e5, "N")
-    ('5 mm', '0.3', '400000 N')
-    """
-    if unit == "m":
-        return f"{1e3 * number:.6g} mm"
-    return f"{number:.6g}" if unit in ("", "1") else f"{number:.6g} {unit}"
 
 
 def label_text(dimension: str, label: object, unit: str = "1") -> str:
