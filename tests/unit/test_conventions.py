@@ -47,6 +47,14 @@ def test_modules_are_imported_by_text_in_one_place():
             "scipy meshio netgen",
         ),
         (
+            "import matplotlib; matplotlib.use('agg'); import springtune as st; beam = st.Beam('100 mm', '20 mm');"
+            "steel = st.Material('210 GPa', 0.3, '7850 kg/m^3'); mesh = st.make_mesh(beam, 'free', '10 mm');"
+            "scene = st.Scene(beam, mesh, steel, 'traction', '1 kN'); str(scene.solve()); scene.solve().plot();"
+            "st.sensitivity(scene, [0.5, 0.9]).plot(); st.predict(beam, mesh, steel); scene.motion();"
+            "st.moduli(mesh, steel, 'patch'); st.SpringNet.from_scene(scene)",
+            "snakemake pydantic xarray bokeh h5netcdf netCDF4 h5py click rich psutil jinja2 yaml meshio",
+        ),
+        (
             "from springtune.studies.kinds.scenes import mesh, sensitivity, solve, reference",
             "snakemake xarray matplotlib pandas pydantic pint",
         ),
