@@ -40,26 +40,23 @@ GROUPS = ("definitions", "loads", "mesh_types", "kinds")
 
 @cache
 def plugins() -> "dict[str, list[EntryPoint]]":
-    """Entry points of other packages by group, sorted by package."""
+    """Entry points of other packages by group, sorted by module."""
     if os.environ.get(PLUGINS_VARIABLE) == "none":
         return dict.fromkeys(GROUPS, [])
     from importlib.metadata import entry_points  # here: it costs more than a light command
 
     found = entry_points()
-    return {
-        group: sorted(found.select(group=f"springtune.{group}"), key=lambda one: (_package(one), one.name))
-        for group in GROUPS
-    }
+    return {group: sorted(found.select(group=f"springtune.{group}"), key=_package) for group in GROUPS}
 
 
 def _package(one: "EntryPoint") -> str:
-    return one.dist.name if one.dist else one.module
+    return one.module.partition(".")[0]
 
 
 @cache
-def plugin_packages() -> dict[str, str]:
-    """Distributions that declare something by entry points, by top-level package."""
-    return {one.module.partition(".")[0]: _package(one) for group in plugins().values() for one in group}
+def plugin_packages() -> set[str]:
+    """Packages that declare something by entry points."""
+    return {_package(one) for group in plugins().values() for one in group}
 
 
 def full_name(module: str) -> str:
@@ -122,7 +119,7 @@ class Extended(Mapping[str, Entry]):
     """Read-only ordered mapping of the package's entries and of those that other packages declare by entry points.
 
     `adopt` checks an imported object and returns the entry. What it refuses, or what cannot be imported, is left out
-    with a `PluginWarning`. `packages` has the distributions of entries of other packages.
+    with a `PluginWarning`. `packages` has the packages of entries of others.
     """
 
     def __init__(

@@ -56,12 +56,12 @@ def test_a_study_uses_all_that_a_package_declares(run):
         assert (root.status == 1).all() and root.deformation_error.notnull().all()
         assert lengths.shortest.item() == pytest.approx(5e-3)
         assert lengths.longest.item() == pytest.approx(2**0.5 * 5e-3)
-        assert json.loads(root.attrs["software"])["springtune-example"] == "1.0"
+        assert json.loads(root.attrs["software"])["springtune_example"] == "1.0"
     assert (run / "results/even/figures/size_left_steel_lift.png").stat().st_size
 
 
 def test_commands_list_what_packages_declare(run, site):
-    assert "for the example's sake (springtune-example)" in python(run, site, "-m", "springtune", "definitions")
+    assert "for the example's sake (springtune_example)" in python(run, site, "-m", "springtune", "definitions")
     shown = python(run, site, "-m", "springtune", "scenes", "config/even.yaml")
     assert "measured     2  meshes, their shortest and longest spring" in shown
 

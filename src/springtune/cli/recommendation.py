@@ -7,7 +7,6 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 from .. import __version__
-from ..problem.compare import error_text
 from ..problem.shapes import QUANTITY_UNITS
 from ..safe_io.tables import TabledList, aligned
 
@@ -135,8 +134,7 @@ def prediction_text(
 
 def search_text(subject: Subject, search: "MeshSearch", springs_alone: bool = False) -> str:
     """Text of a search for a mesh."""
-    from ..prediction.choices import bounds_text
-    from ..prediction.search import answer_text, size_text
+    from ..prediction.search import answer_text
 
     where, steps = "in" if subject.load else "under", subject.dense
     wanted = f"{100 * search.error:.6g} %"
@@ -146,24 +144,19 @@ def search_text(subject: Subject, search: "MeshSearch", springs_alone: bool = Fa
         *([] if springs_alone else [f"recommended: {answer_text(search.best)}"]),
         f"with springs alone: {answer_text(search.best_springs)}",
     ]
-    heads = ["mesh", "size", "definition", "cells", "particles", "springs", *search.loads, "static solve"]
-    heads += ["largest step"] if steps else []
     right = (3, *range(5, 9 + len(search.loads) + steps))
     notes = []
     tables = [] if springs_alone else [("with any definition", search.by_type, False)]
     tables.append(("with springs alone", search.springs_by_type, True))
     for what, found, alone in tables:
-        rows = [heads]
+        chosen = []
         for name, one in sorted(found.items(), key=lambda item: _order(item[1])):
             if one is None:
                 notes.append(f"{name}, {what}: {_nearest(search, name, alone)}")
                 continue
-            errors = [bounds_text(one.choice.errors[load], error_text, "") for load in search.loads]
-            rows.append([name, size_text(one.size), one.choice.definition + ("" if one.confirmed else " *")])
-            rows[-1] += [f"{number:,}" for number in (one.cells, one.particles, one.springs)]
-            rows[-1] += [*errors, f"{1e3 * one.seconds:.3g} ms", *([f"{one.step_limit:.3g} s"] if steps else [])]
-        if rows[1:]:
-            lines += ["", f"{what}:", aligned(rows, left=2, right=right)]
+            chosen.append(one)
+        if chosen:
+            lines += ["", f"{what}:", aligned(TabledList(chosen).table(), left=2, right=right)]
     answers = [one for _, found, _ in tables for one in found.values()]
     explained = []
     if any(one and not one.confirmed for one in answers):

@@ -30,7 +30,6 @@ from .bands import FEWEST_CELLS
 from .choices import (
     CASES,
     NEED_ENERGIES,
-    NO_REFERENCE,
     ON_QUADS,
     ON_TRIANGLES,
     SOLVED,
@@ -183,14 +182,16 @@ class MeshChoice(Tabled):
     confirmed: bool
 
     def _rows(self) -> Iterator[tuple[str, str]]:
-        yield "mesh", f"{self.mesh_type} {size_text(self.size)}, {self.cells} cells across"
-        yield "size", f"{self.particles:,} particles, {self.springs:,} springs"
-        yield "definition", self.choice.definition
+        yield "mesh", self.mesh_type
+        yield "size", size_text(self.size)
+        yield "definition", self.choice.definition + ("" if self.confirmed else " *")
+        for name in ("cells", "particles", "springs"):
+            yield name, f"{getattr(self, name):,}"
         for name, error in self.choice.errors.items():
-            yield name, bounds_text(error, error_text, NO_REFERENCE)
+            yield name, bounds_text(error, error_text, "")
         yield "static solve", f"{1e3 * self.seconds:.3g} ms"
-        yield "largest step", "" if math.isnan(self.step_limit) else f"{self.step_limit:.3g} s"
-        yield "confirmed by finer meshes", "yes" if self.confirmed else "no"
+        if not math.isnan(self.step_limit):
+            yield "largest step", f"{self.step_limit:.3g} s"
 
     @property
     def _rank(self) -> tuple[bool, int, int]:

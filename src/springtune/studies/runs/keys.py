@@ -287,10 +287,10 @@ class Code:
         packages: set[tuple[str, str]] = set()
         ours = self._has(path)
         where = path.relative_to(self.package).as_posix() if ours else str(path)
-        for name, distribution in () if ours else plugin_packages().items():
+        for name in () if ours else plugin_packages():
             place = _own(name)
             if place and path.with_suffix("").is_relative_to(place):  # its version counts, not only this code
-                packages.add((where, distribution))
+                packages.add((where, name))
         for one in imports:
             for found in self._followed(path, one):
                 if isinstance(found, Path):
