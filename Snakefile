@@ -26,14 +26,16 @@ if not NOTED:
     include: "workflow/rules/outputs.smk"
     include: "workflow/rules/browse.smk"
 
-    if "study" not in config:  # a study that is read for the paper has none of its own
+    if config.get("paper", True):  # a study that is read for the paper has none of its own
 
         include: "workflow/rules/paper.smk"
 
-    report: "workflow/report/study.rst"
+    if not MODULE:
+
+        report: "workflow/report/study.rst"
 
     rule all:
-        default_target: True
+        default_target: not HAS_TARGET
         message:
             f"{RESULTS} is complete"
         input:
@@ -55,3 +57,6 @@ if not NOTED:
 
     onerror:
         log_end("broken")
+
+    if MODULE:
+        add_hooks(onstart=begin, onsuccess=lambda: log_end("ending"), onerror=lambda: log_end("broken"))

@@ -1,7 +1,10 @@
 """Shared by all tests."""
 
+import importlib
 import os
+import sys
 
+import pytest
 from hypothesis import HealthCheck, settings
 
 # Two modules of one name cannot both be searched for examples, and these have none.
@@ -20,3 +23,14 @@ unhurried = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow]
 settings.register_profile("same", unhurried, derandomize=True)
 settings.register_profile("anew", unhurried, max_examples=400)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))
+
+
+@pytest.fixture(params=["meshio", "meshlane"])
+def mesh_library(request, monkeypatch):
+    """meshio, and its fork in its place. Files of a test's own stay meshio's."""
+    from springtune.mesh.formats import library  # with numpy, after the settings above
+
+    package = importlib.import_module(request.param)
+    monkeypatch.setitem(sys.modules, "meshio", package)
+    assert library() is package and request.param in package.__file__
+    return package

@@ -40,6 +40,8 @@ if ! "$python" -m pip --version >/dev/null 2>&1; then
     }
 fi
 
+[ -e "$venv/bin/pip" ] || ln -s pip3 "$venv/bin/pip" # ensurepip makes no command of this name
+
 # uv installs in a third of the time, but does not read pip's configuration; where it gets nowhere, pip does the work.
 say "installing the packages of requirements/$what.txt"
 install() {

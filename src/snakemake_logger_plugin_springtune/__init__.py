@@ -1,11 +1,11 @@
-"""Snakemake logger plugin: a study's progress on terminals, plain lines elsewhere.
+"""Snakemake logger plugin: a line that moves while a study runs on a terminal, elsewhere a line for each stage.
 
-Snakemake imports all plugins at each start, so drawing is imported only by a run with work to do.
+Snakemake imports all plugins at each start, so the display is imported only by a run with work to do.
 """
 
 import os
 import sys
-from logging import ERROR, WARNING, Handler, LogRecord
+from logging import WARNING, Handler, LogRecord
 from typing import TYPE_CHECKING
 
 from snakemake_interface_logger_plugins.base import LogHandlerBase
@@ -18,8 +18,9 @@ if TYPE_CHECKING:
 class LogHandler(LogHandlerBase):
     """Handler of Snakemake's records.
 
-    Terminals get a display. Files, pipes, continuous integration (``CI``), terminals without cursor control and runs
-    with ``--dry-run``, ``--printshellcmds``, ``--verbose``, ``--debug-dag`` or ``--quiet`` get Snakemake's own lines.
+    A run shows its progress, warnings, errors and its end; Snakemake's log file has all lines. What comes before is
+    held back until a run begins, and written if none does. Runs with ``--dry-run``, ``--printshellcmds``,
+    ``--verbose``, ``--debug-dag`` or ``--quiet`` get Snakemake's own lines.
     """
 
     writes_to_stream = True
@@ -29,7 +30,11 @@ class LogHandler(LogHandlerBase):
         Handler.__init__(self)  # the interface before 2.0 leaves it out
         self.display: Display | None = None
         self.plain: Handler | None = None
-        self.wanted = self._wanted()
+        self.held: list[LogRecord] = []
+        asked = self.common_settings
+        quiet = {str(getattr(one, "name", one)).lower() for one in asked.quiet or ()}
+        otherwise = asked.dryrun or asked.printshellcmds or asked.verbose or asked.debug_dag
+        self.wanted = not otherwise and not quiet & {"all", "progress", "rules"}
 
     def emit(self, record: LogRecord) -> None:
         """Show a record."""
@@ -42,53 +47,55 @@ class LogHandler(LogHandlerBase):
             self._plain().emit(record)
 
     def close(self) -> None:
-        """Restore the terminal."""
+        """Restore the terminal, and write what is held back."""
         self._stop()
         super().close()
 
-    def _wanted(self) -> bool:
-        asked = self.common_settings
-        quiet = {str(getattr(one, "name", one)).lower() for one in asked.quiet or ()}
-        otherwise = asked.dryrun or asked.printshellcmds or asked.verbose or asked.debug_dag
-        able = sys.stderr.isatty() and os.environ.get("TERM", "dumb") != "dumb" and not os.environ.get("CI")
-        return able and not otherwise and not quiet & {"all", "progress", "rules"}
-
     def _show(self, record: LogRecord) -> None:
-        estimates = getattr(record, "estimates", None)
+        estimates, event = getattr(record, "estimates", None), getattr(record, "event", None)
         if not self.wanted:
             self._plain().emit(record)
         elif estimates is not None:
             from .display import Display
 
-            title, colourless = record.getMessage(), self.common_settings.nocolor
-            self.display = Display(estimates, record.cores, title, colourless)  # type: ignore[attr-defined]
+            stream = sys.stderr
+            stream.write(f"{record.getMessage()}\n")
+            self.held.clear()
+            moves = stream.isatty() and os.environ.get("TERM", "dumb") != "dumb" and not os.environ.get("CI")
+            self.display = Display(estimates, record.cores, stream, moves, record.slowdown)  # type: ignore[attr-defined]
         elif getattr(record, "ends", False):
+            self.wanted = False  # what Snakemake says after it is shown
             self._stop()
-            sys.stderr.write(record.getMessage() + "\n")
+            sys.stderr.write(f"{record.getMessage()}\n")
+        elif self.display is not None:
+            self._follow(self.display, record)
+        elif record.levelno < WARNING and event != LogEvent.JOB_INFO:
+            self.held.append(record)
         else:
-            self._follow(record)
-
-    def _follow(self, record: LogRecord) -> None:
-        event = getattr(record, "event", None)
-        if self.display is None:
-            # Without the Snakefile's hooks (--no-hooks) there is nothing to display.
-            self.wanted = event != LogEvent.JOB_INFO
+            # An error, or a job: without the Snakefile's hooks (--no-hooks) there is nothing to display.
+            self.wanted = record.levelno >= WARNING
+            self._stop()
             self._plain().emit(record)
-            return
+
+    def _follow(self, display: "Display", record: LogRecord) -> None:
+        event = getattr(record, "event", None)
         if event == LogEvent.JOB_INFO:
-            self.display.begin(record.jobid)  # type: ignore[attr-defined]
+            display.begin(record.jobid)  # type: ignore[attr-defined]
         elif event == LogEvent.JOB_FINISHED:
-            self.display.finish(record.job_id)  # type: ignore[attr-defined]
+            display.finish(record.job_id)  # type: ignore[attr-defined]
         elif event == LogEvent.JOB_ERROR:
-            self.display.fail(record.jobid)  # type: ignore[attr-defined]
+            display.fail(record.jobid)  # type: ignore[attr-defined]
         if record.levelno >= WARNING:
-            style = "red" if record.levelno >= ERROR else "yellow"
-            self.display.tell(self.format(record), style)
+            display.tell(lambda: self._plain().emit(record))
 
     def _stop(self) -> None:
+        """Remove the display, or write what was held back for want of one."""
         if self.display is not None:
             self.display.stop()
             self.display = None
+        held, self.held = self.held, []
+        for record in held:
+            self._plain().emit(record)
 
     def _plain(self) -> Handler:
         """Snakemake's own handler."""

@@ -17,6 +17,7 @@ from springtune.cli import main
 from springtune.handover.net import SpringNet
 from springtune.handover.simulation import STEP_SHARE, EquilibriumWarning
 from springtune.mesh import Mesh, signed_areas
+from springtune.problem.geometry import AssumptionWarning
 from springtune.springs import DEFINITIONS
 
 STEEL = st.Material("210 GPa", 0.3, density="7850 kg/m^3", name="steel")
@@ -631,7 +632,8 @@ def test_files_for_simulators_are_not_read(tmp_path):
 
 
 def test_particles_too_light_for_mujoco_are_refused(tmp_path):
-    beam = st.Beam("1 um", "0.5 um", thickness="1 nm")
+    with pytest.warns(AssumptionWarning, match="1e-06 m, less than 10 um"):
+        beam = st.Beam("1 um", "0.5 um", thickness="1 nm")
     one = st.Scene(beam, st.make_mesh(beam, "structured", "0.1 um"), STEEL, "traction", "1 nN", definition="lattice")
     with pytest.raises(ValueError, match="masses: the least one is .* kg, and MuJoCo takes 1e-15 kg and more; take"):
         one.springs.write(tmp_path / "net.xml", errors=False)

@@ -134,6 +134,7 @@ def test_a_file_alone_balances_the_scene(definition, mesh_type, ending, tmp_path
     assert unbalanced(net, net.points + 1.001 * found.displacements) > 1e-5
 
 
+@pytest.mark.usefixtures("mesh_library")
 @pytest.mark.parametrize("ending", ENDINGS)
 @pytest.mark.parametrize(("definition", "mesh_type"), [("delingette", "free"), ("flechon", "braced")])
 def test_what_is_read_is_what_was_written(definition, mesh_type, ending, tmp_path):
@@ -263,6 +264,7 @@ class TestScene:
 
 
 class TestResult:
+    @pytest.mark.usefixtures("mesh_library")
     @pytest.mark.parametrize("kinematics", ["nonlinear", "linear"])
     @pytest.mark.parametrize("definition", ["patch", "delingette"])
     def test_a_deformed_network_has_its_fields(self, definition, kinematics, tmp_path):

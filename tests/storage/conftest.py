@@ -160,7 +160,7 @@ class Machine:
     def springtune(self, *arguments, **variables):
         """Exit code and output of `springtune run`."""
         command = [self.python, "-m", "springtune", "run", "config/tiny.yaml", "--cores", "2", *arguments]
-        return self._called(command, {"SPRINGTUNE_WORKFLOW": str(REPOSITORY)} | variables)
+        return self._called(command, variables)
 
     def _called(self, command, variables):
         kept = {name: value for name, value in os.environ.items() if not name.lower().endswith("_proxy")}

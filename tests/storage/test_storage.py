@@ -134,4 +134,4 @@ def test_what_is_wrong_is_told(machine, environment):
 
 def test_the_plugin_that_is_missing_is_named(machine):
     code, output = write(machine("one", sys.executable)).snakemake("publish", "--config", PLACE)
-    assert code == 1 and "is not installed; install the extra: pip install 'springtune[s3]'" in output, output
+    assert code == 1 and "is not installed; install the extra, in a clone `pip install '.[s3]'`" in output, output

@@ -464,7 +464,10 @@ class TestRefusals:
 
     def test_a_missing_library(self, checkout, monkeypatch):
         monkeypatch.setitem(sys.modules, "rocrate", None)
-        refused(run("archive", "results/one"), "springtune[archive]")
+        refused(
+            run("archive", "results/one"),
+            "rocrate is missing; install the extra, in a clone `pip install '.[archive]'`",
+        )
 
 
 def rewritten(packed, target, method=zipfile.ZIP_STORED, **changes):

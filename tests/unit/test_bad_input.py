@@ -382,6 +382,7 @@ def plate_file(folder, name, ending, options):
 class TestCounts:
     """Files of some kilobytes that state billions of points or cells: what they took, or why they were refused."""
 
+    @pytest.mark.usefixtures("mesh_library")
     @pytest.mark.parametrize("name", COUNTS)
     def test_a_stated_count_is_no_reason_to_take_memory(self, tmp_path, name):
         ending, options, sound, other = COUNTS[name]

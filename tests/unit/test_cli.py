@@ -98,6 +98,28 @@ class TestThickBodies:
         springtune.Beam("60 mm", "12 mm", "12 mm")
 
 
+@pytest.mark.filterwarnings("default::springtune.problem.geometry.AssumptionWarning")
+class TestSizesOfAnotherUnit:
+    """A beam of 200 m was taken without a word."""
+
+    def test_the_library_warns(self):
+        for sides, said in (((200, 40), "200 m, more than 100 m"), (("8 um", "8 um", "1 um"), "8e-06 m, less than 10")):
+            for body in (springtune.Beam, springtune.Shape.rectangle):
+                with pytest.warns(AssumptionWarning) as found:
+                    body(*sides[:2], thickness=sides[2] if sides[2:] else 1e-3)
+                (message,) = {str(one.message) for one in found}
+                assert f"its longer side is {said}" in message and "a text such as '200 mm' has its own" in message
+        springtune.Beam(100, 40), springtune.Beam("10 um", "10 um", "1 um")
+
+    def test_a_study_and_a_command_warn_once(self, tmp_path):
+        path = tmp_path / "long.yaml"
+        path.write_text(TestThickBodies.STUDY.replace("60 mm", "600 m"))
+        told = run("scenes", path).stderr
+        assert told.count("warning: beam 'sheet': its longer side is 600 m, more than 100 m; check the unit") == 1
+        found = run("predict", "--beam", "200000x40000", "--size", "9000 mm", "--material", "steel")
+        assert found.stderr.count("warning: beam '200000x40000': its longer side is 200 m, more than 100 m") == 1
+
+
 def test_shells_complete_commands_and_values(monkeypatch):
     monkeypatch.chdir(CONFIG.parent)
     assert completed("springtune ", 1) == [f"plain,{name}" for name in COMMANDS]

@@ -1,6 +1,7 @@
 """What holds for the whole source: imports, stages of study kinds, and what tests may touch."""
 
 import ast
+import shutil
 import subprocess
 import sys
 from collections import defaultdict
@@ -22,6 +23,17 @@ def test_imports_keep_the_contracts_of_pyproject():
     assert done.returncode == 0, done.stdout
 
 
+@pytest.mark.slow
+def test_the_environment_has_a_command_pip(tmp_path):
+    """Set up stops after it, where no lists of packages are."""
+    (tmp_path / "tools").mkdir()
+    shutil.copy(REPOSITORY / "tools/setup.sh", tmp_path / "tools")
+    done = subprocess.run(["tools/setup.sh", "run"], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 1 and "installing the packages" in done.stderr
+    told = subprocess.run([tmp_path / ".venv/bin/pip", "--version"], capture_output=True, text=True)
+    assert told.stdout.startswith("pip ") and str(tmp_path) in told.stdout
+
+
 def test_modules_are_imported_by_text_in_one_place():
     """import-linter cannot read such imports: all of them go through `springtune.registry`."""
     found = [
@@ -31,6 +43,25 @@ def test_modules_are_imported_by_text_in_one_place():
         if {"import_module", "__import__", "exec", "eval"} & {getattr(node, "id", ""), getattr(node, "attr", "")}
     ]
     assert set(found) == {"registry.py"}
+
+
+REPLACEABLE = {
+    "meshio": {"mesh/formats.py: meshio"},
+    "netCDF4": {"studies/output/dataset.py: netCDF4"},
+    "pyamg": {"linalg/multigrid.py: pyamg.relaxation.relaxation"},
+}
+"""Packages that one module imports, so that another one can take their place, and what of them: their public names."""
+
+
+def test_packages_that_may_be_replaced_are_imported_in_one_module():
+    found = {name: set() for name in REPLACEABLE}
+    for path, tree in PARSED.items():
+        for node in ast.walk(tree):
+            names = [one.name for one in node.names] if isinstance(node, ast.Import) else [getattr(node, "module", "")]
+            for name in filter(None, names):
+                if name.partition(".")[0] in found:
+                    found[name.partition(".")[0]].add(f"{path.relative_to(SOURCE).as_posix()}: {name}")
+    assert found == REPLACEABLE
 
 
 @pytest.mark.parametrize(

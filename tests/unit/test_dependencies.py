@@ -125,7 +125,7 @@ def test_what_was_read_is_taken_from_a_note_where_it_is_the_same(tmp_path):
 
 # -- what springtune runs on -------------------------------------------------------------------------------------------
 
-WRITING = {"xarray", "matplotlib", "h5netcdf", "netCDF4", "bokeh", "rich", "typst", "jinja2", "pydantic", "yaml", "PIL"}
+WRITING = {"xarray", "matplotlib", "h5netcdf", "netCDF4", "bokeh", "typst", "jinja2", "pydantic", "yaml", "PIL"}
 
 
 @pytest.mark.parametrize("stage", stages(), ids=lambda stage: stage.name)

@@ -8,11 +8,14 @@ from pathlib import Path
 from runpy import run_path
 
 import matplotlib
+import mujoco
 import numpy as np
 import pytest
 import yaml
+from click.testing import CliRunner
 
 import springtune as st
+from springtune.cli import main
 from springtune.mesh import write_mesh
 from springtune.studies.config.kind import outputs
 from springtune.studies.kinds import load_study
@@ -93,6 +96,14 @@ def test_python_of_the_readme_prints_what_it_says():
     with redirect_stdout(io.StringIO()) as printed:
         exec(code, {})
     assert printed.getvalue() == blocks("text")[0]
+
+
+def test_commands_of_the_readme_bring_springs_into_mujoco(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write, view = (words for words in typed(REPOSITORY / "README.md") if {"springs", "mujoco.viewer"} & {*words})
+    written = CliRunner().invoke(main, write[1:])
+    assert written.exit_code == 0, written.output
+    assert mujoco.MjModel.from_xml_path(view[-1].removeprefix("--mjcf=")).nsite == 252
 
 
 def test_study_of_the_readme_is_one(tmp_path):

@@ -136,6 +136,18 @@ def drawn(axes, label):
     return next(line for line in axes.get_lines() if line.get_label() == label)
 
 
+def test_a_backend_of_notebooks_stays_interactive():
+    """It says so when pyplot is imported, in the middle of the first plot; later figures were not shown."""
+
+    @style.styled
+    def first():
+        matplotlib.interactive(True)
+        return []
+
+    first()
+    assert matplotlib.is_interactive()
+
+
 def test_a_sensitivity_curve_carries_the_errors_of_the_dataset(tree):
     axes = st.plot_sensitivity(tree, **CURVE)
     curves = tree["sensitivity"].to_dataset().sel(CURVE).sel(kinematics="nonlinear")

@@ -2,10 +2,12 @@
 
 import importlib.util
 import re
+import tomllib
 from pathlib import Path
 
 import pytest
 import yaml
+from packaging.requirements import Requirement
 
 import springtune
 
@@ -22,6 +24,15 @@ def licences():
 
 def test_the_page_is_what_the_lock_files_ask_for(licences):
     licences.main(check=True)
+
+
+def test_each_dependency_says_what_it_is_for(licences):
+    """A row each: name, use, MB, what it brings, what would replace it."""
+    section = licences.PAGE.read_text().partition("## What each dependency is for")[2].partition("\n## ")[0]
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in section.splitlines() if line[:2] == "| "]
+    project = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]
+    assert [name for name, *_ in rows[1:]] == [Requirement(one).name for one in project["dependencies"]]
+    assert all(use and float(megabytes) > 0 and instead for _, use, megabytes, _, instead in rows[1:])
 
 
 def test_the_gpl_comes_with_one_extra_only(licences):

@@ -111,6 +111,7 @@ def test_quality_of_a_right_isosceles_triangle():
     assert quality(mesh) == pytest.approx(expected)
 
 
+@pytest.mark.usefixtures("mesh_library")
 @pytest.mark.parametrize("mesh_type", MESH_TYPES)
 def test_file_keeps_every_digit(tmp_path, mesh_type):
     mesh = MESH_TYPES[mesh_type](0.1, 0.02, 5e-3)
@@ -127,6 +128,7 @@ SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=float)
 HALVES = [("triangle", np.array([[0, 1, 2], [0, 2, 3]]))]
 
 
+@pytest.mark.usefixtures("mesh_library")
 @pytest.mark.parametrize(
     ("points", "cells", "message"),
     [
@@ -143,23 +145,32 @@ def test_files_that_are_no_plane_mesh_are_refused(tmp_path, points, cells, messa
         read_mesh(path)
 
 
-def test_unreadable_file_is_refused(tmp_path):
+def test_unreadable_file_is_refused(tmp_path, mesh_library):
     for name, content in (("mesh.txt", "nothing"), ("mesh.vtu", "nothing"), ("mesh.msh", "$MeshFormat")):
         (tmp_path / name).write_text(content)
-        with pytest.raises(MeshError, match=f"{name}: meshio cannot read it.*; (convert|write) it"):
+        with pytest.raises(MeshError, match=f"{name}: {mesh_library.__name__} cannot read it.*; (convert|write) it"):
             read_mesh(tmp_path / name)
 
 
-@pytest.mark.parametrize(("ending", "name"), [("vtu", "vtu"), ("msh", "gmsh22"), ("inp", "abaqus"), ("vtk", "vtk")])
+FORMATS = {
+    **{name: name for name in ("vtu", "vtk", "med", "hmf", "mdpa", "ply")},
+    **{"gmsh22": "msh", "abaqus": "inp", "exodus": "e", "medit": "mesh", "nastran": "bdf", "permas": "post"},
+    **{"avsucd": "avs", "netgen": "vol"},
+}
+"""Ending of formats that hold lines, triangles and quadrilaterals."""
+
+
+@pytest.mark.usefixtures("mesh_library")
+@pytest.mark.parametrize("name", FORMATS)
 @pytest.mark.parametrize("mesh_type", ["free", "braced"])
-def test_a_beam_may_come_from_any_format(tmp_path, ending, name, mesh_type):
+def test_a_beam_may_come_from_any_format(tmp_path, name, mesh_type):
     mesh = MESH_TYPES[mesh_type](0.1, 0.02, 5e-3)
     # Elsewhere, in mm, with a particle of no cell and with lines on the outline; the first cell clockwise.
     points = np.column_stack([1e3 * mesh.points + [7.0, -3.0], np.zeros(len(mesh.points))])
     points = np.vstack([points, [[50.0, 10.0, 0.0]]])
     kind, cells = ("quad", mesh.quads.copy()) if len(mesh.quads) else ("triangle", mesh.triangles.copy())
     cells[0] = cells[0][::-1]
-    path = tmp_path / f"beam.{ending}"
+    path = tmp_path / f"beam.{FORMATS[name]}"
     meshio.Mesh(points, [("line", mesh.outline_edges(1, 0.0)), (kind, cells)]).write(path, file_format=name)
     found = read_beam_mesh(path, 0.1, 0.02, unit=1e-3)
     # Formats in text keep some twelve digits.

@@ -226,10 +226,3 @@ class TestRun:
         result = run("run", "config/one.yaml", *named)
         assert result.exit_code == 2 and "which is not installed" in result.stderr
         assert "pip install --require-hashes -r requirements/slurm.txt" in result.stderr
-
-    @pytest.mark.parametrize("named", ["config", "nowhere"])
-    def test_a_workflow_that_is_none_is_told(self, checkout, monkeypatch, named):
-        monkeypatch.setenv("SPRINGTUNE_WORKFLOW", named)
-        result = run("run", "config/one.yaml")
-        assert result.exit_code == 1
-        assert f"SPRINGTUNE_WORKFLOW: {named} has no Snakefile of springtune; name the folder of its" in result.stderr

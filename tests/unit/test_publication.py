@@ -390,7 +390,9 @@ def test_an_example_draws_a_figure_of_the_paper(tmp_path, datasets):
 
 def test_without_typst_the_message_says_what_to_install(tmp_path, path, monkeypatch):
     monkeypatch.setitem(sys.modules, "typst", None)
-    with pytest.raises(PaperError, match=re.escape('pip install "springtune[paper]"')):
+    with pytest.raises(
+        PaperError, match=re.escape("in a clone `pip install '.[paper]'`, of a wheel `pip install 'springtune-")
+    ):
         run(paper(tmp_path / "source"), tmp_path / "build", tmp_path / "paper.pdf", path)
 
 

@@ -395,7 +395,7 @@ class TestExport:
     @pytest.mark.parametrize(("name", "ending"), [("pyarrow", "parquet"), ("zarr", "zarr")])
     def test_what_is_not_installed_is_told_with_the_extra(self, path, tmp_path, monkeypatch, name, ending):
         monkeypatch.setitem(sys.modules, name, None)
-        refused(run("export", path, "--to", tmp_path / f"x.{ending}"), name, "pip install springtune[export]")
+        refused(run("export", path, "--to", tmp_path / f"x.{ending}"), name, "in a clone `pip install '.[export]'`")
         assert not os.listdir(tmp_path)
 
 

@@ -354,6 +354,22 @@ class TestRuns:
         solve.gone({"folder": tmp_path / "samples"}, f"{asked[0].stem} 0 mesh", "not done within 1 s", "")
         assert orphans(study, tmp_path) == [tmp_path / "samples" / "old.h5"]
 
+    def test_a_sample_needs_neither_grids_nor_beams_nor_materials(self, here):
+        """Its values are those beside a grid; other groups of scenes are not there."""
+        beside, _ = run()
+        text = study_text()
+        (here / "alone.yaml").write_text(
+            text[: text.index("beams:")] + text[text.index("outputs:") : text.index("grids:")]
+        )
+        campaign = Campaign("alone.yaml")
+        campaign.finish()
+        with xr.open_datatree(campaign.folder / "dataset.nc", engine="h5netcdf") as tree:
+            found, expected = (one["samples"].to_dataset(inherit=False).load() for one in (tree, beside))
+            assert not tree.to_dataset().data_vars
+            for name in found.data_vars:
+                assert found[name].variable.equals(expected[name].variable), name
+        assert all((campaign.folder / name).exists() for name in ("index.html", "summary.txt", "tables/sobol.csv"))
+
     def test_designs_without_rows_of_a_pair_have_effects_and_no_indices(self, here):
         tree, _ = run(("size: 16", "size: 64\n  design: latin-hypercube"))
         assert "sobol" not in tree and "role" not in tree["samples"].coords

@@ -296,6 +296,7 @@ FILES = {
 }
 
 
+@pytest.mark.usefixtures("mesh_library")
 @pytest.mark.parametrize("name", FILES)
 @pytest.mark.parametrize("shape", [plate(), LE1], ids=lambda shape: shape.name)
 def test_groups_come_back_from_files(tmp_path, name, shape):
@@ -308,6 +309,7 @@ def test_groups_come_back_from_files(tmp_path, name, shape):
     assert same(grouped, found) and not found.unusable
 
 
+@pytest.mark.usefixtures("mesh_library")
 @pytest.mark.parametrize("ending", ["vtu", "msh"])
 def test_squares_and_points_between_particles_come_back(tmp_path, ending):
     grouped = squares()
@@ -324,6 +326,7 @@ def test_a_unit_is_that_of_all_coordinates(tmp_path):
     assert same(grouped, st.read_shape(tmp_path / "mm.msh", "1 mm"))
 
 
+@pytest.mark.usefixtures("mesh_library")
 def test_numbers_name_what_has_no_name(tmp_path):
     grouped = mesh_shape(plate(), 5e-3)
     write_mesh(tmp_path / "own.msh", grouped)
@@ -378,6 +381,7 @@ UNUSABLE = {
 }
 
 
+@pytest.mark.usefixtures("mesh_library")
 @pytest.mark.parametrize("name", UNUSABLE)
 def test_what_cannot_be_a_group_is_said_when_it_is_used(tmp_path, name):
     grouped = mesh_shape(plate(), 5e-3)
@@ -392,6 +396,7 @@ def test_what_cannot_be_a_group_is_said_when_it_is_used(tmp_path, name):
     assert says in str(caught.value)
 
 
+@pytest.mark.usefixtures("mesh_library")
 def test_names_that_cannot_be_used_are_told(tmp_path):
     grouped = mesh_shape(plate(), 5e-3)
     lines(grouped, **{"left side": grouped.sides["left"]}).write(tmp_path / "file.vtu")
@@ -399,6 +404,17 @@ def test_names_that_cannot_be_used_are_told(tmp_path):
     assert not found.sides and "cannot be a name; use letters" in found.unusable["left side"]
 
 
+@pytest.mark.usefixtures("mesh_library")
+def test_notes_of_a_format_are_no_groups(tmp_path):
+    """What files of MED say besides, such as `med:nom`, was an empty group."""
+    grouped = mesh_shape(plate(), 5e-3)
+    points = np.isin(np.arange(len(grouped.mesh.points)), grouped.sides["left"]).astype(int)
+    by_meshio(grouped, point_data={"left": points}).write(tmp_path / "plate.med")
+    found = read_shape(tmp_path / "plate.med")
+    assert list(found.sides) == ["left"] and not found.unusable
+
+
+@pytest.mark.usefixtures("mesh_library")
 def test_elements_without_group_in_gmsh_4_are_told(tmp_path):
     """What Gmsh writes where elements are in no group and all are saved, meshio does not read."""
     (tmp_path / "all.msh").write_text(msh4(mesh_shape(plate(), 5e-3), others=0))
@@ -406,6 +422,7 @@ def test_elements_without_group_in_gmsh_4_are_told(tmp_path):
         read_shape(tmp_path / "all.msh")
 
 
+@pytest.mark.usefixtures("mesh_library")
 @pytest.mark.parametrize(
     ("write", "says"),
     [

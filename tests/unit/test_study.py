@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from springtune.problem.geometry import Beam
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import Material
-from springtune.studies.config.kind import outputs
+from springtune.studies.config.kind import kinds, outputs
 from springtune.studies.config.messages import StudyError
 from springtune.studies.config.model import CurveSpec, MeshSpec, Reference, SceneSpec
 from springtune.studies.kinds import load_study
@@ -320,6 +320,20 @@ def test_no_other_file_writes_lines_of_a_message(refusal, tmp_path):
     with pytest.raises(StudyError) as caught:
         load_study(tmp_path / "a\nb/none.yaml")
     assert r"a\nb/none.yaml: cannot be read" in str(caught.value)
+
+
+@pytest.mark.parametrize("key", ["laying", "stability", "benchmark", "refine", "samples"])
+def test_a_section_that_computes_needs_no_grid(load, refusal, key):
+    quick = yaml.safe_load((CONFIG / "quick.yaml").read_text())
+    content = {"title": "One section", "outputs": "tables", key: quick[key]}
+    declared = {name: quick[name] for name in ("beams", "materials")}
+    study = load(yaml.safe_dump(content | declared))
+    (kind,) = (kind for kind in kinds() if study.parts[kind.name])
+    assert not study.scenes and key in kind.study_fields and kind.summary(study.parts[kind.name])[0][1] > 0
+    if key == "samples":
+        assert load(yaml.safe_dump(content)).parts["samples"]
+    else:
+        assert "'beams' is missing; give a section for each beam" in refusal(yaml.safe_dump(content))
 
 
 def test_missing_file_and_folder(tmp_path):

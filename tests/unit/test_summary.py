@@ -11,7 +11,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import xarray as xr
-from rich.console import Console
 from snakemake_interface_logger_plugins.common import LogEvent
 from snakemake_interface_logger_plugins.tests import MockOutputSettings, TestLogHandlerBase
 
@@ -220,7 +219,14 @@ class TestWorkload:
         expected = sum(seconds for seconds, _ in mesh.members(study, costs).values()) + 3 * costs.start_up
         stages = ("Meshing", "Tracing the sensitivity curves", "Solving the networks")
         assert sum(load.seconds for load in found.values() if load.part in stages) == pytest.approx(expected)
-        assert re.fullmatch(r"\d+ jobs, about \d+ s on 2 cores if nothing is stored yet", workload.told(found, 2))
+        assert re.fullmatch(r"\d+ jobs, about \d+ s on 2 idle cores if nothing is stored yet", workload.told(found, 2))
+
+    def test_the_load_that_was_assumed_is_told(self):
+        found = {1: workload.Estimate("a", 1, 30.0), 2: workload.Estimate("b", 1, 2.0)}
+        idle = "2 jobs, about 16 s on 2 idle cores if nothing is stored yet"
+        assert workload.told(found, 2, workload.slowdown(2, 0.3, 2), 0.3) == idle
+        busy = f"{idle}; the machine is busy now, load 5.2: then about 58 s"
+        assert workload.told(found, 2, workload.slowdown(2, 5.2, 2), 5.2) == busy
 
     def test_tasks_computed_are_counted_without_their_definitions(self, tmp_path):
         path = tmp_path / "done.json"
@@ -291,21 +297,41 @@ class Terminal(io.StringIO):
         return True
 
 
-def on_terminal(monkeypatch, ci="", **chosen):
-    """Handler on a terminal, and what it writes there; not a fixture, since pytest captures a test's own streams."""
-    terminal = Terminal()
-    monkeypatch.setattr("sys.stderr", terminal)
+def handler(monkeypatch, stream, ci="", **chosen):
+    """Handler that writes to a stream; not a fixture, since pytest captures a test's own streams."""
+    monkeypatch.setattr("sys.stderr", stream)
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.setenv("CI", ci)
     settings = MockOutputSettings()
-    vars(settings).update({"printshellcmds": False} | chosen)
-    return LogHandler(common_settings=settings, settings=None), terminal
+    vars(settings).update({"printshellcmds": False, "nocolor": True} | chosen)
+    made = LogHandler(common_settings=settings, settings=None)
+    made.setFormatter(logging.Formatter("%(message)s"))
+    return made
 
 
 def record(message, level=logging.INFO, **more):
     made = logging.LogRecord("snakemake", level, "x.py", 1, message, (), None)
     vars(made).update(more)
     return made
+
+
+def emit_run(made, error=""):
+    """Records of a run of three jobs, the last of which may fail."""
+    loads = {1: workload.Estimate("Meshing", 3, 1.0), 2: workload.Estimate("Meshing", 3, 1.0)}
+    loads[3] = workload.Estimate("Solving", 4, 1.0)
+    made.emit(record("Building DAG of jobs..."))
+    made.emit(record("two: 3 jobs", estimates=loads, cores=2, slowdown=1.0))
+    for number in loads:
+        made.emit(record("Select jobs to execute..."))
+        made.emit(record("Job: message", event=LogEvent.JOB_INFO, jobid=number))
+        if error and number == 3:
+            made.emit(record(error, logging.ERROR, event=LogEvent.JOB_ERROR, jobid=number))
+        else:
+            made.emit(record("Finished job", event=LogEvent.JOB_FINISHED, job_id=number))
+        made.emit(record("1 of 3 steps done", event=LogEvent.PROGRESS))
+    made.emit(record("what became of it", ends=True))
+    made.emit(record("Complete log(s)"))
+    made.close()
 
 
 class TestHandler(TestLogHandlerBase):
@@ -319,87 +345,116 @@ class TestHandler(TestLogHandlerBase):
     def get_log_handler_settings(self):
         return None
 
-    def test_terminal_shows_stages_then_the_ending(self, monkeypatch):
-        made, terminal = on_terminal(monkeypatch)
-        loads = {1: workload.Estimate("Meshing", 3, 1.0), 2: workload.Estimate("Solving", 4, 1.0)}
-        made.emit(record("Building DAG of jobs..."))
-        made.emit(record("two: 2 jobs", estimates=loads, cores=2))
-        made.emit(record("x", event=LogEvent.JOB_INFO, jobid=1))
-        made.emit(record("x", event=LogEvent.JOB_FINISHED, job_id=1))
-        made.emit(record("x", event=LogEvent.JOB_INFO, jobid=2))
-        made.emit(record("Error in rule solve", logging.ERROR, event=LogEvent.JOB_ERROR, jobid=2))
-        made.emit(record("what became of it", ends=True))
-        text = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", terminal.getvalue())
-        assert text.index("Building DAG") < text.index("two: 2 jobs") < text.index("Error in rule solve")
-        last = text[text.rindex("Meshing") :]
-        assert re.search(r"Meshing .* 3/3", last) and re.search(r"Solving .* 0/4 .*failed", last)
-        assert last.rstrip().endswith("what became of it") and " left" not in last
+    @pytest.mark.parametrize("stream", [io.StringIO, Terminal])
+    def test_elsewhere_than_on_terminals_a_run_is_a_line_a_stage(self, monkeypatch, stream):
+        made = stream()
+        emit_run(handler(monkeypatch, made, ci="true"))
+        assert re.sub(r"\d\.\d s", "SECONDS", made.getvalue()).splitlines() == [
+            "two: 3 jobs",
+            "Meshing: 2 jobs done, SECONDS; about 1 s left",
+            "Solving: 1 job done, SECONDS",
+            "what became of it",
+            "Complete log(s)",
+        ]
+
+    def test_on_a_terminal_one_line_moves_and_then_the_end_is_there(self, monkeypatch):
+        made = Terminal()
+        emit_run(handler(monkeypatch, made))
+        head, *moving, end = re.split(r"\r\x1b\[\?7l", made.getvalue())
+        assert head == "two: 3 jobs\n" and all("\n" not in line for line in moving)
+        assert end == "\x1b[K\x1b[?7hwhat became of it\nComplete log(s)\n"
+
+    @pytest.mark.parametrize("stream", [io.StringIO, Terminal])
+    def test_errors_of_jobs_are_shown_as_snakemake_writes_them(self, monkeypatch, stream):
+        made = stream()
+        emit_run(handler(monkeypatch, made), error="Error in rule solve:\n    log: logs/solve.log (check it)")
+        text = re.sub(r"\r\x1b\[\?7l.*?\x1b\[\?7h", "", made.getvalue())
+        assert "\nError in rule solve:\n    log: logs/solve.log (check it)\n" in text
+        assert text.endswith("what became of it\nComplete log(s)\n")
+        assert ("Solving: 0 of 1 jobs done, 1 failed" in text) == (stream is io.StringIO)
 
     @pytest.mark.parametrize(
         ("setting", "value"), [("dryrun", True), ("verbose", True), ("quiet", {"all"}), ("printshellcmds", True)]
     )
     def test_runs_that_ask_for_more_or_less_get_snakemakes_lines(self, monkeypatch, setting, value):
-        assert on_terminal(monkeypatch)[0].wanted
-        assert not on_terminal(monkeypatch, **{setting: value})[0].wanted
+        made = io.StringIO()
+        emit_run(handler(monkeypatch, made, **{setting: value}))
+        assert made.getvalue().count("Select jobs to execute...") == 3
 
-    def test_elsewhere_all_is_as_without_a_plugin(self, monkeypatch):
-        stream = io.StringIO()
-        monkeypatch.setattr("sys.stderr", stream)
-        made = LogHandler(common_settings=MockOutputSettings(), settings=None)
-        made.setFormatter(logging.Formatter("%(message)s"))
-        for message in ("Building DAG of jobs...", "2 jobs", "what became of it"):
-            made.emit(record(message, **({"estimates": {}, "cores": 2} if message == "2 jobs" else {})))
-        assert stream.getvalue() == "Building DAG of jobs...\n2 jobs\nwhat became of it\n"
+    def test_what_starts_no_run_is_as_without_a_plugin(self, monkeypatch):
+        made = io.StringIO()
+        shown = handler(monkeypatch, made)
+        for message in ("Building DAG of jobs...", "Nothing to be done"):
+            shown.emit(record(message))
+        shown.close()
+        assert made.getvalue() == "Building DAG of jobs...\nNothing to be done\n"
 
-    def test_continuous_integration_is_quiet(self, monkeypatch):
-        assert not on_terminal(monkeypatch, ci="true")[0].wanted
+    def test_a_warning_before_a_run_leaves_it_a_line_a_stage(self, monkeypatch):
+        made = io.StringIO()
+        shown = handler(monkeypatch, made)
+        shown.emit(record("take care", logging.WARNING))
+        emit_run(shown)
+        assert made.getvalue().startswith("take care\ntwo: 3 jobs\nMeshing: 2 jobs")
 
     def test_without_hooks_jobs_are_told_as_ever(self, monkeypatch):
-        made, terminal = on_terminal(monkeypatch)
-        made.setFormatter(logging.Formatter("%(message)s"))
-        made.emit(record("Job 1: Meshing", event=LogEvent.JOB_INFO, jobid=1))
-        made.emit(record("Finished", event=LogEvent.JOB_FINISHED, job_id=1))
-        assert "Job 1: Meshing" in terminal.getvalue() and "Finished" in terminal.getvalue()
+        made = Terminal()
+        shown = handler(monkeypatch, made)
+        shown.emit(record("Building DAG of jobs..."))
+        shown.emit(record("Job 1: Meshing", event=LogEvent.JOB_INFO, jobid=1))
+        shown.emit(record("Finished", event=LogEvent.JOB_FINISHED, job_id=1))
+        assert made.getvalue().split("\n") == ["Building DAG of jobs...", "", "Job 1: Meshing", "Finished", ""]
 
     def test_a_display_that_fails_takes_no_message_with_it(self, monkeypatch):
-        made, terminal = on_terminal(monkeypatch)
-        made.emit(record("two", estimates={1: SimpleNamespace()}, cores=2))
-        made.emit(record("still told"))
-        assert "two" in terminal.getvalue() and "still told" in terminal.getvalue()
+        made = Terminal()
+        shown = handler(monkeypatch, made)
+        shown.emit(record("two", estimates={1: SimpleNamespace()}, cores=2, slowdown=1.0))
+        shown.emit(record("still told"))
+        assert "two" in made.getvalue() and "still told" in made.getvalue()
 
 
 class TestDisplay:
-    def shown(self, loads):
-        console = Console(file=io.StringIO(), force_terminal=True, width=100)
-        return Display(loads, 2, "title", console=console)
+    """At times that the tests set."""
+
+    def shown(self, loads, slowdown=1.0):
+        self.now = 1000.0
+        return Display(loads, 2, io.StringIO(), False, slowdown, clock=lambda: self.now)
 
     def test_what_is_left_follows_jobs_that_are_done(self):
         display = self.shown({1: workload.Estimate("a", 1, 100.0), 2: workload.Estimate("b", 1, 100.0)})
-        try:
-            assert display.left() == pytest.approx(100.0)  # a job each core
-            now = time.monotonic()
-            display.jobs[1].begun, display.jobs[1].ended = now - 400, now
-            assert display.left() == pytest.approx(100 * 405 / 105)  # four times as long as expected, about
-            display.fail(2)
-            assert display.left() == 0
-        finally:
-            display.stop()
+        assert display.left() == pytest.approx(100.0)  # a job each core
+        display.begin(1)
+        self.now += 400
+        display.finish(1)
+        assert display.left() == pytest.approx(100 * 405 / 105)  # four times as long as expected, about
+        assert display.line() == "1 of 2 jobs, 6:40 min, about 6:26 min left"
+        assert display.stream.getvalue() == "a: 1 job done, 400.0 s; about 6:26 min left\n"
+        display.begin(2)
+        self.now += 100
+        assert display.line() == "1 of 2 jobs, 8:20 min, about 4:46 min left: b 0/1"
+        display.fail(2)
+        assert display.left() == 0
+
+    def test_a_busy_machine_is_expected_to_take_longer_until_jobs_show_that_it_does_not(self):
+        loads = {number: workload.Estimate("a", 1, 100.0) for number in range(4)}
+        display = self.shown(loads, slowdown=4.0)
+        assert display.left() == pytest.approx(4 * 200)
+        display.begin(0)
+        self.now += 100
+        display.finish(0)
+        assert display.left() == pytest.approx(150 * 120 / 105)
 
     def test_files_that_a_job_has_made_count(self, tmp_path):
         paths = [tmp_path / str(number) for number in range(4)]
         paths[0].touch()
         os.utime(paths[0], (0, 0))  # from an earlier run
         display = self.shown({1: workload.Estimate("a", 8, 10.0, 1, paths)})
-        try:
-            display.begin(1)
-            assert display.jobs[1].made() == 0
-            paths[1].touch()
-            os.utime(paths[1], (time.time() + 60,) * 2)
-            assert display.jobs[1].made() == 0.25
-            display.finish(1)
-            assert display.jobs[1].made() == 1
-        finally:
-            display.stop()
+        display.begin(1)
+        assert display.jobs[1].made() == 0
+        paths[1].touch()
+        os.utime(paths[1], (time.time() + 60,) * 2)
+        assert display.jobs[1].made() == 0.25 and display.line().endswith("left: a 2/8")
+        display.finish(1)
+        assert display.jobs[1].made() == 1
 
 
 def test_a_job_without_a_word_on_a_full_disk(planned, monkeypatch):

@@ -58,7 +58,8 @@ NEEDED = [one for one in NEEDED if not one.startswith("snakemake")]
 SNAKEMAKE = [one for one in DECLARED["dependencies"] if one.startswith("snakemake")]
 """Snakemake and the interface of its loggers."""
 
-TESTERS = [one for one in DECLARED["optional-dependencies"]["test"] if re.match("hypothesis|mujoco|pytest", one)]
+TESTERS = DECLARED["optional-dependencies"]["test"]
+TESTERS = [one for one in TESTERS if re.match("hypothesis|meshlane|mujoco|pytest", one)]
 
 PYTHONS = [one.rpartition(" ")[2] for one in DECLARED["classifiers"] if re.search(r":: 3\.\d+$", one)]
 """Versions of Python that are supported."""

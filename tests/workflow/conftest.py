@@ -32,20 +32,23 @@ class Run:
         command = ["--snakefile", REPOSITORY / "Snakefile", "--directory", self.folder, "--cores", "2"]
         command += ["--workflow-profile", REPOSITORY / "workflow/profiles/default"]
         command += ["--configfile", self.folder / config, *arguments]
-        command = list(map(str, command))
         if package:
             return called(["snakemake", *command], self.folder, PYTHONPATH=str(package))
+        return self.forked(command)
+
+    def forked(self, command, **environment):
+        """Exit code and output of Snakemake in this folder."""
         log = self.folder.with_suffix(".log")
         log.unlink(missing_ok=True)
-        told = {"arguments": command, "folder": str(self.folder), "log": str(log)}
-        self.forks.stdin.write(json.dumps(told | {"environment": dict(os.environ)}) + "\n")
+        told = {"arguments": list(map(str, command)), "folder": str(self.folder), "log": str(log)}
+        self.forks.stdin.write(json.dumps(told | {"environment": os.environ | environment}) + "\n")
         self.forks.stdin.flush()
         return int(self.forks.stdout.readline()), log.read_text()
 
     def springtune(self, config, *arguments):
         """Exit code and output of `springtune run` in this folder, on two cores."""
         command = ["springtune", "run", config, "--cores", "2", *arguments]
-        return called(command, self.folder, SPRINGTUNE_WORKFLOW=str(REPOSITORY))
+        return called(command, self.folder)
 
     def write(self, name, text):
         """Write a study."""

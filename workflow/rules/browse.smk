@@ -22,6 +22,8 @@ rule browse:
         RESULTS / "logs/browse.log",
     benchmark:
         RESULTS / "benchmarks/browse.tsv"
+    conda:
+        ENVIRONMENT
     shell:
         "python -m springtune.studies.output.browse.page {input.dataset:q} {output.page:q} {output.done:q}"
         " {params.digest:q} {params.files:q} > {log:q} 2>&1"

@@ -25,6 +25,8 @@ rule collect:
         RESULTS / "logs/collect.log",
     benchmark:
         RESULTS / "benchmarks/collect.tsv"
+    conda:
+        ENVIRONMENT
     shell:
         "python -m springtune.studies.kinds.collect {params.config:q} {params.folder:q} {output.dataset:q}"
         " {output.done:q} {params.digest:q} {params.untold:q} > {log:q} 2>&1"

@@ -27,11 +27,12 @@ def loaded_study():
     """The study; its warnings are printed by the run and not by its jobs, which read it, too."""
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore" if IS_CHILD else "default", AssumptionWarning)
+            warnings.simplefilter("ignore" if IS_CHILD else "once", AssumptionWarning)
             warnings.showwarning = lambda message, *where: print(f"warning: {message}", file=sys.stderr)
             return load_study(CONFIG)
     except StudyError as error:
-        refused(error)
+        remedy = f"; as a module springtune takes its study by config: {{'study': 'config/mine.yaml'}}"
+        refused(f"{error}{remedy if MODULE and 'study' not in config else ''}")
 
 
 def job_seconds():
@@ -59,15 +60,25 @@ def left_empty():
     return chosen
 
 
+# Keys of results have the versions of the packages that Snakemake sees, so jobs must run on these.
+ENVIRONMENT = None if DEPLOYED else "../envs/springtune.yaml"
+"""What rules need, for readers and for `--lint`; see docs/how-to/use-conda.md."""
+
+if DEPLOYED and not IS_CHILD:
+    print("note: jobs run in the environment of Snakemake; --software-deployment-method is not used", file=sys.stderr)
+
 ON_CLUSTER = NODES is not None
-UNUSABLE_PATH = workload.refusal(CONFIG, Path.cwd(), Path(workflow.basedir), Path(sys.executable), ON_CLUSTER)
+UNUSABLE_PATH = workload.refusal(CONFIG, Path.cwd(), SOURCE, Path(sys.executable), ON_CLUSTER)
 if UNUSABLE_PATH and not IS_CHILD:
     refused(UNUSABLE_PATH)
+if MOVED:
+    refused(f"module {MODULE}: results are in results/<study> and take no other prefix; leave the prefix out")
 
 LEFT_EMPTY = left_empty()
 STUDY = loaded_study()
 RESULTS = Path("results") / STUDY.name
-config |= {"title": rst(STUDY.title), "results": str(RESULTS)}  # for the report's text
+if not MODULE:
+    config |= {"title": rst(STUDY.title), "results": str(RESULTS)}  # for the report's text
 
 # The number of jobs follows from the cores; on a cluster, which has room for all, from the seconds of a job.
 CORES = 1 if ON_CLUSTER or IS_CHILD else workflow.cores or 1
@@ -129,7 +140,7 @@ def needs(name, wildcards):
 # Figures and tables in Snakemake's report.
 
 SHOWN = FORMATS[0]  # the format that browsers show
-CAPTIONS = {path.stem for path in (Path(workflow.basedir) / "workflow/report").glob("*.rst")}
+CAPTIONS = {path.stem for path in (SOURCE / "workflow/report").glob("*.rst")}
 
 
 def files(one):

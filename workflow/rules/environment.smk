@@ -9,6 +9,7 @@ from snakemake.exceptions import WorkflowError
 
 from springtune.studies.runs import workload
 from springtune.studies.runs.run_tasks import STATE, source_state
+from springtune.studies.runs.source import USUAL_STUDY, config_file, workflow_folder
 
 BEGUN = time.time()
 """Start of this run [s since the epoch]; newer files are its products."""
@@ -33,14 +34,21 @@ os.environ.setdefault(STATE, source_state())
 
 
 def chosen_config():
-    """The study of --configfile or of the paper; `config["study"]` in studies that the paper reads."""
+    """The study of --configfile or of the paper; `config["study"]` of a module."""
     if "study" in config:
+        if not isinstance(config["study"], str):
+            raise WorkflowError(f"study: {config['study']!r} is no path; give that of a study's YAML file")
         return Path(config["study"])
     named = [str(path) for path in workflow.configfiles]
     if len(named) > 1:
         raise WorkflowError(f"one study at a time: --configfile names {len(named)}: {', '.join(named)}")
-    path = Path(named[0] if named else "config/paper.yaml")
+    deployed = Path("config/config.yaml")  # where workflows that others deploy have theirs
+    path = Path(named[0]) if named else deployed if deployed.is_file() else config_file(USUAL_STUDY)
     return path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path
 
 
 CONFIG = chosen_config()
+
+HERE = Path(str(workflow.current_basedir))
+SOURCE = HERE.parents[1] if HERE.is_dir() else workflow_folder()
+"""Folder of the Snakefile; of a remote one, which Snakemake reads file by file, that of the installed package."""

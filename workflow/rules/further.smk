@@ -35,5 +35,7 @@ for stage in stages():
                 RESULTS / "logs" / f"{stage.name}_{{bundle}}.log",
             benchmark:
                 RESULTS / "benchmarks" / f"{stage.name}_{{bundle}}.tsv"
+            conda:
+                ENVIRONMENT
             shell:
                 "python -m springtune.studies.runs.run_tasks {params.tasks:q} {output:q} {params.digest:q} > {log:q} 2>&1"

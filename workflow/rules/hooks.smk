@@ -7,7 +7,10 @@ from springtune.studies.runs.workload import READ
 
 
 def begin():
-    """Lock the studies and write the notes of their jobs; then log the expected work."""
+    """Lock the studies and write the notes of their jobs; then log the expected work. A second call does nothing."""
+    if workload.BEGUN:
+        return
+    workload.BEGUN.append(RESULTS)
     try:
         for _, one in READ:
             locks.check_idle(one.folder)
@@ -43,12 +46,17 @@ def log_begin():
         names += [study.name] if own or study is STUDY else []
         estimates |= workload.estimates(study, one, own)
     side_by_side = max(1, min(NODES, len(jobs))) if ON_CLUSTER else CORES
-    text = f"{', '.join(names)}: {workload.told(estimates, side_by_side)}"
-    logger.info(text, extra={"estimates": estimates, "cores": side_by_side})
+    load = 0.0 if ON_CLUSTER else os.getloadavg()[0]
+    slower = workload.slowdown(side_by_side, load, os.cpu_count() or 1)
+    text = f"{', '.join(names)}: {workload.told(estimates, side_by_side, slower, load)}"
+    logger.info(text, extra={"estimates": estimates, "cores": side_by_side, "slowdown": slower})
 
 
 def log_end(how):
-    """Unlock the studies and log their summary, see `springtune.studies.output.summary`."""
+    """Unlock the studies and log their summary, see `springtune.studies.output.summary`; once for each begin."""
+    if not workload.BEGUN:
+        return
+    workload.BEGUN.clear()
     from springtune.studies.output import summary  # here: only a run needs it
 
     end_timers()

@@ -27,6 +27,8 @@ for job, made in MADE.items():
             RESULTS / f"logs/{job}.log",
         benchmark:
             RESULTS / f"benchmarks/{job}.tsv"
+        conda:
+            ENVIRONMENT
         shell:
             "python -m springtune.studies.output.present {input.dataset:q} {params.folder:q} {output.done:q} {params.digest:q}"
             " {params.outputs:q} > {log:q} 2>&1"

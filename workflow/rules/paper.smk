@@ -2,13 +2,13 @@
 
 from springtune.studies.paper import PaperError, check_typst
 
-PAPER_SOURCE = Path(workflow.basedir, "workflow/paper")
+PAPER_SOURCE = SOURCE / "workflow/paper"
 PAPER_DATASETS = [Path("results") / name / rerun.DATASET for name in rerun.PAPER_STUDIES]
 
 
 # Snakemake tells the targets after the Snakefile was read. Who wants neither the paper nor a job of a study that it reads
 # need not read these studies.
-PAPER_WANTED = any(word == "paper" or Path(word).name == "paper.pdf" for word in WORDS)
+PAPER_WANTED = any(word == "paper" or word.endswith("_paper") or Path(word).name == "paper.pdf" for word in WORDS)
 
 if PAPER_WANTED:
     PAPER = rerun.paper_job(PAPER_SOURCE, PAPER_DATASETS, Path("results/paper"))
@@ -21,14 +21,13 @@ if PAPER_WANTED or any(word.startswith(tuple(f"{name}_" for name in rerun.PAPER_
     for name in rerun.PAPER_STUDIES:
         if name != STUDY.name:
             prefix = f"{name}_"
-            beside = CONFIG.with_name(f"{name}.yaml")
 
             module:
                 name: name
                 snakefile:
                     "../../Snakefile"
                 config:
-                    {"study": str(beside if beside.exists() else Path("config", beside.name))}
+                    {"study": str(config_file(f"{name}.yaml", CONFIG.parent)), "paper": False}
 
             use rule * from name exclude all as prefix*
 
@@ -55,6 +54,8 @@ rule paper:
         "results/paper/logs/paper.log",
     benchmark:
         "results/paper/benchmarks/paper.tsv"
+    conda:
+        ENVIRONMENT
     shell:
         "python -m springtune.studies.paper.build {params.source:q} {params.folder:q} {output.paper:q}"
         " {output.done:q} {params.digest:q} {input.datasets:q} > {log:q} 2>&1"

@@ -23,6 +23,8 @@ rule mesh:
         RESULTS / "logs/mesh_{bundle}.log",
     benchmark:
         RESULTS / "benchmarks/mesh_{bundle}.tsv"
+    conda:
+        ENVIRONMENT
     shell:
         "python -m springtune.studies.runs.run_tasks {params.tasks:q} {output:q} {params.digest:q} > {log:q} 2>&1"
 

@@ -6,6 +6,7 @@ What stages store is no output that Snakemake knows of, so a stage is one pack; 
 from importlib.util import find_spec
 
 from springtune.studies.archive.parts import ENDING
+from springtune.studies.output.text import how_to_install
 
 PLUGIN = "snakemake_storage_plugin_s3"
 STORAGE = str(config.get("storage", "")).rstrip("/")
@@ -16,7 +17,7 @@ if not STORAGE:
 if not re.fullmatch(r"s3://[^/{}]+(/[^{}]+)?", STORAGE):
     refused(f"storage: '{STORAGE}' is no place for results; give one such as s3://bucket/folder")
 if find_spec(PLUGIN) is None:
-    refused("storage: Snakemake's plugin for s3:// is not installed; install the extra: pip install 'springtune[s3]'")
+    refused(f"storage: Snakemake's plugin for s3:// is not installed; {how_to_install('s3')}")
 
 
 def stored(name):
@@ -54,6 +55,8 @@ if "fetch" in WORDS:  # what makes packs is not to be asked for them; targets ar
             config=lambda wildcards: str(CONFIG),
         benchmark:
             RESULTS / "benchmarks/fetch.tsv"
+        conda:
+            ENVIRONMENT
         shell:
             "python -m springtune.studies.archive.parts fetch {params.config:q} {input:q}"
 
@@ -84,6 +87,8 @@ else:
                 RESULTS / f"logs/pack_{stage}.log",
             benchmark:
                 RESULTS / f"benchmarks/pack_{stage}.tsv"
+            conda:
+                ENVIRONMENT
             shell:
                 "python -m springtune.studies.archive.parts pack {params.folder:q} {output:q} {input:q} > {log:q} 2>&1"
 
@@ -98,5 +103,7 @@ else:
             RESULTS / "logs/upload.log",
         benchmark:
             RESULTS / "benchmarks/upload.tsv"
+        conda:
+            ENVIRONMENT
         shell:
             "python -m springtune.studies.archive.parts copy {output:q} {input:q} > {log:q} 2>&1"

@@ -192,14 +192,12 @@ def main() -> None:
     command exits with 0 when it has done what was asked, with 1 when that failed, and with 2 when it was called in a
     wrong way.
     """
-    usual, said = warnings.showwarning, click.get_current_context().meta.setdefault(SAID, [])
+    usual, said = warnings.showwarning, click.get_current_context().meta.setdefault(SAID, {})
 
     def show(message: Warning | str, category: type[Warning], *where: Any, **further: Any) -> None:
-        if category.__name__ in (
-            "AssumptionWarning",
-            "PluginWarning",
-        ):  # not imported, so that --help does not wait for it
-            said.append(f"warning: {shown(message)}")
+        # Not imported, so that --help does not wait for them.
+        if category.__name__ in ("AssumptionWarning", "PluginWarning"):
+            said[f"warning: {shown(message)}"] = None  # each once, in this order
         else:
             usual(message, category, *where, **further)
 

@@ -12,8 +12,9 @@ import click
 from ..safe_io.escapes import clipped, shown
 from ..safe_io.tables import aligned
 from ..studies.output.text import cell_text, paragraphs, variable_name
+from ..studies.runs.source import CONFIG_FOLDER
 from . import examples
-from .options import CONFIG_FOLDER, RESULTS_FOLDER, dataset_path
+from .options import RESULTS_FOLDER, dataset_path
 
 if TYPE_CHECKING:
     import xarray as xr

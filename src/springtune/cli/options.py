@@ -14,6 +14,7 @@ from click.core import ParameterSource
 
 from ..problem.parameters import MOST_SCENES, MOST_SCENES_VARIABLE
 from ..registry import imported
+from ..studies.runs.source import CONFIG_FOLDER
 from . import FAILED, WRONG, mesh_types
 
 if TYPE_CHECKING:
@@ -401,7 +402,7 @@ def sheet_options(
     return decorate
 
 
-RESULTS_FOLDER, CONFIG_FOLDER = Path("results"), Path("config")
+RESULTS_FOLDER = Path("results")
 
 DATASET = "dataset.nc"
 

@@ -14,7 +14,7 @@ from click.core import ParameterSource
 from ..problem.status import Status
 from ..safe_io.escapes import shown
 from ..safe_io.tables import aligned
-from ..studies.output.text import bytes_text, from_json, paragraphs, place_text, without_numbers
+from ..studies.output.text import bytes_text, from_json, how_to_install, paragraphs, place_text, without_numbers
 from . import examples
 from .options import idle, studies
 
@@ -145,6 +145,8 @@ def _provenance(tree: "xr.DataTree") -> list[str]:
         )
         files = f", {changed} changed files in git_diff" if changed else ""
         lines.append(f"  commit {attributes['git_commit']}{files}")
+    if attributes.get("study_commit"):
+        lines.append(f"  study: commit {attributes['study_commit']}")
     software = from_json(attributes.get("software"))
     if software:
         lines.append("  " + ", ".join(f"{name} {version}" for name, version in software.items() if version != "none"))
@@ -401,9 +403,7 @@ def archive(
     try:
         import rocrate  # noqa: F401
     except ImportError:
-        raise click.ClickException(
-            "the library rocrate is missing; install the extra: pip install 'springtune[archive]'"
-        ) from None
+        raise click.ClickException(f"the library rocrate is missing; {how_to_install('archive')}") from None
     from ..studies.archive.contents import stored_size
     from ..studies.archive.crate import write
 

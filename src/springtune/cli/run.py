@@ -11,23 +11,15 @@ from typing import TYPE_CHECKING
 
 import click
 
+from ..studies.runs.source import USUAL_STUDY, config_file, workflow_folder
 from . import examples, studies_here
 from .options import allow, max_scenes
 
 if TYPE_CHECKING:
     from ..studies.config.model import Study
 
-USUAL_STUDY = "config/paper.yaml"
-"""Default study."""
-
 NOT_SOLVED = 3
 """Exit code of a strict run with unsolved scenes."""
-
-WORKFLOW = ("Snakefile", "workflow/rules/common.smk")
-"""Files that every checkout has."""
-
-NAMED_BY = "SPRINGTUNE_WORKFLOW"
-"""Environment variable with the checkout whose workflow runs in the current folder, as in a container."""
 
 
 @click.command(
@@ -56,8 +48,7 @@ def run(
 ) -> None:
     """Run a study, the paper's where none is named.
 
-    Checks the study and then runs Snakemake in the folder of the checkout, where results/ is; in this folder, if the
-    environment variable SPRINGTUNE_WORKFLOW names a checkout; in another one by --results. All options but those
+    Checks the study and then runs Snakemake, with results/ in this folder or that of --results. All options but those
     below are Snakemake's. Exits with 0 when everything is made, scenes that could not be solved included, with 1 when
     the study is wrong or a job failed, and with 2 when it was called in a wrong way.
     """
@@ -77,14 +68,11 @@ def run(
     second = [one for before, one in zip([""] + options, options) if _is_study(one) and before in NO_VALUE]
     if named and second:
         raise click.UsageError(f"one study at a time: springtune run {arguments[0]}, then springtune run {second[0]}")
-    checkout = checkout_of_run()
-    if checkout is None:
-        raise click.ClickException(how_to_get_one(Path(arguments[0]) if named else None))
     if _wants_slurm(options) and not find_spec(SLURM):
         why = "the profile slurm needs Snakemake's plugin for Slurm, which is not installed"
         raise click.UsageError(f"{why}: python -m pip install --require-hashes -r requirements/slurm.txt")
-    path = Path(arguments[0]).absolute() if named else checkout / USUAL_STUDY
-    shown = Path(arguments[0]) if named else path
+    shown = Path(arguments[0]) if named else config_file(USUAL_STUDY)
+    path = shown.absolute()
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", AssumptionWarning)  # Snakemake's reading says it
@@ -92,11 +80,11 @@ def run(
     except StudyError as error:
         click.echo(str(error) + _meant(shown), err=True)
         raise SystemExit(1) from None
-    folder = results.absolute() if results else Path.cwd() if os.environ.get(NAMED_BY) else checkout
+    folder, source = results.absolute() if results else Path.cwd(), workflow_folder()
     if folder != Path.cwd():
         click.echo(f"results go to {folder / 'results' / study.name}", err=True)
     path = path.relative_to(folder) if path.is_relative_to(folder) else path
-    workflow = [] if folder == checkout else ["--snakefile", str(checkout / "Snakefile")]
+    workflow = [] if folder == source else ["--snakefile", str(source / "Snakefile")]
     left_empty = {name: True for name, given in (("no_diff", no_diff), ("no_host", no_host)) if given}
     os.environ |= {f"SPRINGTUNE_{name.upper()}": "true" for name in left_empty}
     forced: list[str] = []
@@ -171,8 +159,7 @@ def _read_for_paper(config: Path, study: "Study") -> "list[Study]":
     from ..studies.kinds import load_study
     from ..studies.runs.rerun import PAPER_STUDIES
 
-    beside = (config.with_name(f"{name}.yaml") for name in PAPER_STUDIES if name != study.name)
-    return [load_study(one if one.exists() else Path("config", one.name)) for one in beside]
+    return [load_study(config_file(f"{name}.yaml", config.parent)) for name in PAPER_STUDIES if name != study.name]
 
 
 def _unlock(studies: "list[Study]", command: list[str]) -> None:
@@ -235,36 +222,8 @@ def _is_study(argument: str) -> bool:
 
 def _meant(path: Path) -> str:
     """Suggestion of an existing study for a missing one, or an empty string."""
-    near = Path("config") / f"{path.stem}.yaml"
+    near = config_file(f"{path.stem}.yaml")
     return f"; did you mean {near}?" if not path.exists() and near != path and near.is_file() else ""
-
-
-def is_checkout(folder: Path) -> bool:
-    """Return whether a folder is a checkout."""
-    return all((folder / file).is_file() for file in WORKFLOW)
-
-
-def checkout_of_run() -> Path | None:
-    """Folder of the workflow: the named one, the current one, or that of the library; None if there is none."""
-    named = os.environ.get(NAMED_BY)
-    if not named:
-        return next(filter(is_checkout, (Path.cwd(), Path(__file__).parents[3])), None)
-    folder = Path(named).absolute()
-    if not is_checkout(folder):
-        raise click.ClickException(f"{NAMED_BY}: {named} has no Snakefile of springtune; name the folder of its source")
-    return folder
-
-
-def how_to_get_one(study: Path | None) -> str:
-    """Message for a library without the workflow."""
-    from .. import __version__
-
-    return (
-        "studies are run by springtune's workflow, which is in its source and not in the installed package; get a "
-        f"clone, or unpack springtune-{__version__}.tar.gz, change to its folder, and there\n"
-        f"  springtune run {study.absolute() if study else USUAL_STUDY}\n"
-        f"or name that folder by {NAMED_BY}, to have the results here"
-    )
 
 
 def _snakemake() -> list[str]:

@@ -9,9 +9,9 @@ import click
 from ..registry import NAME, NAME_RULE
 from ..safe_io.atomic import write_text
 from ..safe_io.tables import aligned
+from ..studies.runs.source import CONFIG_FOLDER, config_file, is_source_tree
 from . import WrongCall, examples, studies_here
-from .options import CONFIG_FOLDER, allow, loaded, max_scenes
-from .run import checkout_of_run, how_to_get_one, is_checkout
+from .options import allow, loaded, max_scenes
 
 
 @click.command(
@@ -43,10 +43,7 @@ def new(study: str, shape: bool) -> None:
     if not path.resolve().is_relative_to(Path.cwd().resolve()):
         click.echo(f"written outside of this folder: {path.resolve()}")
     scenes = 4 if shape else 2
-    if checkout_of_run():
-        click.echo(f"{path}: {scenes} scenes; change it as you like, and run it:\n  springtune run {path}")
-    else:
-        click.echo(f"{path}: {scenes} scenes; change it as you like. To run it: {how_to_get_one(path)}")
+    click.echo(f"{path}: {scenes} scenes; change it as you like, and run it:\n  springtune run {path}")
 
 
 def _path(given: str) -> Path:
@@ -56,7 +53,7 @@ def _path(given: str) -> Path:
         if not path.name:
             return path
         path = path.with_name(f"{path.name}.yaml")
-        path = CONFIG_FOLDER / path if given == path.stem and is_checkout(Path()) else path
+        path = CONFIG_FOLDER / path if given == path.stem and is_source_tree(Path()) else path
     return path
 
 
@@ -64,7 +61,7 @@ def template_text(path: Path, body: str) -> str:
     """Text of a new study of a beam or of a shape."""
     from ..mesh import MESH_TYPES
 
-    schema = _beside(path, SCHEMA)
+    schema = Path(os.path.relpath(config_file(SCHEMA), path.parent)).as_posix()
     words = path.stem.replace("-", " ").replace("_", " ").strip() or path.stem
     template = Template(Path(__file__).with_name(f"study_of_a_{body}.yaml").read_text())
     text = template.substitute(
@@ -72,16 +69,7 @@ def template_text(path: Path, body: str) -> str:
         title=words[0].upper() + words[1:],
         mesh_types=", ".join(name for name in MESH_TYPES if name.isalpha() and name != "structured"),
     )
-    return f"# yaml-language-server: $schema={schema}\n{text}" if schema else text
-
-
-def _beside(path: Path, name: str) -> str | None:
-    """Path of a file in the checkout's config, relative to a study; None if there is none."""
-    checkout = checkout_of_run()
-    file = checkout / CONFIG_FOLDER / name if checkout else None
-    if file is None or not file.is_file():
-        return None
-    return Path(os.path.relpath(file, path.parent)).as_posix()
+    return f"# yaml-language-server: $schema={schema}\n{text}"
 
 
 @click.command(

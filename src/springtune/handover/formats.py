@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..mesh.formats import LONGEST_SAID
+from ..mesh.formats import LONGEST_SAID, library
 from ..safe_io.atomic import check_folder, replacing, write_text
 from ..safe_io.inputs import DataElsewhere, check_alone
 from .mujoco import mjcf
@@ -386,9 +386,7 @@ def _numbers(header: Mapping[str, Any]) -> dict[str, float]:
 
 
 def _read_vtu(path: Path) -> Read:
-    import meshio
-
-    grid = meshio.read(path)
+    grid = library().read(path)
     arrays: dict[str, np.ndarray] = {"points": grid.points[:, :2]}
     for old, new in POINT_NAMES.items():
         if new in grid.point_data:

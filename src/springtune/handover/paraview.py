@@ -8,6 +8,7 @@ from xml.sax.saxutils import quoteattr, unescape
 
 import numpy as np
 
+from ..mesh.formats import library
 from ..safe_io.atomic import UNFINISHED, replacing
 
 CELL_NAMES = {2: "line", 3: "triangle", 4: "quad"}
@@ -28,7 +29,6 @@ def write_vtu(
     `cells` are particles by number of corners, 2 for lines. `cell_data` is by name and number of corners, NaN on cells
     without it. Vectors get a third component of zero for ParaView.
     """
-    import meshio
 
     def flat(values: np.ndarray) -> np.ndarray:
         if values.ndim == 1:
@@ -43,7 +43,7 @@ def write_vtu(
             given[count] if count in given else np.full((len(corners), *shape), np.nan)
             for count, corners in present.items()
         ]
-    grid = meshio.Mesh(
+    grid = library().Mesh(
         flat(points),
         [(CELL_NAMES[count], corners) for count, corners in present.items()],
         point_data={name: flat(values) for name, values in point_data.items()},

@@ -137,18 +137,17 @@ class Multigrid:
         return np.multiply(self._cycle(0, single), size, dtype=float)
 
     def _cycle(self, depth: int, right: np.ndarray) -> np.ndarray:
-        from pyamg.amg_core import gauss_seidel
+        from pyamg.relaxation.relaxation import gauss_seidel
 
         if depth == len(self._levels):
             return cho_solve(self._coarsest, right.astype(float), check_finite=False).astype(np.float32)
         matrix, prolong, restrict = self._levels[depth]
-        entries, last = (matrix.indptr, matrix.indices, matrix.data), len(right) - 1
         solution = np.zeros_like(right)
-        gauss_seidel(*entries, solution, right, 0, last + 1, 1)
+        gauss_seidel(matrix, solution, right)
         missing = matrix @ solution
         np.subtract(right, missing, out=missing)
         solution += prolong @ self._cycle(depth + 1, restrict @ missing)
-        gauss_seidel(*entries, solution, right, last, -1, -1)
+        gauss_seidel(matrix, solution, right, sweep="backward")
         return solution
 
     def solve(self, right: np.ndarray, tolerance: float = RESIDUAL) -> np.ndarray:

@@ -57,6 +57,13 @@ LONGEST_SAID = 120
 """Most characters of a message of meshio that are shown."""
 
 
+def library() -> Any:
+    """Package that reads and writes mesh files, imported here alone; one with its interface can take its place."""
+    import meshio
+
+    return meshio
+
+
 def write_mesh(path: str | Path, mesh: Mesh | GroupedMesh) -> None:
     """Write a mesh atomically, with its groups.
 
@@ -70,8 +77,6 @@ def write_mesh(path: str | Path, mesh: Mesh | GroupedMesh) -> None:
     if ending not in kinds:
         raise MeshError(f"{path}: is not to end in '{ending}'; give a name that ends in {' or '.join(kinds)}")
     check_folder(path)
-    import meshio
-
     grouped = mesh if isinstance(mesh, GroupedMesh) else GroupedMesh(mesh)
     mesh = grouped.mesh
     # A named point that is no particle becomes a point of its own.
@@ -97,7 +102,7 @@ def write_mesh(path: str | Path, mesh: Mesh | GroupedMesh) -> None:
     points = np.column_stack([points, np.zeros(len(points))])
     data, fields = (_vtu_marks if ending == ".vtu" else _gmsh_tags)(path, blocks)
     cells = [(kind, corners) for kind, corners, _ in blocks]
-    content = meshio.Mesh(points, cells, cell_data=data, field_data=fields)
+    content = library().Mesh(points, cells, cell_data=data, field_data=fields)
     with replacing(path) as unfinished:
         content.write(unfinished, file_format=kinds[ending])
 
@@ -195,15 +200,13 @@ def file_content(path: str | Path) -> Any:
             pass
         except DataElsewhere as error:
             raise MeshError(str(error)) from None
-    import meshio
-
-    told, memory = io.StringIO(), READ_MEMORY + READ_MEMORY_SHARE * size
+    told, memory, package = io.StringIO(), READ_MEMORY + READ_MEMORY_SHARE * size, library()
     try:
         # meshio tells people of what it leaves out, and exits where it does not know the format.
         with redirect_stdout(told), redirect_stderr(told), warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
             with bounded(memory, READ_SECONDS + READ_SECONDS_SHARE * size):
-                return meshio.read(path)
+                return package.read(path)
     except MemoryError as error:
         if _is_the_machines(error, memory):
             raise
@@ -221,9 +224,9 @@ def file_content(path: str | Path) -> Any:
         why = f"it is damaged, or not what its name says{shown}; write it again"
         if PHYSICAL in said:
             why = f"some of its elements are in no physical group{shown}; give all of them one, or write format 2.2"
-        if Path(path).suffix.lower() not in meshio.extension_to_filetypes:
+        if Path(path).suffix.lower() not in package.extension_to_filetypes:
             why = f"unknown format '{Path(path).suffix}'; convert it to .vtu or .msh"
-        raise MeshError(f"{path}: meshio cannot read it: {why}") from None
+        raise MeshError(f"{path}: {package.__name__} cannot read it: {why}") from None
 
 
 def coordinates(path: str | Path, content: Any) -> np.ndarray:
@@ -411,7 +414,7 @@ class _Groups:
             self.unusable[name] = "names sides and a point in the file; rename one"
         named = [*self.content.field_data, *self.content.point_sets, *self.content.cell_sets]
         for name in named:
-            if not name.startswith("gmsh:") and name not in {*lines, *points, *cells}:
+            if ":" not in name and name not in {*lines, *points, *cells}:  # others are notes of a format, as of MED
                 self.unusable.setdefault(name, "has nothing in the file; put something in it")
         return GroupedMesh(self.mesh, self.sides, self.points, self.parts, self.unusable)
 

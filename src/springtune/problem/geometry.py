@@ -1,6 +1,7 @@
 """Geometry of the bodies that a study asks for."""
 
 import warnings
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from .quantities import Number, positive, put
@@ -17,6 +18,23 @@ def warn_of_thickness(thickness: float, sides: tuple[float, float], what: str) -
         warnings.warn(
             f"{what}, thickness: {1e3 * thickness:g} mm exceeds its smaller side, {1e3 * smaller:.6g} mm, and plane "
             "stress is an assumption about thin sheets; give a smaller thickness",
+            AssumptionWarning,
+            stacklevel=4,  # whoever makes the body
+        )
+
+
+LEAST_SIDE, MOST_SIDE = 1e-5, 100.0
+"""Longer sides of bodies [m] beyond which a unit is likely to be missing."""
+
+
+def warn_of_size(sides: Iterable[float], what: str) -> None:
+    """Warn if the longer side of a body [m] is so short or long that a unit is likely to be missing."""
+    longer = max(sides)
+    if not LEAST_SIDE <= longer <= MOST_SIDE:
+        usual = f"more than {MOST_SIDE:g} m" if longer > MOST_SIDE else f"less than {1e6 * LEAST_SIDE:g} um"
+        warnings.warn(
+            f"{what}: its longer side is {longer:.6g} m, {usual}; check the unit: numbers in Python are in m, a text "
+            "such as '200 mm' has its own",
             AssumptionWarning,
             stacklevel=4,  # whoever makes the body
         )
@@ -41,7 +59,8 @@ class Beam:
     Warns
     -----
     AssumptionWarning
-        If it is thicker than its smaller side: plane stress is for thin sheets.
+        If it is thicker than its smaller side: plane stress is for thin sheets. If its longer side is more than 100 m
+        or less than 10 um: numbers are in m.
 
     Examples
     --------
@@ -62,6 +81,7 @@ class Beam:
             raise ValueError(f"name: {self.name!r} is not a text; give one such as '200x40', or none")
         if not self.name:
             put(self, name=f"{1e3 * self.length:g}x{1e3 * self.height:g}")
+        warn_of_size((self.length, self.height), f"beam {self.name!r}")
         warn_of_thickness(self.thickness, (self.length, self.height), f"beam {self.name!r}")
 
     @property

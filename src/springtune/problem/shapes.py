@@ -21,7 +21,7 @@ from typing import Any
 
 from ..mesh.sides import OutlineSide, Point, Round, enclosed, extent, in_mm, meeting, turned, winds_about
 from ..registry import NAME, NAME_RULE
-from .geometry import beam_label, warn_of_thickness
+from .geometry import beam_label, warn_of_size, warn_of_thickness
 from .quantities import Number, nearest, positive, put, quantity
 
 Place = tuple[Number, Number]
@@ -556,7 +556,8 @@ class Shape:
     Warns
     -----
     AssumptionWarning
-        If a shape with an outline is thicker than the smaller side of its bounding box.
+        If a shape with an outline is thicker than the smaller side of its bounding box, or its longer side is more
+        than 100 m or less than 10 um: numbers are in m.
 
     Examples
     --------
@@ -610,6 +611,7 @@ class Shape:
         except ValueError as error:
             raise ValueError(f"{what}: {error}") from None
         (left, low), (right, high) = self.extent
+        warn_of_size((right - left, high - low), what)
         warn_of_thickness(self.thickness, (right - left, high - low), what)
 
     def _check_rounds(self) -> None:

@@ -27,7 +27,7 @@ from ..problem.boundary import (
     reaction_weights,
     supported,
 )
-from ..problem.geometry import Beam, warn_of_thickness
+from ..problem.geometry import Beam, warn_of_size, warn_of_thickness
 from ..problem.loads import LOADS, LoadKind
 from ..problem.materials import ANY_MATERIAL, AnyMaterial, Material
 from ..problem.quantities import positive
@@ -267,7 +267,9 @@ class ShapeStatement(Statement):
         self.by_part = _materials(material, grouped)
         check_meshed(shape, grouped, self.by_part)
         if shape.file:
-            warn_of_thickness(shape.thickness, np.ptp(self.mesh.points, axis=0), f"shape {shape.name!r}")
+            sides = np.ptp(self.mesh.points, axis=0)
+            warn_of_size(sides, f"shape {shape.name!r}")
+            warn_of_thickness(shape.thickness, sides, f"shape {shape.name!r}")
         if isinstance(scale, bool) or not (isinstance(scale, Real) and np.isfinite(scale) and scale):
             raise ValueError(f"scale: {scale!r} is no factor; give a finite number that is not zero")
         self.load, self.scale, self.force = load, float(scale), 1.0

@@ -18,8 +18,9 @@ from ..config.messages import StudyError
 from ..output.browse import page as browse
 from ..output.reading import attributes
 from ..runs import provenance, records, rerun
-from ..runs.keys import OURS, PACKAGE, installed
+from ..runs.keys import OURS, installed
 from ..runs.plan import plan
+from ..runs.source import PACKAGE
 from ..runs.workload import COMMANDS_FILE
 from .parts import ELSEWHERE
 from .verify import files as verified

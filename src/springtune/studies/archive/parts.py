@@ -246,7 +246,7 @@ def is_stored(place: Path) -> bool:
 
 def _otherwise(site: Site) -> str:
     """Difference of a site's installation from this one, with the remedy."""
-    from ..runs.provenance import git_commit  # here: a merge that fits asks for nothing of it
+    from ..runs.provenance import library_commit  # here: a merge that fits asks for nothing of it
 
     software = json.loads(site.attributes.get("software", "{}"))
     packages = {name: version for name, version in software.items() if name != "python" and installed(name) != version}
@@ -255,7 +255,7 @@ def _otherwise(site: Site) -> str:
     here = f"{sys.version_info[0]}.{sys.version_info[1]}"
     if python and python != here:
         told.insert(0, f"Python {python} there and {here} here")
-    commit, own = site.attributes.get("git_commit", ""), git_commit(Path.cwd())
+    commit, own = site.attributes.get("git_commit", ""), library_commit()
     if not told and commit != own:
         told = [f"the code is {commit or 'of no commit'} there and {own or 'of no commit'} here"]
     if not told:

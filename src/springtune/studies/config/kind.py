@@ -157,8 +157,8 @@ class Kind:
         Package of its modules, for kinds of other packages; modules of stages and outputs then have full names.
     study_fields, grid_fields : dict of str to tuple
         Keys that it adds to a study and to grids, with type and pydantic field.
-    alone : tuple of str
-        Those of its keys that a study may have instead of beams and grids.
+    alone : dict of str to tuple
+        Those of its keys that a study may have instead of grids, and the keys that each needs.
     files : callable, optional
         From its part of a study to further input files.
     check : callable, optional
@@ -190,7 +190,7 @@ class Kind:
     package: str = field(default="", kw_only=True)
     study_fields: dict[str, tuple[Any, Any]] = field(default_factory=dict)
     grid_fields: dict[str, tuple[Any, Any]] = field(default_factory=dict)
-    alone: tuple[str, ...] = ()
+    alone: dict[str, tuple[str, ...]] = field(default_factory=dict)
     files: Callable[[Any], Iterable[Path]] = lambda part: ()
     check: Callable[[Any, Problems], None] = lambda config, problems: None
     expand: Callable[[Any, Any], Any] = lambda config, declared: ()

@@ -1,7 +1,7 @@
 """Models of the sections of a study; the JSON schema and the tables of config/README.md are generated from them."""
 
 import json
-from collections.abc import Container, Iterable, Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from pathlib import Path
 from types import NoneType
 from typing import Annotated, Any, ClassVar, NamedTuple, Self, get_args, get_origin
@@ -341,7 +341,7 @@ GRID_PARAMETERS = (
 class ExcludeConfig(Section):
     """Combinations that a grid leaves out: those with one of the given values of every given parameter."""
 
-    beam: Annotated[list[BeamName], OneOrMore()] | None = Field(None, description="Beams.")
+    beam: Annotated[list[BeamName], OneOrMore()] | None = Field(None, description="Beams that grids and sections name.")
     mesh_type: Annotated[list[MeshType], OneOrMore()] | None = Field(None, description="Mesh types.")
     mesh_size: Lengths | None = Field(None, description="Lengths of an edge.")
     material: Annotated[list[MaterialName], OneOrMore()] | None = Field(None, description="Materials.")
@@ -487,8 +487,10 @@ class StudyConfig(Section):
     """A study."""
 
     title: Text = Field(description="Title of the study, one line.")
-    beams: Annotated[dict[str, BeamConfig], Named("beam")] = Field({}, description="Beams; grids need them.")
-    materials: Annotated[dict[str, MaterialConfig], Named("material")] = Field(description="Materials.")
+    beams: Annotated[dict[str, BeamConfig], Named("beam")] = Field({}, description="Beams.")
+    materials: Annotated[dict[str, MaterialConfig], Named("material")] = Field(
+        {}, description="Materials that grids and sections name."
+    )
     definitions: DefinitionsConfig = Field(
         default_factory=DefinitionsConfig, description="Parameters of the definitions `paper` and `calibrated`."
     )
@@ -516,28 +518,25 @@ class StudyConfig(Section):
     )
 
     alone: ClassVar[dict[str, tuple[str, ...]]] = {}
-    """Keys of study kinds that a study may have instead of beams and grids, and the other keys that each needs."""
+    """Keys of study kinds that a study may have instead of grids, and the keys that each needs."""
 
     @classmethod
     def _needed(cls, given: Mapping[str, object]) -> dict[str, str]:
         found = super()._needed(given)
-        if "grids" in given or not set(cls.alone) & set(given):
-            begun = [name for name, others in cls.alone.items() if set(others) & set(given)]
-            if begun and not {"beams", "grids"} & set(given):
-                found |= dict.fromkeys(begun, "")
-            else:
-                ways = [" and ".join(f"'{name}'" for name in (*others, key)) for key, others in cls.alone.items()]
-                instead = "".join(f", or {way}" for way in ways)
-                found |= {"beams": "" if "grids" in given else instead, "grids": instead}
+        own = {key: [name for name in needed if name not in GRIDS_NEED] for key, needed in cls.alone.items()}
+        for key in ("grids", *cls.alone):
+            if {key, *own.get(key, ())} & set(given):
+                found |= dict.fromkeys((key, *cls.alone.get(key, GRIDS_NEED)), "")
+        if len(found) == 1:  # the title
+            ways = [" and ".join(f"'{name}'" for name in (*others, key)) for key, others in own.items()]
+            found |= dict.fromkeys(("beams", "grids"), f", or {', '.join(ways)}") | {"materials": ""}
         return {name: found[name] for name in cls.model_fields if name in found}
 
 
 RESERVED.update(StudyConfig.model_fields, GridConfig.model_fields)
 
-
-def _beams_or(alone: Iterable[str]) -> dict[str, Any]:
-    """JSON schema of the keys that replace beams and grids."""
-    return {"anyOf": [{"required": ["beams", "grids"]}, *({"required": [name]} for name in alone)]}
+GRIDS_NEED = ("beams", "materials")
+"""Keys that a study with grids needs."""
 
 
 class Later(NamedTuple):
@@ -577,18 +576,17 @@ def study_model(kinds: Sequence[Kind], given: Container[object] | None = None) -
             "Figures of scenes show nonlinear kinematics if a grid has them, otherwise linear ones.",
         ),
     )
+    alone = {name: needed for kind in kinds for name, needed in kind.alone.items()}
+    own = ", ".join(f"`{name}`" for name in alone)
     study_fields["grids"] = (
         Annotated[dict[str, grid], Named("grid", for_files=False)],
-        Field({}, description="Grids of scenes to compute."),
+        Field({}, description=f"Grids of scenes to compute. A study with one of {own} needs none."),
     )
     model = create_model("StudyConfig", __base__=StudyConfig, **study_fields)
     model.__doc__ = StudyConfig.__doc__
-    model.alone = {
-        name: tuple(other for other in kind.study_fields if other not in kind.alone)
-        for kind in kinds
-        for name in kind.alone
-    }
-    model.model_config["json_schema_extra"] = _beams_or(model.alone)
+    model.alone = alone
+    ways = {"grids": GRIDS_NEED} | alone
+    model.model_config["json_schema_extra"] = {"anyOf": [{"required": [*needed, key]} for key, needed in ways.items()]}
     return model
 
 

@@ -26,7 +26,7 @@ MEASURED = (
 )  # fmt: skip
 """Variables that depend on the machine."""
 
-TOLD_ATTRIBUTES = ("title", "study", "springtune_version", "git_commit")
+TOLD_ATTRIBUTES = ("title", "study", "springtune_version", "git_commit", "study_commit")
 
 UNTOLD = {"created", "history", "host", "git_diff", "config", "config_sha256", "software", "inputs", "source"}
 UNTOLD |= {"Conventions", "references", "accepted", "tolerances"}

@@ -23,9 +23,7 @@ from springtune.units import QUANTITY_KINDS, UnitError, parse
 from . import reading
 from .dataset import flag_words, is_flagged
 from .selection import at, shown_swept
-from .text import label_text
-
-EXTRA = "install what is missing with `pip install springtune[export]`"
+from .text import how_to_install, label_text
 
 
 class RequestError(ValueError):
@@ -198,7 +196,7 @@ def write_parquet(path: str | os.PathLike[str], columns: Sequence[Column], attri
         import pyarrow as pa
         import pyarrow.parquet
     except ImportError:
-        raise ValueError(f"{path}: Parquet needs pyarrow; {EXTRA}") from None
+        raise ValueError(f"{path}: Parquet needs pyarrow; {how_to_install('export')}") from None
     arrays = [pa.array(column.values.tolist(), from_pandas=True) for column in columns]
     fields = [
         pa.field(column.name, array.type, metadata={"units": column.units, "long_name": column.long_name})
@@ -215,7 +213,7 @@ def write_zarr(path: str | os.PathLike[str], tree: xr.DataTree) -> None:
     try:
         import zarr  # noqa: F401
     except ImportError:
-        raise ValueError(f"{path}: Zarr needs zarr; {EXTRA}") from None
+        raise ValueError(f"{path}: Zarr needs zarr; {how_to_install('export')}") from None
     path = Path(path)
     unfinished, before = (path.with_name(f"{path.name}.{mark}{UNFINISHED}") for mark in (writer(), "before"))
     tree = tree.load()

@@ -24,7 +24,7 @@ FOUND_ANYHOW = (*MEASURED, "*message", "iterations", "residual", "definition_eva
 
 MOST_BYTES = 2e9
 
-JOINED = ("title", "study", "springtune_version", "git_commit")
+JOINED = ("title", "study", "springtune_version", "git_commit", "study_commit")
 """Attributes whose different texts are joined."""
 
 

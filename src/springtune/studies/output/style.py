@@ -110,6 +110,8 @@ def styled(plot: Callable[P, Drawn]) -> Callable[P, Drawn]:
     def inside(*arguments: P.args, **keywords: P.kwargs) -> Drawn:
         with matplotlib.rc_context(SETTINGS):
             drawn = plot(*arguments, **keywords)
+            interactive = matplotlib.is_interactive()
+        matplotlib.interactive(interactive)  # a notebook's backend sets it, when pyplot is imported by a first plot
         for panel in np.ravel(np.asarray(drawn, dtype=object)):
             _as_written(panel)
         return drawn

@@ -2,6 +2,8 @@
 
 from importlib.util import find_spec
 
+from ..output.text import how_to_install
+
 
 class PaperError(Exception):
     """A fault of a paper's source or datasets."""
@@ -10,4 +12,4 @@ class PaperError(Exception):
 def check_typst() -> None:
     """Raise if Typst is not installed."""
     if find_spec("typst") is None:
-        raise PaperError('the paper is set with Typst, which is not installed: pip install "springtune[paper]"')
+        raise PaperError(f"the paper is set with Typst, which is not installed; {how_to_install('paper')}")

@@ -30,6 +30,7 @@ from springtune.springs import DEFINITIONS
 
 from . import checked_json
 from .checked_json import hash_of
+from .source import PACKAGE
 
 if TYPE_CHECKING:
     from springtune.problem.geometry import Beam
@@ -164,8 +165,6 @@ class _Reader:
         else:
             add(repr(node))
 
-
-PACKAGE = Path(__file__).parents[2]
 
 NOT_COUNTED = {
     ("studies/output/browse/page.py", "h5py"): "numbers come out of a dataset as they went in, or not at all",

@@ -19,6 +19,7 @@ from ..config.kind import OTHER_KINDS, kinds
 from ..config.model import Study
 from .keys import distribution, installed
 from .records import checksum
+from .source import COMMIT_FILE, PACKAGE, clone
 
 SOFTWARE = (
     "cvxopt",
@@ -58,7 +59,9 @@ def attributes(study: Study, config: str | Path, untold: Collection[str] = ()) -
     software = {name: installed(name) for name in (*SOFTWARE, *_plugins(study))}
     software["python"] = platform.python_version()
     folder = Path(config).resolve().parent
-    commit = git_commit(folder)
+    library, own = library_commit(), study_commit(folder)
+    checkouts = ((clone(), library), (folder, own))
+    changed = [place for place, commit in checkouts if place and commit.endswith(CHANGED)]
     found = {
         "title": study.title,
         "Conventions": "CF-1.11",
@@ -69,13 +72,13 @@ def attributes(study: Study, config: str | Path, untold: Collection[str] = ()) -
         "config_sha256": hashlib.sha256(study.text.encode()).hexdigest(),
         "inputs": json.dumps(inputs(study, folder), sort_keys=True),
         "springtune_version": __version__,
-        "git_commit": commit,
-        "git_diff": git_diff(study, folder) if commit.endswith(CHANGED) and "git_diff" not in untold else "",
+        "git_commit": library,
+        "git_diff": "" if "git_diff" in untold else git_diff(study, *changed),
         "created": created,
         "software": json.dumps(software, sort_keys=True),
         "host": "" if "host" in untold else platform.node(),
     }
-    return found | _references(study)
+    return found | ({"study_commit": own} if own else {}) | _references(study)
 
 
 def _plugins(study: Study) -> set[str]:
@@ -128,10 +131,27 @@ def git_commit(folder: Path) -> str:
     return git(folder, "describe", "--always", "--abbrev=40", f"--dirty={CHANGED}", "--exclude=*").strip()
 
 
-def git_diff(study: Study, folder: Path) -> str:
-    """Difference from the commit; a long one is clipped and ends in its SHA-256."""
+def library_commit() -> str:
+    """Commit of the library: the noted one of a built package, or that of its clone; empty if unknown."""
+    if COMMIT_FILE.is_file():
+        return COMMIT_FILE.read_text().strip()
+    root = clone()
+    return git_commit(root) if root else ""
+
+
+def study_commit(folder: Path) -> str:
+    """Commit of the checkout of a study; empty outside of git and for studies of the library."""
+    top = git(folder, "rev-parse", "--show-toplevel").removesuffix("\n")
+    root = clone()
+    of_library = folder.is_relative_to(PACKAGE.resolve()) or (root and root.resolve() == Path(top))
+    return git_commit(folder) if top and not of_library else ""
+
+
+def git_diff(study: Study, *folders: Path) -> str:
+    """Differences of checkouts from their commits; a long text is clipped and ends in its SHA-256."""
     # Whatever files are written in.
-    text = difference(study, folder).encode(errors="surrogateescape").decode(errors="replace").replace("\0", "")
+    text = "".join(difference(study, folder) for folder in folders)
+    text = text.encode(errors="surrogateescape").decode(errors="replace").replace("\0", "")
     if len(text) <= LONGEST:
         return text
     digest = hashlib.sha256(text.encode()).hexdigest()

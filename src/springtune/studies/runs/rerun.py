@@ -13,10 +13,11 @@ from springtune.safe_io.atomic import UNFINISHED
 from ..config.kind import FORMATS, further_modules, kinds, modules, outputs
 from . import checked_json, records
 from .checked_json import ASIDE, hash_of
-from .keys import CODE_FILE, OURS, PACKAGE, stage_key
+from .keys import CODE_FILE, OURS, stage_key
 from .plan import BUNDLES_FILE, Plan, plan, stages, table_files
 from .provenance import inputs
 from .run_tasks import RECORDS
+from .source import PACKAGE
 
 if TYPE_CHECKING:
     from ..config.kind import Output

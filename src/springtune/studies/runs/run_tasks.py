@@ -19,14 +19,13 @@ from springtune.registry import imported
 
 from . import checked_json, driver, records
 from .checked_json import DamagedError, hash_of, set_aside
+from .source import PACKAGE
 from .task_costs import TaskCosts, Watch, run_limited
 
 Made = TypeVar("Made")
 
 TASKS, RECORDS = "tasks", "done"
 """Folders of a study: notes of jobs to do, and records of done jobs."""
-
-PACKAGE = Path(__file__).parents[2]
 
 STATE = "SPRINGTUNE_SOURCE_STATE"
 """Environment variable with the `source_state` at the begin of a run, for its jobs."""
@@ -43,7 +42,8 @@ def main(tasks: str, done: str, digest: str) -> None:
     note = checked_json.read(tasks)
     if note is None or note["digest"] != digest:
         raise SystemExit(
-            f"{tasks}: not what this job is to do; call the same command again, it writes it anew (without --no-hooks)"
+            f"{tasks}: not what this job is to do; call the same command again, it writes it anew, without "
+            "--no-hooks. Where springtune is a module, `onstart:` of the workflow has to call springtune.onstart()"
         )
     began_with = os.environ.get(STATE)
     if began_with and began_with != source_state():

@@ -21,8 +21,14 @@ if TYPE_CHECKING:
 READ: "list[tuple[Study, Plan]]" = []
 """Studies that this process runs: the requested one, and those that the paper reads."""
 
+BEGUN: list[Path] = []
+"""Results of the workflow that began the run; several modules of one workflow share the run."""
+
 PRESENTED = (1.5, 0.3)
 """Seconds of a job after the stages, before any is measured: fixed, and per file."""
+
+SLOWED = 1.25
+"""Least slowdown by other programs that is told; a run that has just ended leaves such a load."""
 
 AFTER = "Dataset, figures and tables"
 """Description of the jobs after the stages."""
@@ -118,11 +124,25 @@ def presented_needs(folder: Path, rule: str, files: int) -> Needs:
     return Needs(_seconds_presented(folder, rule, files))
 
 
-def told(found: dict[int, Estimate], cores: int) -> str:
-    """Expected work of a run in one line."""
+def slowdown(cores: int, load: float, machine: int) -> float:
+    """How much longer jobs take that share the cores of a machine with a load of other programs.
+
+    Examples
+    --------
+    >>> slowdown(2, 0.4, 2), slowdown(2, 6.0, 2), slowdown(2, 6.0, 16)
+    (1.0, 4.0, 1.0)
+    """
+    share = (load + min(cores, machine)) / machine
+    return share if share > SLOWED else 1.0
+
+
+def told(found: dict[int, Estimate], cores: int, slower: float = 1.0, load: float = 0.0) -> str:
+    """Expected work of a run in one line, with the load that it assumes."""
     seconds = sum(estimate.seconds * min(estimate.threads, cores) for estimate in found.values()) / cores
     jobs = f"{len(found)} job{'' if len(found) == 1 else 's'}"
-    return f"{jobs}, about {clock(seconds)} on {cores} core{'' if cores == 1 else 's'} if nothing is stored yet"
+    busy = f"; the machine is busy now, load {load:.1f}: then about {clock(slower * seconds)}" if slower > 1 else ""
+    idle = f"{cores} idle core{'' if cores == 1 else 's'}"
+    return f"{jobs}, about {clock(seconds)} on {idle} if nothing is stored yet{busy}"
 
 
 def clock(seconds: float) -> str:

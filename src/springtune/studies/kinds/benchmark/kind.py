@@ -274,9 +274,11 @@ VARIABLES = {
 KIND = Kind(
     "benchmark",
     study_fields={"benchmark": optional(BenchmarkConfig, "Run time against error; it makes the group `/benchmark`.")},
+    alone={"benchmark": ("beams", "materials")},
     check=_check,
     expand=_expand,
     axes=_axes,
+    summary=lambda part: [["benchmark", len(part), "cases, timed one by one"]],
     variables=VARIABLES,
     dimensions={
         "scene": "scene of the benchmark",

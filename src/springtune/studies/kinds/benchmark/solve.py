@@ -345,7 +345,7 @@ def solvers(scene, sizes, most_seconds):
         mesh = MESH_TYPES["structured"](scene.beam.length, scene.beam.height, size)
         for i, name in enumerate(SOLVERS):
             if name == "Cholesky" and not factors.CHOLESKY:
-                found = _failed("CHOLMOD is not installed; install springtune[cholesky]")
+                found = _failed("CHOLMOD is not installed; install cvxopt")
             else:
                 found = in_process(_solver, most_seconds, scene, mesh, name)
             cases.note(found, i, j)

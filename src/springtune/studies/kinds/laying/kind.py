@@ -158,9 +158,11 @@ STAGE = stage("laying", "studies.kinds.laying.solve", "Laying the strips", _task
 KIND = Kind(
     "laying",
     study_fields={"laying": optional(LayingConfig, "A strip laid on a trapezoid; it makes the group `/laying`.")},
+    alone={"laying": ("beams", "materials")},
     check=_check,
     expand=_expand,
     axes=_axes,
+    summary=lambda part: [["strips", len(part.strips), "laid on a trapezoid"]],
     stages=(STAGE,),
     outputs=OUTPUTS,
     tables=lambda study: ["laying"] if study.parts["laying"] else [],

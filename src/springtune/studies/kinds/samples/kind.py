@@ -9,7 +9,7 @@ from pydantic_core import CoreSchema, core_schema
 
 from springtune.mesh import MESH_TYPES
 from springtune.mesh.types import MOST_MESHED
-from springtune.problem.geometry import warn_of_thickness
+from springtune.problem.geometry import warn_of_size, warn_of_thickness
 from springtune.problem.loads import LOADS
 from springtune.problem.parameters import MOST_SCENES
 from springtune.problem.quantities import LEAST, nearest
@@ -363,7 +363,9 @@ def _expand(config, declared):
     if not config.samples:
         return None
     sample = _sample(config.samples)
-    smallest = tuple(sample.parameters[name]["low"] for name in ("length", "height"))
+    sides = [sample.parameters[name] for name in ("length", "height")]
+    smallest = tuple(side["low"] for side in sides)
+    warn_of_size((*smallest, *(side["high"] for side in sides)), "samples")
     warn_of_thickness(sample.parameters["thickness"]["high"], smallest, "samples")
     return sample
 
@@ -488,6 +490,7 @@ KIND = Kind(
     study_fields={
         "samples": optional(SamplesConfig, "Sampled scenes; they make the groups `/samples`, `/effects` and `/sobol`.")
     },
+    alone={"samples": ()},
     check=_check,
     expand=_expand,
     axes=lambda sample: {"load": set(sample.loads), "definition": set(sample.definitions)},

@@ -164,10 +164,6 @@ READ_AT_ONCE = 1_000_000
 
 def check(config, problems):
     """Add what is wrong, see `springtune.studies.config.kind.Kind`."""
-    if bool(config.shapes) != bool(config.shape_grids):
-        here, lacking = ("shapes", "shape_grids") if config.shapes else ("shape_grids", "shapes")
-        problems.add((here,), f"'{lacking}' is missing; add it: shape_grids say what is computed of the shapes")
-        return
     for name, shape in (config.shapes or {}).items():
         path = "shapes", name
         for part, material in shape.parts.items():

@@ -277,12 +277,11 @@ KIND = Kind(
             Later("studies.kinds.shapes.sections", "NAMED_GRIDS"),
             Field(
                 None,
-                description="What is to be computed of the shapes; it makes the group `/shapes`. A study that has it "
-                "needs neither beams nor grids.",
+                description="What is to be computed of the shapes; it makes the group `/shapes`.",
             ),
         ),
     },
-    alone=("shape_grids",),
+    alone={"shape_grids": ("shapes", "materials")},
     files=_files,
     check=_check,
     expand=_expand,

@@ -100,9 +100,11 @@ KIND = Kind(
     study_fields={
         "stability": optional(StabilityConfig, "Experiments on numerical stability; they make the group `/stability`.")
     },
+    alone={"stability": ("beams", "materials")},
     check=_check,
     expand=_expand,
     axes=_axes,
+    summary=lambda part: [["experiments", len(part), "on numerical stability"]],
     stages=(STAGE,),
     outputs=OUTPUTS,
     **by_task("stability", _tasks, lambda one: (one.name, one.definition)),

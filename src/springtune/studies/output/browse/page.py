@@ -30,6 +30,7 @@ from springtune.safe_io.inputs import bounded
 
 from ...config.kind import modules
 from ...runs import records
+from ..colours import ERROR_COLOURS, ERROR_RANGE
 from ..reading import REMEDY, check_links, guarded, most_of
 from . import View
 
@@ -68,7 +69,8 @@ def page(dataset: str | os.PathLike[str], files: Iterable[str] = ()) -> str:
     if "springtune_version" not in attributes:
         raise ValueError(f"{path}: is not a dataset of springtune; {REMEDY}")
     declared = {path: asdict(view) for path, view in views().items()}
-    content = {"groups": groups, "declared": declared, "files": sorted(files)}
+    scale = {"colours": ERROR_COLOURS, "range": ERROR_RANGE}
+    content = {"groups": groups, "declared": declared, "files": sorted(files), "scale": scale}
     library = _library()
     texts = {"content": json.dumps(content, separators=(",", ":"), allow_nan=False)} | library
     script = "(() => {\n" + "".join(_asset(f"{name}.js") for name in SCRIPTS) + "})();\n"

@@ -19,37 +19,40 @@ class Cells {
     const constant = this.dims.filter((name) => !this.varying.includes(name));
     const count = this.status.size, present = new Int32Array(count);
     for (let i = 0; i < count; i++) present[i] = i;
-    this.shown = new Set(Object.values(this.status.flags).filter((one) => one !== "not_requested"));
     const tally = this.page.tally;
-    const boxes = Object.entries(tally).filter((one) => one[1]).map(([status, number_]) => {
-      const box = element("input", { type: "checkbox", value: status, checked: status !== "not_requested",
-        onchange: () => {
-          if (box.checked) this.shown.add(status);
-          else this.shown.delete(status);
-          this.table.update();
-        } });
-      return element("label", { class: "box" }, box, badge(status), ` ${number_}`);
-    });
+    const boxes = Object.entries(tally).filter((one) => one[1]).map(([status, number_]) => element("label", { class: "box" },
+      element("input", { type: "checkbox", value: status, checked: status !== "not_requested", onchange: () => this.table.update() }),
+      badge(status), ` ${number_}`));
+    const shown = () => new Set([...holder.querySelectorAll(".boxes input:checked")].map((one) => one.value));
     const counter = element("span", { class: "soft", role: "status", "aria-live": "polite" });
+    const reset = element("button", { type: "button", class: "copy", id: "reset", text: "Reset filters", onclick: () => {
+      for (const box of holder.querySelectorAll(".boxes input")) box.checked = box.value !== "not_requested";
+      this.table.reset();
+    } });
+    const sentence = root.sign(root.fields[SCENE_ERROR] || {}, {}, ["load"]);
     const tableHolder = element("div");
     const caption = constant.map((name) => labelWithUnit(root.dims[name], 0)).join(" · ");
     this.side = element("div", { class: "chosen-cell" });
     holder.append(element("div", { class: "cells" },
       element("div", { class: "list" },
-        element("div", { class: "row" }, element("fieldset", { class: "boxes" }, element("legend", { text: "Status" }), boxes)),
+        element("div", { class: "row" }, element("fieldset", { class: "boxes" }, element("legend", { text: "Status" }), boxes), reset),
         element("p", { class: "soft small" }, caption ? `All cells: ${caption}. ` : "", counter),
         tableHolder,
-        element("p", { class: "soft small", text: "Click a row, or use the arrow keys in the table. Click a head to sort." })),
+        element("p", { class: "soft small" }, "Click a row, or use the arrow keys in the table. Click a head to sort.",
+          sentence ? ` Deformation error, (network − reference) / |reference|: ${sentence}.` : "")),
       this.side));
     this.table = new Table(tableHolder, {
       columns: this.columns(), rows: Array.from(present), label: "Cells of the study",
       choose: (row) => this.page.choose(this.placesOf(row)),
-      changed: (shown, all) => (counter.textContent = `${shown} of ${all} cells shown.`),
+      changed: (count_, all, wrong, filtered) => {
+        counter.textContent = [`${count_} of ${all} cells shown.`, ...wrong].join(" ");
+        reset.disabled = !filtered && [...holder.querySelectorAll(".boxes input")].every((box) => box.checked === (box.value !== "not_requested"));
+      },
+      extra: () => {
+        const words = shown();
+        return (row) => words.has(this.status.meaning(this.status.valueAt(row)));
+      },
     });
-    const flags = Object.fromEntries(Object.entries(this.status.flags).map(([key, word]) => [key, word]));
-    const status = this.status.unpacked();
-    this.table.extra = (row) => this.shown.has(flags[status[row]]);
-    this.table.update();
     this.buildSide();
     const first = this.table.order[0] ?? 0;
     this.places ||= this.placesOf(first);
@@ -74,28 +77,29 @@ class Cells {
       const field = root.fields[name];
       if (name === "status") columns.push(this.statusColumn());
       if (!field || name === "status" || !field.dims.every((one) => this.dims.includes(one))) continue;
-      const at = this.placing(field), scale = unitOf(field)[0], unit = unitOf(field)[1];
+      const at = field.from(this.status), scale = unitOf(field)[0], unit = unitOf(field)[1];
       const numeric = !field.isText && !field.flags;
       const absent = this.empty(field);
       if (absent) continue;
       columns.push({
-        name, title: titled(field), hint: field.long_name, numeric,
-        width: field.isText ? 34 : Math.max(10, widest(titled(field)) + 2),
+        name, title: titled(field), hint: field.long_name, numeric, pinned: name === SCENE_ERROR,
+        width: field.isText ? 34 : Math.max(longest(field) + 3, widest(titled(field)) + 2),
         value: (row) => { const value = field.valueAt(at(row)); return numeric ? value * scale : value; },
         sortValue: unit === "%" && /error/.test(name)
           ? (row) => Math.abs(field.valueAt(at(row))) : undefined,
         text: (row) => written(field, field.valueAt(at(row))),
       });
     }
+    if (!columns.some((one) => one.pinned)) for (const one of columns) one.pinned = one.name === "status";
     return columns;
   }
 
   statusColumn() {
+    const labels = Object.entries(this.page.tally).filter((one) => one[1]).map((one) => spoken(one[0]));
+    const word = (row) => this.status.meaning(this.status.valueAt(row));
     return {
-      name: "status", title: "status", width: widest(Object.keys(this.page.tally).filter((one) => this.page.tally[one]).join(" ")) + 6, value: (row) => this.status.valueAt(row),
-      text: (row) => spoken(this.status.meaning(this.status.valueAt(row))),
-      node: (row) => badge(this.status.meaning(this.status.valueAt(row))),
-      labels: Object.entries(this.page.tally).filter((one) => one[1]).map((one) => spoken(one[0])),
+      name: "status", title: "status", width: Math.max(...labels.map((one) => one.length)) + 6, labels,
+      value: (row) => this.status.valueAt(row), text: (row) => spoken(word(row)), node: (row) => badge(word(row)),
     };
   }
 
@@ -103,14 +107,6 @@ class Cells {
   empty(field) {
     const values = field.unpacked();
     return field.isText ? values.every((one) => one < 0) : field.type === "float" && values.every((one) => Number.isNaN(one));
-  }
-
-  // From a row, a place in `status`, to the place in a field of fewer dimensions.
-  placing(field) {
-    const root = this.root, strides = this.status.strides;
-    const steps = field.dims.map((name) => [strides[name], root.dims[name].size, field.strides[name]]);
-    if (field.dims.length === this.dims.length && field.dims.every((one, i) => one === this.dims[i])) return (row) => row;
-    return (row) => steps.reduce((sum, [stride, size, own]) => sum + (Math.floor(row / stride) % size) * own, 0);
   }
 
   placesOf(row) {
@@ -138,7 +134,7 @@ class Cells {
       sections.push(panel("size", "Error against mesh size", chart("size"), under("size")));
     if (this.dims.length > 1) sections.push(panel("map", "Map over two parameters", over("map"), chart("map"), under("map")));
     sections.push(panel("shape", "The network over its reference", over("shape"), chart("shape"), under("shape")));
-    this.code = element("pre", { class: "code", tabindex: "0" });
+    this.code = element("pre", { class: "code", tabindex: "0", role: "region", "aria-label": "Python code of this cell" });
     this.files = element("div");
     this.everything = element("div");
     this.side.append(this.heading, this.selectors, this.facts, ...sections,
@@ -212,20 +208,28 @@ class Cells {
     const value = field.of(places);
     if (value === "" || Number.isNaN(value)) return null;
     const unit = unitOf(field)[1];
-    return written(field, value, 5) + (unit ? ` ${unit}` : "");
+    return written(field, value, 5) + (unit && !field.flags && !isFile(field, value) ? ` ${unit}` : "");
+  }
+
+  // The error of the printed displacements; errors themselves are printed without sign.
+  printed(places) {
+    const reference = this.value("paper_reference_displacement", places);
+    const error = (this.value("paper_displacement", places) - reference) / Math.abs(reference);
+    return Number.isFinite(error) ? [`${signed(100 * error, 3)} %`, signWord(error, reference)] : [];
   }
 
   showFacts(places) {
     const status = this.status.meaning(this.status.of(places));
     const rows = [];
-    const add = (title, ...names) => {
-      const found = names.map((name) => this.fact(name, places)).filter(Boolean);
-      if (found.length) rows.push(element("div", {}, element("dt", { text: title }), element("dd", { text: found.join(", ") })));
+    const say = (title, ...found) => {
+      if (found[0]) rows.push(element("div", {}, element("dt", { text: title }), element("dd", { text: found.filter(Boolean).join(", ") })));
     };
-    add("deformation error", SCENE_ERROR);
+    const add = (title, name, ...more) => say(title, this.fact(name, places), ...more);
+    add("deformation error", SCENE_ERROR, this.sign(places));
     add("network", "displacement");
     add("reference", "reference_displacement");
-    add("printed error", "paper_deformation_error");
+    add("printed error", "paper_deformation_error", "printed without sign");
+    say("error of printed displacements", ...this.printed(places));
     add("uniform stiffness", "stiffness");
     add("force", "force");
     add("particles", "particles");
@@ -236,6 +240,18 @@ class Cells {
       .filter(([, text], i, all) => all.findIndex((one) => one[1] === text) === i).map(([what, text]) => ` · ${what}${text}`);
     this.facts.replaceChildren(element("p", {}, badge(status), words.join("")),
       element("dl", { class: "facts" }, rows));
+  }
+
+  // What the sign of an error of a cell means: of its own, or of one that is given.
+  sign(places = this.places, error = this.value(SCENE_ERROR, places)) {
+    return signWord(error, this.value("reference_displacement", places));
+  }
+
+  // What is written under the errors of the chosen cell's parameters.
+  signNote() {
+    const reference = this.value("reference_displacement"), sentence = signSentence([["", reference]]);
+    const beyond = this.status.meaning(this.status.of(this.places)) === "beyond_linear";
+    return [sentence, beyond && "the linear reference does not apply to this cell"].filter(Boolean);
   }
 
   async showCurve() {
@@ -258,14 +274,14 @@ class Cells {
     const limits = window_(x.map((one) => one / scale), y.map((one) => 100 * one), marks.map((one) => one.x));
     await chart.show({
       series: [{
-        name: "error of the network", x: x.map((one) => one / scale), y: y.map((one) => 100 * one), hollow,
-        tips: y.map((one, i) => `${signed(100 * one, 4)} % at ${number(x[i], 4)} N/m, ${spoken(words[i] || "")}`), size: 5,
+        name: "error of the network", x: x.map((one) => one / scale), y: y.map((one) => 100 * one), hollow, words,
+        tips: y.map((one, i) => `${signed(100 * one, 4)} % ${this.sign(this.places, one)} at ${number(x[i], 4)} N/m, ${spoken(words[i] || "")}`), size: 5,
       }],
       marks, xlabel: `uniform stiffness [${unit}]`, ylabel: "deformation error [%]", zero: true, window: limits,
     });
     const list = marks.map((one) => element("li", {}, element("b", { text: one.name }), ` ${number(one.value, 4)} N/m`));
     this.parts["curve-under"].replaceChildren(element("ul", { class: "legend" }, list,
-      hollow.some((one, i) => one && Number.isFinite(y[i])) ? element("li", { text: "○ hollow: not a stable solution" }) : null));
+      [...hollowWords([{ y, hollow, words }]), ...this.signNote()].map((text) => element("li", { text }))));
   }
 
   // Stiffnesses to mark on a curve; those that say the same number share a mark.
@@ -311,8 +327,8 @@ class Cells {
       if (!y.some(Number.isFinite)) continue;
       const words = this.status.along("mesh_size", places).map((one) => this.status.meaning(one));
       series.push({
-        name: by ? labelText(this.root.dims[by], i) : "error", x: sizes, y, hollow: words.map((one) => one !== "solved"),
-        tips: y.map((one, j) => `${signed(one, 4)} % at ${number(sizes[j])} mm, ${spoken(words[j])}`),
+        name: by ? labelText(this.root.dims[by], i) : "error", x: sizes, y, hollow: words.map((one) => one !== "solved"), words,
+        tips: y.map((one, j) => `${signed(one, 4)} % ${this.sign(this.places, one)} at ${number(sizes[j])} mm, ${spoken(words[j])}`),
         look: look(i), chosen: !by || i === this.places[by] ? this.places.mesh_size : -1,
         width: !by || i === this.places[by] ? 3 : 1.5,
       });
@@ -325,8 +341,7 @@ class Cells {
     await this.charts.size.show({
       series, xlabel: "mesh size [mm]", ylabel: "deformation error [%]", zero: true, logx: sizes.length > 1, xticks: sizes,
     });
-    const open = series.some((one) => one.hollow.some((hollow, j) => hollow && Number.isFinite(one.y[j])));
-    under.replaceChildren(legend(series, open ? ["○ hollow: not a stable solution"] : []));
+    under.replaceChildren(legend(series, [...hollowWords(series), ...this.signNote()]));
   }
 
   async showMap() {
@@ -338,7 +353,6 @@ class Cells {
       return this.status.meaning(this.status.of(places)) !== "not_requested" || (i === this.places[x] && j === this.places[y]);
     };
     const [across, down, without] = filled(columns, rows, there);
-    const limit = field.flags ? 1 : scaleLimit(field), diverge = /error/.test(field.name);
     const values = [], cells = [];
     down.forEach((j, row) => across.forEach((i, column) => {
       const places = { ...this.places, [x]: i, [y]: j };
@@ -346,8 +360,12 @@ class Cells {
       values.push(value);
       cells.push({ row, column, places, value, status });
     }));
-    const finite = field.flags ? [] : values.filter(Number.isFinite);
-    const low = Math.min(...finite), high = Math.max(...finite), [scale, unit] = unitOf(field);
+    const signs = Object.keys(SIGNS).filter((word) => !["solved", "not_requested"].includes(word) && cells.some((cell) => cell.status === word))
+      .map((word) => `${SIGNS[word]} ${spoken(word)}`);
+    const words = [cells.some((cell) => cell.status === "not_requested") && "hatched: not requested", ...signs,
+      root.sign(field, this.places, [x, y]), "click a tile to choose it", without];
+    const key = element("span", { class: "soft", text: words.filter(Boolean).join(" · ") });
+    const colours = field.flags ? null : colouring(field, values, key), [scale, unit] = unitOf(field);
     for (const cell of cells) {
       const { value, status } = cell;
       cell.tip = `${spoken(status)}${Number.isFinite(value) && !field.flags ? `, ${written(field, value, 4)} ${unit}` : ""}`;
@@ -358,10 +376,10 @@ class Cells {
         cell.text = cell.missing ? "" : status === "solved" ? "no value" : SIGNS[status];
         cell.ink = ink("ink");
       } else {
-        const rgb = diverge ? diverging(value / limit) : sequential(high > low ? (value - low) / (high - low) : 0.3);
+        const rgb = colours.of(value);
         cell.colour = css(rgb);
         cell.ink = readableOn(rgb);
-        cell.text = number(value * scale, 2) + (status === "unstable" ? " ○" : "");
+        cell.text = written(field, value, 2) + (status === "solved" ? "" : ` ${SIGNS[status]}`);
       }
     }
     const chosen = { row: down.indexOf(this.places[y]), column: across.indexOf(this.places[x]) };
@@ -370,12 +388,7 @@ class Cells {
       xlabel: titled({ ...columns, name: x }), ylabel: titled({ ...rows, name: y }),
       pick: (cell) => this.page.choose(cell.places), chosen: chosen.row >= 0 && chosen.column >= 0 ? chosen : null,
     });
-    const signs = Object.keys(SIGNS).filter((word) => !["solved", "not_requested"].includes(word) && cells.some((cell) => cell.status === word))
-      .map((word) => `${SIGNS[word]} ${spoken(word)}`);
-    const key = element("span", { class: "soft", text: [cells.some((cell) => cell.missing) && "hatched: not requested", ...signs, "click a tile to choose it", without].filter(Boolean).join(" · ") });
-    this.parts["map-under"].replaceChildren(field.flags ? categories(field, key)
-      : diverge ? colourScale(`≤ −${number(limit * scale, 2)} ${unit}`, "0 in the middle", `≥ +${number(limit * scale, 2)} ${unit}`, [key])
-        : finite.length ? rampScale(`${number(low * scale, 3)} ${unit}`, `${number(high * scale, 3)} ${unit}`, key) : key);
+    this.parts["map-under"].replaceChildren(field.flags ? categories(field, key) : colours.key);
   }
 
   python(places) {
@@ -430,45 +443,25 @@ function stiffnessUnit(values) {
   return power ? [`${ten(power)} N/m`, 10 ** power] : ["N/m", 1];
 }
 
-// What of a curve is shown first: around the marks, errors that can be told apart.
+// What of a curve is shown first: around the marks, errors that can be told apart. No limit goes through a point.
 function window_(x, y, marks) {
-  const good = x.filter((one, i) => Number.isFinite(y[i]));
-  let low = Math.min(...good), high = Math.max(...good);
-  if (marks.length) {
-    low = Math.max(low, 0.6 * Math.min(...marks));
-    high = Math.min(Math.max(high, ...marks), 1.7 * Math.max(...marks));
-  }
-  const seen = y.filter((one, i) => Number.isFinite(one) && x[i] >= low && x[i] <= high);
-  const bottom = Math.max(-60, Math.min(...seen, 0)), top = Math.min(60, Math.max(...seen, 0));
-  const room = 0.08 * (top - bottom || 1), side = 0.03 * (high - low || high);
-  return { x: [low - side, high + side], y: [bottom - room, top + 4 * room] };
-}
-
-// Limit of a scale of errors: a round number that most of the study's do not exceed.
-function scaleLimit(field) {
-  if (field.limit) return field.limit;
-  const sizes = Array.from(field.unpacked()).filter(Number.isFinite).map(Math.abs).sort((a, b) => a - b);
-  const most = sizes[Math.floor(0.85 * (sizes.length - 1))] || 1;
-  const power = 10 ** Math.floor(Math.log10(most));
-  return (field.limit = [1, 2, 5, 10].map((one) => one * power).find((one) => one >= most) || most);
-}
-
-function sequential(share) {
-  const stops = [[247, 251, 255], [198, 219, 239], [107, 174, 214], [33, 113, 181], [8, 48, 107]];
-  const place = Math.max(0, Math.min(1, share)) * (stops.length - 1), low = Math.min(Math.floor(place), stops.length - 2);
-  return stops[low].map((one, i) => Math.round(one + (place - low) * (stops[low + 1][i] - one)));
-}
-
-function rampScale(low, high, extra) {
-  const stops = [0, 0.25, 0.5, 0.75, 1].map((share) => css(sequential(share)));
-  const bar = element("span", { class: "bar", style: `background: linear-gradient(to right, ${stops.join(",")})` });
-  return element("p", { class: "scale" }, element("span", { text: low }), bar, element("span", { text: high }), extra);
+  const good = x.map((_, i) => i).filter((i) => Number.isFinite(y[i])), least = Math.min(...marks), most = Math.max(...marks);
+  const near = good.filter((i) => !marks.length || x[i] >= 0.6 * least && x[i] <= 1.7 * most);
+  const legible = near.filter((i) => Math.abs(y[i]) <= 60), seen = [legible, near, good].find((one) => one.length);
+  const low = Math.min(...seen.map((i) => x[i])), high = Math.max(...seen.map((i) => x[i]));
+  const side = 0.03 * (Math.max(high, most) - Math.min(low, least) || high);
+  const before = Math.max(...good.map((i) => x[i]).filter((one) => one < low)), after = Math.min(...good.map((i) => x[i]).filter((one) => one > high));
+  const left = Math.min(Math.max(low - side, (low + before) / 2), least - side);
+  const right = Math.max(Math.min(high + side, (high + after) / 2), most + side);
+  const inside = good.filter((i) => x[i] >= left && x[i] <= right).map((i) => y[i]);
+  const bottom = Math.min(...inside, 0), top = Math.max(...inside, 0), room = 0.08 * (top - bottom || 1);
+  return { x: [left, right], y: [bottom - room, top + 4 * room] };
 }
 
 function category(field, value) {
   const meaning = field.meaning(value), place = Object.keys(field.flags).indexOf(String(value));
   const colours = {
-    solved: "#009e73", linear_only: "#56b4e9", not_converged: "#e69f00", unstable: "#cc79a7", failed: "#d55e00",
+    solved: "#009e73", beyond_linear: "#f0e442", linear_only: "#56b4e9", not_converged: "#e69f00", unstable: "#cc79a7", failed: "#d55e00",
   };
   const missing = place < 0 || meaning === "not_requested";
   return {
@@ -487,4 +480,18 @@ function categories(field, extra) {
 
 function widest(words) {
   return Math.max(...words.split(" ").map((one) => one.length));
+}
+
+// Most letters of a number of a field, as the table writes it.
+function longest(field) {
+  const scale = unitOf(field)[0];
+  let least = Infinity, most = 0, negative = isSigned(field);
+  for (const value of field.unpacked()) {
+    const size = Math.abs(value);
+    if (size > 0 && size < least) least = size;
+    if (size > most && size < Infinity) most = size;
+    negative ||= value < 0;
+  }
+  const length = (value) => (value > 0 && value < Infinity ? number(1.111 * 10 ** Math.floor(Math.log10(value * scale))).length : 1);
+  return Math.max(length(least), length(most)) + Number(negative);
 }

@@ -7,8 +7,7 @@ const MARKERS = ["circle", "square", "diamond", "triangle", "inverted_triangle",
 const SHAPES = {
   circle: "●", square: "■", diamond: "◆", triangle: "▲", inverted_triangle: "▼", hex: "⬢", star: "★", plus: "+",
 };
-const COOL = [[5, 48, 97], [33, 102, 172], [67, 147, 195], [146, 197, 222], [209, 229, 240]];
-const WARM = [[253, 219, 199], [244, 165, 130], [230, 97, 1], [179, 74, 6], [110, 40, 4]];
+const BLUES = ["#f7fbff", "#c6dbef", "#6baed6", "#2171b5", "#08306b"];
 const CATEGORIES = ["#56b4e9", "#009e73", "#e69f00", "#d55e00", "#cc79a7", "#0072b2", "#8a6bbe", "#7f7f7f"];
 
 const dark = matchMedia("(prefers-color-scheme: dark)");
@@ -39,12 +38,11 @@ function ink(name) {
   return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 }
 
-// Blue below zero, orange above, `middle` at zero: share from -1 to 1.
-function diverging(share, middle = [247, 247, 247]) {
-  const bounded = Math.max(-1, Math.min(1, share));
-  const stops = bounded < 0 ? [middle, ...COOL.slice().reverse()] : [middle, ...WARM];
-  const place = Math.abs(bounded) * (stops.length - 1), low = Math.min(Math.floor(place), stops.length - 2);
-  return stops[low].map((one, i) => Math.round(one + (place - low) * (stops[low + 1][i] - one)));
+// A colour between stops, at a share from 0 to 1.
+function between(stops, share) {
+  const place = Math.max(0, Math.min(1, share)) * (stops.length - 1), low = Math.min(Math.floor(place), stops.length - 2);
+  const [one, other] = [stops[low], stops[low + 1]].map((text) => [1, 3, 5].map((i) => parseInt(text.slice(i, i + 2), 16)));
+  return one.map((value, i) => Math.round(value + (place - low) * (other[i] - value)));
 }
 
 function css(rgb) {
@@ -53,6 +51,26 @@ function css(rgb) {
 
 function readableOn(rgb) {
   return 0.299 * rgb[0] + 0.587 * rgb[1] + 0.114 * rgb[2] > 140 ? "#111" : "#fff";
+}
+
+// Colours of the finite values of a map, and its key: sizes of errors have the scale of the figures.
+function colouring(field, values, key) {
+  const scale = unitOf(field)[0], unit = unitOf(field)[1], finite = values.filter(Number.isFinite);
+  const low = Math.min(...finite), high = Math.max(...finite);
+  const ramp = (stops, from, to, words) => element("p", { class: "scale" }, element("span", { text: from }),
+    element("span", { class: "bar", style: `background: linear-gradient(to right, ${stops.join(",")})` }), element("span", { text: to }),
+    words ? element("span", { class: "soft", text: words }) : null, key);
+  if (isError(field)) {
+    const { colours, range } = window.springtune.scale, [least, most] = range.map(Math.log10);
+    return {
+      of: (value) => between(colours, (Math.log10(100 * Math.abs(value)) - least) / (most - least)),
+      key: ramp(colours, `≤ ${number(range[0])} %`, `≥ ${number(range[1])} %`, "size of the error, logarithmic"),
+    };
+  }
+  return {
+    of: (value) => between(BLUES, high > low ? (value - low) / (high - low) : 0.3),
+    key: finite.length ? ramp(BLUES, `${number(low * scale, 3)} ${unit}`, `${number(high * scale, 3)} ${unit}`) : key,
+  };
 }
 
 const charts = new Set();
@@ -97,7 +115,16 @@ class Chart {
     const view = await B.Plotting.show(fig, this.holder);
     if (this.fig === fig) this.view = view;
     else dispose(view);
+    this.name_();
     return fig;
+  }
+
+  // Bokeh's plots take the focus, without a name.
+  name_() {
+    const find = (root) => root.querySelector?.(".bk-events") || [...root.querySelectorAll("*")].map((one) => one.shadowRoot && find(one.shadowRoot)).find(Boolean);
+    const layer = this.view && find(this.holder);
+    layer?.setAttribute("role", "img");
+    layer?.setAttribute("aria-label", `Plot: ${this.spoken || this.name}`);
   }
 
   remove() {
@@ -131,7 +158,9 @@ class Chart {
     this.recolour?.(text, soft);
   }
 
-  axes(x, y) {
+  axes(x, y, spoken_ = `${y} over ${x}`) {
+    this.spoken = spoken_;
+    this.name_();
     for (const [side, words] of [["below", x], ["left", y]])
       for (const axis of this.fig[side]) if ("axis_label" in axis) axis.axis_label = words;
   }
@@ -264,10 +293,9 @@ class Lines extends Chart {
       });
     });
     const range = (values, log, given) => given || spread(values, log);
-    const allX = [].concat(...lines.xs, points.x, marks.map((one) => one.x));
+    const allX = [].concat(...lines.xs, points.x, marks.map((one) => one.x)), allY = [].concat(...lines.ys, points.y);
     let x = categories ? [-0.5, categories.length - 0.5] : range(allX, logx, window.x);
-    let y = range([].concat(...lines.ys, points.y), logy, window.y);
-    if (zero && !logy && !window.y) y = [Math.min(y[0], 0), Math.max(y[1], 0)];
+    let y = range(zero ? [...allY, 0] : allY, logy, window.y);
     if (window.equal) [x, y] = this.fitted(x, y);
     const sorted = marks.filter((one) => Number.isFinite(one.x) && (!logx || one.x > 0)).sort((a, b) => a.x - b.x);
     const levels = Math.min(sorted.length, 4);
@@ -392,12 +420,26 @@ class Tiles extends Chart {
   }
 }
 
-// Scale of colours under a map or a shape: its ends, its middle and what is missing.
-function colourScale(low, middle, high, extra = []) {
-  const stops = [-1, -0.75, -0.5, -0.25, 0, 0.25, 0.5, 0.75, 1].map((share) => css(diverging(share)));
-  const bar = element("span", { class: "bar", style: `background: linear-gradient(to right, ${stops.join(",")})` });
-  return element("p", { class: "scale" }, element("span", { text: low }), bar, element("span", { text: high }),
-    middle ? element("span", { class: "soft", text: middle }) : null, extra);
+// Outlines of several rounds, such as that of a hole, as one line with gaps: each round is closed.
+function rounds(values, numbers) {
+  const found = [];
+  let first = 0;
+  values.forEach((one, i) => {
+    if (!Number.isFinite(one)) return;
+    if (i && numbers && numbers[i] !== numbers[i - 1]) {
+      found.push(values[first], NaN);
+      first = i;
+    }
+    found.push(one);
+  });
+  return [...found, values[first]];
+}
+
+// What hollow points are: their statuses, where a value stands.
+function hollowWords(series) {
+  const found = new Set(series.flatMap((one) => one.y.map((y, i) => (one.hollow?.[i] && Number.isFinite(y) ? one.words[i] : ""))));
+  found.delete("");
+  return found.size ? [`○ hollow: ${[...found].map(spoken).join(", ")}`] : [];
 }
 
 dark.addEventListener("change", () => {

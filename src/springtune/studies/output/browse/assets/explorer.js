@@ -18,11 +18,11 @@ class Explorer {
     this.picture = element("div", { class: "chart" });
     this.under = element("div");
     this.numbers = element("div");
-    const single = Object.values(fields).filter((field) => !field.dims.length);
+    const single = Object.values(fields).filter((field) => !field.dims.length && !/^topology/.test(field.long_name));
     const left = this.group.left_out;
     holder.append(element("h2", { text: this.view.title }), this.view.note ? element("p", { text: this.view.note }) : "",
       left.length ? element("p", { class: "none", text: `Too large for this page, and in dataset.nc only: ${left.join(", ")}.` }) : "",
-      this.over, element("section", { class: "panel wide-panel" }, this.picture, this.under), this.numbers,
+      this.network(), this.over, element("section", { class: "panel wide-panel" }, this.picture, this.under), this.numbers,
       single.length ? element("section", { class: "panel" }, element("h3", { text: "Single numbers" }), this.singles(single)) : "",
       element("section", { class: "panel" }, element("h3", { text: "What the group holds" }), this.inventory()));
     this.lines = new Lines(this.picture, `${this.group.path} lines`, 400);
@@ -31,7 +31,7 @@ class Explorer {
     this.page.charts[`${this.group.path} map`] = this.tiles;
     const own = Object.values(fields).filter((field) => field.dims.length);
     if (!own.length) return;
-    if (this.plots.length) this.take(0);
+    if (this.plots.length) this.take(Math.max(0, this.plots.findIndex((plot) => this.varies(plot))));
     else {
       const full = own.filter((field) => !field.isText && !field.flags && !this.bare(field));
       this.free((full.find((field) => /error/.test(field.name)) || full[0] || own[0]).name);
@@ -43,6 +43,37 @@ class Explorer {
     const known = (name) => !name || name in fields || name in dims;
     return plot.value in fields && known(plot.x) && (!plot.by || plot.by in dims) && !this.bare(fields[plot.value])
       && !(plot.x in fields && this.bare(fields[plot.x]));
+  }
+
+  // Whether points of a plot stand over more than one place.
+  varies(plot) {
+    const field = this.group.fields[plot.x];
+    if (!field) return true;
+    const values = Array.from(field.unpacked()).filter(Number.isFinite);
+    return values.some((one) => Math.abs(one - values[0]) > 1e-4 * Math.abs(one));
+  }
+
+  // Networks that no cell of the table has, such as those of shapes.
+  network() {
+    if (this.group.path === "/fields" || !Shape.NEEDED.every((name) => name in this.group.fields)) return "";
+    const [over, chart, under] = ["row", "chart", ""].map((name) => element("div", { class: name })), choices = element("div", { class: "row" });
+    const shape = new Shape(over, chart, under, this.page, this.group), { dims, fields } = this.group, places = {};
+    const free = fields.displacement_x.dims.slice(0, -1), values = fields.displacement_x;
+    for (const name of free) places[name] = 0;
+    const there = (name, i) => Number.isFinite(values.of({ ...places, [name]: i }));
+    const draw = () => {
+      free.forEach((name, i) => {
+        if (i && !there(name, places[name])) places[name] = Math.max(0, Array.from({ length: dims[name].size }, (_, j) => j).find((j) => there(name, j)) ?? 0);
+      });
+      choices.replaceChildren(...free.map((name, i) => choice(spoken(name),
+        Array.from({ length: dims[name].size }, (_, j) => [j, labelWithUnit(dims[name], j)]).filter(([j]) => !i || there(name, j)), places[name],
+        (value) => { places[name] = Number(value); this.moved = draw(); }, { "data-dim": name })));
+      const why = shape.fill(places);
+      return why ? shape.say({ words: why }) : shape.controls() || shape.draw(true);
+    };
+    this.page.charts[`${this.group.path} network`] = shape.chart;
+    this.moved = draw();
+    return element("section", { class: "panel", id: "panel-network" }, element("h3", { text: "The network over its reference" }), choices, over, chart, under);
   }
 
   bare(field) {
@@ -188,7 +219,7 @@ class Explorer {
       }
       series.push({
         name: i === null ? "" : labelWithUnit(dims[plot.by], i), x, y, look: look(i ?? 0),
-        hollow: words?.map((one) => one !== "solved"), size: sizes > 60 ? 3 : 6,
+        hollow: words?.map((one) => one !== "solved"), words, size: sizes > 60 ? 3 : 6,
         line: plot.shows !== "points", markers: plot.shows === "points" || !(plot.equal || sizes > 200),
         tips: y.map((one, j) => `${field.flags ? spoken(field.meaning(one)) : number(one)} ${yUnit} at ${textual ? labels[j] : number(x[j])}${words ? `, ${spoken(words[j])}` : ""}`),
       });
@@ -198,9 +229,11 @@ class Explorer {
       if (!second || !(x in fields || x in dims)) continue;
       const last = second.dims.at(-1);
       if (!last) continue;
-      const across = x in fields ? fields[x].along(last, this.chosen).map((one) => one * unitOf(fields[x])[0])
+      let across = x in fields ? fields[x].along(last, this.chosen).map((one) => one * unitOf(fields[x])[0])
         : textual ? labels.map((_, i) => i) : (dims[x].labels || []).map((one) => one * unitOf(dims[x])[0]);
-      const up = second.along(last, this.chosen).map((one) => (logy ? Math.abs(one) : one) * unitOf(second)[0]);
+      let up = second.along(last, this.chosen).map((one) => (logy ? Math.abs(one) : one) * unitOf(second)[0]);
+      const numbers = fields.outline_round?.dims.at(-1) === last ? fields.outline_round.along(last, this.chosen) : null;
+      if (numbers) [across, up] = [across, up].map((one) => rounds(one, numbers));
       if (up.some(Number.isFinite)) series.push({ name, x: across, y: up, width: 2, markers: false,
         look: { color: "ink", dash: series.some((one) => one.look.color === "ink") ? "1 4" : "5 3", marker: "circle" } });
     }
@@ -212,7 +245,7 @@ class Explorer {
     const known = new Set(series.map((one) => one.name));
     for (const name of this.lit) if (!known.has(name)) this.lit.delete(name);
     if (this.lit.size) for (const one of series) one.faint = !this.lit.has(one.name);
-    const absolute = logy && /error/.test(field.name);
+    const absolute = logy && isSigned(field);
     const name = (one, unit) => one + (unit ? ` [${unit}]` : "");
     const across = textual || plot.equal ? "" : tamed(series, "x", logx), up = plot.equal || field.flags ? "" : tamed(series, "y", logy);
     const xUnit = xField ? unitOf(xField)[1] : xDim ? unitOf(xDim)[1] : "";
@@ -222,7 +255,7 @@ class Explorer {
       xlabel: name(spoken(plot.x), `${across}${xUnit}`),
       ylabel: name(absolute ? `|${spoken(field.name)}|` : spoken(field.name), `${up}${yUnit}`),
     });
-    const words = series.some((one) => one.hollow?.some((open, j) => open && Number.isFinite(one.y[j]))) ? ["○ hollow: not solved"] : [];
+    const words = [...hollowWords(series), absolute ? "sizes of errors; the table has their signs" : this.sign(field, along)].filter(Boolean);
     if (series.length > CROWD && !this.lit.size) words.push(`${series.length} lines: choose names to bring them out`);
     if (hidden) words.push(`and ${hidden} lines more: the table below has them all`);
     if (field.flags) words.push(Object.entries(field.flags).map(([key, word]) => `${key}: ${spoken(word)}`).join(", "));
@@ -234,7 +267,7 @@ class Explorer {
 
   async map(field) {
     const plot = this.plot, { dims } = this.group, cells = [], values = [];
-    const across = dims[plot.x], down = dims[plot.by], [scale, unit] = unitOf(field);
+    const across = dims[plot.x], down = dims[plot.by], unit = unitOf(field)[1];
     const read = (i, j) => field.of({ ...this.chosen, [plot.x]: i, [plot.by]: j });
     const there = (value) => (field.flags ? field.meaning(value) !== "" && field.meaning(value) !== "not_requested" : Number.isFinite(value));
     const [columns, rows, without] = filled(across, down, (i, j) => there(read(i, j)));
@@ -243,14 +276,14 @@ class Explorer {
       cells.push({ row, column, value });
       if (Number.isFinite(value)) values.push(value);
     }));
-    const low = Math.min(...values), high = Math.max(...values), diverge = /error/.test(field.name);
-    const limit = diverge ? scaleLimit(field) : 1;
+    const words = ["hatched: nothing", this.sign(field), without].filter(Boolean);
+    const key = element("span", { class: "soft", text: words.join(" · ") }), colours = field.flags ? null : colouring(field, values, key);
     for (const cell of cells) {
       if (field.flags) Object.assign(cell, category(field, cell.value));
       else if (!Number.isFinite(cell.value)) Object.assign(cell, { missing: true, colour: "#8883", text: "", tip: "nothing" });
       else {
-        const rgb = diverge ? diverging(cell.value / limit) : sequential(high > low ? (cell.value - low) / (high - low) : 0.3);
-        Object.assign(cell, { colour: css(rgb), ink: readableOn(rgb), text: number(cell.value * scale, 2), tip: `${number(cell.value * scale)} ${unit}` });
+        const rgb = colours.of(cell.value);
+        Object.assign(cell, { colour: css(rgb), ink: readableOn(rgb), text: written(field, cell.value, 2), tip: `${written(field, cell.value, 4)} ${unit}` });
       }
     }
     this.lines.forget();
@@ -262,10 +295,13 @@ class Explorer {
       cells, columns: columns.map((i) => labelText(across, i)), rows: rows.map((j) => labelText(down, j)),
       xlabel: titled({ ...across, name: plot.x }), ylabel: titled({ ...down, name: plot.by }), pick: null,
     });
-    const key = element("span", { class: "soft", text: ["hatched: nothing", without].filter(Boolean).join(" · ") });
-    this.under.replaceChildren(field.flags ? categories(field, key)
-      : diverge ? colourScale(`≤ −${number(limit * scale, 2)} ${unit}`, "0 in the middle", `≥ +${number(limit * scale, 2)} ${unit}`, [key])
-        : values.length ? rampScale(`${number(low * scale, 3)} ${unit}`, `${number(high * scale, 3)} ${unit}`, key) : "");
+    this.under.replaceChildren(field.flags ? categories(field, key) : colours.key);
+  }
+
+  // What the sign of the plotted errors means.
+  sign(field, along = "") {
+    const { x, by } = this.plot;
+    return this.group.sign(field, this.chosen, [x, by, along], this.page.groups["/"]);
   }
 
   // What the plot shows as numbers, or texts.
@@ -276,7 +312,9 @@ class Explorer {
       .filter(([, values]) => values.some((one) => (field.isText ? one !== "" : !Number.isNaN(one))));
     const unit = unitOf(field)[1];
     const head = [titled({ ...dims[along], name: along }), ...kept.map(([i]) => (i === null ? titled(field) : labelWithUnit(by, i)))];
-    const body = Array.from({ length: dims[along].size }, (_, j) => [labelText(dims[along], j), ...kept.map(([, values]) => written(field, values[j], 5))]);
+    const there = (one) => (field.isText ? one !== "" : !Number.isNaN(one));
+    const body = Array.from({ length: dims[along].size }, (_, j) => j).filter((j) => kept.some(([, values]) => there(values[j])))
+      .map((j) => [labelText(dims[along], j), ...kept.map(([, values]) => written(field, values[j], 5))]);
     return { head, body, unit };
   }
 
@@ -289,10 +327,10 @@ class Explorer {
     const open = this.opened ?? (field.isText || body.length <= 30);
     const details = element("details", { open, ontoggle: () => (this.opened = details.open) },
       element("summary", { text: `${spoken(field.name)}${unit ? ` [${unit}]` : ""} in numbers` }),
-      element("p", { class: "small" }, field.long_name || ""), cut,
+      element("p", { class: "small" }, [field.long_name, this.sign(field, along)].filter(Boolean).join("; ")), cut,
       element("div", { class: "grid plain-grid", tabindex: "0", role: "region", "aria-label": `Numbers of ${spoken(field.name)}` },
         element("table", { class: "plain" },
-          element("thead", {}, element("tr", {}, head.slice(0, columns).map((text) => element("th", { scope: "col", text })))),
+          element("thead", {}, element("tr", {}, head.slice(0, columns).map((text, i) => element("th", { scope: "col", class: i && !field.isText ? "number" : "", text })))),
           element("tbody", {}, shown.map((row) => element("tr", {}, row.slice(0, columns).map((text, i) => element(i ? "td" : "th", { class: i && !field.isText ? "number" : "", text }))))))),
       copyButton(csv, "Copy as CSV"));
     if (field.isText) details.open = true;
@@ -323,10 +361,11 @@ class Explorer {
 
   redraw() {
     this.render();
+    this.page.charts[`${this.group.path} network`]?.redraw?.();
   }
 
   show() {
-    return this.drawn;
+    return Promise.all([this.moved, this.drawn]);
   }
 }
 

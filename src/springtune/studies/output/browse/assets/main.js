@@ -1,5 +1,12 @@
 // The page: its head, its views, and the selection that they share with the address.
 
+const MANY = 100; // times as many cells: their view is the first
+
+// How many cells a study asked for.
+function asked(tally) {
+  return Object.entries(tally || {}).reduce((sum, [word, count]) => sum + (word === "not_requested" ? 0 : count), 0);
+}
+
 class Page {
   constructor(content) {
     Object.assign(this, content);
@@ -9,11 +16,13 @@ class Page {
 
   async start() {
     const root = await this.groups["/"].load();
-    this.count(root);
+    this.counted = Object.values(this.groups).filter((group) => group !== root && group.path !== "/sensitivity" && group.fields.status);
+    for (const group of this.counted) await group.load();
+    this.tally = asked(root.tally()) ? root.tally() : null;
     this.head(root);
     this.views = {};
     if (this.tally) this.views.cells = new Cells(this, this.declared["/"] || { columns: [] });
-    if (Object.keys(root.fields).length)
+    if (Object.keys(root.fields).length && (this.tally || !root.fields.status))
       this.views.compare = new Explorer(this, root, { ...(this.declared["/"] || { note: "", plots: [] }), title: "Compare" });
     for (const [path, group] of Object.entries(this.groups)) {
       if (path === "/") continue;
@@ -26,16 +35,15 @@ class Page {
     await this.follow();
   }
 
-  // How the study ended: cells by status.
-  count(root) {
-    const status = root.fields.status;
-    if (!status?.flags || !status.dims.length) return;
-    const values = status.unpacked();
-    this.tally = Object.fromEntries(Object.values(status.flags).map((word) => [word, 0]));
-    for (let i = 0; i < values.length; i++) {
-      const word = status.meaning(values[i]);
-      this.tally[word] = (this.tally[word] || 0) + 1;
-    }
+  // A group's cells by status, and what it counts first: "8 shapes".
+  holds(group) {
+    const tally = group.tally(), all = asked(tally);
+    if (!all) return null;
+    const first = group.fields.status.dims.find((name) => group.dims[name].size > 1), title = this.declared[group.path]?.title || spoken(group.path.slice(1));
+    const badges = Object.entries(tally).filter(([word, count]) => count && word !== "not_requested")
+      .map(([word, count]) => element("span", { class: "count" }, badge(word), ` ${count}`));
+    return element("span", { class: "holds" }, element("a", { href: `#view=${group.path.slice(1)}`, text: title }),
+      first ? `: ${counted(group.dims[first].size, spoken(first))}` : ":", badges);
   }
 
   head(root) {
@@ -45,13 +53,14 @@ class Page {
     document.getElementById("facts").textContent = words.join(" · ");
     const end = document.getElementById("end");
     if (this.tally) {
-      const asked = Object.entries(this.tally).filter(([word, count]) => count && word !== "not_requested");
-      const all = asked.reduce((sum, one) => sum + one[1], 0);
+      const all = asked(this.tally);
       end.append(element("span", {}, element("b", { text: String(all) }), all === 1 ? " cell: " : " cells: "),
-        ...asked.map(([word, count]) => element("span", { class: "count" }, badge(word), ` ${count}`)),
+        ...Object.entries(this.tally).filter(([word, count]) => count && word !== "not_requested")
+          .map(([word, count]) => element("span", { class: "count" }, badge(word), ` ${count}`)),
         this.tally.not_requested ? element("span", { class: "soft", text: `${this.tally.not_requested} not requested` }) : "");
       this.errors(root, end);
     }
+    document.getElementById("holds").append(...this.counted.map((group) => this.holds(group)).filter(Boolean));
     const links = document.getElementById("links");
     const named = [["dataset.nc", "dataset.nc"], ["tables/index.html", "tables"], ["paper.pdf", "paper.pdf"], ["report.zip", "report"]];
     for (const [path, text] of named)
@@ -64,20 +73,18 @@ class Page {
     if (!field || field.dims.join() !== status.dims.join()) return;
     const values = field.unpacked(), sizes = [];
     let worst = -1;
-    const applies = root.fields.reference_applies;
     for (let i = 0; i < values.length; i++) {
       if (!Number.isFinite(values[i]) || status.meaning(status.valueAt(i)) !== "solved") continue;
-      const at = Object.fromEntries(status.dims.map((name) => [name, Math.floor(i / status.strides[name]) % root.dims[name].size]));
-      if (applies && applies.of(at) !== 1) continue;
       sizes.push(Math.abs(values[i]));
       if (worst < 0 || Math.abs(values[i]) > Math.abs(values[worst])) worst = i;
     }
-    if (!sizes.length) return end.append(element("span", { class: "soft", text: "no cell has an error" }));
+    if (!sizes.length) return end.append(element("span", { class: "soft", text: this.tally.beyond_linear ? "no cell has an error that counts" : "no cell has an error" }));
     sizes.sort((a, b) => a - b);
     const middle = (sizes[(sizes.length - 1) >> 1] + sizes[sizes.length >> 1]) / 2;
     const places = Object.fromEntries(status.dims.map((name) => [name, Math.floor(worst / status.strides[name]) % root.dims[name].size]));
-    end.append(element("span", { text: `|error|: median ${number(100 * middle, 3)} %, ` },
-      element("a", { href: this.address("cells", places), text: `largest ${number(100 * sizes.at(-1), 3)} %` })));
+    const word = signWord(values[worst], root.fields.reference_displacement?.of(places));
+    end.append(element("span", { text: `|error|${this.tally.beyond_linear ? " where the reference applies" : ""}: median ${number(100 * middle, 3)} %, ` },
+      element("a", { href: this.address("cells", places), text: `largest ${number(100 * sizes.at(-1), 3)} %` }), word ? `, ${word}` : ""));
   }
 
   tabs() {
@@ -98,19 +105,26 @@ class Page {
 
   // What the address says: a view, and for each dimension of the root a label.
   async follow() {
-    const asked = new URLSearchParams(location.hash.slice(1));
+    const wanted = new URLSearchParams(location.hash.slice(1));
     const names = Object.keys(this.views);
-    const view = names.includes(asked.get("view")) ? asked.get("view") : names[0];
+    const view = names.includes(wanted.get("view")) ? wanted.get("view") : [...wanted.keys()].length ? names[0] : this.first();
     if (this.views.cells) {
       const root = this.groups["/"], places = {};
       for (const name of root.fields.status.dims) {
-        if (!asked.has(name)) continue;
-        const place = Array.from({ length: root.dims[name].size }, (_, i) => String(root.label(name, i))).indexOf(asked.get(name));
+        if (!wanted.has(name)) continue;
+        const place = Array.from({ length: root.dims[name].size }, (_, i) => String(root.label(name, i))).indexOf(wanted.get(name));
         if (place >= 0) places[name] = place;
       }
       if (Object.keys(places).length) this.places = { ...(this.places || this.firstPlaces()), ...places };
     }
     await this.open(view, false);
+  }
+
+  // The view to begin with: that of cells, unless a few stand beside very many others.
+  first() {
+    const names = Object.keys(this.views), most = (name) => asked(this.counted.find((group) => group.path === `/${name}`)?.tally());
+    const largest = names.reduce((one, other) => (most(other) > most(one) ? other : one), names[0]);
+    return asked(this.tally) * MANY < most(largest) ? largest : names[0];
   }
 
   firstPlaces() {
@@ -191,7 +205,7 @@ class About {
       element("tr", {}, element("th", { scope: "row", text: spoken(name) }), element("td", { text: String(value) }))))));
     const link = (path) => element("li", {}, element("a", { href: path, text: path }));
     const files = this.page.files;
-    const config = element("pre", { class: "code", tabindex: "0", text: about.config || "" });
+    const config = element("pre", { class: "code", tabindex: "0", role: "region", "aria-label": "The study's YAML", text: about.config || "" });
     holder.append(element("h2", { text: about.title || "Study" }),
       element("section", { class: "panel" }, element("h3", { text: "Where it comes from" }), table(plain)),
       element("section", { class: "panel" }, element("h3", { text: "Versions" }), table(software)),

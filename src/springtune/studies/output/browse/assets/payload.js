@@ -59,17 +59,30 @@ class Field {
     return (this.values = new Float32Array(values.buffer));
   }
 
+  // Place among the unpacked values; below zero where a row has none.
+  placeAt(flat) {
+    if (!this.place) return flat;
+    const row = this.place[Math.floor(flat / this.points)];
+    return row < 0 ? -1 : row * this.points + (flat % this.points);
+  }
+
   // Number or text at a place of the flat array; NaN or "" where there is none.
   valueAt(flat) {
-    const values = this.unpacked();
-    let place = flat;
-    if (this.place) {
-      const row = this.place[Math.floor(flat / this.points)];
-      if (row < 0) return this.isText ? "" : this.type === "float" ? NaN : 0;
-      place = row * this.points + (flat % this.points);
-    }
+    const values = this.unpacked(), place = this.placeAt(flat);
+    if (place < 0) return this.isText ? "" : this.type === "float" ? NaN : 0;
     const value = values[place];
     return this.isText ? (value < 0 ? "" : this.words[value]) : value;
+  }
+
+  // From a place in the flat array of another field to the place in that of this one, which has no dimension beyond.
+  from(other) {
+    const steps = this.dims.map((name) => [other.strides[name], this.group.dims[name].size, this.strides[name]]);
+    if (this.dims.join() === other.dims.join()) return (flat) => flat;
+    return (flat) => steps.reduce((sum, [stride, size, own]) => sum + (Math.floor(flat / stride) % size) * own, 0);
+  }
+
+  within(dims) {
+    return this.dims.every((name) => dims.includes(name));
   }
 
   // Place in the flat array of places along the dimensions; those not given are the first.
@@ -103,8 +116,60 @@ class Group {
   }
 
   async load() {
-    this.bytes ||= await inflated(`group-${this.number}`);
+    if (!this.bytes) {
+      this.bytes = await inflated(`group-${this.number}`);
+      this.judge();
+    }
     return this;
+  }
+
+  // Solved cells that the linear reference cannot judge have a status of their own.
+  judge() {
+    const { status, reference_applies: applies } = this.fields;
+    if (!status?.flags || !applies?.within(status.dims)) return;
+    const solved = Number(Object.keys(status.flags).find((key) => status.flags[key] === "solved"));
+    const values = status.unpacked(), beyond = Math.max(...Object.keys(status.flags)) + 1, at = applies.from(status);
+    for (let flat = 0; flat < status.size; flat++) {
+      const place = status.placeAt(flat);
+      if (place < 0 || values[place] !== solved || applies.valueAt(at(flat)) !== 0) continue;
+      values[place] = beyond;
+      status.flags[beyond] = "beyond_linear";
+    }
+  }
+
+  // Cells by status, with those of any count; null where the group has no cells.
+  tally() {
+    const status = this.fields.status;
+    if (!status?.flags || !status.dims.length || !this.bytes) return null;
+    const values = status.unpacked(), found = {};
+    for (const value of values) found[value] = (found[value] || 0) + 1;
+    const tally = Object.fromEntries(Object.entries(status.flags).map(([key, word]) => [word, found[key] || 0]));
+    if (status.place) tally.not_requested = (tally.not_requested || 0) + status.size - values.length;
+    return tally;
+  }
+
+  // Which sign of the errors of a field means too soft, at these places and along these dimensions.
+  sign(field, places = {}, along = [], above = null) {
+    if (!isSigned(field)) return "";
+    const name = { face_error: "reference_face_displacement", error: "reference_value", expected_error: "expected_value" }[field.name];
+    const of = this.fields[name] ? this : this.fields.reference_displacement ? this : above;
+    const reference = of?.fields[this.fields[name] ? name : "reference_displacement"];
+    if (!reference || !/^(deformation_|second_|face_|expected_)?error$/.test(field.name)) return "positive: too large";
+    const by = ["load", "quantity"].find((one) => along.includes(one) && reference.dims.includes(one));
+    const kind = of.fields.quantity_kind, sums = {};
+    let others = false;
+    for (let flat = 0; flat < reference.size; flat++) {
+      const value = reference.valueAt(flat);
+      const at = Object.fromEntries(reference.dims.map((one) => [one, Math.floor(flat / reference.strides[one]) % of.dims[one].size]));
+      const elsewhere = (one) => one in places && !along.includes(one) && of.label(one, at[one]) !== this.label(one, places[one]);
+      if (!Number.isFinite(value) || reference.dims.some(elsewhere)) continue;
+      if (kind && kind.of(at) !== "displacement") others = true;
+      else sums[by ? at[by] : ""] = (sums[by ? at[by] : ""] || 0) + Math.sign(value);
+    }
+    const pairs = Object.entries(sums).map(([place, sum]) => [by ? of.label(by, Number(place)) : "", sum]);
+    const sentence = signSentence(pairs, by === "quantity" ? "of" : "under");
+    if (!others) return sentence;
+    return sentence ? `displacements: ${sentence}; other quantities: positive: too large` : "positive: too large";
   }
 
   label(name, place) {

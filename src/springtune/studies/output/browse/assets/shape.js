@@ -3,18 +3,23 @@
 const SCALES = [0, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 1e4];
 
 class Shape {
-  constructor(over, holder, under, page) {
-    Object.assign(this, { over, holder, under, page });
-    this.chart = new Outline(holder, "shape", 320);
-    this.group = page.groups["/fields"];
+  static NEEDED = ["x", "y", "spring_nodes", "displacement_x", "displacement_y"];
+
+  constructor(over, holder, under, page, group = page.groups["/fields"]) {
+    Object.assign(this, { over, holder, under, page, group });
+    this.chart = new Outline(holder, "network", 320);
+    this.chart.redraw = () => this.data && this.draw(true);
     this.factor = 1;
   }
 
   async show(places) {
     this.stop();
-    this.factor = 1;
     const why = await this.read(places);
-    if (!why) return this.controls() || this.draw(true);
+    return why ? this.say(why) : this.controls() || this.draw(true);
+  }
+
+  say(why) {
+    this.data = null;
     this.over.replaceChildren();
     this.under.replaceChildren();
     this.chart.say(why.words);
@@ -26,8 +31,8 @@ class Shape {
     const root = this.page.groups["/"], group = this.group;
     if (!group) return { words: "This dataset has no displacement fields: the study does not ask for the output 'deformed'." };
     await group.load();
-    const f = group.fields, needed = ["x", "y", "spring_nodes", "displacement_x", "displacement_y"];
-    if (!needed.every((name) => name in f)) return { words: group.left_out.length ? LEFT_OUT : "The group /fields has not the variables that a network is drawn from; its own view shows what there is." };
+    const f = group.fields;
+    if (!Shape.NEEDED.every((name) => name in f)) return { words: group.left_out.length ? LEFT_OUT : "The group /fields has not the variables that a network is drawn from; its own view shows what there is." };
     const at = {};
     for (const name of Object.keys(places))
       if (name in group.dims) at[name] = group.place(name, root.label(name, places[name]));
@@ -47,22 +52,13 @@ class Shape {
           ...places, ...Object.fromEntries(others.map((name) => [name, kept[name]])) }) }),
       };
     }
-    const trimmed = (field, along, where) => {
-      const values = field.along(along, where);
-      let end = values.length;
-      while (end && Number.isNaN(values[end - 1])) end--;
-      return values.slice(0, end);
-    };
-    const dimOf = (field) => field.dims[field.dims.length - 1];
-    const particle = dimOf(f.x), [spring, end] = f.spring_nodes.dims.slice(-2);
-    const x = trimmed(f.x, particle, at), ux = trimmed(f.displacement_x, particle, at);
-    if (!x.length || !ux.length) {
+    if (this.fill(at)) {
       const sizes = "mesh_size" in at ? group.dims.mesh_size.size : 0;
       const other = Array.from({ length: sizes }, (_, i) => i)
         .find((i) => Number.isFinite(f.displacement_x.of({ ...at, mesh_size: i })));
       if (other === undefined) {
         const status = root.fields.status, word = status.meaning(status.of(places));
-        const reason = word === "not_requested" ? "the study does not ask for it" : word === "solved" ? "none were kept" : spoken(word);
+        const reason = word === "not_requested" ? "the study does not ask for it" : ["solved", "beyond_linear"].includes(word) ? "none were kept" : spoken(word);
         return { words: `There are no displacement fields of this cell (${reason}).` };
       }
       const size = labelWithUnit(group.dims.mesh_size, other);
@@ -72,6 +68,23 @@ class Shape {
           ...places, mesh_size: root.place("mesh_size", group.label("mesh_size", other)) }) }),
       };
     }
+    return null;
+  }
+
+  // Take the fields at places of the group; words where there are none.
+  fill(at) {
+    this.stop();
+    this.factor = 1;
+    const trimmed = (field, along, where) => {
+      const values = field.along(along, where);
+      let end = values.length;
+      while (end && Number.isNaN(values[end - 1])) end--;
+      return values.slice(0, end);
+    };
+    const f = this.group.fields, dimOf = (field) => field.dims[field.dims.length - 1];
+    const particle = dimOf(f.x), [spring, end] = f.spring_nodes.dims.slice(-2);
+    const x = trimmed(f.x, particle, at), ux = trimmed(f.displacement_x, particle, at);
+    if (!x.length || !ux.length) return "There are no displacement fields of this network.";
     const own = (field) => Object.fromEntries(field.dims.filter((name) => name in at).map((name) => [name, at[name]]));
     const read = (field, along) => field.along(along, own(field)).slice(0, along === particle ? x.length : undefined);
     const [first, second] = [0, 1].map((one) => trimmed(f.spring_nodes, spring, { ...at, [end]: one }));
@@ -81,6 +94,7 @@ class Shape {
     if (line) {
       data.ox = trimmed(f.outline_x, line, at);
       data.oy = f.outline_y.along(line, at).slice(0, data.ox.length);
+      data.rounds = f.outline_round?.along(line, at);
       const moved = f.reference_displacement_x;
       if (moved) {
         data.oux = moved.along(line, at).slice(0, data.ox.length);
@@ -166,8 +180,9 @@ class Shape {
     const { data, scale, factor } = this, s = scale * factor, mm = 1e3;
     const moved = (p, u, share) => p.map((one, i) => mm * (one + share * (u ? u[i] : 0)));
     const x = moved(data.x, data.ux, s), y = moved(data.y, data.uy, s);
-    const limit = Math.max(...data.carried.values.filter(Number.isFinite).map(Math.abs)) || 1;
-    const closed = (line) => [...line, line[0]];
+    const sizes = data.carried.values.filter(Number.isFinite).map(Math.abs).sort((a, b) => a - b);
+    const limit = sizes[Math.floor(0.97 * (sizes.length - 1))] || sizes.at(-1) || 1; // a few at a corner carry far more
+    const closed = (line) => rounds(line, data.rounds);
     const outlines = [];
     if (data.ox?.length) {
       outlines.push({ x: closed(moved(data.ox, null, 0)), y: closed(moved(data.oy, null, 0)), what: "rest" });
@@ -186,8 +201,8 @@ class Shape {
     });
     if (frame) {
       const bar = element("span", { class: "bar", style: `background: linear-gradient(to right, ${[-1, -0.5, 0, 0.5, 1].map(carriedColour).join(",")})` });
-      this.under.replaceChildren(element("p", { class: "scale" }, element("span", { text: `−${number(limit, 3)} ${unit}` }), bar,
-        element("span", { text: `+${number(limit, 3)} ${unit}` }),
+      this.under.replaceChildren(element("p", { class: "scale" }, element("span", { text: `≤ −${number(limit, 3)} ${unit}` }), bar,
+        element("span", { text: `≥ +${number(limit, 3)} ${unit}` }),
         element("span", { class: "soft", text: `${name}, tension positive · thin line: at rest${data.oux ? " · wide line: the reference" : " · the page has no reference of this load"}` })),
         element("p", { class: "soft small", text: "The load's slider scales the displacements under the whole load: the dataset holds no path to it." }));
     }
@@ -228,6 +243,6 @@ class Outline extends Lines {
       const [x, y] = this.fitted(across, up);
       this.window(x, y);
     }
-    this.axes("x [mm]", "y [mm]");
+    this.axes("x [mm]", "y [mm]", "the deformed network over its reference");
   }
 }

@@ -3,12 +3,12 @@
 const ROW = 28;
 
 class Table {
-  // columns: {name, title, hint, width, numeric, value(row), text(row), labels?, sign?}; rows: numbers of rows.
-  constructor(holder, { columns, rows, label, choose, changed }) {
-    Object.assign(this, { columns, all: rows, choose, changed });
+  // columns: {name, title, hint, width, numeric, value(row), text(row), labels?, pinned?}; rows: numbers of rows.
+  // `extra` makes one more test of rows.
+  constructor(holder, { columns, rows, label, choose, changed, extra }) {
+    Object.assign(this, { columns, all: rows, choose, changed, extra });
     this.sorting = null;
     this.filters = {};
-    this.extra = () => true;
     this.order = rows;
     this.chosen = -1;
     this.body = element("tbody");
@@ -34,7 +34,7 @@ class Table {
     this.headings = this.columns.map((column) => {
       const button = element("button", { type: "button", title: column.hint || "", onclick: () => this.sort(column) },
         column.title, element("span", { class: "arrow", "aria-hidden": "true" }));
-      return element("th", { scope: "col", class: column.numeric ? "number" : "" }, button);
+      return element("th", { scope: "col", class: classes(column) }, button);
     });
     const filters = this.columns.map((column) => {
       const set = (text) => {
@@ -55,7 +55,7 @@ class Table {
         });
       }
       input.dataset.column = column.name;
-      return element("td", {}, input);
+      return element("td", { class: column.pinned ? "pinned" : "" }, input);
     });
     return element("thead", {}, element("tr", {}, this.headings), element("tr", { class: "filters" }, filters));
   }
@@ -72,9 +72,22 @@ class Table {
     this.update();
   }
 
+  reset() {
+    this.filters = {};
+    for (const input of this.table.tHead.querySelectorAll("[data-column]")) input.value = "";
+    this.update();
+  }
+
   update() {
-    const tests = this.columns.map((column) => this.test(column)).filter(Boolean);
-    let rows = this.all.filter((row) => this.extra(row) && tests.every((test) => test(row)));
+    const wrong = [];
+    const tests = this.columns.map((column) => {
+      const test = this.test(column), field = this.table.tHead.querySelector(`[data-column="${column.name}"]`);
+      if (typeof test === "string") wrong.push(`${column.title}: ${test}`);
+      field.toggleAttribute("aria-invalid", typeof test === "string");
+      return test;
+    }).filter((test) => typeof test === "function");
+    const extra = this.extra();
+    let rows = this.all.filter((row) => extra(row) && tests.every((test) => test(row)));
     if (this.sorting) {
       const { column, down } = this.sorting, way = down ? -1 : 1;
       const value = column.sortValue || column.value;
@@ -91,9 +104,10 @@ class Table {
     this.holder.setAttribute("aria-rowcount", rows.length + 2);
     this.seen = "";
     this.draw();
-    this.changed?.(rows.length, this.all.length);
+    this.changed?.(rows.length, this.all.length, wrong, Object.values(this.filters).some((text) => text.trim()));
   }
 
+  // What a row must pass in a column; nothing where its filter is empty, words where it cannot be understood.
   test(column) {
     const asked = (this.filters[column.name] || "").trim();
     if (!asked) return null;
@@ -104,6 +118,9 @@ class Table {
     }
     const plain = asked.replaceAll("−", "-").replaceAll(",", ".").replace(/[%\s]/g, "");
     const range = plain.match(/^(.+?)\.\.(.+)$/), bound = plain.match(/^(<=|>=|<|>|≤|≥)(.+)$/);
+    const numbers = range ? range.slice(1) : [bound ? bound[2] : plain];
+    if (plain !== "–" && !numbers.every((text) => Number.isFinite(Number(text)) || !range && !bound && /^[-+]?[\d.]*(e-?)?$/.test(text)))
+      return `"${asked}" is not a number. Write a number, a range such as −2..2, or a bound such as >5 or <=0.1.`;
     if (range) return (row) => column.value(row) >= Number(range[1]) && column.value(row) <= Number(range[2]);
     if (bound) {
       const limit = Number(bound[2]);
@@ -131,7 +148,7 @@ class Table {
     for (let place = first; place < last; place++) {
       const row = this.order[place], chosen = row === this.chosen;
       const cells = this.columns.map((column, i) => {
-        const cell = element(i ? "td" : "th", { role: "gridcell", class: column.numeric ? "number" : "" });
+        const cell = element(i ? "td" : "th", { role: "gridcell", class: classes(column) });
         if (column.node) cell.append(column.node(row));
         else cell.textContent = column.text(row);
         if (!column.numeric && !column.node) cell.title = cell.textContent;
@@ -145,10 +162,16 @@ class Table {
     if (last < this.order.length) rows.push(gap(this.order.length - last));
     if (!this.order.length)
       rows.push(element("tr", {}, element("td", { colspan: this.columns.length, class: "empty",
-        text: "No cell passes these filters." })));
+        text: this.asked() })));
     this.body.replaceChildren(...rows);
     if (this.places.has(this.chosen)) this.holder.setAttribute("aria-activedescendant", `row-${this.chosen}`);
     else this.holder.removeAttribute("aria-activedescendant");
+  }
+
+  // Why there is no row.
+  asked() {
+    const set = this.columns.map((column) => [column.title, (this.filters[column.name] || "").trim()]).filter(([, text]) => text);
+    return set.length ? `No cell has ${set.map(([title, text]) => `${title}: "${text}"`).join(" and ")}.` : "No cell has a chosen status.";
   }
 
   // Show a row as chosen; `tell` says so to the rest of the page.
@@ -181,4 +204,8 @@ class Table {
     event.preventDefault();
     this.select(Math.max(0, Math.min(last, moves[event.key])), true);
   }
+}
+
+function classes(column) {
+  return [column.numeric && "number", column.pinned && "pinned"].filter(Boolean).join(" ");
 }

@@ -6,18 +6,20 @@ const UNITS = {
 };
 const LEFT_OUT = "This is too large for the page; it is in dataset.nc alone.";
 const SIGNS = {
-  solved: "●", linear_only: "◐", not_converged: "▲", unstable: "○", failed: "✕", not_requested: "–",
+  solved: "●", beyond_linear: "◇", linear_only: "◐", not_converged: "▲", unstable: "○", failed: "✕", not_requested: "–",
 };
+const PHRASES = { beyond_linear: "solved; the linear reference does not apply" };
 
 function unitOf(one) {
   if (one.flags || one.isText) return [1, ""];
   const units = one.units || "1";
-  if (units === "1" && /(^|_)(errors?(?!_rate)|strain|elongation|swing)(_|$)/.test(one.name)) return [100, "%"];
+  if (units === "1" && /(^|_)(errors?(?!_rate)|strain|elongation|swing)(_|$)/.test(one.name) && !/^standard error/.test(one.long_name))
+    return [100, "%"];
   return UNITS[units] || [1, units];
 }
 
 function spoken(name) {
-  return String(name).replaceAll("_", " ");
+  return PHRASES[name] || String(name).replaceAll("_", " ");
 }
 
 function titled(one) {
@@ -48,22 +50,62 @@ function signed(value, digits = 3) {
   return value > 0 ? `+${text}` : text;
 }
 
+// Whether the sign of an error means something: not that of a norm, an estimate, or a number printed without one.
+function isSigned(field) {
+  field.negative ??= /signed|less 1|- 1$|network - reference/.test(field.long_name) || isError(field) && field.unpacked().some((one) => one < 0);
+  return isError(field) && field.negative && !/without sign/.test(field.long_name);
+}
+
+function isError(field) {
+  return /error/.test(field.name) && unitOf(field)[1] === "%" && !/estimate/.test(field.name);
+}
+
+// The same words as springtune.problem.compare: what the sign of an error means.
+function signWord(error, reference, displacement = true) {
+  const beyond = error * reference, words = displacement ? ["too soft", "too stiff"] : ["too large", "too small"];
+  return beyond > 0 ? words[0] : beyond < 0 ? words[1] : "";
+}
+
+// References are pairs of a name, such as that of a load, and a displacement or its sign.
+function signSentence(references, where = "under") {
+  const known = references.filter((one) => one[1]), against = known.filter((one) => one[1] < 0).map((one) => one[0]);
+  if (!known.length) return "";
+  if (!against.length) return "positive: too soft";
+  if (against.length === known.length) return "negative: too soft";
+  const names = [against.slice(0, -1).join(", "), against.at(-1)].filter(Boolean).join(" and ");
+  return `positive: too soft; ${where} ${names}, where displacements are negative, negative is too soft`;
+}
+
 // A value of a field as the page writes it, its unit apart.
 function written(field, value, digits) {
   if (field.isText) return value;
   if (field.flags) return spoken(field.meaning(value));
-  const [scale, unit] = unitOf(field);
-  return unit === "%" && /error/.test(field.name) ? signed(value * scale, digits) : number(value * scale, digits);
+  if (isFile(field, value)) return OF_FILE;
+  const scale = unitOf(field)[0];
+  return isSigned(field) ? signed(value * scale, digits) : number(value * scale, digits);
+}
+
+// A mesh that was read from a file was made with no size.
+const OF_FILE = "as in file";
+function isFile(one, value) {
+  return value === 0 && /(^|_)mesh_size$/.test(one.name);
 }
 
 function labelText(dim, place) {
   const label = dim.labels ? dim.labels[place] : place;
+  if (isFile(dim, label)) return OF_FILE;
   return typeof label === "number" ? number(label * unitOf(dim)[0], 6) : String(label);
 }
 
 function labelWithUnit(dim, place) {
-  const unit = unitOf(dim)[1], plain = typeof (dim.labels ? dim.labels[place] : place) === "number";
-  return labelText(dim, place) + (plain && unit ? ` ${unit}` : "");
+  const unit = unitOf(dim)[1], label = dim.labels ? dim.labels[place] : place;
+  return labelText(dim, place) + (typeof label === "number" && unit && !isFile(dim, label) ? ` ${unit}` : "");
+}
+
+// "18,432 samples", "1 shape", "5 approaches".
+function counted(count, name) {
+  const many = /(s|x|ch)$/.test(name) ? `${name}es` : name.replace(/y$/, "ie") + "s";
+  return `${count.toLocaleString("en")} ${count === 1 || name === "kinematics" ? name : many}`;
 }
 
 // Elements: texts are always set as text, so that what a dataset says is never markup.

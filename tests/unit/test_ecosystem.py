@@ -1,0 +1,110 @@
+"""What others read of the project besides its pages: environments, hosted CI, the notebook, the software paper."""
+
+import json
+import os
+import re
+import tomllib
+from pathlib import Path
+
+import nbformat
+import yaml
+from packaging.requirements import Requirement
+
+REPOSITORY = Path(__file__).parents[2]
+PROJECT = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]
+
+CONDA = {"matplotlib": "matplotlib-base", "snakemake": "snakemake-minimal"}
+"""Packages of other names in conda-forge and bioconda; netgen-mesher is in neither, and comes by pip."""
+
+
+def environment(path):
+    """Packages of a conda environment, and those that pip installs in it."""
+    *packages, pip = yaml.safe_load((REPOSITORY / path).read_text())["dependencies"]
+    return packages, pip["pip"]
+
+
+def test_conda_environments_have_what_the_package_needs():
+    needed = [Requirement(one) for one in PROJECT["dependencies"]]
+    by_pip = [str(one) for one in needed if one.name == "netgen-mesher"]
+    by_conda = [f"{CONDA.get(one.name, one.name)} {one.specifier}" for one in needed if str(one) not in by_pip]
+    packages, pip = environment("workflow/envs/springtune.yaml")
+    assert sorted(packages) == sorted([f"python {PROJECT['requires-python']}", "pip", *by_conda]) and pip == by_pip
+    assert environment("environment.yml") == (packages, [*pip, "--editable ."])
+
+
+def test_hosted_ci_runs_ours_with_pinned_actions():
+    found = yaml.safe_load((REPOSITORY / ".github/workflows/ci.yml").read_text())
+    assert set(found) == {"name", True, "permissions", "jobs"} and found["permissions"] == {
+        "contents": "read"
+    }  # on: True
+    for job in found["jobs"].values():
+        assert {"runs-on", "timeout-minutes", "steps"} <= set(job)
+        assert all(("run" in step) != ("uses" in step) for step in job["steps"])
+        assert job["steps"][-1]["run"] == "bash .ci/run" and os.access(REPOSITORY / ".ci/run", os.X_OK)
+        for used in (step["uses"] for step in job["steps"] if "uses" in step):
+            assert re.fullmatch(r"[\w-]+/[\w-]+@[0-9a-f]{40}", used), f"{used}: pin a commit"
+
+
+def test_the_notebook_has_no_outputs_and_explains_each_step():
+    """tests/workflow/test_quick.py runs it."""
+    notebook = nbformat.read(REPOSITORY / "examples/springtune.ipynb", as_version=4)
+    nbformat.validate(notebook)
+    assert notebook.cells[0].cell_type == "markdown" and "## The page" in notebook.cells[-2].source
+    for cell in notebook.cells:
+        assert cell.cell_type == "markdown" or not (cell.outputs or cell.execution_count)
+
+
+ARTICLE = (REPOSITORY / "article/paper.md").read_text()
+_, HEAD, BODY = ARTICLE.split("---\n", 2)
+TEXT = re.sub(r"<!--.*?-->", "", BODY, flags=re.DOTALL)
+SECTIONS = ["Summary", "Statement of need", "State of the field", "Software design", "Research impact statement",
+            "AI usage disclosure", "Acknowledgements", "References"]  # fmt: skip
+"""What the Journal of Open Source Software asks for, in 750 to 1,750 words."""
+
+
+def test_the_software_paper_has_what_the_journal_asks_for():
+    head = yaml.safe_load(HEAD)
+    assert {"title", "tags", "authors", "affiliations", "bibliography"} <= set(head)
+    assert [one["name"] for one in head["authors"]] == [one["name"] for one in PROJECT["authors"]]
+    assert [name for name in re.findall(r"^# (.*)$", TEXT, re.MULTILINE) if name in SECTIONS] == SECTIONS
+    assert 750 <= len(TEXT.split()) <= 1750
+    # The journal's programs take the first file of that name.
+    assert min(REPOSITORY.glob("*/paper.md")).parent.name == "article"
+
+
+def test_citations_of_the_software_paper_are_the_long_papers():
+    references = yaml.safe_load((REPOSITORY / "workflow/paper/references.yml").read_text())
+    entries = dict(
+        re.findall(r"^@\w+\{([\w-]+),\n(.*?)^\}", (REPOSITORY / "article/paper.bib").read_text(), re.M | re.S)
+    )
+    assert set(entries) == set(re.findall(r"@([a-z][\w-]*)", TEXT))
+    for name, entry in entries.items():
+        field = dict(re.findall(r"^  (\w+) = \{(.*)\},$", entry, re.MULTILINE))
+        known = references[name]
+        plain = (field["title"].strip("{}"), field.get("author", "").split(" and "), field.get("doi"))
+        doi = known.get("serial-number", {}).get("doi")
+        assert plain == (known["title"].strip("{}"), known.get("author", [""]), doi), name
+        assert field.get("year") == (str(known["date"]) if "date" in known else None), name
+
+
+def test_numbers_of_the_software_paper_are_those_of_make_paper():
+    """By their names; where the long paper was made here, they are compared with it."""
+    folder = REPOSITORY / "workflow/paper"
+    declared = yaml.safe_load((folder / "numbers.yaml").read_text())["numbers"]
+    declared |= yaml.safe_load((folder / "printed.yaml").read_text())
+    stated = dict(re.findall(r"(\w+): ([\d.]+)", re.search(r"<!-- Numbers(.*?)-->", BODY, re.DOTALL)[1]))
+    assert set(stated) <= set(declared)
+    assert set(re.findall(r"(?<![\w.-])\d+(?:\.\d+)?(?=e6\b|\b(?!-D))", TEXT)) == set(stated.values())
+    readme = (REPOSITORY / "README.md").read_text()
+    rows = [line for line in TEXT.splitlines() if line.startswith("| `")]
+    assert rows and all(row in readme for row in rows)
+    made = REPOSITORY / "results/paper/paper/numbers.json"
+    if made.exists():
+        found = json.loads(made.read_text())["numbers"]
+        assert stated == {name: found[name]["text"] for name in stated}
+
+
+def test_an_address_of_the_repository_stands_in_both_places():
+    """docs/release.md says where; there is none yet."""
+    citation = yaml.safe_load((REPOSITORY / "CITATION.cff").read_text())
+    assert citation.get("repository-code") == PROJECT.get("urls", {}).get("Source")

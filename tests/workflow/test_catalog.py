@@ -1,0 +1,42 @@
+"""What the Snakemake workflow catalog asks of a workflow, and what its users try first."""
+
+import yaml
+
+SMALL = """\
+title: small
+beams: {short: {length: 60 mm, height: 20 mm}}
+materials: {steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}}
+grids:
+  grid: {beam: short, mesh_type: right, mesh_size: 10 mm, material: steel, load: traction, force: 1 kN,
+         definition: lattice}
+"""
+
+
+def test_deployment_methods_change_nothing(run):
+    """Jobs stay on the packages that keys of results have: no environment is made, and nothing runs again."""
+    run.write("small.yaml", SMALL)
+    mesh = "results/small/done/mesh_0.json"
+    asked = ("--software-deployment-method", "conda", "--dry-run", mesh)
+    code, told = run.snakemake("small.yaml", *asked)
+    assert code == 0 and "jobs run in the environment of Snakemake" in told and "will be created" not in told
+    code, told = run.snakemake("small.yaml", "--nocolor", mesh)
+    assert code == 0 and "environment of Snakemake" not in told
+    code, told = run.snakemake("small.yaml", *asked)
+    assert code == 0 and "Nothing to be done" in told
+
+
+def test_the_linter_has_no_remark_on_the_paper(run, repository):
+    """tests/workflow/test_quick.py has the other rules."""
+    code, told = run.snakemake(repository / "config/quick.yaml", "--lint", "text", "paper")
+    assert (code, told.splitlines()[-1]) == (0, "Congratulations, your workflow is in a good condition!"), told
+
+
+def test_settings_of_the_catalog(repository):
+    usage = yaml.safe_load((repository / ".snakemake-workflow-catalog.yml").read_text())["usage"]
+    assert {"mandatory-flags", "software-stack-deployment", "report"} == set(usage)
+    option, study = usage["mandatory-flags"]["flags"].split()
+    assert option == "--configfile" and (repository / study).is_file()
+    for path in ("config/README.md", "workflow/Snakefile", "workflow/envs/springtune.yaml", "LICENSE"):
+        assert (repository / path).is_file()
+    first = " ".join((repository / "README.md").read_text().split("\n\n")[2].split())
+    assert "Snakemake workflow" in first and "Python library" in first

@@ -1,0 +1,139 @@
+"""Another workflow that uses this one: ``module springtune``, of this machine and of a host."""
+
+import re
+import shutil
+import subprocess
+import zipfile
+
+import pytest
+import snakemake.sourcecache
+
+from conftest import REPOSITORY, Run
+
+from tables import STUDIES
+
+OTHERS = """\
+rule all:
+    input: "told.txt", "results/mine/index.html"
+
+module springtune:
+    snakefile: {snakefile}
+    config: {config}
+{further}
+use rule * from springtune as springtune_*
+
+rule tell:
+    input: "results/mine/dataset.nc"
+    output: "told.txt"
+    shell: "echo told > {{output}}"
+"""
+
+HERE = repr(str(REPOSITORY / "Snakefile"))
+
+MINE = '{"study": "config/mine.yaml"}'
+
+
+@pytest.fixture
+def others(tmp_path, forks):
+    """Writes the workflow of others beside a study, and calls Snakemake on it, as they would."""
+    run = Run(tmp_path / "others", forks)
+    (run.folder / "config").mkdir(parents=True)
+    run.write("config/mine.yaml", STUDIES["elsewhere"].replace("grids:", "outputs: [tables]\ngrids:"))
+
+    def call(*arguments, snakefile=HERE, config=MINE, further="", added="", **environment):
+        run.write("Snakefile", OTHERS.format(snakefile=snakefile, config=config, further=further) + added)
+        return run.forked(["--cores", "2", "--scheduler", "greedy", *arguments], **environment)
+
+    call.folder = run.folder
+    return call
+
+
+def test_it_runs_and_reports_what_another_workflow_asks_for(others):
+    code, told = others()
+    assert code == 0, told
+    assert "2  2 solved" in told and "springtune_present" not in told  # our hooks ran, and our `all` is not its target
+    made = [others.folder / name for name in ("told.txt", "results/mine/index.html", "results/mine/summary.txt")]
+    assert all(path.is_file() for path in made)
+    code, told = others("springtune_all")
+    assert code == 0 and "springtune_present_scenes" in told, told
+    code, told = others("springtune_all", "--report", "report.zip")
+    assert code == 0, told
+    with zipfile.ZipFile(others.folder / "report.zip") as file:
+        page = file.read("report/report.html").decode()
+    assert (REPOSITORY / "workflow/report/tables.rst").read_text().split("\n")[0] in page
+
+
+def test_another_ones_file_of_configuration_may_be_the_study(others):
+    code, told = others("-n", "--configfile", "config/mine.yaml", config="config")
+    assert code == 0 and re.search(r"^springtune_solve +\d", told, re.MULTILINE), told
+
+
+@pytest.mark.parametrize("calls", [False, True], ids=["does not call ours", "calls ours"])
+def test_hooks_of_another_workflow(others, calls):
+    """Its `onstart:` replaces ours; it calls ours then, or is told to."""
+    own = "onstart:\n    print('own hook')\n" + "    springtune.begin()\n" * calls
+    code, told = others("results/mine/done/mesh_0.json", added=own)
+    assert (code == 0) == calls and "own hook" in told, told
+    if not calls:
+        log = (others.folder / "results/mine/logs/mesh_0.log").read_text()
+        assert "`onstart:` of the workflow has to call springtune.onstart()" in log
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        ({"further": "    prefix: 'there'\n"}, "module springtune: results are in results/<study> and take no other"),
+        ({"config": "{'study': 3}"}, "study: 3 is no path; give that of a study's YAML file"),
+        ({"config": "{'study': 'none.yaml'}"}, "none.yaml: cannot be read: No such file or directory"),
+        ({"config": "{}", "arguments": ("--configfile", "other.yaml")}, "as a module springtune takes its study by"),
+    ],
+    ids=["prefix", "type", "missing", "other"],
+)
+def test_what_a_module_cannot_be_given_is_told(others, given, says):
+    (others.folder / "other.yaml").write_text("samples: []\n")
+    code, told = others("-n", *given.pop("arguments", ()), **given)
+    assert code == 1 and says in told and "Traceback" not in told, told
+    assert not (others.folder / "results").exists()
+
+
+@pytest.fixture
+def host(tmp_path):
+    """Environment in which git gets a repository of this workflow where it asks a host for one."""
+    repository = tmp_path / "host/owner/workflow"
+    shutil.copytree(REPOSITORY / "workflow", repository / "workflow")
+    shutil.copy(REPOSITORY / "Snakefile", repository)
+    git = ["git", "-c", "user.name=a", "-c", "user.email=a@b.c"]
+    for command in (["init", "-q", "-b", "main"], ["add", "."], ["commit", "-q", "-m", "a"]):
+        subprocess.run([*git, *command], cwd=repository, check=True)
+    instead = f"url.{tmp_path}/host/.insteadOf"
+    return {
+        "GIT_CONFIG_COUNT": "1", "GIT_CONFIG_KEY_0": instead, "GIT_CONFIG_VALUE_0": "https://github.com/",
+        "XDG_CACHE_HOME": str(tmp_path / "cache"),
+    }  # fmt: skip
+
+
+REMOTE = 'github("owner/workflow", path="Snakefile", branch="main")'
+
+
+HOSTED = pytest.mark.skipif(
+    not hasattr(snakemake.sourcecache, "HostedGitRepo"), reason="this Snakemake asks hosts without git"
+)
+
+
+@HOSTED
+def test_a_workflow_on_a_host_finds_its_files(others, host):
+    """Which Snakemake reads one by one: no folder has them."""
+    code, told = others("-n", snakefile=REMOTE, **host)
+    assert code == 0 and re.search(r"^springtune_solve +\d", told, re.MULTILINE), told
+
+
+@HOSTED
+@pytest.mark.slow
+def test_a_workflow_on_a_host_runs(others, host):
+    code, told = others(snakefile=REMOTE, **host)
+    assert code == 0 and (others.folder / "told.txt").is_file(), told
+    code, told = others("--report", "report.zip", snakefile=REMOTE, **host)
+    assert code == 0 and (others.folder / "report.zip").is_file(), told
+    # The paper, with the files beside it and the studies that it reads.
+    code, told = others("-n", "springtune_paper", snakefile=REMOTE, **host)
+    assert code == 0 and re.search(r"^springtune_definitions_mesh +\d", told, re.MULTILINE), told
