@@ -15,7 +15,6 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
 from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -40,7 +39,7 @@ GROUPS = ("definitions", "loads", "mesh_types", "kinds")
 
 @cache
 def plugins() -> "dict[str, list[EntryPoint]]":
-    """Entry points of other packages by group, sorted by module."""
+    """Entry points of other packages by group, sorted by package."""
     if os.environ.get(PLUGINS_VARIABLE) == "none":
         return dict.fromkeys(GROUPS, [])
     from importlib.metadata import entry_points  # here: it costs more than a light command
@@ -50,19 +49,21 @@ def plugins() -> "dict[str, list[EntryPoint]]":
 
 
 def _package(one: "EntryPoint") -> str:
-    return one.module.partition(".")[0]
+    return one.dist.name if one.dist else one.module
 
 
 @cache
 def plugin_packages() -> set[str]:
-    """Packages that declare something by entry points."""
-    return {_package(one) for group in plugins().values() for one in group}
+    """Top-level modules of the packages that declare something by entry points."""
+    return {one.module.partition(".")[0] for group in plugins().values() for one in group}
 
 
+@cache
 def full_name(module: str) -> str:
     """Name under which Python imports a module: one of the package, or of a package with entry points."""
-    top = module.partition(".")[0]
-    return module if not find_spec(f"springtune.{top}") and top in plugin_packages() else f"springtune.{module}"
+    place = Path(__file__).with_name(module.partition(".")[0])
+    ours = place.is_dir() or place.with_suffix(".py").is_file()
+    return module if not ours and place.name in plugin_packages() else f"springtune.{module}"
 
 
 def imported(name: str) -> Any:
@@ -119,7 +120,7 @@ class Extended(Mapping[str, Entry]):
     """Read-only ordered mapping of the package's entries and of those that other packages declare by entry points.
 
     `adopt` checks an imported object and returns the entry. What it refuses, or what cannot be imported, is left out
-    with a `PluginWarning`. `packages` has the packages of entries of others.
+    with a `PluginWarning`. `packages` has the distributions of entries of other packages.
     """
 
     def __init__(
@@ -164,7 +165,7 @@ class Extended(Mapping[str, Entry]):
         self._discover()
         if isinstance(name, str) and name not in self._entries:
             self._load(name)
-        return name in self._entries
+        return isinstance(name, str) and name in self._entries
 
     def __getitem__(self, name: str) -> Entry:
         if name not in self:

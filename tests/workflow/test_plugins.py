@@ -57,12 +57,14 @@ def test_a_study_uses_all_that_a_package_declares(run):
         assert (root.status == 1).all() and root.deformation_error.notnull().all()
         assert lengths.shortest.item() == pytest.approx(5e-3)
         assert lengths.longest.item() == pytest.approx(2**0.5 * 5e-3)
-        assert json.loads(root.attrs["software"])["springtune_example"] == "1.0"
-    assert (run / "results/even/figures/size_left_steel_lift.png").stat().st_size
+        assert json.loads(root.attrs["software"])["springtune-example"] == "1.0"
+    assert all(
+        (run / f"results/even/figures/{stem}.png").stat().st_size for stem in ("size_left_steel_lift", "lengths")
+    )
 
 
 def test_commands_list_what_packages_declare(run, site):
-    assert "for the example's sake (springtune_example)" in python(run, site, "-m", "springtune", "definitions")
+    assert "for the example's sake (springtune-example)" in python(run, site, "-m", "springtune", "definitions")
     shown = python(run, site, "-m", "springtune", "scenes", "config/even.yaml")
     assert "measured     2  meshes, their shortest and longest spring" in shown
 
@@ -76,9 +78,10 @@ jobs = rerun.jobs(study, plan.plan(study, Path("results/even"), 1))
 print(*[name.partition("_")[0] for name, job in jobs.items() if rerun.fault(job, jobs)])
 """
 
-SPRINGS, SOLVE, METADATA = (
+SPRINGS, SOLVE, FIGURES, METADATA = (
     "springtune_example/springs.py",
     "springtune_example/solve.py",
+    "springtune_example/figures.py",
     "springtune_example-1.0.dist-info/METADATA",
 )
 
@@ -88,11 +91,12 @@ SPRINGS, SOLVE, METADATA = (
     [
         (SPRINGS, "# nothing", "", ""),
         (SOLVE, "lengths.min()", "lengths.min() + 0", "lengths collect"),
+        (FIGURES, "style.line(0)", "style.line(1)", "present"),
         (SPRINGS, "0.8 *", "0.9 *", "mesh solve lengths collect"),
         (SPRINGS, "(BOTTOM, BOTH),", "(BOTTOM, (1,)),", "reference mesh solve lengths collect"),
-        (METADATA, "Version: 1.0", "Version: 1.1", "mesh solve lengths collect"),
+        (METADATA, "Version: 1.0", "Version: 1.1", "mesh solve lengths collect present"),
     ],
-    ids=["nothing", "a stage's code", "a definition", "a load's supports", "the version"],
+    ids=["nothing", "a stage's code", "a figure", "a definition", "a load's supports", "the version"],
 )
 def test_changes_of_a_package_compute_again_what_uses_it(run, site, tmp_path, file, before, after, again):
     changed = shutil.copytree(site, tmp_path / "site", ignore=shutil.ignore_patterns("__pycache__"))

@@ -8,7 +8,7 @@ from pydantic import Field
 from springtune.mesh import MESH_TYPES
 from springtune.studies.config.checks import check_known
 from springtune.studies.config.fields import BeamName, Length, OneOrMore, one_of
-from springtune.studies.config.kind import Kind
+from springtune.studies.config.kind import Kind, Output
 from springtune.studies.config.sections import Section
 from springtune.studies.runs.keys import mesh_type_key
 from springtune.studies.runs.stages import Task, stage
@@ -57,4 +57,13 @@ KIND = Kind(
         "message": (("mesh_type",), "1", "why there are no lengths", ""),
     },
     stages=(stage("lengths", "springtune_example.solve", "Measuring springs", _tasks),),
+    outputs=(
+        Output(
+            "lengths",
+            "the figure of lengths",
+            figures=lambda study: {"lengths": {}},
+            plot="springtune_example.figures:lengths",
+            lack=lambda study: "" if study.parts["lengths"] else "has no lengths to show; add a section 'lengths'",
+        ),
+    ),
 )

@@ -268,8 +268,10 @@ def kinds() -> tuple[Kind, ...]:
 
 
 def further_modules(study: Study) -> list[str]:
-    """Modules that declare the kinds of other packages that a study uses."""
-    return [one.module for one in plugins()["kinds"] if study.parts.get(one.name)]
+    """Modules that declare and collect the kinds of other packages that a study uses."""
+    used = [kind for kind in OTHER_KINDS.values() if study.parts[kind.name]]
+    found = [one.module for one in plugins()["kinds"] if one.name in {kind.name for kind in used}]
+    return found + [kind.place("collect") for kind in used if not kind.variables]
 
 
 @cache

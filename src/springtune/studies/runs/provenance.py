@@ -17,7 +17,7 @@ from springtune.springs import DEFINITIONS
 
 from ..config.kind import OTHER_KINDS, kinds
 from ..config.model import Study
-from .keys import distribution, installed
+from .keys import installed
 from .records import checksum
 from .source import COMMIT_FILE, PACKAGE, clone
 
@@ -87,7 +87,7 @@ def _plugins(study: Study) -> set[str]:
         name for name, part in study.parts.items() if part
     }
     tables: tuple[Extended[Any], ...] = (DEFINITIONS, MESH_TYPES, LOADS, OTHER_KINDS)
-    return {distribution(package) for table in tables for name, package in table.packages.items() if name in used}
+    return {package for table in tables for name, package in table.packages.items() if name in used}
 
 
 def _references(study: Study) -> dict[str, str]:

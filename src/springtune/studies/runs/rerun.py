@@ -102,11 +102,6 @@ def jobs(study: "Study", plan: Plan, chosen: Mapping[str, bool] | None = None) -
 def _collect_digest(study: "Study", plan: Plan) -> str:
     """Digest of a study's dataset: of the study's files, the jobs of its stages and the code."""
     code = [stage_key(name) for name in ("studies.kinds.collect", *modules("kind", "collect"), *further_modules(study))]
-    code += [
-        stage_key(kind.place("collect"))
-        for kind in kinds()
-        if kind.package and not kind.variables and study.parts[kind.name]
-    ]
     code += [stage_key(made.collect) for made in outputs().values() if made.collect and made.name in study.outputs]
     stages = [job.digest for job in plan.jobs.values()]
     return hash_of(study.name, inputs(study, study.path.resolve().parent), stages, code)
