@@ -13,6 +13,7 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+import psutil
 import pytest
 import xarray as xr
 
@@ -127,6 +128,32 @@ def test_texts_that_are_mostly_holes_take_no_room_and_read_the_same(tmp_path):
                 assert {"units", "long_name"} <= set(found[name].attrs), name
     with st.open(tmp_path) as tree:
         assert str(tree.message[{"beam": -1, "mesh_size": -1}].values.ravel()[0]).endswith("\u03bb < 1")
+
+
+def test_a_dataset_with_large_texts_is_closed(tmp_path):
+    """It stayed open, and HDF5 2.2 crashed in a program that opened it again."""
+    dataset.write(
+        tmp_path / "dataset.nc",
+        {"/": ROOT.empty(AXES | {"mesh_size": tuple(1e-3 * (1 + np.arange(80000)))})},
+        {"springtune_version": "0"},
+    )
+    path = str((tmp_path / "dataset.nc").resolve())
+
+    def is_open():
+        return path in {file.path for file in psutil.Process().open_files()}
+
+    with st.open(tmp_path) as tree:
+        assert "values with dtype" in repr(tree.message.variable) and is_open()
+        assert not (tree.message[{"mesh_size": slice(10)}] != "").any()
+    assert not is_open()
+
+
+@pytest.mark.parametrize("order", [("h5py", "netCDF4"), ("netCDF4", "h5py")], ids=" first, ".join)
+def test_two_copies_of_hdf5_share_a_file(tmp_path, order):
+    """Each library brings one. `tests/versions` does the same with the oldest and newest of both."""
+    program = Path(__file__).parents[1] / "versions/two_hdf5.py"
+    done = subprocess.run([sys.executable, program, *order, tmp_path / "two.nc"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
 
 
 def test_texts_of_most_cells_are_stored_as_ever(tmp_path):

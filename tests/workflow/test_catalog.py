@@ -1,5 +1,9 @@
 """What the Snakemake workflow catalog asks of a workflow, and what its users try first."""
 
+import shutil
+import subprocess
+import sys
+
 import yaml
 
 SMALL = """\
@@ -29,6 +33,23 @@ def test_the_linter_has_no_remark_on_the_paper(run, repository):
     """tests/workflow/test_quick.py has the other rules."""
     code, told = run.snakemake(repository / "config/quick.yaml", "--lint", "text", "paper")
     assert (code, told.splitlines()[-1]) == (0, "Congratulations, your workflow is in a good condition!"), told
+
+
+def test_the_small_study_of_the_catalog_runs_by_its_snakefile(repository, tmp_path):
+    """Called as there is, and as a module, as snakedeploy writes it."""
+    shutil.copytree(repository / ".test", tmp_path / "deployed")
+    beside = tmp_path / "deployed/Snakefile"
+    beside.write_text(f"""configfile: "config/config.yaml"
+module springtune:
+    snakefile: {str(repository / "workflow/Snakefile")!r}
+    config: config
+use rule * from springtune
+""")
+    for snakefile in (repository / "workflow/Snakefile", beside):
+        command = [sys.executable, "-m", "snakemake", "--snakefile", snakefile, "--dry-run"]
+        done = subprocess.run(command, cwd=tmp_path / "deployed", capture_output=True, text=True)
+        assert done.returncode == 0 and "results/config is complete" in done.stdout, done.stderr
+    assert (repository / ".test/config/config.yaml").samefile(repository / "config/quick.yaml")
 
 
 def test_settings_of_the_catalog(repository):

@@ -168,7 +168,12 @@ def _terms(cells: np.ndarray, columns: Mapping[str, np.ndarray]) -> Iterable[Ter
         if found and len(found) < len(names):
             raise ValueError(f"{kind} terms without {', '.join(sorted(set(names) - set(found)))}")
         if found:
-            yield Terms(kind, cells, {name: np.ascontiguousarray(values, float) for name, values in found.items()})
+            yield _terms_of(kind, cells, found)
+
+
+def _terms_of(kind: str, cells: np.ndarray, values: Mapping[str, Any]) -> Terms:
+    """Terms of all values of a kind."""
+    return Terms(kind, cells, {name: np.ascontiguousarray(values[name], float) for name in VALUES[kind]})
 
 
 def _by_corners(energies: Iterable[Terms]) -> dict[int, dict[str, np.ndarray]]:
@@ -330,14 +335,7 @@ def _read_json(path: Path) -> Read:
         for name, one in ARRAYS.items()
         if found[name] is not None
     }
-    energies = tuple(
-        Terms(
-            one["kind"],
-            arrays[one["cells"]],
-            {name: np.array(one["values"][name], dtype=float) for name in VALUES[one["kind"]]},
-        )
-        for one in found["energies"]
-    )
+    energies = [_terms_of(one["kind"], arrays[one["cells"]], one["values"]) for one in found["energies"]]
     return arrays, energies, found["header"]
 
 
@@ -457,14 +455,7 @@ def _read_h5(path: Path) -> Read:
     with h5py.File(path) as file:
         arrays = {name: file[name][()] for name in ARRAYS if name in file}
         groups = [file["energies"][str(number)] for number in range(len(file.get("energies", ())))]
-        energies = tuple(
-            Terms(
-                group.attrs["kind"],
-                arrays[group.attrs["cells"][1:]],
-                {name: group[name][()] for name in VALUES[group.attrs["kind"]]},
-            )
-            for group in groups
-        )
+        energies = [_terms_of(one.attrs["kind"], arrays[one.attrs["cells"][1:]], one) for one in groups]
         return arrays, energies, _header_in(file["header"])
 
 

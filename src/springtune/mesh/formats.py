@@ -207,15 +207,12 @@ def file_content(path: str | Path) -> Any:
             warnings.simplefilter("ignore")
             with bounded(memory, READ_SECONDS + READ_SECONDS_SHARE * size):
                 return package.read(path)
-    except MemoryError as error:
-        if _is_the_machines(error, memory):
-            raise
-        raise MeshError(
-            f"{path}: is damaged: it states more points or cells than its {size / 1e3:.3g} kB can hold; write it again"
-        ) from None
     except (Exception, SystemExit) as error:
         if _is_the_machines(error, memory):
             raise
+        if isinstance(error, MemoryError):
+            stated = f"it states more points or cells than its {size / 1e3:.3g} kB can hold"
+            raise MeshError(f"{path}: is damaged: {stated}; write it again") from None
         said = " ".join(told.getvalue().split() if isinstance(error, SystemExit) else str(error).split())
         said = said.partition("Error: Couldn't read")[0].removeprefix("ReadError:").strip()
         if not isinstance(error, SystemExit):

@@ -321,18 +321,21 @@ class _Texts(BackendArray):
 def opened(path: Path, most: float, texts: Collection[str] = ()) -> xr.DataTree:
     """Open a file, and leave the arrays `texts` in it: xarray reads all texts, at the width of the longest."""
     with _small_cache():
-        tree = xr.open_datatree(path, engine="netcdf4", drop_variables=[*texts])
+        source = xr.open_datatree(path, engine="netcdf4", drop_variables=[*texts])
     if not texts:
-        return tree
+        return source
+    groups = {}
     with h5netcdf.File(path) as file:
-        for node in tree.subtree:
-            variables = (file if node is tree else file[node.path]).variables
+        for node in source.subtree:
+            variables = (file if node is source else file[node.path]).variables
             data = node.to_dataset(inherit=False)
             for name in set(texts) & set(variables):
                 array = _Texts(path, f"{node.path}/{name}", variables[name].shape, most)
                 lazy = indexing.LazilyIndexedArray(array)
                 data[name] = xr.Variable(variables[name].dimensions, lazy, dict(variables[name].attrs))
-            node.dataset = data[[name for name in variables if name in data.data_vars]]
+            groups[node.path] = data[[name for name in variables if name in data.data_vars]]
+    tree = xr.DataTree.from_dict(groups)
+    tree.set_close(source.close)
     return tree
 
 

@@ -84,9 +84,7 @@ SAVED_AS: dict[str, dict[str, Any]] = {
 def line(number: int) -> dict[str, Any]:
     """Colour, dashes and marker of the line of that number; beyond the last, colours come back with other markers."""
     turn, colour = divmod(number, len(LINES))
-    return {"color": LINES[colour]["color"]} | {
-        key: LINES[(colour + 2 * turn) % len(LINES)][key] for key in ("linestyle", "marker")
-    }
+    return LINES[(colour + 2 * turn) % len(LINES)] | {"color": LINES[colour]["color"]}
 
 
 def plain(panel: Axes, *axes: Literal["x", "y"]) -> None:
