@@ -13,7 +13,15 @@ from click.core import ParameterSource
 
 from ..problem.status import Status
 from ..safe_io.escapes import shown
-from ..studies.output.text import aligned, bytes_text, from_json, paragraphs, place_text, without_numbers
+from ..studies.output.text import (
+    aligned,
+    bytes_text,
+    from_json,
+    how_to_install,
+    paragraphs,
+    place_text,
+    without_numbers,
+)
 from . import examples
 from .options import idle, studies
 
@@ -402,8 +410,6 @@ def archive(
     try:
         import rocrate  # noqa: F401
     except ImportError:
-        from ..studies.output.text import how_to_install
-
         raise click.ClickException(f"the library rocrate is missing; {how_to_install('archive')}") from None
     from ..studies.archive.contents import stored_size
     from ..studies.archive.crate import write

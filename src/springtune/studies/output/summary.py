@@ -117,7 +117,7 @@ def _named(cells: Cells) -> Iterator[str]:
 
 def _worst(root: "xr.Dataset", finite: "xr.Dataset | None" = None) -> Iterator[str]:
     """Largest error of each definition over solved scenes with a valid reference."""
-    errors = judged(root, finite)
+    errors, at_finite_strain = judged(root, finite), None if finite is None else of_own_law(finite)
     places = np.argwhere(np.isfinite(errors.values))
     values, axis = errors.values[tuple(places.T)], errors.dims.index("definition")
     found = []
@@ -129,10 +129,11 @@ def _worst(root: "xr.Dataset", finite: "xr.Dataset | None" = None) -> Iterator[s
         found.append((float(values[worst]), str(root.definition.values[number]), where))
     found.sort(key=lambda row: -abs(row[0]))
     if found:
-        scenes = "the one scene that has one" if len(places) == 1 else f"the {len(places)} scenes that have one"
+        number = len(places)
+        scenes = "the one scene that has one" if number == 1 else f"the {number} scenes that have one"
         head = "worst deformation error, (network - reference) / |reference|, of each definition"
         yield from ("", f"{head}, of {scenes}; tension is positive")
-        if finite is not None and of_own_law(finite) is not None:
+        if at_finite_strain is not None:
             yield "  nonlinear networks against finite strain, linear ones against small strain"
         yield aligned([[name, f"{100 * error:+.2f} %", where] for error, name, where in found[:WORST]], 2, right=(1,))
     if len(found) > WORST:
