@@ -34,6 +34,15 @@ class TestSixLines:
         assert result.error == pytest.approx(result.displacement / result.reference().displacement - 1)
         assert abs(result.error) < 5e-3 and scene.objection == ""
 
+    def test_the_sign_of_an_error_has_its_word(self):
+        soft = {"definition": "paper", "stiffness": "120e6 N/m", "kinematics": "linear"}
+        pulled, pressed = scene(load="traction", **soft).solve(), scene(load="compression", **soft).solve()
+        assert pulled.error == pytest.approx(-pressed.error) and pulled.error > 0.01
+        assert pulled.sign_word == pressed.sign_word == "too soft"
+        assert scene(load="compression", **soft | {"stiffness": "250e6 N/m"}).solve().sign_words == {
+            "displacement": "too stiff"
+        }
+
     def test_texts_and_numbers_are_one(self):
         assert st.Beam("200 mm", "4 cm", "1 mm") == st.Beam(0.2, 0.04) and st.Beam(0.2, 0.04).name == "200x40"
         assert st.Material("210 GPa", 0.3, "7850 kg/m^3") == st.Material(210e9, 0.3, 7850)

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 from .. import __version__
+from ..problem.compare import sign_sentence, sign_word
 
 if TYPE_CHECKING:
     from ..prediction.choices import Choice, Number, References, ShapeReferences
@@ -15,8 +16,7 @@ if TYPE_CHECKING:
     from ..problem.materials import Material
     from ..scene.statements import ShapeStatement
 
-BEAM_ERRORS = "Errors are of the displacement of the loaded side"
-SHAPE_ERRORS = "Errors are (network - reference) / |reference| of each quantity"
+MEANT = "Errors are (network - reference) / |reference| of"
 
 
 @dataclass(frozen=True)
@@ -24,16 +24,19 @@ class Subject:
     """A beam under loads, or a shape under a load case, as a prediction names it.
 
     `name` and `made_of` (material, thickness) are texts, `about` is the same as JSON. `known` are references by load,
-    of a shape by quantity; `meaning` says what an error is of. `dense`: all materials have a density, so that there are
-    largest time steps. Only shapes have a `load`, only beams rows of a table of `references`.
+    of a shape by quantity, `compared` their values and kinds; `meaning` says what an error is of, `sign` what its sign
+    means. `dense`: all materials have a density, so that there are largest time steps. Only shapes have a `load`, only
+    beams rows of a table of `references`.
     """
 
     name: str
     made_of: str
     about: dict[str, Any]
     known: "References | ShapeReferences"
+    compared: dict[str, tuple[float, str]]
     load: str
     meaning: str
+    sign: str
     dense: bool
     references: list[list[str]]
 
@@ -43,9 +46,16 @@ class Subject:
         estimates = [found.error_estimate for found in self.known.values() if not isinstance(found, str)]
         return f"{100 * max(estimates, default=0):.1g} %"
 
+    @property
+    def signs(self) -> list[str]:
+        """Line that says what the sign of an error means; none where no displacement has a reference."""
+        return [f"{self.sign[0].upper()}{self.sign[1:]}."] if self.sign else []
+
 
 def beam_subject(beam: "Beam", material: "Material", known: "References") -> Subject:
     """Beam of a prediction."""
+    from ..problem.loads import LOADS
+
     young = material.young_modulus
     modulus = f"{young / 1e9:g} GPa" if young >= 1e9 else f"{young / 1e6:g} MPa"
     made_of = f"{material.name}, E = {modulus}, nu = {material.poisson_ratio:g}, t = {1e3 * beam.thickness:g} mm"
@@ -56,14 +66,20 @@ def beam_subject(beam: "Beam", material: "Material", known: "References") -> Sub
         for load, found in known.items()
     }
     about = {"beam": asdict(beam), "material": asdict(material), "loads": list(known), "references": references}
-    meaning = f"{BEAM_ERRORS}, {_signs(list(known))}"
-    return Subject(beam.label, made_of, about, known, "", meaning, material.density is not None, [])
+    signs = {load: LOADS[load].sign for load in known}
+    meaning = f"{MEANT} the displacement of the loaded side"
+    compared = {load: (sign, "displacement") for load, sign in signs.items()}
+    sign, dense = sign_sentence(signs), material.density is not None
+    return Subject(beam.label, made_of, about, known, compared, "", meaning, sign, dense, [])
 
 
 def shape_subject(statement: "ShapeStatement", known: "ShapeReferences") -> Subject:
     """Shape of a prediction."""
     units = {"displacement": "m", "reaction": "N", "stress": "Pa", "area": "m2", "energy": "J"}
-    unit = {one.name: units[one.kind] for one in statement.case.quantities}
+    kind = {one.name: one.kind for one in statement.case.quantities}
+    compared = {name: (found.value, kind[name]) for name, found in known.items() if not isinstance(found, str)}
+    moved = {name: value for name, (value, of) in compared.items() if of == "displacement"}
+    sign = f"{'' if len(moved) == len(compared) else 'of displacements '}{sign_sentence(moved, 'of')}" if moved else ""
     about = {
         "shape": statement.shape.name,
         "load": statement.load,
@@ -74,7 +90,7 @@ def shape_subject(statement: "ShapeStatement", known: "ShapeReferences") -> Subj
         },
     }
     references = [
-        [name, f"{found.value:.6g} {unit[name]}", f"{100 * found.error_estimate:.1g} %"]
+        [name, f"{found.value:.6g} {units[kind[name]]}", f"{100 * found.error_estimate:.1g} %"]
         for name, found in known.items()
         if not isinstance(found, str)
     ]
@@ -83,8 +99,10 @@ def shape_subject(statement: "ShapeStatement", known: "ShapeReferences") -> Subj
         f"{statement.named_materials}, t = {1e3 * statement.thickness:g} mm",
         about,
         known,
+        compared,
         statement.load,
-        SHAPE_ERRORS,
+        f"{MEANT} each quantity",
+        sign,
         all(one.density is not None for one in statement.materials),
         references,
     )
@@ -126,11 +144,13 @@ def prediction_text(
         f"{subject.name}, {mesh_name}: {counts}; {subject.made_of}",
         "",
         f"recommended: {first}; with springs alone: {plain}",
+        *_at_worst(subject, choices, (first, plain)),
         "",
         aligned(rows, left=2, right=range(3, 3 + len(columns) + 2 * of_beam)),
         "",
         f"{subject.meaning}{': ' if of_beam else ', '}{how},",
         f"{KINEMATICS_TEXT} (error estimate {subject.estimate})." if of_beam else f"{KINEMATICS_TEXT}.",
+        *subject.signs,
         f"{ranked} E, its error, and nu are of a patch test between rollers." if of_beam else ranked,
     ]
     if subject.references:
@@ -187,6 +207,7 @@ def search_text(subject: Subject, search: "MeshSearch", springs_alone: bool = Fa
         "Meshes are ranked by their particles.",
         f"{subject.meaning}, solved on each mesh,",
         f"{KINEMATICS_TEXT} (error estimate {subject.estimate}).",
+        *subject.signs,
         "Static solve: of one load with its network assembled and factorized, measured here once.",
     ]
     lines += ["Largest step: of undamped explicit integrators, about rest, held nowhere."] if steps else []
@@ -251,19 +272,22 @@ def size_text(size: float) -> str:
 KINEMATICS_TEXT = "with linear kinematics (small strain), against the converged reference of small strain"
 """Kinematics and reference of the errors."""
 
-ABOVE = "above zero where too soft"
-"""Meaning of the sign of an error for positive displacements."""
 
-
-def _signs(loads: Sequence[str]) -> str:
-    """Meaning of the sign of (network - reference) / |reference|."""
-    from ..problem.loads import LOADS
-
-    against = [load for load in loads if LOADS[load].sign < 0]
-    along = [load for load in loads if load not in against]
-    if not against:
-        return ABOVE
-    return f"{ABOVE}, but under {_listed(against)} below" if along else "below zero where too soft"
+def _at_worst(subject: Subject, choices: "Sequence[Choice]", names: Sequence[str]) -> list[str]:
+    """Line with the largest error of each recommended definition, its part and what its sign means."""
+    texts = []
+    for choice in choices:
+        if choice.definition in names:
+            errors = [
+                (error, name)
+                for name, value in choice.errors.items()
+                for error in (value if isinstance(value, tuple) else (value,))
+                if error == error
+            ]
+            worst, name = max(errors, key=lambda one: abs(one[0]))
+            word = sign_word(worst, *subject.compared[name])
+            texts.append(f"{choice.definition} {_percent(worst)} ({name}{word and ', '}{word})")
+    return [f"at worst: {', '.join(texts)}"] if texts else []
 
 
 def _listed(words: Sequence[str]) -> str:

@@ -17,9 +17,15 @@ from ..studies.output.text import (
     aligned,
     bytes_text,
     from_json,
+<<<<<<< HEAD
     how_to_install,
     paragraphs,
     place_text,
+=======
+    paragraphs,
+    place_text,
+    sign_text,
+>>>>>>> main
     without_numbers,
 )
 from . import examples
@@ -119,7 +125,7 @@ def _errors(tree: "xr.DataTree") -> list[str]:
     error = root.deformation_error.where(counted).transpose(*root.deformation_error.dims)
     by = [name for name in ("definition", "kinematics") if name in error.dims]
     named = [name for name in by if name == "definition" or error.sizes[name] > 1]
-    rows: list[list[object]] = [["  definition", *named[1:], "cells", "median", "worst", "at"]]
+    rows: list[list[object]] = [["  definition", *named[1:], "cells", "median", "worst", "", "at"]]
     for labels in product(*(error[name].values for name in by)):
         here = error.sel(dict(zip(by, labels)))
         sizes = np.abs(here.values[np.isfinite(here.values)])
@@ -127,7 +133,8 @@ def _errors(tree: "xr.DataTree") -> list[str]:
             worst = np.unravel_index(np.nanargmax(np.abs(here.values)), here.shape)
             numbers = [len(sizes), f"{100 * np.median(sizes):.3g} %", f"{100 * here.values[worst]:+.3g} %"]
             place = place_text(root, here.dims, map(int, worst))
-            rows.append([f"  {labels[0]}", *labels[1 : len(named)], *numbers, place])
+            word = sign_text(root, float(here.values[worst]), here.dims, worst)
+            rows.append([f"  {labels[0]}", *labels[1 : len(named)], *numbers, word, place])
     head = "errors, (network - reference) / |reference|, of scenes that are solved and within their reference's reach"
     return [head, *aligned(rows, 0, range(len(named), len(named) + 3)).splitlines()] if rows[1:] else []
 
@@ -147,9 +154,7 @@ def _provenance(tree: "xr.DataTree") -> list[str]:
     attributes = {str(name): str(value) for name, value in tree.attrs.items()}
     lines = ["made with", f"  springtune {attributes.get('springtune_version', 'unknown')}"]
     if attributes.get("git_commit"):
-        changed = attributes.get("git_diff", "").count("\ndiff --git ") + attributes.get("git_diff", "").startswith(
-            "diff"
-        )
+        changed = f"\n{attributes.get('git_diff', '')}".count("\ndiff --git ")
         files = f", {changed} changed files in git_diff" if changed else ""
         lines.append(f"  commit {attributes['git_commit']}{files}")
     if attributes.get("study_commit"):

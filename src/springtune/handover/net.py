@@ -27,6 +27,7 @@ from ..mechanics.energies import AngleEnergy, AreaEnergy, BiquadraticEnergy, Ene
 from ..mechanics.integrators import IMPLICIT, INTEGRATORS
 from ..mesh import Mesh, corner_angles, signed_areas
 from ..mesh.cells import rows_of
+from ..problem.compare import sign_sentence
 from ..problem.geometry import Beam
 from ..problem.loads import LOADS
 from ..problem.materials import AnyMaterial, Material
@@ -57,8 +58,8 @@ UNITS = {
 """Units of what a net holds; those of terms stand with them."""
 
 MEANING = (
-    "(network - reference) / |reference| of the displacement along the force, tension positive: above zero where the "
-    "springs are too soft, under compression and pressure below; linear kinematics, small strain"
+    "(network - reference) / |reference| of the displacement along the axis of the force; "
+    f"{sign_sentence({name: load.sign for name, load in LOADS.items()})}; linear kinematics, small strain"
 )
 """Meaning of an expected error."""
 

@@ -102,9 +102,9 @@ class Choice:
         Whether it needs more than springs.
     errors : dict of str to float
         Deformation error by load, of a shape by quantity, linear kinematics against the reference of small strain,
-        (network - reference) / abs(reference) [1]: above zero where the network is too soft, but below under
-        compression and pressure, whose displacements are negative. NaN without a reference, for
-        the reason in `failures`, and of a quantity that is negligible beside others of its kind.
+        (network - reference) / abs(reference) [1]: positive means too soft; where displacements are negative, as under
+        compression and pressure, negative does. NaN without a reference, for the reason in `failures`, and of a
+        quantity that is negligible beside others of its kind.
     young_modulus_error : float
         Young's modulus along x between rollers over the material's, less one [1].
     poisson_ratio : float

@@ -15,7 +15,7 @@ from ..mechanics.newton import Equilibrium
 from ..mechanics.statics import SingularError, StaticProblem
 from ..mesh import Mesh
 from ..mesh.groups import GroupedMesh
-from ..problem.compare import quantity_errors
+from ..problem.compare import quantity_errors, sign_word
 from ..problem.geometry import AssumptionWarning, Beam
 from ..problem.loads import KINEMATICS
 from ..problem.materials import AnyMaterial
@@ -695,6 +695,33 @@ class Result:
         True
         """
         return quantity_errors(self.values, self.scene.reference_values())
+
+    @property
+    def sign_word(self) -> str:
+        """What the sign of `error` means: ``"too soft"`` or ``"too stiff"``; empty without an error.
+
+        Of a quantity other than a displacement ``"too large"`` or ``"too small"``.
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> beam, steel = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3)
+        >>> mesh = st.make_mesh(beam, "structured", "5 mm")
+        >>> result = st.Scene(beam, mesh, steel, "compression", "40 kN", definition="lattice").solve()
+        >>> f"{100 * result.error:+.2f} %, {result.sign_word}", result.sign_words
+        ('-3.59 %, too soft', {'displacement': 'too soft'})
+        """
+        return next(iter(self.sign_words.values()))
+
+    @property
+    def sign_words(self) -> dict[str, str]:
+        """As `sign_word`, of each quantity of interest by name."""
+        of_beam, known = isinstance(self.scene.statement, BeamStatement), self.scene.reference_values()
+        kinds = {} if of_beam else {one.name: one.kind for one in self.scene.case.quantities}
+        return {
+            name: sign_word(error, known.get(name, np.nan), kinds.get(name, "displacement"))
+            for name, error in self.errors.items()
+        }
 
     def write(self, path: str | Path, steps: int = 10) -> list[Path]:
         """Write the deformed network as VTU, for ParaView and others.
