@@ -17,15 +17,9 @@ from ..studies.output.text import (
     aligned,
     bytes_text,
     from_json,
-<<<<<<< HEAD
-    how_to_install,
-    paragraphs,
-    place_text,
-=======
     paragraphs,
     place_text,
     sign_text,
->>>>>>> main
     without_numbers,
 )
 from . import examples
@@ -415,6 +409,8 @@ def archive(
     try:
         import rocrate  # noqa: F401
     except ImportError:
+        from ..studies.output.text import how_to_install
+
         raise click.ClickException(f"the library rocrate is missing; {how_to_install('archive')}") from None
     from ..studies.archive.contents import stored_size
     from ..studies.archive.crate import write
