@@ -342,7 +342,7 @@ GRID_PARAMETERS = (
 class ExcludeConfig(Section):
     """Combinations that a grid leaves out: those with one of the given values of every given parameter."""
 
-    beam: Annotated[list[BeamName], OneOrMore()] | None = Field(None, description="Beams that grids and sections name.")
+    beam: Annotated[list[BeamName], OneOrMore()] | None = Field(None, description="Beams.")
     mesh_type: Annotated[list[MeshType], OneOrMore()] | None = Field(None, description="Mesh types.")
     mesh_size: Lengths | None = Field(None, description="Lengths of an edge.")
     material: Annotated[list[MaterialName], OneOrMore()] | None = Field(None, description="Materials.")
@@ -488,7 +488,9 @@ class StudyConfig(Section):
     """A study."""
 
     title: Text = Field(description="Title of the study, one line.")
-    beams: Annotated[dict[str, BeamConfig], Named("beam")] = Field({}, description="Beams.")
+    beams: Annotated[dict[str, BeamConfig], Named("beam")] = Field(
+        {}, description="Beams that grids and sections name."
+    )
     materials: Annotated[dict[str, MaterialConfig], Named("material")] = Field(
         {}, description="Materials that grids and sections name."
     )
