@@ -58,16 +58,18 @@ UNITS = {
 }
 """Units of what a net holds; those of terms stand with them."""
 
-MEANING = (
-    "(network - reference) / |reference| of the displacement along the axis of the force; "
-    f"{sign_sentence({name: load.sign for name, load in LOADS.items()})}; linear kinematics, small strain"
-)
-"""Meaning of an expected error."""
-
 MEANING_ON_SHAPES = (
     "(network - reference) / |reference| of each quantity that the load case asks for; linear kinematics, small strain"
 )
 """Meaning of an expected error on a shape."""
+
+
+def meaning() -> str:
+    """Meaning of an expected error, for all loads."""
+    signs = sign_sentence({name: load.sign for name, load in LOADS.items()})
+    of = "(network - reference) / |reference| of the displacement along the axis of the force"
+    return f"{of}; {signs}; linear kinematics, small strain"
+
 
 CONSTANTS_SAID = ("name", "young_modulus", "poisson_ratio", "density")
 """Constants of a material in a header."""
@@ -418,7 +420,7 @@ def _parts(
         },
         "load": None,
         "expected_error": f"{NOT_COMPUTED}: not asked for",
-        "expected_error_means": MEANING,
+        "expected_error_means": meaning(),
         "largest_stable_step": _stable_steps(sheet, springs, materials, inertia, held),
         "largest_stable_step_means": STEP_MEANING,
         "units": UNITS

@@ -132,7 +132,7 @@ def _errors(tree: xr.DataTree) -> list[str]:
         here = error.sel(dict(zip(by, labels)))
         sizes = np.abs(here.values[np.isfinite(here.values)])
         if len(sizes):
-            worst = [int(place) for place in np.unravel_index(np.nanargmax(np.abs(here.values)), here.shape)]
+            worst = tuple(map(int, np.unravel_index(np.nanargmax(np.abs(here.values)), here.shape)))
             numbers = [len(sizes), f"{100 * np.median(sizes):.3g} %", f"{100 * here.values[worst]:+.3g} %"]
             place = place_text(root, here.dims, worst)
             word = sign_text(root, float(here.values[worst]), here.dims, worst)
