@@ -13,15 +13,7 @@ from click.core import ParameterSource
 
 from ..problem.status import Status
 from ..safe_io.escapes import shown
-from ..studies.output.text import (
-    aligned,
-    bytes_text,
-    from_json,
-    how_to_install,
-    paragraphs,
-    place_text,
-    without_numbers,
-)
+from ..studies.output.text import aligned, bytes_text, from_json, paragraphs, place_text, without_numbers
 from . import examples
 from .options import idle, studies
 
@@ -147,9 +139,7 @@ def _provenance(tree: "xr.DataTree") -> list[str]:
     attributes = {str(name): str(value) for name, value in tree.attrs.items()}
     lines = ["made with", f"  springtune {attributes.get('springtune_version', 'unknown')}"]
     if attributes.get("git_commit"):
-        changed = attributes.get("git_diff", "").count("\ndiff --git ") + attributes.get("git_diff", "").startswith(
-            "diff"
-        )
+        changed = f"\n{attributes.get('git_diff', '')}".count("\ndiff --git ")
         files = f", {changed} changed files in git_diff" if changed else ""
         lines.append(f"  commit {attributes['git_commit']}{files}")
     if attributes.get("study_commit"):
@@ -410,6 +400,8 @@ def archive(
     try:
         import rocrate  # noqa: F401
     except ImportError:
+        from ..studies.output.text import how_to_install
+
         raise click.ClickException(f"the library rocrate is missing; {how_to_install('archive')}") from None
     from ..studies.archive.contents import stored_size
     from ..studies.archive.crate import write

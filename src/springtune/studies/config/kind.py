@@ -153,7 +153,8 @@ class Kind:
     study_fields, grid_fields : dict of str to tuple
         Keys that it adds to a study and to grids, with type and pydantic field.
     alone : dict of str to tuple
-        Those of its keys that a study may have instead of grids, and the keys that each needs.
+        Keys that a study may have instead of grids, and what each needs; by default its optional keys, which need beams
+        and materials.
     files : callable, optional
         From its part of a study to further input files.
     check : callable, optional

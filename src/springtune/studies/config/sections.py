@@ -181,8 +181,9 @@ class MaterialConfig(Section):
     stiffness: StiffnessConfig | None = Field(None, description="Elastic constants in plane stress.")
     uniaxial_test: FileName | None = Field(
         None,
-        description="CSV file of a uniaxial test of rubber, relative to the study's folder: stretch and nominal stress "
-        "under a head such as `stretch,nominal stress [MPa]`. Definition `yeoh` uses the fitted law.",
+        description="CSV file of a uniaxial test of rubber, relative to the study's folder: stretch or strain and "
+        "nominal stress under a head such as `stretch,nominal stress [MPa]` or `strain [%],nominal stress [MPa]`. "
+        "Definition `yeoh` uses the fitted law.",
     )
     terms: Terms | None = Field(
         None, description="Number of terms of the fitted law; 3 by default, 1 is the neo-Hookean law."
@@ -574,7 +575,10 @@ def study_model(kinds: Sequence[Kind], given: Container[object] | None = None) -
             "Figures of scenes show nonlinear kinematics if a grid has them, otherwise linear ones.",
         ),
     )
-    alone = {name: needed for kind in kinds for name, needed in kind.alone.items()}
+    alone: dict[str, tuple[str, ...]] = {}
+    for kind in kinds:
+        optional_keys = (name for name, (_, field) in kind.study_fields.items() if field.default is None)
+        alone |= kind.alone or dict.fromkeys(optional_keys, GRIDS_NEED)
     own = ", ".join(f"`{name}`" for name in alone)
     study_fields["grids"] = (
         Annotated[dict[str, grid], Named("grid", for_files=False)],

@@ -43,10 +43,7 @@ LIBRARY = ("bokeh", "bokeh-api")
 
 def views() -> dict[str, View]:
     """Views that the study kinds declare."""
-    found: dict[str, View] = {}
-    for name in modules("outputs"):
-        found |= {view.group: view for view in getattr(imported(name), "VIEWS", ())}
-    return found
+    return {view.group: view for name in modules("outputs") for view in getattr(imported(name), "VIEWS", ())}
 
 
 def page(dataset: str | os.PathLike[str], files: Iterable[str] = ()) -> str:
