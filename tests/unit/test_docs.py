@@ -22,7 +22,7 @@ from springtune.studies.kinds import load_study
 
 from campaigns import Campaign
 from pages import blocks as blocks_of
-from pages import check_command, follow, typed
+from pages import check_command, claims, follow, typed
 from synthetic import dataset
 
 REPOSITORY = Path(__file__).parents[2]
@@ -64,6 +64,18 @@ def test_relative_links_lead_somewhere(page):
         assert target.exists(), f"{page.name}: {link}"
         if anchor:
             assert anchor in anchors(target), f"{page.name}: {link}"
+
+
+def test_the_study_of_the_readme_asks_for_what_its_table_claims():
+    study = load_study(REPOSITORY / "config/paper.yaml")
+    asked = {
+        (one.definition, one.mesh.beam.name, one.mesh.mesh_type, one.mesh.mesh_size, one.material.name, one.load)
+        for one in study.scenes
+        if one.kinematics == "linear"
+    }
+    cells = [(one.beam, one.mesh_type, one.mesh_size, one.material, one.load) for one in study.printed]
+    assert len(cells) == 45 and {*claims(REPOSITORY / "README.md")} == {"patch", "delingette"}
+    assert {(name, *cell) for name in claims(REPOSITORY / "README.md") for cell in cells} <= asked
 
 
 def test_every_page_is_reached_from_the_readme():

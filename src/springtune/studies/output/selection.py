@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
+from springtune.problem.compare import sign_sentence
 from springtune.problem.geometry import beam_label
 from springtune.problem.parameters import OF_BODIES, SWEPT, shown_order
 from springtune.problem.status import Status
@@ -111,6 +112,16 @@ def at(data: xr.Dataset, values: Mapping[str, xr.DataArray]) -> xr.Dataset:
         others = [one for one in found[name].dims if one not in dimensions]
         found[name] = found[name].isel(dict.fromkeys(others, -1), drop=True) if others else found[name]
     return found.reset_coords([name for name in chosen if name in found.coords])
+
+
+def sign_of_errors(data: xr.Dataset) -> str:
+    """Sentence on which sign of a group's errors means too soft, from its references; empty without any."""
+    if "reference_displacement" not in data:
+        return ""
+    known = data.reference_displacement
+    loads = known["load"].values.tolist() if "load" in known.dims else [""]
+    signs = {load: float(np.sign(known.sel(load=load) if load else known).sum()) for load in loads}
+    return sign_sentence({load: sign for load, sign in signs.items() if sign})
 
 
 def labels_of(present: xr.DataArray, name: str) -> list[Label]:

@@ -14,13 +14,14 @@ import numpy as np
 
 from springtune.problem.status import Status
 from springtune.safe_io.escapes import shown
+from springtune.safe_io.tables import aligned
 
 from ..runs import checked_json, rerun
 from ..runs.checked_json import ASIDE
 from ..runs.plan import Plan
 from ..runs.workload import clock, computed, results_of
 from .selection import judged, of_own_law
-from .text import aligned, place_text, without_numbers
+from .text import place_text, sign_text, without_numbers
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -126,15 +127,19 @@ def _worst(root: "xr.Dataset", finite: "xr.Dataset | None" = None) -> Iterator[s
         worst = own[np.argmax(abs(values[own]))]
         others = [dim for dim in errors.dims if dim != "definition"]
         where = place_text(root, others, np.delete(places[worst], axis).tolist())
-        found.append((float(values[worst]), str(root.definition.values[number]), where))
+        error = float(values[worst])
+        found.append(
+            (error, sign_text(root, error, errors.dims, places[worst]), str(root.definition.values[number]), where)
+        )
     found.sort(key=lambda row: -abs(row[0]))
     if found:
         scenes = "the one scene that has one" if len(places) == 1 else f"the {len(places)} scenes that have one"
         head = "worst deformation error, (network - reference) / |reference|, of each definition"
-        yield from ("", f"{head}, of {scenes}; tension is positive")
+        yield from ("", f"{head}, of {scenes}")
         if finite is not None and of_own_law(finite) is not None:
             yield "  nonlinear networks against finite strain, linear ones against small strain"
-        yield aligned([[name, f"{100 * error:+.2f} %", where] for error, name, where in found[:WORST]], 2, right=(1,))
+        rows = [[name, f"{100 * error:+.2f} %", word, where] for error, word, name, where in found[:WORST]]
+        yield aligned(rows, 2, right=(1,))
     if len(found) > WORST:
         yield f"  and of {len(found) - WORST} more at most {100 * abs(found[WORST][0]):.2f} %"
 
