@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..safe_io.escapes import clipped, shown
-from ..studies.output.text import aligned, cell_text, paragraphs, variable_name
+from ..safe_io.tables import aligned
+from ..studies.output.text import cell_text, paragraphs, variable_name
 from ..studies.runs.source import CONFIG_FOLDER
 from . import examples
 from .options import RESULTS_FOLDER, dataset_path

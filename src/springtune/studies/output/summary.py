@@ -14,13 +14,14 @@ import numpy as np
 
 from springtune.problem.status import Status
 from springtune.safe_io.escapes import shown
+from springtune.safe_io.tables import aligned
 
 from ..runs import checked_json, rerun
 from ..runs.checked_json import ASIDE
 from ..runs.plan import Plan
 from ..runs.workload import clock, computed, results_of
 from .selection import judged, of_own_law
-from .text import aligned, place_text, sign_text, without_numbers
+from .text import place_text, sign_text, without_numbers
 
 if TYPE_CHECKING:
     import xarray as xr

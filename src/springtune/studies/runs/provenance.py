@@ -7,10 +7,15 @@ import subprocess
 from collections.abc import Collection
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 from springtune import __version__
+from springtune.mesh import MESH_TYPES
+from springtune.problem.loads import LOADS
+from springtune.registry import Extended
+from springtune.springs import DEFINITIONS
 
-from ..config.kind import kinds
+from ..config.kind import OTHER_KINDS, kinds
 from ..config.model import Study
 from .keys import installed
 from .records import checksum
@@ -53,7 +58,8 @@ def attributes(
 ) -> dict[str, str]:
     """Attributes of the root of a study's dataset."""
     created = datetime.now(UTC).isoformat(timespec="seconds")
-    software = {name: installed(name) for name in SOFTWARE} | {"python": platform.python_version()}
+    software = {name: installed(name) for name in (*SOFTWARE, *_plugins(study))}
+    software["python"] = platform.python_version()
     folder = Path(config).resolve().parent
     library, own = library_commit(package), study_commit(folder, package)
     checkouts = ((clone(package), library), (folder, own))
@@ -75,6 +81,15 @@ def attributes(
         "host": "" if "host" in untold else platform.node(),
     }
     return found | ({"study_commit": own} if own else {}) | _references(study)
+
+
+def _plugins(study: Study) -> set[str]:
+    """Distributions of the definitions, mesh types, loads and study kinds of other packages that a study uses."""
+    used = {label for labels in study.axes.values() for label in labels} | {
+        name for name, part in study.parts.items() if part
+    }
+    tables: tuple[Extended[Any], ...] = (DEFINITIONS, MESH_TYPES, LOADS, OTHER_KINDS)
+    return {package for table in tables for name, package in table.packages.items() if name in used}
 
 
 def _references(study: Study) -> dict[str, str]:
