@@ -140,7 +140,7 @@ class Page {
     if (view !== "cells") found.set("view", view);
     if (view === "cells" && places)
       for (const name of Object.keys(places)) if (root.dims[name].size > 1) found.set(name, String(root.label(name, places[name])));
-    return `#${found}`;
+    return `#${String(found) || "view=cells"}`;
   }
 
   async open(name, remember = true) {
