@@ -184,12 +184,6 @@ class Extended(Mapping[str, Entry]):
         return f"<{self._what}s: {', '.join(self)}>"
 
 
-NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,59}")
-NAME_RULE = (
-    "use letters, digits, '.', '_' and '-', at most 60 of them, and no '.' in front: names become parts of file names"
-)
-
-
 class Registry(Extended[Function]):
     """Mapping of declared functions; imports the package's modules when needed."""
 
