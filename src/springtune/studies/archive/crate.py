@@ -16,6 +16,7 @@ in CITATION.cff are named.
 """
 
 import json
+import os
 import shutil
 import tempfile
 import zipfile
@@ -465,7 +466,8 @@ def _zip(target: Path, packed: "Iterable[Packed]") -> None:
         for one in sorted(packed, key=lambda one: (one.name != METADATA, one.name)):
             info = zipfile.ZipInfo(one.name, PACKED_AT)
             info.compress_type, info.create_system = zipfile.ZIP_DEFLATED, 3  # Unix, whatever this system is
-            info.external_attr = (0o100755 if one.runs else 0o100644) << 16
+            runs = isinstance(one.source, Path) and os.access(one.source, os.X_OK)
+            info.external_attr = (0o100755 if runs else 0o100644) << 16
             info.file_size = one.size
             source = BytesIO(one.source) if isinstance(one.source, bytes) else open(one.source, "rb")  # noqa: SIM115
             with source, archive.open(info, "w", force_zip64=one.size > zipfile.ZIP64_LIMIT) as written:

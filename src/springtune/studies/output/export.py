@@ -11,6 +11,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +24,7 @@ from springtune.units import QUANTITY_KINDS, UnitError, parse
 from . import reading
 from .dataset import flag_words, is_flagged
 from .selection import at, shown_swept
-from .text import how_to_install, label_text
+from .text import cell_text, how_to_install
 
 
 class RequestError(ValueError):
@@ -210,10 +211,8 @@ def write_parquet(path: str | os.PathLike[str], columns: Sequence[Column], attri
 
 def write_zarr(path: str | os.PathLike[str], tree: xr.DataTree) -> None:
     """Write a Zarr store atomically."""
-    try:
-        import zarr  # noqa: F401
-    except ImportError:
-        raise ValueError(f"{path}: Zarr needs zarr; {how_to_install('export')}") from None
+    if find_spec("zarr") is None:
+        raise ValueError(f"{path}: Zarr needs zarr; {how_to_install('export')}")
     path = Path(path)
     unfinished, before = (path.with_name(f"{path.name}.{mark}{UNFINISHED}") for mark in (writer(), "before"))
     tree = tree.load()
@@ -348,7 +347,8 @@ def _write_series(networks: _Scenes | _Shapes, path: Path) -> None:
 
     with series(path) as add:
         for number, labels in enumerate(networks.labels):
-            add(float(number), partial(networks.write, labels=labels), networks.named(labels, "_").replace(" ", ""))
+            name = networks.named(labels).replace(", ", "_").replace(" ", "")
+            add(float(number), partial(networks.write, labels=labels), name)
 
 
 NETWORKS_OF_SHAPES = "shape_fields"
@@ -381,10 +381,9 @@ class _Scenes:
         self.numbers = at(root[names], swept)[names].assign(swept).load()
         self.mesh: dict[str, str | float] = {}  # the one of before: scenes of one follow each other
 
-    def named(self, labels: Mapping[str, str | float], between: str = ", ") -> str:
+    def named(self, labels: Mapping[str, str | float]) -> str:
         """Labels of a scene in words."""
-        units = {name: str(self.tree["/fields"][name].attrs.get("units", "1")) for name in labels}
-        return between.join(label_text(name, label, units[name]) for name, label in labels.items())
+        return cell_text(labels, {name: str(self.tree["/fields"][name].attrs.get("units", "1")) for name in labels})
 
     def write(self, path: Path, labels: Mapping[str, str | float]) -> None:
         """Write a scene."""
@@ -465,9 +464,9 @@ class _Shapes:
         ]
         self.labels = [one for one in found if all(one[name] in wanted for name, wanted in selection.items())]
 
-    def named(self, labels: Mapping[str, str | float], between: str = ", ") -> str:
+    def named(self, labels: Mapping[str, str | float]) -> str:
         """Labels of a network in words."""
-        return between.join(map(str, labels.values()))
+        return ", ".join(map(str, labels.values()))
 
     def write(self, path: Path, labels: Mapping[str, str | float]) -> None:
         """Write a network."""
