@@ -127,9 +127,9 @@ def _errors(tree: "xr.DataTree") -> list[str]:
         if len(sizes):
             worst = np.unravel_index(np.nanargmax(np.abs(here.values)), here.shape)
             numbers = [len(sizes), f"{100 * np.median(sizes):.3g} %", f"{100 * here.values[worst]:+.3g} %"]
-            place = place_text(root, here.dims, map(int, worst))
-            word = sign_text(root, float(here.values[worst]), here.dims, worst)
-            rows.append([f"  {labels[0]}", *labels[1 : len(named)], *numbers, word, place])
+            place = [int(one) for one in worst]
+            words = sign_text(root, float(here.values[worst]), here.dims, place), place_text(root, here.dims, place)
+            rows.append([f"  {labels[0]}", *labels[1 : len(named)], *numbers, *words])
     head = "errors, (network - reference) / |reference|, of scenes that are solved and within their reference's reach"
     return [head, *aligned(rows, 0, range(len(named), len(named) + 3)).splitlines()] if rows[1:] else []
 
