@@ -189,6 +189,8 @@ def test_commands_are_commands(page, tmp_path):
     shutil.copytree(REPOSITORY / "config", tmp_path / "config")
     for name in ("mine", "theirs", "coarse_to_fine", "columns", "sweep", "plate", "outlined"):
         shutil.copy(tmp_path / "config/quick.yaml", tmp_path / f"config/{name}.yaml")
+    for name in ("mine.yaml", "paper_tables.csv"):
+        shutil.copy(tmp_path / "config" / name, tmp_path)  # outside of a clone
     for words in typed(page):
         check_command(words, tmp_path)
 

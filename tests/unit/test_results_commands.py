@@ -173,6 +173,11 @@ class TestInfo:
         tree.to_netcdf(tmp_path / "dataset.nc", engine="netcdf4")
         result = run("info", tmp_path)
         assert result.exit_code == 0 and "  /benchmark " in result.stdout
+        tree.attrs["title"] = "<i>"
+        tree.to_netcdf(tmp_path / "other.nc", engine="netcdf4")
+        found = st.info(tmp_path / "other.nc")
+        assert repr(found) == str(found) and str(found).startswith("<i>\nstudy unknown")
+        assert found._repr_html_().startswith("<pre>&lt;i&gt;\nstudy unknown")
 
     def test_what_is_no_dataset_is_told_in_one_line(self, tmp_path):
         refused(run("info", tmp_path / "none"), "there is no such dataset")

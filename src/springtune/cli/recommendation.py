@@ -2,17 +2,19 @@
 
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .. import __version__
-from ..problem.compare import sign_sentence, sign_word
+from ..problem.compare import error_text, sign_sentence, sign_word
+from ..problem.shapes import QUANTITY_UNITS
+from ..safe_io.tables import TabledList, aligned
 
 if TYPE_CHECKING:
-    from ..prediction.choices import Choice, Number, References, ShapeReferences
+    from ..prediction.choices import Choice, References, ShapeReferences
     from ..prediction.search import MeshChoice, MeshSearch
     from ..problem.geometry import Beam
     from ..problem.materials import Material
@@ -72,7 +74,6 @@ def beam_subject(beam: "Beam", material: "Material", known: "References") -> Sub
 
 def shape_subject(statement: "ShapeStatement", known: "ShapeReferences") -> Subject:
     """Shape of a prediction."""
-    units = {"displacement": "m", "reaction": "N", "stress": "Pa", "area": "m2", "energy": "J"}
     kind = {one.name: one.kind for one in statement.case.quantities}
     compared = {name: (found.value, kind[name]) for name, found in known.items() if not isinstance(found, str)}
     moved = {name: value for name, (value, of) in compared.items() if of == "displacement"}
@@ -88,7 +89,7 @@ def shape_subject(statement: "ShapeStatement", known: "ShapeReferences") -> Subj
         },
     }
     references = [
-        [name, f"{found.value:.6g} {units[kind[name]]}", f"{100 * found.error_estimate:.1g} %"]
+        [name, f"{found.value:.6g} {QUANTITY_UNITS[kind[name]]}", f"{100 * found.error_estimate:.1g} %"]
         for name, found in known.items()
         if not isinstance(found, str)
     ]
@@ -114,20 +115,12 @@ def prediction_text(
     sizes: Sequence[float] = (),
 ) -> str:
     """Text of a prediction; `sizes` [m] are of the meshes that bands are extrapolated from."""
-    from ..studies.output.text import aligned
-
     columns, of_beam = list(subject.known), not subject.load
-    rows = [["definition", "springs inside", "on the outline", *columns, *(["E", "nu"] * of_beam), "besides springs"]]
+    heads, *rows = TabledList(choices).table()
+    kept = [place for place, head in enumerate(heads) if of_beam or head not in ("E", "nu")]
+    rows = [[row[place] for place in kept] for row in (heads, *rows)]
     notes = [f"{name}: no reference; {found}" for name, found in subject.known.items() if isinstance(found, str)]
     for choice in choices:
-        row = [choice.definition]
-        row += [_bounds(value, "{:.5g} N/m".format, "each its own") for value in (choice.inside, choice.outline)]
-        row += [_bounds(choice.errors[name], _percent, _missing(choice, subject.load or name)) for name in columns]
-        if of_beam:
-            missing = _missing(choice, "patch test")
-            row.append(_bounds(choice.young_modulus_error, _percent, missing))
-            row.append(_bounds(choice.poisson_ratio, _three_decimals, missing))
-        rows.append([*row, choice.extra])
         notes += [f"{choice.definition}, {part}: {reason}" for part, reason in choice.failures.items()]
     first, plain = (name or "none" for name in recommended(choices))
     particles, springs = about["particles"], about["springs"]
@@ -159,34 +152,29 @@ def prediction_text(
 
 def search_text(subject: Subject, search: "MeshSearch", springs_alone: bool = False) -> str:
     """Text of a search for a mesh."""
-    from ..studies.output.text import aligned
+    from ..prediction.search import answer_text
 
     where, steps = "in" if subject.load else "under", subject.dense
     wanted = f"{100 * search.error:.6g} %"
     lines = [
         f"{subject.name}; {subject.made_of}; an error of at most {wanted} {where} {_listed(search.loads)}",
         "",
-        *([] if springs_alone else [f"recommended: {_answer(search.best)}"]),
-        f"with springs alone: {_answer(search.best_springs)}",
+        *([] if springs_alone else [f"recommended: {answer_text(search.best)}"]),
+        f"with springs alone: {answer_text(search.best_springs)}",
     ]
-    heads = ["mesh", "size", "definition", "cells", "particles", "springs", *search.loads, "static solve"]
-    heads += ["largest step"] if steps else []
     right = (3, *range(5, 9 + len(search.loads) + steps))
     notes = []
     tables = [] if springs_alone else [("with any definition", search.by_type, False)]
     tables.append(("with springs alone", search.springs_by_type, True))
     for what, found, alone in tables:
-        rows = [heads]
+        chosen = []
         for name, one in sorted(found.items(), key=lambda item: _order(item[1])):
             if one is None:
                 notes.append(f"{name}, {what}: {_nearest(search, name, alone)}")
                 continue
-            errors = [_bounds(one.choice.errors[load], _percent, "") for load in search.loads]
-            rows.append([name, size_text(one.size), one.choice.definition + ("" if one.confirmed else " *")])
-            rows[-1] += [f"{number:,}" for number in (one.cells, one.particles, one.springs)]
-            rows[-1] += [*errors, f"{1e3 * one.seconds:.3g} ms", *([f"{one.step_limit:.3g} s"] if steps else [])]
-        if rows[1:]:
-            lines += ["", f"{what}:", aligned(rows, left=2, right=right)]
+            chosen.append(one)
+        if chosen:
+            lines += ["", f"{what}:", aligned(TabledList(chosen).table(), left=2, right=right)]
     answers = [one for _, found, _ in tables for one in found.values()]
     explained = []
     if any(one and not one.confirmed for one in answers):
@@ -256,17 +244,6 @@ def recommended(choices: "Sequence[Choice]") -> tuple[str | None, str | None]:
     return (solved[0].definition if solved else None), (plain[0].definition if plain else None)
 
 
-def size_text(size: float) -> str:
-    """Mesh size [m] as the option takes it.
-
-    Examples
-    --------
-    >>> size_text(0.00308)
-    '3.08 mm'
-    """
-    return f"{1e3 * size:.12g} mm"
-
-
 KINEMATICS_TEXT = "with linear kinematics (small strain), against the converged reference of small strain"
 """Kinematics and reference of the errors."""
 
@@ -279,19 +256,12 @@ def _at_worst(subject: Subject, choices: "Sequence[Choice]", names: Sequence[str
             bounds = ((error, name) for name, value in choice.errors.items() for error in np.ravel(value))
             worst, name = max((one for one in bounds if one[0] == one[0]), key=lambda one: abs(one[0]))
             word = sign_word(worst, *subject.compared[name])
-            texts.append(f"{choice.definition} {_percent(worst)} ({name}{word and ', '}{word})")
+            texts.append(f"{choice.definition} {error_text(worst)} ({name}{word and ', '}{word})")
     return [f"at worst: {', '.join(texts)}"] if texts else []
 
 
 def _listed(words: Sequence[str]) -> str:
     return " and ".join([", ".join(words[:-1]), words[-1]] if words[1:] else words)
-
-
-def _answer(one: "MeshChoice | None") -> str:
-    if one is None:
-        return "none"
-    sure = "" if one.confirmed else ", not confirmed by finer meshes"
-    return f"{one.mesh_type} {size_text(one.size)} with {one.choice.definition}, {one.particles:,} particles{sure}"
 
 
 def _order(one: "MeshChoice | None") -> tuple[bool, int]:
@@ -301,7 +271,7 @@ def _order(one: "MeshChoice | None") -> tuple[bool, int]:
 def _nearest(search: "MeshSearch", mesh_type: str, springs_alone: bool) -> str:
     """Reason why no mesh was found, and the nearest one."""
     from ..prediction.choices import NEED_ENERGIES, as_sure_as, in_order
-    from ..prediction.search import SPRINGS_ALONE
+    from ..prediction.search import SPRINGS_ALONE, size_text
 
     tried = [one for one in search.tried if one.mesh_type == mesh_type]
     names = [(one, name) for one in tried for name in one.errors if name in SPRINGS_ALONE or not springs_alone]
@@ -339,28 +309,3 @@ def _json(content: dict[str, Any]) -> str:
         return None if isinstance(value, float) and not math.isfinite(value) else value
 
     return json.dumps(plain(content), indent=2, ensure_ascii=False)
-
-
-def _missing(choice: "Choice", part: str) -> str:
-    """Word for a missing number."""
-    if "springs" in choice.failures:
-        return "refused"
-    reason = choice.failures.get(part) or choice.failures.get("patch test")
-    return "no reference" if reason is None else "unstable" if "unstable" in reason else "unsolved"
-
-
-def _bounds(value: "Number", form: Callable[[float], str], missing: str) -> str:
-    """A number, or the bounds of a band, as text."""
-    numbers = value if isinstance(value, tuple) else (value,)
-    texts = [missing if number != number else form(number) for number in numbers]
-    return texts[0] if len(set(texts)) == 1 else " to ".join(texts)
-
-
-def _three_decimals(value: float) -> str:
-    return f"{round(value, 3) + 0.0:.3f}"
-
-
-def _percent(value: float) -> str:
-    """Error with two decimals below 10 %, otherwise three digits."""
-    value = 100 * value
-    return f"{round(value, 2) + 0.0:+.2f} %" if abs(value) < 10 else f"{value:+.3g} %"

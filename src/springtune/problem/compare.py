@@ -15,6 +15,14 @@ HALVINGS = 12
 """Bisections in search of a best stiffness where a curve ends."""
 
 
+def error_text(error: float) -> str:
+    """Deformation error in words: two decimals below 10 %, otherwise three digits."""
+    percent = 100 * error
+    if percent != percent:
+        return "no reference"
+    return f"{round(percent, 2) + 0.0:+.2f} %" if abs(percent) < 10 else f"{percent:+.3g} %"
+
+
 def deformation_error(displacement: ArrayLike, reference: ArrayLike) -> np.ndarray:
     """Signed deformation error ``(network - reference) / |reference|`` [1].
 

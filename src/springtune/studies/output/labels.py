@@ -15,8 +15,9 @@ from matplotlib.font_manager import FontProperties, findfont, get_font
 from matplotlib.patches import Patch
 from matplotlib.ticker import NullLocator
 
+from springtune.problem.status import Status
+
 from . import style
-from .dataset import STATUS
 from .style import POINTS, SMALL, arrange
 
 End = tuple[float, float, str, str]
@@ -267,7 +268,7 @@ def key_below(panel: Axes, shown: Sequence[tuple[str, Mapping[str, Any]]], below
 
 def statuses(flags: np.ndarray) -> dict[str, int]:
     """Number of cells of each status but those that were not asked for, by its words."""
-    return {STATUS[flag].replace("_", " "): int((flags == flag).sum()) for flag in np.unique(flags[flags != 0])}
+    return {str(Status(flag)).replace("_", " "): int((flags == flag).sum()) for flag in np.unique(flags[flags != 0])}
 
 
 def say(panel: Axes, text: str, bare: bool = True) -> None:
