@@ -438,10 +438,13 @@ class TestPredictAMesh:
     def test_signs_are_told(self):
         size = (*self.STEEL, "--size", "5 mm", "--mesh", "right")
         text = run("predict", *size, "--loads", "compression,traction").stdout
-        assert "Positive: too soft; under compression, where displacements are negative, negative is too soft." in text
+        assert (
+            "Of errors, positive: too soft; under compression, where displacements are negative, negative is too soft."
+            in text
+        )
         assert "at worst: delingette" in text and "% (compression, too " in text
         text = run("predict", *size, "--loads", "pressure").stdout
-        assert "\nNegative: too soft.\n" in text and "% (pressure, too stiff)" in text
+        assert "\nOf errors, negative: too soft.\n" in text and "% (pressure, too stiff)" in text
 
     def test_json_of_a_prediction(self):
         result = run("predict", *self.STEEL, "--size", "5 mm", "--loads", "bending,pressure", "--json")
