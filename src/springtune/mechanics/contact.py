@@ -264,7 +264,7 @@ class Contact:
                 parts.append(self._on_floor(owner, sides[owner]))
             for target in range(len(self.all)):
                 if target != owner and min(owner, target) < len(self.bodies):
-                    parts += self._between(owner, sides[owner], target, sides[target])
+                    parts.append(self._between(owner, sides[owner], target, sides[target]))
         return Contacts(*(np.concatenate([getattr(part, one.name) for part in parts]) for one in fields(Contacts)))
 
     def _on_floor(self, owner: int, sides: _Sides) -> Contacts:
@@ -282,18 +282,15 @@ class Contact:
             gaps=places[near, 1],
         )
 
-    def _between(self, owner: int, own: _Sides, target: int, met: _Sides) -> list[Contacts]:
-        """Corners of one body near edges of another one; an empty list where they are far from each other."""
+    def _between(self, owner: int, own: _Sides, target: int, met: _Sides) -> Contacts:
+        """Corners of one body near edges of another one."""
         places, (after, before) = self.all[owner].points[own.corners], self.all[target].neighbours
-        found = self._facing(places, own, met, before)
-        if found is None:
-            return []
-        rows, edge = found
+        rows, edge = self._facing(places, own, met, before)
         ahead, behind = met.turn[edge] < -STRAIGHT, met.turn[before[edge]] < -STRAIGHT
         rows = np.concatenate([rows, rows[ahead], rows[behind]])
         edge = np.concatenate([edge, after[edge[ahead]], before[edge[behind]]])
         offset = places[rows] - met.start[edge]
-        contacts = Contacts(
+        return Contacts(
             owners=np.full(len(rows), owner),
             corners=own.corners[rows],
             targets=np.full(len(rows), target),
@@ -302,17 +299,16 @@ class Contact:
             normals=met.normals[edge],
             gaps=np.einsum("na,na->n", offset, met.normals[edge]),
         )
-        return [contacts]
 
     def _facing(
         self, places: np.ndarray, own: _Sides, met: _Sides, before: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray] | None:
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Corners near an edge that faces them, by their number in the outline, and the nearest such edge of each."""
         reach = REACH * self.size
         near = _near(met.start, places, reach)
         shown = np.flatnonzero(_near(places, met.start, reach + met.length))
         if not near.any() or not len(shown):
-            return None
+            return np.zeros((2, 0), dtype=int)
         start, along, length, normals = (part[shown] for part in (met.start, met.along, met.length, met.normals))
         offset = places[near][:, None, :] - start[None, :, :]
         gaps = np.einsum("nea,ea->ne", offset, normals)

@@ -199,15 +199,9 @@ class LoadedNetwork:
         """Factorize the tangent of resistance less load, see `Network.factorize_tangent`."""
         return self.network.factorize_tangent(displacements, self._follower_at(s))
 
-    def newton(
-        self,
-        s: float,
-        start: np.ndarray,
-        max_factorizations: int = MAX_FACTORIZATIONS,
-        keep_tangent: float = KEEP_TANGENT,
-    ) -> Equilibrium:
+    def newton(self, s: float, start: np.ndarray, max_factorizations: int = MAX_FACTORIZATIONS) -> Equilibrium:
         """Run Newton's method from displacements [m], shape (n_points, 2), see `Newton`."""
-        return Newton(self, s, max_factorizations, keep_tangent).solve(self.moved(s, start))
+        return Newton(self, s, max_factorizations).solve(self.moved(s, start))
 
     def _follower_at(self, s: float) -> tuple[float, FollowerPressure] | None:
         return None if self.follower is None else (s, self.follower)
@@ -218,13 +212,13 @@ class Newton:
 
     A few steps may leave the residual above its minimum. Then the best iterate is restored and steps are halved until
     the residual falls (watchdog technique: Chamberlain, Lemarechal, Pedersen and Powell, Math. Programming Study
-    16:1, 1982). No step may invert a cell. A factor is reused while its steps cut the residual by `keep_tangent`: a
+    16:1, 1982). No step may invert a cell. A factor is reused while its steps cut the residual by `KEEP_TANGENT`: a
     new one costs ten such steps.
     """
 
-    def __init__(self, problem: LoadedNetwork, s: float, max_factorizations: int, keep_tangent: float) -> None:
+    def __init__(self, problem: LoadedNetwork, s: float, max_factorizations: int) -> None:
         self.problem, self.network, self.s = problem, problem.network, s
-        self.max_factorizations, self.keep_tangent = max_factorizations, keep_tangent
+        self.max_factorizations = max_factorizations
 
     def solve(self, start: np.ndarray) -> Equilibrium:
         """Return the equilibrium from displacements [m], shape (n_points, 2), that contain the prescribed ones.
@@ -286,7 +280,7 @@ class Newton:
         if there is None:
             return "line search found no descent"
         self._steps += 1
-        self._keep = there.residual <= self.keep_tangent * self._here.residual
+        self._keep = there.residual <= KEEP_TANGENT * self._here.residual
         self._here = there
         self._best, self._since_best = (there, 0) if lower else (self._best, self._since_best + 1)
         return ""

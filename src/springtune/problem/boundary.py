@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from ..mesh.cells import Mesh, signed_areas
-from ..mesh.groups import GroupedMesh
+from ..mesh.groups import GroupedMesh, part_names
 from ..mesh.sheets import check_held, in_words
 from .loads import MIDDLE, LoadKind, Side
 from .quantities import nearest
@@ -130,11 +130,12 @@ def forces(
 
 def followed(grouped: GroupedMesh, case: LoadCase, thickness: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
     """Return the edges (n, 2) with follower pressure, the body to the left, and it (n,) times the thickness [N/m]."""
-    found = [(sides_of(grouped, one.group), one.pressure * thickness) for one in case.pressures if one.follower]
-    edges = [np.zeros((0, 2), dtype=np.int64), *(edges for edges, _ in found)]
-    return np.concatenate(edges), np.concatenate(
-        [np.full(len(edges), value) for edges, value in [(edges[0], 0.0), *found]]
-    )
+    edges, pressures = [np.zeros((0, 2), dtype=np.int64)], [0.0]
+    for one in case.pressures:
+        if one.follower:
+            edges.append(sides_of(grouped, one.group))
+            pressures.append(one.pressure * thickness)
+    return np.concatenate(edges), np.repeat(pressures, [len(part) for part in edges])
 
 
 def particle_masses(grouped: GroupedMesh, thickness: float, densities: Mapping[str, float | None]) -> np.ndarray:
@@ -154,17 +155,6 @@ def particle_masses(grouped: GroupedMesh, thickness: float, densities: Mapping[s
         areas = signed_areas(points, corners)
         np.add.at(masses, corners, (density * thickness * areas / count)[:, None])
     return masses
-
-
-def part_names(grouped: GroupedMesh) -> dict[int, np.ndarray]:
-    """Return the part of each cell, by number of corners: ``""`` for the main part."""
-    found = {}
-    for count, corners in grouped.mesh.cells.items():
-        found[count] = np.full(len(corners), "", dtype=object)
-        for name, cells in grouped.parts.items():
-            if count in cells:
-                found[count][cells[count]] = name
-    return found
 
 
 def displacement_weights(grouped: GroupedMesh, quantity: Quantity) -> np.ndarray:

@@ -19,7 +19,7 @@ from scipy import spatial
 
 from ..mesh.cells import signed_areas
 from ..mesh.free import triangulate, upright
-from ..mesh.groups import GroupedMesh
+from ..mesh.groups import GroupedMesh, part_names
 from ..mesh.sides import OutlineSide, Point
 from ..problem.shapes import Shape
 from .small_strain import ELEMENT_GROWTH, SHRINKAGE
@@ -355,12 +355,9 @@ def _polygons(grouped: GroupedMesh) -> tuple[tuple[str, ...], list[_Piece]]:
     """Names of parts, and straight pieces around and between the parts of a mesh."""
     mesh = grouped.mesh
     names = tuple(dict.fromkeys(["", *grouped.parts]))
-    ways, parts = [], []
+    ways, parts, labels = [], [], part_names(grouped)
     for count, cells in mesh.cells.items():
-        of_cells = np.zeros(len(cells), dtype=int)
-        for name, inside in grouped.parts.items():
-            if count in inside:
-                of_cells[inside[count]] = names.index(name)
+        of_cells = np.array([names.index(name) for name in labels[count]])
         for i in range(count):
             ways.append(cells[:, [i, (i + 1) % count]])
             parts.append(of_cells)

@@ -305,7 +305,7 @@ def calculix_cps8(scene, size, clock):
     value, along, axis = scene.side
     with clock("meshing"):
         points, elements = calculix.quadratic_mesh(scene.beam.length, scene.beam.height, size)
-        shares = calculix.side_weights(points, along, 1 - along, value, quadratic=True)
+        shares = calculix.side_weights(points, along, value)
         load = np.zeros(points.shape)
         load[:, axis] = scene.force * shares
         clamp = np.zeros(points.shape, dtype=bool)
