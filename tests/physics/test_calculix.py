@@ -14,7 +14,7 @@ from springtune.reference.small_strain import solve_small_strain
 
 pytestmark = [
     pytest.mark.slow,
-    pytest.mark.skipif(not calculix.installed(), reason="needs CalculiX (ccx; Debian package calculix-ccx)"),
+    pytest.mark.skipif(not calculix.program(), reason="needs CalculiX (ccx; Debian package calculix-ccx)"),
 ]
 
 

@@ -19,6 +19,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, fields
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve, cholesky, solve_triangular
@@ -226,6 +227,16 @@ class Contacts:
     gaps: np.ndarray
 
 
+class _Quadratic(NamedTuple):
+    """Problem of a Newton step: by body tangent, missing forces and rows of its contacts; gaps, and likely contacts."""
+
+    tangents: list[csc_array]
+    missing: list[np.ndarray]
+    rows: list[csc_array]
+    gaps: np.ndarray
+    likely: np.ndarray
+
+
 class Contact:
     """Bodies, rigid obstacles and a floor at y = 0.
 
@@ -416,9 +427,10 @@ class Contact:
         rows = self._rows(contacts, contacts.normals)
         try:
             tangents = [body.tangent(share, part) for body, part in zip(self.bodies, more)]
-            found = self._closed(tangents, missing, rows, contacts.gaps, known > 0) if near else None
+            quadratic = _Quadratic(tangents, missing, rows, contacts.gaps, known > 0)
+            found = self._closed(quadratic) if near else None
             if found is None:
-                found = self._opening(tangents, missing, rows, contacts.gaps, known > 0)
+                found = self._opening(quadratic)
         except (RuntimeError, SingularError, ValueError, np.linalg.LinAlgError):
             return None
         steps, forces = found
@@ -431,18 +443,12 @@ class Contact:
         self.contacts, self.forces, self.drag = contacts, forces, drag
         return longest
 
-    def _opening(
-        self,
-        tangents: list[csc_array],
-        missing: list[np.ndarray],
-        rows: list[csc_array],
-        gaps: np.ndarray,
-        likely: np.ndarray,
-    ) -> tuple[list[np.ndarray], np.ndarray]:
+    def _opening(self, quadratic: _Quadratic) -> tuple[list[np.ndarray], np.ndarray]:
         """Return steps and contact forces of the quadratic minimum under all contact conditions.
 
         Few of many contacts close: the minimum takes the likely ones, and then adds those that it violates.
         """
+        tangents, missing, rows, gaps, likely = quadratic
         solves = [body.solver(tangent) for body, tangent in zip(self.bodies, tangents)]
         steps = free = [solve(part) for solve, part in zip(solves, missing)]
         opening = gaps + sum(row.T @ part for row, part in zip(rows, free))
@@ -462,20 +468,14 @@ class Contact:
             more = np.flatnonzero(left < min(-GAP * self.size, 0.5 * left.min()))
         return steps, forces
 
-    def _closed(
-        self,
-        tangents: list[csc_array],
-        missing: list[np.ndarray],
-        rows: list[csc_array],
-        gaps: np.ndarray,
-        closed: np.ndarray,
-    ) -> tuple[list[np.ndarray], np.ndarray] | None:
+    def _closed(self, quadratic: _Quadratic) -> tuple[list[np.ndarray], np.ndarray] | None:
         """Return the Newton step with the contacts that were closed; None if the set of closed contacts is unclear.
 
         Contacts that pull are opened and those that close are added, a few times over. The tangent needs to be
         definite only on the motions that closed contacts leave free. This is a true Newton step; `_opening` adds
         resistance.
         """
+        tangents, missing, rows, gaps, closed = quadratic
         scale = np.mean([np.abs(tangent.diagonal()).mean() for tangent in tangents])
         stacked, stiffness = vstack(rows, format="csc"), block_diag(tangents)
         sizes = np.cumsum([len(part) for part in missing])

@@ -322,12 +322,11 @@ class Newton:
         return Equilibrium(here.displacements, False, self._steps, here.residual, self._factor, reason)
 
 
-def error_estimate(
-    network: Network, factor: Factor, missing: np.ndarray, displacements: np.ndarray, linear: bool = False
-) -> float:
+def error_estimate(network: Network, factor: Factor, here: Iterate, linear: bool) -> float:
     """Return the estimated relative error of displacements [1], from the Newton step left and rounding of forces."""
-    rounding = network.rounding(displacements, linear)
-    return norm(factor.estimate(missing + _signs(len(rounding)) * rounding)) / (norm(displacements.ravel()) or 1.0)
+    rounding = network.rounding(here.displacements, linear)
+    step = factor.estimate(here.missing + _signs(len(rounding)) * rounding)
+    return norm(step) / (norm(here.displacements.ravel()) or 1.0)
 
 
 @lru_cache(maxsize=4)
@@ -344,11 +343,11 @@ def refine(
     linear: bool = False,
 ) -> tuple[Iterate, float]:
     """Take steps with one tangent while each halves the estimated error; return the iterate and that error [1]."""
-    error = error_estimate(network, factor, here.missing, here.displacements, linear)
+    error = error_estimate(network, factor, here, linear)
     while error > REFINED:
         displacements = here.displacements + network.expand(factor.solve(here.missing))
         there = Iterate(displacements, *balance(displacements))
-        better = error_estimate(network, factor, there.missing, displacements, linear)
+        better = error_estimate(network, factor, there, linear)
         if not better <= 0.5 * error or not linear and network.inverted(displacements):
             break
         here, error = there, better

@@ -16,11 +16,6 @@ import numpy as np
 from ..problem.materials import Material
 
 
-def installed() -> bool:
-    """Whether the program is on the machine."""
-    return bool(program())
-
-
 def quadratic_mesh(length: float, height: float, size: float) -> tuple[np.ndarray, np.ndarray]:
     """Return points (n_points, 2) [m] and serendipity quadrilaterals (n_elements, 8) of about even size [m].
 

@@ -247,8 +247,6 @@ def lagrange_values(places: np.ndarray, count: int) -> np.ndarray:
 
     Barycentric formula (Berrut and Trefethen, SIAM Review 46:501, 2004, formula 4.2 with weights 5.4).
     """
-    if count == 1:
-        return np.ones((len(places), 1))
     weights = (-1.0) ** np.arange(count)
     weights[[0, -1]] /= 2
     distances = places[:, None] - chebyshev_points(count)

@@ -284,9 +284,7 @@ class _Problem:
             if side.arc is not None or np.abs(self.stiffness[:, :2, 2]).max() > 1e-12 * self.stiffness.max():
                 return False
             conditions = [value for group in side.groups for value in supported.get(group, [])]
-            if any(group in loads for group in side.groups):
-                return False
-            if len(conditions) != 1:
+            if any(group in loads for group in side.groups) or len(conditions) != 1:
                 return False
             x, y = conditions[0]
             flat = np.abs(way) < 1e-12
