@@ -229,7 +229,7 @@ def test_multigrid_gives_what_a_factorization_gives(mesh_type):
     mesh = MESH_TYPES[mesh_type](0.1, 0.04, 1.8e-3)
     problem = problem_on(mesh)
     factor = iterative(problem.network)
-    solution, exact = factor.solve(problem.load), problem.rest_factor.solve(problem.load)
+    solution, exact = factor.solve(problem.load), problem.network.rest_factor.solve(problem.load)
     assert np.abs(solution - exact).max() <= 1e-9 * np.abs(exact).max()
     assert (factor.name, factor.negative_pivots) == ("multigrid", 0)
 

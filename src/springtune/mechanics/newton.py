@@ -108,11 +108,6 @@ class LoadedNetwork:
             forces = np.where(network.held, network.linear_forces(self.slope), 0.0)
             self.load_norm = float(np.hypot(np.linalg.norm(self.load), np.linalg.norm(forces))) or self.load_norm
 
-    @property
-    def rest_factor(self) -> Factor:
-        """Tangent factorized at rest, shared by all loads of the network."""
-        return self.network.rest_factor
-
     @cached_property
     def _slope(self) -> tuple[np.ndarray, float, float]:
         """The linear network's displacements over ``s``, the residual [1] and the estimated error of them [1]."""
@@ -121,12 +116,12 @@ class LoadedNetwork:
             missing = self.load - self.network.linear_resistance(slope)
             return missing, norm(missing) / self.load_norm
 
+        network, factor = self.network, self.network.rest_factor
         if self.given is None:
-            first = self.network.expand(self.rest_factor.solve(self.load))
+            first = network.expand(factor.solve(self.load))
         else:
-            pull = self.load - self.network.linear_resistance(self.given)
-            first = self.given + self.network.expand(self.rest_factor.solve(pull))
-        here, error = refine(self.network, Iterate(first, *balance(first)), self.rest_factor, balance, linear=True)
+            first = self.given + network.expand(factor.solve(self.load - network.linear_resistance(self.given)))
+        here, error = refine(network, Iterate(first, *balance(first)), factor, balance, linear=True)
         return here.displacements, here.residual, error
 
     @property
@@ -136,7 +131,7 @@ class LoadedNetwork:
 
     def stability(self, s: float, displacements: np.ndarray, factor: Factor) -> tuple[int, bool]:
         """Return the number of negative pivots of an equilibrium's tangent, and whether it is singular."""
-        if self.follower is None or factor is self.rest_factor:
+        if self.follower is None or factor is self.network.rest_factor:
             return factor.negative_pivots, False
         modes = self.modes(s, displacements, factor)
         merged = np.abs(modes.imag) > MERGED * np.abs(modes)

@@ -82,12 +82,12 @@ class StaticProblem(LoadedNetwork):
     @cached_property
     def start(self) -> Expansion:
         """Short series about rest: where Newton's method starts."""
-        return Expansion(self.network, self.load, 0.0, None, self.rest_factor, order=START_ORDER, rough=True)
+        return Expansion(self.network, self.load, 0.0, None, self.network.rest_factor, order=START_ORDER, rough=True)
 
     @cached_property
     def rest(self) -> Expansion:
         """Long series about rest, for a whole curve."""
-        return Expansion(self.network, self.load, 0.0, None, self.rest_factor)
+        return Expansion(self.network, self.load, 0.0, None, self.network.rest_factor)
 
     @cached_property
     def long_rest(self) -> Expansion:
@@ -98,7 +98,7 @@ class StaticProblem(LoadedNetwork):
         """Return the equilibrium with linear kinematics."""
         slope, residual, error = self._slope
         reason = uncertainty(error)
-        return Equilibrium(s * slope, not reason, 1, residual, self.rest_factor, reason, error)
+        return Equilibrium(s * slope, not reason, 1, residual, self.network.rest_factor, reason, error)
 
     def judge(self, s: float, found: Equilibrium) -> tuple[Status, str, float]:
         """Return status, message and negative pivots of an equilibrium; NaN pivots if it has no regular tangent."""

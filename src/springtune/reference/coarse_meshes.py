@@ -245,9 +245,7 @@ class _Piece:
 
 def _refined(pieces: list[_Piece], extent: float, largest_turn: float) -> list[_Piece]:
     """Pieces that are short where others are near, and turn little."""
-    done = False
-    while not done:
-        done = True
+    while True:
         samples = np.array([piece.at(np.linspace(0, 1, PIECE_SAMPLES)) for piece in pieces])
         chords = samples[:, -1] - samples[:, 0]
         lengths = np.linalg.norm(np.diff(samples, axis=1), axis=2).sum(axis=1)
@@ -268,11 +266,11 @@ def _refined(pieces: list[_Piece], extent: float, largest_turn: float) -> list[_
             )
             if length > 1.01 * limit or piece.turn > 1.01 * largest_turn or sagitta > LARGEST_SAGITTA * nearest:
                 refined += piece.halves()
-                done = False
             else:
                 refined.append(piece)
+        if len(refined) == len(pieces):
+            return pieces
         pieces = refined
-    return pieces
 
 
 def _cut(side: OutlineSide, points: Mapping[str, Point], small: float) -> tuple[list[float], list[str]]:

@@ -644,8 +644,10 @@ class _Level:
         if quantity.kind == "area":
             return float(self._area_growth().sum())
         if quantity.kind == "stress":
-            place = ("xx", "yy", "xy").index(quantity.component)
-            return float(self._corner_stress(space.mesh.named[quantity.of])[place])
+            # The mean in the triangles at its corner.
+            rows, places = np.nonzero(space.corners == space.mesh.named[quantity.of])
+            stresses = self._stresses(rows, np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])[places])
+            return float(stresses.mean(axis=0)[("xx", "yy", "xy").index(quantity.component)])
         axis = "xy".index(quantity.component)
         if quantity.kind == "reaction":
             return self._reaction(quantity.of, axis)
@@ -743,11 +745,6 @@ class _Level:
             local[curved] -= step
             curved = curved[np.flatnonzero(np.abs(step).max(axis=1) > 1e-13)]
         return found, local
-
-    def _corner_stress(self, point: int) -> np.ndarray:
-        """Mean of the stresses in the triangles at a corner [Pa], shape (3,)."""
-        rows, places = np.nonzero(self.space.corners == point)
-        return self._stresses(rows, np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])[places]).mean(axis=0)
 
     def displacements(self, points: np.ndarray) -> np.ndarray:
         """Displacements at points [m], shape (n, 2)."""

@@ -25,7 +25,7 @@ def network(scene, mesh, definition, clock):
         sheet, springs, problem = _problem(scene, mesh, definition)
         problem.network.tangent()
     with clock("factorizing"):
-        problem.rest_factor  # noqa: B018  factorized when first asked for
+        problem.network.rest_factor  # noqa: B018  factorized when first asked for
     with clock("solving"):
         found = problem.linear(scene.force / springs.reference)
     if not found.converged:
@@ -187,7 +187,7 @@ def condensation(scene, size, clock):
     with clock("assembling"):
         problem.network.tangent()
     with clock("factorizing"):
-        net, factor = problem.network, problem.rest_factor
+        net, factor = problem.network, problem.network.rest_factor
         loaded = np.flatnonzero(problem.load)
         responses = np.zeros((len(loaded), len(loaded)))
         watched = net.reduce(sheet.measured(scene.kind))
