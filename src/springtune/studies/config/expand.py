@@ -303,7 +303,7 @@ def build(
     check_cells(config, used, bool(curves), problems)
     problems.stop()
     bodies = declared(config, problems.folder)
-    parts = {kind.name: kind.expand(config, bodies) for kind in kinds}
+    parts = {kind.name: kind.expand(config, bodies) if kind.wanted(config) else () for kind in kinds}
     if config.printed and names:
         problems.add(
             ("printed",),

@@ -157,9 +157,10 @@ class Kind:
     files : callable, optional
         From its part of a study to further input files.
     check : callable, optional
-        Adds the mistakes of a config to `springtune.studies.config.messages.Problems`.
+        Adds the mistakes of a config with its sections to `springtune.studies.config.messages.Problems`.
     expand : callable, optional
-        From a config and `springtune.studies.config.expand.Declared` to its part of a study, empty if unused.
+        From a config with its sections and `springtune.studies.config.expand.Declared` to its part of a study, which
+        is empty in other studies.
     axes : callable, optional
         From that part to the labels of its groups' dimensions.
     summary : callable, optional
@@ -200,6 +201,10 @@ class Kind:
     costs: dict[str, tuple[float, float]] = field(default_factory=dict)
     pieces: Callable[[Study, Any, Any], Mapping[tuple[str | int, ...], float]] | None = None
     take: Callable[[Study, Collection[tuple[str | int, ...]]], Study] | None = None
+
+    def wanted(self, config: Any) -> bool:
+        """Return whether a config has one of its sections; a kind without any depends on the grids."""
+        return not self.study_fields or any(getattr(config, key) for key in self.study_fields)
 
     def module(self, name: str) -> ModuleType:
         """A module of its package."""

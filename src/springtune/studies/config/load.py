@@ -33,7 +33,7 @@ def load(path: str | Path, kinds: Sequence[Kind], beside: Path | None = None) ->
     config = _validate(study_model(kinds, content if isinstance(content, dict) else ()), content, problems)
     check_names(config, problems)
     check_counts(config, content, problems)
-    for kind in kinds:
+    for kind in filter(lambda kind: kind.wanted(config), kinds):
         kind.check(config, problems)
     problems.stop()
     test_files = files_of_tests(config, beside, problems)

@@ -87,7 +87,7 @@ def _parts(annotation: Any) -> tuple[Any, tuple[Any, ...]]:
 class Section(BaseModel):
     """A mapping of known keys in a study."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True, validate_default=True)
 
     @model_validator(mode="before")
     @classmethod
@@ -121,7 +121,7 @@ class BeamConfig(Section):
 
     length: Length = Field(description="Extent along x, the direction of the load.")
     height: Length = Field(description="Extent along y.")
-    thickness: Length = Field("1 mm", validate_default=True, description="Extent out of the plane.")
+    thickness: Length = Field("1 mm", description="Extent out of the plane.")
 
 
 class StiffnessConfig(Section):
@@ -131,8 +131,8 @@ class StiffnessConfig(Section):
     C22: Stress = Field(description="Stress along y for a strain along y.")
     C12: SignedStress = Field(description="Stress along x for a strain along y.")
     C66: Stress = Field(description="Shear stress for a shear angle.")
-    C16: SignedStress = Field("0 Pa", validate_default=True, description="Shear stress for a strain along x.")
-    C26: SignedStress = Field("0 Pa", validate_default=True, description="Shear stress for a strain along y.")
+    C16: SignedStress = Field("0 Pa", description="Shear stress for a strain along x.")
+    C26: SignedStress = Field("0 Pa", description="Shear stress for a strain along y.")
 
 
 MATERIAL_FORMS = (
@@ -161,7 +161,7 @@ class MaterialConfig(Section):
     strain it has the initial modulus of that law and nu = 0.5. Beams need an isotropic material or rubber.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True, json_schema_extra=_one_form)
+    model_config = ConfigDict(json_schema_extra=_one_form)
 
     young_modulus: Stress | None = Field(None, description="Young's modulus E.")
     poisson_ratio: PoissonRatio | None = Field(
@@ -294,9 +294,9 @@ class DefinitionsConfig(Section):
 class SensitivityConfig(Section):
     """Equally spaced stiffnesses of every sensitivity curve, as multiples of sqrt(3)/2 E t."""
 
-    start: Ratio = Field("0.4", validate_default=True, alias="from", description="Smallest stiffness.")
-    stop: Ratio = Field("1.6", validate_default=True, alias="to", description="Largest stiffness.")
-    points: Points = Field("61", validate_default=True, description="Number of stiffnesses, both ends included.")
+    start: Ratio = Field("0.4", alias="from", description="Smallest stiffness.")
+    stop: Ratio = Field("1.6", alias="to", description="Largest stiffness.")
+    points: Points = Field("61", description="Number of stiffnesses, both ends included.")
 
 
 class LimitsConfig(Section):
@@ -306,9 +306,9 @@ class LimitsConfig(Section):
     """
 
     seconds: LimitSeconds = Field(
-        "3600", validate_default=True, description="Processor time, which does not depend on other load of the machine."
+        "3600", description="Processor time, which does not depend on other load of the machine."
     )
-    memory: Memory = Field("8 GB", validate_default=True, description="Memory in addition to that of the idle job.")
+    memory: Memory = Field("8 GB", description="Memory in addition to that of the idle job.")
 
 
 class MeshFileConfig(Section):
@@ -317,7 +317,7 @@ class MeshFileConfig(Section):
     file: FileName = Field(description="The file, relative to the study's folder.")
     beam: BeamName = Field(description="Beam that the mesh fills.")
     mesh_size: Length = Field(description="Length of an edge, which names the mesh in grids and in the dataset.")
-    unit: Length = Field("1 m", validate_default=True, description="Unit of the coordinates in the file.")
+    unit: Length = Field("1 m", description="Unit of the coordinates in the file.")
 
 
 GRID_PARAMETERS = (
@@ -380,7 +380,7 @@ class GridConfig(Section):
     adds these as dimensions.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True, json_schema_extra=_rows_may_give)
+    model_config = ConfigDict(json_schema_extra=_rows_may_give)
 
     beam: Annotated[list[BeamName], OneOrMore(repeats=True)] = Field(description="Beams, by name.")
     mesh_type: Annotated[list[MeshType], OneOrMore(repeats=True)] = Field(
@@ -428,11 +428,11 @@ class GridConfig(Section):
     )
     kinematics: Annotated[list[Kinematics], OneOrMore(repeats=True)] = Field(
         "nonlinear",
-        validate_default=True,
         description="`nonlinear`: springs keep their length law. `linear`: they keep their tangent at rest.",
     )
     zip: Annotated[list[list[str]], Groups(GRID_PARAMETERS)] = Field(
         [],
+        validate_default=False,
         description="Parameters whose values are paired instead of combined, such as `[mesh_size, force]`: the first "
         "with the first, and so on. Give a list of such lists for several groups.",
     )
@@ -448,7 +448,6 @@ class GridConfig(Section):
     )
     sensitivity: Flag = Field(
         "true",
-        validate_default=True,
         description="Whether each mesh, material, load and kinematics gets a sensitivity curve. "
         "Curves that `calibrated` needs are always computed.",
     )
@@ -470,7 +469,6 @@ class PartConfig(Section):
     of: PartCount = Field(description="Number of parts.")
     by: DealtBy = Field(
         "mesh",
-        validate_default=True,
         description="What a part keeps together: the scenes of a `mesh`, unless they are more than a part, or of a "
         "`grid`.",
     )
@@ -487,32 +485,39 @@ class StudyConfig(Section):
     """A study."""
 
     title: Text = Field(description="Title of the study, one line.")
-    beams: Annotated[dict[str, BeamConfig], Named("beam")] = Field({}, description="Beams.")
+    beams: Annotated[dict[str, BeamConfig], Named("beam")] = Field({}, validate_default=False, description="Beams.")
     materials: Annotated[dict[str, MaterialConfig], Named("material")] = Field(
-        {}, description="Materials that grids and sections name."
+        {}, validate_default=False, description="Materials that grids and sections name."
     )
     definitions: DefinitionsConfig = Field(
-        default_factory=DefinitionsConfig, description="Parameters of the definitions `paper` and `calibrated`."
+        default_factory=DefinitionsConfig,
+        validate_default=False,
+        description="Parameters of the definitions `paper` and `calibrated`.",
     )
     sensitivity: SensitivityConfig = Field(
-        default_factory=SensitivityConfig, description="Range of stiffness of the sensitivity curves."
+        default_factory=SensitivityConfig,
+        validate_default=False,
+        description="Range of stiffness of the sensitivity curves.",
     )
     mesh_files: Annotated[dict[str, list[MeshFileConfig]], Named("mesh type")] | None = Field(
         None, description="Your own mesh types: for each a list of files, one for each beam and mesh size."
     )
-    outputs: list[str] = Field([], validate_default=False)
+    outputs: list[str] = Field([])
     further_references: Annotated[list[FurtherReference], OneOrMore()] = Field(
         [],
+        validate_default=False,
         description="References at finite strain for every beam, material and load, besides the one of small strain. "
         "The group `/finite_strain` has them and the networks' errors; under pressure `/block` has them, too. Each "
         "takes seconds. Incompressible materials have none in plane strain. 'yeoh-plane-stress' needs a material with "
         "a `uniaxial_test` and uses its fitted law.",
     )
-    limits: LimitsConfig = Field(default_factory=LimitsConfig, description="Limits of one task.")
+    limits: LimitsConfig = Field(
+        default_factory=LimitsConfig, validate_default=False, description="Limits of one task."
+    )
     printed: FileName | None = Field(
         None, description="CSV file of printed values to compare with, relative to the study's folder."
     )
-    grids: dict[str, GridConfig] = Field({})
+    grids: dict[str, GridConfig] = Field({}, validate_default=False)
     part: PartConfig | None = Field(
         None, description="The part that this file requests; written by `springtune split`."
     )
@@ -569,7 +574,6 @@ def study_model(kinds: Sequence[Kind], given: Container[object] | None = None) -
         Annotated[list[output_name], OneOrMore()],
         Field(
             [output.name for output in outputs if output.usual],
-            validate_default=False,
             description=f"Figures and tables of the dataset: {meanings}. "
             "Figures of scenes show nonlinear kinematics if a grid has them, otherwise linear ones.",
         ),
@@ -578,7 +582,9 @@ def study_model(kinds: Sequence[Kind], given: Container[object] | None = None) -
     own = ", ".join(f"`{name}`" for name in alone)
     study_fields["grids"] = (
         Annotated[dict[str, grid], Named("grid", for_files=False)],
-        Field({}, description=f"Grids of scenes to compute. A study with one of {own} needs none."),
+        Field(
+            {}, validate_default=False, description=f"Grids of scenes to compute. A study with one of {own} needs none."
+        ),
     )
     model = create_model("StudyConfig", __base__=StudyConfig, **study_fields)
     model.__doc__ = StudyConfig.__doc__

@@ -80,7 +80,6 @@ class BenchmarkConfig(Section):
     )
     most_seconds: Seconds = Field(
         "30",
-        validate_default=True,
         description="Seconds of the processor that a run may take; what takes more is a hole that says so, and so are "
         "finer sizes of it.",
     )

@@ -27,8 +27,8 @@ class PatchConfig(Section):
     Its mesh is that of a beam of this extent: give the extent of the beam to compare with.
     """
 
-    length: Length = Field("100 mm", validate_default=True, description="Extent along x.")
-    height: Length = Field("20 mm", validate_default=True, description="Extent along y.")
+    length: Length = Field("100 mm", description="Extent along x.")
+    height: Length = Field("20 mm", description="Extent along y.")
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ def _summary(moduli):
 
 
 def _tasks(study):
-    for one in study.parts["moduli"].measurements if study.parts["moduli"] else ():
+    for one in study.parts["moduli"].measurements:
         mesh, name = _mesh_of(study, one), f"{one.mesh_type}_{1e3 * one.mesh_size:g}mm"
         yield Task(
             {"definition": one.definition, "poisson_ratio": one.poisson_ratio},
@@ -117,7 +117,11 @@ KIND = Kind(
     study_fields={
         "patch": (
             PatchConfig,
-            Field(default_factory=PatchConfig, description="Box on whose meshes moduli are measured."),
+            Field(
+                default_factory=PatchConfig,
+                validate_default=False,
+                description="Box on whose meshes moduli are measured.",
+            ),
         )
     },
     grid_fields={
@@ -125,7 +129,6 @@ KIND = Kind(
             Flag,
             Field(
                 "false",
-                validate_default=True,
                 description="Whether effective moduli are measured for each definition, mesh type, mesh size and "
                 "Poisson's ratio, on the box under `patch`. Definitions with a given stiffness have none.",
             ),

@@ -90,7 +90,7 @@ class RefinementConfig(Section):
     """
 
     beam: BeamName = Field(description="Beam.")
-    mesh_type: MadeType = Field("structured", validate_default=True, description="Generated mesh type.")
+    mesh_type: MadeType = Field("structured", description="Generated mesh type.")
     mesh_size: Length | None = Field(None, description="Length of an edge; required unless it is the parameter.")
     material: MaterialName = Field(description="Material.")
     load: Load = Field(description="Load.")
@@ -98,22 +98,18 @@ class RefinementConfig(Section):
     definition: Annotated[list[DefinitionName], OneOrMore()] = Field(
         description="Definitions that derive a stiffness and need no reference."
     )
-    kinematics: Kinematics = Field("nonlinear", validate_default=True, description="Kinematics of the network.")
+    kinematics: Kinematics = Field("nonlinear", description="Kinematics of the network.")
     parameter: ParameterName = Field(description="Parameter to vary: " + "; ".join(
         f"`{name}`, {one.meaning}" for name, one in VARIED.items()) + ".")  # fmt: skip
     start: End = Field(alias="from", description="Smallest value, with its unit.")
     stop: End = Field(alias="to", description="Largest value, with its unit.")
-    points: Count = Field("5", validate_default=True, description="Values of the first batch, both ends included.")
-    spacing: Spacing = Field(
-        "linear", validate_default=True, description="Whether values or their logarithms are evenly spaced."
-    )
-    tolerance: Share = Field("1 %", validate_default=True, description="Size of the error that matters.")
+    points: Count = Field("5", description="Values of the first batch, both ends included.")
+    spacing: Spacing = Field("linear", description="Whether values or their logarithms are evenly spaced.")
+    tolerance: Share = Field("1 %", description="Size of the error that matters.")
     resolution: Share = Field(
-        "0.1 %",
-        validate_default=True,
-        description="Width of the narrowest intervals, as a share of the distance between the ends.",
+        "0.1 %", description="Width of the narrowest intervals, as a share of the distance between the ends."
     )
-    most: Count = Field("33", validate_default=True, description="Most values of each definition.")
+    most: Count = Field("33", description="Most values of each definition.")
 
 
 @dataclass(frozen=True)
@@ -134,7 +130,7 @@ class Refinement:
 
 
 def _check(config, problems):
-    for name, section in (config.refine or {}).items():
+    for name, section in config.refine.items():
         path = "refine", name
         check_known(problems, (*path, "beam"), "beam", section.beam, config.beams)
         check_beam_material(problems, (*path, "material"), section.material, config)
@@ -202,7 +198,7 @@ def _check_definitions(section, path, problems):
 
 def _expand(config, declared):
     found = []
-    for name, section in (config.refine or {}).items():
+    for name, section in config.refine.items():
         ends = [ENDS[section.parameter].read(text) for text in (section.start, section.stop)]
         how = section.points, section.spacing == SPACINGS[1], section.tolerance, section.resolution, section.most
         beam, material = declared.beams[section.beam], declared.materials[section.material]
@@ -226,8 +222,6 @@ def _axes(refinements):
 
 
 def _summary(refinements):
-    if not refinements:
-        return []
     first, most = (sum(getattr(one.rule, name) for one in refinements) for name in ("points", "most"))
     return [["refined", first, f"values to begin with, at most {most}, where errors cross zero or a tolerance"]]
 

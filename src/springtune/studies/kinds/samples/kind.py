@@ -170,7 +170,7 @@ class ParametersConfig(Section):
     )
     height: Annotated[Drawn, Distributed("height", "{from: 20 mm, to: 80 mm}")] = Field(description="Extent along y.")
     thickness: Annotated[Drawn, Distributed("thickness", "{from: 1 mm, to: 2 mm}")] = Field(
-        "1 mm", validate_default=True, description="Extent out of the plane."
+        "1 mm", description="Extent out of the plane."
     )
     mesh_size: Annotated[Drawn, Distributed("mesh_size", "{from: 2 mm, to: 5 mm}")] | None = Field(
         None, description="Length of an edge; at most the smaller side of any beam. Give this or `relative_mesh_size`."
@@ -219,31 +219,26 @@ class SamplesConfig(Section):
 
     design: Design = Field(
         SOBOL_INDICES,
-        validate_default=True,
         description="`sobol-indices`: Saltelli's design for first- and total-order Sobol indices, with `size` x "
         "(varied parameters + 2) points; `sobol`: scrambled Sobol points; `latin-hypercube`.",
     )
     size: Size = Field(description="Number of points: a power of two. For `sobol-indices`, of base samples.")
-    seed: Seed = Field("1", validate_default=True, description="Seed of the random numbers.")
-    mesh_type: MadeType = Field("structured", validate_default=True, description="Generated mesh type.")
+    seed: Seed = Field("1", description="Seed of the random numbers.")
+    mesh_type: MadeType = Field("structured", description="Generated mesh type.")
     load: Annotated[list[Load], OneOrMore()] = Field(description="Loads; each acts on every point's scene.")
     definition: Annotated[list[DefinitionName], OneOrMore()] = Field(
         description="Definitions that need no reference and no stated stiffness."
     )
     kinematics: Kinematics = Field(
         "linear",
-        validate_default=True,
         description="`linear` solves scenes once that differ in thickness, Young's modulus and force alone; "
         "`nonlinear` solves each scene, which takes some ten times as long.",
     )
     best_stiffness: Flag = Field(
-        "true",
-        validate_default=True,
-        description="Whether to find the uniform stiffness without an error, too; with linear kinematics only.",
+        "true", description="Whether to find the uniform stiffness without an error, too; with linear kinematics only."
     )
     failures: FailurePolicy = Field(
         DROP,
-        validate_default=True,
         description="If scenes have no value, `drop` leaves their whole base samples out of indices, and `withhold` "
         "gives no indices. Both count them.",
     )
@@ -284,8 +279,6 @@ class Sample:
 
 def _check(config, problems):
     section = config.samples
-    if not section:
-        return
     where, sample = ("samples", "parameters"), _sample(section)
     if (section.parameters.mesh_size is None) == (section.parameters.relative_mesh_size is None):
         if section.parameters.mesh_size is not None:
@@ -360,8 +353,6 @@ def _sample(section):
 
 
 def _expand(config, declared):
-    if not config.samples:
-        return None
     sample = _sample(config.samples)
     sides = [sample.parameters[name] for name in ("length", "height")]
     smallest = tuple(side["low"] for side in sides)
@@ -423,8 +414,6 @@ def result_key(sample, load, definition):
 def _references(study):
     """Tasks of the references, one a kind of load."""
     sample = study.parts["samples"]
-    if not sample:
-        return
     drawn, box = None, reference_box(sample)
     if sample.rows <= MOST_SOLVED:
         drawn = {"design": sample.design, "seed": sample.seed, "parameters": sample.parameters}
@@ -438,8 +427,6 @@ def _references(study):
 def _blocks(study):
     """Tasks of some base samples each; those of a sample of half the size are the first of them."""
     sample = study.parts["samples"]
-    if not sample:
-        return
     scenes = {
         result_key(sample, load, definition): _load_of(sample, load) | {"definition": definition}
         for load in sample.loads

@@ -134,7 +134,7 @@ def _mesh_members(study, costs):
     """Meshes with their scenes, and the cost of both."""
     part = study.parts["shapes"]
     members = {}
-    for name, scenes in by_mesh(part).items() if part else ():
+    for name, scenes in by_mesh(part).items():
         count = particles(part, scenes[0])
         seconds = costs.of("shape_mesh", count)
         seconds += sum(costs.of("shape_scene", count) + costs.of(one.definition, count) for one in scenes)
@@ -152,7 +152,7 @@ def _meshes(study, folder, members):
 
 def _reference_tasks(study):
     part = study.parts["shapes"]
-    for one in part.referred if part else ():
+    for one in part.referred:
         task = reference_task(part, *one)
         yield Task(task, costs=[("shape_reference", 0)], name="/".join(one), key=task["key"])
 
@@ -230,10 +230,9 @@ STAGES = (
 
 
 def _check(config, problems):
-    if config.shapes or config.shape_grids:
-        from .expand import check
+    from .expand import check
 
-        check(config, problems)
+    check(config, problems)
 
 
 def _expand(config, declared):

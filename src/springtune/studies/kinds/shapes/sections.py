@@ -204,11 +204,7 @@ class PressureConfig(Section):
     model_config = {"json_schema_extra": _or_text()}
 
     pressure: PressureValue = Field(description="Pressure.")
-    follower: Flag = Field(
-        "false",
-        validate_default=True,
-        description="Whether it turns and grows with the sides, in nonlinear kinematics.",
-    )
+    follower: Flag = Field("false", description="Whether it turns and grows with the sides, in nonlinear kinematics.")
 
     @model_validator(mode="before")
     @classmethod
@@ -299,9 +295,7 @@ class ShapeLoadConfig(Section):
         {}, description="Pressures, by group; positive towards the body."
     )
     gravity: Gravity = Field(
-        ["0", "0"],
-        validate_default=True,
-        description="Acceleration along x and y, such as `[0, -9.81 m/s^2]`; needs densities.",
+        ["0", "0"], description="Acceleration along x and y, such as `[0, -9.81 m/s^2]`; needs densities."
     )
     quantities: Annotated[dict[str, QuantityConfig], Named("quantity")] = Field(
         description="Quantities of interest, by name; the first one stands for all where one is wanted."
@@ -311,7 +305,7 @@ class ShapeLoadConfig(Section):
 class ShapeConfig(Section):
     """A body of any outline, or that of a mesh file, with named groups of its sides and points."""
 
-    thickness: Length = Field("1 mm", validate_default=True, description="Extent out of the plane.")
+    thickness: Length = Field("1 mm", description="Extent out of the plane.")
     outline: Annotated[list[SegmentConfig], SIDE_WORDS] | None = Field(
         None, description="Round of its sides, counter-clockwise."
     )
@@ -321,7 +315,7 @@ class ShapeConfig(Section):
         description="Mesh file in the place of an outline, of a format that meshio reads, its path relative to the "
         "study's folder; its groups are the shape's.",
     )
-    unit: Length = Field("1 m", validate_default=True, description="Unit of the coordinates in the file.")
+    unit: Length = Field("1 m", description="Unit of the coordinates in the file.")
     points: Annotated[dict[str, Place], Words("places such as [48 mm, 52 mm], by name")] = Field(
         {}, description="Named points of an outline or inside of it: particles of every mesh."
     )
@@ -370,13 +364,10 @@ class ShapeGridConfig(Section):
         description="Definitions that derive a stiffness on triangles and need no reference."
     )
     kinematics: Annotated[list[Kinematics], OneOrMore()] = Field(
-        "nonlinear",
-        validate_default=True,
-        description="Whether springs keep their length law or their tangent at rest.",
+        "nonlinear", description="Whether springs keep their length law or their tangent at rest."
     )
     reference: Flag = Field(
         "true",
-        validate_default=True,
         description="Whether there is a converged reference; else errors are those against `expected` values alone.",
     )
 

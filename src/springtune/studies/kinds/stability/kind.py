@@ -30,20 +30,17 @@ class StabilityConfig(Section):
         description="Definitions that derive a stiffness and need no reference; the first one stands for all where an "
         "experiment is not about definitions."
     )
-    mesh_type: MeshType = Field("structured", validate_default=True, description="Mesh type of triangles.")
+    mesh_type: MeshType = Field("structured", description="Mesh type of triangles.")
     mesh_size: Annotated[list[Length], OneOrMore()] = Field(
         description="Lengths of an edge; most experiments take the coarsest."
     )
     experiment: Annotated[list[ExperimentName], OneOrMore()] = Field(
         list(EXPERIMENTS),
-        validate_default=False,
         description="; ".join(f"`{name}`: {text}" for name, text in EXPERIMENTS.items()) + ". All of them without.",
     )
 
 
 def _check(config, problems):
-    if not config.stability:
-        return
     section = config.stability
     check_known(problems, ("stability", "beam"), "beam", section.beam, config.beams)
     check_beam_material(problems, ("stability", "material"), section.material, config)
@@ -65,8 +62,6 @@ def _check(config, problems):
 def _expand(config, declared):
     """Experiments: one a definition, or one in all."""
     section = config.stability
-    if not section:
-        return ()
     beam, material = declared.beams[section.beam], declared.materials[section.material]
     sizes = tuple(sorted(section.mesh_size))
     return tuple(
