@@ -154,7 +154,7 @@ def check_particles(
 ) -> None:
     """Refuse mesh sizes that give too many particles."""
     if refusal := _too_many(min(sizes), length, height):
-        problems.add(path, f"{_in_mm(min(sizes))} gives {refusal}")
+        problems.add(path, f"{in_mm(min(sizes))} gives {refusal}")
 
 
 def _too_many(size: float, length: float, height: float) -> str:
@@ -242,20 +242,21 @@ def check_meshes(config: StudyConfig, content: dict[str, Any], grids: Iterable[G
         written = content["grids"][name]["mesh_size"]
         for number, size in enumerate(grid.mesh_size):
             listed = isinstance(written, list)
-            shown = f"'{written[number]}'" if listed else f"'{written}'" if isinstance(written, str) else _in_mm(size)
+            shown = f"'{written[number]}'" if listed else f"'{written}'" if isinstance(written, str) else in_mm(size)
             path = ("grids", name, "mesh_size", number) if listed else ("grids", name, "mesh_size")
             for beam in dict.fromkeys(grid.beam):
                 if (size, beam) not in made:
                     continue
                 length, height = config.beams[beam].length, config.beams[beam].height
                 if size > min(length, height):
-                    side = _in_mm(min(length, height))
+                    side = in_mm(min(length, height))
                     problems.add(path, f"{shown} is larger than beam '{beam}'; give at most its smaller side, {side}")
                 elif refusal := _too_many(size, length, height):
                     problems.add(path, f"{shown} gives beam '{beam}' {refusal}")
 
 
-def _in_mm(length: float) -> str:
+def in_mm(length: float) -> str:
+    """Length as messages show it."""
     return f"{1e3 * length:g} mm"
 
 

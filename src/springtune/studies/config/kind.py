@@ -73,11 +73,6 @@ class Output:
     usual: bool = False
 
     @property
-    def made_by(self) -> str:
-        """Name of the job that makes it."""
-        return self.job or self.name
-
-    @property
     def module(self) -> str:
         """Module that draws the figures."""
         return self.plot.partition(":")[0]
@@ -112,9 +107,9 @@ class Stage:
         From a study and `springtune.studies.runs.plan.Costs` to expected seconds and a value by name; None for a
         stage with the bundles of another one.
     like : str
-        Stage whose bundles it shares.
-    same, every : tuple of str
-        Stages that it needs: the job of the same bundle, or all jobs.
+        Stage whose bundles it shares, and whose job of the same bundle it needs.
+    every : tuple of str
+        Stages that it needs all jobs of, besides the job of the same bundle.
     alone : bool
         Whether a job has one member and the whole machine, so that its seconds can be measured.
     folder : str
@@ -130,7 +125,6 @@ class Stage:
     products: Callable[[dict[str, Any]], Iterable[Path]]
     members: Callable[[Study, Any], Mapping[str, tuple[float, Any]]] | None = None
     like: str = ""
-    same: tuple[str, ...] = ()
     every: tuple[str, ...] = ()
     alone: bool = False
     folder: str = ""

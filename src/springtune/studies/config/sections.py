@@ -56,7 +56,6 @@ from .kind import Kind, Output, kinds
 from .messages import refuse, show
 
 MOST_PARTS = 1000
-"""Most parts that a study is split into."""
 
 PLAUSIBLE = 20.0
 """Factor on sqrt(3)/2 E t beyond which a stated stiffness counts as an error of units."""
@@ -87,7 +86,7 @@ def _parts(annotation: Any) -> tuple[Any, tuple[Any, ...]]:
 class Section(BaseModel):
     """A mapping of known keys in a study."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True, validate_default=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
     @model_validator(mode="before")
     @classmethod
@@ -111,6 +110,11 @@ class Section(BaseModel):
         return {name: "" for name, field in names.items() if field.is_required()}
 
 
+def default(value: Any, description: str, **options: Any) -> Any:
+    """Field with a default, written as in a study."""
+    return Field(value, validate_default=True, description=description, **options)
+
+
 def optional(section: Any, description: str) -> tuple[Any, Any]:
     """Type and field of a section that a study may leave out."""
     return section | None, Field(None, description=description)
@@ -121,7 +125,7 @@ class BeamConfig(Section):
 
     length: Length = Field(description="Extent along x, the direction of the load.")
     height: Length = Field(description="Extent along y.")
-    thickness: Length = Field("1 mm", description="Extent out of the plane.")
+    thickness: Length = default("1 mm", description="Extent out of the plane.")
 
 
 class StiffnessConfig(Section):
@@ -131,8 +135,8 @@ class StiffnessConfig(Section):
     C22: Stress = Field(description="Stress along y for a strain along y.")
     C12: SignedStress = Field(description="Stress along x for a strain along y.")
     C66: Stress = Field(description="Shear stress for a shear angle.")
-    C16: SignedStress = Field("0 Pa", description="Shear stress for a strain along x.")
-    C26: SignedStress = Field("0 Pa", description="Shear stress for a strain along y.")
+    C16: SignedStress = default("0 Pa", description="Shear stress for a strain along x.")
+    C26: SignedStress = default("0 Pa", description="Shear stress for a strain along y.")
 
 
 MATERIAL_FORMS = (
@@ -145,7 +149,6 @@ MATERIAL_FORMS = (
 
 
 OF_A_TEST = ("terms", "equibiaxial_test", "pure_shear_test")
-"""Keys that need a `uniaxial_test`."""
 
 
 def _one_form(schema: dict[str, Any]) -> None:
@@ -294,9 +297,9 @@ class DefinitionsConfig(Section):
 class SensitivityConfig(Section):
     """Equally spaced stiffnesses of every sensitivity curve, as multiples of sqrt(3)/2 E t."""
 
-    start: Ratio = Field("0.4", alias="from", description="Smallest stiffness.")
-    stop: Ratio = Field("1.6", alias="to", description="Largest stiffness.")
-    points: Points = Field("61", description="Number of stiffnesses, both ends included.")
+    start: Ratio = default("0.4", alias="from", description="Smallest stiffness.")
+    stop: Ratio = default("1.6", alias="to", description="Largest stiffness.")
+    points: Points = default("61", description="Number of stiffnesses, both ends included.")
 
 
 class LimitsConfig(Section):
@@ -305,10 +308,10 @@ class LimitsConfig(Section):
     Results do not depend on limits. After a change of limits only the tasks that went beyond them are computed again.
     """
 
-    seconds: LimitSeconds = Field(
+    seconds: LimitSeconds = default(
         "3600", description="Processor time, which does not depend on other load of the machine."
     )
-    memory: Memory = Field("8 GB", description="Memory in addition to that of the idle job.")
+    memory: Memory = default("8 GB", description="Memory in addition to that of the idle job.")
 
 
 class MeshFileConfig(Section):
@@ -317,7 +320,7 @@ class MeshFileConfig(Section):
     file: FileName = Field(description="The file, relative to the study's folder.")
     beam: BeamName = Field(description="Beam that the mesh fills.")
     mesh_size: Length = Field(description="Length of an edge, which names the mesh in grids and in the dataset.")
-    unit: Length = Field("1 m", description="Unit of the coordinates in the file.")
+    unit: Length = default("1 m", description="Unit of the coordinates in the file.")
 
 
 GRID_PARAMETERS = (
@@ -426,19 +429,17 @@ class GridConfig(Section):
     definition: Annotated[list[DefinitionName], OneOrMore(repeats=True)] = Field(
         description="Rules for the stiffness of every spring; `springtune definitions` lists them."
     )
-    kinematics: Annotated[list[Kinematics], OneOrMore(repeats=True)] = Field(
+    kinematics: Annotated[list[Kinematics], OneOrMore(repeats=True)] = default(
         "nonlinear",
         description="`nonlinear`: springs keep their length law. `linear`: they keep their tangent at rest.",
     )
     zip: Annotated[list[list[str]], Groups(GRID_PARAMETERS)] = Field(
         [],
-        validate_default=False,
         description="Parameters whose values are paired instead of combined, such as `[mesh_size, force]`: the first "
         "with the first, and so on. Give a list of such lists for several groups.",
     )
     exclude: Annotated[list[ExcludeConfig], Sections()] = Field(
-        [],
-        description="Combinations to leave out, such as `{mesh_type: free, mesh_size: 1 mm}`; a list for several.",
+        [], description="Combinations to leave out, such as `{mesh_type: free, mesh_size: 1 mm}`; a list for several."
     )
     rows: FileName | None = Field(
         None,
@@ -446,7 +447,7 @@ class GridConfig(Section):
         "its key, and one row for each combination. Units stand beside the numbers (`5 mm`) or in the head "
         "(`mesh_size [mm]`). Other parameters of the grid are combined with each row.",
     )
-    sensitivity: Flag = Field(
+    sensitivity: Flag = default(
         "true",
         description="Whether each mesh, material, load and kinematics gets a sensitivity curve. "
         "Curves that `calibrated` needs are always computed.",
@@ -467,7 +468,7 @@ class PartConfig(Section):
 
     number: PartNumber = Field(description="Number of the part.")
     of: PartCount = Field(description="Number of parts.")
-    by: DealtBy = Field(
+    by: DealtBy = default(
         "mesh",
         description="What a part keeps together: the scenes of a `mesh`, unless they are more than a part, or of a "
         "`grid`.",
@@ -485,19 +486,15 @@ class StudyConfig(Section):
     """A study."""
 
     title: Text = Field(description="Title of the study, one line.")
-    beams: Annotated[dict[str, BeamConfig], Named("beam")] = Field({}, validate_default=False, description="Beams.")
+    beams: Annotated[dict[str, BeamConfig], Named("beam")] = Field({}, description="Beams.")
     materials: Annotated[dict[str, MaterialConfig], Named("material")] = Field(
-        {}, validate_default=False, description="Materials that grids and sections name."
+        {}, description="Materials that grids and sections name."
     )
     definitions: DefinitionsConfig = Field(
-        default_factory=DefinitionsConfig,
-        validate_default=False,
-        description="Parameters of the definitions `paper` and `calibrated`.",
+        default_factory=DefinitionsConfig, description="Parameters of the definitions `paper` and `calibrated`."
     )
     sensitivity: SensitivityConfig = Field(
-        default_factory=SensitivityConfig,
-        validate_default=False,
-        description="Range of stiffness of the sensitivity curves.",
+        default_factory=SensitivityConfig, description="Range of stiffness of the sensitivity curves."
     )
     mesh_files: Annotated[dict[str, list[MeshFileConfig]], Named("mesh type")] | None = Field(
         None, description="Your own mesh types: for each a list of files, one for each beam and mesh size."
@@ -505,19 +502,16 @@ class StudyConfig(Section):
     outputs: list[str] = Field([])
     further_references: Annotated[list[FurtherReference], OneOrMore()] = Field(
         [],
-        validate_default=False,
         description="References at finite strain for every beam, material and load, besides the one of small strain. "
         "The group `/finite_strain` has them and the networks' errors; under pressure `/block` has them, too. Each "
         "takes seconds. Incompressible materials have none in plane strain. 'yeoh-plane-stress' needs a material with "
         "a `uniaxial_test` and uses its fitted law.",
     )
-    limits: LimitsConfig = Field(
-        default_factory=LimitsConfig, validate_default=False, description="Limits of one task."
-    )
+    limits: LimitsConfig = Field(default_factory=LimitsConfig, description="Limits of one task.")
     printed: FileName | None = Field(
         None, description="CSV file of printed values to compare with, relative to the study's folder."
     )
-    grids: dict[str, GridConfig] = Field({}, validate_default=False)
+    grids: dict[str, GridConfig] = Field({})
     part: PartConfig | None = Field(
         None, description="The part that this file requests; written by `springtune split`."
     )
@@ -539,7 +533,6 @@ class StudyConfig(Section):
 
 
 GRIDS_NEED = ("beams", "materials")
-"""Keys that a study with grids needs."""
 
 
 class Later(NamedTuple):
@@ -582,9 +575,7 @@ def study_model(kinds: Sequence[Kind], given: Container[object] | None = None) -
     own = ", ".join(f"`{name}`" for name in alone)
     study_fields["grids"] = (
         Annotated[dict[str, grid], Named("grid", for_files=False)],
-        Field(
-            {}, validate_default=False, description=f"Grids of scenes to compute. A study with one of {own} needs none."
-        ),
+        Field({}, description=f"Grids of scenes to compute. A study with one of {own} needs none."),
     )
     model = create_model("StudyConfig", __base__=StudyConfig, **study_fields)
     model.__doc__ = StudyConfig.__doc__

@@ -7,7 +7,6 @@ PACKAGE = Path(__file__).parents[2]
 CONFIG_FOLDER = Path("config")
 
 USUAL_STUDY = "paper.yaml"
-"""Study of a run without another one."""
 
 COPY = PACKAGE / "workflow"
 """The workflow in the package of a wheel, see ``hatch_build.py``."""

@@ -13,7 +13,7 @@ from springtune.springs import DEFINITIONS
 from ...config.checks import check_beam_material, check_for_triangles, check_known, check_particles, check_product
 from ...config.fields import BeamName, DefinitionName, Length, MaterialName, OneOrMore, Stress, number, one_of
 from ...config.kind import Kind
-from ...config.sections import Section, optional
+from ...config.sections import Section, default, optional
 from ...runs.keys import definition_key, material_key, mesh_type_key
 from ...runs.stages import Task, stage
 from .outputs import OUTPUTS
@@ -56,14 +56,14 @@ class LayingConfig(Section):
         description="Definitions that derive a stiffness and need no reference."
     )
     mesh_size: Annotated[list[Length], OneOrMore()] = Field(description="Lengths of an edge.")
-    reference_size: Length = Field("1 mm", description="Length of an edge of the reference's finest mesh.")
-    loading: Annotated[list[Loading], OneOrMore()] = Field(
+    reference_size: Length = default("1 mm", description="Length of an edge of the reference's finest mesh.")
+    loading: Annotated[list[Loading], OneOrMore()] = default(
         "pressure",
         description="`pressure`: on the upper face, following it; `gravity`: the same force as weight; `ends`: draws "
         "the ends down to the floor.",
     )
     pressure: Stress = Field(description="Pressure, or weight over the upper face.")
-    friction: Annotated[list[Friction], OneOrMore()] = Field("0", description="Coulomb's coefficients of friction.")
+    friction: Annotated[list[Friction], OneOrMore()] = default("0", description="Coulomb's coefficients of friction.")
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from ...config.checks import check_particles
 from ...config.fields import Flag, Length
 from ...config.kind import Kind
 from ...config.model import MeshSpec
-from ...config.sections import Section
+from ...config.sections import Section, default
 from ...runs.keys import definition_key, mesh_type_key
 from ...runs.stages import Task, stage
 from ..scenes.plan import mesh_key, mesh_parameters, mesh_source, particles
@@ -27,8 +27,8 @@ class PatchConfig(Section):
     Its mesh is that of a beam of this extent: give the extent of the beam to compare with.
     """
 
-    length: Length = Field("100 mm", description="Extent along x.")
-    height: Length = Field("20 mm", description="Extent along y.")
+    length: Length = default("100 mm", description="Extent along x.")
+    height: Length = default("20 mm", description="Extent along y.")
 
 
 @dataclass(frozen=True)
@@ -117,17 +117,13 @@ KIND = Kind(
     study_fields={
         "patch": (
             PatchConfig,
-            Field(
-                default_factory=PatchConfig,
-                validate_default=False,
-                description="Box on whose meshes moduli are measured.",
-            ),
+            Field(default_factory=PatchConfig, description="Box on whose meshes moduli are measured."),
         )
     },
     grid_fields={
         "moduli": (
             Flag,
-            Field(
+            default(
                 "false",
                 description="Whether effective moduli are measured for each definition, mesh type, mesh size and "
                 "Poisson's ratio, on the box under `patch`. Definitions with a given stiffness have none.",

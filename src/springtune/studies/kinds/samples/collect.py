@@ -270,7 +270,6 @@ def _indices(sample, data, axes):
 
 
 RESAMPLES = 1000
-"""Bootstrap samples."""
 
 LEVEL = 0.95
 """Share of bootstrap samples within a band."""

@@ -15,11 +15,11 @@ from springtune.problem.parameters import MOST_SCENES
 from springtune.problem.quantities import LEAST, nearest
 from springtune.springs import DEFINITIONS
 
-from ...config.checks import MORE_SCENES, check_able, most_scenes
+from ...config.checks import MORE_SCENES, check_able, in_mm, most_scenes
 from ...config.fields import DefinitionName, Flag, Kinematics, Load, OneOrMore, Scalar, number, one_of, quantity
 from ...config.kind import Kind
 from ...config.messages import refuse, show
-from ...config.sections import Section, optional
+from ...config.sections import Section, default, optional
 from ...runs.checked_json import hash_of
 from ...runs.keys import definition_key, mesh_type_key, stage_key
 from ...runs.stages import Task, stage
@@ -33,7 +33,6 @@ DISTRIBUTION_KEYS = {
     "triangular": ("from", "mode", "to"),
     "normal": ("mean", "deviation"),
 }
-"""Keys that each distribution needs."""
 
 DEVIATIONS = 4.0
 """Standard deviations from the mean at which a normal distribution ends by default."""
@@ -169,7 +168,7 @@ class ParametersConfig(Section):
         description="Extent along x, the direction of the load."
     )
     height: Annotated[Drawn, Distributed("height", "{from: 20 mm, to: 80 mm}")] = Field(description="Extent along y.")
-    thickness: Annotated[Drawn, Distributed("thickness", "{from: 1 mm, to: 2 mm}")] = Field(
+    thickness: Annotated[Drawn, Distributed("thickness", "{from: 1 mm, to: 2 mm}")] = default(
         "1 mm", description="Extent out of the plane."
     )
     mesh_size: Annotated[Drawn, Distributed("mesh_size", "{from: 2 mm, to: 5 mm}")] | None = Field(
@@ -223,18 +222,18 @@ class SamplesConfig(Section):
         "(varied parameters + 2) points; `sobol`: scrambled Sobol points; `latin-hypercube`.",
     )
     size: Size = Field(description="Number of points: a power of two. For `sobol-indices`, of base samples.")
-    seed: Seed = Field("1", description="Seed of the random numbers.")
-    mesh_type: MadeType = Field("structured", description="Generated mesh type.")
+    seed: Seed = default("1", description="Seed of the random numbers.")
+    mesh_type: MadeType = default("structured", description="Generated mesh type.")
     load: Annotated[list[Load], OneOrMore()] = Field(description="Loads; each acts on every point's scene.")
     definition: Annotated[list[DefinitionName], OneOrMore()] = Field(
         description="Definitions that need no reference and no stated stiffness."
     )
-    kinematics: Kinematics = Field(
+    kinematics: Kinematics = default(
         "linear",
         description="`linear` solves scenes once that differ in thickness, Young's modulus and force alone; "
         "`nonlinear` solves each scene, which takes some ten times as long.",
     )
-    best_stiffness: Flag = Field(
+    best_stiffness: Flag = default(
         "true", description="Whether to find the uniform stiffness without an error, too; with linear kinematics only."
     )
     failures: FailurePolicy = Field(
@@ -320,24 +319,20 @@ def _check_sizes(sample, problems):
     if relative:
         largest = size["high"] * height["high"]
         if largest > length["low"]:
-            problems.add(path, f"{size['high']:g} of a height of {_mm(height['high'])} is {_mm(largest)}, larger than "
-                         f"a length of {_mm(length['low'])}; give a smaller 'to', or longer beams")  # fmt: skip
+            problems.add(path, f"{size['high']:g} of a height of {in_mm(height['high'])} is {in_mm(largest)}, larger "
+                         f"than a length of {in_mm(length['low'])}; give a smaller 'to', or longer beams")  # fmt: skip
     else:
         largest, side = size["high"], min(length["low"], height["low"])
         if largest > side:
-            problems.add(path, f"up to {_mm(largest)} is larger than the smallest side of a beam, {_mm(side)}; give at "
-                         f"most {_mm(side)}, or a 'relative_mesh_size'")  # fmt: skip
+            problems.add(path, f"up to {in_mm(largest)} is larger than the smallest side of a beam, {in_mm(side)}; "
+                         f"give at most {in_mm(side)}, or a 'relative_mesh_size'")  # fmt: skip
     box = length["high"], height["low" if relative else "high"]
     smallest = size["low"] * (height["low"] if relative else 1.0)
     particles = MESH_TYPES[sample.mesh_type].particles(*box, smallest) if smallest**2 else float("inf")
     if particles > MOST_MESHED:
-        low, beam = f"{size['low']:g}" if relative else _mm(size["low"]), f"{_mm(box[0])} x {_mm(box[1])}"
+        low, beam = f"{size['low']:g}" if relative else in_mm(size["low"]), f"{in_mm(box[0])} x {in_mm(box[1])}"
         most = f"more than {MOST_MESHED:.0e}"
         problems.add(path, f"{low} makes {particles:.0e} particles of a beam {beam}, {most}; give a larger 'from'")
-
-
-def _mm(length: float) -> str:
-    return f"{1e3 * length:g} mm"
 
 
 def _sample(section):

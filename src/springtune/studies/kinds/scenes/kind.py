@@ -65,11 +65,7 @@ def summary(study: Study, further: list[list[object]]) -> str:
     rows: list[list[object]] = [
         ["scenes", len(study.scenes), again],
         ["meshes", meshes, f"each serves {users / meshes:.3g} scenes and curves on average"],
-        [
-            "references",
-            len(study.references),
-            f"from {solutions}: small strain scales with force, E t and size",
-        ],
+        ["references", len(study.references), f"from {solutions}: small strain scales with force, E t and size"],
         ["curves", len(study.curves), f"of {len(study.stiffness_ratios)} stiffnesses, each one continuation in F/k"],
         ["networks", networks, "to factorize at rest, at most: loads and uniform stiffnesses share one a mesh"],
     ]

@@ -66,9 +66,7 @@ def mesh_source(part, one):
 def mesh_key(part, one):
     """Key of a scene's mesh."""
     return hash_of(
-        parameters(mesh_source(part, one)),
-        stage_key("studies.kinds.shapes.mesh"),
-        _reader(part.shape[one.shape]),
+        parameters(mesh_source(part, one)), stage_key("studies.kinds.shapes.mesh"), _reader(part.shape[one.shape])
     )
 
 
@@ -219,12 +217,7 @@ STAGES = (
     ),
     mesh_stage("shape_mesh", "studies.kinds.shapes.mesh", "Meshing shapes", _meshes, _mesh_members),
     stage_on_meshes(
-        "shape_solve",
-        "studies.kinds.shapes.solve",
-        "Solving the networks of shapes",
-        _solve,
-        "solutions",
-        "shape_mesh",
+        "shape_solve", "studies.kinds.shapes.solve", "Solving the networks of shapes", _solve, "solutions", "shape_mesh"
     ),
 )
 
@@ -274,10 +267,7 @@ KIND = Kind(
         ),
         "shape_grids": (
             Later("studies.kinds.shapes.sections", "NAMED_GRIDS"),
-            Field(
-                None,
-                description="What is to be computed of the shapes; it makes the group `/shapes`.",
-            ),
+            Field(None, description="What is to be computed of the shapes; it makes the group `/shapes`."),
         ),
     },
     alone={"shape_grids": ("shapes", "materials")},

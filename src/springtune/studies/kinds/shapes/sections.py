@@ -23,7 +23,7 @@ from ...config.fields import (
     one_of,
 )
 from ...config.messages import refuse, show
-from ...config.sections import Section
+from ...config.sections import Section, default
 
 OUTLINED = {"free": "Delaunay triangles inside of the outline"}
 """Mesh types of outlines, and what they are."""
@@ -204,7 +204,7 @@ class PressureConfig(Section):
     model_config = {"json_schema_extra": _or_text()}
 
     pressure: PressureValue = Field(description="Pressure.")
-    follower: Flag = Field("false", description="Whether it turns and grows with the sides, in nonlinear kinematics.")
+    follower: Flag = default("false", description="Whether it turns and grows with the sides, in nonlinear kinematics.")
 
     @model_validator(mode="before")
     @classmethod
@@ -294,7 +294,7 @@ class ShapeLoadConfig(Section):
     pressures: Annotated[dict[str, PressureConfig], Words("a stress, or a section, by group; see below")] = Field(
         {}, description="Pressures, by group; positive towards the body."
     )
-    gravity: Gravity = Field(
+    gravity: Gravity = default(
         ["0", "0"], description="Acceleration along x and y, such as `[0, -9.81 m/s^2]`; needs densities."
     )
     quantities: Annotated[dict[str, QuantityConfig], Named("quantity")] = Field(
@@ -305,7 +305,7 @@ class ShapeLoadConfig(Section):
 class ShapeConfig(Section):
     """A body of any outline, or that of a mesh file, with named groups of its sides and points."""
 
-    thickness: Length = Field("1 mm", description="Extent out of the plane.")
+    thickness: Length = default("1 mm", description="Extent out of the plane.")
     outline: Annotated[list[SegmentConfig], SIDE_WORDS] | None = Field(
         None, description="Round of its sides, counter-clockwise."
     )
@@ -315,7 +315,7 @@ class ShapeConfig(Section):
         description="Mesh file in the place of an outline, of a format that meshio reads, its path relative to the "
         "study's folder; its groups are the shape's.",
     )
-    unit: Length = Field("1 m", description="Unit of the coordinates in the file.")
+    unit: Length = default("1 m", description="Unit of the coordinates in the file.")
     points: Annotated[dict[str, Place], Words("places such as [48 mm, 52 mm], by name")] = Field(
         {}, description="Named points of an outline or inside of it: particles of every mesh."
     )
@@ -363,10 +363,10 @@ class ShapeGridConfig(Section):
     definition: Annotated[list[DefinitionName], OneOrMore()] = Field(
         description="Definitions that derive a stiffness on triangles and need no reference."
     )
-    kinematics: Annotated[list[Kinematics], OneOrMore()] = Field(
+    kinematics: Annotated[list[Kinematics], OneOrMore()] = default(
         "nonlinear", description="Whether springs keep their length law or their tangent at rest."
     )
-    reference: Flag = Field(
+    reference: Flag = default(
         "true",
         description="Whether there is a converged reference; else errors are those against `expected` values alone.",
     )
