@@ -112,8 +112,7 @@ def check_counts(config: StudyConfig, content: dict[str, Any], problems: Problem
     try:
         most = most_scenes()
     except ValueError as error:
-        problems.add((), str(error))
-        problems.stop()
+        problems.stop_at((), str(error))
     before = 0
     for name, grid in config.grids.items():
         number, lengths = count(grid)
@@ -133,11 +132,9 @@ def _check_labels(config: StudyConfig, problems: Problems) -> None:
     """Estimate the size of the dataset before grids are expanded."""
     if not config.grids or any(grid.exclude for grid in config.grids.values()):
         return  # exclusions may leave labels out
-    lists = {name: {value for grid in config.grids.values() for value in values_of(grid, name)} for name in LABELLED}
+    labelled = (name for name in GRID_PARAMETERS if name != "pressure")
+    lists = {name: {value for grid in config.grids.values() for value in values_of(grid, name)} for name in labelled}
     check_cells(config, {name: values for name, values in lists.items() if values}, False, problems)
-
-
-LABELLED = tuple(name for name in GRID_PARAMETERS if name != "pressure")
 
 
 def check_product(problems: Problems, section: object, path: Sequence[Key], labels: Iterable[str], most: int) -> None:

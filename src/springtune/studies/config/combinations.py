@@ -139,8 +139,7 @@ def read_lines(
         text = read(path, LARGEST_CSV).decode("utf-8-sig")
     except ValueError as error:
         why = "not UTF-8 text" if isinstance(error, UnicodeDecodeError) else error
-        problems.add(where, f"'{path}' cannot be read: {why}; {remedy}")
-        problems.stop()
+        problems.stop_at(where, f"'{path}' cannot be read: {why}; {remedy}")
     # Empty lines in place of comments, so that the reader's line numbers are the file's.
     reader = csv.reader("\n" if line.startswith("#") else line for line in text.splitlines(keepends=True))
     try:

@@ -292,12 +292,11 @@ def build(
     bodies = declared(config, problems.folder)
     parts = {kind.name: kind.expand(config, bodies) if kind.wanted(config) else () for kind in kinds}
     if config.printed and names:
-        problems.add(
+        problems.stop_at(
             ("printed",),
             f"printed cells know no {' or '.join(names)}, which grids sweep; give the sweep a study of its own, or "
             "remove the key",
         )
-        problems.stop()
     made = [output.name for kind in kinds for output in kind.outputs]
     first, last, points = config.sensitivity.start, config.sensitivity.stop, config.sensitivity.points
     steps = [first + (last - first) * step / (points - 1) for step in range(points)]

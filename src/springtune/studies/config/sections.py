@@ -106,8 +106,7 @@ class Section(BaseModel):
     @classmethod
     def _needed(cls, given: Mapping[str, object]) -> dict[str, str]:
         """Required keys, each with a remedy besides giving it."""
-        names = {field.alias or name: field for name, field in cls.model_fields.items()}
-        return {name: "" for name, field in names.items() if field.is_required()}
+        return {field.alias or name: "" for name, field in cls.model_fields.items() if field.is_required()}
 
 
 def default(value: Any, description: str, **options: Any) -> Any:
@@ -323,24 +322,6 @@ class MeshFileConfig(Section):
     unit: Length = default("1 m", description="Unit of the coordinates in the file.")
 
 
-GRID_PARAMETERS = (
-    "beam",
-    "mesh_type",
-    "mesh_size",
-    "material",
-    "load",
-    "force",
-    "pressure",
-    "thickness",
-    "young_modulus",
-    "poisson_ratio",
-    "stiffness_scale",
-    "definition",
-    "kinematics",
-)
-"""Keys of a grid whose values are combined."""
-
-
 class ExcludeConfig(Section):
     """Combinations that a grid leaves out: those with one of the given values of every given parameter."""
 
@@ -360,9 +341,13 @@ class ExcludeConfig(Section):
 
     @model_validator(mode="after")
     def _something(self) -> Self:
-        if all(getattr(self, name) is None for name in GRID_PARAMETERS):
+        if all(values is None for _, values in self):
             raise refuse("no parameter at all would leave nothing; give values of one such as {mesh_size: 1 mm}")
         return self
+
+
+GRID_PARAMETERS = tuple(ExcludeConfig.model_fields)
+"""Keys of a grid whose values are combined."""
 
 
 def _rows_may_give(schema: dict[str, Any]) -> None:

@@ -108,10 +108,7 @@ def _networks(study: Study) -> int:
 
 def _within(study: Study) -> int:
     """Number of printed cells that the study has scenes for."""
-    cells = {
-        (scene.mesh.beam.name, scene.mesh.mesh_type, scene.mesh.mesh_size, scene.material.name, scene.load)
-        for scene in study.scenes
-    }
+    cells = {(*scene.mesh.labels.values(), scene.material.name, scene.load) for scene in study.scenes}
     return sum((cell.beam, cell.mesh_type, cell.mesh_size, cell.material, cell.load) in cells for cell in study.printed)
 
 

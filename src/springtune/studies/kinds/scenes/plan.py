@@ -65,9 +65,6 @@ def curves_by_mesh(study):
 #
 # Where that takes fewer solves. An interpolant has no whole fields; references that need one are solved one by one.
 
-WITH_FIELDS = ("block", "definitions")
-"""Outputs that show whole fields of all references."""
-
 NODES_OF_ASPECTS = ((0.5, 5), (1.2, 9), (3.6, 17), (7.0, 33))
 """Nodes along aspect ratios that interpolants took, by the largest logarithm of the last over the first one. Others
 took up to 65."""
@@ -89,7 +86,7 @@ NU_STEP = 0.05
 @once_a_study("grids", "outputs")
 def interpolants(study: "Study") -> "dict[str, tuple[Box, dict[Body, tuple[float, float]]]]":
     """Interpolants of a study by kind of load: their box, and the unit problem of each body in it."""
-    if any(name in study.outputs for name in WITH_FIELDS):
+    if "block" in study.outputs or "definitions" in study.outputs:  # which show whole fields of all references
         return {}
     scenes = [scene for grid in study.grids for scene in grid.scenes]
     # Bodies are few and shared; comparing them for each of 100,000 scenes is no way to find them.
@@ -129,16 +126,12 @@ def box_of(problems: set[tuple[float, float]]) -> "Box":
     first, last, least, largest = min(aspects), max(aspects), min(nus), max(nus)
     if first < last:
         # An end that is one of the steps stays where it is, though its logarithm is rounded.
-        lower, upper = floor(ASPECT_STEPS * log10(first) + 1e-5), ceil(ASPECT_STEPS * log10(last) - 1e-5)
-        first, last = (
-            min(first, float(f"{10 ** (lower / ASPECT_STEPS):.7g}")),
-            max(last, float(f"{10 ** (upper / ASPECT_STEPS):.7g}")),
-        )
+        steps = floor(ASPECT_STEPS * log10(first) + 1e-5), ceil(ASPECT_STEPS * log10(last) - 1e-5)
+        lower, upper = (float(f"{10 ** (step / ASPECT_STEPS):.7g}") for step in steps)
+        first, last = min(first, lower), max(last, upper)
     if least < largest:
-        below, above = (
-            round(floor(least / NU_STEP + 1e-6) * NU_STEP, 2),
-            round(ceil(largest / NU_STEP - 1e-6) * NU_STEP, 2),
-        )
+        steps = floor(least / NU_STEP + 1e-6), ceil(largest / NU_STEP - 1e-6)
+        below, above = (round(step * NU_STEP, 2) for step in steps)
         least, largest = min(least, below) if below > -1 else least, min(max(largest, above), 0.5)
     return (first, last), (least, largest)
 
@@ -365,8 +358,7 @@ def _mesh_members(study, costs):
 
 
 def _meshes(study, folder, members):
-    sources = [(mesh, mesh_source(mesh)) for mesh, *_ in members]
-    files = [{"name": stem(mesh), "key": mesh_key(mesh)} | source for mesh, source in sources]
+    files = [{"name": stem(mesh), "key": mesh_key(mesh)} | mesh_source(mesh) for mesh, *_ in members]
     return {"folder": str(folder / "meshes"), "files": files}
 
 

@@ -133,11 +133,14 @@ def _mesh_members(study, costs):
     part = study.parts["shapes"]
     members = {}
     for name, scenes in by_mesh(part).items():
-        count = particles(part, scenes[0])
-        seconds = costs.of("shape_mesh", count)
-        seconds += sum(costs.of("shape_scene", count) + costs.of(one.definition, count) for one in scenes)
-        members[name] = seconds, scenes
+        seconds = costs.of("shape_mesh", particles(part, scenes[0]))
+        members[name] = seconds + sum(_seconds(part, one, costs) for one in scenes), scenes
     return members
+
+
+def _seconds(part, one, costs):
+    count = particles(part, one)
+    return costs.of("shape_scene", count) + costs.of(one.definition, count)
 
 
 def _meshes(study, folder, members):
@@ -177,8 +180,7 @@ def pieces(study, costs, division):
     part = study.parts["shapes"]
     found = defaultdict(float)
     for one in part.scenes:
-        count = particles(part, one)
-        found[one.shape, one.load] += costs.of("shape_scene", count) + costs.of(one.definition, count)
+        found[one.shape, one.load] += _seconds(part, one, costs)
     for shape, _, load in part.referred:
         found[shape, load] += costs.of("shape_reference")
     return division.of_section(found)

@@ -50,13 +50,11 @@ BEYOND_MEASURE = 1e30
 """Size of a coordinate, force or pressure from which it is beyond all measure [SI units]."""
 
 
-class Signed(Scalar):
+def signed(kind: str) -> Scalar:
     """Annotation of a quantity of either sign, or zero, which needs no unit."""
-
-    def __init__(self, kind: str) -> None:
-        example = units.QUANTITY_KINDS[kind].example
-        words = f"{'an' if kind[0] in 'ae' else 'a'} {kind} such as '{example}'"
-        super().__init__(lambda text: _signed(text, kind), {"type": ["string", "number"], "examples": [example]}, words)
+    about = units.QUANTITY_KINDS[kind]
+    schema = {"type": ["string", "number"], "examples": [about.example]}
+    return Scalar(lambda text: _signed(text, kind), schema, about.words)
 
 
 def _signed(text: str, kind: str) -> float:
@@ -75,7 +73,7 @@ class Vector:
     """Annotation of two quantities, along x and along y."""
 
     def __init__(self, kind: str) -> None:
-        self.item = Signed(kind)
+        self.item = signed(kind)
         example = units.QUANTITY_KINDS[kind].example
         pair = f"0, {example}" if example.startswith("-") else f"{example}, 0"
         self.words = f"{kind}s along x and y, such as [{pair}]"
@@ -103,8 +101,8 @@ class Words:
 Place = Annotated[tuple[float, float], Vector("length")]
 ForceVector = Annotated[tuple[float, float], Vector("force")]
 Gravity = Annotated[tuple[float, float], Vector("acceleration")]
-Displacement = Annotated[float, Signed("length")]
-PressureValue = Annotated[float, Signed("stress")]
+Displacement = Annotated[float, signed("length")]
+PressureValue = Annotated[float, signed("stress")]
 GroupName = Annotated[str, Scalar(str, {"type": "string", "minLength": 1}, "the name of a group")]
 PointName = Annotated[str, Scalar(str, {"type": "string", "minLength": 1}, "the name of a point")]
 PartName = Annotated[str, Scalar(str, {"type": "string", "minLength": 1}, "the name of a part")]
