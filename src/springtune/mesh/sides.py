@@ -57,11 +57,14 @@ class OutlineSide:
             raise ValueError(
                 f"from {in_mm(self.start)} to itself; leave it out, and split an entire circle into four arcs"
             )
-        if self.centre is not None:
-            vars(self)["_arc"] = self._found_arc(self.centre)
+        _ = self.arc  # refused here, not when it is used
 
-    def _found_arc(self, centre: Point) -> tuple[float, float, float, float]:
-        """Semi-axes along x and y [m], angle at the start and angle that it turns by, counter-clockwise [rad]."""
+    @cached_property
+    def arc(self) -> tuple[float, float, float, float] | None:
+        """Of an arc: semi-axes along x and y [m], angle at the start and by which it turns, counter-clockwise [rad]."""
+        if self.centre is None:
+            return None
+        centre = self.centre
         (x, y), (u, v) = ((end[0] - centre[0], end[1] - centre[1]) for end in (self.start, self.end))
         first, second = math.hypot(x, y), math.hypot(u, v)
         about = f"arc from {in_mm(self.start)} to {in_mm(self.end)} about {in_mm(centre)}"
@@ -88,12 +91,6 @@ class OutlineSide:
         if abs(turn) < 1e-9:
             raise ValueError(f"{about}: turns by no angle; correct the centre, or leave it out for a straight side")
         return across, along, begin, turn
-
-    @property
-    def arc(self) -> tuple[float, float, float, float] | None:
-        """Of an arc: semi-axes along x and y [m], angle at the start and by which it turns, counter-clockwise [rad]."""
-        found: tuple[float, float, float, float] | None = vars(self).get("_arc")
-        return found
 
     @property
     def circular(self) -> bool:

@@ -52,7 +52,7 @@ from .fields import (
     number,
     one_of,
 )
-from .kind import Kind, Output, kinds
+from .kind import RESERVED, Kind, Output, kinds
 from .messages import refuse, show
 
 MOST_PARTS = 1000
@@ -183,8 +183,9 @@ class MaterialConfig(Section):
     stiffness: StiffnessConfig | None = Field(None, description="Elastic constants in plane stress.")
     uniaxial_test: FileName | None = Field(
         None,
-        description="CSV file of a uniaxial test of rubber, relative to the study's folder: stretch and nominal stress "
-        "under a head such as `stretch,nominal stress [MPa]`. Definition `yeoh` uses the fitted law.",
+        description="CSV file of a uniaxial test of rubber, relative to the study's folder: stretch or strain and "
+        "nominal stress under a head such as `stretch,nominal stress [MPa]` or `strain [%],nominal stress [MPa]`. "
+        "Definition `yeoh` uses the fitted law.",
     )
     terms: Terms | None = Field(
         None, description="Number of terms of the fitted law; 3 by default, 1 is the neo-Hookean law."
@@ -325,7 +326,7 @@ class MeshFileConfig(Section):
 class ExcludeConfig(Section):
     """Combinations that a grid leaves out: those with one of the given values of every given parameter."""
 
-    beam: Annotated[list[BeamName], OneOrMore()] | None = Field(None, description="Beams that grids and sections name.")
+    beam: Annotated[list[BeamName], OneOrMore()] | None = Field(None, description="Beams.")
     mesh_type: Annotated[list[MeshType], OneOrMore()] | None = Field(None, description="Mesh types.")
     mesh_size: Lengths | None = Field(None, description="Lengths of an edge.")
     material: Annotated[list[MaterialName], OneOrMore()] | None = Field(None, description="Materials.")
@@ -471,7 +472,9 @@ class StudyConfig(Section):
     """A study."""
 
     title: Text = Field(description="Title of the study, one line.")
-    beams: Annotated[dict[str, BeamConfig], Named("beam")] = Field({}, description="Beams.")
+    beams: Annotated[dict[str, BeamConfig], Named("beam")] = Field(
+        {}, description="Beams that grids and sections name."
+    )
     materials: Annotated[dict[str, MaterialConfig], Named("material")] = Field(
         {}, description="Materials that grids and sections name."
     )
@@ -517,6 +520,8 @@ class StudyConfig(Section):
         return {name: found[name] for name in cls.model_fields if name in found}
 
 
+RESERVED.update(StudyConfig.model_fields, GridConfig.model_fields)
+
 GRIDS_NEED = ("beams", "materials")
 
 
@@ -556,7 +561,10 @@ def study_model(kinds: Sequence[Kind], given: Container[object] | None = None) -
             "Figures of scenes show nonlinear kinematics if a grid has them, otherwise linear ones.",
         ),
     )
-    alone = {name: needed for kind in kinds for name, needed in kind.alone.items()}
+    alone: dict[str, tuple[str, ...]] = {}
+    for kind in kinds:
+        optional_keys = (name for name, (_, field) in kind.study_fields.items() if field.default is None)
+        alone |= kind.alone or dict.fromkeys(optional_keys, GRIDS_NEED)
     own = ", ".join(f"`{name}`" for name in alone)
     study_fields["grids"] = (
         Annotated[dict[str, grid], Named("grid", for_files=False)],

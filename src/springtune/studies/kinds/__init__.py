@@ -34,7 +34,7 @@ def load_study(path: str | Path, beside: Path | None = None) -> "Study":
     >>> import springtune as st
     >>> study = st.load_study("config/paper.yaml")
     >>> len(study.scenes), len(study.curves)
-    (270, 90)
+    (360, 90)
     >>> study.axes["mesh_size"]
     (0.001, 0.002, 0.005)
     """

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from springtune.safe_io.atomic import UNFINISHED
 
-from ..config.kind import FORMATS, kinds, modules, outputs
+from ..config.kind import FORMATS, further_modules, kinds, modules, outputs
 from . import checked_json, records
 from .checked_json import ASIDE, hash_of
 from .keys import CODE_FILE, OURS, stage_key
@@ -100,7 +100,7 @@ def jobs(study: "Study", plan: Plan, chosen: Mapping[str, bool] | None = None) -
 
 def _collect_digest(study: "Study", plan: Plan) -> str:
     """Digest of a study's dataset: of the study's files, the jobs of its stages and the code."""
-    code = [stage_key(name) for name in ("studies.kinds.collect", *modules("kind", "collect"))]
+    code = [stage_key(name) for name in ("studies.kinds.collect", *modules("kind", "collect"), *further_modules(study))]
     code += [stage_key(made.collect) for made in outputs().values() if made.collect and made.name in study.outputs]
     stages = [job.digest for job in plan.jobs.values()]
     return hash_of(study.name, inputs(study, study.path.resolve().parent), stages, code)
@@ -113,7 +113,7 @@ def _present_digest(members: "Iterable[Output]", files: list[str]) -> str:
         used += filter(None, (name.partition(":")[0] for name in (one.plot, one.write)))
         if one.page:
             used += ["studies.output.page", *modules("kind")]
-            used += [f"studies.kinds.{kind.name}.{kind.tables_by}" for kind in kinds() if kind.tables]
+            used += [kind.place(kind.tables_by) for kind in kinds() if kind.tables]
             templates.append(records.checksum(PACKAGE / "studies/output/page.html"))
     return hash_of(files, [stage_key(name) for name in dict.fromkeys(used)], templates)
 

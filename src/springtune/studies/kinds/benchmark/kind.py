@@ -272,7 +272,6 @@ VARIABLES = {
 KIND = Kind(
     "benchmark",
     study_fields={"benchmark": optional(BenchmarkConfig, "Run time against error; it makes the group `/benchmark`.")},
-    alone={"benchmark": ("beams", "materials")},
     check=_check,
     expand=_expand,
     axes=_axes,

@@ -149,7 +149,6 @@ STAGE = stage("laying", "studies.kinds.laying.solve", "Laying the strips", _task
 KIND = Kind(
     "laying",
     study_fields={"laying": optional(LayingConfig, "A strip laid on a trapezoid; it makes the group `/laying`.")},
-    alone={"laying": ("beams", "materials")},
     check=_check,
     expand=_expand,
     axes=_axes,

@@ -271,7 +271,6 @@ KIND = Kind(
             "Values that are added where an error matters; they make the group `/refinement`.",
         )
     },
-    alone={"refine": ("beams", "materials")},
     check=_check,
     expand=_expand,
     axes=_axes,

@@ -7,11 +7,11 @@ from math import prod
 
 from springtune.problem.loads import LOADS
 from springtune.reference.answers import unit_problem
+from springtune.safe_io.tables import aligned
 from springtune.springs import DEFINITIONS
 
 from ...config.kind import Kind
 from ...config.model import SceneSpec, Study
-from ...output.text import aligned
 from .outputs import OUTPUTS, stems
 from .plan import STAGES, expected_solves, interpolants, pieces, take
 

@@ -8,7 +8,18 @@ from springtune.safe_io.escapes import no_mathematics
 
 from ...output import labels, style
 from ...output.dataset import STATUS
-from ...output.drawing import extent, in_words, largest, magnification, plane, spring_ends
+from ...output.drawing import (
+    NO_RESULT,
+    NOT_ASKED,
+    error_text,
+    extent,
+    heat_map,
+    in_words,
+    largest,
+    magnification,
+    plane,
+    spring_ends,
+)
 from ...output.selection import cells, choose, group, labels_of
 from .outputs import DEFORMED, ERRORS, figures
 
@@ -23,12 +34,6 @@ FIRST = ("lattice", "energy-fit", "patch", "patch-fit", "area", "delingette")
 
 FORCES = LinearSegmentedColormap.from_list("forces", ["#0a4f9e", "#6fa0cf", "#c4c4c4", "#dd8466", "#a50f15"])
 """Colours of spring forces: from compression to tension, the middle dark enough for thin lines."""
-
-LEAST_SHOWN = 1e-3
-"""Smallest error of the overview [%]: what is below stands there."""
-
-MOST_SHOWN_ERROR = 100.0
-"""Largest error of the overview [%]: what is beyond stands there."""
 
 
 def shapes(tree):
@@ -189,7 +194,7 @@ def _why(cut):
 
 @style.styled
 def plot_shapes(data, ax=None, *, material=None, kinematics=None):
-    """Size of the error of each quantity of all shapes on their finest mesh: a row a quantity, a marker a definition.
+    """Size of the error of each quantity of all shapes on their finest mesh: a row a quantity, a column a definition.
 
     Parameters
     ----------
@@ -213,57 +218,38 @@ def plot_shapes(data, ax=None, *, material=None, kinematics=None):
     --------
     >>> import springtune as st  # tree = st.open("results/mine")
     >>> axes = st.plot_shapes(tree)
-    >>> axes.get_xlabel()
+    >>> axes.get_title(loc="left")
     '|Error| on the finest mesh [%]'
     """
     whole = group(data, "shapes")
     rows = _rows(whole, material, kinematics)
-    definitions = [name for name in whole.definition.values.tolist() if any(name in row["errors"] for row in rows)]
-    looks = {name: style.line(i) | {"linestyle": ""} for i, name in enumerate(definitions)}
-    tall = 1.2 + 0.24 * max(len(rows), 3) + 0.14 * -(-(len(definitions) + 1) // 5)
-    figure, axes = style.panels(ax, figsize=(style.PAGE, tall))
+    names = [name for name in whole.definition.values.tolist() if any(name in row["asked"] for row in rows)]
+    errors = np.array([[row["errors"].get(name, np.nan) for name in names] for row in rows])
+    texts = [[error_text(row["errors"][name], "") if name in row["errors"] else
+              NO_RESULT if name in row["asked"] else NOT_ASKED for name in names] for row in rows]  # fmt: skip
+    heads = list(map(no_mathematics, names))
+    references = np.array([row["reference"] for row in rows])
+    if np.isfinite(references).any():
+        heads.append("reference to expected")
+        errors = np.column_stack([errors, references])
+        own = [error_text(one, "") if np.isfinite(one) else "" for one in references]
+        texts = [[*row, one] for row, one in zip(texts, own)]
+    under = 0.3 + max(map(labels.width, heads), default=0.5)
+    figure, axes = style.panels(ax, figsize=(style.PAGE, 0.25 + under + 0.17 * max(len(rows), 3)))
     panel = axes[0, 0]
     left = 0.15 + max((labels.width(row["name"]) for row in rows), default=0.5)
-    nowhere = [name for name in whole.definition.values.tolist() if rows and all(name in _lost(row) for row in rows)]
-    lacking = [[name for name in _lost(row) if name not in nowhere] for row in rows]
-    holes = [f"without {', '.join(lost)}" for lost in lacking if lost]
-    right = 0.1 + max(map(labels.width, holes), default=0.0)
-    place = {
-        "left": left,
-        "right": min(right, 2.0),
-        "bottom": 0.42 + 0.16 * bool(nowhere),
-        "top": 0.36 + 0.145 * -(-(len(definitions) + 1) // 5),
-    }
-    style.arrange(figure, axes, **place)
-    if not any(row["errors"] for row in rows):
+    style.arrange(figure, axes, left=left, right=0.08, bottom=under, top=0.25)
+    panel.set_title("|Error| on the finest mesh [%]")
+    if not np.isfinite(errors).any():
         labels.say(panel, "No quantity has an error: see status and message.")
         return panel
-    panel.set(xscale="log", xlabel="|Error| on the finest mesh [%]", ylim=(len(rows) - 0.5, -0.5))
-    for name, look in looks.items():
-        shown = [(row["errors"][name], place) for place, row in enumerate(rows) if name in row["errors"]]
-        x, y = np.transpose(shown)
-        panel.plot(np.clip(x, LEAST_SHOWN, MOST_SHOWN_ERROR), y, label=name, **look | {"markersize": 4.2})
-    for number, row in enumerate(rows):
-        if np.isfinite(row["reference"]):
-            x = np.clip(row["reference"], LEAST_SHOWN, MOST_SHOWN_ERROR)
-            panel.plot([x], [number], "|", color="0.5", markersize=9, zorder=1)
-        if lacking[number]:
-            text = labels.wrapped(f"without {', '.join(lacking[number])}", 1.9)
-            panel.annotate(text, (1, number), xycoords=("axes fraction", "data"), xytext=(3, 0), va="center",
-                           textcoords="offset points", fontsize=style.SMALL, color="0.4")  # fmt: skip
-    if nowhere:
-        labels.note(panel, f"nowhere solved: {', '.join(nowhere)}")
+    heat_map(panel, errors, np.array(texts, dtype=object))
     panel.set_yticks(range(len(rows)), [no_mathematics(row["name"]) for row in rows])
-    panel.tick_params(axis="y", length=0)
-    style.plain(panel, "x")
-    handles, names = panel.get_legend_handles_labels()
-    if any(np.isfinite(row["reference"]) for row in rows):
-        handles.append(panel.plot([], [], "|", color="0.5", markersize=9, linestyle="")[0])
-        names.append("reference to expected")
-    # Above the legend.
-    panel.set_title("Quantities of shapes", pad=6 + 10.5 * -(-len(names) // 5))
-    panel.legend(handles, names, loc="lower left", bbox_to_anchor=(-0.02, 1.0), ncols=5, columnspacing=1.2,
-                 handletextpad=0.2, borderaxespad=0.1)  # fmt: skip
+    panel.set_xticks(range(len(heads)), heads, rotation=90)
+    panel.tick_params(length=0)
+    said = {NO_RESULT: "no result that counts", NOT_ASKED: "not asked for"}
+    shown = {text for row in texts for text in row}
+    labels.note(panel, "; ".join(f"{mark}: {word}" for mark, word in said.items() if mark in shown), under - 0.18)
     return panel
 
 
@@ -289,11 +275,6 @@ def _rows(whole, material, kinematics):
             row = {"name": f"{where}: {name}", "errors": errors, "asked": definitions}
             found.append(row | {"reference": reference or np.nan})
     return found
-
-
-def _lost(row):
-    """Definitions that were asked for and have no error that counts on the finest mesh."""
-    return [name for name in row["asked"] if name not in row["errors"]]
 
 
 # -- networks ----------------------------------------------------------------------------------------------------------

@@ -108,7 +108,6 @@ KIND = Kind(
     study_fields={
         "stability": optional(StabilityConfig, "Experiments on numerical stability; they make the group `/stability`.")
     },
-    alone={"stability": ("beams", "materials")},
     check=_check,
     expand=_expand,
     axes=_axes,
