@@ -34,19 +34,15 @@ class Factor(Protocol):
     @property
     def negative_pivots(self) -> int:
         """Number of negative eigenvalues of the matrix; 0 where it is positive definite."""
-        ...
 
     def solve(self, right: np.ndarray) -> np.ndarray:
         """Solve for right-hand sides, shape (unknowns,) or (unknowns, n)."""
-        ...
 
     def step(self, right: np.ndarray) -> np.ndarray:
         """As `solve`, for a step of Newton's method."""
-        ...
 
     def estimate(self, right: np.ndarray) -> np.ndarray:
         """As `solve`, but only an estimate."""
-        ...
 
 
 class SuperLUFactor:
@@ -71,11 +67,6 @@ class SuperLUFactor:
         except RuntimeError as error:
             raise SingularError(str(error)) from error
 
-    @property
-    def fill(self) -> int:
-        """Number of entries of the lower triangular factor."""
-        return self._lu.L.nnz
-
     def solve(self, right: np.ndarray) -> np.ndarray:
         """Solution of the factorized system, shape (unknowns,) or (unknowns, n)."""
         solution = np.empty_like(right)
@@ -96,7 +87,6 @@ class Analysis:
     """Reusable symbolic factorization of all symmetric matrices of one sparsity.
 
     Supernodal Cholesky factorization (Chen, Davis, Hager and Rajamanickam, ACM Trans. Math. Softw. 35(3):22, 2008).
-    `symbolic_factors` is the largest number of numeric factors in use at a time.
     """
 
     def __init__(self, indices: np.ndarray, pointers: np.ndarray, order: np.ndarray | None = None) -> None:
@@ -109,7 +99,6 @@ class Analysis:
         self._matrix = spmatrix(np.zeros(len(self._lower)), rows, columns, (size, size))
         self._order = {} if order is None else {"p": matrix(order.astype(np.int64))}
         self._spare: list[Any] = []
-        self.symbolic_factors = 0
         cholmod.options["supernodal"] = 2
 
     def factorize(self, data: np.ndarray) -> "CholeskyFactor | None":
@@ -118,11 +107,7 @@ class Analysis:
 
         self._matrix.V = matrix(data[self._lower])
         # A factor is made in the place of its symbolic one, and gives that back when nobody needs it any more.
-        if self._spare:
-            factor = self._spare.pop()
-        else:
-            factor = cholmod.symbolic(self._matrix, uplo="L", **self._order)
-            self.symbolic_factors += 1
+        factor = self._spare.pop() if self._spare else cholmod.symbolic(self._matrix, uplo="L", **self._order)
         try:
             cholmod.numeric(self._matrix, factor)
         except ArithmeticError:

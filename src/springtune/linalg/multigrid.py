@@ -83,21 +83,19 @@ class Multigrid:
         self.name = "multigrid"
         self._direct: Factor | None = None
         self._certain = False
-        self._levels: list[_Level] = []
-        self._coarsest: Any = None
-        self._borrowed = like is not None and like._coarsest is not None
-        if like is not None and self._borrowed:
-            self._levels, self._coarsest = like._levels, like._coarsest
-        else:
+        if like is None or like._coarsest is None:
             self._lay_grids()
+        else:
+            self._borrowed, self._levels, self._coarsest = True, like._levels, like._coarsest
 
     def _lay_grids(self) -> None:
         """Levels and the factor of the coarsest one, of the matrix itself."""
-        self._borrowed, self._levels, self._coarsest = False, [], None
+        self._borrowed = False
+        self._levels: list[_Level] = []
         try:
             self._coarsest = self._coarsened(self._points, self._places)
         except LinAlgError:  # then the matrix is not positive definite either
-            self._levels = []
+            self._levels, self._coarsest = [], None
 
     def _coarsened(self, points: np.ndarray, places: np.ndarray) -> Any:
         """Levels down to the coarsest one, whose dense factor is returned."""

@@ -158,14 +158,11 @@ def read_mesh(path: str | Path, unit: float = 1.0) -> Mesh:
 def assembled(path: str | Path, content: Any, unit: float) -> tuple[Mesh, np.ndarray]:
     """Return the mesh of meshio's data, and its particles' numbers in the file; `unit` in m."""
     cells = _read_cells(path, content)
-    used, numbers = np.unique(np.concatenate([corners.ravel() for corners in cells.values()]), return_inverse=True)
+    used = np.unique(np.concatenate([corners.ravel() for corners in cells.values()]))
     with np.errstate(over="ignore"):  # what is too far away is refused
         points = _read_points(path, unit * coordinates(path, content), used)
-    start = 0
     for count, corners in cells.items():
-        corners = numbers[start : start + corners.size].reshape(corners.shape)
-        start += corners.size
-        cells[count] = _counter_clockwise(path, points, corners)
+        cells[count] = _counter_clockwise(path, points, np.searchsorted(used, corners))
     return Mesh(points, cells.get(3, no_cells(3)), cells.get(4, no_cells(4))), used
 
 

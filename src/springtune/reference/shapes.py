@@ -121,45 +121,7 @@ def solve_shape(
     Curves are polynomials of the level's degree (isoparametric), reactions are the work of the solution on a unit
     displacement of their group, and stresses are not smoothed.
     """
-    by_part = materials if isinstance(materials, Mapping) else {"": materials}
-    return converge(shape, load, by_part, grouped, tolerance)
-
-
-def solve_each(
-    shape: Shape,
-    load: LoadCase,
-    materials: AnyMaterial | Mapping[str, AnyMaterial],
-    grouped: GroupedMesh | None = None,
-) -> tuple[list[ShapeReference], dict[str, str]]:
-    """Return references that together have every quantity of interest that converges, and the faults of the others.
-
-    A quantity without a limit, such as the stress at a corner, does not affect the others.
-    """
-    try:
-        return [solve_shape(shape, load, materials, grouped)], {}
-    except (ReferenceNotConvergedError, ValueError) as error:
-        if len(load.quantities) < 2:
-            return [], dict.fromkeys([one.name for one in load.quantities] or [""], str(error))
-    found: list[ShapeReference] = []
-    lacking: dict[str, str] = {}
-    for one in load.quantities:
-        more, why = solve_each(shape, replace(load, quantities=(one,)), materials, grouped)
-        found += more
-        lacking |= why
-    return found, lacking
-
-
-def converge(
-    shape: Shape,
-    load: LoadCase,
-    materials: Mapping[str, AnyMaterial],
-    grouped: GroupedMesh | None = None,
-    tolerance: float = 1e-4,
-    tractions: Mapping[str, Field] | None = None,
-    displacements: Mapping[str, Field] | None = None,
-) -> ShapeReference:
-    """Solve as `solve_shape`, with tractions [Pa] and displacements [m] that may vary along groups."""
-    problem = _Problem(shape, load, materials, grouped, tractions or {}, displacements or {})
+    problem = _Problem(shape, load, materials if isinstance(materials, Mapping) else {"": materials}, grouped)
     names = [quantity.name for quantity in load.quantities]
     values: list[dict[str, float]] = []
     estimates: dict[str, float] = {}
@@ -211,6 +173,30 @@ def converge(
     raise ReferenceNotConvergedError(f"reference of shape {shape.name!r}, load {load.name!r}: {complaint}")
 
 
+def solve_each(
+    shape: Shape,
+    load: LoadCase,
+    materials: AnyMaterial | Mapping[str, AnyMaterial],
+    grouped: GroupedMesh | None = None,
+) -> tuple[list[ShapeReference], dict[str, str]]:
+    """Return references that together have every quantity of interest that converges, and the faults of the others.
+
+    A quantity without a limit, such as the stress at a corner, does not affect the others.
+    """
+    try:
+        return [solve_shape(shape, load, materials, grouped)], {}
+    except (ReferenceNotConvergedError, ValueError) as error:
+        if len(load.quantities) < 2:
+            return [], dict.fromkeys([one.name for one in load.quantities] or [""], str(error))
+    found: list[ShapeReference] = []
+    lacking: dict[str, str] = {}
+    for one in load.quantities:
+        more, why = solve_each(shape, replace(load, quantities=(one,)), materials, grouped)
+        found += more
+        lacking |= why
+    return found, lacking
+
+
 def unmet(estimate: float, accepted: float, before: float, last: float) -> str:
     """Return why an error estimate is refused, or an empty string; `before` and `last` are the last two steps.
 
@@ -242,10 +228,8 @@ class _Problem:
         load: LoadCase,
         materials: Mapping[str, AnyMaterial],
         grouped: GroupedMesh | None,
-        tractions: Mapping[str, Field],
-        displacements: Mapping[str, Field],
     ) -> None:
-        self.shape, self.load, self.tractions, self.displacements = shape, load, tractions, displacements
+        self.shape, self.load = shape, load
         self.points = {name: np.array(point, dtype=float) for name, point in shape.points.items()}
         if grouped is not None:
             self.points |= {name: np.array(point, dtype=float) for name, point in grouped.points.items()}
@@ -286,15 +270,11 @@ class _Problem:
         loads: dict[str, list[object]] = {}
         for number, traction in enumerate(load.tractions):
             loads.setdefault(traction.group, []).append(("traction", number))
-        for group in tractions:
-            loads.setdefault(group, []).append(("traction", group))
         for pressure in load.pressures:
             loads.setdefault(pressure.group, []).append(("pressure", pressure.pressure))
-        supported: dict[str, list[object]] = {}
+        supported: dict[str, list[tuple[float | None, float | None]]] = {}
         for support in load.supports:
             supported.setdefault(support.group, []).append((support.x, support.y))
-        for group in displacements:
-            supported[group] = [group]
 
         def condition(side: Side) -> object:
             found = [(group, supported.get(group, []), loads.get(group, [])) for group in side.groups]
@@ -304,9 +284,7 @@ class _Problem:
             if side.arc is not None or np.abs(self.stiffness[:, :2, 2]).max() > 1e-12 * self.stiffness.max():
                 return False
             conditions = [value for group in side.groups for value in supported.get(group, [])]
-            if any(group in loads for group in side.groups):
-                return False
-            if len(conditions) != 1 or not isinstance(conditions[0], tuple):
+            if any(group in loads for group in side.groups) or len(conditions) != 1:
                 return False
             x, y = conditions[0]
             flat = np.abs(way) < 1e-12
@@ -563,8 +541,6 @@ class _Level:
         load, thickness = problem.load, problem.shape.thickness
         total = np.zeros((space.n_functions, 2))
         for traction in load.tractions:
-            if traction.group in problem.tractions:
-                continue
             if traction.group in space.mesh.named:
                 total[space.mesh.named[traction.group]] += traction.force
             else:
@@ -572,8 +548,6 @@ class _Level:
                 total += shares[:, None] * traction.force
         for pressure in load.pressures:
             total -= pressure.pressure * thickness * self._integral(pressure.group, lambda _, normals: normals)
-        for group, given in problem.tractions.items():
-            total += thickness * self._integral(group, given)
         if any(load.gravity):
             _, weights, values, gradients = tabulated(space.degree, 3 * space.degree)
             volume = weights * np.abs(space.jacobians(gradients)[1])
@@ -588,7 +562,7 @@ class _Level:
         held, values = np.zeros((space.n_functions, 2), dtype=bool), np.zeros((space.n_functions, 2))
         for support in problem.load.supports:
             for axis, value in enumerate((support.x, support.y)):
-                if value is None or support.group in problem.displacements:
+                if value is None:
                     continue
                 if support.group in space.mesh.named:
                     corners = np.array([space.mesh.named[support.group]])
@@ -606,16 +580,6 @@ class _Level:
                         "energy is infinite: leave a gap between them"
                     )
                 held[functions, axis], values[corners, axis] = True, value
-        along, inverse = side_fit(space.degree)
-        for group, given in problem.displacements.items():
-            for ends, _ in self._group_sides(group):
-                functions = space.on_side(ends)
-                at = side_functions(space.degree, np.concatenate([[-1.0, 1.0], along]))[0] @ space.places[functions]
-                wanted = given(at, np.zeros_like(at))
-                values[functions[:2]] = wanted[:2]
-                straight = (wanted[0] + wanted[1]) / 2 + along[:, None] * (wanted[1] - wanted[0]) / 2
-                values[functions[2:]] = inverse @ (wanted[2:] - straight)
-                held[functions] = True
         where = f"load {problem.load.name!r} of shape {problem.shape.name!r}"
         check_held(space.mesh.points, space.edges, held[: len(space.mesh.points)], where)
         return held, values
@@ -680,8 +644,10 @@ class _Level:
         if quantity.kind == "area":
             return float(self._area_growth().sum())
         if quantity.kind == "stress":
-            place = ("xx", "yy", "xy").index(quantity.component)
-            return float(self._corner_stress(space.mesh.named[quantity.of])[place])
+            # The mean in the triangles at its corner.
+            rows, places = np.nonzero(space.corners == space.mesh.named[quantity.of])
+            stresses = self._stresses(rows, np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])[places])
+            return float(stresses.mean(axis=0)[("xx", "yy", "xy").index(quantity.component)])
         axis = "xy".index(quantity.component)
         if quantity.kind == "reaction":
             return self._reaction(quantity.of, axis)
@@ -779,11 +745,6 @@ class _Level:
             local[curved] -= step
             curved = curved[np.flatnonzero(np.abs(step).max(axis=1) > 1e-13)]
         return found, local
-
-    def _corner_stress(self, point: int) -> np.ndarray:
-        """Mean of the stresses in the triangles at a corner [Pa], shape (3,)."""
-        rows, places = np.nonzero(self.space.corners == point)
-        return self._stresses(rows, np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])[places]).mean(axis=0)
 
     def displacements(self, points: np.ndarray) -> np.ndarray:
         """Displacements at points [m], shape (n, 2)."""
