@@ -108,7 +108,7 @@ licences: $(VENV)/.test
 
 # The configuration's schema and manual, from the models that validate it.
 docs: $(VENV)/.run
-	python tools/manual.py
+	SPRINGTUNE_PLUGINS=none python tools/manual.py
 
 # The pages, the names' docstrings and the examples as a site: build/site/index.html. An example reads the quick study.
 site: $(VENV)/.test results/quick/dataset.nc

@@ -13,6 +13,9 @@ collect_ignore_glob = ["conftest.py", "*/conftest.py"]
 # Tests run in several processes; threads of theirs would only fight for the cores.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+# What other packages declare here is no part of the tests.
+os.environ.setdefault("SPRINGTUNE_PLUGINS", "none")
+
 # No test is to fail because the machine is busy: nothing of these settings looks at the clock.
 unhurried = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
 

@@ -43,6 +43,7 @@ _NAMES = {
     "mesh.groups": ("GroupedMesh",),
     "studies.output.merging": ("merge",),
     "studies.output.reading": ("field", "open"),
+    "studies.output.summing_up": ("info",),
     "prediction.choices": ("Choice", "predict"),
     "prediction.search": ("MeshChoice", "MeshSearch", "SolvedMesh", "find_mesh"),
     "problem.geometry": ("Beam",),

@@ -73,6 +73,7 @@ from .studies.kinds.stability.figures import plot_stability_strains as plot_stab
 from .studies.output.merging import merge as merge
 from .studies.output.reading import field as field
 from .studies.output.reading import open as open
+from .studies.output.summing_up import info as info
 from .units import UnitError as UnitError
 
 __all__: list[str]

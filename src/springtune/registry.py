@@ -1,30 +1,78 @@
-"""Registries of named functions: a decorator adds each to a mapping.
+"""Registries of what has a name in studies, and imports by text.
 
-On first use the mapping imports all modules of a package to find what they declare. Code outside the package uses the
-same decorator.
+A decorator adds a function to a mapping. On first use the mapping imports all modules of a package to find what they
+declare. Code outside the package uses the same decorator. Other packages declare more by entry points of the groups
+``springtune.definitions``, ``springtune.loads``, ``springtune.mesh_types`` and ``springtune.kinds``. They are imported
+when their name is asked for, or all names.
 """
 
 import inspect
+import os
 import pkgutil
 import re
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from importlib import import_module
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 HOOKS = {"drawing": "studies.output.drawing", "writing": "handover.written"}
 """Modules of upper layers that lower ones call by name, so that no result depends on them."""
 
 
+PLUGINS_VARIABLE = "SPRINGTUNE_PLUGINS"
+"""Environment variable; ``none`` leaves out what other packages declare."""
+
+
+class PluginWarning(UserWarning):
+    """What another package declares is left out; the message says why."""
+
+
+GROUPS = ("definitions", "loads", "mesh_types", "kinds")
+"""Groups of entry points, after ``springtune.``."""
+
+
+@cache
+def plugins() -> "dict[str, list[EntryPoint]]":
+    """Entry points of other packages by group, sorted by package."""
+    if os.environ.get(PLUGINS_VARIABLE) == "none":
+        return dict.fromkeys(GROUPS, [])
+    from importlib.metadata import entry_points  # here: it costs more than a light command
+
+    found = entry_points()
+    return {group: sorted(found.select(group=f"springtune.{group}"), key=_package) for group in GROUPS}
+
+
+def _package(one: "EntryPoint") -> str:
+    return one.dist.name if one.dist else one.module
+
+
+@cache
+def plugin_packages() -> set[str]:
+    """Top-level modules of the packages that declare something by entry points."""
+    return {one.module.partition(".")[0] for group in plugins().values() for one in group}
+
+
+@cache
+def full_name(module: str) -> str:
+    """Name under which Python imports a module: one of the package, or of a package with entry points."""
+    place = Path(__file__).with_name(module.partition(".")[0])
+    ours = place.is_dir() or place.with_suffix(".py").is_file()
+    return module if not ours and place.name in plugin_packages() else f"springtune.{module}"
+
+
 def imported(name: str) -> Any:
-    """Import a module of the package, or with ``module:name`` an attribute of it.
+    """Import a module, or with ``module:name`` an attribute of it; see `full_name`.
 
     All imports by text use this function: commands, study kinds, stages, outputs, public names and hooks.
     """
     module, _, attribute = name.partition(":")
-    found = import_module(f"springtune.{module}")
+    found = import_module(full_name(module))
     return getattr(found, attribute) if attribute else found
 
 
@@ -58,24 +106,93 @@ class Declared:
         return Path(found).absolute() if found and Path(found).is_file() else None
 
 
-Entry = TypeVar("Entry", bound=Declared)
-
-
 NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,59}")
 NAME_RULE = (
     "use letters, digits, '.', '_' and '-', at most 60 of them, and no '.' in front: names become parts of file names"
 )
 
 
-class Registry(Mapping[str, Entry]):
-    """Read-only ordered mapping from names to declared entries; imports the package's modules when needed."""
+Entry = TypeVar("Entry")
+Function = TypeVar("Function", bound=Declared)
 
-    def __init__(self, package: str, what: str):
-        self._package, self._what = package, what
-        self._entries: dict[str, Entry] = {}
+
+class Extended(Mapping[str, Entry]):
+    """Read-only ordered mapping of the package's entries and of those that other packages declare by entry points.
+
+    `adopt` checks an imported object and returns the entry. What it refuses, or what cannot be imported, is left out
+    with a `PluginWarning`. `packages` has the distributions of entries of other packages.
+    """
+
+    def __init__(
+        self, what: str, group: str, entries: dict[str, Entry], adopt: Callable[[str, Any], Entry] | None = None
+    ) -> None:
+        self._what, self._group, self._adopt = what, group, adopt
+        self._entries = entries
+        self._tried: dict[EntryPoint, str] = {}
+        self.packages: dict[str, str] = {}
+
+    def _discover(self) -> None:
+        """Find the package's own entries."""
+
+    def _enter(self, name: str, found: Any) -> None:
+        """Add what another package declares."""
+        if name in self._entries:
+            raise ValueError(f"'{self.packages.get(name, 'springtune')}' has one of that name; it needs another")
+        assert self._adopt
+        self._entries = self._entries | {name: self._adopt(name, found)}
+
+    def _load(self, name: str = "") -> str:
+        """Import the entry points of a name, or all; return why they are left out."""
+        self._discover()
+        asked = [one for one in plugins()[self._group] if name in ("", one.name)]
+        for one in asked:
+            if one in self._tried:
+                continue
+            before, self._tried[one] = self._entries, ""
+            try:
+                self._enter(one.name, one.load())
+                self.packages[one.name] = _package(one)
+            except Exception as error:  # whatever a package does, others work
+                self._entries = before
+                self._tried[one] = (
+                    f"{self._what} '{one.name}' of the package '{_package(one)}' is left out: "
+                    f"{error or type(error).__name__}; update or uninstall this package, or set {PLUGINS_VARIABLE}=none"
+                )
+                warnings.warn(self._tried[one], PluginWarning, stacklevel=2)
+        return "; ".join(filter(None, map(self._tried.get, asked)))
+
+    def __contains__(self, name: object) -> bool:
+        self._discover()
+        if isinstance(name, str) and name not in self._entries:
+            self._load(name)
+        return isinstance(name, str) and name in self._entries
+
+    def __getitem__(self, name: str) -> Entry:
+        if name not in self:
+            raise KeyError(self._load(name) or f"unknown {self._what} '{name}'; known: {', '.join(self)}")
+        return self._entries[name]
+
+    def __iter__(self) -> Iterator[str]:
+        self._load()
+        return iter(self._entries)
+
+    def __len__(self) -> int:
+        self._load()
+        return len(self._entries)
+
+    def __repr__(self) -> str:
+        return f"<{self._what}s: {', '.join(self)}>"
+
+
+class Registry(Extended[Function]):
+    """Mapping of declared functions; imports the package's modules when needed."""
+
+    def __init__(self, package: str, what: str, group: str):
+        super().__init__(what, group, {})
+        self._package = package
         self._complete = False
 
-    def declare(self, entry: Entry) -> None:
+    def declare(self, entry: Function) -> None:
         """Add an entry; the decorators call it.
 
         A function declared again from the same place, as in a notebook cell, replaces the former one.
@@ -106,19 +223,7 @@ class Registry(Mapping[str, Entry]):
                 import_module(f"{self._package}.{module.name}")
             self._complete = True
 
-    def __getitem__(self, name: str) -> Entry:
-        self._discover()
-        if name not in self._entries:
-            raise KeyError(f"unknown {self._what} '{name}'; known: {', '.join(self._entries)}")
-        return self._entries[name]
-
-    def __iter__(self) -> Iterator[str]:
-        self._discover()
-        return iter(self._entries)
-
-    def __len__(self) -> int:
-        self._discover()
-        return len(self._entries)
-
-    def __repr__(self) -> str:
-        return f"<{self._what}s: {', '.join(self)}>"
+    def _enter(self, name: str, found: Any) -> None:
+        """Check that an imported function declared itself under the name of its entry point."""
+        if name not in self._entries or self._entries[name].function is not found:
+            raise ValueError(f"{found!r} is not declared as '{name}'; its decorator and entry point need one name")

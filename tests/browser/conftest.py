@@ -16,7 +16,7 @@ from springtune.studies.kinds.scenes.variables import ROOT, SENSITIVITY
 from springtune.studies.output.browse.page import page
 from springtune.studies.output.dataset import STATUS
 
-from synthetic import dataset
+from synthetic import LABELS, dataset
 
 FLAGS = (
     "--headless=new --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
@@ -135,6 +135,46 @@ def small(tmp_path_factory):
         {"town": ["here", "there"], "day": [1, 2, 3]},
     )
     return written(tmp_path_factory.mktemp("small"), groups, title="<script>alert(1)</script>")
+
+
+@pytest.fixture(scope="session")
+def odd(tmp_path_factory):
+    """Page with meshes of files, printed errors, loads against x, cells beyond their reference, samples, and a hole."""
+    tree = dataset("shapes", "shape_fields", "samples", "sobol")
+    made = {node.path: node.to_dataset(inherit=False) for node in tree.subtree}
+    root = made["/"].assign_coords(mesh_size=[0.0, 2e-3, 5e-3])
+    reference = xr.full_like(root.reference_displacement, 9.5e-3)
+    reference.loc[{"load": "compression"}] *= -1
+    applies = xr.ones_like(root.status.isel(dict.fromkeys(("mesh_type", "mesh_size", "definition"), 0), drop=True))
+    applies.loc[{"load": "compression", "kinematics": "nonlinear"}] = 0
+    root = root.assign(
+        reference_displacement=reference, reference_applies=applies, deformation_error=-root.deformation_error,
+        residual=xr.full_like(root.deformation_error, -1.2345e-13),
+        paper_displacement=xr.full_like(root.paper_displacement, 8.69e-3),
+        paper_reference_displacement=xr.full_like(root.paper_displacement, 9.5e-3),
+        paper_deformation_error=xr.full_like(root.paper_displacement, 0.0861),
+    )  # fmt: skip
+    declared = ROOT.empty(LABELS)
+    for name in root:
+        root[name].attrs = declared[name].attrs
+    for data in (made["/shapes"], made["/samples"]):
+        data["status"].attrs = declared.status.attrs
+    root.mesh_size.attrs["units"] = "m"
+    made["/shapes"].status.loc[{"shape": "hole"}] = 0
+    made["/shapes"].error[{"mesh_size": 2}] = np.nan
+    made["/shapes"].error.attrs["long_name"] = "signed error, (network - reference) / |reference|"
+    fields = made["/shape_fields"]
+    moved = 100 * fields.displacement_x  # by more than the body is long
+    holed = fields.assign(outline_round=fields.outline_round + [0, 0, 1, 1], displacement_x=moved)
+    return written(tmp_path_factory.mktemp("odd"), made | {"/": root, "/shape_fields": holed})
+
+
+@pytest.fixture(scope="session")
+def samples_alone(tmp_path_factory):
+    """Page of samples without cells."""
+    made = {node.path: node.to_dataset() for node in dataset("samples", "sobol").subtree}
+    made["/samples"].status.attrs = ROOT.empty(LABELS).status.attrs
+    return written(tmp_path_factory.mktemp("samples"), made | {"/": xr.Dataset()})
 
 
 @pytest.fixture(scope="session")

@@ -11,7 +11,9 @@ from selenium.webdriver import Keys
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 
+from springtune.problem.compare import sign_sentence
 from springtune.studies.output.browse.server import Server
+from springtune.studies.output.colours import ERROR_COLOURS
 
 CURVE = "springtune.charts.curve.sources.points.data.y.join()"
 HEADING = "document.querySelector('.chosen-cell h2').textContent"
@@ -265,3 +267,181 @@ def test_a_tile_of_the_map_is_a_cell(browser, small):
     )
     browser.wait(f"return {HEADING} !== arguments[0]", before)
     assert browser.ask("return [springtune.places.mesh_size, springtune.places.definition]") == [2, 1]
+
+
+def text(browser, place):
+    return browser.ask("return document.querySelector(arguments[0]).innerText", place)
+
+
+def choose(browser, **places):
+    browser.ask("return springtune.choose({...springtune.places, ...arguments[0]})", places)
+    return " ".join(text(browser, ".chosen-cell .facts").split())
+
+
+class TestWhatIsSo:
+    """What a page says of errors, counts and sizes."""
+
+    def test_the_head_counts_all_that_a_study_has(self, browser, odd):
+        browser.open(odd)
+        assert text(browser, "#end").startswith("288 cells:")
+        said = text(browser, "#holds")
+        assert "Samples: 16 samples" in said and "solved 96" in said and "Shapes: 1 shape " in said
+
+    def test_a_study_without_cells_opens_on_what_it_has(self, browser, samples_alone):
+        browser.open(samples_alone)
+        assert browser.ask("return springtune.opened") == "samples" and "cells" not in views(browser)
+        assert "Samples: 16 samples" in text(browser, "#holds") and not text(browser, "#end")
+
+    def test_very_many_samples_come_before_a_few_cells(self, browser, odd):
+        browser.open(odd)
+        many = "springtune.groups['/samples'].tally = () => ({ solved: 1e5 }); return springtune.first()"
+        assert browser.ask("return springtune.first()") == "cells" and browser.ask(many) == "samples"
+
+    def test_cells_beyond_the_linear_reference_are_marked(self, browser, odd):
+        browser.open(odd)
+        words, head = "solved; the linear reference does not apply", text(browser, "#end")
+        assert "solved 240" in head and f"{words} 48" in head and "|error| where the reference applies" in head
+        choose(browser, load=1, kinematics=0)
+        side = text(browser, ".chosen-cell")
+        assert words in side and "the linear reference does not apply to this cell" in side
+        hollow = "return springtune.charts.size.sources.points.data"
+        points = browser.ask(hollow)
+        assert points["fill"][0] != points["line"][0] and f"hollow: {words}" in side
+        choose(browser, load=0, kinematics=0)
+        points = browser.ask(hollow)
+        assert points["fill"][0] == points["line"][0]
+        show(browser, "compare")
+        browser.ask("const v = springtune.views.compare; v.chosen.load = 1; v.render(); return v.drawn")
+        assert f"◇ {words}" in text(browser, ".view-compare")
+        assert all(
+            one.endswith(" ◇") for one in browser.ask("return springtune.charts['/ map'].sources.words.data.text")
+        )
+
+    def test_rows_without_a_number_are_left_out(self, browser, odd):
+        browser.open(odd)
+        show(browser, "shapes")
+        rows = (
+            "return [...document.querySelectorAll('.view-shapes .plain-grid tbody th')].map((one) => one.textContent)"
+        )
+        assert browser.ask(rows) == ["as in file", "2"]
+
+    def test_signs_are_said(self, browser, odd):
+        browser.open(odd)
+        assert "%, too stiff" in choose(browser, load=0, kinematics=1)
+        assert "%, too soft" in choose(browser, load=1, kinematics=1)
+        assert sign_sentence({"traction": 1, "compression": -1}) in text(browser, ".list")
+        assert "negative: too soft" in text(browser, "#panel-size")
+        show(browser, "compare")
+        assert "positive: too soft" in text(browser, ".view-compare")
+        show(browser, "shapes")
+        browser.ask("const v = springtune.views.shapes; v.chosen.quantity = 1; v.render(); return v.drawn")
+        assert "positive: too large" in text(browser, ".view-shapes")  # of an energy
+
+    def test_a_printed_error_has_no_invented_sign(self, browser, odd):
+        browser.open(odd)
+        facts = choose(browser, load=0)
+        assert "printed error 8.61 %, printed without sign" in facts
+        assert "error of printed displacements −8.53 %, too stiff" in facts
+        column = "const t = springtune.views.cells.table; return t.columns.find((c) => c.name === arguments[0]).text(0)"
+        assert browser.ask(column, "paper_deformation_error") == "8.61"
+
+    def test_a_mesh_of_a_file_has_no_size(self, browser, odd):
+        browser.open(odd)
+        options = "return [...document.querySelectorAll('[data-dim=mesh_size] option')].map((one) => one.text)"
+        assert browser.ask(options) == ["as in file", "2 mm", "5 mm"]
+
+    def test_numbers_keep_their_exponents(self, browser, odd):
+        browser.open(odd)
+        found = browser.ask(
+            "const i = springtune.views.cells.table.columns.findIndex((c) => c.name === 'residual');"
+            "const cell = document.querySelector('.list tr[data-place]').children[i];"
+            "return [cell.textContent, cell.scrollWidth - cell.clientWidth]")  # fmt: skip
+        assert found == ["−1.234e−13", 0]
+
+    def test_errors_have_the_colours_of_the_figures(self, browser, odd):
+        browser.open(odd)
+        assert browser.ask("return springtune.scale.colours") == list(ERROR_COLOURS)
+        browser.ask("const c = springtune.views.cells; c.root.fields.deformation_error.unpacked().fill(-1.0);"
+                    "return springtune.choose({...springtune.places, load: 2})")  # fmt: skip
+        last = "rgb(" + ",".join(str(int(ERROR_COLOURS[-1][i : i + 2], 16)) for i in (1, 3, 5)) + ")"
+        assert set(browser.ask("return springtune.charts.map.sources.tiles.data.fill")) == {last}
+
+    def test_no_marker_is_cut_at_zero(self, browser, odd):
+        browser.open(odd)
+        choose(browser, load=0, kinematics=1)  # all errors are below zero
+        assert browser.ask("return springtune.charts.size.fig.y_range.end") > 0.1
+
+    def test_a_hole_is_a_line_of_its_own_and_the_network_is_drawn(self, browser, odd):
+        browser.open(odd)
+        show(browser, "shape_fields")
+        at_rest = browser.wait("return springtune.charts['/shape_fields'].sources.lines?.data.xs[0]")
+        assert at_rest == pytest.approx([0, 0.1, 0, None, 0.1, 0, 0.1])
+        network = browser.ask(
+            "const n = springtune.charts['/shape_fields network'].sources;"
+            "return [n.springs.data.x0.length, n.lines.data.xs.map((one) => one.length)]"
+        )
+        assert network == [3, [7, 7]]  # both outlines: at rest, and of the reference
+        assert "× 0.0" in text(browser, "#panel-network")
+        browser.driver.find_element(By.CSS_SELECTOR, "#panel-network [data-dim=definition]").send_keys("area")
+        assert "tension positive" in text(browser, "#panel-network")
+
+
+class TestFilters:
+    def test_what_is_no_number_is_said_so(self, browser, odd):
+        browser.open(odd)
+        field = browser.driver.find_element(By.CSS_SELECTOR, ".list [data-column=deformation_error]")
+        field.send_keys("abc")
+        said = text(browser, ".list [role=status]")
+        assert '"abc" is not a number' in said and "-2..2" in said.replace("−", "-") and "288 of 288" in said
+        assert field.get_attribute("aria-invalid") is not None
+        for asked in ("<-100", "1e9", "-5..-1"):
+            field.clear()
+            field.send_keys(asked)
+            assert "not a number" not in text(browser, ".list [role=status]")
+        field.clear()
+        field.send_keys(">5000")
+        assert 'No cell has deformation error [%]: ">5000".' in text(browser, ".list .empty")
+
+    def test_one_button_resets_them(self, browser, odd):
+        browser.open(odd)
+        order, button = "return springtune.views.cells.table.order.length", browser.driver.find_element(By.ID, "reset")
+        assert not button.is_enabled()
+        browser.driver.find_element(By.CSS_SELECTOR, ".list [data-column=load]").send_keys("compression")
+        browser.driver.find_element(By.CSS_SELECTOR, ".boxes input[value=solved]").click()
+        assert browser.ask(order) == 48
+        button.click()
+        assert browser.ask(order) == 288 and not button.is_enabled()
+        assert browser.ask("return document.querySelector('.list [data-column=load]').value") == ""
+
+
+def test_all_that_takes_the_focus_has_a_name(browser, odd):
+    browser.open(odd)
+    nodes = []
+    for view in views(browser):
+        show(browser, view)
+        nodes += browser.driver.execute_cdp_cmd("Accessibility.getFullAXTree", {})["nodes"]
+    focusable = {"name": "focusable", "value": {"type": "booleanOrUndefined", "value": True}}
+    stops = [node for node in nodes if focusable in node.get("properties", [])]
+    assert len(stops) > 50
+    assert [one for one in stops if not one.get("name", {}).get("value")] == []
+
+
+def test_on_a_phone_the_error_is_in_view(browser, odd):
+    browser.resize(400)
+    browser.open(odd)
+    cells = (
+        "return [...document.querySelectorAll('.list thead th')].findIndex((one) => /deformation/.test(one.innerText))"
+    )
+    place = browser.ask(cells)
+    left, right, low, high = browser.ask(
+        "const g = document.querySelector('.list .grid').getBoundingClientRect();"
+        "const c = document.querySelector('.list tr[data-place]').children[arguments[0]].getBoundingClientRect();"
+        "return [c.left, c.right, g.left, g.right]", place)  # fmt: skip
+    assert low < left < right <= high
+
+
+def test_no_chart_is_narrower_than_its_labels(browser, odd):
+    """BokehJS leaves a bit of the label of an axis beside a plot that was narrower than it."""
+    browser.open(odd)
+    browser.resize(100)
+    assert browser.ask("return document.querySelector('#panel-size .chart').clientWidth") > 200

@@ -70,7 +70,7 @@ def test_from_a_clone_to_a_paper(browser, clone):
     with browsing(clone) as address:
         browser.open(address)
         cells = browser.ask("return springtune.views.cells.table.order.length")
-        assert cells == 270 and browser.complaints() == []
+        assert cells == 360 and browser.complaints() == []
     (change,) = (block for block in blocks(clone / "docs/tutorial/from-clone-to-paper.md") if block.language == "diff")
     patch(change.code, clone)
     make(clone, "study")

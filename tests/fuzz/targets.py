@@ -33,7 +33,7 @@ from snakemake.utils import format as rendered
 
 import springtune as st
 from springtune.cli.diff import comparison_text
-from springtune.cli.results import info_text, verified
+from springtune.cli.results import verified
 from springtune.handover.formats import ENDINGS
 from springtune.mechanics.moduli import PatchTest
 from springtune.mesh import MESH_TYPES, MeshError, corner_angles, read_beam_mesh, signed_areas, write_mesh
@@ -54,6 +54,7 @@ from springtune.studies.output.export import export
 from springtune.studies.output.page import html as tables_page
 from springtune.studies.output.page import shown as shown_table
 from springtune.studies.output.style import png_and_pdf, styled
+from springtune.studies.output.summing_up import info_text
 from springtune.studies.runs import rerun, workload
 from springtune.studies.runs.plan import plan
 

@@ -1,5 +1,6 @@
 """The approaches of the benchmark against each other and the reference, and how a case is run."""
 
+import itertools
 import os
 import signal
 import subprocess
@@ -96,6 +97,18 @@ def asked(sizes, approaches, **shortest):
     return [shortest.get(name.replace("-", "_").replace("/", "_"), min(sizes)) for name in approaches]
 
 
+def clocks(patch, step, used):
+    """Put clocks in place of those of the time and of the processor; each look at one takes its step [s]."""
+    for name, one in (("perf_counter", step), ("process_time", used)):
+        patch.setattr(time, name, itertools.count(0, one).__next__)
+
+
+@pytest.fixture(autouse=True)
+def quiet(monkeypatch):
+    """A machine that does nothing else, whatever this one does."""
+    clocks(monkeypatch, 1e-3, 1e-2)
+
+
 def test_a_case_has_the_shapes_of_the_dataset_and_what_was_asked_for():
     approaches = approach_names(["lattice", "delingette"], ["structured", "braced"], ["linear-triangles", "free-form"])
     assert approaches == (
@@ -122,11 +135,62 @@ def test_a_case_has_the_shapes_of_the_dataset_and_what_was_asked_for():
 def test_what_is_run_does_not_depend_on_the_machine(monkeypatch):
     approaches, sizes = ("lattice/structured", "linear-triangles"), (5e-3, 1e-2)
     quick = benchmark.measure(SCENES["traction"], approaches, sizes, asked(sizes, approaches), 30.0)
-    clock = time.perf_counter
-    monkeypatch.setattr(time, "perf_counter", lambda: 1e4 * clock())  # all takes ten thousand times as long
+    clocks(monkeypatch, 10.0, 100.0)  # all takes ten thousand times as long
     slow = benchmark.measure(SCENES["traction"], approaches, sizes, asked(sizes, approaches), 30.0)
     assert (slow["seconds"] > 1.0).all() and (slow["status"] == quick["status"]).all()
     assert (quick["status"] == Status.SOLVED).all() and (slow["error"] == quick["error"]).all()
+
+
+class TestSteady:
+    """Runs of given seconds on a clock of their own, and what of them it had the processor."""
+
+    @pytest.fixture
+    def times(self, monkeypatch):
+        def times(seconds, share=1.0):
+            now = [0.0, 0.0]
+
+            def run():
+                taken = next(seconds)
+                now[:] = now[0] + taken, now[1] + share * taken
+                return taken
+
+            monkeypatch.setattr(time, "perf_counter", lambda: now[0])
+            monkeypatch.setattr(time, "process_time", lambda: now[1])
+            return run
+
+        return times
+
+    def test_runs_that_are_alike_are_enough(self, times):
+        seconds = iter((0.1, 0.11, 0.12, 9.0))
+        assert benchmark.middle(benchmark.steady(times(seconds), 3)) == pytest.approx(0.11)
+        assert next(seconds) == 9.0
+
+    def test_a_run_that_waited_is_repeated(self, times):
+        runs = benchmark.steady(times(iter((0.86, 0.14, 0.5, 0.74, 0.15, 0.16))), 3)
+        assert [result for _, result in runs] == [0.14, 0.15, 0.16]
+
+    def test_times_of_a_busy_machine_are_none(self, times):
+        seconds = iter(0.1 * 1.5**number for number in range(99))
+        assert benchmark.steady(times(seconds), 3) == [] and next(seconds) < 0.1 * 1.5**10
+        assert np.isnan(benchmark.middle([]))
+
+    def test_a_run_without_the_processor_is_none(self, times):
+        assert benchmark.steady(times(iter((0.9,) * 9), share=0.5), 1) == []
+        assert len(benchmark.steady(times(iter((0.9,) * 9), share=0.9), 1)) == 1
+
+
+def test_what_a_busy_machine_spoils_keeps_its_error_and_says_so(monkeypatch):
+    clocks(monkeypatch, 1.0, 0.1)
+    approaches, sizes = ("lattice/structured", "linear-triangles"), (1e-2,)
+    found = benchmark.measure(SCENES["traction"], approaches, sizes, asked(sizes, approaches), 30.0)
+    assert (found["status"] == Status.SOLVED).all() and np.isfinite(found["error"]).all()
+    assert np.isnan(found["seconds"]).all() and not found["pareto"].any() and np.isnan(found["reference_seconds"])
+    assert set(found["message"].ravel()) == {"not measured: the machine was busy"}
+    curves = benchmark.curves(SCENES["traction"], 1e-2, 30.0)
+    assert curves["curve_status"] == Status.SOLVED and "busy" in curves["curve_message"].item()
+    systems, steps = (of(SCENES["traction"], sizes, 30.0) for of in (benchmark.solvers, benchmark.explicit))
+    assert {"not measured: the machine was busy"} <= set(systems["solver_message"].ravel())
+    assert "busy" in steps["explicit_message"][0] and np.isnan(steps["copy_bandwidth"]).all()
 
 
 def ended_by(number, below):

@@ -44,6 +44,11 @@ def with_(motion, **options):
     return Motion(motion.network, motion.inertia[:, 0], **(kept | options))
 
 
+def damped(motion):
+    """The motion with critical damping of its loaded mode."""
+    return with_(motion, mass_damping=motion.critical_damping)
+
+
 def oscillator(**options):
     """One particle on one spring along x: a mass of 1 and a stiffness of 1 over the reference, omega = 1."""
     mesh = Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 1.0]]), np.array([[0, 1, 2]]))
@@ -198,7 +203,7 @@ def test_lowest_loaded_mode_is_the_bars():
 @pytest.mark.parametrize("linear", [True, False])
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_static_limit_is_the_static_solution(integrator, linear):
-    motion = with_(beam(size=0.01, linear=linear)).critical()
+    motion = damped(beam(size=0.01, linear=linear))
     problem = StaticProblem(motion.network, weights(motion.network.mesh, AXIAL))
     s = motion.load.sum()
     static = (problem.linear(s) if linear else problem.nonlinear(s)).displacements
@@ -379,7 +384,7 @@ def test_truncated_conjugate_gradients_stop_short_and_say_so():
 
 
 def test_single_precision_keeps_six_digits():
-    motion = beam(linear=False).critical()
+    motion = damped(beam(linear=False))
     step = 0.8 * motion.step_limit("central-difference")
     double = motion.run("central-difference", step, 3000).displacements
     single = motion.run("central-difference", step, 3000, precision="float32").displacements
@@ -555,7 +560,7 @@ def test_an_explicit_run_to_rest_factorizes_once():
     motion = beam(network_type=Counted)
     assert relax(motion.network, motion.load).status == "rest"
     assert motion.network.taken == 1
-    found = motion.critical()
+    found = damped(motion)
     before = motion.network.taken
     step = 0.8 * motion.step_limit("central-difference")
     assert found.run("central-difference", step, 100_000, rest=1e-6).status == "rest"
@@ -584,7 +589,7 @@ def to_rest(motion, way):
     """Brought to rest by relaxation or an integrator."""
     if way == "relax":
         return relax(motion.network, motion.load, linear=motion.linear)
-    motion = motion.critical()
+    motion = damped(motion)
     step = 0.8 * motion.step_limit("symplectic-euler") if way in EXPLICIT else 0.1 / motion.loaded_frequency
     return motion.run(way, step, 20_000, rest=1e-4)
 
@@ -684,7 +689,7 @@ def test_a_run_records_the_bound_of_its_step():
 
 
 def test_a_rest_criterion_ends_a_run():
-    motion = beam().critical()
+    motion = damped(beam())
     step = 0.8 * motion.step_limit("central-difference")
     assert motion.run("central-difference", step, 100_000, rest=1e-4).steps < 5000
 
@@ -699,7 +704,7 @@ def test_a_turning_point_is_no_rest():
 
 def test_a_run_through_inverted_triangles_is_reported():
     """Pushed far beyond what springs carry, they pass through each other and come to rest: no answer."""
-    motion = beam(force=-2e6, size=0.01).critical()
+    motion = damped(beam(force=-2e6, size=0.01))
     found = motion.run("central-difference", 0.3 * motion.step_limit("central-difference"), 20_000, rest=1e-6)
     assert found.status in ("inverted", "diverged") and found.message
 

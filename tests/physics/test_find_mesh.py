@@ -5,7 +5,7 @@ import pytest
 
 import springtune as st
 from counting import counted
-from springtune.prediction.choices import PREDICTED, in_order
+from springtune.prediction.choices import in_order, predicted
 from springtune.prediction.search import NEED_ENERGIES, asked_error, find_mesh
 from springtune.problem.status import Status
 from springtune.scene.sheet import Sheet
@@ -170,7 +170,7 @@ class TestBetweenWholeDivisions:
         for _ in range(20):
             aspect, nu = np.exp(random.uniform(0, np.log(10))), random.uniform(0, 0.49)
             beam, material = st.Beam(0.1 * aspect, 0.1), st.Material("210 GPa", nu)
-            loads = [str(name) for name in random.permutation(PREDICTED)[: random.integers(1, 4)]]
+            loads = [str(name) for name in random.permutation(predicted())[: random.integers(1, 4)]]
             error, types = float(random.choice([0.005, 0.01, 0.02, 0.05])), list(random.permutation([*st.MESH_TYPES]))
             search = find_mesh(beam, material, error, loads=loads, mesh_types=map(str, types[:2]), most=2500)
             for one in found_in(search):

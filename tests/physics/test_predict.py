@@ -13,7 +13,7 @@ from springtune.mechanics.network import Network
 from springtune.mesh import MESH_TYPES
 from springtune.mesh.types import MeshType
 from springtune.prediction.bands import extrapolate
-from springtune.prediction.choices import CASES, PREDICTED, predict, references
+from springtune.prediction.choices import CASES, predict, predicted, references
 from springtune.problem.boundary import held, weights
 from springtune.problem.geometry import Beam
 from springtune.problem.loads import LOADS
@@ -313,15 +313,15 @@ class TestWhatScenesSay:
         """The row `uniform` once had a stiffness that the definition of that name does not give: +3.8 %, not -6.4."""
         beam, material = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3)
         mesh = st.make_mesh(beam, mesh_type, "8 mm")
-        choices = predict(beam, mesh, material, loads=PREDICTED)
-        assert compared(beam, mesh, material, choices, PREDICTED) >= 3 * len(PREDICTED)
+        choices = predict(beam, mesh, material, loads=predicted())
+        assert compared(beam, mesh, material, choices, predicted()) >= 3 * len(predicted())
 
     def test_of_eighty_beams(self):
         """Of eight shapes, as a reference scales with size, thickness and modulus."""
         random, count = np.random.default_rng(14), 0
         for number in range(8):
             aspect, material, *_ = random_case(random)
-            load = PREDICTED[number % len(PREDICTED)]
+            load = predicted()[number % len(predicted())]
             one = references(Beam(aspect, 1.0, 1.0), Material(1.0, material.poisson_ratio), [load])[load]
             for largest in (2000, *9 * (200,)):
                 beam, mesh_type, size = random_mesh(random, aspect, largest)
@@ -340,7 +340,7 @@ class TestWhatScenesSay:
         for _ in range(200):
             _, material, beam, mesh_type, size = random_case(random)
             mesh = MESH_TYPES[mesh_type](beam.length, beam.height, size)
-            loads = [str(name) for name in random.choice(PREDICTED, 2, replace=False)]
+            loads = [str(name) for name in random.choice(predicted(), 2, replace=False)]
             count += compared(beam, mesh, material, predict(beam, mesh, material, loads=loads), loads)
         assert count > 1600
 
@@ -360,18 +360,18 @@ def held_by_bands(random, most):
         mesh_type, size = str(random.choice(list(MESH_TYPES))), np.sqrt(aspect / most / random.uniform(1.5, 6))
         beam = Beam(aspect, 1.0, 1e-3, "any")
         try:
-            bands, _ = extrapolate(mesh_type, size, beam, material, most=most, loads=PREDICTED)
+            bands, _ = extrapolate(mesh_type, size, beam, material, most=most, loads=predicted())
             break
         except ValueError as error:  # a slender one
             assert "less than 4 cells across" in str(error)
     mesh = MESH_TYPES[mesh_type](beam.length, beam.height, size)
-    found = {one.definition: one for one in predict(beam, mesh, material, loads=PREDICTED)}
+    found = {one.definition: one for one in predict(beam, mesh, material, loads=predicted())}
     outside = np.array(
         [
             (max(low - value, value - high, 0), abs(value))
             for band in bands
             if band.definition in found and not band.failures and not found[band.definition].failures
-            for load in PREDICTED
+            for load in predicted()
             for (low, high), value in [(band.errors[load], found[band.definition].errors[load])]
         ]
     )

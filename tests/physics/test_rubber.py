@@ -154,6 +154,17 @@ def test_stress_of_a_lattice_is_the_derivative_of_its_springs_energy(test, acros
 HEAD = "stretch,nominal stress [MPa]\n"
 
 
+@pytest.mark.parametrize(("head", "unit"), [("strain", 1), ("Strain [%]", 100), ("engineering strain in percent", 100)])
+def test_a_test_over_strain_is_that_over_stretch(tmp_path, head, unit):
+    test = treloar("uniaxial")
+    path = tmp_path / "strain.csv"
+    rows = [f"{unit * (stretch - 1):.12g},{stress / 1e6:.12g}" for stretch, stress in zip(test.stretch, test.stress)]
+    path.write_text("\n".join([f"{head},nominal stress [MPa]", "0,0", *rows]))
+    found = TensileTest.read(path)
+    np.testing.assert_allclose(found.stretch, test.stretch, rtol=1e-9)
+    assert fit_rubber(path).coefficients == pytest.approx(fit_rubber(test).coefficients, rel=1e-6)
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -161,6 +172,13 @@ HEAD = "stretch,nominal stress [MPa]\n"
         ("", "is empty"),
         ("1.1,0.2\n1.2,0.3\n", "no head of a test"),
         ("stretch,stress\n1.1,0.2\n", "no head of a test"),
+        ("load,nominal stress [MPa]\n1.1,0.2\n", "with a head such as 'stretch,nominal stress [MPa]' or 'strain [%]"),
+        ("stretch,strain,stress [MPa]\n1.1,0.1,0.2\n", "is no head of a test; give two columns, stretch or"),
+        ("true strain,stress [MPa]\n0.1,0.2\n", "no head of a test; give two columns, stretch or engineering strain"),
+        ("stretch [%],stress [MPa]\n110,0.2\n", "no head of a test"),
+        ("strain,stress [MPa]\n1.1,0.2\n1.2,0.3\n1.5,0.4\n", "smallest strain is 1.1, as of a stretch or of percent"),
+        ("strain,stress [MPa]\n0,0\n10,0.2\n20,0.3\n50,0.4\n", "name the column 'stretch' or 'strain [%]'"),
+        ("stretch,stress [MPa]\n0.1,0.2\n0.2,0.3\n0.5,0.4\n", "or name the column 'strain'"),
         ("stretch,stress [mm]\n1.1,0.2\n", "nominal stress"),
         (HEAD + "1.1,0.2\n1.2,zwei\n", "line 3: '1.2,zwei' is not two numbers"),
         (HEAD + "1.1,0.2\n1.2,0.3,7\n", "line 3"),

@@ -3,6 +3,7 @@
 Of what git knows, or of all files where there is no git. Packages are installed, so a network or a cache is needed.
 """
 
+import ctypes
 import os
 import re
 import shutil
@@ -23,10 +24,18 @@ WITHIN = re.compile(
     r"springtune/.*\.py|springtune/(__init__\.pyi|py\.typed|studies/output/page\.html)"
     r"|springtune/cli/study_of_a_(beam|shape)\.yaml"
     r"|springtune/studies/output/browse/assets/\w+\.(css|html|js)"
+    r"|springtune/workflow/(Snakefile|config/.*|examples/.*|profiles/.*|workflow/.*)"
     r"|snakemake_logger_plugin_springtune/\w+\.py"
     rf"|{NAME}\.dist-info/(METADATA|WHEEL|RECORD|entry_points\.txt|licenses/LICENSE)"
 )
 """All that a wheel may have."""
+
+WORKFLOW = (
+    "Snakefile", "config/paper.yaml", "config/paper_tables.csv", "config/treloar/uniaxial.csv",
+    "config/study.schema.json", "examples/rubber_tests.py", "profiles/default/config.yaml", "workflow/paper/main.typ",
+    "workflow/report/study.rst", "workflow/rules/common.smk",
+)  # fmt: skip
+"""What a study needs besides the package."""
 
 
 def done(*command, **options):
@@ -101,14 +110,17 @@ def empty(wheel, tmp_path_factory):
 
 @pytest.fixture
 def call(empty, tmp_path):
-    """Calls a program of the empty environment in an empty folder, whose name is `here`."""
-    here = tmp_path / "empty"
-    here.mkdir()
-    environment = {"PATH": "/usr/bin:/bin", "HOME": str(here), "LANG": "C.UTF-8"}
+    """Calls a program of the empty environment in an empty folder, whose name is `here`; no git is on its PATH."""
+    here, programs = tmp_path / "empty", tmp_path / "programs"
+    for folder in (here, programs):
+        folder.mkdir()
+    for name in ("bash", "sh", "env"):
+        (programs / name).symlink_to(shutil.which(name))
+    environment = {"PATH": str(programs), "HOME": str(here / "home"), "LANG": "C.UTF-8"}
 
-    def call(program, *arguments):
+    def call(program, *arguments, **options):
         command = [str(empty / program), *map(str, arguments)]
-        return subprocess.run(command, cwd=here, env=environment, capture_output=True, text=True)
+        return subprocess.run(command, cwd=here, env=environment, capture_output=True, text=True, **options)
 
     call.here = here
     return call
@@ -127,19 +139,34 @@ def test_the_wheel_has_the_package_and_nothing_else(wheel):
         if path.is_file() and path.parent.name != "__pycache__" and path.name != "conftest.py"
     }
     assert source <= names
+    carried = {f"springtune/workflow/{name}" for name in WORKFLOW}
+    assert carried <= names, carried - names
+
+
+def test_what_is_built_of_a_clone_has_its_commit(tree, tmp_path):
+    """Source distribution and wheel, and not of a clone around it."""
+    around = shutil.copytree(tree, tmp_path / "around", symlinks=True)
+    git = ["git", "-C", around, "-c", "user.name=a", "-c", "user.email=a@b.c"]
+    for command in (["init", "-q"], ["add", "."], ["commit", "-q", "-m", "a"]):
+        done(*git, *command)
+    commit = done(*git, "rev-parse", "HEAD")
+    source, wheel = built(around, tmp_path / "dist")
+    with zipfile.ZipFile(wheel) as file:
+        assert file.read("springtune/commit.txt").decode() == commit
+    inside = around / "inside"
+    with tarfile.open(source) as file:
+        file.extractall(inside)
+    assert (inside / NAME / "src/springtune/commit.txt").read_text() == commit
+    (inside / NAME / "src/springtune/commit.txt").unlink()
+    with zipfile.ZipFile(built(inside / NAME, tmp_path / "again")[1]) as file:
+        assert "springtune/commit.txt" not in file.namelist()
 
 
 def test_the_source_has_what_a_clone_has(release):
     with tarfile.open(release[0]) as file:
         names = {name.partition("/")[2] for name in file.getnames()}
-    wanted = ("Snakefile", "Makefile", "LICENSE", "CITATION.cff", "config/paper.yaml", "requirements/run.txt")
-    wanted += (
-        "workflow/rules/common.smk",
-        "profiles/default/config.yaml",
-        "workflow/profiles/README.md",
-        "tools/setup.sh",
-        "tests/conftest.py",
-    )
+    wanted = ("Makefile", "LICENSE", "CITATION.cff", "requirements/run.txt", "workflow/profiles/README.md", *WORKFLOW)
+    wanted += ("tools/setup.sh", "tests/conftest.py")
     assert names.issuperset(wanted), set(wanted) - names
     assert not {name for name in names if name.startswith(("results", "build", ".venv", ".snakemake/"))}
 
@@ -198,41 +225,68 @@ def test_the_scene_of_the_readme_is_solved(call, description):
     assert (found.stdout, found.stderr) == (shown, "")
 
 
+@pytest.fixture
+def read_only(empty):
+    """Options of a process that cannot write into the environment, as that of an administrator."""
+    folders = [path for path in empty.parent.rglob("*") if path.is_dir() and not path.is_symlink()]
+    for folder in folders:
+        folder.chmod(0o555)
+    library, drop_capability, override = ctypes.CDLL(None), 24, 1  # root writes anywhere without this
+    yield {"preexec_fn": lambda: library.prctl(drop_capability, override, 0, 0, 0)}
+    for folder in folders:
+        folder.chmod(0o755)
+
+
 @pytest.mark.parametrize("shape", [(), ("--shape",)], ids=["beam", "shape"])
-def test_a_study_is_written_and_told(call, shape):
-    written = call("springtune", "new", "mine", *shape)
-    assert written.returncode == 0, written.stderr
-    # Without a workflow nothing runs it: that is said at once, and where to go.
-    assert f"unpack {NAME}.tar.gz" in written.stdout and "clone" in written.stdout
-    told = call("springtune", "scenes", "mine.yaml")
-    assert told.returncode == 0, told.stderr
-    assert re.search(rf"scenes +{4 if shape else 2}\b", told.stdout)
+def test_a_study_is_written_and_run_in_an_empty_folder(call, read_only, empty, shape):
+    """With Python alone: no clone, no git, and an environment that is only read."""
+    before = {path: path.stat().st_mtime_ns for path in empty.parent.rglob("*")}
+    touch = "import pathlib, springtune; pathlib.Path(springtune.__file__).with_name('touched').touch()"
+    assert "Permission denied" in call("python", "-c", touch, **read_only).stderr
+    assert call("python", "-c", "import shutil; print(shutil.which('git'))", **read_only).stdout == "None\n"
+    written = call("springtune", "new", "mine", *shape, **read_only)
+    assert written.stdout.splitlines()[1:] == ["  springtune run mine.yaml"], written.stderr
+    scenes = 4 if shape else 2
+    assert re.search(rf"scenes +{scenes}\b", call("springtune", "scenes", "mine.yaml", **read_only).stdout)
+    ran = call("springtune", "run", "mine.yaml", "--cores", 1, **read_only)
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+    assert re.search(r"^results +results/mine: index.html, dataset.nc", ran.stdout + ran.stderr, re.MULTILINE)
+    told = call("springtune", "info", "results/mine", **read_only)
+    assert f"{scenes} asked, {scenes} solved" in told.stdout and f"springtune {springtune.__version__}" in told.stdout
+    assert "commit" not in told.stdout  # of a tree without git
+    assert "unknown" not in (call.here / "results/mine/tables/index.html").read_text()
+    assert (call.here / "results/mine/index.html").stat().st_size > 100_000
+    again = call("springtune", "run", "mine.yaml", **read_only)
+    assert again.returncode == 0 and "results/mine is complete" in again.stdout
+    assert call("springtune", "verify", "mine.yaml", **read_only).returncode == 0
+    assert {path: path.stat().st_mtime_ns for path in empty.parent.rglob("*")} == before
 
 
-def test_running_says_what_is_missing_and_where_it_is(call):
-    call("springtune", "new", "mine")
-    before = sorted(call.here.iterdir())
-    found = call("springtune", "run", "mine.yaml", "--cores", 1)
-    assert found.returncode == 1
-    assert "workflow" in found.stderr and f"unpack {NAME}.tar.gz" in found.stderr
-    assert f"springtune run {call.here / 'mine.yaml'}" in found.stderr
-    assert sorted(call.here.iterdir()) == before
+def test_studies_of_the_package_run(call, read_only):
+    """With the files that they name: the paper's is that of a run without a study."""
+    told = call("springtune", "run", "--dry-run", "--cores", 1, **read_only)
+    assert told.returncode == 0 and "results/paper" in told.stdout + told.stderr, told.stderr
+    program = (
+        "from springtune.studies.kinds import load_study\n"
+        "from springtune.studies.runs.source import CONFIG_FOLDER, workflow_folder\n"
+        "for path in sorted((workflow_folder() / CONFIG_FOLDER).glob('*.yaml')):\n"
+        "    print(path.stem, len(load_study(path).scenes))\n"
+    )
+    told = call("python", "-c", program, **read_only)
+    assert told.returncode == 0 and len(told.stdout.splitlines()) >= 10, told.stderr
+    assert not (call.here / "results").exists()
 
 
-@pytest.mark.parametrize("named", [False, True], ids=["there", "here"])
-def test_the_source_runs_a_study(call, empty, release, named):
-    """With the environment of the wheel, in the folder of the source or with it named: what the message tells to do."""
+def test_the_source_runs_a_study(call, empty, release):
+    """In the folder of the source, with the environment of the wheel."""
     with tarfile.open(release[0]) as file:
         file.extractall(call.here)
-    call("springtune", "new", "mine")
     source = call.here / NAME
     environment = {"PATH": f"{empty}:/usr/bin:/bin", "HOME": str(call.here), "LANG": "C.UTF-8"}
-    environment |= {"SPRINGTUNE_WORKFLOW": str(source)} if named else {}
-    folder = call.here if named else source
-    done(empty / "springtune", "run", call.here / "mine.yaml", "--cores", "1", cwd=folder, env=environment)
-    assert (folder / "results/mine/dataset.nc").is_file()
-    assert (folder / "results/mine/index.html").is_file()
-    assert not (source / "results").exists() or not named
+    done(empty / "springtune", "new", "mine", cwd=source, env=environment)
+    done(empty / "springtune", "run", "config/mine.yaml", "--cores", "1", cwd=source, env=environment)
+    assert (source / "results/mine/dataset.nc").is_file()
+    assert (source / "results/mine/index.html").is_file()
 
 
 @pytest.mark.parametrize(

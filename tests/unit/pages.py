@@ -78,6 +78,11 @@ def agree(page, shown, printed):
     assert doctest.OutputChecker().check_output(shown, printed, flags), f"{page.name} shows\n{shown}\nbut\n{printed}"
 
 
+def claims(readme):
+    """Median and worst error of each definition in the table of the README, as texts."""
+    return dict(re.findall(r"^\| `(\w+)` \|[^|]*\| (.*? \| .*?) \|$", readme.read_text(), re.MULTILINE))
+
+
 def write_study(text, folder):
     """Write a study where its first line says, or add its sections to the one that is there; else None."""
     found = re.match(r"# (added to )?(config/[\w.]+)\n", text)
@@ -130,6 +135,8 @@ def follow(page, folder, run=None):
         elif block.language == "yaml":
             assert yaml.safe_load(block.code)
             write_study(block.code, folder)
+        elif block.language == "toml":
+            assert block.code in (REPOSITORY / "examples/plugin/pyproject.toml").read_text()
         elif block.language == "diff":
             patch(block.code, folder)
         else:

@@ -5,13 +5,26 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from springtune.problem.compare import best_stiffness, deformation_error
+from springtune.problem.compare import best_stiffness, deformation_error, sign_sentence, sign_word
 from springtune.problem.status import Status
 from springtune.springs.calibrated import calibrate
 
 
 def test_deformation_error_is_signed_by_direction():
     assert deformation_error([1.1, 0.9, -1.1, -0.9], [1.0, 1.0, -1.0, -1.0]) == pytest.approx([0.1, -0.1, -0.1, 0.1])
+
+
+def test_the_word_of_a_sign_turns_with_the_reference():
+    assert [sign_word(error, 1e-3) for error in (0.1, -0.1, 0.0, np.nan)] == ["too soft", "too stiff", "", ""]
+    assert [sign_word(error, -1e-3) for error in (0.1, -0.1)] == ["too stiff", "too soft"]
+    assert sign_word(0.1, np.nan) == "" and sign_word(-0.1, -2e6, "stress") == "too large"
+
+
+def test_the_sentence_of_signs_is_true_for_all_loads():
+    assert sign_sentence({"traction": 2.0, "shear": 1.0}) == sign_sentence({}) == "positive: too soft"
+    assert sign_sentence({"pressure": -2.0, "compression": -1.0}) == "negative: too soft"
+    mixed = sign_sentence({"pressure": -2.0, "traction": 1.0, "compression": -1.0})
+    assert mixed.startswith("positive: too soft; under pressure and compression, where") and "negative is" in mixed
 
 
 STIFFNESS = np.linspace(0.4, 1.6, 61)

@@ -78,6 +78,14 @@ def test_packages_that_may_be_replaced_are_imported_in_one_module():
             "scipy meshio netgen",
         ),
         (
+            "import matplotlib; matplotlib.use('agg'); import springtune as st; beam = st.Beam('100 mm', '20 mm');"
+            "steel = st.Material('210 GPa', 0.3, '7850 kg/m^3'); mesh = st.make_mesh(beam, 'free', '10 mm');"
+            "scene = st.Scene(beam, mesh, steel, 'traction', '1 kN'); str(scene.solve()); scene.solve().plot();"
+            "st.sensitivity(scene, [0.5, 0.9]).plot(); st.predict(beam, mesh, steel); scene.motion();"
+            "st.moduli(mesh, steel, 'patch'); st.SpringNet.from_scene(scene)",
+            "snakemake pydantic xarray bokeh h5netcdf netCDF4 h5py click rich psutil jinja2 yaml meshio",
+        ),
+        (
             "from springtune.studies.kinds.scenes import mesh, sensitivity, solve, reference",
             "snakemake xarray matplotlib pandas pydantic pint",
         ),
@@ -115,7 +123,7 @@ def root(node):
 
 
 def private(name):
-    return name.startswith("_") and not name.endswith("__") and name != "_"
+    return name.startswith("_") and not name.endswith("_")  # such as __init__ and _repr_html_ of notebooks
 
 
 TESTS = sorted((REPOSITORY / "tests").rglob("*.py"))

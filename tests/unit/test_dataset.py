@@ -28,7 +28,8 @@ from springtune.studies.kinds.scenes.variables import ROOT, SENSITIVITY
 from springtune.studies.output import dataset
 from springtune.studies.output.dataset import CHUNK, Group
 from springtune.studies.output.reading import lazily
-from springtune.studies.runs import provenance, source
+from springtune.studies.runs import provenance
+from springtune.studies.runs.source import clone, workflow_folder
 
 AXES = {
     "beam": ("a", "b"),
@@ -205,6 +206,14 @@ def committed(folder, message="a"):
     return git
 
 
+def library(folder):
+    """Files of a library in a folder; its package."""
+    for name in ("Snakefile", "workflow/rules/common.smk", "requirements/run.txt", "src/springtune/one.py"):
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text("")
+    return folder / "src/springtune"
+
+
 class TestProvenance:
     def test_inputs_are_named_without_the_machine(self, tmp_path):
         repository = tmp_path / "somewhere"
@@ -219,64 +228,50 @@ class TestProvenance:
         assert str(tmp_path) not in json.dumps(found)
         assert "references" not in found  # nothing printed
 
-    def test_changes_are_kept_where_there_are_some(self, tmp_path, monkeypatch):
-        path = TestConventions().study(tmp_path)
-        monkeypatch.setattr(provenance, "clone", lambda: tmp_path)
+    def test_changes_are_kept_where_there_are_some(self, tmp_path):
+        package, path = library(tmp_path), TestConventions().study(tmp_path)
         committed(tmp_path)
-        clean = provenance.attributes(load_study(path), path)
+        clean = provenance.attributes(load_study(path), path, package=package)
         assert len(clean["git_commit"]) == 40 and clean["git_diff"] == "" and "study_commit" not in clean
         path.write_text(path.read_text().replace("Small", "Smaller"))
-        dirty = provenance.attributes(load_study(path), path)
+        dirty = provenance.attributes(load_study(path), path, package=package)
         assert dirty["git_commit"] == clean["git_commit"] + "+changes"
         assert "-title: Small\n+title: Smaller\n" in dirty["git_diff"]
 
-    def test_a_study_in_a_checkout_of_its_own_has_two_commits(self, tmp_path, monkeypatch):
-        library, mine = tmp_path / "library", tmp_path / "mine"
-        (library / "src").mkdir(parents=True)
-        (library / "requirements").mkdir()
-        for name in ("src/one.py", "requirements/run.txt"):
-            (library / name).write_text("")
+    def test_a_study_in_a_checkout_of_its_own_has_two_commits(self, tmp_path):
+        package, mine = library(tmp_path / "library"), tmp_path / "mine"
         mine.mkdir()
         path = TestConventions().study(mine)
-        monkeypatch.setattr(provenance, "clone", lambda: library)
-        outside = provenance.attributes(load_study(path), path)
-        assert outside["git_commit"] == "" and "study_commit" not in outside
-        committed(library)
-        outside = provenance.attributes(load_study(path), path)
+        unknown = provenance.attributes(load_study(path), path, package=package)
+        assert unknown["git_commit"] == "" and "study_commit" not in unknown
+        committed(tmp_path / "library")
+        outside = provenance.attributes(load_study(path), path, package=package)
         assert len(outside["git_commit"]) == 40 and "study_commit" not in outside
         committed(mine, "another")
-        (library / "src/one.py").write_text("changed code\n")
+        (package / "one.py").write_text("changed code\n")
         path.write_text(path.read_text() + "# changed study\n")
-        found = provenance.attributes(load_study(path), path)
+        found = provenance.attributes(load_study(path), path, package=package)
         assert found["git_commit"] == outside["git_commit"] + "+changes"
         assert found["study_commit"].endswith("+changes") and found["study_commit"][:40] != outside["git_commit"]
         added = [line for line in found["git_diff"].splitlines() if line.startswith("+") and "changed" in line]
         assert added == ["+changed code", "+# changed study"]
 
-    def test_a_built_package_has_the_commit_that_it_was_built_from(self, tmp_path, monkeypatch):
+    def test_a_built_package_has_the_commit_that_it_was_built_from(self, tmp_path):
         """And not that of a folder above, such as of a project whose environment it is in."""
         package = tmp_path / ".venv/springtune"
         (package / "workflow/config").mkdir(parents=True)
         path = TestConventions().study(package / "workflow/config")
         committed(tmp_path)
-        for name, value in {
-            "PACKAGE": package,
-            "COMMIT_FILE": package / "commit.txt",
-            "COPY": package / "workflow",
-        }.items():
-            monkeypatch.setattr(source, name, value)
-            monkeypatch.setattr(provenance, name, value, raising=False)
-        assert source.workflow_folder() == package / "workflow" and source.clone() is None
-        unknown = provenance.attributes(load_study(path), path)
+        assert workflow_folder(package) == package / "workflow" and clone(package) is None
+        unknown = provenance.attributes(load_study(path), path, package=package)
         assert unknown["git_commit"] == unknown["git_diff"] == "" and "study_commit" not in unknown
         (package / "commit.txt").write_text("f00d\n")
-        known = provenance.attributes(load_study(path), path)
+        known = provenance.attributes(load_study(path), path, package=package)
         assert known["git_commit"] == "f00d" and "study_commit" not in known
 
-    def test_changes_are_those_of_package_rules_and_study_alone(self, tmp_path, monkeypatch):
-        monkeypatch.setattr(provenance, "clone", lambda: tmp_path)
+    def test_changes_are_those_of_package_rules_and_study_alone(self, tmp_path):
         (tmp_path / "config").mkdir()
-        path = TestConventions().study(tmp_path / "config")
+        package, path = library(tmp_path), TestConventions().study(tmp_path / "config")
         kept = ["src/own.py", "Snakefile", "workflow/rules/a[b].smk", "workflow/report/a.rst"]
         others = ["workflow/profiles/slurm/config.yaml", "Makefile", "requirements/run.txt", "config/other.yaml"]
         for name in (*kept, *others):
@@ -287,10 +282,10 @@ class TestProvenance:
             (tmp_path / name).write_text(f"changed {name}\n")
         path.write_text(path.read_text() + "# changed study\n")
         study = load_study(path)
-        found = provenance.attributes(study, path)["git_diff"]
+        found = provenance.attributes(study, path, package=package)["git_diff"]
         added = [line for line in found.splitlines() if line.startswith("+") and "changed" in line]
         assert set(added) == {"+# changed study", *(f"+changed {name}" for name in kept)}
-        less = provenance.attributes(study, path, ["git_diff", "host"])
+        less = provenance.attributes(study, path, ["git_diff", "host"], package)
         assert less["git_diff"] == less["host"] == "" and less["git_commit"].endswith("+changes")
 
     def test_long_changes_are_cut_and_hashed(self, tmp_path):

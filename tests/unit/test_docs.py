@@ -22,7 +22,7 @@ from springtune.studies.kinds import load_study
 
 from campaigns import Campaign
 from pages import blocks as blocks_of
-from pages import check_command, follow, typed
+from pages import check_command, claims, follow, typed
 from synthetic import dataset
 
 REPOSITORY = Path(__file__).parents[2]
@@ -64,6 +64,18 @@ def test_relative_links_lead_somewhere(page):
         assert target.exists(), f"{page.name}: {link}"
         if anchor:
             assert anchor in anchors(target), f"{page.name}: {link}"
+
+
+def test_the_study_of_the_readme_asks_for_what_its_table_claims():
+    study = load_study(REPOSITORY / "config/paper.yaml")
+    asked = {
+        (one.definition, one.mesh.beam.name, one.mesh.mesh_type, one.mesh.mesh_size, one.material.name, one.load)
+        for one in study.scenes
+        if one.kinematics == "linear"
+    }
+    cells = [(one.beam, one.mesh_type, one.mesh_size, one.material, one.load) for one in study.printed]
+    assert len(cells) == 45 and {*claims(REPOSITORY / "README.md")} == {"patch", "delingette"}
+    assert {(name, *cell) for name in claims(REPOSITORY / "README.md") for cell in cells} <= asked
 
 
 def test_every_page_is_reached_from_the_readme():
@@ -177,6 +189,8 @@ def test_commands_are_commands(page, tmp_path):
     shutil.copytree(REPOSITORY / "config", tmp_path / "config")
     for name in ("mine", "theirs", "coarse_to_fine", "columns", "sweep", "plate", "outlined"):
         shutil.copy(tmp_path / "config/quick.yaml", tmp_path / f"config/{name}.yaml")
+    for name in ("mine.yaml", "paper_tables.csv"):
+        shutil.copy(tmp_path / "config" / name, tmp_path)  # outside of a clone
     for words in typed(page):
         check_command(words, tmp_path)
 

@@ -22,7 +22,7 @@ from springtune.studies.kinds.moduli.figures import definitions
 from springtune.studies.kinds.scenes import errors, figures
 from springtune.studies.kinds.scenes.figures import NETWORK_LINE, draw_curve
 from springtune.studies.kinds.stability.figures import PLOTS
-from springtune.studies.output import present, style
+from springtune.studies.output import labels, present, style
 from springtune.studies.output.style import png_and_pdf
 from springtune.studies.runs.keys import modules
 
@@ -414,12 +414,79 @@ def test_a_study_of_linear_kinematics_alone_has_its_figures(tree):
             plt.close(drawn_on)
 
 
-def test_no_line_runs_through_the_key_of_a_sensitivity_figure(tree):
+def said(panel):
+    """All texts of a figure."""
+    return [text.get_text() for text in panel.figure.findobj(Text)]
+
+
+def test_the_key_of_a_sensitivity_figure_hides_no_line(tree):
     stem, plot, selection = next(iter(figures.sensitivity(tree)))
     panel = plot(tree, **selection)
-    frame = panel.get_legend().get_frame()
-    assert frame.get_visible() and frame.get_alpha() == 1 and frame.get_facecolor()[:3] == (1, 1, 1)
-    plt.close(panel.figure)
+    panel.figure.draw_without_rendering()
+    key, label = panel.get_legend().get_window_extent(), panel.xaxis.label.get_window_extent()
+    assert panel.figure.bbox.y0 <= key.y0 and key.y1 <= label.y0 < panel.bbox.y0
+
+
+@pytest.fixture
+def beyond():
+    """A dataset none of whose references applies."""
+    tree = dataset()
+    applies = tree.status.isel(mesh_type=0, mesh_size=0, definition=0, drop=True)
+    tree.dataset = tree.to_dataset().assign(reference_applies=0 * applies)
+    return tree
+
+
+def test_what_is_beyond_the_reference_is_marked(tree, beyond):
+    assert "hollow: beyond small strain" in " ".join(said(st.plot_size(beyond, **SCENES)[0]))
+    (panel, *_) = st.plot_size(beyond, **SCENES)
+    hollow = [line for line in panel.get_lines() if line.get_markerfacecolor() == "white"]
+    assert len(hollow) == len(DEFINITIONS) and all(np.isfinite(line.get_ydata()).all() for line in hollow)
+    assert any(text.startswith("beyond small strain") for text in said(st.plot_sensitivity(beyond, **CURVE)))
+    deformed = " ".join(said(st.plot_deformed(beyond, **SCENES, definition="area")[0]))
+    assert "reference beyond small strain" in deformed.replace("\n", " ")
+    for panel in (st.plot_sensitivity(tree, **CURVE), st.plot_deformed(tree, **SCENES, definition="area")[0]):
+        assert "beyond" not in " ".join(said(panel))
+
+
+def test_signed_errors_say_once_what_their_sign_means():
+    tree = dataset()
+    against = xr.where(tree["load"].isin(("compression", "pressure")), -1.0, 1.0)
+    tree.dataset = tree.to_dataset().assign(reference_displacement=against * abs(tree.reference_displacement))
+    for load, words in (("traction", "positive: too soft"), ("compression", "negative: too soft")):
+        panels = st.plot_size(tree, **SCENES | {"load": load})
+        signs = [text for text in said(panels[0]) if "too soft" in text]
+        assert len(signs) == 1 and signs[0].startswith(words), signs
+    panel = st.plot_definitions_loads(tree, beam="100x20", mesh_type="free", kinematics="linear")[0]
+    (text,) = (text.replace("\n", " ") for text in said(panel) if "too soft" in text)
+    assert text.startswith("positive: too soft; under compression and pressure, where displacements are negative, neg")
+
+
+@pytest.mark.parametrize("plot", [st.plot_size, st.plot_definitions_size])
+def test_one_mesh_size_is_no_column_of_dots(tree, plot):
+    selection = EVERY_PLOT[plot][0]
+    for panel in plot(group_of_one_size(tree), **selection):
+        drawn = [line for line in panel.get_lines() if set(line.get_label().split(", ")) & {*DEFINITIONS}]
+        places = [place for line in drawn for place in line.get_xdata()]
+        assert panel.get_xscale() == "linear" and panel.get_xlabel().startswith("One mesh size, ")
+        assert places and len(set(places)) == len(places) and not len(panel.get_xticks())
+
+
+def group_of_one_size(tree):
+    """Root of a dataset with its coarsest mesh alone."""
+    return tree.to_dataset().isel(mesh_size=[-1])
+
+
+def test_counts_and_shares_of_large_strains_look_different(tree):
+    texts = {text for panel in st.plot_stability_strains(tree) for text in (one.get_text() for one in panel.texts)}
+    assert all(text.isdecimal() or text in ("", "f", "path") or text.endswith(" %") for text in texts), texts
+
+
+def test_the_grey_band_of_a_refinement_is_explained(tree):
+    assert any(text.startswith("grey: within the tolerance, ") for text in said(st.plot_refinement(tree)[0]))
+
+
+def test_a_number_keeps_its_unit():
+    assert labels.wrapped("100x20, mesh 5 mm, rubber", labels.width("100x20, mesh 5 ")) == "100x20, mesh\n5 mm, rubber"
 
 
 @pytest.mark.parametrize(("predicted", "shown"), [(150e6, True), (50e6, False), (300e6, False)])

@@ -331,6 +331,10 @@ def test_figures_show_the_last_values_and_say_which(swept):
         definition="lattice", thickness=3e-3, young_modulus=2e9, poisson_ratio=0.5, stiffness_scale=1.0
     )
     assert lines["lattice"].get_ydata() == pytest.approx(100 * wanted.values.ravel())
+    doubted = tree.to_dataset()
+    doubted = doubted.assign(reference_applies=0 * doubted.reference_applies)
+    (panel,) = springtune.plot_sweep(doubted, parameter="force")
+    assert any("hollow: beyond small strain" in text.get_text().replace("\n", " ") for text in panel.texts)
     with pytest.raises(ValueError, match="parameter: 'height' is not swept; the study sweeps force, thickness"):
         springtune.plot_sweep(tree, parameter="height")
 

@@ -5,7 +5,20 @@ import pytest
 from springtune.mesh import MESH_TYPES
 from springtune.problem import loads
 from springtune.problem.geometry import Beam
-from springtune.problem.loads import AXIAL, BENDING, BOTH, BOTTOM, FACE, LEFT, LOAD_KINDS, LOADS, RIGHT, SHEAR, TOP
+from springtune.problem.loads import (
+    AXIAL,
+    BENDING,
+    BOTH,
+    BOTTOM,
+    FACE,
+    LEFT,
+    LOAD_KINDS,
+    LOADS,
+    OWN_LOADS,
+    RIGHT,
+    SHEAR,
+    TOP,
+)
 from springtune.problem.materials import Material
 from springtune.reference.finite_strain import solve_finite_strain
 from springtune.reference.small_strain import solve_small_strain
@@ -27,7 +40,7 @@ EXACT = FORCE * BEAM.height / (CORK.young_modulus * BEAM.thickness * BEAM.length
 @pytest.fixture
 def lift(monkeypatch):
     """A load that the package does not have."""
-    monkeypatch.setitem(LOADS, "lift", loads.Load(LIFT, 1.0))
+    monkeypatch.setitem(OWN_LOADS, "lift", loads.Load(LIFT, 1.0))
     monkeypatch.setitem(LOAD_KINDS, "lift", LIFT)
 
 

@@ -220,9 +220,45 @@ class TestRun:
         assert result.exit_code == code and said in result.stderr
         assert "Traceback" not in result.stderr
 
+    @pytest.fixture
+    def called(self, monkeypatch):
+        """Folders and commands that Snakemake would be called by."""
+        found = []
+
+        def execute(program, command):
+            found.append((Path.cwd(), command))
+            raise SystemExit(0)
+
+        monkeypatch.setattr("os.execv", execute)
+        return found
+
+    @pytest.mark.parametrize("folder", ["", "of mine"], ids=["here", "elsewhere"])
+    def test_the_workflow_of_the_library_runs_it_here(self, checkout, monkeypatch, called, folder):
+        """In the folder one stands in, though it holds no workflow; or in that of --results."""
+        here = checkout / "empty"
+        here.mkdir()
+        monkeypatch.chdir(here)
+        assert run("new", "mine").stdout.splitlines()[1] == "  springtune run mine.yaml"
+        told = run("run", "mine.yaml", "--list-rules", *(["--results", folder] if folder else []))
+        ((place, command),) = called
+        study = here / "mine.yaml" if folder else "mine.yaml"
+        assert place == here / folder
+        assert command[-4:-1] == ["--snakefile", str(REPOSITORY / "Snakefile"), "--list-rules"]
+        assert command[-1] == f"--configfile={study}"
+        said = f"results go to {folder}/results/mine; paths below are as seen from {folder}\n"
+        assert told.stderr == (said if folder else "")
+
+    def test_without_a_study_it_is_the_papers_of_here_or_of_the_library(self, checkout, called):
+        run("run", "--list-rules")
+        shutil.copy("config/one.yaml", "config/paper.yaml")
+        run("run", "--list-rules")
+        studies = [command[-1].removeprefix("--configfile=") for _, command in called]
+        assert studies == [str(REPOSITORY / "config/paper.yaml"), "config/paper.yaml"]
+        assert f"did you mean {REPOSITORY / 'config/quick.yaml'}?" in run("run", "quick").stderr
+
     @pytest.mark.parametrize("named", [["--workflow-profile", "slurm"], ["--workflow-profile=workflow/profiles/slurm"]])
     @pytest.mark.skipif(bool(find_spec(SLURM)), reason="the plugin is installed")
     def test_slurm_without_its_plugin_says_what_to_install(self, named):
         result = run("run", "config/one.yaml", *named)
         assert result.exit_code == 2 and "which is not installed" in result.stderr
-        assert "pip install --require-hashes -r requirements/slurm.txt" in result.stderr
+        assert "pip install '.[slurm]'" in result.stderr

@@ -58,6 +58,7 @@ def path(tmp_path_factory):
     for name, value in (("status", 1), ("deformation_error", 0.01), ("displacement", 1e-3), ("solver", "Cholesky")):
         root[name].loc[place] = value
     root["particles"].loc[place] = 100
+    root["reference_displacement"].values[...] = 1e-3
     root["beam_length"].values[:] = [0.2, 0.1]
     for mesh_type, status, message in (("free", 3, "last residual 2.5e-01"), ("structured", 5, "springs gone")):
         cell = place | {"mesh_type": mesh_type, "load": "bending", "definition": "patch"}
@@ -154,8 +155,8 @@ class TestInfo:
             "1 not_converged: last residual 2.5e-01",
             "1 failed: springs gone",
             "/sensitivity: 6 asked, 6 solved",
-            "lattice 4 1 % -20 % 200x40, free, 5 mm, steel, traction",
-            "patch 2 1 % +1 % 200x40, structured, 5 mm, steel, traction",
+            "lattice 4 1 % -20 % too stiff 200x40, free, 5 mm, steel, traction",
+            "patch 2 1 % +1 % too soft 200x40, structured, 5 mm, steel, traction",
             "commit f00d+changes, 1 changed files in git_diff",
             "numpy 2.0",
             "on here",
@@ -172,6 +173,11 @@ class TestInfo:
         tree.to_netcdf(tmp_path / "dataset.nc", engine="netcdf4")
         result = run("info", tmp_path)
         assert result.exit_code == 0 and "  /benchmark " in result.stdout
+        tree.attrs["title"] = "<i>"
+        tree.to_netcdf(tmp_path / "other.nc", engine="netcdf4")
+        found = st.info(tmp_path / "other.nc")
+        assert repr(found) == str(found) and str(found).startswith("<i>\nstudy unknown")
+        assert found._repr_html_().startswith("<pre>&lt;i&gt;\nstudy unknown")
 
     def test_what_is_no_dataset_is_told_in_one_line(self, tmp_path):
         refused(run("info", tmp_path / "none"), "there is no such dataset")

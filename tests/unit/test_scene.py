@@ -34,6 +34,15 @@ class TestSixLines:
         assert result.error == pytest.approx(result.displacement / result.reference().displacement - 1)
         assert abs(result.error) < 5e-3 and scene.objection == ""
 
+    def test_the_sign_of_an_error_has_its_word(self):
+        soft = {"definition": "paper", "stiffness": "120e6 N/m", "kinematics": "linear"}
+        pulled, pressed = scene(load="traction", **soft).solve(), scene(load="compression", **soft).solve()
+        assert pulled.error == pytest.approx(-pressed.error) and pulled.error > 0.01
+        assert pulled.sign_word == pressed.sign_word == "too soft"
+        assert scene(load="compression", **soft | {"stiffness": "250e6 N/m"}).solve().sign_words == {
+            "displacement": "too stiff"
+        }
+
     def test_texts_and_numbers_are_one(self):
         assert st.Beam("200 mm", "4 cm", "1 mm") == st.Beam(0.2, 0.04) and st.Beam(0.2, 0.04).name == "200x40"
         assert st.Material("210 GPa", 0.3, "7850 kg/m^3") == st.Material(210e9, 0.3, 7850)
@@ -109,6 +118,27 @@ class TestEquilibrium:
         result = found.solve()
         assert run.status == "rest"
         assert np.abs(run.displacements - result.displacements).max() <= 1e-6 * abs(result.displacement)
+
+    def test_a_bent_beam_is_let_go(self):
+        """Energy in J, which the implicit midpoint keeps: half of force times displacement; and it comes to rest."""
+        bent = scene(load="bending", force="100 N", kinematics="linear")
+        result, motion = bent.solve(), bent.motion(released=True)
+        assert not motion.load.any()
+        start, step = result.displacements, 0.02 / bent.motion().loaded_frequency
+        run = motion.run("implicit-midpoint", step, 50, start=start, sample=10)
+        assert run.samples[:, 1] == pytest.approx(0.5 * bent.force * result.displacement, rel=1e-9)
+        assert run.samples[-1, 3] < 0  # N s: it was bent upwards
+        calm = bent.motion(released=True, mass_damping=bent.motion().critical_damping)
+        run = calm.run("backward-euler", 10 * step, 500, start=start, rest=1e-6)
+        assert run.status == "rest" and np.abs(run.displacements).max() < 1e-3 * result.displacement
+        with pytest.raises(ValueError, match="ask the motion under the load, without released=True"):
+            motion.critical_damping  # noqa: B018
+
+    def test_a_turning_load_is_let_go_of(self):
+        pressed = scene(load="follower-pressure", force="100 N")
+        with pytest.raises(ValueError, match="or let go of it by released=True"):
+            pressed.motion()
+        assert not pressed.motion(released=True).load.any()
 
 
 def test_networks_are_shared_between_scenes_of_a_sheet():
@@ -247,3 +277,65 @@ def test_the_time_of_a_definition_is_taken_off_the_scene_that_spent_it_alone():
         assert 0 < results[-1]["seconds"] <= elapsed - deriving[-1]
     assert deriving[0] > 0 and deriving[1:] == [0.0, 0.0]
     assert [result["definition_seconds"] for result in results] == 3 * deriving[:1]  # what they cost, whoever paid
+
+
+class TestShown:
+    """In a line, as a table in terminals and in notebooks, with units."""
+
+    def test_a_result(self):
+        result = scene().solve()
+        lines = str(result).splitlines()
+        assert lines[0] == "Result" and lines[1].split() == ["status", "solved"]
+        assert lines[3].split() == ["displacement", f"{1e3 * result.displacement:.6g}", "mm"]
+        assert lines[-1].split("displacement  ")[1] == f"{100 * result.error:+.2f} % {result.sign_word}"
+        assert repr(result).startswith("Result(status: solved; scene: 100x20 mm, traction of 20000 N, patch, nonlinear")
+        assert "error" not in repr(result)  # which would solve the reference
+
+    def test_a_result_without_an_equilibrium_says_why(self):
+        failed = scene(load="bending", force="20 MN").solve()
+        assert failed.status is st.Status.NOT_CONVERGED
+        assert "displacement  none" in str(failed) and failed.message in str(failed) and "error" not in str(failed)
+
+    def test_where_the_reference_does_not_apply(self):
+        soft = st.Material("1 GPa", 0.3)
+        bent = st.Scene(BEAM, st.make_mesh(BEAM, "structured", "5 mm"), soft, "bending", "200 N").solve()
+        assert "but" in str(bent) and "the linear reference does not apply" in str(bent)
+
+    def test_quantities_of_a_shape_have_their_units(self):
+        asked = [st.Quantity("end", "displacement", "right", "x"), st.Quantity("corner", "stress", "there", "xx")]
+        pull = st.LoadCase(
+            "pull", [st.Support("left", x=0, y=0)], [st.Traction("right", ("4 kN", 0))], quantities=asked
+        )
+        plate = st.Shape.rectangle("100 mm", "40 mm", points={"there": ("50 mm", "40 mm")}, loads={"pull": pull})
+        result = st.Scene(plate, st.mesh_shape(plate, "10 mm"), STEEL, "pull", kinematics="linear").solve()
+        shown = {line.split()[0]: line.split()[-1] for line in str(result).splitlines()[1:]}
+        assert shown["end"] == "mm" and shown["corner"] == "MPa"
+        assert "error of end" in str(result) and "error of corner" in str(result)
+
+    def test_html_is_escaped(self):
+        named = st.Material(210e9, 0.3, name="<script>&")
+        html = st.Scene(BEAM, st.make_mesh(BEAM, "right", "5 mm"), named, "traction", 1.0)._repr_html_()
+        assert ">&lt;script&gt;&amp;</td>" in html and "<script>" not in html
+
+    def test_a_prediction_is_one_table(self):
+        choices = st.predict(BEAM, st.make_mesh(BEAM, "structured", "5 mm"), STEEL)
+        head, *rows = repr(choices).splitlines()
+        assert head.split()[:4] == ["definition", "springs", "inside", "on"] and len(rows) == len(choices)
+        assert rows[0].split()[0] == choices[0].definition and "N/m" in rows[0]
+        assert choices._repr_html_().count("<tr>") == 1 + len(choices)
+        assert f"definition: {choices[0].definition}; " in repr(choices[0])
+
+    def test_others(self):
+        one = scene()
+        curve = st.sensitivity(one)
+        assert f"no error at  {curve.best_stiffness:.4g} N/m" in str(curve)
+        search = st.find_mesh(BEAM, STEEL, "5 %", mesh_types=["structured"], loads=["traction"])
+        assert search.best.mesh_type in str(search) and "static solve" in str(search.best)
+        net = st.SpringNet.from_scene(one)
+        assert f"mass                     {net.masses.sum():.4g} kg" in str(net)
+        assert "expected error traction" in str(net)
+        run = one.motion().run("backward-euler", 1e-5, 3)
+        assert "time      3e-05 s, 3 steps" in str(run)
+        for shown in (curve, search, search.best, net, run, one):
+            assert shown._repr_html_().startswith(f"<div><b>{type(shown).__name__}</b><table><tr><th")
+            assert "\n" not in repr(shown)

@@ -52,6 +52,7 @@ def check_sides(shape, grouped):
         assert tuple(place) == shape.points[name]
 
 
+@pytest.mark.filterwarnings("ignore:.*its longer side is")
 @settings(max_examples=25, deadline=None)
 @given(
     some.lists(some.floats(0.5, 1.0), min_size=3, max_size=9),

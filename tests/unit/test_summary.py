@@ -69,9 +69,14 @@ class TestText:
         assert "  80x10, free, 1 mm, steel, traction, lattice, linear: refuses the mesh" in lines
         assert lines[-1].startswith("Not everything is solved: 3 of 5 scenes.")
         # The unstable scene's error of 500 % is none; the largest error comes first.
-        errors = [line.split()[:3] for line in lines if " %" in line]
-        assert errors == [["patch", "-20.00", "%"], ["lattice", "+1.00", "%"]]
+        errors = [line.split()[:5] for line in lines if " %" in line]
+        assert errors == [["patch", "-20.00", "%", "too", "stiff"], ["lattice", "+1.00", "%", "too", "soft"]]
         assert "of the 2 scenes that have one" in text
+
+    def test_a_word_turns_with_the_displacement(self, root):
+        root.data["reference_displacement"].values[...] *= -1  # pulled down
+        text = summary.text({"/": root.data}, "A study")
+        assert "-20.00 %  too soft" in text and "+1.00 %  too stiff" in text
 
     def test_everything_solved_has_no_holes(self, root):
         data = root.data.where(root.data.status.isin([0, 1]), 0)

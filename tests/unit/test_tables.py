@@ -213,6 +213,19 @@ def test_holes_of_the_benchmark_are_listed_by_their_reason():
     assert rows[0]["float32, 2 threads"] == "200, 10.0" and rows[0]["error, float32"] == "1.0e-06"
 
 
+def test_times_that_are_not_measured_are_said():
+    tree = timed({"steady": STEADY, "busy": STEADY}, {"steady": STEADY, "busy": STEADY})
+    data = tree["benchmark"].to_dataset()
+    data.status.values[:], data.message.values[0, 1] = 1, "not measured: the machine was busy"
+    data.seconds.values[0, 1] = np.nan
+    text = benchmark.page(xr.DataTree.from_dict({"/benchmark": data}))
+    assert "- `busy` (1, 2, 5, 10 mm): not measured: the machine was busy" in text
+    rows = {row["at 1 mm"]: row["time"] for row in tables(text)["traction: approaches on one mesh size"]}
+    assert rows["`busy`"] == "not measured" and rows["`steady`"] == "80 ms"
+    first = tables(text)["traction: the quickest ways to an error"][0]
+    assert "steady" in first["first"] and not first["second"]
+
+
 def test_the_page_states_the_rule():
     text = benchmark.page(timed({"steady": STEADY}, {"steady": STEADY}))
     assert "all finer ones" in text and "120x30" in text
@@ -311,6 +324,16 @@ def test_the_page_has_both_kinematics_and_says_what_was_not_asked(tmp_path):
     assert compression[0][5:] == ["0.003500u", "+2.34", "not asked"] and compression[1][-1] == "not converged"
     assert 'title="no equilibrium"' in html and "u</span> marks an equilibrium that is unstable" in html
     assert "alu-bar, 120 x 25 mm, 2 mm thick" in html
+
+
+def test_the_page_says_once_what_a_sign_means(tmp_path):
+    tree = scenes()
+    tables_page.write(tree, tmp_path)
+    assert (tmp_path / "index.html").read_text().count("|reference|; positive: too soft. The reference") == 1
+    tree["reference_displacement"].loc[{"load": "compression"}] *= -1
+    tables_page.write(tree, tmp_path)
+    said = "; positive: too soft; under compression, where displacements are negative, negative is too soft."
+    assert (tmp_path / "index.html").read_text().count(said) == 1
 
 
 def test_the_page_speaks_of_the_paper_only_where_the_study_has_its_cells(tmp_path):

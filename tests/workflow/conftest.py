@@ -76,6 +76,13 @@ def run(tmp_path_factory, forks):
     return Run(folder, forks)
 
 
+@pytest.fixture
+def run_alone(tmp_path, forks):
+    """An empty folder of one test to run Snakemake in."""
+    (tmp_path / "alone").mkdir()
+    return Run(tmp_path / "alone", forks)
+
+
 @pytest.fixture(scope="session")
 def repository():
     """The repository's folder."""

@@ -72,7 +72,7 @@ def test_no_character_of_a_path_is_the_shells(repository, tmp_path):
     checkout.parent.mkdir()
     checkout.symlink_to(repository)
     command = [sys.executable, "-m", "springtune", "run", "./-mine.yaml", "--results", results, "--cores", "2"]
-    environment = os.environ | {"SPRINGTUNE_WORKFLOW": str(checkout)}
+    environment = os.environ | {"PYTHONPATH": str(checkout / "src")}
     done = subprocess.run(list(map(str, command)), cwd=config, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
     assert (results / "results/-mine/dataset.nc").is_file()

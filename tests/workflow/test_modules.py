@@ -4,11 +4,10 @@ import re
 import shutil
 import subprocess
 import zipfile
+from pathlib import Path
 
 import pytest
 import snakemake.sourcecache
-
-from conftest import REPOSITORY, Run
 
 from tables import STUDIES
 
@@ -28,23 +27,24 @@ rule tell:
     shell: "echo told > {{output}}"
 """
 
+REPOSITORY = Path(__file__).parents[2]
+
 HERE = repr(str(REPOSITORY / "Snakefile"))
 
 MINE = '{"study": "config/mine.yaml"}'
 
 
 @pytest.fixture
-def others(tmp_path, forks):
+def others(run_alone):
     """Writes the workflow of others beside a study, and calls Snakemake on it, as they would."""
-    run = Run(tmp_path / "others", forks)
-    (run.folder / "config").mkdir(parents=True)
-    run.write("config/mine.yaml", STUDIES["elsewhere"].replace("grids:", "outputs: [tables]\ngrids:"))
+    (run_alone.folder / "config").mkdir()
+    run_alone.write("config/mine.yaml", STUDIES["elsewhere"].replace("grids:", "outputs: [tables]\ngrids:"))
 
     def call(*arguments, snakefile=HERE, config=MINE, further="", added="", **environment):
-        run.write("Snakefile", OTHERS.format(snakefile=snakefile, config=config, further=further) + added)
-        return run.forked(["--cores", "2", "--scheduler", "greedy", *arguments], **environment)
+        run_alone.write("Snakefile", OTHERS.format(snakefile=snakefile, config=config, further=further) + added)
+        return run_alone.forked(["--cores", "2", "--scheduler", "greedy", *arguments], **environment)
 
-    call.folder = run.folder
+    call.folder = run_alone.folder
     return call
 
 

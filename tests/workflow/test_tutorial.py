@@ -10,7 +10,7 @@ import springtune as st
 from springtune.studies.kinds import load_study
 
 from campaigns import Campaign
-from pages import blocks, follow, patch, write_study
+from pages import blocks, claims, follow, patch, write_study
 
 CHAPTERS = ("own-beam", "own-material", "own-mesh-file", "own-definition", "own-figure")
 
@@ -81,7 +81,7 @@ def test_the_change_of_the_first_chapter_adds_the_cells_that_it_shows(reader, re
 
 @pytest.mark.slow
 def test_from_a_clone_to_a_paper(reader, repository):
-    """Both runs are made, and every number that the page shows is theirs."""
+    """Both runs are made, and every number that the page shows is theirs, as are those of the README's table."""
 
     def study(path):
         code, output = reader.snakemake(path)
@@ -89,3 +89,8 @@ def test_from_a_clone_to_a_paper(reader, repository):
 
     steps = list(follow(repository / "docs/tutorial/from-clone-to-paper.md", reader.folder, study))
     assert sum("make study" in block.code for block, _ in steps) == 2
+    with st.open("results/paper") as tree:
+        found = 100 * abs(tree.to_dataset().deformation_error.sel(kinematics="linear"))
+        for name, claimed in claims(repository / "README.md").items():
+            errors = found.sel(definition=name)
+            assert errors.count() == 45 and claimed == f"{errors.median():.2f} % | {errors.max():.2f} %"

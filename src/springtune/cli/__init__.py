@@ -195,7 +195,8 @@ def main() -> None:
     usual, said = warnings.showwarning, click.get_current_context().meta.setdefault(SAID, {})
 
     def show(message: Warning | str, category: type[Warning], *where: Any, **further: Any) -> None:
-        if category.__name__ == "AssumptionWarning":  # not imported, so that --help does not wait for it
+        # Not imported, so that --help does not wait for them.
+        if category.__name__ in ("AssumptionWarning", "PluginWarning"):
             said[f"warning: {shown(message)}"] = None  # each once, in this order
         else:
             usual(message, category, *where, **further)

@@ -5,12 +5,13 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from ..safe_io.escapes import clipped, shown
-from ..studies.output.text import aligned, cell_text, paragraphs, variable_name
+from ..safe_io.tables import aligned
+from ..studies.output.text import cell_text, paragraphs, variable_name
 from ..studies.runs.source import CONFIG_FOLDER
 from . import examples
 from .options import RESULTS_FOLDER, dataset_path
@@ -51,6 +52,7 @@ def tolerance(context: click.Context, parameter: click.Parameter, given: str | N
         "springtune diff results/before results/mine",
         "springtune diff before.nc mine --relative 1e-3 --group sensitivity",
         "springtune diff before.nc after.nc --json > changes.json",
+        "springtune diff before mine --definitions",
     )
 )
 @click.argument("before")
@@ -65,6 +67,7 @@ def tolerance(context: click.Context, parameter: click.Parameter, given: str | N
 @click.option("--all", "every", is_flag=True, help="All rows.")
 @click.option("--config", is_flag=True, help="Show the diff of the studies' files, too.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+@click.option("--definitions", "by_definition", is_flag=True, help="Compare the errors of definitions side by side.")
 def diff(
     before: str,
     after: str,
@@ -76,6 +79,7 @@ def diff(
     every: bool,
     config: bool,
     as_json: bool,
+    by_definition: bool,
 ) -> None:
     """Say what changed from one dataset to another beyond a tolerance, scene by scene.
 
@@ -84,10 +88,15 @@ def diff(
     --relative is of its largest number. Seconds, what is measured of the machine, when and where a dataset was made are
     not compared; versions and the studies' files are told and make no difference.
 
+    With --definitions it says instead how many scenes of each definition have an error, and the median and the largest
+    of these without their sign, in both. Scenes of one dataset alone count, too.
+
     Exits with 0 if nothing changed, 1 if something did, and 2 if nothing could be compared.
     """
     from ..studies.output import comparison, expected, reading
 
+    if by_definition and (ignored or every or config or relative is not None or absolute is not None):
+        raise click.UsageError("--definitions goes with --group and --json alone")
     try:
         paths = [dataset_path(before), dataset_path(after)]
         with ExitStack() as stack:
@@ -98,6 +107,12 @@ def diff(
                 raise ValueError(f"{paths[1]}: holds accepted values; give them first, and then results")
             if kept and (relative is not None or absolute is not None):
                 raise ValueError(f"{paths[0]}: has its own tolerances; leave --relative and --absolute out, or edit it")
+            if by_definition:
+                if kept:
+                    raise ValueError(f"{paths[0]}: holds accepted values; give two datasets")
+                errors = comparison.compare_definitions(one, other, groups)
+                click.echo(json.dumps(errors, indent=1) if as_json else definitions_text(errors, paths))
+                return
             given = comparison.Tolerance(comparison.RELATIVE if relative is None else relative, absolute)
             found = comparison.compare(
                 one, other, None if kept else given, groups, ignored, None if every else rows,
@@ -145,6 +160,23 @@ def comparison_text(
     if found.attributes or found.config:
         parts.append(_told(found, config))
     return paragraphs(parts)
+
+
+def definitions_text(errors: "Sequence[Mapping[str, Any]]", paths: Sequence[Path]) -> str:
+    """Errors of definitions in two datasets, side by side."""
+    parts = [[f"before: {paths[0]}", f"after:  {paths[1]}"]]
+    for group in dict.fromkeys(row["group"] for row in errors):
+        rows = [["  definition", "scenes", "after", "median", "after", "change", "worst", "after", "change"]]
+        for row in (one for one in errors if one["group"] == group):
+            texts = [f"  {row['definition']}", *(str(count or 0) for count in row["scenes"].values())]
+            for pair in (row["median"].values(), row["worst"].values()):
+                texts += ["none" if share is None else f"{100 * share:.3g} %" for share in pair]
+                old, new = pair
+                texts.append("" if None in pair else f"{100 * (new - old):+.2g}")
+            rows.append(texts)
+        what = "scenes" if group == "/" else group
+        parts.append([f"errors of {what} without their sign", *aligned(rows, 0, range(1, 9)).splitlines()])
+    return paragraphs([*parts, *([] if errors else [["neither has errors of definitions"]])])
 
 
 def _summary(found: "Comparison", sides: Sequence[str]) -> str:

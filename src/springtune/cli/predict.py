@@ -224,8 +224,8 @@ def _find_on_beam(
     """Find the mesh of a beam that keeps an error."""
     from ..handover.net import SpringNet
     from ..mesh import MESH_TYPES
-    from ..prediction.search import find_mesh
-    from .recommendation import beam_subject, search_json, search_text, size_text
+    from ..prediction.search import find_mesh, size_text
+    from .recommendation import beam_subject, search_json, search_text
 
     if sheet.size is not None:
         raise ValueError(f"--size: '{sheet.size}' is what --error finds; leave one of them out")

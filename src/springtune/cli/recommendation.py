@@ -2,21 +2,25 @@
 
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from .. import __version__
+from ..problem.compare import error_text, sign_sentence, sign_word
+from ..problem.shapes import QUANTITY_UNITS
+from ..safe_io.tables import TabledList, aligned
 
 if TYPE_CHECKING:
-    from ..prediction.choices import Choice, Number, References, ShapeReferences
+    from ..prediction.choices import Choice, References, ShapeReferences
     from ..prediction.search import MeshChoice, MeshSearch
     from ..problem.geometry import Beam
     from ..problem.materials import Material
     from ..scene.statements import ShapeStatement
 
-BEAM_ERRORS = "Errors are of the displacement of the loaded side"
-SHAPE_ERRORS = "Errors are (network - reference) / |reference| of each quantity"
+MEANT = "Errors are (network - reference) / |reference| of"
 
 
 @dataclass(frozen=True)
@@ -24,16 +28,19 @@ class Subject:
     """A beam under loads, or a shape under a load case, as a prediction names it.
 
     `name` and `made_of` (material, thickness) are texts, `about` is the same as JSON. `known` are references by load,
-    of a shape by quantity; `meaning` says what an error is of. `dense`: all materials have a density, so that there are
-    largest time steps. Only shapes have a `load`, only beams rows of a table of `references`.
+    of a shape by quantity, `compared` their values and kinds; `meaning` says what an error is of, `sign` what its sign
+    means. `dense`: all materials have a density, so that there are largest time steps. Only shapes have a `load`, only
+    beams rows of a table of `references`.
     """
 
     name: str
     made_of: str
     about: dict[str, Any]
     known: "References | ShapeReferences"
+    compared: dict[str, tuple[float, str]]
     load: str
     meaning: str
+    sign: list[str]
     dense: bool
     references: list[list[str]]
 
@@ -46,6 +53,8 @@ class Subject:
 
 def beam_subject(beam: "Beam", material: "Material", known: "References") -> Subject:
     """Beam of a prediction."""
+    from ..problem.loads import LOADS
+
     young = material.young_modulus
     modulus = f"{young / 1e9:g} GPa" if young >= 1e9 else f"{young / 1e6:g} MPa"
     made_of = f"{material.name}, E = {modulus}, nu = {material.poisson_ratio:g}, t = {1e3 * beam.thickness:g} mm"
@@ -56,14 +65,20 @@ def beam_subject(beam: "Beam", material: "Material", known: "References") -> Sub
         for load, found in known.items()
     }
     about = {"beam": asdict(beam), "material": asdict(material), "loads": list(known), "references": references}
-    meaning = f"{BEAM_ERRORS}, {_signs(list(known))}"
-    return Subject(beam.label, made_of, about, known, "", meaning, material.density is not None, [])
+    signs = {load: LOADS[load].sign for load in known}
+    meaning = f"{MEANT} the displacement of the loaded side"
+    compared = {load: (sign, "displacement") for load, sign in signs.items()}
+    sign = [f"Of errors, {sign_sentence(signs)}."]
+    return Subject(beam.label, made_of, about, known, compared, "", meaning, sign, material.density is not None, [])
 
 
 def shape_subject(statement: "ShapeStatement", known: "ShapeReferences") -> Subject:
     """Shape of a prediction."""
-    units = {"displacement": "m", "reaction": "N", "stress": "Pa", "area": "m2", "energy": "J"}
-    unit = {one.name: units[one.kind] for one in statement.case.quantities}
+    kind = {one.name: one.kind for one in statement.case.quantities}
+    compared = {name: (found.value, kind[name]) for name, found in known.items() if not isinstance(found, str)}
+    moved = {name: value for name, (value, of) in compared.items() if of == "displacement"}
+    of = "errors" if len(moved) == len(compared) else "errors of displacements"
+    sign = [f"Of {of}, {sign_sentence(moved, 'of')}."] if moved else []
     about = {
         "shape": statement.shape.name,
         "load": statement.load,
@@ -74,7 +89,7 @@ def shape_subject(statement: "ShapeStatement", known: "ShapeReferences") -> Subj
         },
     }
     references = [
-        [name, f"{found.value:.6g} {unit[name]}", f"{100 * found.error_estimate:.1g} %"]
+        [name, f"{found.value:.6g} {QUANTITY_UNITS[kind[name]]}", f"{100 * found.error_estimate:.1g} %"]
         for name, found in known.items()
         if not isinstance(found, str)
     ]
@@ -83,8 +98,10 @@ def shape_subject(statement: "ShapeStatement", known: "ShapeReferences") -> Subj
         f"{statement.named_materials}, t = {1e3 * statement.thickness:g} mm",
         about,
         known,
+        compared,
         statement.load,
-        SHAPE_ERRORS,
+        f"{MEANT} each quantity",
+        sign,
         all(one.density is not None for one in statement.materials),
         references,
     )
@@ -98,20 +115,12 @@ def prediction_text(
     sizes: Sequence[float] = (),
 ) -> str:
     """Text of a prediction; `sizes` [m] are of the meshes that bands are extrapolated from."""
-    from ..studies.output.text import aligned
-
     columns, of_beam = list(subject.known), not subject.load
-    rows = [["definition", "springs inside", "on the outline", *columns, *(["E", "nu"] * of_beam), "besides springs"]]
+    heads, *rows = TabledList(choices).table()
+    kept = [place for place, head in enumerate(heads) if of_beam or head not in ("E", "nu")]
+    rows = [[row[place] for place in kept] for row in (heads, *rows)]
     notes = [f"{name}: no reference; {found}" for name, found in subject.known.items() if isinstance(found, str)]
     for choice in choices:
-        row = [choice.definition]
-        row += [_bounds(value, "{:.5g} N/m".format, "each its own") for value in (choice.inside, choice.outline)]
-        row += [_bounds(choice.errors[name], _percent, _missing(choice, subject.load or name)) for name in columns]
-        if of_beam:
-            missing = _missing(choice, "patch test")
-            row.append(_bounds(choice.young_modulus_error, _percent, missing))
-            row.append(_bounds(choice.poisson_ratio, _three_decimals, missing))
-        rows.append([*row, choice.extra])
         notes += [f"{choice.definition}, {part}: {reason}" for part, reason in choice.failures.items()]
     first, plain = (name or "none" for name in recommended(choices))
     particles, springs = about["particles"], about["springs"]
@@ -126,11 +135,13 @@ def prediction_text(
         f"{subject.name}, {mesh_name}: {counts}; {subject.made_of}",
         "",
         f"recommended: {first}; with springs alone: {plain}",
+        *_at_worst(subject, choices, (first, plain)),
         "",
         aligned(rows, left=2, right=range(3, 3 + len(columns) + 2 * of_beam)),
         "",
         f"{subject.meaning}{': ' if of_beam else ', '}{how},",
         f"{KINEMATICS_TEXT} (error estimate {subject.estimate})." if of_beam else f"{KINEMATICS_TEXT}.",
+        *subject.sign,
         f"{ranked} E, its error, and nu are of a patch test between rollers." if of_beam else ranked,
     ]
     if subject.references:
@@ -141,34 +152,29 @@ def prediction_text(
 
 def search_text(subject: Subject, search: "MeshSearch", springs_alone: bool = False) -> str:
     """Text of a search for a mesh."""
-    from ..studies.output.text import aligned
+    from ..prediction.search import answer_text
 
     where, steps = "in" if subject.load else "under", subject.dense
     wanted = f"{100 * search.error:.6g} %"
     lines = [
         f"{subject.name}; {subject.made_of}; an error of at most {wanted} {where} {_listed(search.loads)}",
         "",
-        *([] if springs_alone else [f"recommended: {_answer(search.best)}"]),
-        f"with springs alone: {_answer(search.best_springs)}",
+        *([] if springs_alone else [f"recommended: {answer_text(search.best)}"]),
+        f"with springs alone: {answer_text(search.best_springs)}",
     ]
-    heads = ["mesh", "size", "definition", "cells", "particles", "springs", *search.loads, "static solve"]
-    heads += ["largest step"] if steps else []
     right = (3, *range(5, 9 + len(search.loads) + steps))
     notes = []
     tables = [] if springs_alone else [("with any definition", search.by_type, False)]
     tables.append(("with springs alone", search.springs_by_type, True))
     for what, found, alone in tables:
-        rows = [heads]
+        chosen = []
         for name, one in sorted(found.items(), key=lambda item: _order(item[1])):
             if one is None:
                 notes.append(f"{name}, {what}: {_nearest(search, name, alone)}")
                 continue
-            errors = [_bounds(one.choice.errors[load], _percent, "") for load in search.loads]
-            rows.append([name, size_text(one.size), one.choice.definition + ("" if one.confirmed else " *")])
-            rows[-1] += [f"{number:,}" for number in (one.cells, one.particles, one.springs)]
-            rows[-1] += [*errors, f"{1e3 * one.seconds:.3g} ms", *([f"{one.step_limit:.3g} s"] if steps else [])]
-        if rows[1:]:
-            lines += ["", f"{what}:", aligned(rows, left=2, right=right)]
+            chosen.append(one)
+        if chosen:
+            lines += ["", f"{what}:", aligned(TabledList(chosen).table(), left=2, right=right)]
     answers = [one for _, found, _ in tables for one in found.values()]
     explained = []
     if any(one and not one.confirmed for one in answers):
@@ -187,6 +193,7 @@ def search_text(subject: Subject, search: "MeshSearch", springs_alone: bool = Fa
         "Meshes are ranked by their particles.",
         f"{subject.meaning}, solved on each mesh,",
         f"{KINEMATICS_TEXT} (error estimate {subject.estimate}).",
+        *subject.sign,
         "Static solve: of one load with its network assembled and factorized, measured here once.",
     ]
     lines += ["Largest step: of undamped explicit integrators, about rest, held nowhere."] if steps else []
@@ -237,44 +244,24 @@ def recommended(choices: "Sequence[Choice]") -> tuple[str | None, str | None]:
     return (solved[0].definition if solved else None), (plain[0].definition if plain else None)
 
 
-def size_text(size: float) -> str:
-    """Mesh size [m] as the option takes it.
-
-    Examples
-    --------
-    >>> size_text(0.00308)
-    '3.08 mm'
-    """
-    return f"{1e3 * size:.12g} mm"
-
-
 KINEMATICS_TEXT = "with linear kinematics (small strain), against the converged reference of small strain"
 """Kinematics and reference of the errors."""
 
-ABOVE = "above zero where too soft"
-"""Meaning of the sign of an error for positive displacements."""
 
-
-def _signs(loads: Sequence[str]) -> str:
-    """Meaning of the sign of (network - reference) / |reference|."""
-    from ..problem.loads import LOADS
-
-    against = [load for load in loads if LOADS[load].sign < 0]
-    along = [load for load in loads if load not in against]
-    if not against:
-        return ABOVE
-    return f"{ABOVE}, but under {_listed(against)} below" if along else "below zero where too soft"
+def _at_worst(subject: Subject, choices: "Sequence[Choice]", names: Sequence[str]) -> list[str]:
+    """Line with the largest error of each recommended definition, its part and what its sign means."""
+    texts = []
+    for choice in choices:
+        if choice.definition in names:
+            bounds = ((error, name) for name, value in choice.errors.items() for error in np.ravel(value))
+            worst, name = max((one for one in bounds if one[0] == one[0]), key=lambda one: abs(one[0]))
+            word = sign_word(worst, *subject.compared[name])
+            texts.append(f"{choice.definition} {error_text(worst)} ({name}{word and ', '}{word})")
+    return [f"at worst: {', '.join(texts)}"] if texts else []
 
 
 def _listed(words: Sequence[str]) -> str:
     return " and ".join([", ".join(words[:-1]), words[-1]] if words[1:] else words)
-
-
-def _answer(one: "MeshChoice | None") -> str:
-    if one is None:
-        return "none"
-    sure = "" if one.confirmed else ", not confirmed by finer meshes"
-    return f"{one.mesh_type} {size_text(one.size)} with {one.choice.definition}, {one.particles:,} particles{sure}"
 
 
 def _order(one: "MeshChoice | None") -> tuple[bool, int]:
@@ -284,7 +271,7 @@ def _order(one: "MeshChoice | None") -> tuple[bool, int]:
 def _nearest(search: "MeshSearch", mesh_type: str, springs_alone: bool) -> str:
     """Reason why no mesh was found, and the nearest one."""
     from ..prediction.choices import NEED_ENERGIES, as_sure_as, in_order
-    from ..prediction.search import SPRINGS_ALONE
+    from ..prediction.search import SPRINGS_ALONE, size_text
 
     tried = [one for one in search.tried if one.mesh_type == mesh_type]
     names = [(one, name) for one in tried for name in one.errors if name in SPRINGS_ALONE or not springs_alone]
@@ -322,28 +309,3 @@ def _json(content: dict[str, Any]) -> str:
         return None if isinstance(value, float) and not math.isfinite(value) else value
 
     return json.dumps(plain(content), indent=2, ensure_ascii=False)
-
-
-def _missing(choice: "Choice", part: str) -> str:
-    """Word for a missing number."""
-    if "springs" in choice.failures:
-        return "refused"
-    reason = choice.failures.get(part) or choice.failures.get("patch test")
-    return "no reference" if reason is None else "unstable" if "unstable" in reason else "unsolved"
-
-
-def _bounds(value: "Number", form: Callable[[float], str], missing: str) -> str:
-    """A number, or the bounds of a band, as text."""
-    numbers = value if isinstance(value, tuple) else (value,)
-    texts = [missing if number != number else form(number) for number in numbers]
-    return texts[0] if len(set(texts)) == 1 else " to ".join(texts)
-
-
-def _three_decimals(value: float) -> str:
-    return f"{round(value, 3) + 0.0:.3f}"
-
-
-def _percent(value: float) -> str:
-    """Error with two decimals below 10 %, otherwise three digits."""
-    value = 100 * value
-    return f"{round(value, 2) + 0.0:+.2f} %" if abs(value) < 10 else f"{value:+.3g} %"

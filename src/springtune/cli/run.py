@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from ..studies.output.text import how_to_install
 from ..studies.runs.source import USUAL_STUDY, config_file, workflow_folder
 from . import examples, studies_here
 from .options import allow, max_scenes
@@ -55,6 +56,7 @@ def run(
     from ..problem.geometry import AssumptionWarning
     from ..studies.config.messages import StudyError
     from ..studies.kinds import load_study  # here, so that --help does not wait for it
+    from ..studies.runs.rerun import PAPER_STUDIES
 
     allow(most)
     named = bool(arguments) and not arguments[0].startswith("-")
@@ -70,7 +72,7 @@ def run(
         raise click.UsageError(f"one study at a time: springtune run {arguments[0]}, then springtune run {second[0]}")
     if _wants_slurm(options) and not find_spec(SLURM):
         why = "the profile slurm needs Snakemake's plugin for Slurm, which is not installed"
-        raise click.UsageError(f"{why}: python -m pip install --require-hashes -r requirements/slurm.txt")
+        raise click.UsageError(f"{why}; {how_to_install('slurm')}")
     shown = Path(arguments[0]) if named else config_file(USUAL_STUDY)
     path = shown.absolute()
     try:
@@ -81,8 +83,8 @@ def run(
         click.echo(str(error) + _meant(shown), err=True)
         raise SystemExit(1) from None
     folder, source = results.absolute() if results else Path.cwd(), workflow_folder()
-    if folder != Path.cwd():
-        click.echo(f"results go to {folder / 'results' / study.name}", err=True)
+    if results and folder != Path.cwd():
+        click.echo(f"results go to {results}/results/{study.name}; paths below are as seen from {results}", err=True)
     path = path.relative_to(folder) if path.is_relative_to(folder) else path
     workflow = [] if folder == source else ["--snakefile", str(source / "Snakefile")]
     left_empty = {name: True for name, given in (("no_diff", no_diff), ("no_host", no_host)) if given}
@@ -96,7 +98,8 @@ def run(
         raise click.ClickException(f"--results {folder}: {why}") from None
     if _computes(options) or _plans(options):
         study = study if path == shown else load_study(path)  # its files are seen from here
-        studies = [study, *(_read_for_paper(path, study) if "paper" in options else ())]
+        others = [name for name in PAPER_STUDIES if name != study.name] if "paper" in options else []
+        studies = [study, *(load_study(config_file(f"{name}.yaml", path.parent)) for name in others)]
     if _plans(options):
         # A dry run removes no records. An option of the user's, which comes later, replaces this one.
         outdated = _outdated(studies, left_empty, "a run makes it again")
@@ -152,14 +155,6 @@ def _plans(options: list[str]) -> bool:
 
 def _results(study: "Study") -> Path:
     return Path("results") / study.name
-
-
-def _read_for_paper(config: Path, study: "Study") -> "list[Study]":
-    """Other studies that the paper reads, as the rule `paper` finds them."""
-    from ..studies.kinds import load_study
-    from ..studies.runs.rerun import PAPER_STUDIES
-
-    return [load_study(config_file(f"{name}.yaml", config.parent)) for name in PAPER_STUDIES if name != study.name]
 
 
 def _unlock(studies: "list[Study]", command: list[str]) -> None:

@@ -8,7 +8,7 @@ import click
 
 from ..registry import NAME, NAME_RULE
 from ..safe_io.atomic import write_text
-from ..studies.output.text import aligned
+from ..safe_io.tables import aligned
 from ..studies.runs.source import CONFIG_FOLDER, config_file, is_source_tree
 from . import WrongCall, examples, studies_here
 from .options import allow, loaded, max_scenes
@@ -109,9 +109,13 @@ def scenes(config: Path, most: int | None) -> None:
 def definitions() -> None:
     """List the definitions of spring stiffness."""
     from .. import DEFINITIONS
-    from ..studies.output.text import aligned
 
-    click.echo(aligned([[name, definition.summary] for name, definition in DEFINITIONS.items()], left=2))
+    others = DEFINITIONS.packages
+    rows = [
+        [name, f"{one.summary} ({others[name]})" if name in others else one.summary]
+        for name, one in DEFINITIONS.items()
+    ]
+    click.echo(aligned(rows, left=2))
 
 
 BY = ("mesh", "grid")

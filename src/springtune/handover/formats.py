@@ -492,9 +492,6 @@ _SIMULATORS = {
     ".xpbd.json": _for_simulator("XPBD", xpbd),
 }
 
-FOR_SIMULATORS = tuple(_SIMULATORS)
-"""Endings of the names of files for simulators, which are not read."""
-
 
 def _format_of(path: Path) -> _Format:
     # The longest ending that fits: .xpbd.json is not .json.

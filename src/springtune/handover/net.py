@@ -14,7 +14,7 @@ the quadratic form of its second derivative at rest.
 
 import inspect
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,10 +27,12 @@ from ..mechanics.energies import AngleEnergy, AreaEnergy, BiquadraticEnergy, Ene
 from ..mechanics.integrators import IMPLICIT, INTEGRATORS
 from ..mesh import Mesh, corner_angles, signed_areas
 from ..mesh.cells import rows_of
+from ..problem.compare import error_text, sign_sentence
 from ..problem.geometry import Beam
 from ..problem.loads import LOADS
 from ..problem.materials import AnyMaterial, Material
 from ..problem.quantities import positive
+from ..safe_io.tables import Tabled
 from ..scene.meshes import A_BEAM, A_MATERIAL, A_MESH, check_filled, is_a
 from ..scene.motion import stable_steps
 from ..scene.sheet import AnyDefinition, Sheet, check_stiffness, definition_of, named
@@ -56,16 +58,18 @@ UNITS = {
 }
 """Units of what a net holds; those of terms stand with them."""
 
-MEANING = (
-    "(network - reference) / |reference| of the displacement along the force, tension positive: above zero where the "
-    "springs are too soft, under compression and pressure below; linear kinematics, small strain"
-)
-"""Meaning of an expected error."""
-
 MEANING_ON_SHAPES = (
     "(network - reference) / |reference| of each quantity that the load case asks for; linear kinematics, small strain"
 )
 """Meaning of an expected error on a shape."""
+
+
+def meaning() -> str:
+    """Meaning of an expected error, for all loads."""
+    signs = sign_sentence({name: load.sign for name, load in LOADS.items()})
+    of = "(network - reference) / |reference| of the displacement along the axis of the force"
+    return f"{of}; {signs}; linear kinematics, small strain"
+
 
 CONSTANTS_SAID = ("name", "young_modulus", "poisson_ratio", "density")
 """Constants of a material in a header."""
@@ -77,8 +81,8 @@ NOT_COMPUTED = "not computed"
 """First words of a text in the place of a number."""
 
 
-@dataclass(frozen=True, eq=False)
-class SpringNet(Net):
+@dataclass(frozen=True, eq=False, repr=False)
+class SpringNet(Tabled, Net):
     """A network of springs as plain arrays, in SI units.
 
     Attributes
@@ -125,6 +129,18 @@ class SpringNet(Net):
     >>> (st.SpringNet.read("net.json").stiffness == net.stiffness).all().item()
     True
     """
+
+    def _rows(self) -> Iterator[tuple[str, str]]:
+        about = self.header
+        yield "definition", about.get("definition", "")
+        yield "size", f"{len(self.points)} particles, {len(self.springs)} springs, {1e3 * self.thickness:g} mm thick"
+        yield "stiffness", f"{self.stiffness.min():.4g} to {self.stiffness.max():.4g} N/m" if len(self.springs) else ""
+        yield "besides springs", ", ".join(f"energy of {one.kind}s" for one in self.energies)
+        yield "mass", "" if self.masses is None else f"{self.masses.sum():.4g} kg"
+        yield "load", load["name"] if (load := about.get("load")) else "none"
+        expected = about.get("expected_error", "")
+        for name, error in expected.items() if isinstance(expected, dict) else [("", expected)]:
+            yield f"expected error {name}".rstrip(), error if isinstance(error, str) else error_text(error)
 
     @classmethod
     def from_scene(
@@ -404,7 +420,7 @@ def _parts(
         },
         "load": None,
         "expected_error": f"{NOT_COMPUTED}: not asked for",
-        "expected_error_means": MEANING,
+        "expected_error_means": meaning(),
         "largest_stable_step": _stable_steps(sheet, springs, materials, inertia, held),
         "largest_stable_step_means": STEP_MEANING,
         "units": UNITS

@@ -10,7 +10,7 @@ A run can rest on an unstable equilibrium, such as a straight column above its b
 is factorized once, and its negative pivots are counted.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -22,6 +22,7 @@ from scipy.sparse.linalg import eigsh
 from ..linalg.factors import SingularError
 from ..mesh.cells import Mesh
 from ..mesh.sheets import free_motion
+from ..safe_io.tables import Tabled
 from .integrators import EXPLICIT, IMPLICIT, INTEGRATORS, LAGGED, PRECISIONS, BackwardEuler
 from .network import Network
 from .newton import TOLERANCE
@@ -44,8 +45,8 @@ def masses(mesh: Mesh, density: float, thickness: float) -> np.ndarray:
     return density * thickness * mesh.particle_areas
 
 
-@dataclass(frozen=True)
-class Run:
+@dataclass(frozen=True, repr=False)
+class Run(Tabled):
     """Result of a run.
 
     - `displacements`, `velocities` (n_points, 2): Final state [m], [m/s].
@@ -53,9 +54,9 @@ class Run:
       done), ``"diverged"`` or ``"inverted"``.
     - `message`: What went wrong and what to do; else empty.
     - `time`: [s]
-    - `residual`: Final out-of-balance force over the load [1]; without a load, over the reference stiffness [m].
+    - `residual`: Final out-of-balance force over the load [1]; without a load, over that of the start.
     - `step_bound`: Step [s] that is safe by `Motion.particle_bound`; infinite for implicit schemes.
-    - `samples` (n, 4): Time [s], and energy [m2] and momentum [m s] over the reference stiffness, if asked for.
+    - `samples` (n, 4): Time [s], energy [J] and momentum [N s], if asked for, see `Motion.energy`.
     """
 
     displacements: np.ndarray
@@ -68,13 +69,20 @@ class Run:
     step_bound: float
     samples: np.ndarray
 
+    def _rows(self) -> Iterator[tuple[str, str]]:
+        yield "status", self.status
+        yield "reason", self.message
+        yield "time", f"{self.time:.4g} s, {self.steps} steps"
+        yield "residual", f"{self.residual:.2g}"
+
 
 class Motion(Moving):
     """Network with masses, dampers and a load.
 
     `inertia` (n_points,) is mass over reference stiffness [s2] and `load` (n_points, 2) force over it [m].
     `mass_damping` is alpha [1/s]. `dampers` (n_springs,) is damping along each spring over the reference stiffness
-    [s]; ``beta * network.stiffness`` is Rayleigh damping by stiffness.
+    [s]; ``beta * network.stiffness`` is Rayleigh damping by stiffness. `reference` is the reference stiffness [N/m];
+    energies and momenta are over it where it is left out.
     """
 
     # -- before a run -----------------------------------------------------------------------------------------------
@@ -135,7 +143,7 @@ class Motion(Moving):
         """
         factor, load = self.network.rest_factor, self.network.reduce(self.load)
         if not load.any():
-            raise ValueError("no load, so no mode is loaded; give a load or a damping")
+            raise ValueError("no load, so no mode is loaded; ask the motion under the load, without released=True")
         found: list[np.ndarray] = []
         vector = factor.solve(load)
         for _ in range(min(12, len(load))):
@@ -152,24 +160,27 @@ class Motion(Moving):
         shares = (shapes.T @ (basis @ load)) ** 2 / squares
         return float(np.sqrt(squares[int(np.argmax(shares))]))
 
-    def critical(self) -> "Motion":
-        """The same motion with critical mass damping of the lowest loaded mode."""
-        return Motion(self.network, self.inertia[:, 0], self.load, 2 * self.loaded_frequency, self.dampers, self.linear)
+    @property
+    def critical_damping(self) -> float:
+        """Mass damping [1/s] that is critical for the mode of `loaded_frequency`."""
+        return 2 * self.loaded_frequency
 
     # -- mechanics --------------------------------------------------------------------------------------------------
 
     def energy(self, displacements: np.ndarray, velocities: np.ndarray) -> float:
-        """Kinetic energy, plus that of the network, less the work of the load, over the reference stiffness [m2]."""
+        """Kinetic energy, plus that of the network, less the work of the load [J]."""
         kinetic = 0.5 * float((self.inertia * velocities**2).sum())
         if self.linear:
             stored = 0.5 * float((displacements * self.network.linear_forces(displacements)).sum())
         else:
             stored = self.network.energy(displacements)
-        return kinetic + stored - float((self.load * displacements).sum())
+        return self.reference * (kinetic + stored - float((self.load * displacements).sum()))
 
-    def residual(self, displacements: np.ndarray) -> float:
-        """Out-of-balance force over the load [1], or without a load, over the reference stiffness [m]."""
+    def residual(self, displacements: np.ndarray, start: np.ndarray | None = None) -> float:
+        """Out-of-balance force over the load [1]; without a load, over that of a start (n_points, 2) [m]."""
         size = np.linalg.norm(self.network.reduce(self.load))
+        if not size and start is not None:
+            size = np.linalg.norm(self.missing(start))
         with np.errstate(over="ignore", invalid="ignore"):
             return float(np.linalg.norm(self.missing(displacements)) / (size or 1.0))
 
@@ -209,7 +220,9 @@ class Motion(Moving):
         shape = self.network.held.shape
         v = np.zeros(shape) if velocities is None else np.array(velocities, dtype=float)
         v[self.network.held] = 0.0
-        stepper.begin(np.zeros(shape) if start is None else np.array(start, dtype=float), v)
+        first = np.zeros(shape) if start is None else np.array(start, dtype=float)
+        stepper.begin(first.copy(), v)
+        let_go = 0.0 if rest is None or self.load.any() else self.energy(first, v)
         pace = sample or (CHECK if name in EXPLICIT else 1)
         samples: list[list[float]] = []
         done = 0
@@ -221,18 +234,18 @@ class Motion(Moving):
                     u, v = stepper.state()
                     break
                 if sample:
-                    samples.append([done * step, self.energy(u, v), *(self.inertia * v).sum(axis=0)])
+                    samples.append([done * step, self.energy(u, v), *self.reference * (self.inertia * v).sum(axis=0)])
                     if watch is not None:
                         watch(done * step, u, v)
-                at_rest = rest is not None and done > 0 and self._at_rest(u, v, rest)
+                at_rest = rest is not None and done > 0 and self._at_rest(u, v, rest, first, let_go)
                 if at_rest or done >= steps:
-                    end = self._good_end(u, name, done, at_rest, rest)
+                    end = self._good_end(u, name, done, at_rest, None if rest is None else self.residual(u, first))
                     break
                 count = min(pace, steps - done)
                 stepper.advance(count)
                 done += count
         sampled = np.array(samples).reshape(-1, 4)
-        return Run(u, v, *end, done, done * step, self.residual(u), self.step_bound(name), sampled)
+        return Run(u, v, *end, done, done * step, self.residual(u, first), self.step_bound(name), sampled)
 
     def _bad_end(
         self, failed: str, u: np.ndarray, v: np.ndarray, integrator: str, step: float, done: int
@@ -251,7 +264,7 @@ class Motion(Moving):
         return BLOWN_UP * np.ptp(self.network.mesh.points, axis=0).max()
 
     def _good_end(
-        self, u: np.ndarray, integrator: str, done: int, at_rest: bool, rest: float | None
+        self, u: np.ndarray, integrator: str, done: int, at_rest: bool, residual: float | None
     ) -> tuple[str, str]:
         """Status and message of a run that came to rest, or took its last step."""
         if self.network.inverted(u):
@@ -261,17 +274,17 @@ class Motion(Moving):
             if status == "unstable" and integrator == "backward-euler":
                 message += ", in smaller steps, since large ones stay where they would otherwise be driven away"
             return status, message
-        if rest is None:
+        if residual is None:
             return "moving", ""
-        residual = self.residual(u)
         return "moving", f"not at rest after {done} steps, residual {residual:.1e}; take more steps or other damping"
 
-    def _at_rest(self, u: np.ndarray, v: np.ndarray, rest: float) -> bool:
-        if self.residual(u) > rest:
+    def _at_rest(self, u: np.ndarray, v: np.ndarray, rest: float, first: np.ndarray, let_go: float) -> bool:
+        if self.residual(u, first) > rest:
             return False
-        # Speed that the load would give its particles in free fall through the static displacement.
-        work = abs(float((self.load * u).sum())) or 1.0
-        return 0.5 * float((self.inertia * v**2).sum()) <= rest**2 * work
+        # The speed that the load would give its particles in free fall through the static displacement; without a load,
+        # the speed of the energy at the start.
+        energy = self.reference * abs(float((self.load * u).sum())) or let_go or 1.0
+        return 0.5 * self.reference * float((self.inertia * v**2).sum()) <= rest**2 * energy
 
     def judge_rest(self, displacements: np.ndarray) -> tuple[str, str]:
         """Return status and message of an equilibrium, by its stability."""

@@ -39,8 +39,9 @@ class Moving:
         mass_damping: float = 0.0,
         dampers: np.ndarray | None = None,
         linear: bool = False,
+        reference: float = 1.0,
     ) -> None:
-        self.network, self.linear = network, linear
+        self.network, self.linear, self.reference = network, linear, reference
         self.load = np.zeros(network.held.shape) if load is None else load
         self.mass_damping, self.dampers = mass_damping, dampers
         self.inertia = np.repeat(np.asarray(inertia, dtype=float)[:, None], 2, axis=1)

@@ -3,7 +3,7 @@
 import math
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 Point = tuple[float, float]
@@ -51,19 +51,20 @@ class OutlineSide:
     end: Point
     centre: Point | None = None
     group: str = ""
-    #: Of an arc: semi-axes along x and y [m], angle at the start and by which it turns, counter-clockwise [rad].
-    arc: tuple[float, float, float, float] | None = field(default=None, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if self.start == self.end:
             raise ValueError(
                 f"from {in_mm(self.start)} to itself; leave it out, and split an entire circle into four arcs"
             )
-        if self.centre is not None:
-            vars(self)["arc"] = self._found_arc(self.centre)
+        _ = self.arc  # refused here, not when it is used
 
-    def _found_arc(self, centre: Point) -> tuple[float, float, float, float]:
-        """Return `arc`."""
+    @cached_property
+    def arc(self) -> tuple[float, float, float, float] | None:
+        """Of an arc: semi-axes along x and y [m], angle at the start and by which it turns, counter-clockwise [rad]."""
+        if self.centre is None:
+            return None
+        centre = self.centre
         (x, y), (u, v) = ((end[0] - centre[0], end[1] - centre[1]) for end in (self.start, self.end))
         first, second = math.hypot(x, y), math.hypot(u, v)
         about = f"arc from {in_mm(self.start)} to {in_mm(self.end)} about {in_mm(centre)}"

@@ -103,7 +103,7 @@ class MeshType(Declared):
         return too_many(self.particles(length, height, size), size, side, box)
 
 
-MESH_TYPES: Registry[MeshType] = Registry(__package__, "mesh type")
+MESH_TYPES: Registry[MeshType] = Registry(__package__, "mesh type", "mesh_types")
 """Mesh types by name, in the order of their labels."""
 
 

@@ -5,7 +5,7 @@ of small strain; a patch test between rollers measures Young's modulus and Poiss
 """
 
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf, nan
 from typing import Any, NamedTuple, TypeVar, cast
@@ -17,7 +17,7 @@ from ..mechanics.moduli import PatchTest
 from ..mechanics.statics import SingularError
 from ..mesh import Mesh
 from ..mesh.groups import GroupedMesh
-from ..problem.compare import quantity_errors
+from ..problem.compare import error_text, quantity_errors
 from ..problem.geometry import Beam
 from ..problem.loads import LOADS, LoadKind
 from ..problem.materials import AnyMaterial, Material
@@ -25,15 +25,12 @@ from ..problem.quantities import nearest
 from ..problem.shapes import Shape
 from ..problem.status import Status
 from ..reference.small_strain import ReferenceNotConvergedError, ReferenceSolution, solve_small_strain
+from ..safe_io.tables import Tabled, TabledList
 from ..scene.meshes import A_BEAM, A_MATERIAL, A_MESH, is_a
 from ..scene.motion import stable_steps
 from ..scene.sheet import Sheet
 from ..scene.statements import BeamStatement, ShapeStatement, Statement
 from ..springs import DEFINITIONS, DefinitionError, Springs
-
-PREDICTED = tuple(name for name, load in LOADS.items() if not load.follower)
-"""Loads that can be predicted, keys of `springtune.problem.loads.LOADS`: all but those that turn with the side that
-they act on, which linear kinematics do not tell from the others."""
 
 CASES = ("traction", "bending", "shear")
 """Loads that are predicted where none are named."""
@@ -84,8 +81,8 @@ ShapeReferences = dict[str, QuantityReference | str]
 """References by quantity of interest, or why one is missing."""
 
 
-@dataclass(frozen=True)
-class Choice:
+@dataclass(frozen=True, repr=False)
+class Choice(Tabled):
     """A definition on a mesh: its stiffness, and what it gets wrong there.
 
     Numbers are those of the mesh. Where it is too large to solve they are bands, pairs of a lower and an upper bound.
@@ -102,9 +99,9 @@ class Choice:
         Whether it needs more than springs.
     errors : dict of str to float
         Deformation error by load, of a shape by quantity, linear kinematics against the reference of small strain,
-        (network - reference) / abs(reference) [1]: above zero where the network is too soft, but below under
-        compression and pressure, whose displacements are negative. NaN without a reference, for
-        the reason in `failures`, and of a quantity that is negligible beside others of its kind.
+        (network - reference) / abs(reference) [1]: positive means too soft; where displacements are negative, as under
+        compression and pressure, negative does. NaN without a reference, for the reason in `failures`, and of a
+        quantity that is negligible beside others of its kind.
     young_modulus_error : float
         Young's modulus along x between rollers over the material's, less one [1].
     poisson_ratio : float
@@ -146,6 +143,37 @@ class Choice:
         errors = np.abs([np.broadcast_to(error, 2) for error in self.errors.values()])
         return inf if self.failures or np.isnan(errors).all() else float(np.nanmax(errors))
 
+    def _rows(self) -> Iterator[tuple[str, str]]:
+        yield "definition", self.definition
+        for label, value in (("springs inside", self.inside), ("on the outline", self.outline)):
+            yield label, bounds_text(value, "{:.5g} N/m".format, "each its own")
+        for name, error in self.errors.items():
+            yield name, bounds_text(error, error_text, self._missing(name))
+        if (
+            missing := self._missing("patch test")
+        ) != NO_REFERENCE or self.young_modulus_error == self.young_modulus_error:
+            yield "E", bounds_text(self.young_modulus_error, error_text, missing)
+            yield "nu", bounds_text(self.poisson_ratio, lambda ratio: f"{round(ratio, 3) + 0.0:.3f}", missing)
+        yield "besides springs", self.extra
+
+    def _missing(self, part: str) -> str:
+        """Word for a missing number."""
+        if "springs" in self.failures:
+            return "refused"
+        others = (why for name, why in self.failures.items() if name not in self.errors)
+        why = self.failures.get(part, next(others, ""))
+        return NO_REFERENCE if not why else "unstable" if "unstable" in why else "unsolved"
+
+
+NO_REFERENCE = "no reference"
+
+
+def bounds_text(value: Number, form: Callable[[float], str], missing: str) -> str:
+    """A number, or the bounds of a band, as text."""
+    numbers = value if isinstance(value, tuple) else (value,)
+    texts = [missing if number != number else form(number) for number in numbers]
+    return texts[0] if len(set(texts)) == 1 else " to ".join(texts)
+
 
 def check_beam(beam: Beam) -> None:
     """Refuse a beam of absurd size, or too slender for its references."""
@@ -163,16 +191,24 @@ def check_beam(beam: Beam) -> None:
         )
 
 
+def predicted() -> tuple[str, ...]:
+    """Loads that can be predicted, keys of `springtune.problem.loads.LOADS`.
+
+    All but those that turn with the side that they act on, which linear kinematics do not tell from the others.
+    """
+    return tuple(name for name, load in LOADS.items() if not load.follower)
+
+
 def check_loads(loads: Iterable[str]) -> tuple[str, ...]:
     """Loads, each once."""
     if isinstance(loads, str) or not isinstance(loads, Iterable):
         raise ValueError(f"loads: {loads!r} is no list of loads; give one such as {list(CASES)}")
     names = tuple(loads)
     for name in names:
-        if name not in PREDICTED:
-            raise ValueError(f"loads: {name!r} cannot be predicted; {nearest(str(name), PREDICTED)}")
+        if name not in LOADS or LOADS[name].follower:
+            raise ValueError(f"loads: {name!r} cannot be predicted; {nearest(str(name), predicted())}")
     if not names:
-        raise ValueError(f"loads: none; give some of {', '.join(PREDICTED)}")
+        raise ValueError(f"loads: none; give some of {', '.join(predicted())}")
     return tuple(dict.fromkeys(names))
 
 
@@ -300,12 +336,13 @@ def beam_statements(
     return [BeamStatement(beam, mesh, material, load, 1.0, "linear") for load in check_loads(loads)]
 
 
-def best_first(choices: Iterable[Choice], known: References | ShapeReferences) -> list[Choice]:
+def best_first(choices: Iterable[Choice], known: References | ShapeReferences) -> TabledList[Choice]:
     """Choices of a mesh, the least worst error first.
 
     Errors that differ by less than the error estimates count as equal: then springs alone come first, then names.
     """
-    return in_order(choices, lambda one: one.worst, lambda one: (one.energies, one.definition), as_sure_as(known))
+    order = in_order(choices, lambda one: one.worst, lambda one: (one.energies, one.definition), as_sure_as(known))
+    return TabledList(order)
 
 
 def as_sure_as(known: Mapping[str, Any]) -> float:

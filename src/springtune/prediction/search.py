@@ -8,7 +8,7 @@ meshes have whole numbers of cells across, and some sizes between, whose cells a
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import count, takewhile
@@ -18,10 +18,12 @@ import numpy as np
 from ..mesh import MESH_TYPES
 from ..mesh.groups import GroupedMesh
 from ..mesh.outlines import mesh_shape
+from ..problem.compare import error_text
 from ..problem.geometry import Beam
 from ..problem.materials import AnyMaterial, Material
 from ..problem.quantities import nearest, quantity
 from ..problem.shapes import Shape
+from ..safe_io.tables import Tabled
 from ..scene.meshes import A_MATERIAL, A_SHAPE, is_a
 from ..scene.statements import ShapeStatement, Statement
 from .bands import FEWEST_CELLS
@@ -37,6 +39,7 @@ from .choices import (
     Trial,
     as_sure_as,
     beam_statements,
+    bounds_text,
     check_beam,
     check_loads,
     in_order,
@@ -126,8 +129,8 @@ class SolvedMesh:
         return math.inf if not sizes or any(size != size for size in sizes) else max(sizes)
 
 
-@dataclass(frozen=True)
-class MeshChoice:
+@dataclass(frozen=True, repr=False)
+class MeshChoice(Tabled):
     """A mesh and a definition that keep an error, and what they cost.
 
     Attributes
@@ -178,13 +181,44 @@ class MeshChoice:
     finer: tuple[SolvedMesh, ...] = field(repr=False)
     confirmed: bool
 
+    def _rows(self) -> Iterator[tuple[str, str]]:
+        yield "mesh", self.mesh_type
+        yield "size", size_text(self.size)
+        yield "definition", self.choice.definition + ("" if self.confirmed else " *")
+        for name in ("cells", "particles", "springs"):
+            yield name, f"{getattr(self, name):,}"
+        for name, error in self.choice.errors.items():
+            yield name, bounds_text(error, error_text, "")
+        yield "static solve", f"{1e3 * self.seconds:.3g} ms"
+        if not math.isnan(self.step_limit):
+            yield "largest step", f"{self.step_limit:.3g} s"
+
     @property
     def _rank(self) -> tuple[bool, int, int]:
         return not self.confirmed, self.particles, self.springs
 
 
-@dataclass(frozen=True, eq=False)
-class MeshSearch:
+def size_text(size: float) -> str:
+    """Mesh size [m] as the option takes it.
+
+    Examples
+    --------
+    >>> size_text(0.00308)
+    '3.08 mm'
+    """
+    return f"{1e3 * size:.12g} mm"
+
+
+def answer_text(one: MeshChoice | None) -> str:
+    """Mesh and definition of an answer in words."""
+    if one is None:
+        return "none"
+    sure = "" if one.confirmed else ", not confirmed by finer meshes"
+    return f"{one.mesh_type} {size_text(one.size)} with {one.choice.definition}, {one.particles:,} particles{sure}"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MeshSearch(Tabled):
     """Which meshes keep an error, as `find_mesh` found it.
 
     Attributes
@@ -235,6 +269,14 @@ class MeshSearch:
     def best_springs(self) -> MeshChoice | None:
         """The mesh with the fewest particles and springs alone; None if no mesh keeps the error."""
         return self._least(self.springs_by_type)
+
+    def _rows(self) -> Iterator[tuple[str, str]]:
+        yield "error to keep", f"{100 * self.error:.6g} %: {', '.join(self.loads)}"
+        yield "best", answer_text(self.best)
+        yield "best of springs alone", answer_text(self.best_springs)
+        for name, one in self.by_type.items():
+            yield name, answer_text(one).removeprefix(f"{name} ")
+        yield "solved", f"{len(self.tried)} meshes, of at most {self.most:,} particles"
 
     def _least(self, found: dict[str, MeshChoice | None]) -> MeshChoice | None:
         there = [one for one in found.values() if one]

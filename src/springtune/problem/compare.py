@@ -15,13 +15,52 @@ HALVINGS = 12
 """Bisections in search of a best stiffness where a curve ends."""
 
 
+def error_text(error: float) -> str:
+    """Deformation error in words: two decimals below 10 %, otherwise three digits."""
+    percent = 100 * error
+    if percent != percent:
+        return "no reference"
+    return f"{round(percent, 2) + 0.0:+.2f} %" if abs(percent) < 10 else f"{percent:+.3g} %"
+
+
 def deformation_error(displacement: ArrayLike, reference: ArrayLike) -> np.ndarray:
     """Signed deformation error ``(network - reference) / |reference|`` [1].
 
-    Positive means further along +x: too soft in tension, too stiff in compression.
+    Positive means further along +x: too soft in tension, too stiff in compression; see `sign_word`.
     """
     displacement, reference = np.asarray(displacement), np.asarray(reference)
     return (displacement - reference) / np.abs(reference)
+
+
+def sign_word(error: float, reference: float, kind: str = "displacement") -> str:
+    """Word for the sign of an error: "too soft" or "too stiff"; empty where the error or its reference is zero or NaN.
+
+    Of another `kind` of quantity, such as a stress, "too large" or "too small".
+
+    Examples
+    --------
+    >>> sign_word(-0.02, -9.5e-3), sign_word(-0.02, 9.5e-3)
+    ('too soft', 'too stiff')
+    """
+    more, less = ("too soft", "too stiff") if kind == "displacement" else ("too large", "too small")
+    return more if error * reference > 0 else less if error * reference < 0 else ""
+
+
+def sign_sentence(references: Mapping[str, float], where: str = "under") -> str:
+    """Say once which sign of errors means too soft, for displacements of references by load or by quantity.
+
+    Examples
+    --------
+    >>> sign_sentence({"traction": 1.0, "compression": -1.0})
+    'positive: too soft; under compression, where displacements are negative, negative is too soft'
+    """
+    against = [name for name, value in references.items() if value < 0]
+    if not against:
+        return "positive: too soft"
+    if not any(value > 0 for value in references.values()):
+        return "negative: too soft"
+    names = " and ".join(filter(None, (", ".join(against[:-1]), against[-1])))
+    return f"positive: too soft; {where} {names}, where displacements are negative, negative is too soft"
 
 
 def quantity_errors(values: Mapping[str, float], known: Mapping[str, float]) -> dict[str, float]:
@@ -147,9 +186,9 @@ def assured(errors: np.ndarray, second: np.ndarray) -> np.ndarray:
 
 
 def unbeaten(errors: np.ndarray, seconds: np.ndarray) -> np.ndarray:
-    """Return whether no other case has a smaller error in no more time; False for NaN errors."""
+    """Return whether no other case has a smaller error in no more time; False for NaN errors or times."""
     best = np.zeros(errors.shape, dtype=bool)
-    for place in map(tuple, np.argwhere(np.isfinite(errors))):
+    for place in map(tuple, np.argwhere(np.isfinite(errors) & np.isfinite(seconds))):
         best[place] = not ((errors < errors[place]) & (seconds <= seconds[place])).any()
     return best
 

@@ -18,13 +18,16 @@
 
 A load's displacement is the mean of the loaded side along the force; under pressure, that of the side's middle.
 
-To add a load, add a row to `LOADS`, and a `LoadKind` if its supports, side or direction are new.
+To add a load, add a row to `OWN_LOADS`, and a `LoadKind` if its supports, side or direction are new. Other packages
+have entry points in the group ``springtune.loads``.
 """
 
-from dataclasses import dataclass
+import hashlib
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from ..registry import NAME, NAME_RULE, Extended
 from .geometry import Beam
 
 if TYPE_CHECKING:
@@ -174,7 +177,7 @@ class Load:
     follower: bool = False
 
 
-LOADS = {
+OWN_LOADS = {
     "traction": Load(AXIAL, 1.0),
     "compression": Load(AXIAL, -1.0),
     "bending": Load(BENDING, 1.0),
@@ -182,10 +185,35 @@ LOADS = {
     "pressure": Load(FACE, -1.0),
     "follower-pressure": Load(FACE, -1.0, follower=True),
 }
-"""Loads by name."""
+"""Loads of this package by name."""
 
-LOAD_KINDS = {load.kind.name: load.kind for load in LOADS.values()}
+
+class _Kinds(dict[str, LoadKind]):
+    """Kinds of load by name; those of other packages are looked up when asked for."""
+
+    def __missing__(self, name: str) -> LoadKind:
+        self.update({load.kind.name: load.kind for load in LOADS.values() if load.kind.name == name})
+        return {**self}[name]
+
+
+LOAD_KINDS = _Kinds({load.kind.name: load.kind for load in OWN_LOADS.values()})
 """Kinds of load by name."""
+
+
+def _adopted(name: str, load: Any) -> Load:
+    """Load of another package; what its kind holds is in the kind's name, and so in the keys of results."""
+    if not NAME.fullmatch(name):
+        raise ValueError(f"it cannot name a load; {NAME_RULE}")
+    if type(load) is not Load or type(load.kind) is not LoadKind:
+        raise ValueError(f"{load!r} is not a springtune.problem.loads.Load of a LoadKind")
+    if load.kind in LOAD_KINDS.values():
+        return load
+    content = repr((load.kind.loaded, load.kind.axis, load.kind.held, load.kind.pressed))
+    return replace(load, kind=replace(load.kind, name=f"{name}-{hashlib.sha256(content.encode()).hexdigest()[:8]}"))
+
+
+LOADS = Extended("load", "loads", OWN_LOADS, _adopted)
+"""Loads by name."""
 
 KINEMATICS = ("nonlinear", "linear")
 """Kinematics under a load: springs that keep their length law, or their tangent at rest."""

@@ -1,6 +1,7 @@
 """Rubber tests in CSV files, and Yeoh's law fitted to one: see `fit_rubber`."""
 
 import csv
+import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -19,7 +20,10 @@ CHECKED = 400
 FIT_DIGITS = 10
 """Digits of what is fitted."""
 
-TWO_COLUMNS = "give two columns with a head such as 'stretch,nominal stress [MPa]'"
+TWO_COLUMNS = (
+    "give two columns, stretch or engineering strain and nominal stress, with a head such as 'stretch,nominal stress "
+    "[MPa]' or 'strain [%],nominal stress [MPa]'"
+)
 
 
 class TestDataError(ValueError):
@@ -54,7 +58,8 @@ class TensileTest:
             place = int(np.argmax(wrong))
             raise TestDataError(
                 f"{self.name}: a stretch of {stretch[place]:g} with a stress of {stress[place]:g} Pa: tension is "
-                "positive, above a stretch of 1; give nominal stress over stretch (1 plus strain), not over strain"
+                "positive, above a stretch of 1; give nominal stress over stretch (1 plus strain), or name the column "
+                "'strain'"
             )
         if len(np.unique(stretch[told])) < 3:
             raise TestDataError(f"{self.name}: has fewer than three stretches besides 1; give more points")
@@ -62,7 +67,7 @@ class TensileTest:
 
     @classmethod
     def read(cls, path: str | Path) -> "TensileTest":
-        """Read a CSV file of stretch and nominal stress, with the unit in the column's head."""
+        """Read a CSV file of stretch or engineering strain and of nominal stress, with units in the columns' heads."""
         try:
             lines = read(path, LARGEST_CSV).decode("utf-8-sig").splitlines()
         except ValueError as error:
@@ -73,13 +78,17 @@ class TensileTest:
         if not rows:
             raise TestDataError(f"'{path}' is empty; {TWO_COLUMNS}")
         head = rows[0][1]
+        where, column = f"'{path}', line {rows[0][0]}: ", head[0].lower()
+        kinds = [kind for kind in ("stretch", "strain") if kind in column]
+        percent = "%" in column or "percent" in column
         unit = head[1].partition("[")[2].partition("]")[0] if len(head) == 2 else ""
-        if "stretch" not in head[0].lower() or not unit:
-            raise TestDataError(f"'{path}', line {rows[0][0]}: {','.join(head)!r} is no head of a test; {TWO_COLUMNS}")
+        other = percent and kinds != ["strain"] or re.search("true|log|cauchy", ",".join(head).lower())
+        if len(kinds) != 1 or not unit or other:
+            raise TestDataError(f"{where}{','.join(head)!r} is no head of a test; {TWO_COLUMNS}")
         try:
             scale = positive(f"1 {unit}", "stress", "nominal stress")
         except ValueError as error:
-            raise TestDataError(f"'{path}', line {rows[0][0]}: {error}") from None
+            raise TestDataError(f"{where}{error}") from None
         found = []
         for number, row in rows[1:]:
             try:
@@ -90,6 +99,15 @@ class TensileTest:
                 ) from None
             found.append((stretch, scale * stress))
         stretches, stresses = np.array(found).reshape(-1, 2).T
+        if kinds == ["strain"]:
+            strains = stretches / (100 if percent else 1)
+            least = np.abs(strains[strains != 0]).min(initial=np.inf)
+            if 1 <= least < np.inf:
+                raise TestDataError(
+                    f"'{path}': its smallest strain is {least:g}, as of a stretch or of percent; name the column "
+                    "'stretch' or 'strain [%]', or give stretches (1 plus strain)"
+                )
+            stretches = 1 + strains
         return cls(stretches, stresses, str(path))
 
 
@@ -133,8 +151,9 @@ def fit_rubber(
     Parameters
     ----------
     uniaxial : str or Path
-        CSV file of two columns, stretch and nominal stress with its unit in the head, such as ``stretch,nominal
-        stress [MPa]``; lines with # are comments. Or a `springtune.problem.rubber.TensileTest`.
+        CSV file of two columns, stretch or engineering strain and nominal stress with its unit in the head, such as
+        ``stretch,nominal stress [MPa]`` or ``strain [%],nominal stress [MPa]``; lines with # are comments. Or a
+        `springtune.problem.rubber.TensileTest`.
     equibiaxial, pure_shear : str or Path, optional
         Files of other tests, only compared.
     terms : int, optional

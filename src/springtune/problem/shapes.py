@@ -336,6 +336,10 @@ COMPONENTS: dict[str, tuple[str, ...]] = {
 """Kinds of quantities of interest, and their components."""
 
 
+QUANTITY_UNITS = {"displacement": "m", "stress": "Pa", "reaction": "N", "area": "m2", "energy": "J"}
+"""Unit of each kind of quantity."""
+
+
 @dataclass(frozen=True)
 class Quantity:
     """A quantity of interest.

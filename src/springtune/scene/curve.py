@@ -1,5 +1,6 @@
 """Displacement over uniform stiffness: one equilibrium path serves all stiffnesses and forces of one sign."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -8,10 +9,11 @@ from numpy.typing import ArrayLike
 
 from ..mechanics.series import LinearPath, StablePath
 from ..mesh import Mesh
-from ..problem.compare import Best, best_stiffness, deformation_error
+from ..problem.compare import Best, best_stiffness, deformation_error, error_text
 from ..problem.loads import LoadKind
 from ..problem.status import Status
 from ..registry import hook
+from ..safe_io.tables import Tabled
 from ..springs import Springs
 from ..springs.lattice import COEFFICIENT, predicted_stiffness, uniform
 from .sheet import Sheet
@@ -62,8 +64,8 @@ def face_edge(mesh: Mesh) -> float:
     return float(np.median(np.abs(np.diff(mesh.points[faces, 0]))))
 
 
-@dataclass(frozen=True)
-class Curve:
+@dataclass(frozen=True, repr=False)
+class Curve(Tabled):
     """A sensitivity curve: displacement of a scene over uniform stiffness.
 
     Attributes
@@ -113,6 +115,15 @@ class Curve:
     best_message: str
     predicted_stiffness: float
     title: str
+
+    def _rows(self) -> Iterator[tuple[str, str]]:
+        yield "of", self.title
+        yield "stiffness", f"{self.stiffness[0]:.4g} to {self.stiffness[-1]:.4g} N/m"
+        yield "error", " to ".join(map(error_text, self.error[self.stable][[0, -1]])) if self.stable.any() else ""
+        yield "stable", f"{self.stable.sum()} of {len(self.stable)}"
+        yield "reason", self.message
+        yield "no error at", self.best_message or f"{self.best_stiffness:.4g} N/m"
+        yield "predicted", "" if np.isnan(self.predicted_stiffness) else f"{self.predicted_stiffness:.4g} N/m"
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
         """Draw the error over the stiffness.

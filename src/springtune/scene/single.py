@@ -2,7 +2,7 @@
 
 import time
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
@@ -15,14 +15,15 @@ from ..mechanics.newton import Equilibrium
 from ..mechanics.statics import SingularError, StaticProblem
 from ..mesh import Mesh
 from ..mesh.groups import GroupedMesh
-from ..problem.compare import quantity_errors
+from ..problem.compare import error_text, quantity_errors, sign_word
 from ..problem.geometry import AssumptionWarning, Beam
 from ..problem.loads import KINEMATICS
 from ..problem.materials import AnyMaterial
 from ..problem.quantities import positive
-from ..problem.shapes import Shape
+from ..problem.shapes import QUANTITY_UNITS, Shape
 from ..problem.status import Status
 from ..registry import hook
+from ..safe_io.tables import Tabled, number_text
 from ..springs import Springs
 from .meshes import is_a
 from .sheet import AnyDefinition, Sheet, check_stiffness, definition_of, named
@@ -38,7 +39,7 @@ if TYPE_CHECKING:
     from ..reference.small_strain import ReferenceSolution
 
 
-class Scene:
+class Scene(Tabled):
     """A boundary-value problem: a beam or a shape, meshed by springs of a definition, under a load.
 
     Parameters
@@ -182,6 +183,15 @@ class Scene:
             f"Scene({self.statement.body}, {len(self.mesh.points)} particles, {self.statement.named_materials}, "
             f"{self.statement.label}, {self.definition.name}, {self.kinematics})"
         )
+
+    def _rows(self) -> Iterator[tuple[str, str]]:
+        about = self.statement
+        yield "body", f"{about.body}, {1e3 * about.thickness:g} mm thick"
+        yield "mesh", f"{len(self.mesh.points)} particles, {len(self.mesh.edges)} springs"
+        yield "material", about.named_materials
+        yield "load", about.label
+        yield "definition", self.definition.name
+        yield "kinematics", self.kinematics
 
     @cached_property
     def _derived(self) -> tuple[Springs, float]:
@@ -408,11 +418,13 @@ class Scene:
         """
         return "" if self.kinematics == "linear" else self.statement.objection(self.sheet, self.finite_strain)
 
-    def motion(self, **options: Any) -> "Motion":
+    def motion(self, released: bool = False, **options: Any) -> "Motion":
         """The scene in time, its force switched on at rest and kept; free of damping.
 
         Parameters
         ----------
+        released : bool, optional
+            Without the force: to let go of a loaded body, start a run from the displacements of its result.
         **options
             ``mass_damping``, ``dampers`` and others as `springtune.mechanics.dynamics.Motion` takes them.
 
@@ -424,6 +436,7 @@ class Scene:
         ------
         ValueError
             If the material has no density, or the load prescribes displacements or turns with the sides it acts on.
+            Turning loads can be released.
 
         Notes
         -----
@@ -437,6 +450,17 @@ class Scene:
         >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "5 mm"), steel, "traction", "1 kN")
         >>> print(f"{1e9 * scene.motion().step_limit('central-difference'):.0f} ns")
         622 ns
+
+        Let go of, a bent beam has the work of the force as energy, and comes back to rest where it is damped:
+
+        >>> scene = st.Scene(beam, scene.mesh, steel, "bending", "100 N", kinematics="linear")
+        >>> bent, motion = scene.solve(), scene.motion(released=True)
+        >>> energy = motion.energy(bent.displacements, 0 * bent.displacements)
+        >>> print(f"{1e3 * energy:.3f} mJ, {1e3 * scene.force * bent.displacement / 2:.3f} mJ")
+        11.449 mJ, 11.449 mJ
+        >>> calm = scene.motion(released=True, mass_damping=scene.motion().critical_damping)
+        >>> calm.run("backward-euler", 1e-5, 1000, start=bent.displacements, rest=1e-6).status
+        'rest'
         """
         inertia = self.statement.masses()
         if inertia is None:
@@ -446,15 +470,16 @@ class Scene:
             raise ValueError(
                 f"load: {self.load!r} prescribes displacements, and a motion is under forces; take another load"
             )
-        if self.problem.follower is not None:
+        if self.problem.follower is not None and not released:
             raise ValueError(
                 f"load: {self.load!r} turns with the side that it acts on, and forces of a motion do not; take one "
-                "that does not follow"
+                "that does not follow, or let go of it by released=True"
             )
         from ..mechanics.dynamics import Motion
 
         reference = self.springs.reference
-        known: dict[str, Any] = {"linear": self.kinematics == "linear", "load": self.forces / reference}
+        load = None if released else self.forces / reference
+        known: dict[str, Any] = {"linear": self.kinematics == "linear", "load": load, "reference": reference}
         return Motion(self.network, inertia / reference, **(known | options))
 
     def write_motion(
@@ -573,8 +598,8 @@ class SceneSprings(Springs):
         return written
 
 
-@dataclass(frozen=True)
-class Result:
+@dataclass(frozen=True, repr=False)
+class Result(Tabled):
     """The answer of a scene.
 
     Attributes
@@ -627,6 +652,29 @@ class Result:
     seconds: float
     definition_seconds: float
     values: dict[str, float]
+
+    def _rows(self) -> Iterator[tuple[str, str]]:
+        about = self.scene.statement
+        yield "status", str(self.status)
+        yield "reason", self.message
+        yield "scene", f"{about.body}, {about.label}, {self.scene.definition.name}, {self.scene.kinematics}"
+        units = {one.name: QUANTITY_UNITS[one.kind] for one in about.case.quantities}
+        for name, value in self.values.items():
+            known = number_text(value, units[name]) if units[name] != "Pa" else f"{1e-6 * value:.6g} MPa"
+            yield name, known if value == value else "none"
+        yield "solved in", f"{1e3 * self.seconds:.3g} ms"
+
+    def _computed_rows(self) -> Iterator[tuple[str, str]]:
+        if self.equilibrium is None or not self.equilibrium.converged:
+            return
+        try:
+            errors, objection = self.errors, self.scene.objection
+        except (RuntimeError, ValueError) as why:  # there is no reference, or not of a quantity
+            yield "error", f"no reference: {why}"
+            return
+        for name, error in errors.items():
+            yield f"error of {name}", f"{error_text(error)} {self.sign_words[name]}".rstrip()
+        yield "but", objection
 
     @property
     def displacements(self) -> np.ndarray:
@@ -695,6 +743,30 @@ class Result:
         True
         """
         return quantity_errors(self.values, self.scene.reference_values())
+
+    @property
+    def sign_word(self) -> str:
+        """What the sign of `error` means: ``"too soft"`` or ``"too stiff"``; empty without an error.
+
+        Of a quantity other than a displacement ``"too large"`` or ``"too small"``.
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> beam, steel = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3)
+        >>> mesh = st.make_mesh(beam, "structured", "5 mm")
+        >>> result = st.Scene(beam, mesh, steel, "compression", "40 kN", definition="lattice").solve()
+        >>> f"{100 * result.error:+.2f} %, {result.sign_word}", result.sign_words
+        ('-3.59 %, too soft', {'displacement': 'too soft'})
+        """
+        return next(iter(self.sign_words.values()))
+
+    @property
+    def sign_words(self) -> dict[str, str]:
+        """As `sign_word`, of each quantity of interest by name."""
+        known = self.scene.reference_values()
+        kinds = {one.name: one.kind for one in self.scene.statement.case.quantities}
+        return {name: sign_word(error, known.get(name, np.nan), kinds[name]) for name, error in self.errors.items()}
 
     def write(self, path: str | Path, steps: int = 10) -> list[Path]:
         """Write the deformed network as VTU, for ParaView and others.

@@ -189,7 +189,7 @@ NEEDS = ("", "stiffness", "cases")
 
 Function = TypeVar("Function", bound=Callable[..., Springs])
 
-DEFINITIONS: Registry[Definition] = Registry(__package__, "definition")
+DEFINITIONS: Registry[Definition] = Registry(__package__, "definition", "definitions")
 """Definitions by name, in the order of their labels."""
 
 

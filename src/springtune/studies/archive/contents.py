@@ -56,7 +56,7 @@ CHECKOUT_FILES = (
 
 FOLDERS = {
     "src": (".css", ".html", ".js", ".py", ".pyi", ".typed", ".yaml"),
-    "workflow": (".csl", "README.md", ".rst", ".smk", ".typ", ".yaml", ".yml"),
+    "workflow": (".csl", "README.md", "Snakefile", ".rst", ".smk", ".typ", ".yaml", ".yml"),
     "requirements": (".in", ".txt"),
 }
 """Packed folders, and the endings used without git."""
@@ -182,7 +182,8 @@ def gather(
     if code.diff and "git_diff" not in untold:
         packed[DIFF] = of_text(DIFF, code.diff)
     own = names[study.path.resolve()]
-    tell_machine = host == platform.node() and "host" not in untold and not _elsewhere(folder)
+    elsewhere = any((folder / note).is_file() for note in (COMMANDS_FILE, ELSEWHERE))  # other machines took part
+    tell_machine = host == platform.node() and "host" not in untold and not elsewhere
     found = Contents(
         study=study,
         plan=made,
@@ -409,11 +410,6 @@ def _without(dataset: Packed, names: Collection[str], scratch: Path) -> tuple[Pa
                 file.attrs.modify(name, np.bytes_(b"-" * len(text)))
     packed = _of_file(dataset.name, copy)
     return Packed(packed.name, packed.source, packed.sha256, packed.size, dataset.sha256), found, host
-
-
-def _elsewhere(folder: Path) -> bool:
-    """Return whether other machines computed part of a study."""
-    return any((folder / note).is_file() for note in (COMMANDS_FILE, ELSEWHERE))
 
 
 def _departures(checkout: Path, told: dict[str, str]) -> dict[str, tuple[str, str]]:

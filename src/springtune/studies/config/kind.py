@@ -9,7 +9,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from springtune.registry import imported
+from springtune.registry import Extended, imported, plugins
 
 if TYPE_CHECKING:
     from .messages import Problems
@@ -21,6 +21,9 @@ _FIRST = ("scenes", "moduli", "laying", "stability", "benchmark", "samples", "re
 
 KINDS = _FIRST + tuple(sorted({path.parent.name for path in _PACKAGES.glob("*/kind.py")} - {*_FIRST}))
 """Packages of the study kinds, in the order of the dataset's groups; other kinds come last."""
+
+RESERVED: set[str] = set()
+"""Keys of studies and grids that no kind adds; `springtune.studies.config.sections` enters them."""
 
 
 FORMATS = ("png", "pdf")
@@ -73,11 +76,6 @@ class Output:
     usual: bool = False
 
     @property
-    def made_by(self) -> str:
-        """Name of the job that makes it."""
-        return self.job or self.name
-
-    @property
     def module(self) -> str:
         """Module that draws the figures."""
         return self.plot.partition(":")[0]
@@ -112,9 +110,9 @@ class Stage:
         From a study and `springtune.studies.runs.plan.Costs` to expected seconds and a value by name; None for a
         stage with the bundles of another one.
     like : str
-        Stage whose bundles it shares.
-    same, every : tuple of str
-        Stages that it needs: the job of the same bundle, or all jobs.
+        Stage whose bundles it shares, and whose job of the same bundle it needs.
+    every : tuple of str
+        Stages that it needs all jobs of, besides the job of the same bundle.
     alone : bool
         Whether a job has one member and the whole machine, so that its seconds can be measured.
     folder : str
@@ -130,7 +128,6 @@ class Stage:
     products: Callable[[dict[str, Any]], Iterable[Path]]
     members: Callable[[Study, Any], Mapping[str, tuple[float, Any]]] | None = None
     like: str = ""
-    same: tuple[str, ...] = ()
     every: tuple[str, ...] = ()
     alone: bool = False
     folder: str = ""
@@ -150,16 +147,20 @@ class Kind:
     ----------
     name : str
         Name of its package and of its part of a study in `Study.parts`.
+    package : str
+        Package of its modules, for kinds of other packages; modules of stages and outputs then have full names.
     study_fields, grid_fields : dict of str to tuple
         Keys that it adds to a study and to grids, with type and pydantic field.
     alone : dict of str to tuple
-        Those of its keys that a study may have instead of grids, and the keys that each needs.
+        Keys that a study may have instead of grids, and what each needs; by default its optional keys, which need beams
+        and materials.
     files : callable, optional
         From its part of a study to further input files.
     check : callable, optional
-        Adds the mistakes of a config to `springtune.studies.config.messages.Problems`.
+        Adds the mistakes of a config with its sections to `springtune.studies.config.messages.Problems`.
     expand : callable, optional
-        From a config and `springtune.studies.config.expand.Declared` to its part of a study, empty if unused.
+        From a config with its sections and `springtune.studies.config.expand.Declared` to its part of a study, which
+        is empty in other studies.
     axes : callable, optional
         From that part to the labels of its groups' dimensions.
     summary : callable, optional
@@ -182,6 +183,7 @@ class Kind:
     """
 
     name: str
+    package: str = field(default="", kw_only=True)
     study_fields: dict[str, tuple[Any, Any]] = field(default_factory=dict)
     grid_fields: dict[str, tuple[Any, Any]] = field(default_factory=dict)
     alone: dict[str, tuple[str, ...]] = field(default_factory=dict)
@@ -201,10 +203,25 @@ class Kind:
     pieces: Callable[[Study, Any, Any], Mapping[tuple[str | int, ...], float]] | None = None
     take: Callable[[Study, Collection[tuple[str | int, ...]]], Study] | None = None
 
+    def wanted(self, config: Any) -> bool:
+        """Return whether a config has one of its sections; a kind without any depends on the grids."""
+        return not self.study_fields or any(getattr(config, key) for key in self.study_fields)
+
+    def place(self, name: str) -> str:
+        """Name of a module of its package."""
+        return f"{self.package or f'studies.kinds.{self.name}'}.{name}"
+
     def module(self, name: str) -> ModuleType:
         """A module of its package."""
-        found: ModuleType = imported(f"studies.kinds.{self.name}.{name}")
+        found: ModuleType = imported(self.place(name))
         return found
+
+    @property
+    def names(self) -> set[tuple[str, str]]:
+        """What it names, each with what it is; of these no other kind has one."""
+        keys = {("key", key) for key in (*self.study_fields, *self.grid_fields)}
+        made = {("output", one.name) for one in self.outputs} | {("stage", one.name) for one in self.stages}
+        return {("name", self.name)} | keys | made
 
 
 def stem(name: str, selection: Mapping[str, str]) -> str:
@@ -225,15 +242,42 @@ def modules(*names: str) -> list[str]:
     ]
 
 
+def _own_kinds() -> tuple[Kind, ...]:
+    return tuple(imported(f"studies.kinds.{name}.kind:KIND") for name in KINDS)
+
+
+def _adopted(name: str, kind: Any) -> Kind:
+    """Study kind of another package, which shares no name with others."""
+    if not isinstance(kind, Kind) or kind.name != name:
+        raise ValueError(f"{kind!r} is not a springtune.studies.config.kind.Kind of that name")
+    known = {about: other.name for other in (*_own_kinds(), *OTHER_KINDS._entries.values()) for about in other.names}
+    known |= {("key", key): "springtune" for key in RESERVED}
+    for about in sorted(kind.names & known.keys()):
+        raise ValueError(f"{about[0]} '{about[1]}' is of '{known[about]}' already; it needs another")
+    return kind
+
+
+OTHER_KINDS = Extended[Kind]("study kind", "kinds", {}, _adopted)
+"""Study kinds of other packages, by name."""
+
+
 @cache
 def kinds() -> tuple[Kind, ...]:
     """All study kinds."""
-    return tuple(imported(f"studies.kinds.{name}.kind:KIND") for name in KINDS)
+    return (*_own_kinds(), *OTHER_KINDS.values())
+
+
+def further_modules(study: Study) -> list[str]:
+    """Modules that declare and collect the kinds of other packages that a study uses."""
+    used = [kind for kind in OTHER_KINDS.values() if study.parts[kind.name]]
+    found = [one.module for one in plugins()["kinds"] if one.name in {kind.name for kind in used}]
+    return found + [kind.place("collect") for kind in used if not kind.variables]
 
 
 @cache
 def outputs() -> dict[str, Output]:
     """Outputs of all study kinds, by name."""
     apart = {name.split(".")[2]: imported(f"{name}:OUTPUTS") for name in modules("outputs")}
-    found = (apart[name] if name in apart else imported(f"studies.kinds.{name}.kind:KIND").outputs for name in KINDS)
+    found = [apart[name] if name in apart else imported(f"studies.kinds.{name}.kind:KIND").outputs for name in KINDS]
+    found += [kind.outputs for kind in OTHER_KINDS.values()]
     return {output.name: output for outputs in found for output in outputs}

@@ -7,10 +7,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
+from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.image import AxesImage
 
+from springtune.problem.compare import sign_sentence
 from springtune.problem.status import Status
 
 from . import labels, style
+from .colours import ERROR_COLOURS, ERROR_RANGE
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -21,6 +25,12 @@ if TYPE_CHECKING:
 
 LARGEST_SHOWN = 100.0
 """Largest error of a curve in a plot [%]."""
+
+BEYOND_SMALL_STRAIN = "beyond small strain"
+"""What a figure says of errors against references that do not apply, `reference_applies` false."""
+
+NO_RESULT, NOT_ASKED = "×", "–"
+"""Cells of a heat map without an error."""
 
 
 @style.styled
@@ -74,6 +84,8 @@ def draw_curve(ax: Axes | None, curve: "Curve") -> Axes:
     labels.settle(figure, axes, place)
     if not len(known):
         labels.say(panel, curve.message or "There is no reference, and so no error.", bare=False)
+    elif np.isfinite(error).any():
+        said.append(sign_sentence({"": float(np.nansum(curve.displacement))}))
     labels.note(panel, "; ".join(said))
     return panel
 
@@ -90,6 +102,24 @@ def fitted(panel: Axes, texts: Iterable[str], size: float = style.SMALL) -> str:
     """Texts, one a line, wrapped to the width of a panel."""
     room = panel.get_window_extent().width / panel.figure.dpi
     return "\n".join(labels.wrapped(text, room, size) for text in texts)
+
+
+def heat_map(panel: Axes, errors: np.ndarray, texts: np.ndarray) -> AxesImage:
+    """Cells coloured by the size of an error [%] with texts, both of shape (n_rows, n_columns)."""
+    shade, (low, high) = np.log10(np.clip(np.abs(errors), *ERROR_RANGE)), np.log10(ERROR_RANGE)
+    colours = LinearSegmentedColormap.from_list("errors", ERROR_COLOURS)
+    image = panel.imshow(shade, cmap=colours, vmin=low, vmax=high, aspect="auto")
+    for (row, column), text in np.ndenumerate(texts):
+        colour = "white" if shade[row, column] > 1.2 else "0.5" if text == NOT_ASKED else "k"
+        panel.text(column, row, text, ha="center", va="center", fontsize=style.SMALL, color=colour)
+    panel.grid(False)
+    return image
+
+
+def error_text(error: float, sign: str = "+") -> str:
+    """Error [%] with the digits that a cell of a heat map has room for."""
+    size = abs(error)
+    return f"{error:{sign}.{0 if size >= 9.95 else 1 if size >= 0.095 else 2}f}".replace("-", "−")
 
 
 def magnification(wanted: float) -> float:

@@ -1,5 +1,6 @@
 """Place texts in figures: line names, notes and messages."""
 
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cache
@@ -12,9 +13,11 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.font_manager import FontProperties, findfont, get_font
 from matplotlib.patches import Patch
+from matplotlib.ticker import NullLocator
+
+from springtune.problem.status import Status
 
 from . import style
-from .dataset import STATUS
 from .style import POINTS, SMALL, arrange
 
 End = tuple[float, float, str, str]
@@ -48,10 +51,14 @@ def power_of_ten(largest: float) -> tuple[float, str]:
     return 10.0**power, POWERS[power]
 
 
+BETWEEN_WORDS = re.compile(r"(?<!\d) | (?!(?:m|mm|N|kN|Pa|kPa|MPa|GPa|N/m|%)(?:\W|$))")
+"""Spaces at which a text may be wrapped."""
+
+
 def wrapped(text: str, room: float, size: float = SMALL) -> str:
-    """Wrap a text at spaces to a width [inch]."""
+    """Wrap a text at spaces to a width [inch]; a number keeps its unit."""
     lines = [""]
-    for word in text.split(" "):
+    for word in BETWEEN_WORDS.split(text):
         longer = f"{lines[-1]} {word}".strip()
         if lines[-1] and width(longer, size) > room:
             lines.append(word)
@@ -134,6 +141,18 @@ def alike(curves: dict[str, np.ndarray], within: float) -> list[list[str]]:
         else:
             groups.append([name])
     return groups
+
+
+def sizes_axis(panel: Axes, sizes: np.ndarray, count: int) -> list[np.ndarray]:
+    """Axis of mesh sizes [mm]: places of each of so many lines; a single size has its points side by side."""
+    if len(sizes) == 1:
+        panel.set(xlabel=f"One mesh size, {sizes[0]:g} mm", xlim=(-0.6, count - 0.4), xticks=[])
+        return [np.array([float(number)]) for number in range(count)]
+    panel.set(xscale="log", xlabel="Mesh size [mm]")
+    panel.set_xticks(sizes, [f"{size:g}" for size in sizes])
+    panel.xaxis.set_minor_locator(NullLocator())
+    panel.set_xlim(sizes.min() / 1.2, sizes.max() * 1.2)
+    return [sizes] * count
 
 
 def line(panel: Axes, x: np.ndarray, y: np.ndarray, look: Mapping[str, Any], name: str, end: str = "") -> list[End]:
@@ -235,9 +254,21 @@ def arranged(
         name_lines(panel, named)
 
 
+KEY_ROW, KEY_COLUMNS = 0.16, 2
+"""Height of a row of a key [inch], and the entries of a row."""
+
+
+def key_below(panel: Axes, shown: Sequence[tuple[str, Mapping[str, Any]]], below: float = 0.38) -> None:
+    """Explain looks `below` a panel's label [inch]."""
+    handles = [panel.plot([], [], color="0.3", **look)[0] for _, look in shown]
+    height = panel.get_window_extent().height / panel.figure.dpi
+    panel.legend(handles, [text for text, _ in shown], loc="upper left", bbox_to_anchor=(0, -below / height),
+                 ncols=KEY_COLUMNS, handlelength=1.2, borderaxespad=0, borderpad=0)  # fmt: skip
+
+
 def statuses(flags: np.ndarray) -> dict[str, int]:
     """Number of cells of each status but those that were not asked for, by its words."""
-    return {STATUS[flag].replace("_", " "): int((flags == flag).sum()) for flag in np.unique(flags[flags != 0])}
+    return {str(Status(flag)).replace("_", " "): int((flags == flag).sum()) for flag in np.unique(flags[flags != 0])}
 
 
 def say(panel: Axes, text: str, bare: bool = True) -> None:

@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from springtune.safe_io.tables import number_text
+
 from .alignment import joined, on_common_axes
 from .comparison import MEASURED, Tolerance, Values
 from .dataset import STATUS, nothing
-from .text import cell_text, number_text, variable_name
+from .text import cell_text, variable_name
 
 SAME_VALUE = 1e-9
 """Relative difference below which values of a scene agree."""

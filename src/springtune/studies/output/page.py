@@ -11,6 +11,7 @@ import xarray as xr
 from springtune.safe_io.atomic import write_text
 
 from ..config.kind import kinds
+from .selection import sign_of_errors
 from .text import csv_text, decimals, number
 
 ANSWERED = ("solved", "unstable", "linear_only")
@@ -28,7 +29,9 @@ def write(tree: xr.DataTree, folder: str | Path) -> list[str]:
     written = {f"{table['stem']}.csv": csv_text(table["rows"]) for table in tables}
     scenes = [_scenes(table, list(map(str, tree.kinematics.values))) for table in tables if "title" not in table]
     further = [shown(table) for table in tables if "title" in table]
-    written["index.html"] = html(scenes, further, _beams(tree.to_dataset()), tree.attrs)
+    root = tree.to_dataset()
+    about = tree.attrs | {"sign": sign_of_errors(root) if scenes else ""}
+    written["index.html"] = html(scenes, further, _beams(root), about)
     for name, text in written.items():
         write_text(Path(folder) / name, text)
     return list(written)
@@ -37,7 +40,7 @@ def write(tree: xr.DataTree, folder: str | Path) -> list[str]:
 def html(
     scenes: list[dict[str, Any]], further: list[dict[str, Any]], beams: list[str], attributes: Mapping[Any, Any]
 ) -> str:
-    """Page of tables prepared by `shown`, with the dataset's attributes."""
+    """Page of tables prepared by `shown`, with the dataset's attributes and the meaning of a `sign`."""
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("springtune.studies.output", ""),
         autoescape=True,

@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
+from springtune.problem.compare import sign_sentence
 from springtune.problem.geometry import beam_label
 from springtune.problem.parameters import OF_BODIES, SWEPT, shown_order
+from springtune.problem.status import Status
 
 from ..config.model import FINITE_STRAIN_REFERENCE, TESTED_REFERENCE
 
@@ -112,6 +114,16 @@ def at(data: xr.Dataset, values: Mapping[str, xr.DataArray]) -> xr.Dataset:
     return found.reset_coords([name for name in chosen if name in found.coords])
 
 
+def sign_of_errors(data: xr.Dataset) -> str:
+    """Sentence on which sign of a group's errors means too soft, from its references; empty without any."""
+    if "reference_displacement" not in data:
+        return ""
+    signs = np.sign(data.reference_displacement)
+    signs = signs if "load" in signs.dims else signs.expand_dims(load=[""])
+    signs = signs.sum([name for name in signs.dims if name != "load"])
+    return sign_sentence(dict(zip(signs["load"].values.tolist(), signs.values.tolist())))
+
+
 def labels_of(present: xr.DataArray, name: str) -> list[Label]:
     """Labels of a dimension with any cell present, in dataset order."""
     there = present.any([dimension for dimension in present.dims if dimension != name])
@@ -174,6 +186,19 @@ def of_own_law(finite: xr.Dataset) -> xr.Dataset | None:
         own = there.broadcast_like(array).transpose(*array.dims) if set(there.dims) <= set(array.dims) else there
         found[name] = array.where(own, neo_hooke[name])
     return found
+
+
+def judged(data: xr.Dataset, finite: xr.Dataset | None = None, name: str = "deformation_error") -> xr.DataArray:
+    """Errors of solved cells whose reference applies, NaN elsewhere.
+
+    Those of nonlinear networks are against references at `finite` strain where there are any.
+    """
+    solved = data.status == Status.SOLVED
+    errors = data[name].where(solved & (data.get("reference_applies", 1) == 1))
+    at_finite_strain = None if finite is None else of_own_law(finite)
+    if at_finite_strain is not None:
+        errors = errors.where(data.kinematics == "linear", at_finite_strain[name].where(solved))
+    return errors.transpose(*data[name].dims)
 
 
 def own_law(cell: xr.Dataset, name: str) -> str | None:

@@ -14,13 +14,14 @@ import numpy as np
 
 from springtune.problem.status import Status
 from springtune.safe_io.escapes import shown
+from springtune.safe_io.tables import aligned
 
 from ..runs import checked_json, rerun
 from ..runs.checked_json import ASIDE
 from ..runs.plan import Plan
 from ..runs.workload import clock, computed, results_of
-from .selection import of_own_law
-from .text import aligned, place_text, without_numbers
+from .selection import judged, of_own_law
+from .text import place_text, sign_text, without_numbers
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -115,23 +116,10 @@ def _named(cells: Cells) -> Iterator[str]:
         yield f"  and {len(order) - len(told)} more"
 
 
-def _at_finite_strain(root: "xr.Dataset", finite: "xr.Dataset | None") -> "xr.DataArray | None":
-    """Errors of nonlinear networks against finite strain, NaN elsewhere; None without a reference."""
-    finite = None if finite is None else of_own_law(finite)
-    if finite is None:
-        return None
-    return finite.deformation_error.where(root.kinematics != "linear").transpose(*root.deformation_error.dims)
-
-
 def _worst(root: "xr.Dataset", finite: "xr.Dataset | None" = None) -> Iterator[str]:
     """Largest error of each definition over solved scenes with a valid reference."""
-    counted, errors = (root.status == Status.SOLVED) & (root.reference_applies == 1), root.deformation_error
-    at_finite_strain = _at_finite_strain(root, finite)
-    if at_finite_strain is not None:  # never a nonlinear network against small strain
-        linear = root.kinematics == "linear"
-        errors = errors.where(linear, at_finite_strain)
-        counted = counted & linear | (root.status == Status.SOLVED) & at_finite_strain.notnull()
-    places = np.argwhere(counted.transpose(*errors.dims).values & np.isfinite(errors.values))
+    errors = judged(root, finite)
+    places = np.argwhere(np.isfinite(errors.values))
     values, axis = errors.values[tuple(places.T)], errors.dims.index("definition")
     found = []
     for number in np.unique(places[:, axis]).tolist():
@@ -139,16 +127,19 @@ def _worst(root: "xr.Dataset", finite: "xr.Dataset | None" = None) -> Iterator[s
         worst = own[np.argmax(abs(values[own]))]
         others = [dim for dim in errors.dims if dim != "definition"]
         where = place_text(root, others, np.delete(places[worst], axis).tolist())
-        found.append((float(values[worst]), str(root.definition.values[number]), where))
+        error = float(values[worst])
+        found.append(
+            (error, sign_text(root, error, errors.dims, places[worst]), str(root.definition.values[number]), where)
+        )
     found.sort(key=lambda row: -abs(row[0]))
     if found:
-        number = int(counted.sum())
-        scenes = "the one scene that has one" if number == 1 else f"the {number} scenes that have one"
+        scenes = "the one scene that has one" if len(places) == 1 else f"the {len(places)} scenes that have one"
         head = "worst deformation error, (network - reference) / |reference|, of each definition"
-        yield from ("", f"{head}, of {scenes}; tension is positive")
-        if at_finite_strain is not None:
+        yield from ("", f"{head}, of {scenes}")
+        if finite is not None and of_own_law(finite) is not None:
             yield "  nonlinear networks against finite strain, linear ones against small strain"
-        yield aligned([[name, f"{100 * error:+.2f} %", where] for error, name, where in found[:WORST]], 2, right=(1,))
+        rows = [[name, f"{100 * error:+.2f} %", word, where] for error, word, name, where in found[:WORST]]
+        yield aligned(rows, 2, right=(1,))
     if len(found) > WORST:
         yield f"  and of {len(found) - WORST} more at most {100 * abs(found[WORST][0]):.2f} %"
 

@@ -5,12 +5,13 @@ import io
 import json
 import math
 import re
-from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, SupportsFloat
 
 from springtune import __version__
 from springtune.problem.parameters import SWEPT, with_unit
 from springtune.safe_io.escapes import shown
+from springtune.safe_io.tables import number_text
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -21,19 +22,6 @@ def paragraphs(parts: Iterable[Iterable[str]]) -> str:
     return "\n\n".join("\n".join(map(shown, lines)) for lines in parts)
 
 
-def aligned(rows: Iterable[Iterable[object]], left: int, right: Collection[int] = ()) -> str:
-    """Align columns, those in `right` to the right."""
-    texts = [[shown(cell) for cell in row] for row in rows]
-    widths = [max(map(len, column)) for column in zip(*texts)]
-    lines = []
-    for row in texts:
-        cells = [
-            cell.rjust(width) if n in right else cell.ljust(width) for n, (cell, width) in enumerate(zip(row, widths))
-        ]
-        lines.append((" " * left + "  ".join(cells)).rstrip())
-    return "\n".join(lines)
-
-
 def bytes_text(number: float) -> str:
     """Bytes with a readable unit."""
     for unit in ("B", "kB", "MB"):
@@ -41,19 +29,6 @@ def bytes_text(number: float) -> str:
             return f"{number:.3g} {unit}"
         number /= 1000
     return f"{number:.3g} GB"
-
-
-def number_text(number: float, unit: str) -> str:
-    """Number with unit, lengths in mm.
-
-    Examples
-    --------
-    >>> number_text(0.005, "m"), number_text(0.3, "1"), number_text(4e5, "N")
-    ('5 mm', '0.3', '400000 N')
-    """
-    if unit == "m":
-        return f"{1e3 * number:.6g} mm"
-    return f"{number:.6g}" if unit in ("", "1") else f"{number:.6g} {unit}"
 
 
 def label_text(dimension: str, label: object, unit: str = "1") -> str:
@@ -88,6 +63,16 @@ def place_text(data: "xr.Dataset", dims: Iterable[Hashable], place: Iterable[int
     pairs = [(str(name), data[name] if name in data.coords else None, int(at)) for name, at in zip(dims, place)]
     units = {name: str(axis.attrs.get("units", "1")) for name, axis, _ in pairs if axis is not None}
     return cell_text({name: at if axis is None else axis.values[at] for name, axis, at in pairs}, units)
+
+
+def sign_text(data: "xr.Dataset", error: float, dims: Iterable[Hashable], place: Iterable[int]) -> str:
+    """Word for the sign of the deformation error of a cell, see `springtune.problem.compare.sign_word`."""
+    if "reference_displacement" not in data:
+        return ""
+    from springtune.problem.compare import sign_word  # here, since it imports numpy
+
+    known, at = data.reference_displacement, dict(zip(dims, place))
+    return sign_word(error, float(known.isel({name: at[name] for name in known.dims})))
 
 
 NUMBER = re.compile(r"[+-]?[0-9][0-9.]*(e[+-]?[0-9]+)?")

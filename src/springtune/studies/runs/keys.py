@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from springtune.mesh import MESH_TYPES
-from springtune.registry import Declared
+from springtune.registry import Declared, full_name, plugin_packages
 from springtune.springs import DEFINITIONS
 
 from . import checked_json
@@ -284,7 +284,12 @@ class Code:
         """Imported files, and packages with the importing file as in `NOT_COUNTED`."""
         files: set[Path] = set()
         packages: set[tuple[str, str]] = set()
-        where = path.relative_to(self.package).as_posix() if self._has(path) else str(path)
+        ours = self._has(path)
+        where = path.relative_to(self.package).as_posix() if ours else str(path)
+        for name in () if ours else plugin_packages():
+            place = _own(name)
+            if place and path.with_suffix("").is_relative_to(place):  # its version counts, not only this code
+                packages.add((where, name))
         for one in imports:
             for found in self._followed(path, one):
                 if isinstance(found, Path):
@@ -407,17 +412,15 @@ def distribution(package: str) -> str:
 
 
 def _module(name: str) -> Path:
-    return PACKAGE / (name.replace(".", "/") + ".py")
+    ours = PACKAGE / (name.replace(".", "/") + ".py")
+    spec = None if ours.is_file() else find_spec(full_name(name))
+    return Path(spec.origin) if spec and spec.origin else ours
 
 
 @cache
 def _own(package: str) -> Path | None:
-    """Path of a package without distribution, such as one on PYTHONPATH."""
-    from importlib.metadata import PackageNotFoundError, version
-
-    try:
-        version(distribution(package))
-    except PackageNotFoundError:
+    """Path of a package without distribution, such as one on PYTHONPATH, or with entry points for springtune."""
+    if package in plugin_packages() or installed(distribution(package)) == "none":
         spec = find_spec(package)
         origin = Path(spec.origin) if spec and spec.origin else Path()
         if origin.suffix == ".py":

@@ -7,10 +7,15 @@ import subprocess
 from collections.abc import Collection
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 from springtune import __version__
+from springtune.mesh import MESH_TYPES
+from springtune.problem.loads import LOADS
+from springtune.registry import Extended
+from springtune.springs import DEFINITIONS
 
-from ..config.kind import kinds
+from ..config.kind import OTHER_KINDS, kinds
 from ..config.model import Study
 from .keys import installed
 from .records import checksum
@@ -48,13 +53,16 @@ PRINTED = {"paper_tables.csv": "the paper Mass-Spring Parameters Definition in 2
 """Sources of printed values by file name."""
 
 
-def attributes(study: Study, config: str | Path, untold: Collection[str] = ()) -> dict[str, str]:
+def attributes(
+    study: Study, config: str | Path, untold: Collection[str] = (), package: Path = PACKAGE
+) -> dict[str, str]:
     """Attributes of the root of a study's dataset."""
     created = datetime.now(UTC).isoformat(timespec="seconds")
-    software = {name: installed(name) for name in SOFTWARE} | {"python": platform.python_version()}
+    software = {name: installed(name) for name in (*SOFTWARE, *_plugins(study))}
+    software["python"] = platform.python_version()
     folder = Path(config).resolve().parent
-    library, own = library_commit(), study_commit(folder)
-    checkouts = ((clone(), library), (folder, own))
+    library, own = library_commit(package), study_commit(folder, package)
+    checkouts = ((clone(package), library), (folder, own))
     changed = [place for place, commit in checkouts if place and commit.endswith(CHANGED)]
     found = {
         "title": study.title,
@@ -73,6 +81,15 @@ def attributes(study: Study, config: str | Path, untold: Collection[str] = ()) -
         "host": "" if "host" in untold else platform.node(),
     }
     return found | ({"study_commit": own} if own else {}) | _references(study)
+
+
+def _plugins(study: Study) -> set[str]:
+    """Distributions of the definitions, mesh types, loads and study kinds of other packages that a study uses."""
+    used = {label for labels in study.axes.values() for label in labels} | {
+        name for name, part in study.parts.items() if part
+    }
+    tables: tuple[Extended[Any], ...] = (DEFINITIONS, MESH_TYPES, LOADS, OTHER_KINDS)
+    return {package for table in tables for name, package in table.packages.items() if name in used}
 
 
 def _references(study: Study) -> dict[str, str]:
@@ -116,19 +133,18 @@ def git_commit(folder: Path) -> str:
     return git(folder, "describe", "--always", "--abbrev=40", f"--dirty={CHANGED}", "--exclude=*").strip()
 
 
-def library_commit() -> str:
+def library_commit(package: Path = PACKAGE) -> str:
     """Commit of the library: the noted one of a built package, or that of its clone; empty if unknown."""
-    if COMMIT_FILE.is_file():
-        return COMMIT_FILE.read_text().strip()
-    root = clone()
+    noted, root = package / COMMIT_FILE, clone(package)
+    if noted.is_file():
+        return noted.read_text().strip()
     return git_commit(root) if root else ""
 
 
-def study_commit(folder: Path) -> str:
+def study_commit(folder: Path, package: Path) -> str:
     """Commit of the checkout of a study; empty outside of git and for studies of the library."""
-    top = git(folder, "rev-parse", "--show-toplevel").removesuffix("\n")
-    root = clone()
-    of_library = folder.is_relative_to(PACKAGE.resolve()) or (root and root.resolve() == Path(top))
+    top, root = git(folder, "rev-parse", "--show-toplevel").removesuffix("\n"), clone(package)
+    of_library = folder.is_relative_to(package.resolve()) or (root and root.resolve() == Path(top))
     return git_commit(folder) if top and not of_library else ""
 
 
@@ -147,9 +163,8 @@ def git_diff(study: Study, *folders: Path) -> str:
 def difference(study: Study, folder: Path, *options: str) -> str:
     """Difference of package, rules and the study's files from the commit, without untracked files."""
     top, root = Path(git(folder, "rev-parse", "--show-toplevel").removesuffix("\n")), _checkout(folder)
-    files = {file.resolve() for file in input_files(study)} | (
-        {root / name for name in COMPARED_WITH_COMMIT} if root else set()
-    )
+    files = {file.resolve() for file in input_files(study)}
+    files |= {root / name for name in COMPARED_WITH_COMMIT if root}
     known = [str(file) for file in sorted(files) if file.is_relative_to(top)]
     command = ("--literal-pathspecs", "diff", "--no-color", "--no-ext-diff", *options, "HEAD", "--")
     return git(folder, *command, *known) if known else ""

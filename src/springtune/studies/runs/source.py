@@ -7,32 +7,25 @@ PACKAGE = Path(__file__).parents[2]
 CONFIG_FOLDER = Path("config")
 
 USUAL_STUDY = "paper.yaml"
-"""Study of a run without another one."""
 
-COPY = PACKAGE / "workflow"
-"""The workflow in the package of a wheel, see ``hatch_build.py``."""
-
-COMMIT_FILE = PACKAGE / "commit.txt"
-"""The commit that the package was built from; a clone has no such file."""
-
-EXPECTED = ("Snakefile", "workflow/rules/common.smk")
-"""Files that every source tree has."""
+COPY, COMMIT_FILE = "workflow", "commit.txt"
+"""In the package of a wheel: the workflow, and the commit that it was built from; see ``hatch_build.py``."""
 
 
 def is_source_tree(folder: Path) -> bool:
     """Return whether a folder has the workflow."""
-    return all((folder / file).is_file() for file in EXPECTED)
+    return (folder / "Snakefile").is_file() and (folder / "workflow/rules/common.smk").is_file()
 
 
-def workflow_folder() -> Path:
-    """Folder with the Snakefile of this library, and with workflow, config and examples beside it."""
-    around = PACKAGE.parents[1]
-    return around if is_source_tree(around) else COPY
+def workflow_folder(package: Path = PACKAGE) -> Path:
+    """Folder with the Snakefile of the library, and with workflow, config and examples beside it."""
+    around = package.parents[1]
+    return around if is_source_tree(around) else package / COPY
 
 
-def clone() -> Path | None:
+def clone(package: Path = PACKAGE) -> Path | None:
     """Clone that the library is used from; None of a built package, whatever git knows of the folders above it."""
-    root = workflow_folder()
+    root = workflow_folder(package)
     return root if (root / ".git").exists() else None
 
 

@@ -8,7 +8,7 @@ from springtune.problem.status import Status
 
 from ...output import labels, style
 from ...output.selection import choose, group
-from . import PARTS
+from . import BUSY, PARTS
 from .outputs import figures
 
 APPROACH_FAMILIES = {
@@ -25,6 +25,8 @@ WITH_ENERGIES = ("area", "angular", "delingette", "delingette-tensile", "neo-hoo
 SHOWN = ("delingette/structured", "van-gelder/structured", "area/braced", "linear-triangles", "quadratic-triangles",
          "boundary-elements", "tensor-mass", "relaxation", "calculix-cps3", "calculix-cps8")  # fmt: skip
 """Approaches with names before others."""
+
+RING = {"markersize": 7, "markerfacecolor": "none", "markeredgecolor": "black", "markeredgewidth": 0.8}
 
 PART_COLOURS = ("#0b3c5d", "#2879b9", "#7fb8da", "#c8ddf0", "#f2f2f2")
 """Of the parts of run time, and of the rest: lighter from part to part."""
@@ -65,7 +67,9 @@ def benchmark(tree):
 
 @style.styled
 def plot_benchmark(data, ax=None, *, scene=None):
-    """Error over run time: a line an approach, over mesh sizes; what assures an error soonest is ringed.
+    """Error over run time: a line an approach, over mesh sizes.
+
+    Rings: no other approach that finer meshes and a second beam confirm is both faster and more accurate.
 
     Parameters
     ----------
@@ -90,21 +94,22 @@ def plot_benchmark(data, ax=None, *, scene=None):
     >>> import springtune as st  # tree = st.open("results/mine")
     >>> axes = st.plot_benchmark(tree, scene="traction")
     >>> axes.get_title(loc="left")
-    'traction: ringed: nothing assures less error in less time'
+    'traction'
     >>> axes.get_xscale(), axes.get_ylabel()
     ('log', '|Error| [%]')
     """
     case = _scene(data, scene)
-    lost = _lost(case)
+    rings = unbeaten(case.assured_error.values, case.seconds.values)
+    ringed = "○: no other confirmed approach is both faster and more accurate" if rings.any() else ""
+    lost = "; ".join(filter(None, (ringed, _lost(case) and f"not drawn: {_lost(case)}")))
     figure, axes = style.panels(ax, figsize=(style.PAGE, 4.0))
     place = dict(left=0.62, right=0.08, bottom=0.8 if lost else 0.62, top=0.3)
     style.arrange(figure, axes, **place)
     panel, shown, there, ends = axes[0, 0], named(case), set(), []
-    rings = unbeaten(case.assured_error.values, case.seconds.values)
     for ring, approach in zip(rings, map(str, case.approach.values)):
         here, kind = case.sel(approach=approach), family(approach)
         errors, seconds = 100 * np.abs(here.error.values), here.seconds.values
-        good, look = np.isfinite(errors) & (errors > 0), APPROACH_FAMILIES[kind]
+        good, look = np.isfinite(errors * seconds) & (errors > 0), APPROACH_FAMILIES[kind]
         if not good.any():
             continue
         thin = {} if approach in shown else {"linewidth": 0.3, "markersize": 1.5, "alpha": 0.4}
@@ -113,14 +118,12 @@ def plot_benchmark(data, ax=None, *, scene=None):
         if approach in shown:
             finest = np.flatnonzero(good)[0]
             ends.append((seconds[finest], errors[finest], approach, look["color"]))
-        panel.plot(seconds[ring], errors[ring], "o", markersize=7, markerfacecolor="none", markeredgecolor="black",
-                   markeredgewidth=0.8)  # fmt: skip
+        panel.plot(seconds[ring], errors[ring], "o", **RING)
     panel.set(**style.LOGARITHMIC, xlabel="Seconds, from nothing to the displacement", ylabel="|Error| [%]")
     assured = np.isfinite(case.assured_error.values).any()
-    panel.set_title(f"{case.scene.item()}: " + ("ringed: nothing assures less error in less time" if assured else
-                    "nothing is ringed, since no second beam assures an error"))  # fmt: skip
+    panel.set_title(case.scene.item() if assured else f"{case.scene.item()}: no error is confirmed by a second beam")
     if not there:
-        labels.say(panel, f"No approach has an error: {_statuses(case)}.")
+        labels.say(panel, f"No approach has an error and a time: {_statuses(case)}.")
         return panel
     labels.note(panel, lost, below=0.64)
     estimate, seconds = 100 * float(case.reference_error_estimate), float(case.reference_seconds)
@@ -143,16 +146,16 @@ def _scene(data, scene):
 
 
 def _lost(case):
-    """How many cases were asked for and have no numbers, in words; empty where all have."""
+    """How many cases have no numbers or times and why, in words; empty where all have."""
     flags = case.status.values if "status" in case else np.zeros(0, dtype=int)
-    asked, lost = int((flags != 0).sum()), int(((flags != 0) & (flags != Status.SOLVED)).sum())
-    return f"{lost} of {asked} cases have no numbers ({_statuses(case)}); the dataset says why" if lost else ""
+    counts = labels.statuses(flags[flags != Status.SOLVED])
+    counts[BUSY] = int((case.error.notnull() & case.seconds.isnull()).sum())
+    return ", ".join(f"{count} {word}" for word, count in counts.items() if count)
 
 
 def _statuses(case):
-    """What became of the cases of a scene that have no numbers, in words."""
-    flags = case.status.values if "status" in case else np.zeros(0, dtype=int)
-    return ", ".join(labels.statuses(flags[flags != Status.SOLVED])) or "none was asked for"
+    """As `_lost`, where there is nothing to draw."""
+    return _lost(case) or "none was asked for"
 
 
 def _lines(data, panel, x, y, approaches):
@@ -361,6 +364,6 @@ def plot_benchmark_curve(data, ax=None):
         if found:
             style.plain(panel, "x", "y")
         else:
-            labels.say(panel, "The benchmark has timed no curve.")
+            labels.say(panel, str(np.asarray(data.get("curve_message", ""))) or "The benchmark has timed no curve.")
         ends[panel] = found
     return panel

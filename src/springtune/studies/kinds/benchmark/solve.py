@@ -37,7 +37,7 @@ from springtune.springs import DefinitionError, Springs
 from springtune.springs.lattice import COEFFICIENT, half_weight, uniform
 
 from ...runs.task_costs import go_with_parent, own_reason
-from . import CURVE_COUNTS, PARTS, THREAD_COUNTS
+from . import BUSY, CURVE_COUNTS, PARTS, THREAD_COUNTS
 from .approaches import APPROACHES, network
 
 REPETITIONS = 3
@@ -46,6 +46,15 @@ BRIEF = 0.05
 
 LONG = 0.4
 """Cases above these seconds run once."""
+
+SPREAD = 0.25
+"""Largest spread of the quickest runs of a case over the quickest; beyond it the machine was busy."""
+
+OF_PROCESSOR = 0.8
+"""Smallest share of a run's time, above `BRIEF`, in which it has the processor."""
+
+WAITING = 2.0
+"""Seconds for which runs are repeated on a busy machine, besides those that are wanted."""
 
 BESIDE = 10.0
 """Seconds of the processor that a case takes at most besides its longest run, imports and all."""
@@ -102,6 +111,43 @@ class LoadedBeam:
         return self.kind.loaded.place(self.beam.length, self.beam.height), self.kind.normal, self.kind.axis
 
 
+def clocks():
+    """Seconds of a clock, and of the processor in this process and what it has started."""
+    there = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return time.perf_counter(), time.process_time() + there.ru_utime + there.ru_stime
+
+
+def timed(run):
+    """Seconds of a run, whether it had the processor, and its result."""
+    begin, used = clocks()
+    result = run()
+    end, spent = clocks()
+    seconds = end - begin
+    return seconds, seconds < BRIEF or spent - used >= OF_PROCESSOR * seconds, result
+
+
+def steady(run, wanted, runs=()):
+    """Seconds and results of the quickest runs, as many as `wanted`, repeated until they are alike; else none.
+
+    `runs` were `timed` before and count.
+    """
+    runs, until = [*runs], None
+    while True:
+        quickest = sorted((seconds, number) for number, (seconds, quiet, _) in enumerate(runs) if quiet)[:wanted]
+        if len(quickest) == wanted and quickest[-1][0] <= (1 + SPREAD) * quickest[0][0]:
+            return [(seconds, runs[number][2]) for seconds, number in quickest]
+        if len(runs) >= wanted:
+            until = until or clocks()[0] + WAITING
+            if clocks()[0] >= until:
+                return []
+        runs.append(timed(run))
+
+
+def middle(runs):
+    """Median seconds of `steady` runs; NaN without any."""
+    return statistics.median(seconds for seconds, _ in runs) if runs else np.nan
+
+
 class Clock:
     """Seconds of each part of a run."""
 
@@ -136,12 +182,13 @@ def measure(scene, approaches, sizes, finest, most_seconds, second_beam=None):
 
     An approach that fails or exceeds its seconds has a status and a message, and so have its finer sizes.
     """
-    begin = time.perf_counter()
-    reference = solve_small_strain(scene.beam, scene.material, scene.force, kind=scene.kind)
+    seconds, quiet, reference = timed(
+        lambda: solve_small_strain(scene.beam, scene.material, scene.force, kind=scene.kind)
+    )
     result = {
         "reference_displacement": reference.displacement,
         "reference_error_estimate": reference.error_estimate,
-        "reference_seconds": time.perf_counter() - begin,
+        "reference_seconds": seconds if quiet else np.nan,
         "machine_load": os.getloadavg()[0],
     }
     names = ("displacement", "seconds", "seconds_spread", "cold_seconds", "peak_memory", "unknowns")
@@ -215,10 +262,14 @@ def _case(scene, approach, size, meshes, most_seconds, once=False):
     if approach not in APPROACHES:
         mesh_type = approach.partition("/")[2]
         if (mesh_type, size) not in meshes:
-            begin = time.perf_counter()
-            made = MESH_TYPES[mesh_type](scene.beam.length, scene.beam.height, size)
-            made.edges  # noqa: B018  computed when first asked for
-            meshes[mesh_type, size] = made, time.perf_counter() - begin
+
+            def make():
+                made = MESH_TYPES[mesh_type](scene.beam.length, scene.beam.height, size)
+                made.edges  # noqa: B018  computed when first asked for
+                return made
+
+            seconds, quiet, made = timed(make)
+            meshes[mesh_type, size] = made, seconds if quiet or once else np.nan
         mesh, meshing = meshes[mesh_type, size]
     return in_process(_repeat, most_seconds, scene, approach, size, mesh, meshing, once)
 
@@ -270,26 +321,32 @@ def _child(send, function, alarm, arguments):
 def _repeat(alarm, scene, approach, size, mesh, meshing, once):
     """Numbers of a case, run again and again."""
     base = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    seconds, parts = [], []
-    while True:
+
+    def run():
         alarm.set()
-        clock, begin = Clock(), time.perf_counter()
+        clock = Clock()
         if mesh is None:
             displacement, unknowns = APPROACHES[approach](scene, size, clock)
         else:
             displacement, unknowns = network(scene, mesh, approach.partition("/")[0], clock)
-        seconds.append(time.perf_counter() - begin + meshing)
-        parts.append(clock.seconds | ({"meshing": meshing} if mesh is not None else {}))
-        # The first run is cold, which a long one does not feel.
-        wanted = 1 if once or seconds[0] > LONG else 1 + REPETITIONS * (2 if seconds[-1] < BRIEF else 1)
-        if len(seconds) >= wanted:
-            break
-    warm, of_warm = (seconds[1:], parts[1:]) if len(seconds) > 1 else (seconds, parts)
+        return displacement, unknowns, clock.seconds | ({"meshing": meshing} if mesh is not None else {})
+
+    cold = timed(run)
+    displacement, unknowns, _ = cold[2]
+    found = {"displacement": displacement, "unknowns": unknowns}
+    if once:
+        return found
+    # The first run is cold, which a long one does not feel.
+    brief = REPETITIONS * (2 if cold[0] < BRIEF else 1)
+    warm = steady(run, 1, [cold]) if cold[0] > LONG else steady(run, brief)
     here, there = (resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
-    found = {f"{part}_seconds": statistics.median(one[part] for one in of_warm) for part in PARTS}
-    found |= {"displacement": displacement, "unknowns": unknowns, "seconds": statistics.median(warm)}
-    found |= {"seconds_spread": max(warm) - min(warm), "cold_seconds": seconds[0]}
-    return found | {"peak_memory": 1024.0 * max(here - base, there)}
+    found["peak_memory"] = 1024.0 * max(here - base, there)
+    if not warm or np.isnan(meshing):
+        names = ("seconds", "seconds_spread", "cold_seconds", *(f"{part}_seconds" for part in PARTS))
+        return found | dict.fromkeys(names, np.nan) | {"message": BUSY}
+    found |= {f"{part}_seconds": statistics.median(one[2][part] for _, one in warm) for part in PARTS}
+    found |= {"seconds": middle(warm) + meshing, "seconds_spread": warm[-1][0] - warm[0][0]}
+    return found | {"cold_seconds": cold[0] + meshing}
 
 
 def rates(result, sizes):
@@ -315,9 +372,8 @@ def rates(result, sizes):
 def curves(scene, size, most_seconds):
     """Seconds of sensitivity curves, shape (n_counts,): as one path, and solve by solve."""
     found = in_process(_curves, most_seconds, scene, size)
-    if "status" in found:
-        return {"curve_status": found["status"], "curve_message": np.array(found["message"], dtype=object)}
-    return found | {"curve_status": Status.SOLVED, "curve_message": np.array("", dtype=object)}
+    status, message = found.pop("status", Status.SOLVED), found.pop("message", "")
+    return found | {"curve_status": status, "curve_message": np.array(message, dtype=object)}
 
 
 def _curves(alarm, scene, size):
@@ -335,7 +391,8 @@ def _curves(alarm, scene, size):
     one = _median(alarm, lambda: problem().nonlinear(force))
     linear = _median(alarm, lambda: problem().linear(force))
     apart = one * np.array(CURVE_COUNTS)
-    return {"curve_seconds": together, "separate_seconds": apart, "nonlinear_seconds": one, "linear_seconds": linear}
+    found = {"curve_seconds": together, "separate_seconds": apart, "nonlinear_seconds": one, "linear_seconds": linear}
+    return found | _noted(*found.values())
 
 
 def solvers(scene, sizes, most_seconds):
@@ -353,17 +410,20 @@ def solvers(scene, sizes, most_seconds):
 
 
 def _solver(alarm, scene, mesh, name):
-    seconds = []
     coarse = MESH_TYPES["structured"](scene.beam.length, scene.beam.height, scene.beam.height / 2)
-    for one in (coarse, mesh):  # with the first one libraries are read
+
+    def twice(one=mesh):
         springs = Network(one, held(one, scene.kind), half_weight(one), solver=name)
-        matrix, right = springs.tangent(), np.ones(springs.unknowns)
+        matrix, right, seconds = springs.tangent(), np.ones(springs.unknowns), []
         for _ in range(2):
             alarm.set()
-            begin = time.perf_counter()
-            springs.factorize_matrix(matrix).solve(right)
-            seconds.append(time.perf_counter() - begin)
-    return {"solver_seconds": seconds[2], "solver_again_seconds": seconds[3]}
+            seconds.append(timed(lambda: springs.factorize_matrix(matrix).solve(right))[0])
+        return seconds
+
+    twice(coarse)  # libraries are read
+    runs = steady(twice, 2)
+    first, again = np.median([one for _, one in runs], axis=0) if runs else (np.nan, np.nan)
+    return {"solver_seconds": first, "solver_again_seconds": again} | _noted(first)
 
 
 def explicit(scene, sizes, most_seconds, updates=UPDATES):
@@ -409,7 +469,7 @@ def _explicit(alarm, scene, size, updates):
         "spring_updates": rate * len(mesh.edges),
         "explicit_bandwidth": rate * touched,
         "explicit_error": np.array(wrong),
-    }
+    } | _noted(seconds)
 
 
 def _copied(threads):
@@ -422,11 +482,16 @@ def _copied(threads):
 
 
 def _median(alarm, function):
-    seconds = []
-    for _ in range(REPETITIONS):
+    """Median seconds of a function; NaN on a busy machine."""
+
+    def run():
         if alarm:
             alarm.set()
-        begin = time.perf_counter()
         function()
-        seconds.append(time.perf_counter() - begin)
-    return statistics.median(seconds)
+
+    return middle(steady(run, REPETITIONS))
+
+
+def _noted(*seconds):
+    """Message of times of which some are not measured; nothing of others."""
+    return {"message": BUSY} if any(np.isnan(one).any() for one in seconds) else {}

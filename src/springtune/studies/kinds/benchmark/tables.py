@@ -46,9 +46,9 @@ def page(tree: xr.DataTree) -> str:
     return "\n".join(lines)
 
 
-def _time(seconds):
+def _time(seconds, missing=""):
     seconds = float(seconds)
-    return "" if np.isnan(seconds) else f"{1e3 * seconds:.3g} ms" if seconds < 1 else f"{seconds:.3g} s"
+    return missing if np.isnan(seconds) else f"{1e3 * seconds:.3g} ms" if seconds < 1 else f"{seconds:.3g} s"
 
 
 def _rule(data):
@@ -67,7 +67,7 @@ def _quickest(cells):
     rows = []
     errors, seconds = cells.assured_error.transpose("approach", "mesh_size").values, cells.seconds.values
     for target in TARGETS:
-        good = np.where(errors <= target, seconds, np.inf)
+        good = np.where((errors <= target) & np.isfinite(seconds), seconds, np.inf)
         best = good.min(axis=1)
         row = [f"{100 * target:g} %"]
         for i in np.argsort(best)[:3]:
@@ -79,10 +79,10 @@ def _quickest(cells):
 
 
 def _holes(approaches, sizes, status, message):
-    """What was asked for and has no numbers: a line a reason, with its approaches and mesh sizes."""
+    """What was asked for and lacks numbers: a line a reason, with its approaches and mesh sizes."""
     flags, words = (one.transpose(..., "mesh_size").values for one in (status, message))
     found = {}
-    for i, j in np.argwhere((flags != Status.NOT_REQUESTED) & (flags != Status.SOLVED)):
+    for i, j in np.argwhere((flags != Status.NOT_REQUESTED) & ((flags != Status.SOLVED) | (words != ""))):
         found.setdefault(str(words[i, j]), {}).setdefault(str(approaches.values[i]), []).append(sizes.values[j])
     lines = []
     for why, places in found.items():
@@ -100,11 +100,12 @@ def _one_size(cells):
     rows = []
     for i in np.argsort(np.abs(cells.error.values)):
         cell = cells.isel(approach=i)
-        if np.isnan(cell.seconds):
+        if np.isnan(cell.error):
             continue
         rows.append([
             f"`{cell.approach.item()}`", cell_number(cell.error, "+.2g", 100, " %"),
-            *(_time(cell[name]) for name in ("seconds", "cold_seconds", *(f"{part}_seconds" for part in PARTS))),
+            _time(cell.seconds, "not measured"),
+            *(_time(cell[name]) for name in ("cold_seconds", *(f"{part}_seconds" for part in PARTS))),
             *(cell_number(cell[name], form, scale) for name, form, scale in
               (("peak_memory", ".0f", 1e-6), ("error_rate", ".1f", 1), ("cost_exponent", ".2f", 1))),
         ])  # fmt: skip
@@ -146,7 +147,8 @@ def _explicit(data):
     rows = []
     for size in labels_of(np.isfinite(rates), "mesh_size"):
         cells = [dict(mesh_size=size, thread_count=threads, precision=kind) for threads, kind in ways]
-        numbers = [f"{float(rates.sel(cell)):.0f}, {float(moved.sel(cell)):.1f}" for cell in cells]
+        numbers = [f"{float(rates.sel(cell)):.0f}, {float(moved.sel(cell)):.1f}" if np.isfinite(rates.sel(cell)) else ""
+                   for cell in cells]  # fmt: skip
         wrong = float(data.explicit_error.sel(mesh_size=size, precision=data.precision.values[-1]))
         rows.append([f"{1e3 * size:g} mm", *numbers, f"{wrong:.1e}"])
     if not rows:
@@ -155,7 +157,7 @@ def _explicit(data):
     heads = [f"{kind}, {threads} thread{'s' if threads > 1 else ''}" for threads, kind in ways]
     heads = ["structured mesh", *heads, f"error, {data.precision.values[-1]}"]
     copies = ", ".join(
-        f"{float(data.copy_bandwidth.sel(thread_count=threads)) / 1e9:.1f} GB/s by {threads}"
+        f"{cell_number(data.copy_bandwidth.sel(thread_count=threads), '.1f', 1e-9) or 'not measured'} GB/s by {threads}"
         for threads in data.thread_count.values
     )
     lines = ["Nonlinear springs that steps advance, in millions a second, and what they read and write, be it in a "

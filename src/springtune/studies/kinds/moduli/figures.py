@@ -1,14 +1,13 @@
 """Definitions compared: effective against asked Poisson's ratio, error against mesh size, and errors by load."""
 
 import numpy as np
-from matplotlib.ticker import NullLocator
 
 from springtune.safe_io.escapes import no_mathematics
 
 from ...output import labels, style
 from ...output.dataset import most_requested
-from ...output.drawing import fitted
-from ...output.selection import choose, group, labelled_beam, labels_of, unswept
+from ...output.drawing import BEYOND_SMALL_STRAIN, NO_RESULT, NOT_ASKED, error_text, fitted, heat_map
+from ...output.selection import choose, group, labelled_beam, labels_of, sign_of_errors, unswept
 from .outputs import figures
 
 FLOOR = 1e-5
@@ -169,7 +168,7 @@ def plot_definitions_size(data, ax=None, *, beam=None, material=None, load=None,
 
     def draw(panel, name):
         drawn = _field_errors(panel, root.field_error.sel(mesh_type=name), root.status.sel(mesh_type=name))
-        panel.set(xlabel="Mesh size [mm]", ylabel="Error [%]", ylim=limits)
+        panel.set(ylabel="Error [%]", ylim=limits)
         style.plain(panel, "y")
         return drawn
 
@@ -184,9 +183,8 @@ def _field_errors(panel, error, status):
     sizes, names = 1e3 * error.mesh_size.values, error.definition.values
     known = np.isfinite(every)
     curves = {str(name): 100 * np.maximum(row, FLOOR) for name, row, there in zip(names, every, known) if there.any()}
-    panel.set(xscale="log", yscale="log", xlim=(sizes.min() / 1.2, sizes.max() * 1.2))
-    panel.set_xticks(sizes, [f"{size:g}" for size in sizes])
-    panel.xaxis.set_minor_locator(NullLocator())
+    panel.set(yscale="log")
+    places = dict(zip(curves, labels.sizes_axis(panel, sizes, len(curves))))
     if not curves:
         return [], "", f"No definition has a field error here: {_statuses(flags)}."
     together = labels.alike({name: np.log(values) for name, values in curves.items()}, 0.01)
@@ -196,7 +194,7 @@ def _field_errors(panel, error, status):
         named[-1] = base
     others = [name for one in together if one not in named for name in one]
     for name in others:
-        panel.plot(sizes, curves[name], color="0.75", linewidth=0.6, marker=".", markersize=2, zorder=1)
+        panel.plot(places[name], curves[name], color="0.75", linewidth=0.6, marker=".", markersize=2, zorder=1)
     ends, order = [], names.tolist()
     for one in named:
         values, look = curves[one[0]], style.line(order.index(one[0]))
@@ -205,7 +203,7 @@ def _field_errors(panel, error, status):
         if len(there) > 1:
             rate = np.polyfit(np.log(sizes[there]), np.log(values[there]), 1)[0]
             label += f" ({rate:.1f})".replace("-0.0", "0.0").replace("-", "−")
-        ends += labels.line(panel, sizes, values, look, label)
+        ends += labels.line(panel, places[one[0]], values, look, label)
     said = [f"grey: {', '.join(others)}"] if others else []
     lacking = [str(name) for name, there, flag in zip(names, known, flags) if not there.any() and (flag > 0).any()]
     said += [f"no error: {', '.join(lacking)}"] if lacking else []
@@ -245,7 +243,7 @@ def plot_definitions_loads(data, ax=None, *, beam=None, mesh_type=None, material
     --------
     >>> import springtune as st  # tree = st.open("results/mine")
     >>> axes = st.plot_definitions_loads(tree, beam="200x40", mesh_type="free", kinematics="linear")
-    >>> [panel.get_title(loc="left") for panel in axes]
+    >>> [panel.get_title(loc="left").partition(", ν = ")[0] for panel in axes]
     ['steel', 'rubber']
     >>> [tick.get_text() for tick in axes[0].get_xticklabels()]
     ['traction', 'compression', 'pressure']
@@ -282,16 +280,18 @@ def plot_definitions_loads(data, ax=None, *, beam=None, mesh_type=None, material
         panel.set_xticks(range(len(loads)), map(no_mathematics, loads))
         panel.xaxis.set_tick_params(rotation=90, labelsize=style.SMALL)
         panel.set_yticks(range(len(names)), map(no_mathematics, names))
-        panel.set_title(material)
-        panel.grid(False)
+        ratio = f"ν = {float(cells.material_poisson_ratio):g}"
+        panel.set_title(ratio if material == ratio.replace("ν = ", "nu-") else f"{material}, {ratio}")
     if figure is not None:
         width, height = style.size(figure)
         bar = figure.add_axes([1 - 0.52 / width, bottom / height, 0.1 / width, 1 - (bottom + 0.63) / height])
         figure.colorbar(image, cax=bar, ticks=[-1, 0, 1, 2]).set_ticklabels(["0.1", "1", "10", "100"])
         flags = root.status.values
-        said = ["×: no result"] * bool((flags > 1).any()) + ["–: not asked for"] * bool((flags == 0).any())
-        said += ["*: beyond small strain"] * doubted
-        figure.text(0.05 / width, 0.05 / height, "; ".join(said), fontsize=style.SMALL, color="0.25")
+        said = [f"{NO_RESULT}: no result"] * bool((flags > 1).any())
+        said += [f"{NOT_ASKED}: not asked for"] * bool((flags == 0).any())
+        said += [f"*: {BEYOND_SMALL_STRAIN}"] * doubted
+        words = labels.wrapped("; ".join(filter(None, [sign_of_errors(root), *said])), width - 0.1)
+        figure.text(0.05 / width, 0.05 / height, words, fontsize=style.SMALL, color="0.25")
     return axes[0]
 
 
@@ -304,18 +304,11 @@ def _heat(panel, errors, flags, beyond):
     error = np.full(errors.shape[1:], np.nan)
     for values in 100 * errors[::-1]:  # the finest solved mesh comes last and stays
         error = np.where(np.isfinite(values), values, error)
-    asked = (flags != 0).any(axis=0)
-    shade = np.log10(np.clip(np.abs(error), 0.1, 100))
-    image = panel.imshow(shade, cmap="YlOrBr", vmin=-1, vmax=2, aspect="auto")
-    for row, column in np.ndindex(error.shape):
-        size = abs(error[row, column])
-        text = f"{error[row, column]:+.{0 if size >= 9.95 else 1 if size >= 0.095 else 2}f}".replace("-", "−")
-        text += "*" * bool(beyond[column])
-        if np.isnan(size):
-            text = "×" if asked[row, column] else "–"
-        colour = "white" if shade[row, column] > 1.2 else "0.5" if text == "–" else "k"
-        panel.text(column, row, text, ha="center", va="center", fontsize=style.SMALL, color=colour)
-    return image
+    asked, texts = (flags != 0).any(axis=0), np.full(error.shape, NOT_ASKED, dtype=object)
+    for row, column in np.argwhere(asked):
+        known = np.isfinite(error[row, column])
+        texts[row, column] = error_text(error[row, column]) + "*" * bool(beyond[column]) if known else NO_RESULT
+    return heat_map(panel, error, texts)
 
 
 def _spread(root, solved):

@@ -6,7 +6,7 @@ from springtune.problem.status import Status
 
 from ...output import labels, style
 from ...output.drawing import fitted
-from ...output.selection import choose, group
+from ...output.selection import choose, group, sign_of_errors
 from .outputs import SPACINGS, VARIED
 
 HOLLOW = "hollow: unstable, or beyond the linear reference"
@@ -56,7 +56,7 @@ def plot_refinement(data, ax=None, *, refinement=None):
         data = data.sel(refinement=[refinement])
     names = data.refinement.values.tolist()
     figure, axes, flat, _ = style.multiples(ax, len(names), min(2, len(names)), 2.6)
-    place = {"left": 0.6, "right": 0.1, "bottom": 0.58, "top": 0.55, "across": 0.14, "down": 1.15}
+    place = {"left": 0.6, "right": 0.1, "bottom": 0.7, "top": 0.55, "across": 0.14, "down": 1.15}
     style.arrange(figure, axes, **place)
     ends = [_panel(panel, data.sel(refinement=name)) for panel, name in zip(flat, names)]
     labels.settle(figure, axes, place)
@@ -92,7 +92,7 @@ def _panel(panel, data):
     panel.set(xlabel=f"{known.meaning[0].upper()}{known.meaning[1:]}{unit}", ylabel="Deformation error [%]")
     if logarithmic:
         panel.set_xscale("log")
-    ends, hollow = [], False
+    ends, hollow, ticked = [], False, False
     data = data.isel(definition=np.flatnonzero(data.value_count))
     for number, definition in enumerate(data.definition.values.tolist()):
         cell = data.sel(definition=definition)
@@ -105,7 +105,10 @@ def _panel(panel, data):
         hollow |= bool(doubted.any())
         panel.plot(x[doubted], y[doubted], **small | {"markerfacecolor": "white", "linestyle": ""})
         zeros = cell[f"crossing_{parameter}"].values[cell.crossing_level.values == 0] / size
+        ticked |= bool(len(zeros))
         panel.plot(zeros, np.zeros(len(zeros)), "|", color=look["color"], markersize=9)
     if logarithmic:
         style.plain(panel, "x")
-    return ends, HOLLOW if hollow else ""
+    said = [sign_of_errors(data), f"grey: within the tolerance, {tolerance:g} %"]
+    said += ["ticks: zeros" * ticked, HOLLOW * hollow]
+    return ends, "; ".join(filter(None, said))

@@ -5,7 +5,7 @@ from functools import partial
 import numpy as np
 
 from ...output import labels, style
-from ...output.selection import choose, group, labels_of
+from ...output.selection import choose, group, labels_of, sign_of_errors
 
 PARAMETER_AXES = {
     "length": ("length", 1e3, "mm"),
@@ -117,7 +117,9 @@ def plot_sobol(data, ax=None, *, load=None):
     names = found.parameter.values.tolist()
     words = [PARAMETER_AXES[name][0] for name in names]
     columns = min(COLUMNS, max(1, sum(quantity == shown[0][0] for quantity, _ in shown)))
+    limits, farther = _limits(found, shown, load)
     note, title = _note(found.sel(load=load), samples.attrs["size"]), _titled(samples, load, "Sobol indices", columns)
+    note += "; arrows: bands go farther" if farther else ""
     room = style.PAGE if columns > 1 else style.COLUMN
     under, over = (0.14 * labels.lines_of(text) for text in (labels.wrapped(note, room - 0.2), title))
     figure, axes, flat, _ = style.multiples(
@@ -125,12 +127,12 @@ def plot_sobol(data, ax=None, *, load=None):
     )
     style.arrange(figure, axes, left=0.15 + max(map(labels.width, words)), right=0.15, bottom=0.42 + under,
                   top=0.35 + over, across=0.18, down=0.42 if axes.shape[0] > 1 else 0.0, title=title)  # fmt: skip
-    order, limits = found["definition"].values.tolist(), _limits(found, shown, load)
+    order = found["definition"].values.tolist()
     for number, (panel, (quantity, definition)) in enumerate(zip(flat, shown)):
         one = found.sel(quantity=quantity, load=load, definition=definition)
         best = quantity == "best_stiffness"
         panel.set_title(QUANTITY_AXES[quantity][0] + ("" if best else f", {definition}"))
-        _bars(panel, one, "0.35" if best else style.line(order.index(definition))["color"])
+        _bars(panel, one, "0.35" if best else style.line(order.index(definition))["color"], limits)
         panel.set_xlim(limits)
         panel.set_yticks(range(len(names)), words if number % columns == 0 else [""] * len(names))
         if not np.isfinite(one.first_order.values).any():
@@ -151,20 +153,23 @@ def _why(found, one):
 
 
 def _limits(found, shown, load):
-    """Ends of the axis of all panels: from zero to one, farther where bands are, within reason."""
+    """Ends of the axis of all panels, from zero to one or farther within reason, and whether bands go beyond them."""
     cells = [found.sel(quantity=quantity, load=load, definition=name) for quantity, name in shown]
-    low = [np.nan_to_num(cell.first_order_low.values).min() for cell in cells]
-    high = [np.nan_to_num(cell[f"{order}_order_high"].values).max() for cell in cells for order in ("first", "total")]
-    return max(min([0.0, *low]), -0.3) - 0.02, min(max([1.0, *high]), 1.5) + 0.02
+    ends = [np.nan_to_num(cell[f"{order}_order_{end}"].values)
+            for cell in cells for order in ("first", "total") for end in ("low", "high")]  # fmt: skip
+    low, high = min(0.0, *map(np.min, ends)), max(1.0, *map(np.max, ends))
+    return (max(low, -0.3) - 0.02, min(high, 1.5) + 0.02), low < -0.32 or high > 1.52
 
 
-def _bars(panel, indices, colour):
+def _bars(panel, indices, colour, limits):
     """Bars of the indices of one quantity: total order pale and wide, first order full and narrow, with bands."""
     for order, wide, alpha, shift in (("total_order", 0.76, 0.3, 0.2), ("first_order", 0.36, 1.0, -0.2)):
         values, low, high = (indices[f"{order}{end}"].values for end in ("", "_low", "_high"))
         places = np.arange(len(values))
         panel.barh(places, np.maximum(np.nan_to_num(values), 0), wide, color=colour, alpha=alpha, linewidth=0)
         panel.hlines(places + shift, low, high, color="k", linewidth=0.8)
+        for marker, end, cut in (("<", limits[0], low < limits[0]), (">", limits[1], high > limits[1])):
+            panel.plot(np.full(cut.sum(), end), (places + shift)[cut], marker, color="k", markersize=3, clip_on=False)
     panel.set_ylim(len(places) - 0.45, -0.55)
     panel.tick_params(axis="y", length=0)
     panel.grid(False, axis="y")
@@ -253,22 +258,24 @@ def plot_effects(data, ax=None, *, load=None, quantity="deformation_error"):
     if figure is not None:
         handles, texts = flat[0].get_legend_handles_labels()
         figure.legend(handles, texts, loc="lower center", ncols=len(texts), borderaxespad=0.2)
-    _note_below(figure, _lacking(samples, load, definitions), 0.3)
+    _note_below(figure, _lacking(samples, load, definitions, quantity), 0.3)
     return flat
 
 
-def _lacking(samples, load, definitions):
+def _lacking(samples, load, definitions, quantity):
     """How many scenes the means lack, and of how many the reference does not apply; bands."""
     scenes = samples.sel(load=load, definition=definitions)
     unsolved, every = int((scenes.status != 1).sum()), scenes.status.size
     said = ["bands: two standard errors"]
+    if quantity == "deformation_error":
+        said.append(sign_of_errors(samples.sel(load=load)))
     if unsolved:
         said.append(f"without {unsolved} of {every} scenes, which are not solved")
     beyond = int((samples.reference_applies.sel(load=load) == 0).sum()) if "reference_applies" in samples else 0
     if beyond:
         said.append(f"{beyond} of {samples.sizes['sample']} points are beyond small strain or without a reference, "
                     "so that their error is not the network's alone")  # fmt: skip
-    return "; ".join(said)
+    return "; ".join(filter(None, said))
 
 
 def _each_load(name, plot, tree):

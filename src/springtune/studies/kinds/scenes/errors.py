@@ -6,8 +6,8 @@ from springtune.problem.parameters import SWEPT
 
 from ...config.kind import distinct
 from ...output import labels, style
-from ...output.drawing import fitted, in_words
-from ...output.selection import at, cells, group, labelled_beam, labels_of, last_swept, of_own_law
+from ...output.drawing import BEYOND_SMALL_STRAIN, fitted, in_words
+from ...output.selection import at, cells, group, labelled_beam, labels_of, last_swept, of_own_law, sign_of_errors
 from .figures import USUAL, by_beam, each, named, swept_words
 from .outputs import SCENE_LABELS, SWEPT_SHOWN
 
@@ -18,15 +18,19 @@ MOST_LINES = 6
 
 
 def like_with_like(data):
-    """Root of a dataset; errors of nonlinear networks are against finite strain where that is known."""
+    """Root of a dataset; errors of nonlinear networks are against finite strain where that is known.
+
+    `beyond` says where small strain does not apply, so that an error is not the network's alone.
+    """
     root = group(data, "/")
+    root = root.assign(beyond=root.reference_applies == 0 if "reference_applies" in root else root.status < 0)
     finite = data["finite_strain"].to_dataset() if "finite_strain" in getattr(data, "children", ()) else None
     finite = None if finite is None else of_own_law(finite)
     if finite is None:
         return root
-    errors = finite.deformation_error
-    errors = root.deformation_error.where(root.kinematics == "linear", errors).transpose(*root.deformation_error.dims)
-    return root.assign(deformation_error=errors).assign_attrs(finite_strain=True)
+    errors, linear = finite.deformation_error, root.kinematics == "linear"
+    errors = root.deformation_error.where(linear, errors).transpose(*root.deformation_error.dims)
+    return root.assign(deformation_error=errors, beyond=root.beyond & linear).assign_attrs(finite_strain=True)
 
 
 def compared(root, selection):
@@ -48,8 +52,11 @@ def _parts(present):
     return [part.tolist() for part in np.array_split(asked, -(-len(asked) // MOST_LINES))]
 
 
-def _multiples(ax, shown, draw, title, swept):
-    """Small multiples of deformation errors, shape (n_panels,): ``draw`` returns a title, ends of lines and a note."""
+def _multiples(ax, shown, draw, title, swept, sign):
+    """Small multiples of deformation errors, shape (n_panels,): ``draw`` returns a title, ends of lines and a note.
+
+    The first note also has the meaning of a ``sign``.
+    """
     columns = min(3, len(shown)) if len(shown) != 4 else 2
     figure, axes, flat, height = style.multiples(ax, len(shown), columns, 2.1, sharey=True)
     place = {"left": 0.55, "right": 0.06, "top": 0.48, "bottom": 0.4, "across": 0.12, "down": 0.7, "title": title}
@@ -57,7 +64,7 @@ def _multiples(ax, shown, draw, title, swept):
     drawn = {}
     for panel, one in zip(flat, shown):
         words, ends, said = draw(panel, one)
-        said = fitted(panel, said)
+        said = fitted(panel, [*([sign] if sign and ends and not drawn else []), *said])
         drawn[panel] = ends, said, "" if ends else "no errors: " + said.replace("\n", "; ")
         panel.set_title(fitted(panel, [words], 8))
     over = labels.TITLE_LINE * (max(labels.lines_of(panel.get_title("left")) for panel in flat) - 1) if swept else 0.0
@@ -68,26 +75,28 @@ def _multiples(ax, shown, draw, title, swept):
     return flat
 
 
-def _lines(panel, x, here, looks, listed, gaps):
-    """Draw a line a definition, hollow where the equilibrium is in doubt: ends of lines, and what a note says.
+def _lines(panel, places, here, looks, listed, gaps):
+    """Draw a line a definition, hollow where its error is in doubt: ends of lines, and what a note says.
 
-    ``gaps`` says whether cells that were not asked for leave any.
+    ``places`` are those along x of each. ``gaps`` says whether cells that were not asked for leave any.
     """
     ends, said, doubts = [], [], set()
-    for name, look in looks.items():
+    for x, (name, look) in zip(places, looks.items()):
         cell = here.sel(definition=name)
         error, flags = 100 * cell.deformation_error.values, cell.status.values
+        beyond = np.broadcast_to(cell.beyond.values, error.shape)
         known, drawn = np.isfinite(error), (flags != 0) | gaps
         ends += labels.line(panel, x[drawn], error[drawn], look, name)
-        doubtful, lost = known & (flags > 1), {}
+        doubtful, lost = known & ((flags > 1) | beyond), {}
         if doubtful.any():
             panel.plot(x[doubtful], error[doubtful], linestyle="", marker=look["marker"], color=look["color"],
                        markerfacecolor="white", markersize=4.5, zorder=4)  # fmt: skip
-        doubts |= set(map(in_words, flags[doubtful]))
-        for value, flag in zip(x[~known], flags[~known]):
+        doubts |= {in_words(flag) for flag in flags[doubtful] if flag > 1}
+        doubts |= {BEYOND_SMALL_STRAIN} if (known & beyond).any() else set()
+        for place, flag in zip(np.flatnonzero(~known), flags[~known]):
             if flag:
-                lost.setdefault("no reference" if flag == 1 else in_words(flag), []).append(value)
-        said += [f"{name}, {listed(values)}: {reason}" for reason, values in lost.items()]
+                lost.setdefault("no reference" if flag == 1 else in_words(flag), []).append(place)
+        said += [f"{name}, {listed(numbers)}: {reason}" for reason, numbers in lost.items()]
     return ends, [f"hollow: {', '.join(sorted(doubts))}", *said] if doubts else said
 
 
@@ -148,27 +157,26 @@ def plot_size(data, ax=None, *, beam=None, mesh_type=None, material=None, load=N
         here = {parameter: value.sel(beam=name) for parameter, value in values.items()}
         return ", ".join([labelled_beam(root, name) + part, *swept_words(here)]), *drawn
 
-    return _multiples(ax, shown, draw, compared(root, selection), bool(values))
+    return _multiples(ax, shown, draw, compared(root, selection), bool(values), sign_of_errors(root))
 
 
 def _over_sizes(panel, here, looks, first):
     """Draw errors of a beam over mesh size: as `_lines`."""
     here = here.isel(mesh_size=np.flatnonzero((here.status != 0).any("definition").values))
     sizes = 1e3 * here.mesh_size.values
-    ends, said = _lines(
-        panel, sizes, here, looks, lambda values: f"{', '.join(f'{value:g}' for value in values)} mm", True
-    )
+    places = labels.sizes_axis(panel, sizes, len(looks))
+
+    def listed(numbers):
+        return f"{', '.join(f'{sizes[number]:g}' for number in numbers)} mm"
+
+    ends, said = _lines(panel, places, here, looks, listed, True)
     if "paper_displacement" in here:
         printed = 100 * (here.paper_displacement.values / here.paper_reference_displacement.values - 1)
         if (here.force < 0).all():  # printed without sign
             printed = -printed
         if np.isfinite(printed).any():
-            panel.plot(sizes, printed, "x", color="0.35", markersize=4.5, label="as printed")
+            panel.plot(places[0], printed, "x", color="0.35", markersize=4.5, label="as printed")
             said = ["×: as the paper prints", *said] if first else said
-    panel.set(xscale="log", xlabel="Mesh size [mm]")
-    panel.set_xticks(sizes, [f"{size:g}" for size in sizes])
-    panel.minorticks_off()
-    panel.set_xlim(sizes.min() / 1.2, sizes.max() * 1.2)
     if ends:
         panel.hlines(0, *panel.get_xlim(), color="0.3", linewidth=0.7, zorder=1)  # not below names
     return ends, said
@@ -246,7 +254,8 @@ def plot_sweep(
     swept = [name for name in SWEPT if name in root.status.dims]
     if parameter not in swept:
         raise ValueError(f"parameter: {parameter!r} is not swept; the study sweeps {', '.join(swept) or 'nothing'}")
-    root = root[["status", "deformation_error", "beam_length", "beam_height"]]
+    whole = root
+    root = root[["status", "deformation_error", "beyond", "beam_length", "beam_height"]]
     root, beams, selection = by_beam(root, beam, mesh_type, material, load, kinematics)
     looks = _looks(root)
     several = [name for name in beams if _most((root.status != 0).sel(beam=[name]), parameter) > 1]
@@ -257,7 +266,8 @@ def plot_sweep(
         here, definitions = one
         return here.attrs["words"], *_over_values(panel, here, {name: looks[name] for name in definitions}, parameter)
 
-    return _multiples(ax, shown, draw, compared(root, selection), True)
+    sign = sign_of_errors(whole.sel(load=selection["load"]))
+    return _multiples(ax, shown, draw, compared(root, selection), True, sign)
 
 
 def _most(present, parameter):
@@ -293,12 +303,13 @@ def _over_values(panel, here, looks, parameter):
     here, (words, _, unit) = here.transpose("definition", parameter, ...), SWEPT_SHOWN[parameter]
     x = unit * here[parameter].values
 
-    def listed(values):
+    def listed(numbers):
+        values = x[numbers]
         several = f"{len(values)} from {min(values):.4g} to {max(values):.4g}"
         return several if len(values) > 1 else f"{values[0]:.4g}"
 
     # What other beams or grids ask for makes no gaps.
-    ends, said = _lines(panel, x, here, looks, listed, False)
+    ends, said = _lines(panel, [x] * len(looks), here, looks, listed, False)
     panel.set_xlabel(words)
     asked = x[(here.status != 0).any("definition").values]
     if len(asked) > 1 and asked.min() > 0 and asked.max() / asked.min() > WIDE:

@@ -7,7 +7,7 @@ from springtune.problem.parameters import with_unit
 
 from ...config.kind import distinct
 from ...output import labels, style
-from ...output.drawing import extent, fitted, in_words, largest, magnification, plane, spring_ends
+from ...output.drawing import BEYOND_SMALL_STRAIN, extent, fitted, in_words, largest, magnification, plane, spring_ends
 from ...output.selection import at, cells, choose, group, labelled_beam, labels_of, last_swept, own_law, shown_swept
 from .outputs import SCENE_LABELS, SENSITIVITY_LABELS
 
@@ -80,7 +80,7 @@ def plot_sensitivity(data, ax=None, *, beam=None, mesh_type=None, material=None,
 
 
 def _sensitivity(curves, root, selection, swept, ax):
-    figure, axes = style.panels(ax, figsize=(style.COLUMN, 2.6))
+    figure, axes = style.panels(ax, figsize=(style.COLUMN, 2.45))
     panel, (unit, written) = axes[0, 0], labels.power_of_ten(np.nanmax(curves.stiffness.values, initial=0.0))
     place = {"left": 0.45, "right": 0.14, "bottom": 0.4, "top": 0.52}
     style.arrange(figure, axes, **place)
@@ -91,6 +91,8 @@ def _sensitivity(curves, root, selection, swept, ax):
         if (curve.status.values != 0).any():
             end, found = draw_curve(panel, curve, unit, f"{1e3 * size:g} mm", style.line(number), known)
             ends, seen = [*ends, *end], seen | found
+    if root is not None and int(root.get("reference_applies", 1)) == 0:
+        seen.add("beyond")
     errors = 100 * np.abs(curves.deformation_error.values)
     highest = np.nanmax(errors, initial=0.0)
     lowest_of_each = [np.nanmin(one) for one in errors.reshape(-1, errors.shape[-1]) if np.isfinite(one).any()]
@@ -102,15 +104,17 @@ def _sensitivity(curves, root, selection, swept, ax):
     if root is not None and "paper_stiffness" in root:
         _mark_printed(panel, root.paper_stiffness.values, unit)
     over = labels.TITLE_LINE * max(0, labels.lines_of(panel.get_title("left")) - 2) if swept else 0.0
+    key = [(text, look) for name, (text, look) in KEY.items() if name in seen]
+    rows = -(-len(key) // labels.KEY_COLUMNS)
     if ax is None:
-        figure.set_size_inches(style.COLUMN, 2.6 + over)
-    labels.settle(figure, axes, place | {"top": place["top"] + over})
+        figure.set_size_inches(style.COLUMN, 2.45 + over + labels.KEY_ROW * rows)
+    labels.settle(figure, axes, {**place, "top": place["top"] + over, "bottom": 0.4 + labels.KEY_ROW * rows})
     if not ends:
         labels.say(panel, _why_no_curve(curves), bare=False)
         return panel
-    # Names first, since they widen the panel. They begin below the key.
     labels.name_lines(panel, ends)
-    _key(panel, seen)
+    if key:
+        labels.key_below(panel, key)
     return panel
 
 
@@ -149,18 +153,9 @@ KEY = {
     "unstable": ("thin: unstable", {"linewidth": 0.5}),
     "not converged": ("gap: not converged", {"linestyle": ""}),
     "failed": ("gap: failed", {"linestyle": ""}),
+    "beyond": (BEYOND_SMALL_STRAIN, {"linestyle": ""}),
 }
 """What of a sensitivity figure is explained beside its curves, and how it looks."""
-
-
-def _key(panel, seen):
-    shown = [(text, look) for name, (text, look) in KEY.items() if name in seen]
-    handles = [panel.plot([], [], color="0.3", **look)[0] for _, look in shown]
-    if shown:
-        panel.legend(handles, [text for text, _ in shown], loc="upper center", bbox_to_anchor=(0.52, 1.02),
-                     handlelength=1.2, labelspacing=0.25, borderaxespad=0.2,
-                     # No line runs through its words, wherever the paper's stiffness lies.
-                     frameon=True, framealpha=1, edgecolor="none", borderpad=0.2)  # fmt: skip
 
 
 def _sensitivity_title(panel, root, selection, swept):
@@ -338,6 +333,7 @@ def _deformed(panel, fields, root, selection, beam):
     lacking = []
     if np.isfinite(there).any():
         panel.fill(*(outline + scale * there).T, facecolor="0.82", edgecolor="0.45", linewidth=0.8)
+        lacking += [f"reference {BEYOND_SMALL_STRAIN}"] if int(root.get("reference_applies", 1)) == 0 else []
     else:
         lacking.append("no reference")
     if len(outline):

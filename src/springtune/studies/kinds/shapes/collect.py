@@ -3,6 +3,7 @@
 import numpy as np
 
 from springtune.problem.compare import deformation_error
+from springtune.problem.shapes import QUANTITY_UNITS
 from springtune.reference.answers import beyond_linear
 
 from ...output.dataset import OF_PARTICLES, OF_SPRINGS, UGRID, Filler
@@ -77,9 +78,6 @@ SHAPE_FIELDS = declared(
 )
 """Networks that are drawn, each shape's and load's on its finest mesh of a size that can be: they are there to be
 looked at, their displacements and forces with seven digits."""
-
-QUANTITY_UNITS = {"displacement": "m", "stress": "Pa", "reaction": "N", "area": "m2", "energy": "J"}
-"""Units of the values in the dataset."""
 
 
 def groups(study, folder):

@@ -6,9 +6,8 @@ from matplotlib.colors import LinearSegmentedColormap
 
 from springtune.safe_io.escapes import no_mathematics
 
-from ...output import labels, style
+from ...output import drawing, labels, style
 from ...output.dataset import STATUS
-from ...output.drawing import extent, in_words, largest, magnification, plane, spring_ends
 from ...output.selection import cells, choose, group, labels_of
 from .outputs import DEFORMED, ERRORS, figures
 
@@ -23,12 +22,6 @@ FIRST = ("lattice", "energy-fit", "patch", "patch-fit", "area", "delingette")
 
 FORCES = LinearSegmentedColormap.from_list("forces", ["#0a4f9e", "#6fa0cf", "#c4c4c4", "#dd8466", "#a50f15"])
 """Colours of spring forces: from compression to tension, the middle dark enough for thin lines."""
-
-LEAST_SHOWN = 1e-3
-"""Smallest error of the overview [%]: what is below stands there."""
-
-MOST_SHOWN_ERROR = 100.0
-"""Largest error of the overview [%]: what is beyond stands there."""
 
 
 def shapes(tree):
@@ -177,7 +170,7 @@ def _errors_of(panels, cut, name, points):
 
 def _why(cut):
     """Why there is no error."""
-    states = in_words(cut.status.values) or "not asked for"
+    states = drawing.in_words(cut.status.values) or "not asked for"
     message = next((text for text in cut.message.values.ravel().tolist() if text), "")
     if message:
         return f"No error: {states}. {message[:160]}"
@@ -189,7 +182,7 @@ def _why(cut):
 
 @style.styled
 def plot_shapes(data, ax=None, *, material=None, kinematics=None):
-    """Size of the error of each quantity of all shapes on their finest mesh: a row a quantity, a marker a definition.
+    """Size of the error of each quantity of all shapes on their finest mesh: a row a quantity, a column a definition.
 
     Parameters
     ----------
@@ -213,57 +206,38 @@ def plot_shapes(data, ax=None, *, material=None, kinematics=None):
     --------
     >>> import springtune as st  # tree = st.open("results/mine")
     >>> axes = st.plot_shapes(tree)
-    >>> axes.get_xlabel()
+    >>> axes.get_title(loc="left")
     '|Error| on the finest mesh [%]'
     """
     whole = group(data, "shapes")
     rows = _rows(whole, material, kinematics)
-    definitions = [name for name in whole.definition.values.tolist() if any(name in row["errors"] for row in rows)]
-    looks = {name: style.line(i) | {"linestyle": ""} for i, name in enumerate(definitions)}
-    tall = 1.2 + 0.24 * max(len(rows), 3) + 0.14 * -(-(len(definitions) + 1) // 5)
-    figure, axes = style.panels(ax, figsize=(style.PAGE, tall))
+    names = [name for name in whole.definition.values.tolist() if any(name in row["asked"] for row in rows)]
+    errors = np.array([[row["errors"].get(name, np.nan) for name in names] for row in rows])
+    texts = [[drawing.error_text(row["errors"][name], "") if name in row["errors"] else drawing.NO_RESULT
+              if name in row["asked"] else drawing.NOT_ASKED for name in names] for row in rows]  # fmt: skip
+    heads = list(map(no_mathematics, names))
+    references = np.array([row["reference"] for row in rows])
+    if np.isfinite(references).any():
+        heads.append("reference to expected")
+        errors = np.column_stack([errors, references])
+        own = [drawing.error_text(one, "") if np.isfinite(one) else "" for one in references]
+        texts = [[*row, one] for row, one in zip(texts, own)]
+    under = 0.3 + max(map(labels.width, heads), default=0.5)
+    figure, axes = style.panels(ax, figsize=(style.PAGE, 0.25 + under + 0.17 * max(len(rows), 3)))
     panel = axes[0, 0]
     left = 0.15 + max((labels.width(row["name"]) for row in rows), default=0.5)
-    nowhere = [name for name in whole.definition.values.tolist() if rows and all(name in _lost(row) for row in rows)]
-    lacking = [[name for name in _lost(row) if name not in nowhere] for row in rows]
-    holes = [f"without {', '.join(lost)}" for lost in lacking if lost]
-    right = 0.1 + max(map(labels.width, holes), default=0.0)
-    place = {
-        "left": left,
-        "right": min(right, 2.0),
-        "bottom": 0.42 + 0.16 * bool(nowhere),
-        "top": 0.36 + 0.145 * -(-(len(definitions) + 1) // 5),
-    }
-    style.arrange(figure, axes, **place)
-    if not any(row["errors"] for row in rows):
+    style.arrange(figure, axes, left=left, right=0.08, bottom=under, top=0.25)
+    panel.set_title("|Error| on the finest mesh [%]")
+    if not np.isfinite(errors).any():
         labels.say(panel, "No quantity has an error: see status and message.")
         return panel
-    panel.set(xscale="log", xlabel="|Error| on the finest mesh [%]", ylim=(len(rows) - 0.5, -0.5))
-    for name, look in looks.items():
-        shown = [(row["errors"][name], place) for place, row in enumerate(rows) if name in row["errors"]]
-        x, y = np.transpose(shown)
-        panel.plot(np.clip(x, LEAST_SHOWN, MOST_SHOWN_ERROR), y, label=name, **look | {"markersize": 4.2})
-    for number, row in enumerate(rows):
-        if np.isfinite(row["reference"]):
-            x = np.clip(row["reference"], LEAST_SHOWN, MOST_SHOWN_ERROR)
-            panel.plot([x], [number], "|", color="0.5", markersize=9, zorder=1)
-        if lacking[number]:
-            text = labels.wrapped(f"without {', '.join(lacking[number])}", 1.9)
-            panel.annotate(text, (1, number), xycoords=("axes fraction", "data"), xytext=(3, 0), va="center",
-                           textcoords="offset points", fontsize=style.SMALL, color="0.4")  # fmt: skip
-    if nowhere:
-        labels.note(panel, f"nowhere solved: {', '.join(nowhere)}")
+    drawing.heat_map(panel, errors, np.array(texts, dtype=object))
     panel.set_yticks(range(len(rows)), [no_mathematics(row["name"]) for row in rows])
-    panel.tick_params(axis="y", length=0)
-    style.plain(panel, "x")
-    handles, names = panel.get_legend_handles_labels()
-    if any(np.isfinite(row["reference"]) for row in rows):
-        handles.append(panel.plot([], [], "|", color="0.5", markersize=9, linestyle="")[0])
-        names.append("reference to expected")
-    # Above the legend.
-    panel.set_title("Quantities of shapes", pad=6 + 10.5 * -(-len(names) // 5))
-    panel.legend(handles, names, loc="lower left", bbox_to_anchor=(-0.02, 1.0), ncols=5, columnspacing=1.2,
-                 handletextpad=0.2, borderaxespad=0.1)  # fmt: skip
+    panel.set_xticks(range(len(heads)), heads, rotation=90)
+    panel.tick_params(length=0)
+    said = {drawing.NO_RESULT: "no result that counts", drawing.NOT_ASKED: "not asked for"}
+    shown = {text for row in texts for text in row}
+    labels.note(panel, "; ".join(f"{mark}: {word}" for mark, word in said.items() if mark in shown), under - 0.18)
     return panel
 
 
@@ -289,11 +263,6 @@ def _rows(whole, material, kinematics):
             row = {"name": f"{where}: {name}", "errors": errors, "asked": definitions}
             found.append(row | {"reference": reference or np.nan})
     return found
-
-
-def _lost(row):
-    """Definitions that were asked for and have no error that counts on the finest mesh."""
-    return [name for name in row["asked"] if name not in row["errors"]]
 
 
 # -- networks ----------------------------------------------------------------------------------------------------------
@@ -349,7 +318,9 @@ def plot_shape(data, ax=None, *, shape=None, load=None, definition=None):
     missing = [name for name in wanted if name not in asked]
     if missing:
         raise ValueError(f"nothing has definition {missing[0]!r}; there is {', '.join(asked)}")
-    width, height = extent(np.concatenate([plane(case, "{}"), plane(case, "outline_{}")]), (1.0, 1.0))
+    width, height = drawing.extent(
+        np.concatenate([drawing.plane(case, "{}"), drawing.plane(case, "outline_{}")]), (1.0, 1.0)
+    )
     columns = min(NETWORK_COLUMNS, len(wanted))
     page = style.COLUMN if columns == 1 else style.PAGE
     room = (page - 0.5 - 0.25 * columns) / columns
@@ -401,8 +372,8 @@ def _scale(case, networks, extent):
     sizes = np.hypot(case.reference_displacement_x.values, case.reference_displacement_y.values)
     if not np.isfinite(sizes).any():
         sizes = np.hypot(networks.displacement_x.values, networks.displacement_y.values)
-    factor = 0.08 * extent / (largest(sizes) or np.inf)
-    return 1.0 if 0.4 < factor < 2 or not factor else magnification(factor)
+    factor = 0.08 * extent / (drawing.largest(sizes) or np.inf)
+    return 1.0 if 0.4 < factor < 2 or not factor else drawing.magnification(factor)
 
 
 def _largest_force(networks):
@@ -416,7 +387,7 @@ def _network(panel, case, cut, name, scale, most):
     """Draw one network; return its lines, or None."""
     one = case.sel(definition=name) if name in case.definition.values else None
     drawn = one is not None and bool(np.isfinite(one.displacement_x.values).any())
-    outline, there = plane(case, "outline_{}"), plane(case, "reference_displacement_{}")
+    outline, there = drawing.plane(case, "outline_{}"), drawing.plane(case, "reference_displacement_{}")
     for number in range(int(case.outline_round.values.max(initial=-1)) + 1):
         places = np.flatnonzero(case.outline_round.values == number)
         closed = np.append(places, places[:1])
@@ -426,11 +397,11 @@ def _network(panel, case, cut, name, scale, most):
     flag = int(cut.status.sel(definition=name))
     lines = None
     if drawn:
-        springs, kept = spring_ends(case)
+        springs, kept = drawing.spring_ends(case)
         forces = one.spring_force.values[kept]
         width = float(np.clip(18 / np.sqrt(len(springs)), 0.25, 0.9))
         lines = LineCollection(
-            1e3 * (plane(case, "{}") + scale * plane(one, "displacement_{}"))[springs],
+            1e3 * (drawing.plane(case, "{}") + scale * drawing.plane(one, "displacement_{}"))[springs],
             array=forces,
             cmap=FORCES,
             clim=(-most, most),
@@ -443,7 +414,7 @@ def _network(panel, case, cut, name, scale, most):
             panel.set_title(f"{name}: forces in an energy")
     if flag != STATUS.index("solved"):
         message = str(cut.message.sel(definition=name).item())
-        text = f"{in_words(flag)}: {message[:120]}" if lines is None else STATUS[flag]
+        text = f"{drawing.in_words(flag)}: {message[:120]}" if lines is None else STATUS[flag]
         labels.say(panel, text, bare=False)
     return lines
 

@@ -405,7 +405,8 @@ def plot_stability_strains(data, ax=None):
         panel.pcolormesh(flags, cmap=ListedColormap(STATUS_COLOURS), vmin=-0.5, vmax=5.5, edgecolor="white")
         seen |= {round(flag) for flag in np.unique(flags)}
         for i, j in np.ndindex(flags.shape):
-            text = f"{pivots[i, j]:.0f}" if pivots[i, j] > 0 else f"{share[i, j]:.2f}" if share[i, j] < 1 else ""
+            text = f"{100 * share[i, j]:.0f} %" if share[i, j] < 1 else ""
+            text = f"{pivots[i, j]:.0f}" if pivots[i, j] > 0 else text
             if flags[i, j] == 4 and not text:
                 text = "f" if "flutters" in messages[i, j] else "path"
             colour = "white" if flags[i, j] in (3, 5) else "black"
@@ -413,8 +414,8 @@ def plot_stability_strains(data, ax=None):
         panel.set_xticks(np.arange(len(strains)) + 0.5, [f"{100 * x:g}".replace("-", "−") for x in strains])
         panel.set_yticks(np.arange(len(names)) + 0.5, map(no_mathematics, names))
     axes[-1].set_xlabel("Strain of a linear sheet under the load [%]")
-    kinds = {1: "solved", 4: "unstable: negative pivots; 0.5: limit point there; f: flutter; path: on the way",
-             3: "none found: share reached"}  # fmt: skip
+    kinds = {1: "solved", 3: "none found beyond that %",
+             4: "unstable: negative pivots, limit point at % of the load, f: flutter, path: on the way"}  # fmt: skip
     kinds |= {flag: STATUS[flag].replace("_", " ") for flag in sorted(seen) if flag not in kinds}
     keys = labels.swatches({text: STATUS_COLOURS[flag] for flag, text in kinds.items() if flag in seen})
     if figure is None:
@@ -454,7 +455,7 @@ def plot_stability_buckling(data, ax=None):
     ["Buckling load over Euler's, less 1 [%]", 'Force [N]']
     """
     data = _experiment(data, "buckling")
-    with labels.arranged(ax, ncols=2, figsize=(style.PAGE, 2.6), bottom=0.45) as (axes, ends):
+    with labels.arranged(ax, ncols=2, figsize=(style.PAGE, 2.75), bottom=0.65) as (axes, ends):
         ends[axes[0, 1]] = _buckling(data, *axes[0])
     return axes[0]
 
@@ -476,10 +477,12 @@ def _buckling(data, left, right):
         bars = left.bar(places - 0.4 + wide * (number + 0.5), 100 * (ratio - 1), 0.95 * wide, label=f"{rows} rows",
                         color=shades[number % 3], edgecolor="0.3", linewidth=0.4)  # fmt: skip
         for bar, message in zip(bars, data.buckling_message.sel(rows=rows, definition=names).values):
-            bar.set_hatch("///" if message else "")  # nothing bifurcates
+            bar.set_hatch("///" if message else "")
     left.axhspan(-2, 2, color="0.9", zorder=0)
     left.set_xticks(places, map(no_mathematics, names), rotation=20)
     left.legend()
+    hatched = "; hatched: nothing bifurcates" if (data.buckling_message != "").any() else ""
+    labels.note(left, f"grey: ±2 %{hatched}", 0.5)
     arches = {name: data.sel(definition=name) for name in names}
     known = {name: arch for name, arch in arches.items() if np.isfinite(arch.arch_load.values).any()}
     if not known:

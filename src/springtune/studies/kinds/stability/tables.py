@@ -143,7 +143,7 @@ def _strains(data):
         found = (cell.strain_status, cell.negative_pivots, cell.strain_load_share, cell.strain_message)
         for flag, pivots, share, message in zip(*(one.values for one in found)):
             note = " (flutter)" if "flutter" in message.lower() else ""
-            note = f" ({pivots:.0f})" if pivots > 0 else f" ({share:.2f})" if share < 1 else note
+            note = f" ({pivots:.0f})" if pivots > 0 else f" ({100 * share:.0f} %)" if share < 1 else note
             yield STATUS[int(flag)].replace("_", " ") + note
 
     for load in data.strain_load.values:

@@ -43,10 +43,7 @@ LIBRARY = ("bokeh", "bokeh-api")
 
 def views() -> dict[str, View]:
     """Views that the study kinds declare."""
-    found: dict[str, View] = {}
-    for name in modules("outputs"):
-        found |= {view.group: view for view in getattr(imported(name), "VIEWS", ())}
-    return found
+    return {view.group: view for name in modules("outputs") for view in getattr(imported(name), "VIEWS", ())}
 
 
 def page(dataset: str | os.PathLike[str], files: Iterable[str] = ()) -> str:
@@ -192,8 +189,7 @@ def _described(
         values = _values(group.variables[name], attributes)  # each read, packed and forgotten
         sizes |= zip(dimensions, values.shape)
         row, content = _variable(values)
-        row |= {"name": name, "dims": list(dimensions)}
-        row |= _words_on(attributes)
+        row |= {"name": name, "dims": list(dimensions)} | _words_on(attributes)
         if "flag_meanings" in attributes:
             meanings = str(attributes["flag_meanings"]).split()
             flags = np.ravel(attributes.get("flag_values", range(len(meanings)))).tolist()
@@ -243,19 +239,18 @@ def _plain(value: Any) -> Any:
 
 
 def _variable(values: np.ndarray) -> tuple[dict[str, Any], bytes]:
-    row: dict[str, Any] = {}
     if values.dtype.kind in "fc" or values.dtype.kind in "iu" and np.abs(values, dtype=float).max(initial=0) >= 2**31:
         with np.errstate(over="ignore"):  # numbers beyond 3e38 are shown as infinite
             numbers = values.real.astype(np.float32)
-        return _rows(row | {"type": "float"}, numbers, ~np.isnan(numbers))
+        return _rows({"type": "float"}, numbers, ~np.isnan(numbers))
     if values.dtype.kind in "iub":
-        return _rows(row | {"type": "integer"}, values.astype(np.int32), values != 0)
+        return _rows({"type": "integer"}, values.astype(np.int32), values != 0)
     # No array of texts, which gives each the room of the longest one.
     texts = list(map(str, (values if values.dtype.kind == "O" else values.astype(str)).ravel().tolist()))
     words = sorted(set(texts))
     numbers_of = {word: number if word else ABSENT for number, word in enumerate(words)}
     places = np.fromiter(map(numbers_of.__getitem__, texts), np.int32, len(texts)).reshape(values.shape)
-    return _rows(row | {"type": "text", "words": words}, places, places != ABSENT)
+    return _rows({"type": "text", "words": words}, places, places != ABSENT)
 
 
 def _rows(row: dict[str, Any], values: np.ndarray, present: np.ndarray) -> tuple[dict[str, Any], bytes]:

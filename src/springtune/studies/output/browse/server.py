@@ -123,10 +123,7 @@ def _served(dataset: Path) -> dict[str, Path]:
         for path in sorted((dataset.parent / folder).glob("*")):
             if path.suffix in endings and _is_own(path):
                 found[f"{folder}/{path.name}"] = path
-    for name in ALONE:
-        if _is_own(dataset.parent / name):
-            found[name] = dataset.parent / name
-    return found
+    return found | {name: dataset.parent / name for name in ALONE if _is_own(dataset.parent / name)}
 
 
 def _is_own(path: Path) -> bool:

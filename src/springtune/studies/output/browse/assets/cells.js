@@ -29,7 +29,7 @@ class Cells {
       for (const box of holder.querySelectorAll(".boxes input")) box.checked = box.value !== "not_requested";
       this.table.reset();
     } });
-    const sentence = root.sign(root.fields[SCENE_ERROR] || {}, {}, ["load"]);
+    const error = root.fields[SCENE_ERROR], sentence = error && !this.empty(error) ? root.sign(error, {}, ["load"]) : "";
     const tableHolder = element("div");
     const caption = constant.map((name) => labelWithUnit(root.dims[name], 0)).join(" · ");
     this.side = element("div", { class: "chosen-cell" });
@@ -48,6 +48,7 @@ class Cells {
         counter.textContent = [`${count_} of ${all} cells shown.`, ...wrong].join(" ");
         reset.disabled = !filtered && [...holder.querySelectorAll(".boxes input")].every((box) => box.checked === (box.value !== "not_requested"));
       },
+      kind: (row) => this.status.meaning(this.status.valueAt(row)),
       extra: () => {
         const words = shown();
         return (row) => words.has(this.status.meaning(this.status.valueAt(row)));
@@ -130,9 +131,9 @@ class Cells {
     this.has = has;
     const sections = [];
     if (has.curve) sections.push(panel("curve", "Sensitivity: error against uniform stiffness", chart("curve"), under("curve")));
-    if (has.error && this.dims.includes("mesh_size"))
+    if (has.error && this.varying.includes("mesh_size"))
       sections.push(panel("size", "Error against mesh size", chart("size"), under("size")));
-    if (this.dims.length > 1) sections.push(panel("map", "Map over two parameters", over("map"), chart("map"), under("map")));
+    if (this.status.size > 1 && this.dims.length > 1) sections.push(panel("map", "Map over two parameters", over("map"), chart("map"), under("map")));
     sections.push(panel("shape", "The network over its reference", over("shape"), chart("shape"), under("shape")));
     this.code = element("pre", { class: "code", tabindex: "0", role: "region", "aria-label": "Python code of this cell" });
     this.files = element("div");

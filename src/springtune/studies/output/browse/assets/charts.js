@@ -153,6 +153,8 @@ class Chart {
           major_label_text_font: font, axis_label_text_font_style: "normal", axis_label_text_font_size: "13px",
           major_label_text_font_size: "12px", major_tick_in: 0,
         });
+        // Rotated labels are names: all are kept.
+        if (axis.major_label_orientation === "horizontal") axis.major_label_policy = new Bokeh.NoOverlap({ min_distance: 4 });
       }
     for (const grid of fig.center.filter((one) => "grid_line_color" in one)) grid.grid_line_color = line;
     this.recolour?.(text, soft);
@@ -372,7 +374,7 @@ class Tiles extends Chart {
         source: hatched, fill_color: null, line_color: null, hatch_pattern: "/", hatch_color: "#8888", hatch_scale: 8,
       });
       const words = this.source("words", ["x", "y", "text", "color"]);
-      fig.text({ field: "x" }, { field: "y" }, { field: "text" }, {
+      this.words = fig.text({ field: "x" }, { field: "y" }, { field: "text" }, {
         source: words, text_color: { field: "color" }, text_align: "center",
         text_baseline: "middle", text_font_size: "12px", text_font: "system-ui, sans-serif",
       });
@@ -395,7 +397,9 @@ class Tiles extends Chart {
     });
     if (!made || this.fig !== made) return;
     this.cells = cells;
-    const fits = columns.length * 46 < this.holder.clientWidth && rows.length <= 30;
+    const room = (this.holder.clientWidth - 110) / columns.length - 4, most = Math.max(...cells.map((one) => one.text?.length || 0));
+    const size = [12, 10].find((one) => most * 0.65 * one <= room), fits = size && rows.length <= 30;
+    if (fits) this.words.glyph.text_font_size = `${size}px`;
     this.sources.tiles.data = {
       x: cells.map((one) => one.column), y: cells.map((one) => rows.length - 1 - one.row),
       fill: cells.map((one) => one.colour), tip: cells.map((one) => one.tip),

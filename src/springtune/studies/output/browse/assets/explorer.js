@@ -18,7 +18,7 @@ class Explorer {
     this.picture = element("div", { class: "chart" });
     this.under = element("div");
     this.numbers = element("div");
-    const single = Object.values(fields).filter((field) => !field.dims.length && !/^topology/.test(field.long_name));
+    const single = Object.values(fields).filter((field) => !field.dims.length && !/^topology/.test(field.long_name) && field.valueAt(0) !== "");
     const left = this.group.left_out;
     holder.append(element("h2", { text: this.view.title }), this.view.note ? element("p", { text: this.view.note }) : "",
       left.length ? element("p", { class: "none", text: `Too large for this page, and in dataset.nc only: ${left.join(", ")}.` }) : "",
@@ -200,7 +200,7 @@ class Explorer {
       if (textual) return labels.map((_, i) => i);
       return Array.from({ length: sizes }, (_, i) => (labels ? labels[i] * xScale : i));
     };
-    const status = fields.status?.flags && plot.value !== "status" && fields.status.dims.every((one) => field.dims.includes(one)) ? fields.status : null;
+    const status = this.statusOf(field);
     let lines = plot.by ? Array.from({ length: dims[plot.by].size }, (_, i) => i) : [null];
     const series = [];
     let hidden = 0;
@@ -265,25 +265,34 @@ class Explorer {
     }));
   }
 
+  // Statuses of the values of a variable, where the group has them.
+  statusOf(field) {
+    const { status } = this.group.fields;
+    return status?.flags && field !== status && status.within(field.dims) ? status : null;
+  }
+
   async map(field) {
     const plot = this.plot, { dims } = this.group, cells = [], values = [];
     const across = dims[plot.x], down = dims[plot.by], unit = unitOf(field)[1];
     const read = (i, j) => field.of({ ...this.chosen, [plot.x]: i, [plot.by]: j });
     const there = (value) => (field.flags ? field.meaning(value) !== "" && field.meaning(value) !== "not_requested" : Number.isFinite(value));
+    const status = this.statusOf(field);
     const [columns, rows, without] = filled(across, down, (i, j) => there(read(i, j)));
     rows.forEach((j, row) => columns.forEach((i, column) => {
       const value = read(i, j);
-      cells.push({ row, column, value });
+      cells.push({ row, column, value, word: status?.meaning(status.of({ ...this.chosen, [plot.x]: i, [plot.by]: j })) || "solved" });
       if (Number.isFinite(value)) values.push(value);
     }));
-    const words = ["hatched: nothing", this.sign(field), without].filter(Boolean);
+    const marked = new Set(cells.filter((cell) => there(cell.value) && !field.flags).map((cell) => cell.word).filter((word) => word !== "solved"));
+    const words = [cells.some((cell) => !there(cell.value)) && "hatched: nothing", ...[...marked].map((word) => `${SIGNS[word]} ${spoken(word)}`),
+      this.sign(field), without].filter(Boolean);
     const key = element("span", { class: "soft", text: words.join(" · ") }), colours = field.flags ? null : colouring(field, values, key);
     for (const cell of cells) {
       if (field.flags) Object.assign(cell, category(field, cell.value));
       else if (!Number.isFinite(cell.value)) Object.assign(cell, { missing: true, colour: "#8883", text: "", tip: "nothing" });
       else {
         const rgb = colours.of(cell.value);
-        Object.assign(cell, { colour: css(rgb), ink: readableOn(rgb), text: written(field, cell.value, 2), tip: `${written(field, cell.value, 4)} ${unit}` });
+        Object.assign(cell, { colour: css(rgb), ink: readableOn(rgb), text: written(field, cell.value, 2) + (cell.word === "solved" ? "" : ` ${SIGNS[cell.word]}`), tip: `${written(field, cell.value, 4)} ${unit}, ${spoken(cell.word)}` });
       }
     }
     this.lines.forget();
@@ -394,5 +403,6 @@ function filled(across, down, there) {
   const columns = all(across).filter((i) => all(down).some((j) => there(i, j)));
   const rows = all(down).filter((j) => columns.some((i) => there(i, j)));
   const missing = [[across, columns], [down, rows]].flatMap(([dim, kept]) => all(dim).filter((i) => !kept.includes(i)).map((i) => labelText(dim, i)));
-  return [columns, rows, missing.length ? `with nothing here, left out: ${missing.join(", ")}` : ""];
+  const named = missing.length > 7 ? [...missing.slice(0, 6), `and ${missing.length - 6} more`] : missing;
+  return [columns, rows, missing.length ? `with nothing here, left out: ${named.join(", ")}` : ""];
 }

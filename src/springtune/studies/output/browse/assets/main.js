@@ -40,10 +40,11 @@ class Page {
     const tally = group.tally(), all = asked(tally);
     if (!all) return null;
     const first = group.fields.status.dims.find((name) => group.dims[name].size > 1), title = this.declared[group.path]?.title || spoken(group.path.slice(1));
+    const several = first && counted(group.labelsInUse(first), spoken(first));
     const badges = Object.entries(tally).filter(([word, count]) => count && word !== "not_requested")
       .map(([word, count]) => element("span", { class: "count" }, badge(word), ` ${count}`));
     return element("span", { class: "holds" }, element("a", { href: `#view=${group.path.slice(1)}`, text: title }),
-      first ? `: ${counted(group.dims[first].size, spoken(first))}` : ":", badges);
+      several ? `: ${several} ` : ": ", badges);
   }
 
   head(root) {
@@ -139,7 +140,7 @@ class Page {
     if (view !== "cells") found.set("view", view);
     if (view === "cells" && places)
       for (const name of Object.keys(places)) if (root.dims[name].size > 1) found.set(name, String(root.label(name, places[name])));
-    return `#${found}`;
+    return `#${String(found) || "view=cells"}`;
   }
 
   async open(name, remember = true) {
@@ -194,7 +195,7 @@ class About {
 
   build(holder) {
     const about = this.page.groups["/"].attributes;
-    const plain = Object.entries(about).filter(([name]) => !["config", "software", "title"].includes(name));
+    const plain = Object.entries(about).filter(([name, value]) => value !== "" && !["config", "software", "title"].includes(name));
     let software = [];
     try {
       software = Object.entries(JSON.parse(about.software || "{}"));

@@ -148,6 +148,14 @@ class Group {
     return tally;
   }
 
+  // How many labels of a dimension have a cell that was asked for; a group may share labels with others.
+  labelsInUse(name) {
+    const status = this.fields.status, found = new Set();
+    for (let flat = 0; flat < status.size; flat++)
+      if (status.meaning(status.valueAt(flat)) !== "not_requested") found.add(Math.floor(flat / status.strides[name]) % this.dims[name].size);
+    return found.size;
+  }
+
   // Which sign of the errors of a field means too soft, at these places and along these dimensions.
   sign(field, places = {}, along = [], above = null) {
     if (!isSigned(field)) return "";

@@ -1,6 +1,6 @@
 // The network deformed over its reference, springs coloured by what they carry.
 
-const SCALES = [0, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 1e4];
+const SCALES = [0, 0.001, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 1e4];
 
 class Shape {
   static NEEDED = ["x", "y", "spring_nodes", "displacement_x", "displacement_y"];
@@ -107,8 +107,8 @@ class Shape {
     for (let i = 0; i < x.length; i++) most = Math.max(most, Math.hypot(ux[i], data.uy[i]));
     const length = Math.max(...x) - Math.min(...x);
     const wanted = (0.1 * length) / (most || 1);
-    this.start = SCALES.filter((one) => one >= 1 && one <= Math.max(1, wanted)).pop();
-    this.scale = this.start;
+    // A linear answer may be larger than the body.
+    this.scale = wanted > 0.2 && wanted < 2 ? 1 : SCALES.filter((one) => one && (one <= wanted || one === 0.001)).pop();
     return null;
   }
 

@@ -4,9 +4,9 @@ const ROW = 28;
 
 class Table {
   // columns: {name, title, hint, width, numeric, value(row), text(row), labels?, pinned?}; rows: numbers of rows.
-  // `extra` makes one more test of rows.
-  constructor(holder, { columns, rows, label, choose, changed, extra }) {
-    Object.assign(this, { columns, all: rows, choose, changed, extra });
+  // `extra` makes one more test of rows; `kind` gives a row its class.
+  constructor(holder, { columns, rows, label, choose, changed, extra, kind }) {
+    Object.assign(this, { columns, all: rows, choose, changed, extra, kind });
     this.sorting = null;
     this.filters = {};
     this.order = rows;
@@ -14,7 +14,7 @@ class Table {
     this.body = element("tbody");
     this.holder = element("div", {
       class: "grid", tabindex: "0", role: "grid", "aria-label": label, "aria-colcount": columns.length,
-      onscroll: () => this.draw(), onkeydown: (event) => this.key(event),
+      style: `max-height: calc(${rows.length * ROW}px + 8rem)`, onscroll: () => this.draw(), onkeydown: (event) => this.key(event),
       onclick: (event) => {
         const row = event.target.closest("tr[data-place]");
         if (row) this.select(Number(row.dataset.place), true);
@@ -156,7 +156,7 @@ class Table {
       });
       rows.push(element("tr", {
         "data-place": place, "aria-rowindex": place + 3, "aria-selected": String(chosen), id: `row-${row}`,
-        class: chosen ? "chosen" : "",
+        class: [chosen && "chosen", this.kind?.(row)].filter(Boolean).join(" "),
       }, cells));
     }
     if (last < this.order.length) rows.push(gap(this.order.length - last));

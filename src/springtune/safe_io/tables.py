@@ -1,0 +1,95 @@
+"""Rows of labels and values: aligned texts in terminals, HTML in notebooks; foreign texts are escaped."""
+
+from collections.abc import Collection, Iterable, Sequence
+from html import escape
+from typing import TypeVar
+
+from .escapes import shown
+
+
+def aligned(rows: Iterable[Iterable[object]], left: int, right: Collection[int] = ()) -> str:
+    """Align columns, those in `right` to the right."""
+    texts = [[shown(cell) for cell in row] for row in rows]
+    widths = [max(map(len, column)) for column in zip(*texts)]
+    lines = []
+    for row in texts:
+        cells = [
+            cell.rjust(width) if n in right else cell.ljust(width) for n, (cell, width) in enumerate(zip(row, widths))
+        ]
+        lines.append((" " * left + "  ".join(cells)).rstrip())
+    return "\n".join(lines)
+
+
+def number_text(number: float, unit: str) -> str:
+    """Number with unit, lengths in mm.
+
+    Examples
+    --------
+    >>> number_text(0.005, "m"), number_text(0.3, "1"), number_text(4e5, "N")
+    ('5 mm', '0.3', '400000 N')
+    """
+    if unit == "m":
+        return f"{1e3 * number:.6g} mm"
+    return f"{number:.6g}" if unit in ("", "1") else f"{number:.6g} {unit}"
+
+
+def html_table(name: str, rows: Iterable[Sequence[object]], heads: Iterable[object] = ()) -> str:
+    """HTML table below a name; the first cell of each row is its head."""
+    lines = ["".join(_cell("th", head) for head in heads)]
+    lines += [_cell("th", first) + "".join(_cell("td", cell) for cell in others) for first, *others in rows]
+    table = "".join(f"<tr>{line}</tr>" for line in lines if line)
+    return f"<div><b>{escape(name)}</b><table>{table}</table></div>"
+
+
+WRAPPED = 30
+"""Characters from which a cell may have several lines."""
+
+
+def _cell(tag: str, content: object) -> str:
+    text = shown(content)
+    space = "normal" if len(text) >= WRAPPED else "nowrap"  # notebooks have styles of their own
+    return f'<{tag} style="text-align: left; vertical-align: top; white-space: {space}">{escape(text)}</{tag}>'
+
+
+class Tabled:
+    """Object that is shown as rows of labels and texts: in a line by `repr`, as a table in print and in notebooks."""
+
+    def _rows(self) -> Iterable[tuple[str, str]]:
+        """Labels and texts with units; empty texts are not shown."""
+        raise NotImplementedError
+
+    def _computed_rows(self) -> Iterable[tuple[str, str]]:
+        """Further rows that take time, for tables alone."""
+        return ()
+
+    def _table(self) -> list[tuple[str, str]]:
+        return [row for row in (*self._rows(), *self._computed_rows()) if row[1]]
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({'; '.join(f'{label}: {text}' for label, text in self._rows() if text)})"
+
+    def __str__(self) -> str:
+        return f"{type(self).__name__}\n{aligned(self._table(), left=2)}"
+
+    def _repr_html_(self) -> str:
+        return html_table(type(self).__name__, self._table())
+
+
+One = TypeVar("One", bound=Tabled)
+
+
+class TabledList(list[One]):
+    """List that is shown as one table, a row each."""
+
+    def table(self) -> list[list[str]]:
+        """Labels, then the texts of each object."""
+        rows = [dict(one._rows()) for one in self]
+        labels = list(dict.fromkeys(label for row in rows for label in row))
+        return [labels, *([row.get(label, "") for label in labels] for row in rows)]
+
+    def __repr__(self) -> str:
+        return aligned(self.table(), left=1)
+
+    def _repr_html_(self) -> str:
+        heads, *rows = self.table()
+        return html_table(", ".join({type(one).__name__: None for one in self}) or "none", rows, heads)

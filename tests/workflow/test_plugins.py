@@ -1,0 +1,170 @@
+"""Definitions, loads, mesh types and study kinds of other packages, by entry points."""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import xarray as xr
+
+REPOSITORY = Path(__file__).parents[2]
+PLUGIN = REPOSITORY / "examples/plugin"
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """Folder that has the example package, as pip installs it."""
+    folder = tmp_path_factory.mktemp("site")
+    source = shutil.copytree(PLUGIN, tmp_path_factory.mktemp("source") / "plugin")
+    options = ("--quiet", "--no-deps", "--no-build-isolation", "--no-index", "--disable-pip-version-check")
+    subprocess.run([sys.executable, "-m", "pip", "install", *options, "--target", folder, source], check=True)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory, site):
+    """Folder in which a study that uses all of the example package has run."""
+    folder = tmp_path_factory.mktemp("run")
+    for name in ("workflow", "profiles"):
+        shutil.copytree(REPOSITORY / name, folder / name)
+    shutil.copy(REPOSITORY / "Snakefile", folder)
+    (folder / "config").mkdir()
+    shutil.copy(PLUGIN / "even.yaml", folder / "config")
+    python(folder, site, "-m", "snakemake", "--snakefile", "Snakefile", "--cores", "2", "--configfile",
+           "config/even.yaml")  # fmt: skip
+    return folder
+
+
+def python(folder, *arguments, code=0):
+    """Call Python in a folder, with what is installed in a site; return what it prints."""
+    site, *arguments = arguments
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(REPOSITORY / "src"), str(site)])}
+    environment["SPRINGTUNE_PLUGINS"] = "all"
+    command = [sys.executable, *map(str, arguments)]
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
+    assert done.returncode == code, done.stdout + done.stderr
+    return done.stdout + done.stderr
+
+
+def test_a_study_uses_all_that_a_package_declares(run):
+    with xr.open_datatree(run / "results/even/dataset.nc", engine="h5netcdf") as tree:
+        root, lengths = tree.to_dataset(), tree["lengths"].to_dataset().sel(mesh_type="left")
+        assert {"even", "lift", "left"} <= {*root["definition"].values, *root["load"].values, *root["mesh_type"].values}
+        assert (root.status == 1).all() and root.deformation_error.notnull().all()
+        assert lengths.shortest.item() == pytest.approx(5e-3)
+        assert lengths.longest.item() == pytest.approx(2**0.5 * 5e-3)
+        assert json.loads(root.attrs["software"])["springtune-example"] == "1.0"
+    assert all(
+        (run / f"results/even/figures/{stem}.png").stat().st_size for stem in ("size_left_steel_lift", "lengths")
+    )
+
+
+def test_commands_list_what_packages_declare(run, site):
+    assert "for the example's sake (springtune-example)" in python(run, site, "-m", "springtune", "definitions")
+    shown = python(run, site, "-m", "springtune", "scenes", "config/even.yaml")
+    assert "measured     2  meshes, their shortest and longest spring" in shown
+
+
+JOBS = """
+from pathlib import Path
+from springtune.studies.kinds import load_study
+from springtune.studies.runs import plan, rerun
+study = load_study("config/even.yaml")
+jobs = rerun.jobs(study, plan.plan(study, Path("results/even"), 1))
+print(*[name.partition("_")[0] for name, job in jobs.items() if rerun.fault(job, jobs)])
+"""
+
+SPRINGS, SOLVE, FIGURES, METADATA = (
+    "springtune_example/springs.py",
+    "springtune_example/solve.py",
+    "springtune_example/figures.py",
+    "springtune_example-1.0.dist-info/METADATA",
+)
+
+
+@pytest.mark.parametrize(
+    ("file", "before", "after", "again"),
+    [
+        (SPRINGS, "# nothing", "", ""),
+        (SOLVE, "lengths.min()", "lengths.min() + 0", "lengths collect"),
+        (FIGURES, "style.line(0)", "style.line(1)", "present"),
+        (SPRINGS, "0.8 *", "0.9 *", "mesh solve lengths collect"),
+        (SPRINGS, "(BOTTOM, BOTH),", "(BOTTOM, (1,)),", "reference mesh solve lengths collect"),
+        (METADATA, "Version: 1.0", "Version: 1.1", "mesh solve lengths collect present"),
+    ],
+    ids=["nothing", "a stage's code", "a figure", "a definition", "a load's supports", "the version"],
+)
+def test_changes_of_a_package_compute_again_what_uses_it(run, site, tmp_path, file, before, after, again):
+    changed = shutil.copytree(site, tmp_path / "site", ignore=shutil.ignore_patterns("__pycache__"))
+    text = (changed / file).read_text()
+    (changed / file).write_text(text.replace(before, after, 1))
+    assert {*python(run, changed, "-c", JOBS).split()} == {*again.split()}
+
+
+BAD = {
+    "definitions": {"lattice": "bad.springs:lattice", "lost": "bad.missing:what", "other": "bad.springs:undeclared"},
+    "loads": {"traction": "springtune.problem.loads:AXIAL", "kind": "springtune.problem.loads:AXIAL"},
+    "mesh_types": {"broken": "bad.broken:left"},
+    "kinds": {"moduli": "bad.kind:KIND", "extra": "bad.kind:EXTRA"},
+}
+MODULES = {
+    "__init__": "",
+    "springs": "from springtune.springs import definition\ndef undeclared(*_):\n    pass\ndef lattice(*_):\n    pass\n",
+    "broken": "1 / 0\n",
+    "kind": "from springtune.studies.config.kind import Kind\nKIND = Kind('moduli', package='bad')\n"
+    "EXTRA = Kind('extra', package='bad', study_fields={'beams': (int, 0)})\n",
+}
+
+
+@pytest.fixture
+def bad(tmp_path):
+    """Folder with a package in which nothing is right."""
+    (tmp_path / "bad").mkdir()
+    for name, text in MODULES.items():
+        (tmp_path / f"bad/{name}.py").write_text(text)
+    about = tmp_path / "bad-2.0.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: bad\nVersion: 2.0\n")
+    lines = []
+    for group, names in BAD.items():
+        lines += [f"[springtune.{group}]", *(f"{name} = {value}" for name, value in names.items())]
+    (about / "entry_points.txt").write_text("\n".join(lines))
+    return tmp_path
+
+
+def test_what_is_broken_is_left_out_by_name_and_nothing_else(bad):
+    told = python(REPOSITORY, bad, "-m", "springtune", "scenes", "config/quick.yaml")
+    assert re.search(r"^networks +[0-9]+ ", told, re.MULTILINE)
+    for why in (
+        "definition 'lattice' of the package 'bad' is left out: ",
+        "definition 'lost' of the package 'bad' is left out: No module named 'bad.missing'",
+        "is not declared as 'other'; its decorator and entry point need one name; update or uninstall this package, or",
+        "load 'traction' of the package 'bad' is left out: 'springtune' has one of that name",
+        "load 'kind' of the package 'bad' is left out: LoadKind(",
+        "mesh type 'broken' of the package 'bad' is left out: division by zero",
+        "study kind 'moduli' of the package 'bad' is left out: name 'moduli' is of 'moduli' already",
+        "study kind 'extra' of the package 'bad' is left out: key 'beams' is of 'springtune' already",
+    ):
+        assert why in told, told
+
+
+def test_a_taken_name_is_refused_with_both_places(bad):
+    (bad / "bad/springs.py").write_text(
+        "from springtune.springs import definition\n@definition('lattice')\ndef lattice(*_):\n    pass\n"
+    )
+    told = python(REPOSITORY, bad, "-m", "springtune", "definitions")
+    assert "'lattice' is springtune.springs.lattice.springs already; choose another name for bad.springs" in told
+
+
+def test_nothing_is_imported_before_it_is_asked_for(bad):
+    program = "import sys, springtune as st; st.DEFINITIONS['patch'], st.LOADS['traction'], st.MESH_TYPES['free']"
+    assert "bad" not in python(
+        REPOSITORY, bad, "-c", f"{program}; print(*[one for one in sys.modules if 'bad' == one])"
+    )
+    told = python(REPOSITORY, bad, "-c", f"{program}; st.DEFINITIONS['lost']", code=1)
+    assert "definition 'lost' of the package 'bad' is left out: No module named 'bad.missing'" in told
+    assert "broken" not in told
