@@ -32,9 +32,6 @@ PART_NUMBERS = "part"
 PHYSICAL = "gmsh:physical"
 """Cell data in which meshio gives numbers of Gmsh's physical groups; 0 is none."""
 
-LEFT_OUT = ("line", "vertex")
-"""Cells that carry no springs: boundaries and tags, left out."""
-
 COMPANIONS = (".xdmf", ".xmf", ".node", ".ele")
 """Endings of files that hold only a part of a mesh."""
 
@@ -249,7 +246,7 @@ def _read_cells(path: str | Path, content: Any) -> dict[int, np.ndarray]:
                 shape = f"numbers {data.dtype} of shape {data.shape}"
                 raise MeshError(f"{path}: cells '{block.type}' by {shape}; write the mesh again")
             cells.setdefault(CELLS[block.type], []).append(data)
-        elif block.type not in LEFT_OUT:
+        elif block.type not in CELL_DIMENSIONS:
             raise MeshError(f"{path}: has cells '{block.type}'; write linear triangles and quadrilaterals only")
     if not cells:
         raise MeshError(f"{path}: no cell block 'triangle' or 'quad'; write the mesh with triangles or quadrilaterals")
@@ -383,7 +380,7 @@ class _Groups:
                     name, {n: np.zeros(len(found), dtype=bool) for n, found in self.mesh.cells.items()}
                 )
                 masks[CELLS[block.type]][offsets[number] + chosen] = True
-            elif block.type in LEFT_OUT:
+            elif block.type in CELL_DIMENSIONS:
                 (lines if block.type == "line" else points)[name].append(np.asarray(block.data)[chosen])
         for name, nodes in self._point_sets():
             if len(nodes):

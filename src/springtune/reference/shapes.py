@@ -65,7 +65,6 @@ class ShapeReference:
     rotation: float
     strain: float
     unknowns: int
-    degree: int
     _level: "Level" = field(repr=False)
     _kinds: dict[str, str] = field(repr=False)
     negligible: tuple[str, ...] = ()
@@ -165,7 +164,6 @@ def solve_shape(
                 rotation=rotation,
                 strain=strain,
                 unknowns=level.unknowns,
-                degree=degree,
                 negligible=tuple(
                     name for name in names if abs(values[-1][name]) < SMALLEST_SHARE * level.scale(problem.kinds[name])
                 ),

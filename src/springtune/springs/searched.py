@@ -29,15 +29,13 @@ MAX_GRADIENTS = 400
 
 
 @definition("annealed", order=150, needs="cases", anisotropic=True)
-def annealed(
-    mesh: Mesh, material: AnyMaterial, thickness: float, cases: Sequence[Case], evaluations: int = MAX_EVALUATIONS
-) -> Springs:
+def annealed(mesh: Mesh, material: AnyMaterial, thickness: float, cases: Sequence[Case]) -> Springs:
     """Stiffness of each spring by simulated annealing on a scene's reference displacements."""
     from scipy.optimize import dual_annealing  # here: see `springtune.springs`
 
     misfit = Misfit(mesh, material, thickness, cases)
     found = dual_annealing(
-        misfit, misfit.bounds, maxfun=evaluations - 1, maxiter=evaluations, seed=1, no_local_search=True,
+        misfit, misfit.bounds, maxfun=MAX_EVALUATIONS - 1, maxiter=MAX_EVALUATIONS, seed=1, no_local_search=True,
         x0=np.zeros(len(mesh.edges)),
         # Cold and with short steps: in hundreds of dimensions others hit nothing (tried on two meshes).
         initial_temp=0.1, visit=1.1,
@@ -46,9 +44,7 @@ def annealed(
 
 
 @definition("evolved", order=160, needs="cases", anisotropic=True)
-def evolved(
-    mesh: Mesh, material: AnyMaterial, thickness: float, cases: Sequence[Case], evaluations: int = MAX_EVALUATIONS
-) -> Springs:
+def evolved(mesh: Mesh, material: AnyMaterial, thickness: float, cases: Sequence[Case]) -> Springs:
     """Stiffness of each spring by a genetic search on a scene's reference displacements."""
     from scipy.optimize import differential_evolution  # here: see `springtune.springs`
 
@@ -58,7 +54,7 @@ def evolved(
     first[0] = 0.0
     found = differential_evolution(
         misfit, misfit.bounds, init=np.clip(first, *misfit.bounds[0]), rng=generator, polish=False,
-        maxiter=evaluations // POPULATION - 1, tol=0.0, mutation=(0.2, 0.6), recombination=0.3,
+        maxiter=MAX_EVALUATIONS // POPULATION - 1, tol=0.0, mutation=(0.2, 0.6), recombination=0.3,
     )  # fmt: skip
     return misfit.springs(found.x)
 
