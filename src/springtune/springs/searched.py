@@ -29,13 +29,15 @@ MAX_GRADIENTS = 400
 
 
 @definition("annealed", order=150, needs="cases", anisotropic=True)
-def annealed(mesh: Mesh, material: AnyMaterial, thickness: float, cases: Sequence[Case]) -> Springs:
+def annealed(
+    mesh: Mesh, material: AnyMaterial, thickness: float, cases: Sequence[Case], evaluations: int = MAX_EVALUATIONS
+) -> Springs:
     """Stiffness of each spring by simulated annealing on a scene's reference displacements."""
     from scipy.optimize import dual_annealing  # here: see `springtune.springs`
 
     misfit = Misfit(mesh, material, thickness, cases)
     found = dual_annealing(
-        misfit, misfit.bounds, maxfun=MAX_EVALUATIONS - 1, maxiter=MAX_EVALUATIONS, seed=1, no_local_search=True,
+        misfit, misfit.bounds, maxfun=evaluations - 1, maxiter=evaluations, seed=1, no_local_search=True,
         x0=np.zeros(len(mesh.edges)),
         # Cold and with short steps: in hundreds of dimensions others hit nothing (tried on two meshes).
         initial_temp=0.1, visit=1.1,
@@ -44,7 +46,9 @@ def annealed(mesh: Mesh, material: AnyMaterial, thickness: float, cases: Sequenc
 
 
 @definition("evolved", order=160, needs="cases", anisotropic=True)
-def evolved(mesh: Mesh, material: AnyMaterial, thickness: float, cases: Sequence[Case]) -> Springs:
+def evolved(
+    mesh: Mesh, material: AnyMaterial, thickness: float, cases: Sequence[Case], evaluations: int = MAX_EVALUATIONS
+) -> Springs:
     """Stiffness of each spring by a genetic search on a scene's reference displacements."""
     from scipy.optimize import differential_evolution  # here: see `springtune.springs`
 
@@ -54,7 +58,7 @@ def evolved(mesh: Mesh, material: AnyMaterial, thickness: float, cases: Sequence
     first[0] = 0.0
     found = differential_evolution(
         misfit, misfit.bounds, init=np.clip(first, *misfit.bounds[0]), rng=generator, polish=False,
-        maxiter=MAX_EVALUATIONS // POPULATION - 1, tol=0.0, mutation=(0.2, 0.6), recombination=0.3,
+        maxiter=evaluations // POPULATION - 1, tol=0.0, mutation=(0.2, 0.6), recombination=0.3,
     )  # fmt: skip
     return misfit.springs(found.x)
 
