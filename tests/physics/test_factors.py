@@ -82,7 +82,7 @@ def test_factors_of_one_mesh_do_not_overwrite_each_other():
         assert np.allclose(analysis.factorize(3.0 * tangent.data).solve(right), solution / 3, rtol=1e-10)
         assert np.array_equal(first.solve(right), solution)
     del first
-    assert len(analysis._spare) == 2  # used again, not made again
+    assert len(analysis.spare) == 2  # used again, not made again
 
 
 def test_a_solver_that_there_is_not_is_refused():
@@ -367,4 +367,4 @@ def test_the_order_is_of_all_particles_once(mesh_type):
 @pytest.mark.parametrize("mesh_type", ["structured", "braced", "isosceles-0.3"])
 def test_a_large_network_fills_in_less_than_in_an_order_of_minimum_degree(mesh_type):
     network = sheet(mesh_type, 1e-3)  # squares with one diagonal have to be larger still
-    assert network.rest_factor._lu.L.nnz < SuperLUFactor(network.tangent())._lu.L.nnz
+    assert network.rest_factor.lu.L.nnz < SuperLUFactor(network.tangent()).lu.L.nnz

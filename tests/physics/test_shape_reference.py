@@ -13,8 +13,7 @@ from springtune.problem.geometry import Beam
 from springtune.problem.loads import BOTTOM, LEFT, LOAD_KINDS, RIGHT, TOP
 from springtune.problem.materials import Material
 from springtune.problem.shapes import Hole, LoadCase, Pressure, Quantity, Segment, Shape, Support, Traction
-from springtune.reference import shapes
-from springtune.reference.shapes import solve_each, solve_shape
+from springtune.reference.shapes import Level, solve_each, solve_shape
 from springtune.reference.small_strain import ReferenceNotConvergedError, solve_small_strain
 from springtune.reference.triangles import side_fit, side_functions
 
@@ -35,32 +34,29 @@ class Sheet:
 
 def converge(shape, load, materials, tractions=None, displacements=None, **options):
     """Solve as `solve_shape`, with tractions [Pa] and displacements [m] that vary along groups, those of a solution."""
-    forces, supports = shapes._Level._forces, shapes._Level._supports
     tractions, displacements = tractions or {}, displacements or {}
 
-    def pulled(level):
-        parts = (level._integral(group, given) for group, given in tractions.items())
-        return forces(level) + level.problem.shape.thickness * sum(parts)
+    class Prescribed(Level):
+        def forces(self):
+            parts = (self.integral(group, given) for group, given in tractions.items())
+            return super().forces() + self.problem.shape.thickness * sum(parts)
 
-    def moved(level):
-        (held, values), space = supports(level), level.space
-        along, inverse = side_fit(space.degree)
-        places = side_functions(space.degree, np.concatenate([[-1.0, 1.0], along]))[0]
-        for group, given in displacements.items():
-            for ends, _ in level._group_sides(group):
-                functions = space.on_side(ends)
-                wanted = given(places @ space.places[functions], None)
-                straight = (wanted[0] + wanted[1]) / 2 + along[:, None] * (wanted[1] - wanted[0]) / 2
-                values[functions[:2]], values[functions[2:]] = wanted[:2], inverse @ (wanted[2:] - straight)
-                assert held[functions].all()
-        return held, values
+        def supports(self):
+            (held, values), space = super().supports(), self.space
+            along, inverse = side_fit(space.degree)
+            places = side_functions(space.degree, np.concatenate([[-1.0, 1.0], along]))[0]
+            for group, given in displacements.items():
+                for ends, _ in self.group_sides(group):
+                    functions = space.on_side(ends)
+                    wanted = given(places @ space.places[functions], None)
+                    straight = (wanted[0] + wanted[1]) / 2 + along[:, None] * (wanted[1] - wanted[0]) / 2
+                    values[functions[:2]], values[functions[2:]] = wanted[:2], inverse @ (wanted[2:] - straight)
+                    assert held[functions].all()
+            return held, values
 
     own = tuple(one for one in load.tractions if one.group not in tractions)
     load = replace(load, tractions=(*own, *(Traction(group, (0.0, 0.0)) for group in tractions)))
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(shapes._Level, "_forces", pulled)
-        patched.setattr(shapes._Level, "_supports", moved)
-        return solve_shape(shape, load, materials, **options)
+    return solve_shape(shape, load, materials, level_of=Prescribed, **options)
 
 
 def any_sheet(seed):

@@ -40,7 +40,7 @@ class Component(NamedTuple):
     data: Mapping[str, str]
 
 
-ROOT = [
+SCENE_ROOT = [
     Component("DefaultAnimationLoop", {}),
     Component("VisualStyle", {"displayFlags": "showBehaviorModels showForceFields"}),
 ]
@@ -74,7 +74,7 @@ def sofa_xml(net: Net) -> str:
         '<?xml version="1.0"?>',
         f'<Node name="root" dt="{scene.step!r}" gravity="0 0 0">',
         *commented(scene.about, "  "),
-        *_tags([*plugins, *ROOT], "  "),
+        *_tags([*plugins, *SCENE_ROOT], "  "),
         '  <Node name="sheet">',
         *_tags([Component(integrator, scene.sheet[0].data), *scene.sheet[1:]], "    "),
         "  </Node>",
@@ -131,7 +131,7 @@ def sofa_python(net: Net) -> str:
         "PLUGINS": repr(PLUGINS),
         "BACKWARD_EULER": repr(BACKWARD_EULER),
         "INTEGRATOR": repr(dict(scene.sheet[0].data)),
-        "ROOT": _rows(ROOT),
+        "ROOT": _rows(SCENE_ROOT),
         "SHEET": _rows(scene.sheet[1:]),
         "PREDICTED": _rows(scene.predicted),
     }

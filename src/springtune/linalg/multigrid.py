@@ -83,6 +83,8 @@ class Multigrid:
         self.name = "multigrid"
         self._direct: Factor | None = None
         self._certain = False
+        self._levels: list[_Level] = []
+        self._coarsest: Any = None
         if like is None or like._coarsest is None:
             self._lay_grids()
         else:
@@ -90,12 +92,11 @@ class Multigrid:
 
     def _lay_grids(self) -> None:
         """Levels and the factor of the coarsest one, of the matrix itself."""
-        self._borrowed = False
-        self._levels: list[_Level] = []
+        self._borrowed, self._levels, self._coarsest = False, [], None
         try:
             self._coarsest = self._coarsened(self._points, self._places)
         except LinAlgError:  # then the matrix is not positive definite either
-            self._levels, self._coarsest = [], None
+            self._levels = []
 
     def _coarsened(self, points: np.ndarray, places: np.ndarray) -> Any:
         """Levels down to the coarsest one, whose dense factor is returned."""

@@ -319,7 +319,7 @@ class Contact:
         near = _near(met.start, places, reach)
         shown = np.flatnonzero(_near(places, met.start, reach + met.length))
         if not near.any() or not len(shown):
-            return np.zeros((2, 0), dtype=int)
+            return np.zeros(0, dtype=int), np.zeros(0, dtype=int)
         start, along, length, normals = (part[shown] for part in (met.start, met.along, met.length, met.normals))
         offset = places[near][:, None, :] - start[None, :, :]
         gaps = np.einsum("nea,ea->ne", offset, normals)

@@ -168,11 +168,12 @@ class _Sheet:
             else:
                 step /= 2
         mean = float((self.load * moved).sum() / self.load.sum())
-        kind, (*axes, field) = self.kind, self._field(moved)
-        positions = axes[kind.along] / axes[kind.along][-1]
+        kind, (x, y, field) = self.kind, self._field(moved)
+        places = (x, y)[kind.along]
+        positions = places / places[-1]
         profile = field.take(-1 if kind.loaded.far else 0, axis=kind.normal)[:, kind.axis]
         displacement = float(np.interp(0.5, positions, profile)) if kind.pressed else mean
-        return FiniteStrainSolution(displacement, mean, uncertain, positions, profile, *axes, field)
+        return FiniteStrainSolution(displacement, mean, uncertain, positions, profile, x, y, field)
 
     def _joined(self, path: list[tuple[float, np.ndarray]], share: float, moved: np.ndarray, stress: float) -> bool:
         """Whether no snap lies between a stable equilibrium and the last one: the middle is stable, too."""

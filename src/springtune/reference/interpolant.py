@@ -11,7 +11,7 @@ axis with the larger expected error. Then solves between nodes decide: the large
 the error estimate.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -20,7 +20,7 @@ from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike
 
 from ..problem.loads import LoadKind
-from .small_strain import ReferenceNotConvergedError, solve_unit
+from .small_strain import ReferenceNotConvergedError, ReferenceSolution, solve_unit
 
 TOLERANCE = 2e-5
 """Largest relative error estimate of an interpolant by default [1], a fifth of that of a reference."""
@@ -99,6 +99,7 @@ class Interpolant:
         nu_range: tuple[float, float],
         tolerance: float = TOLERANCE,
         most: int | None = None,
+        solve: Callable[..., ReferenceSolution] = solve_unit,
     ) -> Self:
         """Build an interpolant over a box, with as many solves as it needs.
 
@@ -110,7 +111,7 @@ class Interpolant:
             raise ValueError(f"a range of aspect ratios is 0 < first <= last, not {first:g} to {last:g}")
         if not -1 < least <= largest <= 0.5:
             raise ValueError(f"a range of Poisson's ratios is -1 < first <= last <= 0.5, not {least:g} to {largest:g}")
-        box = _Box(kind, (float(first), float(last)), (float(least), float(largest)), tolerance, most)
+        box = _Box(kind, (float(first), float(last)), (float(least), float(largest)), tolerance, most, solve)
         values, error_estimate = box.certified()
         return cls(kind, box.aspect_range, box.nu_range, values, error_estimate, len(box.solved))
 
@@ -155,6 +156,7 @@ class _Box:
     nu_range: tuple[float, float]
     tolerance: float
     most: int | None
+    solver: Callable[..., ReferenceSolution]
 
     def __post_init__(self) -> None:
         #: Answers in the order of `NAMES`, and error estimates, by place in the box: from -1 to 1 along each axis.
@@ -201,7 +203,7 @@ class _Box:
                 aspect = float(np.exp(_between(along, np.log(self.aspect_range))))
                 nu = float(np.clip(_between(across, self.nu_range), *self.nu_range))
                 try:
-                    found = solve_unit(aspect, nu, self.kind, NODE_SHARE * self.tolerance)
+                    found = self.solver(aspect, nu, self.kind, NODE_SHARE * self.tolerance)
                 except ReferenceNotConvergedError as error:
                     raise self._failure(str(error)) from error
                 answers = np.array([getattr(found, name) for name in NAMES])

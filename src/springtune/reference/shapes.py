@@ -65,8 +65,7 @@ class ShapeReference:
     rotation: float
     strain: float
     unknowns: int
-    degree: int
-    _level: "_Level" = field(repr=False)
+    _level: "Level" = field(repr=False)
     _kinds: dict[str, str] = field(repr=False)
     negligible: tuple[str, ...] = ()
     _factor: float = 1.0
@@ -105,11 +104,13 @@ def solve_shape(
     materials: AnyMaterial | Mapping[str, AnyMaterial],
     grouped: GroupedMesh | None = None,
     tolerance: float = 1e-4,
+    level_of: "type[Level] | None" = None,
 ) -> ShapeReference:
     r"""Solve for the displacements of a shape under a load case, at small strain in plane stress.
 
     `grouped` is the mesh of a shape from a file: the polygon around its cells is the geometry. `tolerance` is the
-    largest accepted relative error estimate [1]; ten times as much for stresses.
+    largest accepted relative error estimate [1]; ten times as much for stresses. `level_of` is a `Level` with
+    other loads or supports.
 
     A level of degree p has p layers of triangles at each corner that is not smooth. With :math:`u \sim r^\lambda` one
     more layer scales the missing energy of the innermost triangles by :math:`.2^{2\lambda}`, and one more degree that
@@ -131,7 +132,7 @@ def solve_shape(
         if complaint and problem.size(degree) > LARGEST_LEVEL:
             complaint += "; the next level would not fit into memory: a simpler outline has fewer triangles"
             break
-        level = _Level(problem, degree)
+        level = (level_of or Level)(problem, degree)
         values.append(level.values())
         if len(values) < 3:
             continue
@@ -163,7 +164,6 @@ def solve_shape(
                 rotation=rotation,
                 strain=strain,
                 unknowns=level.unknowns,
-                degree=degree,
                 negligible=tuple(
                     name for name in names if abs(values[-1][name]) < SMALLEST_SHARE * level.scale(problem.kinds[name])
                 ),
@@ -342,7 +342,7 @@ class _Problem:
                 f"{', '.join(sorted(self.loaded_points))} over a side"
             )
 
-    def look_at_reactions(self, level: "_Level") -> None:
+    def look_at_reactions(self, level: "Level") -> None:
         """Note point supports that carry a force: a continuum's displacements and energy are infinite there."""
         least = SMALLEST_REACTION * level.scale("reaction")
         held = [support.group for support in self.load.supports if support.group in self.points]
@@ -459,7 +459,7 @@ VOIGT = np.array([[0, 2], [2, 1]])
 """Place of a pair of axes among xx, yy and xy."""
 
 
-class _Level:
+class Level:
     """A shape solved on one level."""
 
     def __init__(self, problem: _Problem, degree: int) -> None:
@@ -471,8 +471,8 @@ class _Level:
         # Stiffness by axes: of strain d u_c / d x_a on stress along d, b.
         self._tensor = thickness * problem.stiffness[:, VOIGT[:, :, None, None], VOIGT[None, None]]
         matrices = self._matrices()
-        forces = self._forces()
-        held, prescribed = self._supports()
+        forces = self.forces()
+        held, prescribed = self.supports()
         solution, self.residual, self.energy = self._solve(matrices, forces, held, prescribed)
         self.field = solution
         self.held = held
@@ -511,7 +511,7 @@ class _Level:
                     result[rows, :, c, :, d] = flat.transpose(0, 2, 1) @ mixed.reshape(len(rows), -1, count)
         return result.reshape(n, 2 * count, 2 * count)
 
-    def _group_sides(self, group: str) -> list[tuple[tuple[int, int], float]]:
+    def group_sides(self, group: str) -> list[tuple[tuple[int, int], float]]:
         """Sides of a group, and 1 where the body is to the left of them from the lower number, else -1."""
         return [
             (ends, 1.0 if self.outlines[ends][0][1] else -1.0)
@@ -519,10 +519,10 @@ class _Level:
             if group in side.groups
         ]
 
-    def _integral(self, group: str, given: Field) -> np.ndarray:
+    def integral(self, group: str, given: Field) -> np.ndarray:
         """Integral over a group of the functions times vectors."""
         total = np.zeros((self.space.n_functions, 2))
-        for ends, sense in self._group_sides(group):
+        for ends, sense in self.group_sides(group):
             values, points, normals, weights = self.space.side_points(ends, sense, self.space.degree + 3)
             lengths = np.linalg.norm(normals, axis=1)
             total[self.space.on_side(ends)] += values.T @ (
@@ -532,10 +532,10 @@ class _Level:
 
     def _shares(self, group: str) -> np.ndarray:
         """Integral of the functions over a group, by its length."""
-        whole = self._integral(group, lambda points, _: np.ones_like(points))[:, 0]
+        whole = self.integral(group, lambda points, _: np.ones_like(points))[:, 0]
         return whole / whole[: len(self.space.mesh.points)].sum()
 
-    def _forces(self) -> np.ndarray:
+    def forces(self) -> np.ndarray:
         """Forces on the functions [N], shape (n_functions, 2)."""
         problem, space = self.problem, self.space
         load, thickness = problem.load, problem.shape.thickness
@@ -547,7 +547,7 @@ class _Level:
                 shares = self._shares(traction.group)
                 total += shares[:, None] * traction.force
         for pressure in load.pressures:
-            total -= pressure.pressure * thickness * self._integral(pressure.group, lambda _, normals: normals)
+            total -= pressure.pressure * thickness * self.integral(pressure.group, lambda _, normals: normals)
         if any(load.gravity):
             _, weights, values, gradients = tabulated(space.degree, 3 * space.degree)
             volume = weights * np.abs(space.jacobians(gradients)[1])
@@ -556,7 +556,7 @@ class _Level:
             total += by_function[:, None] * load.gravity
         return total
 
-    def _supports(self) -> tuple[np.ndarray, np.ndarray]:
+    def supports(self) -> tuple[np.ndarray, np.ndarray]:
         """What is held, and the coefficients that are prescribed, shape (n_functions, 2)."""
         problem, space = self.problem, self.space
         held, values = np.zeros((space.n_functions, 2), dtype=bool), np.zeros((space.n_functions, 2))
@@ -568,7 +568,7 @@ class _Level:
                     corners = np.array([space.mesh.named[support.group]])
                     functions = corners
                 else:
-                    sides = [ends for ends, _ in self._group_sides(support.group)]
+                    sides = [ends for ends, _ in self.group_sides(support.group)]
                     functions = np.unique(np.concatenate([space.on_side(ends) for ends in sides]))
                     corners = np.unique(sides)
                 other = np.asarray(held[corners, axis] & (values[corners, axis] != value))
@@ -663,11 +663,11 @@ class _Level:
         claims = np.zeros(len(space.mesh.points))
         for support in problem.load.supports:
             if (support.x, support.y)[axis] is not None and support.group not in space.mesh.named:
-                claims[np.unique([ends for ends, _ in self._group_sides(support.group)])] += 1
+                claims[np.unique([ends for ends, _ in self.group_sides(support.group)])] += 1
         if group in space.mesh.named:
             point = space.mesh.named[group]
             return 0.0 if claims[point] else float(self.residual[point, axis])
-        corners = np.unique([ends for ends, _ in self._group_sides(group)])
+        corners = np.unique([ends for ends, _ in self.group_sides(group)])
         return float((self.residual[corners, axis] / np.maximum(claims[corners], 1)).sum())
 
     def _area_growth(self) -> np.ndarray:
