@@ -62,7 +62,7 @@ class Campaign:
             return {*self.plan.jobs} if name == rerun.COLLECT else {rerun.COLLECT}
         stage, label = self.plan.jobs[name].stage, self.plan.jobs[name].label
         others = self.plan.jobs.items()
-        same = {other for other, job in others if job.stage.name in stage.same and job.label == label}
+        same = {other for other, job in others if job.stage.name == stage.like and job.label == label}
         return same | {other for other, job in others if job.stage.name in stage.every}
 
     def finish(self, last=None):

@@ -36,7 +36,7 @@ COOK = STUDIES["shapes"]
 def done(study, folder):
     """Tree of the dataset of a study, its groups and its folder; all stages run in this process."""
     do_stages(study, folder)
-    made, told = collect.run(study.path, folder, folder / "dataset.nc")
+    made, told = collect.run(study, study.path, folder, folder / "dataset.nc")
     with xr.open_datatree(made, engine="netcdf4") as tree:
         tree.load()
     return tree, told.read_text()

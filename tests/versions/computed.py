@@ -74,7 +74,7 @@ def collected(study, output):
         folder = Path(scratch) / "results"
         for job in plan(load_study(study), folder, 1).jobs.values():
             driver.run(job.stage.module, job.content, TaskCosts())
-        collect.run(study, folder, output)
+        collect.run(load_study(study), study, folder, output)
 
 
 if __name__ == "__main__":

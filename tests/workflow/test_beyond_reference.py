@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from springtune.studies.kinds import collect
+from springtune.studies.kinds import collect, load_study
 from springtune.studies.output import page
 from springtune.studies.runs import store
 
@@ -100,7 +100,8 @@ def test_a_scene_without_a_reference_says_so(tree, run, tmp_path):
     kept = file.read_bytes()
     try:
         store.add(file, {file.stem: {"message": lost, "seconds": 0.1}})
-        collect.run(run.folder / "beyond.yaml", run.folder / "results/beyond", tmp_path / "dataset.nc")
+        path = run.folder / "beyond.yaml"
+        collect.run(load_study(path), path, run.folder / "results/beyond", tmp_path / "dataset.nc")
     finally:
         file.write_bytes(kept)
     text = (tmp_path / "summary.txt").read_text()

@@ -18,7 +18,7 @@ for stage in stages():
             message:
                 f"{stage.message}, bundle {{wildcards.bundle}}"
             input:
-                [RESULTS / "done" / f"{other}_{{bundle}}.json" for other in stage.same],
+                [RESULTS / "done" / f"{other}_{{bundle}}.json" for other in filter(None, [stage.like])],
                 [path for other in stage.every for path in done(other)],
             output:
                 RESULTS / "done" / f"{stage.name}_{{bundle}}.json",

@@ -112,8 +112,7 @@ def check_counts(config: StudyConfig, content: dict[str, Any], problems: Problem
     try:
         most = most_scenes()
     except ValueError as error:
-        problems.add((), str(error))
-        problems.stop()
+        problems.stop_at((), str(error))
     before = 0
     for name, grid in config.grids.items():
         number, lengths = count(grid)
@@ -133,11 +132,9 @@ def _check_labels(config: StudyConfig, problems: Problems) -> None:
     """Estimate the size of the dataset before grids are expanded."""
     if not config.grids or any(grid.exclude for grid in config.grids.values()):
         return  # exclusions may leave labels out
-    lists = {name: {value for grid in config.grids.values() for value in values_of(grid, name)} for name in LABELLED}
+    labelled = (name for name in GRID_PARAMETERS if name != "pressure")
+    lists = {name: {value for grid in config.grids.values() for value in values_of(grid, name)} for name in labelled}
     check_cells(config, {name: values for name, values in lists.items() if values}, False, problems)
-
-
-LABELLED = tuple(name for name in GRID_PARAMETERS if name != "pressure")
 
 
 def check_product(problems: Problems, section: object, path: Sequence[Key], labels: Iterable[str], most: int) -> None:
@@ -154,7 +151,7 @@ def check_particles(
 ) -> None:
     """Refuse mesh sizes that give too many particles."""
     if refusal := _too_many(min(sizes), length, height):
-        problems.add(path, f"{_in_mm(min(sizes))} gives {refusal}")
+        problems.add(path, f"{in_mm(min(sizes))} gives {refusal}")
 
 
 def _too_many(size: float, length: float, height: float) -> str:
@@ -242,20 +239,21 @@ def check_meshes(config: StudyConfig, content: dict[str, Any], grids: Iterable[G
         written = content["grids"][name]["mesh_size"]
         for number, size in enumerate(grid.mesh_size):
             listed = isinstance(written, list)
-            shown = f"'{written[number]}'" if listed else f"'{written}'" if isinstance(written, str) else _in_mm(size)
+            shown = f"'{written[number]}'" if listed else f"'{written}'" if isinstance(written, str) else in_mm(size)
             path = ("grids", name, "mesh_size", number) if listed else ("grids", name, "mesh_size")
             for beam in dict.fromkeys(grid.beam):
                 if (size, beam) not in made:
                     continue
                 length, height = config.beams[beam].length, config.beams[beam].height
                 if size > min(length, height):
-                    side = _in_mm(min(length, height))
+                    side = in_mm(min(length, height))
                     problems.add(path, f"{shown} is larger than beam '{beam}'; give at most its smaller side, {side}")
                 elif refusal := _too_many(size, length, height):
                     problems.add(path, f"{shown} gives beam '{beam}' {refusal}")
 
 
-def _in_mm(length: float) -> str:
+def in_mm(length: float) -> str:
+    """Length as messages show it."""
     return f"{1e3 * length:g} mm"
 
 

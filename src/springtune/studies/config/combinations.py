@@ -16,7 +16,7 @@ from springtune.safe_io.inputs import LARGEST_CSV, read
 from .fields import MOST_LISTED
 from .messages import Key, Problems, show, unseen
 from .model import PrintedCell
-from .sections import GRID_PARAMETERS, ExcludeConfig, GridConfig
+from .sections import GRID_PARAMETERS, GridConfig
 
 Factor = tuple[tuple[str, ...], list[tuple[Any, ...]]]
 """Names of zipped parameters, and one tuple of values for each combination."""
@@ -83,10 +83,7 @@ def factors(grid: GridConfig) -> list[Factor]:
     for group in groups_of(grid):
         if group == ("force",) and grid.force and None not in grid.force:
             continue  # forces of each beam go with the beam
-        if "force" in group and grid.force:
-            columns = [grid.force[None] if one == "force" else getattr(grid, one) for one in group]  # type: ignore[index]
-        else:
-            columns = [getattr(grid, one) for one in group]
+        columns = [grid.force[None] if one == "force" else getattr(grid, one) for one in group]  # type: ignore[index]
         found.append((group, list(zip(*columns, strict=True))))
     if grid.force and None not in grid.force:
         place = next(number for number, (group, _) in enumerate(found) if "beam" in group)
@@ -106,7 +103,7 @@ def combinations(name: str, grid: GridConfig, problems: Problems) -> Iterator[Co
     """Yield the combinations of a grid without excluded ones."""
     parts = factors(grid)
     names = [*chain.from_iterable(group for group, _ in parts)]
-    left_out = [_given(one) for one in grid.exclude]
+    left_out = [{key: values for key, values in one if values is not None} for one in grid.exclude]
     matched = [False] * len(left_out)
     for rows in product(*(rows for _, rows in parts)):
         combination = dict(zip(names, chain.from_iterable(rows)))
@@ -122,10 +119,6 @@ def combinations(name: str, grid: GridConfig, problems: Problems) -> Iterator[Co
                 ("grids", name, "exclude", number),
                 f"no combination of the grid has these values of {shown}; correct them, or remove the entry",
             )
-
-
-def _given(excluded: ExcludeConfig) -> dict[str, list[Any]]:
-    return {name: getattr(excluded, name) for name in GRID_PARAMETERS if getattr(excluded, name) is not None}
 
 
 def _among(value: Any, values: list[Any]) -> bool:
@@ -146,8 +139,7 @@ def read_lines(
         text = read(path, LARGEST_CSV).decode("utf-8-sig")
     except ValueError as error:
         why = "not UTF-8 text" if isinstance(error, UnicodeDecodeError) else error
-        problems.add(where, f"'{path}' cannot be read: {why}; {remedy}")
-        problems.stop()
+        problems.stop_at(where, f"'{path}' cannot be read: {why}; {remedy}")
     # Empty lines in place of comments, so that the reader's line numbers are the file's.
     reader = csv.reader("\n" if line.startswith("#") else line for line in text.splitlines(keepends=True))
     try:

@@ -22,17 +22,7 @@ from .combinations import combinations, read_printed
 from .fields import RANGE_DIGITS
 from .kind import Kind
 from .messages import Problems
-from .model import (
-    FURTHER_REFERENCES,
-    CurveSpec,
-    Grid,
-    MeshFiles,
-    MeshSpec,
-    Reference,
-    SceneSpec,
-    Study,
-    swept_value,
-)
+from .model import FURTHER_REFERENCES, CurveSpec, Grid, MeshFiles, MeshSpec, Reference, SceneSpec, Study, swept_value
 from .sections import StudyConfig
 
 Ranks = dict[str, dict[str, int]]
@@ -122,22 +112,19 @@ def _order(ranks: Ranks) -> Callable[[MeshSpec | SceneSpec | CurveSpec | Referen
     definitions, kinematics = ranks["definition"], ranks["kinematics"]
 
     def key(item: MeshSpec | SceneSpec | CurveSpec | Reference) -> tuple[float, ...]:
-        if isinstance(item, SceneSpec | CurveSpec):
-            mesh, material = item.mesh, item.material
-            beam = mesh.beam
-            place = beams[beam.name], mesh_types[mesh.mesh_type], mesh.mesh_size
-            own = materials[material.name], loads[item.load]
-            law = kinematics[item.kinematics], abs(item.force), beam.thickness
-            moduli = material.young_modulus, material.poisson_ratio
-            if isinstance(item, CurveSpec):
-                return (*place, *own, *law, *moduli, 0.0)
-            return (*place, *own, definitions[item.definition], *law, *moduli, item.stiffness_scale)
         if isinstance(item, MeshSpec):
             return beams[item.beam.name], mesh_types[item.mesh_type], item.mesh_size, item.beam.thickness
         material = item.material
         own = materials[material.name], loads[item.load]
         moduli = material.young_modulus, material.poisson_ratio
-        return beams[item.beam.name], *own, abs(item.force), item.beam.thickness, *moduli
+        if isinstance(item, Reference):
+            return beams[item.beam.name], *own, abs(item.force), item.beam.thickness, *moduli
+        mesh, beam = item.mesh, item.mesh.beam
+        place = beams[beam.name], mesh_types[mesh.mesh_type], mesh.mesh_size
+        law = kinematics[item.kinematics], abs(item.force), beam.thickness
+        if isinstance(item, CurveSpec):
+            return *place, *own, *law, *moduli
+        return *place, *own, definitions[item.definition], *law, *moduli, item.stiffness_scale
 
     return key
 
@@ -303,14 +290,13 @@ def build(
     check_cells(config, used, bool(curves), problems)
     problems.stop()
     bodies = declared(config, problems.folder)
-    parts = {kind.name: kind.expand(config, bodies) for kind in kinds}
+    parts = {kind.name: kind.expand(config, bodies) if kind.wanted(config) else () for kind in kinds}
     if config.printed and names:
-        problems.add(
+        problems.stop_at(
             ("printed",),
             f"printed cells know no {' or '.join(names)}, which grids sweep; give the sweep a study of its own, or "
             "remove the key",
         )
-        problems.stop()
     made = [output.name for kind in kinds for output in kind.outputs]
     first, last, points = config.sensitivity.start, config.sensitivity.stop, config.sensitivity.points
     steps = [first + (last - first) * step / (points - 1) for step in range(points)]

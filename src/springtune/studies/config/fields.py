@@ -158,8 +158,7 @@ class Wrapped:
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_wrap_validator_function(self._read, handler(source))
 
-    def _read(self, value: object, handler: core_schema.ValidatorFunctionWrapHandler) -> Any:
-        raise NotImplementedError
+    _read: Callable[..., Any]
 
 
 class OneOrMore(Wrapped):

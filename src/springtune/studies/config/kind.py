@@ -76,11 +76,6 @@ class Output:
     usual: bool = False
 
     @property
-    def made_by(self) -> str:
-        """Name of the job that makes it."""
-        return self.job or self.name
-
-    @property
     def module(self) -> str:
         """Module that draws the figures."""
         return self.plot.partition(":")[0]
@@ -115,9 +110,9 @@ class Stage:
         From a study and `springtune.studies.runs.plan.Costs` to expected seconds and a value by name; None for a
         stage with the bundles of another one.
     like : str
-        Stage whose bundles it shares.
-    same, every : tuple of str
-        Stages that it needs: the job of the same bundle, or all jobs.
+        Stage whose bundles it shares, and whose job of the same bundle it needs.
+    every : tuple of str
+        Stages that it needs all jobs of, besides the job of the same bundle.
     alone : bool
         Whether a job has one member and the whole machine, so that its seconds can be measured.
     folder : str
@@ -133,7 +128,6 @@ class Stage:
     products: Callable[[dict[str, Any]], Iterable[Path]]
     members: Callable[[Study, Any], Mapping[str, tuple[float, Any]]] | None = None
     like: str = ""
-    same: tuple[str, ...] = ()
     every: tuple[str, ...] = ()
     alone: bool = False
     folder: str = ""
@@ -163,9 +157,10 @@ class Kind:
     files : callable, optional
         From its part of a study to further input files.
     check : callable, optional
-        Adds the mistakes of a config to `springtune.studies.config.messages.Problems`.
+        Adds the mistakes of a config with its sections to `springtune.studies.config.messages.Problems`.
     expand : callable, optional
-        From a config and `springtune.studies.config.expand.Declared` to its part of a study, empty if unused.
+        From a config with its sections and `springtune.studies.config.expand.Declared` to its part of a study, which
+        is empty in other studies.
     axes : callable, optional
         From that part to the labels of its groups' dimensions.
     summary : callable, optional
@@ -207,6 +202,10 @@ class Kind:
     costs: dict[str, tuple[float, float]] = field(default_factory=dict)
     pieces: Callable[[Study, Any, Any], Mapping[tuple[str | int, ...], float]] | None = None
     take: Callable[[Study, Collection[tuple[str | int, ...]]], Study] | None = None
+
+    def wanted(self, config: Any) -> bool:
+        """Return whether a config has one of its sections; a kind without any depends on the grids."""
+        return not self.study_fields or any(getattr(config, key) for key in self.study_fields)
 
     def place(self, name: str) -> str:
         """Name of a module of its package."""

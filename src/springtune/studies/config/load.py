@@ -33,7 +33,7 @@ def load(path: str | Path, kinds: Sequence[Kind], beside: Path | None = None) ->
     config = _validate(study_model(kinds, content if isinstance(content, dict) else ()), content, problems)
     check_names(config, problems)
     check_counts(config, content, problems)
-    for kind in kinds:
+    for kind in filter(lambda kind: kind.wanted(config), kinds):
         kind.check(config, problems)
     problems.stop()
     test_files = files_of_tests(config, beside, problems)
@@ -52,8 +52,7 @@ def load(path: str | Path, kinds: Sequence[Kind], beside: Path | None = None) ->
 
 def _validate(model: type[StudyConfig], content: Any, problems: Problems) -> StudyConfig:
     if content is None:
-        problems.add((), f"the file is empty; give the keys {', '.join(model.model_fields)}")
-        problems.stop()
+        problems.stop_at((), f"the file is empty; give the keys {', '.join(model.model_fields)}")
     try:
         return model.model_validate(content)
     except ValidationError as error:
@@ -78,8 +77,6 @@ def _validate(model: type[StudyConfig], content: Any, problems: Problems) -> Stu
 PART_BELOW = (
     "\n# What stands above is the whole study; this file asks for a part of it. Written by `springtune split`.\n"
 )
-
-LONGEST_NAME = 255
 
 
 def is_part(text: str) -> bool:
@@ -108,19 +105,18 @@ def declared_part(config: StudyConfig, text: str, problems: Problems) -> Part | 
         return None
     part = Part(config.part.number, config.part.of, config.part.by, config.part.study)
     if digest_of(whole_text(text)) != part.study:
-        problems.add(
+        problems.stop_at(
             ("part", "study"),
             "the study above it was changed since it was split, so that its parts no longer fit together; change the "
             "whole study and split it again, or remove this section",
         )
-        problems.stop()
     return part
 
 
 def named_files(text: str, path: Path) -> list[Path]:
     """Files that a study names under any key."""
     content, _ = read_yaml(text, str(path))
-    found = {value for value in _texts(content) if value.strip() and len(value) < LONGEST_NAME}
+    found = {value for value in _texts(content) if value.strip() and len(value) < 255}
     files = (path.parent / value for value in sorted(found))
     return [file.resolve() for file in files if file.is_file()]
 

@@ -79,6 +79,11 @@ class Problems:
         """Return whether no problem was added."""
         return not self._found
 
+    def stop_at(self, path: Iterable[Key], message: str, line: int = 0) -> None:
+        """Add a problem, and raise."""
+        self.add(path, message, line)
+        self.stop()
+
     def stop(self) -> None:
         """Raise if a problem was added."""
         if not self._found:
@@ -243,9 +248,7 @@ def _check_seen(text: str, path: tuple[Key, ...], node: yaml.Node, file: str) ->
     """Refuse line breaks and control characters in texts."""
     why = unseen(text)
     if why:
-        problems = Problems(file)
-        problems.add(path, why, node.start_mark.line + 1)
-        problems.stop()
+        Problems(file).stop_at(path, why, node.start_mark.line + 1)
 
 
 def _content(node: yaml.Node | None, path: tuple[Key, ...], lines: dict[tuple[Key, ...], int], file: str) -> Any:
@@ -279,9 +282,8 @@ def _content(node: yaml.Node | None, path: tuple[Key, ...], lines: dict[tuple[Ke
         inside = (*path, key.value)
         _check_seen(key.value, inside, key, file)
         if key.value in content:
-            problems = Problems(file, {inside: line})
-            problems.add(inside, f"'{key.value}' is given twice, first in line {lines[inside]}; rename or remove one")
-            problems.stop()
+            why = f"'{key.value}' is given twice, first in line {lines[inside]}; rename or remove one"
+            Problems(file).stop_at(inside, why, line)
         lines[inside] = line
         content[key.value] = _content(value, inside, lines, file)
     return merged | content

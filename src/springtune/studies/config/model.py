@@ -48,6 +48,11 @@ class MeshSpec:
         """File stem, e.g. ``"200x40_structured_5mm"``."""
         return f"{self.beam.name}_{self.mesh_type}_{1e3 * self.mesh_size:g}mm"
 
+    @cached_property
+    def labels(self) -> dict[str, str | float]:
+        """Labels of its cell of the dataset."""
+        return {"beam": self.beam.name, "mesh_type": self.mesh_type, "mesh_size": self.mesh_size}
+
 
 MeshFiles = dict[tuple[str, str, float], MeshSpec]
 
@@ -219,15 +224,8 @@ class Study:
             beam = one.beam
             found = {"beam": beam.name, "material": one.material.name, "load": one.load}
         else:
-            mesh = one.mesh
-            beam = mesh.beam
-            found = {
-                "beam": beam.name,
-                "mesh_type": mesh.mesh_type,
-                "mesh_size": mesh.mesh_size,
-                "material": one.material.name,
-                "load": one.load,
-            }
+            beam = one.mesh.beam
+            found = one.mesh.labels | {"material": one.material.name, "load": one.load}
             if isinstance(one, SceneSpec):
                 found["definition"] = one.definition
             found["kinematics"] = one.kinematics
@@ -279,12 +277,9 @@ def once_a_study(*names: str) -> Callable[[Callable[[Study], Answer]], Callable[
     return decorate
 
 
-SHOWING = ("deformed", "paraview")
-
-
 def keeps_fields(study: Study) -> bool:
     """Return whether a study's dataset has whole fields, its group `/fields`."""
-    return any(name in study.outputs for name in SHOWING)
+    return "deformed" in study.outputs or "paraview" in study.outputs
 
 
 def shown(scenes: Collection[SceneSpec], swept: Iterable[str]) -> frozenset[SceneSpec]:

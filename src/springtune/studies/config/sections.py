@@ -56,7 +56,6 @@ from .kind import RESERVED, Kind, Output, kinds
 from .messages import refuse, show
 
 MOST_PARTS = 1000
-"""Most parts that a study is split into."""
 
 PLAUSIBLE = 20.0
 """Factor on sqrt(3)/2 E t beyond which a stated stiffness counts as an error of units."""
@@ -107,8 +106,12 @@ class Section(BaseModel):
     @classmethod
     def _needed(cls, given: Mapping[str, object]) -> dict[str, str]:
         """Required keys, each with a remedy besides giving it."""
-        names = {field.alias or name: field for name, field in cls.model_fields.items()}
-        return {name: "" for name, field in names.items() if field.is_required()}
+        return {field.alias or name: "" for name, field in cls.model_fields.items() if field.is_required()}
+
+
+def default(value: Any, description: str, **options: Any) -> Any:
+    """Field with a default, written as in a study."""
+    return Field(value, validate_default=True, description=description, **options)
 
 
 def optional(section: Any, description: str) -> tuple[Any, Any]:
@@ -121,7 +124,7 @@ class BeamConfig(Section):
 
     length: Length = Field(description="Extent along x, the direction of the load.")
     height: Length = Field(description="Extent along y.")
-    thickness: Length = Field("1 mm", validate_default=True, description="Extent out of the plane.")
+    thickness: Length = default("1 mm", description="Extent out of the plane.")
 
 
 class StiffnessConfig(Section):
@@ -131,8 +134,8 @@ class StiffnessConfig(Section):
     C22: Stress = Field(description="Stress along y for a strain along y.")
     C12: SignedStress = Field(description="Stress along x for a strain along y.")
     C66: Stress = Field(description="Shear stress for a shear angle.")
-    C16: SignedStress = Field("0 Pa", validate_default=True, description="Shear stress for a strain along x.")
-    C26: SignedStress = Field("0 Pa", validate_default=True, description="Shear stress for a strain along y.")
+    C16: SignedStress = default("0 Pa", description="Shear stress for a strain along x.")
+    C26: SignedStress = default("0 Pa", description="Shear stress for a strain along y.")
 
 
 MATERIAL_FORMS = (
@@ -145,7 +148,6 @@ MATERIAL_FORMS = (
 
 
 OF_A_TEST = ("terms", "equibiaxial_test", "pure_shear_test")
-"""Keys that need a `uniaxial_test`."""
 
 
 def _one_form(schema: dict[str, Any]) -> None:
@@ -161,7 +163,7 @@ class MaterialConfig(Section):
     strain it has the initial modulus of that law and nu = 0.5. Beams need an isotropic material or rubber.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True, json_schema_extra=_one_form)
+    model_config = ConfigDict(json_schema_extra=_one_form)
 
     young_modulus: Stress | None = Field(None, description="Young's modulus E.")
     poisson_ratio: PoissonRatio | None = Field(
@@ -295,9 +297,9 @@ class DefinitionsConfig(Section):
 class SensitivityConfig(Section):
     """Equally spaced stiffnesses of every sensitivity curve, as multiples of sqrt(3)/2 E t."""
 
-    start: Ratio = Field("0.4", validate_default=True, alias="from", description="Smallest stiffness.")
-    stop: Ratio = Field("1.6", validate_default=True, alias="to", description="Largest stiffness.")
-    points: Points = Field("61", validate_default=True, description="Number of stiffnesses, both ends included.")
+    start: Ratio = default("0.4", alias="from", description="Smallest stiffness.")
+    stop: Ratio = default("1.6", alias="to", description="Largest stiffness.")
+    points: Points = default("61", description="Number of stiffnesses, both ends included.")
 
 
 class LimitsConfig(Section):
@@ -306,10 +308,10 @@ class LimitsConfig(Section):
     Results do not depend on limits. After a change of limits only the tasks that went beyond them are computed again.
     """
 
-    seconds: LimitSeconds = Field(
-        "3600", validate_default=True, description="Processor time, which does not depend on other load of the machine."
+    seconds: LimitSeconds = default(
+        "3600", description="Processor time, which does not depend on other load of the machine."
     )
-    memory: Memory = Field("8 GB", validate_default=True, description="Memory in addition to that of the idle job.")
+    memory: Memory = default("8 GB", description="Memory in addition to that of the idle job.")
 
 
 class MeshFileConfig(Section):
@@ -318,25 +320,7 @@ class MeshFileConfig(Section):
     file: FileName = Field(description="The file, relative to the study's folder.")
     beam: BeamName = Field(description="Beam that the mesh fills.")
     mesh_size: Length = Field(description="Length of an edge, which names the mesh in grids and in the dataset.")
-    unit: Length = Field("1 m", validate_default=True, description="Unit of the coordinates in the file.")
-
-
-GRID_PARAMETERS = (
-    "beam",
-    "mesh_type",
-    "mesh_size",
-    "material",
-    "load",
-    "force",
-    "pressure",
-    "thickness",
-    "young_modulus",
-    "poisson_ratio",
-    "stiffness_scale",
-    "definition",
-    "kinematics",
-)
-"""Keys of a grid whose values are combined."""
+    unit: Length = default("1 m", description="Unit of the coordinates in the file.")
 
 
 class ExcludeConfig(Section):
@@ -358,9 +342,13 @@ class ExcludeConfig(Section):
 
     @model_validator(mode="after")
     def _something(self) -> Self:
-        if all(getattr(self, name) is None for name in GRID_PARAMETERS):
+        if all(values is None for _, values in self):
             raise refuse("no parameter at all would leave nothing; give values of one such as {mesh_size: 1 mm}")
         return self
+
+
+GRID_PARAMETERS = tuple(ExcludeConfig.model_fields)
+"""Keys of a grid whose values are combined."""
 
 
 def _rows_may_give(schema: dict[str, Any]) -> None:
@@ -381,7 +369,7 @@ class GridConfig(Section):
     adds these as dimensions.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True, json_schema_extra=_rows_may_give)
+    model_config = ConfigDict(json_schema_extra=_rows_may_give)
 
     beam: Annotated[list[BeamName], OneOrMore(repeats=True)] = Field(description="Beams, by name.")
     mesh_type: Annotated[list[MeshType], OneOrMore(repeats=True)] = Field(
@@ -427,9 +415,8 @@ class GridConfig(Section):
     definition: Annotated[list[DefinitionName], OneOrMore(repeats=True)] = Field(
         description="Rules for the stiffness of every spring; `springtune definitions` lists them."
     )
-    kinematics: Annotated[list[Kinematics], OneOrMore(repeats=True)] = Field(
+    kinematics: Annotated[list[Kinematics], OneOrMore(repeats=True)] = default(
         "nonlinear",
-        validate_default=True,
         description="`nonlinear`: springs keep their length law. `linear`: they keep their tangent at rest.",
     )
     zip: Annotated[list[list[str]], Groups(GRID_PARAMETERS)] = Field(
@@ -438,8 +425,7 @@ class GridConfig(Section):
         "with the first, and so on. Give a list of such lists for several groups.",
     )
     exclude: Annotated[list[ExcludeConfig], Sections()] = Field(
-        [],
-        description="Combinations to leave out, such as `{mesh_type: free, mesh_size: 1 mm}`; a list for several.",
+        [], description="Combinations to leave out, such as `{mesh_type: free, mesh_size: 1 mm}`; a list for several."
     )
     rows: FileName | None = Field(
         None,
@@ -447,9 +433,8 @@ class GridConfig(Section):
         "its key, and one row for each combination. Units stand beside the numbers (`5 mm`) or in the head "
         "(`mesh_size [mm]`). Other parameters of the grid are combined with each row.",
     )
-    sensitivity: Flag = Field(
+    sensitivity: Flag = default(
         "true",
-        validate_default=True,
         description="Whether each mesh, material, load and kinematics gets a sensitivity curve. "
         "Curves that `calibrated` needs are always computed.",
     )
@@ -469,9 +454,8 @@ class PartConfig(Section):
 
     number: PartNumber = Field(description="Number of the part.")
     of: PartCount = Field(description="Number of parts.")
-    by: DealtBy = Field(
+    by: DealtBy = default(
         "mesh",
-        validate_default=True,
         description="What a part keeps together: the scenes of a `mesh`, unless they are more than a part, or of a "
         "`grid`.",
     )
@@ -503,7 +487,7 @@ class StudyConfig(Section):
     mesh_files: Annotated[dict[str, list[MeshFileConfig]], Named("mesh type")] | None = Field(
         None, description="Your own mesh types: for each a list of files, one for each beam and mesh size."
     )
-    outputs: list[str] = Field([], validate_default=False)
+    outputs: list[str] = Field([])
     further_references: Annotated[list[FurtherReference], OneOrMore()] = Field(
         [],
         description="References at finite strain for every beam, material and load, besides the one of small strain. "
@@ -539,7 +523,6 @@ class StudyConfig(Section):
 RESERVED.update(StudyConfig.model_fields, GridConfig.model_fields)
 
 GRIDS_NEED = ("beams", "materials")
-"""Keys that a study with grids needs."""
 
 
 class Later(NamedTuple):
@@ -574,7 +557,6 @@ def study_model(kinds: Sequence[Kind], given: Container[object] | None = None) -
         Annotated[list[output_name], OneOrMore()],
         Field(
             [output.name for output in outputs if output.usual],
-            validate_default=False,
             description=f"Figures and tables of the dataset: {meanings}. "
             "Figures of scenes show nonlinear kinematics if a grid has them, otherwise linear ones.",
         ),

@@ -39,10 +39,6 @@ def load_study(path: str | Path, beside: Path | None = None) -> "Study":
     (0.001, 0.002, 0.005)
     """
     from ..config.load import load  # here, since pydantic takes a fifth of a second to import
+    from .division import part_of
 
-    study = load(path, kinds(), beside)
-    if study.part is None:
-        return study
-    from .division import part_of  # here: few studies are parts
-
-    return part_of(study)
+    return part_of(load(path, kinds(), beside))

@@ -24,14 +24,8 @@ if TYPE_CHECKING:
     from ..config.model import Study
 
 
-def run(config: str | Path, folder: str | Path, output: str | Path, untold: Collection[str] = ()) -> list[Path]:
+def run(study: "Study", config: str | Path, folder: Path, output: Path, untold: Collection[str] = ()) -> list[Path]:
     """Build the dataset of a study from its stored results."""
-    return _collected(load_study(config), config, Path(folder), Path(output), untold)
-
-
-def _collected(
-    study: "Study", config: str | Path, folder: Path, output: Path, untold: Collection[str] = ()
-) -> list[Path]:
     groups = with_repair(lambda: gathered(study, folder), folder)
     try:
         dataset.write(output, groups, provenance.attributes(study, config, untold))
@@ -50,7 +44,7 @@ def main(config: str, folder: str, output: str, record: str, digest: str, *untol
     chosen = {option: name in untold for option, name in rerun.BLANKED.items()}
     if rerun.jobs(study, plan(study, Path(folder), 1), chosen)[rerun.COLLECT].digest != digest:
         raise SystemExit(f"{config} was changed while the study ran; call the same command again")
-    made = _collected(study, config, Path(folder), Path(output), untold)
+    made = run(study, config, Path(folder), Path(output), untold)
     records.write(record, digest, made, untold=list(untold))
 
 

@@ -4,11 +4,11 @@ A part follows from the whole study and its number alone, so that all sites agre
 the whole study.
 """
 
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import ceil
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ..config.kind import kinds
 from ..config.messages import StudyError
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from ..config.kind import Kind
     from ..config.model import Study
     from ..runs.plan import Costs
-    from ..runs.stages import Task
 
 Name = tuple[str | int, ...]
 """Name of a piece within its study kind."""
@@ -37,19 +36,6 @@ class Division:
     def of_section(self, found: Mapping[Name, float]) -> dict[Name, float]:
         """Return the seconds of a section's pieces; a section is one piece if grids stay together."""
         return {(): sum(found.values())} if self.by == "grid" else dict(found)
-
-
-def by_task(kind: str, tasks: "Callable[[Study], Iterable[Task]]", piece: Callable[[Any], Name]) -> dict[str, Any]:
-    """Return how to divide a kind whose part of a study is a tuple with a task an entry."""
-
-    def pieces(study: "Study", costs: "Costs", division: Division) -> dict[Name, float]:
-        return division.of_section({piece(task.of): task.seconds(costs) for task in tasks(study)})
-
-    def take(study: "Study", names: Collection[Name]) -> "Study":
-        chosen = tuple(one for one in study.parts[kind] if piece(one) in set(names))
-        return replace(study, parts=study.parts | {kind: chosen})
-
-    return {"pieces": pieces, "take": take}
 
 
 def dealt(study: "Study", count: int, by: str) -> list[tuple[float, dict[str, list[Name]]]]:

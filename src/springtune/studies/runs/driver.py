@@ -86,7 +86,9 @@ class _File:
     def __init__(self, module: ModuleType, content: dict[str, Any], file: dict[str, Any], limits: str) -> None:
         self.module, self.content, self.file = module, content, file
         self.path = Path(content["folder"]) / f"{file['name']}.h5"
-        tasks = self._own("tasks", lambda file, content: file["tasks"])(file, content)
+        self.failed: Callable[..., Result] = getattr(module, "failed", _failed)
+        self.all_parts: Callable[..., dict[str, Result]] = getattr(module, "parts", _one_part)
+        tasks = module.tasks(file, content) if hasattr(module, "tasks") else file["tasks"]
         self.tasks = list({task["key"]: task for task in tasks}.values())
         self.limits = limits
 
@@ -98,16 +100,7 @@ class _File:
     @cached_property
     def missing(self) -> list[Task]:
         """Tasks whose result, or a part of it, is not stored."""
-        return [task for task in self.tasks if not self._all_parts(task, {}).keys() <= self.present]
-
-    def _own(self, name: str, usual: Callable[..., Any] | None = None) -> Any:
-        return getattr(self.module, name, usual)
-
-    def failed(self, task: Task, why: str) -> Result:
-        """Result of a failed task."""
-        usual = {"status": Status.FAILED, "message": why}
-        found: Result = self._own("failed", lambda task, why: usual)(task, why)
-        return found
+        return [task for task in self.tasks if not self.all_parts(task, {}).keys() <= self.present]
 
     def fail(self, tasks: list[Task], why: str, limits: str | None = None) -> None:
         """Store the failed results of tasks."""
@@ -115,13 +108,9 @@ class _File:
         parts = [self.parts(task, self.failed(task, why)) for task in tasks]
         store.add(self.path, {key: part | noted for one in parts for key, part in one.items()})
 
-    def _all_parts(self, task: Task, result: Result) -> dict[str, Result]:
-        found: dict[str, Result] = self._own("parts", lambda task, result: {task["key"]: result})(task, result)
-        return found
-
     def parts(self, task: Task, result: Result) -> dict[str, Result]:
         """Parts of a result to store; stored numbers stay unchanged."""
-        parts = self._all_parts(task, result)
+        parts = self.all_parts(task, result)
         return {key: part for key, part in parts.items() if key != task["key"] or key not in self.present}
 
     def solve(self, costs: "TaskCosts") -> None:
@@ -129,7 +118,7 @@ class _File:
         if not self.missing:
             return
         shared: tuple[Any, ...] = ()
-        if self._own("prepare"):
+        if hasattr(self.module, "prepare"):
             made = costs.attempt(self.file["name"], self._prepared, lambda why: {"message": f"mesh: {why}"})
             if made is None:
                 return
@@ -138,7 +127,7 @@ class _File:
                 costs.add(REFUSED, 0, 0.0, len(self.missing))
                 return
             shared = (made,)
-        order = self._own("order")
+        order, cost = getattr(self.module, "order", None), getattr(self.module, "cost", _cost)
         with store.Keeper(self.path) as keeper:
             for task in sorted(self.missing, key=order) if order else self.missing:
                 begin = time.perf_counter()
@@ -147,9 +136,7 @@ class _File:
                 )
                 if result is None:
                     continue
-                for number, row in enumerate(
-                    self._own("cost", _cost)(task, *shared, result, time.perf_counter() - begin)
-                ):
+                for number, row in enumerate(cost(task, *shared, result, time.perf_counter() - begin)):
                     costs.add(ONLY_PARTS if number == 0 and task["key"] in self.present else row[0], *row[1:])
                 for key, part in self.parts(task, result).items():
                     keeper[key] = part
@@ -160,6 +147,14 @@ class _File:
             return self.module.prepare(self.file, self.content)
         except RefusedError as error:
             return {"message": str(error)} | ({store.LIMITS: self.limits} if error.limited else {})
+
+
+def _failed(task: Task, why: str) -> Result:
+    return {"status": Status.FAILED, "message": why}
+
+
+def _one_part(task: Task, result: Result) -> dict[str, Result]:
+    return {task["key"]: result}
 
 
 def _cost(task: Task, *made_and_result: object) -> list[tuple[str, float, object]]:

@@ -77,7 +77,7 @@ def begin(folders: Iterable[Path]) -> None:
 def forget(place: Path = Path(), locked: Collection[str] = ()) -> None:
     """Remove notes of runs that are gone: of this machine, and those on folders that are locked by this process."""
     for path, note in _notes(place):
-        gone = note["host"] == this_host() and not _is_alive(note)
+        gone = note["host"] == this_host() and not lives(note["pid"], note["start"])
         if gone or not {*note["folders"]}.isdisjoint(locked):
             path.unlink(missing_ok=True)
 
@@ -99,7 +99,7 @@ def check_idle(folder: Path) -> bool:
             continue
         if note["host"] != this_host():
             raise LockedError(_told(folder, note, f"on {note['host']}, where this machine cannot look"))
-        if _is_alive(note):
+        if lives(note["pid"], note["start"]):
             raise LockedError(_told(folder, note, "on this machine"))
         killed = True
     return killed
@@ -118,7 +118,3 @@ def _notes(place: Path) -> Iterator[tuple[Path, dict[str, Any]]]:
         note = checked_json.read(path, host=str, pid=int, start=float, folders=list)
         if note is not None:
             yield path, note
-
-
-def _is_alive(note: dict[str, Any]) -> bool:
-    return lives(note["pid"], note["start"])

@@ -290,7 +290,12 @@ def plan(study: "Study", folder: Path, cores: int = 1, lasting: float | None = N
     lasting_before = known.get(LASTING, 0.0)
     lasting = lasting_before if lasting is None else lasting
     costs = Costs(folder.parent / COSTS_FILE, usual_costs())
-    members = {stage.name: dict(stage.members(study, costs)) for stage in stages() if stage.members}
+    members = {
+        stage.name: dict(stage.members(study, costs)) if study.parts[kind.name] else {}
+        for kind in kinds()
+        for stage in kind.stages
+        if stage.members
+    }
     before = {name: known.get(name, {}) for name in members}
     kept: dict[str, dict[str, list[str]]] = {name: {} for name in members}
     # Machines with more cores need other bundles. Bundles that are done stay, so that their jobs do not run again;

@@ -33,7 +33,6 @@ PAPER, PAPER_FILE = "paper", "paper.pdf"
 """The job that typesets the paper, and its product."""
 
 PAPER_STUDIES = ("paper", "definitions", "block", "laying", "stability", "benchmark", "shapes")
-"""Studies that the paper reads."""
 
 
 BLANKED = {"no_diff": "git_diff", "no_host": "host"}
@@ -61,7 +60,7 @@ def output_jobs(study: "Study") -> "dict[str, list[Output]]":
     found: dict[str, list[Output]] = {}
     for one in () if study.part else outputs().values():  # figures and tables are of whole studies
         if one.name in study.outputs and output_files(one, study):
-            found.setdefault(f"{PRESENT}_{one.made_by}", []).append(one)
+            found.setdefault(f"{PRESENT}_{one.job or one.name}", []).append(one)
     return found
 
 
@@ -124,9 +123,7 @@ def _browse_digest(study: "Study") -> str:
         path.name: records.checksum(path) for path in sorted((PACKAGE / "studies/output/browse/assets").iterdir())
     }
     return hash_of(
-        linked(study),
-        [stage_key(name) for name in ("studies.output.browse.page", *modules("outputs"))],
-        assets,
+        linked(study), [stage_key(name) for name in ("studies.output.browse.page", *modules("outputs"))], assets
     )
 
 
@@ -141,13 +138,15 @@ def paper_job(source: Path, datasets: "Iterable[Path]", folder: Path) -> Job:
     return Job(PAPER, digest, (str(folder / PAPER_FILE),), record, inputs=tuple(map(str, datasets)))
 
 
-def fault(job: Job, found: dict[str, Job], wholly: bool = False) -> str:
+def fault(job: Job, found: dict[str, Job]) -> str:
     """Return why a job must run, or an empty string; jobs before it count only by their products."""
-    why = records.fault(job.record, job.digest, job.products, wholly)
+    why = records.fault(job.record, job.digest, job.products)
     if not why and job.reads and not _is_up_to_date(job, found[job.reads]):
         return f"{found[job.reads].products[0]} is another one"
-    if not why and job.inputs and checked_json.read(job.record)["read"] != [_checksum(path) for path in job.inputs]:
-        return "a dataset that it reads is another one"
+    if not why and job.inputs:
+        read = [records.checksum(path) if Path(path).exists() else "" for path in job.inputs]
+        if checked_json.read(job.record)["read"] != read:
+            return "a dataset that it reads is another one"
     return why
 
 
@@ -163,10 +162,6 @@ def outdated(study: "Study", folder: Path, chosen: Mapping[str, bool] | None = N
     faults = {job.record: why for job in found.values() if (why := fault(job, found))}
     known = {record: why for record, why in faults.items() if record.exists()}
     return known if len(known) == len(faults) else known or None
-
-
-def _checksum(path: str) -> str:
-    return records.checksum(path) if Path(path).exists() else ""
 
 
 def _is_up_to_date(job: Job, before: Job) -> bool:

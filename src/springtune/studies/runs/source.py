@@ -7,7 +7,6 @@ PACKAGE = Path(__file__).parents[2]
 CONFIG_FOLDER = Path("config")
 
 USUAL_STUDY = "paper.yaml"
-"""Study of a run without another one."""
 
 COPY, COMMIT_FILE = "workflow", "commit.txt"
 """In the package of a wheel: the workflow, and the commit that it was built from; see ``hatch_build.py``."""

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 SCALARS = "scalars"
 
 MAGIC = b"springtune results, SHA-256 of what follows after 512 bytes: "
-"""Start of a file."""
 
 LIMITS = "limits"
 """Name under which the failed result of a task beyond its limits has these, in words; readers do not get it."""

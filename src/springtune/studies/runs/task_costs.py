@@ -29,9 +29,6 @@ STOPPED = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
 
 LIMITS_TOLD = "(`limits` of the study)"
 
-PARENT_DEATH = 1
-"""Linux's prctl option: signal a process when its parent ends."""
-
 
 class Watch:
     """Limits of a job's tasks, and the current task."""
@@ -71,7 +68,7 @@ class Watch:
 def go_with_parent() -> None:
     """Let the kernel end this process with its parent, where it can."""
     if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(PARENT_DEATH, signal.SIGKILL)
+        ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
 
 
 def run_limited(function: Callable[[], None], watch: Watch, store_failed: Callable[[str, str], None]) -> None:
@@ -160,9 +157,6 @@ def own_reason(error: Exception) -> str:
     return told if named or isinstance(error, ArithmeticError) else ""
 
 
-KIBI = 1024
-"""Unit in which Linux reports the memory of a process [byte]."""
-
 BEYOND_LIMITS = "beyond limits"
 """Name under which records count the tasks that went beyond their limits."""
 
@@ -225,4 +219,4 @@ class TaskCosts:
 def most_memory() -> int:
     """Largest memory so far of this process or a finished child [byte]."""
     most = max(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
-    return most if sys.platform == "darwin" else KIBI * most
+    return most if sys.platform == "darwin" else 1024 * most  # Linux reports KiB

@@ -74,14 +74,14 @@ def computed(done: Path) -> int | None:
 
 def estimates(study: "Study", plan: Plan, jobs: Iterable[tuple[int, str, int, list[str]]]) -> dict[int, Estimate]:
     """Expected work of each job of a run."""
-    folder = plan.folder
     of_bundles = _of_bundles(study, plan)
     order = {stem: place for place, stem in enumerate(of_bundles)}
     found = []
     for number, rule, threads, outputs in jobs:
         if outputs:
             stem = Path(outputs[0]).stem if Path(outputs[0]) == plan.record(Path(outputs[0]).stem) else ""
-            estimate = of_bundles.get(stem) or _presented(folder, rule, outputs)
+            seconds, products = _seconds_presented(plan.folder, rule, len(outputs)), [Path(path) for path in outputs]
+            estimate = of_bundles.get(stem) or Estimate(AFTER, len(outputs), seconds, products=products)
             estimate.threads = threads
             found.append((order.get(stem, len(order)), number, estimate))
     return {number: estimate for _, number, estimate in sorted(found, key=lambda row: row[:2])}
@@ -104,14 +104,8 @@ def _of_bundles(study: "Study", plan: Plan) -> dict[str, Estimate]:
     return found
 
 
-def _presented(folder: Path, rule: str, outputs: list[str]) -> Estimate:
-    """Estimate of a job after the stages; its former seconds if it ran before."""
-    return Estimate(
-        AFTER, len(outputs), _seconds_presented(folder, rule, len(outputs)), products=list(map(Path, outputs))
-    )
-
-
 def _seconds_presented(folder: Path, rule: str, files: int) -> float:
+    """Seconds of a job after the stages; its former ones if it ran before."""
     try:
         return float((folder / "benchmarks" / f"{rule}.tsv").read_text().splitlines()[1].split("\t")[0])
     except (OSError, IndexError, ValueError):  # never run, or not to its end

@@ -31,7 +31,7 @@ from ...config.fields import (
     one_of,
 )
 from ...config.kind import Kind
-from ...config.sections import Section, optional
+from ...config.sections import Section, default, optional
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key
 from ...runs.stages import Task, stage
 from . import CURVE_COUNTS, OTHER_APPROACHES, THREAD_COUNTS, approach_names
@@ -68,7 +68,6 @@ class BenchmarkConfig(Section):
     mesh_type: Annotated[list[MeshType], OneOrMore()] = Field(description="Mesh types of the definitions.")
     approach: Annotated[list[OtherApproach], OneOrMore()] = Field(
         list(OTHER_APPROACHES),
-        validate_default=False,
         description="Other approaches: finite elements, CalculiX where it is on the machine, motion to rest, and what "
         "the paper names: tensor-mass, pre-computed responses, boundary elements, free-form deformation. All without.",
     )
@@ -78,9 +77,8 @@ class BenchmarkConfig(Section):
         default_factory=dict,
         description="The shortest of them that an approach has, by its name, such as `delingette/structured: 0.5 mm`.",
     )
-    most_seconds: Seconds = Field(
+    most_seconds: Seconds = default(
         "30",
-        validate_default=True,
         description="Seconds of the processor that a run may take; what takes more is a hole that says so, and so are "
         "finer sizes of it.",
     )

@@ -13,7 +13,7 @@ from springtune.springs import DEFINITIONS
 from ...config.checks import check_beam_material, check_for_triangles, check_known, check_particles, check_product
 from ...config.fields import BeamName, DefinitionName, Length, MaterialName, OneOrMore, Stress, number, one_of
 from ...config.kind import Kind
-from ...config.sections import Section, optional
+from ...config.sections import Section, default, optional
 from ...runs.keys import definition_key, material_key, mesh_type_key
 from ...runs.stages import Task, stage
 from .outputs import OUTPUTS
@@ -56,19 +56,14 @@ class LayingConfig(Section):
         description="Definitions that derive a stiffness and need no reference."
     )
     mesh_size: Annotated[list[Length], OneOrMore()] = Field(description="Lengths of an edge.")
-    reference_size: Length = Field(
-        "1 mm", validate_default=True, description="Length of an edge of the reference's finest mesh."
-    )
-    loading: Annotated[list[Loading], OneOrMore()] = Field(
+    reference_size: Length = default("1 mm", description="Length of an edge of the reference's finest mesh.")
+    loading: Annotated[list[Loading], OneOrMore()] = default(
         "pressure",
-        validate_default=True,
         description="`pressure`: on the upper face, following it; `gravity`: the same force as weight; `ends`: draws "
         "the ends down to the floor.",
     )
     pressure: Stress = Field(description="Pressure, or weight over the upper face.")
-    friction: Annotated[list[Friction], OneOrMore()] = Field(
-        "0", validate_default=True, description="Coulomb's coefficients of friction."
-    )
+    friction: Annotated[list[Friction], OneOrMore()] = default("0", description="Coulomb's coefficients of friction.")
 
 
 @dataclass(frozen=True)
@@ -95,8 +90,6 @@ class Laying:
 
 
 def _check(config, problems):
-    if not config.laying:
-        return
     check_known(problems, ("laying", "strip"), "beam", config.laying.strip, config.beams)
     for key in ("material", "support"):
         check_beam_material(problems, ("laying", key), getattr(config.laying, key), config)
@@ -114,8 +107,6 @@ def _check(config, problems):
 
 def _expand(config, declared):
     section = config.laying
-    if not section:
-        return None
     beam, base = declared.beams[section.strip], section.trapezoid
     parts = {
         "strip": Strip(beam.length, beam.height, beam.thickness),
@@ -146,7 +137,7 @@ def _axes(laying):
 
 def _tasks(study):
     laying = study.parts["laying"]
-    for one in (*laying.strips, *laying.references) if laying else ():
+    for one in (*laying.strips, *laying.references):
         values = asdict(one) | {"material": material_key(one.material), "support": material_key(one.support)}
         # The trapezoid is of Delingette's springs.
         also = mesh_type_key("structured"), definition_key(one.definition), definition_key("delingette")

@@ -14,7 +14,7 @@ from ...config.checks import check_particles
 from ...config.fields import Flag, Length
 from ...config.kind import Kind
 from ...config.model import MeshSpec
-from ...config.sections import Section
+from ...config.sections import Section, default
 from ...runs.keys import definition_key, mesh_type_key
 from ...runs.stages import Task, stage
 from ..scenes.plan import mesh_key, mesh_parameters, mesh_source, particles
@@ -27,8 +27,8 @@ class PatchConfig(Section):
     Its mesh is that of a beam of this extent: give the extent of the beam to compare with.
     """
 
-    length: Length = Field("100 mm", validate_default=True, description="Extent along x.")
-    height: Length = Field("20 mm", validate_default=True, description="Extent along y.")
+    length: Length = default("100 mm", description="Extent along x.")
+    height: Length = default("20 mm", description="Extent along y.")
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ def _summary(moduli):
 
 
 def _tasks(study):
-    for one in study.parts["moduli"].measurements if study.parts["moduli"] else ():
+    for one in study.parts["moduli"].measurements:
         mesh, name = _mesh_of(study, one), f"{one.mesh_type}_{1e3 * one.mesh_size:g}mm"
         yield Task(
             {"definition": one.definition, "poisson_ratio": one.poisson_ratio},
@@ -123,9 +123,8 @@ KIND = Kind(
     grid_fields={
         "moduli": (
             Flag,
-            Field(
+            default(
                 "false",
-                validate_default=True,
                 description="Whether effective moduli are measured for each definition, mesh type, mesh size and "
                 "Poisson's ratio, on the box under `patch`. Definitions with a given stiffness have none.",
             ),

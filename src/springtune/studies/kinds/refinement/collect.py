@@ -125,7 +125,6 @@ def _put(one, places, batches, results, where, data):
 
 
 CROSSING_COLUMNS = ("refinement", "definition", "parameter", "unit", "error", "value", "width", "change")
-"""Columns of the table of crossings."""
 
 
 def write(tree, folder):

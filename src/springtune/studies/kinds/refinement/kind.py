@@ -32,7 +32,7 @@ from ...config.fields import (
 )
 from ...config.kind import Kind
 from ...config.messages import refuse, show
-from ...config.sections import Section, optional
+from ...config.sections import Section, default, optional
 from ...runs.checked_json import hash_of
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key, stage_key
 from ...runs.stages import Task, stage
@@ -40,7 +40,6 @@ from .batches import Rule
 from .outputs import OUTPUTS, SPACINGS, VARIED
 
 MOST_REFINED = 10_001
-"""Most values of a refinement."""
 
 MADE = ("mesh_size", "force")
 """Parameters that a refinement states unless it varies them; beam and material have the others."""
@@ -58,12 +57,10 @@ def _read_share(value: str) -> float:
 
 
 Share = Annotated[
-    float,
-    Scalar(_read_share, {"type": ["string", "number"], "examples": ["1 %"]}, "a share such as '1 %'"),
+    float, Scalar(_read_share, {"type": ["string", "number"], "examples": ["1 %"]}, "a share such as '1 %'")
 ]
 End = Annotated[
-    str,
-    Scalar(str, {"type": ["string", "number"], "examples": ["1 mm"]}, "a value of the parameter, such as '1 mm'"),
+    str, Scalar(str, {"type": ["string", "number"], "examples": ["1 mm"]}, "a value of the parameter, such as '1 mm'")
 ]
 Count = Annotated[int, number("a whole number from 2 to 10001, such as 33", 2, MOST_REFINED, whole=True)]
 ENDS = {
@@ -90,7 +87,7 @@ class RefinementConfig(Section):
     """
 
     beam: BeamName = Field(description="Beam.")
-    mesh_type: MadeType = Field("structured", validate_default=True, description="Generated mesh type.")
+    mesh_type: MadeType = default("structured", description="Generated mesh type.")
     mesh_size: Length | None = Field(None, description="Length of an edge; required unless it is the parameter.")
     material: MaterialName = Field(description="Material.")
     load: Load = Field(description="Load.")
@@ -98,22 +95,18 @@ class RefinementConfig(Section):
     definition: Annotated[list[DefinitionName], OneOrMore()] = Field(
         description="Definitions that derive a stiffness and need no reference."
     )
-    kinematics: Kinematics = Field("nonlinear", validate_default=True, description="Kinematics of the network.")
+    kinematics: Kinematics = default("nonlinear", description="Kinematics of the network.")
     parameter: ParameterName = Field(description="Parameter to vary: " + "; ".join(
         f"`{name}`, {one.meaning}" for name, one in VARIED.items()) + ".")  # fmt: skip
     start: End = Field(alias="from", description="Smallest value, with its unit.")
     stop: End = Field(alias="to", description="Largest value, with its unit.")
-    points: Count = Field("5", validate_default=True, description="Values of the first batch, both ends included.")
-    spacing: Spacing = Field(
-        "linear", validate_default=True, description="Whether values or their logarithms are evenly spaced."
+    points: Count = default("5", description="Values of the first batch, both ends included.")
+    spacing: Spacing = default("linear", description="Whether values or their logarithms are evenly spaced.")
+    tolerance: Share = default("1 %", description="Size of the error that matters.")
+    resolution: Share = default(
+        "0.1 %", description="Width of the narrowest intervals, as a share of the distance between the ends."
     )
-    tolerance: Share = Field("1 %", validate_default=True, description="Size of the error that matters.")
-    resolution: Share = Field(
-        "0.1 %",
-        validate_default=True,
-        description="Width of the narrowest intervals, as a share of the distance between the ends.",
-    )
-    most: Count = Field("33", validate_default=True, description="Most values of each definition.")
+    most: Count = default("33", description="Most values of each definition.")
 
 
 @dataclass(frozen=True)
@@ -134,7 +127,7 @@ class Refinement:
 
 
 def _check(config, problems):
-    for name, section in (config.refine or {}).items():
+    for name, section in config.refine.items():
         path = "refine", name
         check_known(problems, (*path, "beam"), "beam", section.beam, config.beams)
         check_beam_material(problems, (*path, "material"), section.material, config)
@@ -202,7 +195,7 @@ def _check_definitions(section, path, problems):
 
 def _expand(config, declared):
     found = []
-    for name, section in (config.refine or {}).items():
+    for name, section in config.refine.items():
         ends = [ENDS[section.parameter].read(text) for text in (section.start, section.stop)]
         how = section.points, section.spacing == SPACINGS[1], section.tolerance, section.resolution, section.most
         beam, material = declared.beams[section.beam], declared.materials[section.material]
@@ -226,14 +219,11 @@ def _axes(refinements):
 
 
 def _summary(refinements):
-    if not refinements:
-        return []
     first, most = (sum(getattr(one.rule, name) for one in refinements) for name in ("points", "most"))
     return [["refined", first, f"values to begin with, at most {most}, where errors cross zero or a tolerance"]]
 
 
 REFINER = "studies.kinds.refinement.solve"
-"""Module that solves refinements."""
 
 USUAL_PARTICLES = 1e3
 """Particles of a mesh of unknown size, for costs."""

@@ -270,12 +270,9 @@ def _indices(sample, data, axes):
 
 
 RESAMPLES = 1000
-"""Bootstrap samples."""
 
 LEVEL = 0.95
 """Share of bootstrap samples within a band."""
-
-BOOTSTRAP_SEED = 0
 
 DRAWN_TOGETHER = 1 << 21
 """Most base samples drawn at once for bootstrap samples: 16 MB."""
@@ -327,7 +324,7 @@ def sobol_indices(at_a: np.ndarray, at_b: np.ndarray, at_ab: np.ndarray, least: 
     # Terms of each base sample whose means are taken: 2 n_parameters for the indices, two for the variance.
     terms = np.concatenate([at_b * (at_ab - at_a), 0.5 * (at_a - at_ab) ** 2, [(at_a + at_b) / 2],
                             [(at_a**2 + at_b**2) / 2]])  # fmt: skip
-    random = np.random.default_rng(BOOTSTRAP_SEED)
+    random = np.random.default_rng(0)
     parts, together = [terms.mean(axis=1)[None]], max(1, DRAWN_TOGETHER // rows)
     for begin in range(0, RESAMPLES, together):
         resamples = range(begin, min(begin + together, RESAMPLES))

@@ -25,10 +25,8 @@ SOBOL_INDICES = "sobol-indices"
 """The design for Sobol indices: rows of a base sample differ in one parameter."""
 
 DESIGNS = (SOBOL_INDICES, "sobol", "latin-hypercube")
-"""How samples are drawn."""
 
 SMALLEST_SIZE = 8
-"""Smallest size of a sample."""
 
 BASE_ROWS = 64
 """Most base samples of a task of `SOBOL_INDICES`; they have some hundred rows."""

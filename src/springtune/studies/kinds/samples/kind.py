@@ -15,11 +15,11 @@ from springtune.problem.parameters import MOST_SCENES
 from springtune.problem.quantities import LEAST, nearest
 from springtune.springs import DEFINITIONS
 
-from ...config.checks import MORE_SCENES, check_able, most_scenes
+from ...config.checks import MORE_SCENES, check_able, in_mm, most_scenes
 from ...config.fields import DefinitionName, Flag, Kinematics, Load, OneOrMore, Scalar, number, one_of, quantity
 from ...config.kind import Kind
 from ...config.messages import refuse, show
-from ...config.sections import Section, optional
+from ...config.sections import Section, default, optional
 from ...runs.checked_json import hash_of
 from ...runs.keys import definition_key, mesh_type_key, stage_key
 from ...runs.stages import Task, stage
@@ -33,7 +33,6 @@ DISTRIBUTION_KEYS = {
     "triangular": ("from", "mode", "to"),
     "normal": ("mean", "deviation"),
 }
-"""Keys that each distribution needs."""
 
 DEVIATIONS = 4.0
 """Standard deviations from the mean at which a normal distribution ends by default."""
@@ -169,8 +168,8 @@ class ParametersConfig(Section):
         description="Extent along x, the direction of the load."
     )
     height: Annotated[Drawn, Distributed("height", "{from: 20 mm, to: 80 mm}")] = Field(description="Extent along y.")
-    thickness: Annotated[Drawn, Distributed("thickness", "{from: 1 mm, to: 2 mm}")] = Field(
-        "1 mm", validate_default=True, description="Extent out of the plane."
+    thickness: Annotated[Drawn, Distributed("thickness", "{from: 1 mm, to: 2 mm}")] = default(
+        "1 mm", description="Extent out of the plane."
     )
     mesh_size: Annotated[Drawn, Distributed("mesh_size", "{from: 2 mm, to: 5 mm}")] | None = Field(
         None, description="Length of an edge; at most the smaller side of any beam. Give this or `relative_mesh_size`."
@@ -219,31 +218,26 @@ class SamplesConfig(Section):
 
     design: Design = Field(
         SOBOL_INDICES,
-        validate_default=True,
         description="`sobol-indices`: Saltelli's design for first- and total-order Sobol indices, with `size` x "
         "(varied parameters + 2) points; `sobol`: scrambled Sobol points; `latin-hypercube`.",
     )
     size: Size = Field(description="Number of points: a power of two. For `sobol-indices`, of base samples.")
-    seed: Seed = Field("1", validate_default=True, description="Seed of the random numbers.")
-    mesh_type: MadeType = Field("structured", validate_default=True, description="Generated mesh type.")
+    seed: Seed = default("1", description="Seed of the random numbers.")
+    mesh_type: MadeType = default("structured", description="Generated mesh type.")
     load: Annotated[list[Load], OneOrMore()] = Field(description="Loads; each acts on every point's scene.")
     definition: Annotated[list[DefinitionName], OneOrMore()] = Field(
         description="Definitions that need no reference and no stated stiffness."
     )
-    kinematics: Kinematics = Field(
+    kinematics: Kinematics = default(
         "linear",
-        validate_default=True,
         description="`linear` solves scenes once that differ in thickness, Young's modulus and force alone; "
         "`nonlinear` solves each scene, which takes some ten times as long.",
     )
-    best_stiffness: Flag = Field(
-        "true",
-        validate_default=True,
-        description="Whether to find the uniform stiffness without an error, too; with linear kinematics only.",
+    best_stiffness: Flag = default(
+        "true", description="Whether to find the uniform stiffness without an error, too; with linear kinematics only."
     )
     failures: FailurePolicy = Field(
         DROP,
-        validate_default=True,
         description="If scenes have no value, `drop` leaves their whole base samples out of indices, and `withhold` "
         "gives no indices. Both count them.",
     )
@@ -284,8 +278,6 @@ class Sample:
 
 def _check(config, problems):
     section = config.samples
-    if not section:
-        return
     where, sample = ("samples", "parameters"), _sample(section)
     if (section.parameters.mesh_size is None) == (section.parameters.relative_mesh_size is None):
         if section.parameters.mesh_size is not None:
@@ -327,24 +319,20 @@ def _check_sizes(sample, problems):
     if relative:
         largest = size["high"] * height["high"]
         if largest > length["low"]:
-            problems.add(path, f"{size['high']:g} of a height of {_mm(height['high'])} is {_mm(largest)}, larger than "
-                         f"a length of {_mm(length['low'])}; give a smaller 'to', or longer beams")  # fmt: skip
+            problems.add(path, f"{size['high']:g} of a height of {in_mm(height['high'])} is {in_mm(largest)}, larger "
+                         f"than a length of {in_mm(length['low'])}; give a smaller 'to', or longer beams")  # fmt: skip
     else:
         largest, side = size["high"], min(length["low"], height["low"])
         if largest > side:
-            problems.add(path, f"up to {_mm(largest)} is larger than the smallest side of a beam, {_mm(side)}; give at "
-                         f"most {_mm(side)}, or a 'relative_mesh_size'")  # fmt: skip
+            problems.add(path, f"up to {in_mm(largest)} is larger than the smallest side of a beam, {in_mm(side)}; "
+                         f"give at most {in_mm(side)}, or a 'relative_mesh_size'")  # fmt: skip
     box = length["high"], height["low" if relative else "high"]
     smallest = size["low"] * (height["low"] if relative else 1.0)
     particles = MESH_TYPES[sample.mesh_type].particles(*box, smallest) if smallest**2 else float("inf")
     if particles > MOST_MESHED:
-        low, beam = f"{size['low']:g}" if relative else _mm(size["low"]), f"{_mm(box[0])} x {_mm(box[1])}"
+        low, beam = f"{size['low']:g}" if relative else in_mm(size["low"]), f"{in_mm(box[0])} x {in_mm(box[1])}"
         most = f"more than {MOST_MESHED:.0e}"
         problems.add(path, f"{low} makes {particles:.0e} particles of a beam {beam}, {most}; give a larger 'from'")
-
-
-def _mm(length: float) -> str:
-    return f"{1e3 * length:g} mm"
 
 
 def _sample(section):
@@ -360,8 +348,6 @@ def _sample(section):
 
 
 def _expand(config, declared):
-    if not config.samples:
-        return None
     sample = _sample(config.samples)
     sides = [sample.parameters[name] for name in ("length", "height")]
     smallest = tuple(side["low"] for side in sides)
@@ -423,8 +409,6 @@ def result_key(sample, load, definition):
 def _references(study):
     """Tasks of the references, one a kind of load."""
     sample = study.parts["samples"]
-    if not sample:
-        return
     drawn, box = None, reference_box(sample)
     if sample.rows <= MOST_SOLVED:
         drawn = {"design": sample.design, "seed": sample.seed, "parameters": sample.parameters}
@@ -438,8 +422,6 @@ def _references(study):
 def _blocks(study):
     """Tasks of some base samples each; those of a sample of half the size are the first of them."""
     sample = study.parts["samples"]
-    if not sample:
-        return
     scenes = {
         result_key(sample, load, definition): _load_of(sample, load) | {"definition": definition}
         for load in sample.loads

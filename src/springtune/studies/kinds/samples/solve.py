@@ -30,9 +30,6 @@ GONE_NETWORK = "lost "
 TOGETHER = {"linear": 32, "nonlinear": 4}
 """Tasks whose meshes are sorted together; among more tasks more meshes share cells."""
 
-PART = "_part"
-"""Suffix of the stem of an unfinished task's file."""
-
 SCALES = 1e-7
 """Largest relative difference of a scaled result from a solved one: rounding."""
 
@@ -61,7 +58,7 @@ class _Block:
 
     def __init__(self, file, path, present, limits):
         (task,) = file["tasks"]
-        self.file, self.path, self.part = file, path, path.with_stem(f"{path.stem}{PART}")
+        self.file, self.path, self.part = file, path, path.with_stem(f"{path.stem}_part")
         self.missing = {key: scene for key, scene in file["results"].items() if key not in present}
         self.is_new = DRAWN not in present
         lost = {name for name in present if name.startswith(GONE_NETWORK)}

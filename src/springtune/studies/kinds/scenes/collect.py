@@ -87,14 +87,10 @@ def _reference_of(scene):
     return Reference(scene.mesh.beam, scene.material, scene.load, scene.force)
 
 
-def _mesh_labels(mesh):
-    return {"beam": mesh.beam.name, "mesh_type": mesh.mesh_type, "mesh_size": mesh.mesh_size}
-
-
 def _meshes(study, folder, root):
     for mesh in study.meshes:
         notes = stored.read_notes(folder / "meshes", plan.stem(mesh))
-        root.put({label: value for label, value in notes.items() if label in root.data}, **_mesh_labels(mesh))
+        root.put({label: value for label, value in notes.items() if label in root.data}, **mesh.labels)
 
 
 def _references(study, folder, root):
@@ -167,7 +163,7 @@ def _scenes(study, folder, root, block, fields, objections):
                 x, y = result["displacements"].T
                 of_springs = {"stiffness": result["spring_stiffnesses"], "spring_force": result["spring_forces"]}
                 fields.put({"displacement_x": x, "displacement_y": y} | of_springs, **place)
-                body = _mesh_labels(mesh) | {"material": scene.material.name, "load": scene.load}
+                body = mesh.labels | {"material": scene.material.name, "load": scene.load}
                 if tuple(body.values()) not in compared:  # scenes differ in their definitions
                     compared.add(tuple(body.values()))
                     fields.put(_at_particles(study, folder, scene, fields.data), **body)
@@ -184,7 +180,7 @@ def _at_particles(study, folder, scene, fields):
     found = any_reference.read(folder / "references", reference, ["x", "y", "displacements"])
     if "x" not in found:
         return {}
-    places = fields[["x", "y"]].sel(_mesh_labels(scene.mesh))
+    places = fields[["x", "y"]].sel(scene.mesh.labels)
     points = np.stack([places.x.values, places.y.values], axis=1)
     points = points[~np.isnan(points[:, 0])]
     x, y = scene.force * interpolate(found["x"], found["y"], found["displacements"], points).T
@@ -284,7 +280,7 @@ def _fields(study, folder, axes):
     scenes = [scene for scene in study.scenes if scene in whole]
     shown = {scene.mesh for scene in scenes}
     read = {mesh: stored.read(folder / "meshes", plan.stem(mesh)) for mesh in study.meshes if mesh in shown}
-    meshes = [(_mesh_labels(mesh), found.mesh) for mesh, found in read.items() if found]
+    meshes = [(mesh.labels, found.mesh) for mesh, found in read.items() if found]
     outlines = {one: _outline(study, folder, one) for one in dict.fromkeys(map(_reference_of, scenes))}
     fields = fields_on(fields_of(study), axes, meshes, [points for points, _ in outlines.values()])
     for scene in scenes:

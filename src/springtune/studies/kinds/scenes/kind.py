@@ -65,11 +65,7 @@ def summary(study: Study, further: list[list[object]]) -> str:
     rows: list[list[object]] = [
         ["scenes", len(study.scenes), again],
         ["meshes", meshes, f"each serves {users / meshes:.3g} scenes and curves on average"],
-        [
-            "references",
-            len(study.references),
-            f"from {solutions}: small strain scales with force, E t and size",
-        ],
+        ["references", len(study.references), f"from {solutions}: small strain scales with force, E t and size"],
         ["curves", len(study.curves), f"of {len(study.stiffness_ratios)} stiffnesses, each one continuation in F/k"],
         ["networks", networks, "to factorize at rest, at most: loads and uniform stiffnesses share one a mesh"],
     ]
@@ -112,10 +108,7 @@ def _networks(study: Study) -> int:
 
 def _within(study: Study) -> int:
     """Number of printed cells that the study has scenes for."""
-    cells = {
-        (scene.mesh.beam.name, scene.mesh.mesh_type, scene.mesh.mesh_size, scene.material.name, scene.load)
-        for scene in study.scenes
-    }
+    cells = {(*scene.mesh.labels.values(), scene.material.name, scene.load) for scene in study.scenes}
     return sum((cell.beam, cell.mesh_type, cell.mesh_size, cell.material, cell.load) in cells for cell in study.printed)
 
 

@@ -42,9 +42,10 @@ def run(content, costs, make=make, counted="mesh"):
             stored.refuse(folder, task["name"], task["key"], made)
             costs.add(REFUSED, 0, known["mesh_seconds"])
             continue
-        mesh = made.mesh if isinstance(made, GroupedMesh) else made
+        grouped = made if isinstance(made, GroupedMesh) else GroupedMesh(made)
+        mesh = grouped.mesh
         known |= quality(mesh) | {"particles": len(mesh.points), "springs": len(mesh.edges)}
-        stored.write_made(folder, task["name"], task["key"], made, known)
+        stored.write_made(folder, task["name"], task["key"], grouped, known)
         costs.add(counted, len(mesh.points), time.perf_counter() - begin)
 
 

@@ -65,9 +65,6 @@ def curves_by_mesh(study):
 #
 # Where that takes fewer solves. An interpolant has no whole fields; references that need one are solved one by one.
 
-WITH_FIELDS = ("block", "definitions")
-"""Outputs that show whole fields of all references."""
-
 NODES_OF_ASPECTS = ((0.5, 5), (1.2, 9), (3.6, 17), (7.0, 33))
 """Nodes along aspect ratios that interpolants took, by the largest logarithm of the last over the first one. Others
 took up to 65."""
@@ -89,7 +86,7 @@ NU_STEP = 0.05
 @once_a_study("grids", "outputs")
 def interpolants(study: "Study") -> "dict[str, tuple[Box, dict[Body, tuple[float, float]]]]":
     """Interpolants of a study by kind of load: their box, and the unit problem of each body in it."""
-    if any(name in study.outputs for name in WITH_FIELDS):
+    if "block" in study.outputs or "definitions" in study.outputs:  # which show whole fields of all references
         return {}
     scenes = [scene for grid in study.grids for scene in grid.scenes]
     # Bodies are few and shared; comparing them for each of 100,000 scenes is no way to find them.
@@ -129,16 +126,12 @@ def box_of(problems: set[tuple[float, float]]) -> "Box":
     first, last, least, largest = min(aspects), max(aspects), min(nus), max(nus)
     if first < last:
         # An end that is one of the steps stays where it is, though its logarithm is rounded.
-        lower, upper = floor(ASPECT_STEPS * log10(first) + 1e-5), ceil(ASPECT_STEPS * log10(last) - 1e-5)
-        first, last = (
-            min(first, float(f"{10 ** (lower / ASPECT_STEPS):.7g}")),
-            max(last, float(f"{10 ** (upper / ASPECT_STEPS):.7g}")),
-        )
+        steps = floor(ASPECT_STEPS * log10(first) + 1e-5), ceil(ASPECT_STEPS * log10(last) - 1e-5)
+        lower, upper = (float(f"{10 ** (step / ASPECT_STEPS):.7g}") for step in steps)
+        first, last = min(first, lower), max(last, upper)
     if least < largest:
-        below, above = (
-            round(floor(least / NU_STEP + 1e-6) * NU_STEP, 2),
-            round(ceil(largest / NU_STEP - 1e-6) * NU_STEP, 2),
-        )
+        steps = floor(least / NU_STEP + 1e-6), ceil(largest / NU_STEP - 1e-6)
+        below, above = (round(step * NU_STEP, 2) for step in steps)
         least, largest = min(least, below) if below > -1 else least, min(max(largest, above), 0.5)
     return (first, last), (least, largest)
 
@@ -235,7 +228,7 @@ def solved_reference(beam, material, load):
 
 def finite_key(reference, kind):
     """Key of a reference at finite strain."""
-    return hash_of(kind, _finite_problem(reference), stage_key("studies.kinds.scenes.reference"))
+    return hash_of(_finite_problem(reference, kind), stage_key("studies.kinds.scenes.reference"))
 
 
 def _unit_problem(beam, material, load):
@@ -243,27 +236,33 @@ def _unit_problem(beam, material, load):
     return aspect_ratio, nu, kind.name
 
 
-def _finite_problem(reference):
+def _finite_problem(reference, kind):
+    law, _, plane = kind.partition("-plane-")
     load = LOADS[reference.load]
-    return [beam_key(reference.beam), material_key(reference.material), load.kind.name, reference.force, load.follower]
+    found = {"law": law, "plane": plane, "load": load.kind.name, "force": reference.force, "follower": load.follower}
+    return found | {"beam": beam_key(reference.beam), "material": material_key(reference.material)}
 
 
 def curve_key(study, curve):
     """Key of a sensitivity curve."""
-    parameters = [mesh_key(curve.mesh), LOADS[curve.load].kind.name, curve.force, curve.kinematics]
-    parameters += [stiffnesses(study, curve), reference_of(study, curve.mesh.beam, curve.material, curve.load)]
-    return hash_of(parameters, stage_key("studies.kinds.scenes.sensitivity"))
+    return hash_of(mesh_key(curve.mesh), _curve(study, curve), stage_key("studies.kinds.scenes.sensitivity"))
 
 
 def scene_key(study: "Study", scene: "SceneSpec") -> str:
     """Key of a scene; results of calibrated scenes are stored under `solved_keys`."""
-    return hash_of(
-        _common(study, scene)[1],
-        scene.force,
-        _given_stiffness(study, scene),
-        _thickness_ratio(study, scene),
-        scene.stiffness_scale,
-    )
+    return hash_of(_common(study, scene)[1], _own(study, scene))
+
+
+def _own(study, scene):
+    """Part of a task that scenes of the same `_common` part differ in."""
+    own = {"force": scene.force}
+    if scene.definition == "paper":
+        own["stiffness"] = study.stiffness_table[scene.mesh.mesh_type, scene.material.name]
+    if scene.stiffness_scale != 1:
+        own["stiffness_scale"] = scene.stiffness_scale
+    if scene.definition == "calibrated":  # stiffness is proportional to thickness
+        own["thickness_ratio"] = scene.mesh.beam.thickness / _calibrating(study)[calibration_name(scene)]
+    return own
 
 
 @once_a_study("scenes", "curves", "grids", "outputs", "stiffness_table", "calibration")
@@ -324,13 +323,6 @@ def stiffnesses(study, curve):
     return [ratio * membrane for ratio in study.stiffness_ratios]
 
 
-def _thickness_ratio(study, scene):
-    """Thickness over that of the calibrating beam; stiffness is proportional to it."""
-    if scene.definition != "calibrated":
-        return 1.0
-    return scene.mesh.beam.thickness / _calibrating(study)[calibration_name(scene)]
-
-
 @once_a_study("curves")
 def _calibrating(study):
     """Thickness of the beam that calibrates each group of scenes [m]; a study gives a group one."""
@@ -342,17 +334,8 @@ def _calibrating_curves(study):
 
 
 def calibration_name(scene):
-    """Name of the group of curves that calibrates a scene."""
+    """Name of the group of curves that calibrates a scene, or that a curve is in."""
     return f"{scene.mesh.mesh_type}_{hash_of(material_key(scene.material))[:8]}_{scene.kinematics}"
-
-
-def _group(one):
-    """Mesh type, material and kinematics, which a scene shares with its calibrating curves."""
-    return one.mesh.mesh_type, one.material, one.kinematics
-
-
-def _given_stiffness(study, scene):
-    return study.stiffness_table[scene.mesh.mesh_type, scene.material.name] if scene.definition == "paper" else None
 
 
 # -- stages ------------------------------------------------------------------------------------------------------------
@@ -375,8 +358,7 @@ def _mesh_members(study, costs):
 
 
 def _meshes(study, folder, members):
-    sources = [(mesh, mesh_source(mesh)) for mesh, *_ in members]
-    files = [{"name": stem(mesh), "key": mesh_key(mesh)} | source for mesh, source in sources]
+    files = [{"name": stem(mesh), "key": mesh_key(mesh)} | mesh_source(mesh) for mesh, *_ in members]
     return {"folder": str(folder / "meshes"), "files": files}
 
 
@@ -395,11 +377,8 @@ def _reference_tasks(study):
             name = hash_of(problem[0], problem[2])
             found[key] = Task({"problem": problem}, costs=[("reference", 0)], name=name, key=key)
         for kind in study.further_references:
-            law, _, plane = kind.partition("-plane-")
-            load, key = LOADS[one.load], finite_key(one, kind)
-            values = {"law": law, "plane": plane, "load": load.kind.name, "force": one.force, "follower": load.follower}
-            values |= {"beam": beam_key(one.beam), "material": material_key(one.material)}
-            found[key] = Task(values, costs=[("finite", 0)], name=hash_of(kind, _finite_problem(one)), key=key)
+            values, key = _finite_problem(one, kind), finite_key(one, kind)
+            found[key] = Task(values, costs=[("finite", 0)], name=hash_of(values), key=key)
     yield from found.values()
     asked = {(one.beam, one.material, one.load) for one in study.references}
     for kind, (box, problems) in interpolants(study).items():
@@ -412,7 +391,6 @@ def _reference_tasks(study):
 
 def _curve(study, curve):
     return {
-        "key": curve_key(study, curve),
         "kind": LOADS[curve.load].kind.name,
         "force": curve.force,
         "kinematics": curve.kinematics,
@@ -434,13 +412,13 @@ def mesh_stage(name, module, message, content, members):
 
 def stage_on_meshes(name, module, message, content, folder, mesh="mesh", every=()):
     """Stage that works on the bundles of one that makes meshes."""
-    return Stage(name, module, message, content, products, like=mesh, same=(mesh,), every=every, folder=folder)
+    return Stage(name, module, message, content, products, like=mesh, every=every, folder=folder)
 
 
 def _sensitivity(study, folder, members):
     curves = curves_by_mesh(study)
     files = [
-        {"name": stem(mesh), "tasks": [_curve(study, curve) for curve in curves[mesh]]}
+        {"name": stem(mesh), "tasks": [{"key": curve_key(study, one)} | _curve(study, one) for one in curves[mesh]]}
         for meshes in members
         for mesh in meshes
         if mesh in curves
@@ -462,23 +440,15 @@ def _solve(study, folder, members):
 
 def _scenes(study, mesh):
     """Tasks of a mesh's scenes."""
-    scenes, keys = scenes_by_mesh(study)[mesh], scene_keys(study)[mesh]
-    kept = shown_scenes(study)
-    return [_scene(study, scene, key, kept) for scene, key in zip(scenes, keys)]
-
-
-def _scene(study, scene, key, kept):
-    task = _common(study, scene)[0] | {"key": key, "force": scene.force}
-    stiffness = _given_stiffness(study, scene)
-    if stiffness is not None:
-        task["stiffness"] = stiffness
-    if scene.stiffness_scale != 1:
-        task["stiffness_scale"] = scene.stiffness_scale
-    if scene in kept:
-        task["keep_fields"] = True
-    if scene.definition == "calibrated":
-        task |= {"calibration": calibration_name(scene), "thickness_ratio": _thickness_ratio(study, scene)}
-    return task
+    tasks, kept = [], shown_scenes(study)
+    for scene, key in zip(scenes_by_mesh(study)[mesh], scene_keys(study)[mesh]):
+        task = _common(study, scene)[0] | {"key": key} | _own(study, scene)
+        if scene in kept:
+            task["keep_fields"] = True
+        if scene.definition == "calibrated":
+            task["calibration"] = calibration_name(scene)
+        tasks.append(task)
+    return tasks
 
 
 @once_a_study("scenes")
@@ -494,8 +464,8 @@ def calibration_path(folder):
 
 def _calibrate_members(study, costs):
     """All groups of scenes that share a calibrated stiffness, in one job."""
-    groups = {calibration_name(scene): _group(scene) for scene in calibrated(study)}
-    return {"all": (0.0, sorted(groups.items()))} if groups else {}
+    names = {calibration_name(scene) for scene in calibrated(study)}
+    return {"all": (0.0, sorted(names))} if names else {}
 
 
 def _calibrate(study, folder, members):
@@ -504,9 +474,9 @@ def _calibrate(study, folder, members):
         return place | {"load": curve.load, "force": curve.force}
 
     tasks = [
-        {"name": name, "members": [named(one) for one in _calibrating_curves(study) if _group(one) == group]}
-        for groups in members
-        for name, group in groups
+        {"name": name, "members": [named(one) for one in _calibrating_curves(study) if calibration_name(one) == name]}
+        for names in members
+        for name in names
     ]
     return {
         "file": str(calibration_path(folder)),
@@ -545,8 +515,8 @@ def take(study, names):
 def of_scenes(study: "Study", chosen: "Collection[object]") -> "Study":
     """Study reduced to some scenes and curves and what they need."""
     scenes = tuple(scene for scene in study.scenes if scene in chosen)
-    groups = {_group(scene) for scene in scenes if scene.definition == "calibrated"}
-    calibrating = {one for one in _calibrating_curves(study) if _group(one) in groups}
+    groups = {calibration_name(scene) for scene in scenes if scene.definition == "calibrated"}
+    calibrating = {one for one in _calibrating_curves(study) if calibration_name(one) in groups}
     curves = tuple(one for one in study.curves if one in chosen or one in calibrating)
     asked: list[Any] = [*scenes, *curves]
     bodies = {(one.mesh.beam, one.material, one.load, one.force) for one in asked}

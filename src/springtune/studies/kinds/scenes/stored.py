@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from springtune.mesh import Mesh, read_mesh, write_mesh
+from springtune.mesh import read_mesh, write_mesh
 from springtune.mesh.groups import GroupedMesh
 
 from ...runs import checked_json, store
@@ -25,15 +25,14 @@ def files(folder: str | Path, name: str) -> tuple[Path, Path]:
     return Path(folder) / f"{name}.vtu", Path(folder) / f"{name}.json"
 
 
-def write_made(folder: str | Path, name: str, key: str, made: Mesh | GroupedMesh, known: dict[str, float]) -> None:
-    """Store a mesh and, where it has any, its groups."""
+def write_made(folder: str | Path, name: str, key: str, made: GroupedMesh, known: dict[str, float]) -> None:
+    """Store a mesh and its groups."""
     path, notes = files(folder, name)
     path.parent.mkdir(parents=True, exist_ok=True)
     # The notes name the mesh they belong to, so they go first and come last.
     notes.unlink(missing_ok=True)
-    write_mesh(path, made.mesh if isinstance(made, GroupedMesh) else made)
-    groups = {"groups": _plain(made)} if isinstance(made, GroupedMesh) else {}
-    checked_json.write(notes, {"key": key, "checksum": checksum(path), **known, **groups})
+    write_mesh(path, made.mesh)
+    checked_json.write(notes, {"key": key, "checksum": checksum(path), **known, "groups": _plain(made)})
 
 
 def _plain(grouped: GroupedMesh) -> dict[str, Any]:
@@ -94,8 +93,6 @@ def read(folder: str | Path, name: str) -> GroupedMesh | None:
         return None
     _checked(path, notes["checksum"])
     mesh = read_mesh(path)
-    if "groups" not in notes:
-        return GroupedMesh(mesh)
     groups, count = notes["groups"], {corners: len(cells) for corners, cells in mesh.cells.items()}
     return GroupedMesh(
         mesh,

@@ -210,10 +210,7 @@ BLOCK = declared(
         SCENE: {
             "face_displacement": ("m", "displacement of the middle of the loaded face along the force, network"),
             "face_mean_displacement": ("m", "mean displacement of the loaded face along the force, network"),
-            "last_face_displacement": (
-                "m",
-                "of the middle at the last good load step, where there is no whole one",
-            ),
+            "last_face_displacement": ("m", "of the middle at the last good load step, where there is no whole one"),
         },
         (*SCENE, "face_position"): {
             "face_profile": ("m", "displacement over the loaded face along the force, network")

@@ -156,7 +156,6 @@ def expand(config, declared):
 
 
 MOST_SHAPE_SCENES = 100_000
-"""Most scenes of shapes of a study."""
 
 READ_AT_ONCE = 1_000_000
 """Size of a mesh file up to which its groups are looked at as a study is read [B]."""

@@ -66,9 +66,7 @@ def mesh_source(part, one):
 def mesh_key(part, one):
     """Key of a scene's mesh."""
     return hash_of(
-        parameters(mesh_source(part, one)),
-        stage_key("studies.kinds.shapes.mesh"),
-        _reader(part.shape[one.shape]),
+        parameters(mesh_source(part, one)), stage_key("studies.kinds.shapes.mesh"), _reader(part.shape[one.shape])
     )
 
 
@@ -134,12 +132,15 @@ def _mesh_members(study, costs):
     """Meshes with their scenes, and the cost of both."""
     part = study.parts["shapes"]
     members = {}
-    for name, scenes in by_mesh(part).items() if part else ():
-        count = particles(part, scenes[0])
-        seconds = costs.of("shape_mesh", count)
-        seconds += sum(costs.of("shape_scene", count) + costs.of(one.definition, count) for one in scenes)
-        members[name] = seconds, scenes
+    for name, scenes in by_mesh(part).items():
+        seconds = costs.of("shape_mesh", particles(part, scenes[0]))
+        members[name] = seconds + sum(_seconds(part, one, costs) for one in scenes), scenes
     return members
+
+
+def _seconds(part, one, costs):
+    count = particles(part, one)
+    return costs.of("shape_scene", count) + costs.of(one.definition, count)
 
 
 def _meshes(study, folder, members):
@@ -152,7 +153,7 @@ def _meshes(study, folder, members):
 
 def _reference_tasks(study):
     part = study.parts["shapes"]
-    for one in part.referred if part else ():
+    for one in part.referred:
         task = reference_task(part, *one)
         yield Task(task, costs=[("shape_reference", 0)], name="/".join(one), key=task["key"])
 
@@ -179,8 +180,7 @@ def pieces(study, costs, division):
     part = study.parts["shapes"]
     found = defaultdict(float)
     for one in part.scenes:
-        count = particles(part, one)
-        found[one.shape, one.load] += costs.of("shape_scene", count) + costs.of(one.definition, count)
+        found[one.shape, one.load] += _seconds(part, one, costs)
     for shape, _, load in part.referred:
         found[shape, load] += costs.of("shape_reference")
     return division.of_section(found)
@@ -219,21 +219,15 @@ STAGES = (
     ),
     mesh_stage("shape_mesh", "studies.kinds.shapes.mesh", "Meshing shapes", _meshes, _mesh_members),
     stage_on_meshes(
-        "shape_solve",
-        "studies.kinds.shapes.solve",
-        "Solving the networks of shapes",
-        _solve,
-        "solutions",
-        "shape_mesh",
+        "shape_solve", "studies.kinds.shapes.solve", "Solving the networks of shapes", _solve, "solutions", "shape_mesh"
     ),
 )
 
 
 def _check(config, problems):
-    if config.shapes or config.shape_grids:
-        from .expand import check
+    from .expand import check
 
-        check(config, problems)
+    check(config, problems)
 
 
 def _expand(config, declared):
@@ -275,10 +269,7 @@ KIND = Kind(
         ),
         "shape_grids": (
             Later("studies.kinds.shapes.sections", "NAMED_GRIDS"),
-            Field(
-                None,
-                description="What is to be computed of the shapes; it makes the group `/shapes`.",
-            ),
+            Field(None, description="What is to be computed of the shapes; it makes the group `/shapes`."),
         ),
     },
     alone={"shape_grids": ("shapes", "materials")},

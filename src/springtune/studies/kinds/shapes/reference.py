@@ -58,8 +58,7 @@ def _rounds(shape, grouped):
         outlines = [one.sides for one in shape.rounds if one.inner is None or one.outer is None]
         return [np.array([side.at(i / ALONG) for side in sides for i in range(ALONG)]) for sides in outlines]
     mesh = grouped.mesh
-    edges = mesh.edges[mesh.on_outline]
-    return [mesh.points[one] for one in rounds_of(edges)]
+    return [mesh.points[one] for one in rounds_of(mesh.edges[mesh.on_outline])]
 
 
 def rounds_of(edges):

@@ -23,7 +23,7 @@ from ...config.fields import (
     one_of,
 )
 from ...config.messages import refuse, show
-from ...config.sections import Section
+from ...config.sections import Section, default
 
 OUTLINED = {"free": "Delaunay triangles inside of the outline"}
 """Mesh types of outlines, and what they are."""
@@ -50,13 +50,11 @@ BEYOND_MEASURE = 1e30
 """Size of a coordinate, force or pressure from which it is beyond all measure [SI units]."""
 
 
-class Signed(Scalar):
+def signed(kind: str) -> Scalar:
     """Annotation of a quantity of either sign, or zero, which needs no unit."""
-
-    def __init__(self, kind: str) -> None:
-        example = units.QUANTITY_KINDS[kind].example
-        words = f"{'an' if kind[0] in 'ae' else 'a'} {kind} such as '{example}'"
-        super().__init__(lambda text: _signed(text, kind), {"type": ["string", "number"], "examples": [example]}, words)
+    about = units.QUANTITY_KINDS[kind]
+    schema = {"type": ["string", "number"], "examples": [about.example]}
+    return Scalar(lambda text: _signed(text, kind), schema, about.words)
 
 
 def _signed(text: str, kind: str) -> float:
@@ -75,7 +73,7 @@ class Vector:
     """Annotation of two quantities, along x and along y."""
 
     def __init__(self, kind: str) -> None:
-        self.item = Signed(kind)
+        self.item = signed(kind)
         example = units.QUANTITY_KINDS[kind].example
         pair = f"0, {example}" if example.startswith("-") else f"{example}, 0"
         self.words = f"{kind}s along x and y, such as [{pair}]"
@@ -103,8 +101,8 @@ class Words:
 Place = Annotated[tuple[float, float], Vector("length")]
 ForceVector = Annotated[tuple[float, float], Vector("force")]
 Gravity = Annotated[tuple[float, float], Vector("acceleration")]
-Displacement = Annotated[float, Signed("length")]
-PressureValue = Annotated[float, Signed("stress")]
+Displacement = Annotated[float, signed("length")]
+PressureValue = Annotated[float, signed("stress")]
 GroupName = Annotated[str, Scalar(str, {"type": "string", "minLength": 1}, "the name of a group")]
 PointName = Annotated[str, Scalar(str, {"type": "string", "minLength": 1}, "the name of a point")]
 PartName = Annotated[str, Scalar(str, {"type": "string", "minLength": 1}, "the name of a part")]
@@ -204,11 +202,7 @@ class PressureConfig(Section):
     model_config = {"json_schema_extra": _or_text()}
 
     pressure: PressureValue = Field(description="Pressure.")
-    follower: Flag = Field(
-        "false",
-        validate_default=True,
-        description="Whether it turns and grows with the sides, in nonlinear kinematics.",
-    )
+    follower: Flag = default("false", description="Whether it turns and grows with the sides, in nonlinear kinematics.")
 
     @model_validator(mode="before")
     @classmethod
@@ -298,10 +292,8 @@ class ShapeLoadConfig(Section):
     pressures: Annotated[dict[str, PressureConfig], Words("a stress, or a section, by group; see below")] = Field(
         {}, description="Pressures, by group; positive towards the body."
     )
-    gravity: Gravity = Field(
-        ["0", "0"],
-        validate_default=True,
-        description="Acceleration along x and y, such as `[0, -9.81 m/s^2]`; needs densities.",
+    gravity: Gravity = default(
+        ["0", "0"], description="Acceleration along x and y, such as `[0, -9.81 m/s^2]`; needs densities."
     )
     quantities: Annotated[dict[str, QuantityConfig], Named("quantity")] = Field(
         description="Quantities of interest, by name; the first one stands for all where one is wanted."
@@ -311,7 +303,7 @@ class ShapeLoadConfig(Section):
 class ShapeConfig(Section):
     """A body of any outline, or that of a mesh file, with named groups of its sides and points."""
 
-    thickness: Length = Field("1 mm", validate_default=True, description="Extent out of the plane.")
+    thickness: Length = default("1 mm", description="Extent out of the plane.")
     outline: Annotated[list[SegmentConfig], SIDE_WORDS] | None = Field(
         None, description="Round of its sides, counter-clockwise."
     )
@@ -321,7 +313,7 @@ class ShapeConfig(Section):
         description="Mesh file in the place of an outline, of a format that meshio reads, its path relative to the "
         "study's folder; its groups are the shape's.",
     )
-    unit: Length = Field("1 m", validate_default=True, description="Unit of the coordinates in the file.")
+    unit: Length = default("1 m", description="Unit of the coordinates in the file.")
     points: Annotated[dict[str, Place], Words("places such as [48 mm, 52 mm], by name")] = Field(
         {}, description="Named points of an outline or inside of it: particles of every mesh."
     )
@@ -369,14 +361,11 @@ class ShapeGridConfig(Section):
     definition: Annotated[list[DefinitionName], OneOrMore()] = Field(
         description="Definitions that derive a stiffness on triangles and need no reference."
     )
-    kinematics: Annotated[list[Kinematics], OneOrMore()] = Field(
-        "nonlinear",
-        validate_default=True,
-        description="Whether springs keep their length law or their tangent at rest.",
+    kinematics: Annotated[list[Kinematics], OneOrMore()] = default(
+        "nonlinear", description="Whether springs keep their length law or their tangent at rest."
     )
-    reference: Flag = Field(
+    reference: Flag = default(
         "true",
-        validate_default=True,
         description="Whether there is a converged reference; else errors are those against `expected` values alone.",
     )
 

@@ -35,7 +35,6 @@ EXPERIMENTS = {
     "perturbation": "particles moved at random, inverted starts",
     "buckling": "a slender column, a shallow arch",
 }
-"""Experiments by name."""
 
 ONCE = ("maps", "drift", "rest", "contrast", "sizes")
 """Experiments about schemes and numbers, not definitions: the first definition of a study stands for all."""

@@ -1,6 +1,6 @@
 """Experiments on numerical stability: a study's section ``stability``."""
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Annotated
 
 from pydantic import Field
@@ -10,10 +10,9 @@ from springtune.mesh import MESH_TYPES
 from ...config.checks import check_beam_material, check_density, check_for_triangles, check_known, check_particles
 from ...config.fields import BeamName, DefinitionName, Force, Length, MaterialName, MeshType, OneOrMore, one_of
 from ...config.kind import Kind
-from ...config.sections import Section, optional
+from ...config.sections import Section, default, optional
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key
 from ...runs.stages import Task, stage
-from ..division import by_task
 from . import AXES, EXPERIMENTS, ONCE, Experiment
 from .outputs import OUTPUTS
 
@@ -30,20 +29,17 @@ class StabilityConfig(Section):
         description="Definitions that derive a stiffness and need no reference; the first one stands for all where an "
         "experiment is not about definitions."
     )
-    mesh_type: MeshType = Field("structured", validate_default=True, description="Mesh type of triangles.")
+    mesh_type: MeshType = default("structured", description="Mesh type of triangles.")
     mesh_size: Annotated[list[Length], OneOrMore()] = Field(
         description="Lengths of an edge; most experiments take the coarsest."
     )
     experiment: Annotated[list[ExperimentName], OneOrMore()] = Field(
         list(EXPERIMENTS),
-        validate_default=False,
         description="; ".join(f"`{name}`: {text}" for name, text in EXPERIMENTS.items()) + ". All of them without.",
     )
 
 
 def _check(config, problems):
-    if not config.stability:
-        return
     section = config.stability
     check_known(problems, ("stability", "beam"), "beam", section.beam, config.beams)
     check_beam_material(problems, ("stability", "material"), section.material, config)
@@ -65,8 +61,6 @@ def _check(config, problems):
 def _expand(config, declared):
     """Experiments: one a definition, or one in all."""
     section = config.stability
-    if not section:
-        return ()
     beam, material = declared.beams[section.beam], declared.materials[section.material]
     sizes = tuple(sorted(section.mesh_size))
     return tuple(
@@ -93,6 +87,20 @@ def _tasks(study):
         yield Task(asdict(one) | own, also, labels, one, [(one.name, 0)])
 
 
+def _pieces(study, costs, division):
+    seconds = {_piece(task.of): task.seconds(costs) for task in _tasks(study)}
+    return division.of_section(seconds)
+
+
+def _take(study, names):
+    chosen = tuple(one for one in study.parts["stability"] if _piece(one) in set(names))
+    return replace(study, parts=study.parts | {"stability": chosen})
+
+
+def _piece(one):
+    return one.name, one.definition
+
+
 STAGE = stage("stability", "studies.kinds.stability.solve", "Experiments on stability", _tasks)
 
 KIND = Kind(
@@ -106,7 +114,8 @@ KIND = Kind(
     summary=lambda part: [["experiments", len(part), "on numerical stability"]],
     stages=(STAGE,),
     outputs=OUTPUTS,
-    **by_task("stability", _tasks, lambda one: (one.name, one.definition)),
+    pieces=_pieces,
+    take=_take,
     costs={
         "limits": (10.0, 0.0),
         "maps": (8.0, 0.0),

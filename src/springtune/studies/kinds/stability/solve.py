@@ -7,7 +7,7 @@ Each takes a `Setup` and returns arrays by the names of `STABILITY` in `collect`
 import time
 from contextlib import contextmanager
 from dataclasses import fields, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import product
 
 import numpy as np
@@ -71,16 +71,9 @@ class Setup(Experiment):
         """As `springs`, without forces that the definition adds to a load: experiments are on the network itself."""
         return replace(self.springs(mesh), lateral=0.0)
 
-    @cached_property
-    def _sheets(self):
-        return {}
-
     def sheet(self, mesh):
-        """Sheet of a mesh; the last one is kept."""
-        if id(mesh) not in self._sheets:
-            self._sheets.clear()
-            self._sheets[id(mesh)] = Sheet(mesh, self.beam.thickness)  # which keeps the mesh, and so its identity
-        return self._sheets[id(mesh)]
+        """Sheet of a mesh."""
+        return _sheet(mesh, self.beam.thickness)
 
     def problem(self, mesh, kind=AXIAL, follower=False):
         """Static problem and its reference stiffness."""
@@ -98,6 +91,11 @@ class Setup(Experiment):
         return motion_of(
             self.sheet(mesh), AXIAL, self.plain_springs(mesh), self.material.density, self.force, **options
         )
+
+
+@lru_cache(maxsize=1)
+def _sheet(mesh, thickness):
+    return Sheet(mesh, thickness)
 
 
 def changed(motion, **options):
@@ -381,7 +379,7 @@ def _refined(problem, s, displacements):
         pulls = (network.stiffness * (normals * network.stretch(moved)).sum(axis=1))[:, None] * normals
         np.add.at(missing, network.first, pulls)
         np.subtract.at(missing, network.second, pulls)
-        moved = moved + network.expand(problem.rest_factor.solve(network.reduce(missing).astype(float)))
+        moved = moved + network.expand(network.rest_factor.solve(network.reduce(missing).astype(float)))
     return moved
 
 
@@ -527,4 +525,3 @@ RUN = {
     one.__name__: one
     for one in (limits, maps, drift, rest, slivers, contrast, poisson, sizes, strains, perturbation, buckling)
 }
-"""Experiments by name, see `EXPERIMENTS`."""
