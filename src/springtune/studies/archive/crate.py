@@ -438,8 +438,7 @@ def write(
         cited = citation(Path(CITATION))
         if tell:
             tell(found)
-        packed = dict(found.files)
-        packed |= {METADATA: of_text(METADATA, metadata(found, cited))}
+        packed = found.files | {METADATA: of_text(METADATA, metadata(found, cited))}
         sums = "".join(f"{one.sha256}  {name}\n" for name, one in sorted(packed.items()))
         packed |= {SUMS: of_text(SUMS, sums)}
         check_limits(packed)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -191,7 +192,7 @@ def write_csv(path: str | os.PathLike[str], columns: Sequence[Column]) -> None:
     write_text(Path(path), text.getvalue())
 
 
-def write_parquet(path: str | os.PathLike[str], columns: Sequence[Column], attributes: Mapping[str, object]) -> None:
+def write_parquet(path: str | os.PathLike[str], columns: Sequence[Column], attributes: Mapping[Any, object]) -> None:
     """Write a long table as Parquet with units, long names and attributes."""
     try:
         import pyarrow as pa
@@ -283,10 +284,7 @@ def export(
     if ending == ".csv":
         write_csv(path, columns)
     else:
-        attributes: dict[str, object] = {
-            str(name): value for name, value in tree.attrs.items() if isinstance(value, str)
-        }
-        write_parquet(path, columns, attributes | {"springtune_group": "/" + group.strip("/")})
+        write_parquet(path, columns, tree.attrs | {"springtune_group": "/" + group.strip("/")})
     return f"{path}: {len(columns[0].values) if columns else 0} rows, {len(columns)} columns of group '{group}'"
 
 
