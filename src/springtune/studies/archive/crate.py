@@ -79,6 +79,9 @@ MEDIA = {
 }
 """Media types by file ending, besides those that Python knows."""
 
+OF_PYTHON = MimeTypes()
+"""Python's own media types, without those of this machine."""
+
 TEXT, BYTES = "text/plain", "application/octet-stream"
 """Media types of other files."""
 
@@ -168,7 +171,7 @@ class _Crate:
         one, path = self.found.files[name], PurePosixPath(name)
         other = BYTES if name in self.found.inputs else TEXT
         properties: dict[str, Any] = {"name": path.name, "sha256": one.sha256, "contentSize": str(one.size)}
-        known, _ = MimeTypes().guess_type(name)  # of Python alone, not of this machine
+        known, _ = OF_PYTHON.guess_type(name)
         properties["encodingFormat"] = MEDIA.get(path.suffix, known or other)
         if name == f"{CODE}/Snakefile":
             properties |= {"@type": ["File", "SoftwareSourceCode", "ComputationalWorkflow", "HowTo"]}
