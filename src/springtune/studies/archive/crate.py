@@ -72,12 +72,14 @@ DONE = "http://schema.org/CompletedActionStatus"
 
 MEDIA = {
     ".cff": "application/yaml",
+    ".js": "text/javascript",
+    ".md": "text/markdown",
     ".toml": "application/toml",
     ".vtu": "application/xml",
     ".pvd": "application/xml",
     ".yaml": "application/yaml",
 }
-"""Media types by file ending, besides those that Python knows."""
+"""Media types by file ending that some versions of Python lack."""
 
 OF_PYTHON = MimeTypes()
 """Python's own media types, without those of this machine."""
