@@ -300,7 +300,8 @@ def _tell_contents(found: "Contents") -> None:
     """Print what is packed, and what matters for computing it again."""
     from ..studies.archive.contents import DIFF, FOLDERS
 
-    click.echo(f"{found.folder}: packing {len(found.files)} files, {bytes_text(found.size)}")
+    size = sum(one.size for one in found.files.values())
+    click.echo(f"{found.folder}: packing {len(found.files)} files, {bytes_text(size)}")
     code = found.code
     if not code.commit:
         endings = "; ".join(f"{name}/ {', '.join(known)}" for name, known in FOLDERS.items())

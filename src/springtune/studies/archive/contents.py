@@ -140,11 +140,6 @@ class Contents:
         """Versions that made the dataset."""
         return dict(json.loads(self.attributes["software"]))
 
-    @property
-    def size(self) -> int:
-        """Uncompressed size of all files [B]."""
-        return sum(one.size for one in self.files.values())
-
 
 def gather(
     study: "Study",
