@@ -339,10 +339,8 @@ def archived_names(study: "Study", given: set[Path], checkout: Path) -> dict[Pat
 def _beside(path: Path, checkout: Path) -> str:
     """Name of a file in a folder beside the checkout; empty for others."""
     parts = Path(os.path.relpath(path, checkout)).parts
-    kept = (
-        parts[:1] == ("..",) and parts[1:2] != ("..",) and len(parts) > 2 and parts[1] not in (CODE, OF_RESULTS, INPUTS)
-    )
-    return "/".join(parts[1:]) if kept else ""
+    beside = len(parts) > 2 and parts[0] == ".." and parts[1] not in ("..", CODE, OF_RESULTS, INPUTS)
+    return "/".join(parts[1:]) if beside else ""
 
 
 # -- results -----------------------------------------------------------------------------------------------------------
