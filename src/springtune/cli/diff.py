@@ -207,9 +207,8 @@ def _of_group(group: "GroupChanges", sides: Sequence[str], most: int | None) -> 
             shown = own[:most]
             if own:
                 said = ", ".join(_place(group, {name: label}) for label in shown)
-                lines.append(
-                    f"  {name} only {side}: {said}" + (f", and {len(own) - len(shown)} more" * (len(own) > len(shown)))
-                )
+                more = f", and {len(own) - len(shown)} more" if len(own) > len(shown) else ""
+                lines.append(f"  {name} only {side}: {said}{more}")
     if lines:
         yield [f"labels of {group.name}", *lines]
     for side, alone in zip(sides, group.cells):
@@ -278,9 +277,8 @@ def _told(found: "Comparison", config: bool) -> list[str]:
     lines += aligned(rows, 0).splitlines()
     if found.config:
         less, more = (sum(line.startswith(sign) for line in found.config[2:]) for sign in "-+")
-        lines.append(
-            f"  the studies' files: {less} lines less, {more} more" + ("" if config else "; --config shows them")
-        )
+        told = "" if config else "; --config shows them"
+        lines.append(f"  the studies' files: {less} lines less, {more} more{told}")
         lines += found.config if config else []
     return lines
 

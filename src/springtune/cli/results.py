@@ -385,11 +385,8 @@ def _compared(made: "Reproduced") -> bool:
         return True
     from .diff import comparison_text
 
-    click.echo(
-        comparison_text(
-            near if near.different else exact, [Path("the archive"), Path("computed again")], ("before", "after"), 5
-        )
-    )
+    found, sides = near if near.different else exact, [Path("the archive"), Path("computed again")]
+    click.echo(comparison_text(found, sides, ("before", "after"), 5))
     if not made.others:
         click.echo("  software and machine are the same, so all bits should be")
     click.echo("not reproduced: the values above differ")

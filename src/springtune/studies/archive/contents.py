@@ -416,9 +416,8 @@ def _readme(found: Contents) -> str:
     commit = f"commit {found.code.commit}" if found.code.commit else "from no git checkout"
     version = found.attributes["springtune_version"]
     changed = ", changed" if found.code.changed else ""
-    changed += (
-        f"; what of package, rules and study differs from the commit is in `{DIFF}`" if DIFF in found.files else ""
-    )
+    if DIFF in found.files:
+        changed += f"; what of package, rules and study differs from the commit is in `{DIFF}`"
     return f"""# {markdown(found.study.title)}
 
 The study `{found.study.name}`, computed by springtune {version} ({commit}{changed}). Every file is

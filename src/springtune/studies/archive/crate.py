@@ -326,9 +326,8 @@ class _Crate:
             actions = [self._job(name, tool, message) for name in names]
             jobs += actions
             about = {"name": f"Jobs of the rule {rule}", "description": message}
-            controls.append(
-                self._add(f"#control-{rule}", "ControlAction", **about, instrument=steps[-1], object=actions)
-            )
+            control = self._add(f"#control-{rule}", "ControlAction", **about, instrument=steps[-1], object=actions)
+            controls.append(control)
         workflow["step"] = steps
         notes = tuple(f"{found.folder}/{name}/" for name in ("done", "benchmarks", "tasks"))
         machine = [
