@@ -63,7 +63,8 @@ class TestFile:
     @pytest.mark.parametrize("ending", expected.EXPECTED_ENDINGS)
     def test_what_is_written_is_read(self, ending, tmp_path):
         """Beyond its tolerance not a digit is lost, and an own tolerance of a scene stays."""
-        kept = expected.accepted(made(), tolerances={"": Tolerance(1e-8), "displacement": Tolerance(1e-3, 1e-9)})
+        kept = expected.accepted(made())
+        kept = expected.with_tolerances(kept, {"": Tolerance(1e-8), "displacement": Tolerance(1e-3, 1e-9)})
         kept["tolerance"] = xr.full_like(kept.displacement, np.nan)
         kept["tolerance"].loc[SCENE] = 0.25
         path = tmp_path / f"kept{ending}"

@@ -418,15 +418,9 @@ def accept(
         return
     if results is None:
         raise click.UsageError("name the results to accept: springtune accept results/mine")
-    names = [name.strip() for name in variables.split(",") if name.strip()]
-    _accept(dataset_path(results), target, names, relative, absolute, unsolved)
-
-
-def _accept(
-    path: Path, target: Path | None, names: list[str], relative: float | None, absolute: float | None, unsolved: bool
-) -> None:
     from ..studies.output import comparison, expected, reading
 
+    path, names = dataset_path(results), [name.strip() for name in variables.split(",") if name.strip()]
     with opened(path) as tree, reading.guarded(path):
         if expected.ACCEPTED in tree.attrs:
             raise ValueError(f"{path}: holds accepted values; give the results of a study")

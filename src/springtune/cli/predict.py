@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import click
 
@@ -32,6 +32,11 @@ if TYPE_CHECKING:
     from ..problem.geometry import Beam
     from ..problem.materials import Material
     from .options import AskedShape
+    from .recommendation import Subject
+
+
+ASKED = re.compile("^(?=(beam |error:|load |loads:))")
+"""Begin of messages with the name of an argument, which is an option of `predict`."""
 
 
 @click.command(
@@ -82,19 +87,17 @@ def predict(
     so, until the error is kept on one and on the finer ones tried, up to one with twice as many cells across.
     A shape of a study has errors in the quantities that its load case asks for.
     """
-    with refusals("--write", target):
+    with refusals("--write", target, partial(ASKED.sub, "--")):
         check_kind(sheet.shape, sheet.beam, ("load",))
         if target is not None:
             check_target("--write", target)
         if sheet.shape is not None:
             asked = sheet.asked_shape(load, sized=error is None)
             answer = _on_shape(asked, springs_alone) if error is None else _find_on_shape(asked, error, springs_alone)
+        elif error is None:
+            answer = _on_beam(sheet, loads, springs_alone)
         else:
-            beam, material, cases = _asked_beam(sheet, loads)
-            if error is None:
-                answer = _on_beam(sheet, beam, material, cases, springs_alone)
-            else:
-                answer = _find_on_beam(sheet, beam, material, cases, error, springs_alone)
+            answer = _find_on_beam(sheet, loads, error, springs_alone)
         click.echo(answer.json() if as_json else answer.text())
         if target is None:
             return
@@ -117,26 +120,34 @@ class _Answer(NamedTuple):
     net: "Callable[[str], SpringNet]"
 
 
+def _found(subject: "Subject", search: "MeshSearch", springs_alone: bool, net: "Callable[[str], SpringNet]") -> _Answer:
+    """Answer of a search for a mesh."""
+    from .recommendation import search_json, search_text
+
+    best = search.best_springs if springs_alone else search.best
+    return _Answer(
+        lambda: search_text(subject, search, springs_alone),
+        lambda: search_json(subject, search, springs_alone),
+        best.choice.definition if best else None,
+        net,
+    )
+
+
 def _asked_beam(sheet: SheetOptions, loads: str | None) -> "tuple[Beam, Material, tuple[str, ...]]":
     """Beam, material and loads of the options."""
     from ..prediction.choices import CASES, check_beam, check_loads
 
     beam, material = sheet.asked_beam()
-    try:
-        check_beam(beam)
-        names = CASES if loads is None else [name.strip() for name in loads.split(",") if name.strip()]
-        return beam, material, check_loads(names)
-    except ValueError as error:
-        raise ValueError(f"--{error}") from None
+    check_beam(beam)
+    names = CASES if loads is None else [name.strip() for name in loads.split(",") if name.strip()]
+    return beam, material, check_loads(names)
 
 
 def _kept(choices: "list[Choice]", springs_alone: bool) -> "list[Choice]":
     return [choice for choice in choices if not (springs_alone and choice.energies)]
 
 
-def _on_beam(
-    sheet: SheetOptions, beam: "Beam", material: "Material", loads: tuple[str, ...], springs_alone: bool
-) -> _Answer:
+def _on_beam(sheet: SheetOptions, given: str | None, springs_alone: bool) -> _Answer:
     """Recommend a definition for a mesh of a beam."""
     from ..handover.net import SpringNet
     from ..mesh import MESH_TYPES
@@ -144,6 +155,7 @@ def _on_beam(
     from ..prediction.choices import SOLVED, SOLVED_FROM_FILE, predict, references
     from .recommendation import beam_subject, prediction_json, prediction_text, recommended
 
+    beam, material, loads = _asked_beam(sheet, given)
     mesh_type, edge = sheet.mesh_or_file, sheet.edge(beam)
     name = sheet.mesh_name(edge)
 
@@ -209,24 +221,14 @@ def _on_shape(asked: "AskedShape", springs_alone: bool) -> _Answer:
     )
 
 
-def _find(find: "Callable[[], MeshSearch]") -> "MeshSearch":
-    """Search whose refusals name options."""
-    try:
-        return find()
-    except ValueError as problem:
-        named = str(problem).startswith(("error:", "loads:", "load "))
-        raise ValueError(f"--{problem}" if named else str(problem)) from None
-
-
-def _find_on_beam(
-    sheet: SheetOptions, beam: "Beam", material: "Material", loads: tuple[str, ...], error: str, springs_alone: bool
-) -> _Answer:
+def _find_on_beam(sheet: SheetOptions, given: str | None, error: str, springs_alone: bool) -> _Answer:
     """Find the mesh of a beam that keeps an error."""
     from ..handover.net import SpringNet
     from ..mesh import MESH_TYPES
     from ..prediction.search import find_mesh, size_text
-    from .recommendation import beam_subject, search_json, search_text
+    from .recommendation import beam_subject
 
+    beam, material, loads = _asked_beam(sheet, given)
     if sheet.size is not None:
         raise ValueError(f"--size: '{sheet.size}' is what --error finds; leave one of them out")
     names = None if sheet.mesh_type is None else [name.strip() for name in sheet.mesh_type.split(",")]
@@ -234,7 +236,7 @@ def _find_on_beam(
         if name not in MESH_TYPES:
             why = "is a file, and --error finds sizes of mesh types" if Path(name).is_file() else "is no mesh type"
             raise ValueError(f"--mesh: '{name}' {why}; known: {', '.join(MESH_TYPES)}")
-    search = _find(lambda: find_mesh(beam, material, error, loads=loads, mesh_types=names))
+    search = find_mesh(beam, material, error, loads=loads, mesh_types=names)
     best = search.best_springs if springs_alone else search.best
     subject = beam_subject(beam, material, search.known)  # type: ignore[arg-type]  # of loads
 
@@ -244,19 +246,14 @@ def _find_on_beam(
         name = f"{best.mesh_type} {size_text(best.size)}"
         return SpringNet.from_mesh(mesh, material, definition, beam=beam, mesh_name=name, loads=loads)
 
-    return _Answer(
-        lambda: search_text(subject, search, springs_alone),
-        lambda: search_json(subject, search, springs_alone),
-        best.choice.definition if best else None,
-        net,
-    )
+    return _found(subject, search, springs_alone, net)
 
 
 def _find_on_shape(asked: "AskedShape", error: str, springs_alone: bool) -> _Answer:
     """Find the mesh of a shape that keeps an error."""
     from ..prediction.search import find_shape_mesh
     from ..scene.statements import ShapeStatement
-    from .recommendation import search_json, search_text, shape_subject
+    from .recommendation import shape_subject
 
     if asked.shape.file:
         raise Unmet(
@@ -269,17 +266,12 @@ def _find_on_shape(asked: "AskedShape", error: str, springs_alone: bool) -> _Ans
     def make(size: float) -> "GroupedMesh":
         return replace(asked, size=size).mesh()
 
-    search = _find(lambda: find_shape_mesh(asked.shape, asked.materials, error, load=asked.load, make=make))
+    search = find_shape_mesh(asked.shape, asked.materials, error, load=asked.load, make=make)
     best = search.best_springs if springs_alone else search.best
     size = best.size if best else search.tried[-1].size
     statement = ShapeStatement(asked.shape, make(size), asked.materials, asked.load, 1.0, "linear")
     subject = shape_subject(statement, search.known)  # type: ignore[arg-type]  # of quantities
-    return _Answer(
-        lambda: search_text(subject, search, springs_alone),
-        lambda: search_json(subject, search, springs_alone),
-        best.choice.definition if best else None,
-        lambda definition: net_of_shape(replace(asked, size=size), definition),
-    )
+    return _found(subject, search, springs_alone, partial(net_of_shape, replace(asked, size=size)))
 
 
 # -- springs for other programs ---------------------------------------------------------------------------------------
@@ -350,9 +342,7 @@ def springs(
         if sheet.shape is not None:
             net = net_of_shape(sheet.asked_shape(load), definition, scale, stiffness)
         else:
-            beam, solid = sheet.asked_beam()
-            edge = sheet.edge(beam)
-            net = _net(beam, solid, sheet.mesh(beam, edge), sheet.mesh_name(edge), definition, stiffness, load, force)
+            net = _net_of_beam(sheet, definition, stiffness, load, force)
         with warnings.catch_warnings(record=True) as heard:
             warnings.simplefilter("always", EquilibriumWarning)
             written = net.write(target, mujoco=mujoco)
@@ -372,19 +362,15 @@ def _derived(definition: str) -> Iterator[None]:
         raise Unmet(f"--definition: '{definition}' has no springs on this mesh: {error}; take another") from None
 
 
-def _net(
-    beam: "Beam",
-    material: "Material",
-    mesh: Any,
-    name: str,
-    definition: str,
-    stiffness: str | None,
-    load: str | None,
-    force: str | None,
+def _net_of_beam(
+    sheet: SheetOptions, definition: str, stiffness: str | None, load: str | None, force: str | None
 ) -> "SpringNet":
     from ..handover.net import SpringNet
     from ..scene.single import Scene
 
+    beam, material = sheet.asked_beam()
+    edge = sheet.edge(beam)
+    mesh, name = sheet.mesh(beam, edge), sheet.mesh_name(edge)
     if (load is None) != (force is None):
         if load is None:
             raise ValueError(f"--force: '{force}' is of no load; give --load such as traction, or leave --force out")

@@ -167,12 +167,8 @@ def search_text(subject: Subject, search: "MeshSearch", springs_alone: bool = Fa
     tables = [] if springs_alone else [("with any definition", search.by_type, False)]
     tables.append(("with springs alone", search.springs_by_type, True))
     for what, found, alone in tables:
-        chosen = []
-        for name, one in sorted(found.items(), key=lambda item: _order(item[1])):
-            if one is None:
-                notes.append(f"{name}, {what}: {_nearest(search, name, alone)}")
-                continue
-            chosen.append(one)
+        chosen = sorted((one for one in found.values() if one), key=lambda one: (not one.confirmed, one.particles))
+        notes += [f"{name}, {what}: {_nearest(search, name, alone)}" for name, one in found.items() if one is None]
         if chosen:
             lines += ["", f"{what}:", aligned(TabledList(chosen).table(), left=2, right=right)]
     answers = [one for _, found, _ in tables for one in found.values()]
@@ -262,10 +258,6 @@ def _at_worst(subject: Subject, choices: "Sequence[Choice]", names: Sequence[str
 
 def _listed(words: Sequence[str]) -> str:
     return " and ".join([", ".join(words[:-1]), words[-1]] if words[1:] else words)
-
-
-def _order(one: "MeshChoice | None") -> tuple[bool, int]:
-    return (not one.confirmed, one.particles) if one else (True, 0)
 
 
 def _nearest(search: "MeshSearch", mesh_type: str, springs_alone: bool) -> str:

@@ -2,6 +2,7 @@
 
 import tempfile
 from collections import defaultdict
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,7 +11,7 @@ from click.core import ParameterSource
 
 from ..safe_io.escapes import shown
 from ..safe_io.tables import aligned
-from ..studies.output.text import bytes_text
+from ..studies.output.text import bytes_text, how_to_install
 from . import examples
 from .options import idle, studies
 
@@ -277,12 +278,8 @@ def archive(
     is refused.
     """
     [(found, folder)] = studies(study)
-    try:
-        import rocrate  # noqa: F401
-    except ImportError:
-        from ..studies.output.text import how_to_install
-
-        raise click.ClickException(f"the library rocrate is missing; {how_to_install('archive')}") from None
+    if find_spec("rocrate") is None:
+        raise click.ClickException(f"the library rocrate is missing; {how_to_install('archive')}")
     from ..studies.archive.contents import stored_size
     from ..studies.archive.crate import write
 

@@ -5,7 +5,7 @@ of small strain; a patch test between rollers measures Young's modulus and Poiss
 """
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf, nan
 from typing import Any, NamedTuple, TypeVar, cast
@@ -201,14 +201,21 @@ def predicted() -> tuple[str, ...]:
 
 def check_loads(loads: Iterable[str]) -> tuple[str, ...]:
     """Loads, each once."""
-    if isinstance(loads, str) or not isinstance(loads, Iterable):
-        raise ValueError(f"loads: {loads!r} is no list of loads; give one such as {list(CASES)}")
-    names = tuple(loads)
+    return check_names("loads", loads, predicted(), CASES, "cannot be predicted")
+
+
+def check_names(
+    what: str, given: Iterable[str], known: Collection[str], examples: Sequence[str], wrong: str
+) -> tuple[str, ...]:
+    """Names of loads or mesh types, each once, all of them `known`."""
+    if isinstance(given, str) or not isinstance(given, Iterable):
+        raise ValueError(f"{what}: {given!r} is no list of {what}; give one such as {list(examples)}")
+    names = tuple(given)
     for name in names:
-        if name not in LOADS or LOADS[name].follower:
-            raise ValueError(f"loads: {name!r} cannot be predicted; {nearest(str(name), predicted())}")
+        if not (isinstance(name, str) and name in known):
+            raise ValueError(f"{what}: {name!r} {wrong}; {nearest(str(name), known)}")
     if not names:
-        raise ValueError(f"loads: none; give some of {', '.join(predicted())}")
+        raise ValueError(f"{what}: none; give some of {', '.join(known)}")
     return tuple(dict.fromkeys(names))
 
 

@@ -21,7 +21,7 @@ from ..mesh.outlines import mesh_shape
 from ..problem.compare import error_text
 from ..problem.geometry import Beam
 from ..problem.materials import AnyMaterial, Material
-from ..problem.quantities import nearest, quantity
+from ..problem.quantities import quantity
 from ..problem.shapes import Shape
 from ..safe_io.tables import Tabled
 from ..scene.meshes import A_MATERIAL, A_SHAPE, is_a
@@ -42,6 +42,7 @@ from .choices import (
     bounds_text,
     check_beam,
     check_loads,
+    check_names,
     in_order,
     only_load,
     references,
@@ -193,10 +194,6 @@ class MeshChoice(Tabled):
         if not math.isnan(self.step_limit):
             yield "largest step", f"{self.step_limit:.3g} s"
 
-    @property
-    def _rank(self) -> tuple[bool, int, int]:
-        return not self.confirmed, self.particles, self.springs
-
 
 def size_text(size: float) -> str:
     """Mesh size [m] as the option takes it.
@@ -279,8 +276,8 @@ class MeshSearch(Tabled):
         yield "solved", f"{len(self.tried)} meshes, of at most {self.most:,} particles"
 
     def _least(self, found: dict[str, MeshChoice | None]) -> MeshChoice | None:
-        there = [one for one in found.values() if one]
-        least = [one for one in there if one._rank == min(other._rank for other in there)]
+        ranks = {name: (not one.confirmed, one.particles, one.springs) for name, one in found.items() if one}
+        least = [one for name, one in found.items() if one and ranks[name] == min(ranks.values())]
         order = in_order(
             least,
             lambda one: one.choice.worst,
@@ -383,7 +380,8 @@ def find_mesh(
     assert isinstance(material, Material)  # for type checkers
     asked_error(error)
     loads = check_loads(loads)
-    names = tuple(MESH_TYPES) if mesh_types is None else _mesh_types(mesh_types)
+    given = MESH_TYPES if mesh_types is None else mesh_types
+    names = check_names("mesh types", given, MESH_TYPES, ("structured", "free"), "is unknown")
     if not (isinstance(most, int) and most > 0):
         raise ValueError(f"most: {most!r} is no number of particles; give one such as {SOLVED}")
     known = references(beam, material, loads)
@@ -489,18 +487,6 @@ def _beam_family(beam: Beam, material: Material, loads: tuple[str, ...], name: s
         lambda size: beam_statements(beam, make(*box, size), material, loads),
         partial(make.stretch, *box),
     )
-
-
-def _mesh_types(names: Sequence[str]) -> tuple[str, ...]:
-    if isinstance(names, str) or not isinstance(names, Iterable):
-        raise ValueError(f"mesh types: {names!r} is no list of them; give one such as ['structured', 'free']")
-    chosen = tuple(names)
-    for name in chosen:
-        if not (isinstance(name, str) and name in MESH_TYPES):
-            raise ValueError(f"mesh types: {name!r} is unknown; {nearest(str(name), MESH_TYPES)}")
-    if not chosen:
-        raise ValueError(f"mesh types: none; give some of {', '.join(MESH_TYPES)}")
-    return tuple(dict.fromkeys(chosen))
 
 
 def _cells(rung: int) -> int:

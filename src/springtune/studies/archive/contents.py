@@ -414,9 +414,7 @@ def _without(dataset: Packed, names: Collection[str], scratch: Path) -> tuple[Pa
 
 def _departures(checkout: Path, told: dict[str, str]) -> dict[str, tuple[str, str]]:
     """Versions of the dataset that differ from the locked ones."""
-    wanted: dict[str, str] = {}
-    for lock in LOCK_FILES:
-        wanted |= locked(checkout / lock)
+    wanted = {name: version for lock in LOCK_FILES for name, version in locked(checkout / lock).items()}
     used = json.loads(told.get("software", "{}"))
     return {name: (wanted[name], one) for name, one in sorted(used.items()) if wanted.get(name, one) != one}
 

@@ -22,13 +22,13 @@ import zipfile
 from collections.abc import Callable, Iterable, Mapping
 from datetime import UTC, datetime
 from io import BytesIO
+from mimetypes import MimeTypes
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
 from springtune.safe_io import atomic
 
 from ..runs import checked_json, records, rerun
-from ..runs.plan import stages
 from .contents import (
     CITATION,
     CODE,
@@ -71,25 +71,12 @@ DONE = "http://schema.org/CompletedActionStatus"
 
 MEDIA = {
     ".cff": "application/yaml",
-    ".csv": "text/csv",
-    ".css": "text/css",
-    ".h5": "application/x-hdf5",
-    ".html": "text/html",
-    ".js": "text/javascript",
-    ".json": "application/json",
-    ".md": "text/markdown",
-    ".nc": "application/x-netcdf",
-    ".pdf": "application/pdf",
-    ".png": "image/png",
-    ".py": "text/x-python",
-    ".svg": "image/svg+xml",
     ".toml": "application/toml",
-    ".tsv": "text/tab-separated-values",
     ".vtu": "application/xml",
     ".pvd": "application/xml",
     ".yaml": "application/yaml",
 }
-"""Media types by file ending."""
+"""Media types by file ending, besides those that Python knows."""
 
 TEXT, BYTES = "text/plain", "application/octet-stream"
 """Media types of other files."""
@@ -158,7 +145,7 @@ class _Crate:
         self.found, self.cited, self.version = found, cited, found.attributes["springtune_version"]
         self.crate = ROCrate(version="1.1")
         self.crate.metadata.extra_terms = {name: TERMS + name for name in ("sha256", "resourceUsage", "environment")}
-        self.rules = dict(self._rules())
+        self.rules = self._rules()
         self.modules = {
             module: f"{CODE}/src/springtune/{module.replace('.', '/')}.py" for _, module, _ in self.rules.values()
         }
@@ -180,7 +167,8 @@ class _Crate:
         one, path = self.found.files[name], PurePosixPath(name)
         other = BYTES if name in self.found.inputs else TEXT
         properties: dict[str, Any] = {"name": path.name, "sha256": one.sha256, "contentSize": str(one.size)}
-        properties["encodingFormat"] = MEDIA.get(path.suffix, other)
+        known, _ = MimeTypes().guess_type(name)  # of Python alone, not of this machine
+        properties["encodingFormat"] = MEDIA.get(path.suffix, known or other)
         if name == f"{CODE}/Snakefile":
             properties |= {"@type": ["File", "SoftwareSourceCode", "ComputationalWorkflow", "HowTo"]}
             properties |= {"name": "springtune: parameter studies of mass-spring models", "version": self.version}
@@ -287,13 +275,12 @@ class _Crate:
 
     # -- the workflow and its run --------------------------------------------------------------------------------------
 
-    def _rules(self) -> "list[tuple[str, tuple[str, str, list[str]]]]":
+    def _rules(self) -> dict[str, tuple[str, str, list[str]]]:
         """Description, module and jobs of each rule, in the order of a run."""
-        found, made = self.found, []
-        for stage in stages():
-            own = [name for name, job in found.plan.jobs.items() if job.stage.name == stage.name]
-            if own:
-                made.append((stage.name, (stage.message, stage.module, own)))
+        found = self.found
+        made: dict[str, tuple[str, str, list[str]]] = {}
+        for name, job in found.plan.jobs.items():
+            made.setdefault(job.stage.name, (job.stage.message, job.stage.module, []))[2].append(name)
         drawn = ("Drawing figures and writing tables", "studies.output.present")
         after = {
             rerun.COLLECT: ("Comparing with the references, and collecting the dataset", "studies.kinds.collect"),
@@ -301,7 +288,7 @@ class _Crate:
         }
         for name in found.jobs:
             if name not in found.plan.jobs:
-                made.append((name, (*after.get(name, drawn), [name])))
+                made[name] = (*after.get(name, drawn), [name])
         return made
 
     def _workflow(self) -> None:

@@ -41,8 +41,8 @@ from ..runs.task_costs import TaskCosts, Watch
 if TYPE_CHECKING:
     from ..config.model import Study
 
-HASH = re.compile("[0-9a-f]{24}")
-"""Form of `springtune.studies.runs.checked_json.hash_of`."""
+HASH = re.compile('"([0-9a-f]{24})"')
+"""Form of `springtune.studies.runs.checked_json.hash_of` in JSON."""
 
 TIMES = "seconds"
 """Ending of names of values that differ in every run."""
@@ -66,15 +66,6 @@ class _NotStoredError(Exception):
 
 class _OnlyStored(TaskCosts):
     """Costs of jobs that must find all results stored."""
-
-    def __init__(self, limits: Mapping[str, float]) -> None:
-        super().__init__()
-        self.words = Watch(limits).words
-
-    @property
-    def limits(self) -> str:
-        """Limits of a task in words."""
-        return self.words
 
     def attempt(self, key: str, function: Callable[[], Any], failed: Callable[[str], dict[str, Any]]) -> Any:
         """Refuse to compute."""
@@ -263,18 +254,9 @@ def _otherwise(site: Site) -> str:
     return f"{', '.join(told)}; install the same in both places and run the part again where it was another"
 
 
-def keys_of(content: Any) -> Iterator[str]:
+def keys_of(content: Any) -> list[str]:
     """Keys of results and their inputs in a task."""
-    if isinstance(content, str):
-        if HASH.fullmatch(content):
-            yield content
-    elif isinstance(content, dict):
-        for name, value in content.items():
-            yield from keys_of(name)
-            yield from keys_of(value)
-    elif isinstance(content, list | tuple):
-        for value in content:
-            yield from keys_of(value)
+    return HASH.findall(json.dumps(content))
 
 
 def _union(target: Path, paths: Sequence[Path], names: Mapping[str, str]) -> Callable[[], None] | None:
@@ -341,7 +323,7 @@ def adopt(study: "Study", folder: Path, cores: int) -> int:
             for path in filter(Path.exists, (record, took)):
                 path.touch()
             continue
-        costs = _OnlyStored(study.limits)
+        costs = _OnlyStored(Watch(study.limits))
         try:
             driver.run(job.stage.module, job.content, costs)
         except (_NotStoredError, DamagedError):

@@ -98,18 +98,10 @@ def _with_swept(trees: Sequence[xr.DataTree]) -> list[xr.DataTree]:
             if name in array.dims
         }
         for number, tree in enumerate(made):
-            stated = _stated(tree, name)
+            stated = xr.DataArray(UNCHANGED[name]) if name in UNCHANGED else tree.to_dataset().get(STATED[name])
             if name not in tree.dims and stated is not None:
-                made[number] = _swept(tree, name, stated, sweeping[0][name].attrs, over)
+                made[number] = _swept(tree, name, abs(stated), sweeping[0][name].attrs, over)
     return made
-
-
-def _stated(tree: xr.DataTree, name: str) -> xr.DataArray | None:
-    """A study's value of a parameter over its dimensions; None if unstated."""
-    if name in UNCHANGED:
-        return xr.DataArray(UNCHANGED[name])
-    found = tree.to_dataset().get(STATED[name])
-    return None if found is None else abs(found)
 
 
 def _swept(

@@ -103,11 +103,12 @@ class Filler:
         }
         self._texts: dict[object, object] = {}
 
-    def put(self, values: Mapping[str, object], **labels: Label) -> None:
-        """Write variables by name into one cell."""
+    def put(self, values: Mapping[str, Any], **labels: Label) -> None:
+        """Write variables by name into one cell; rows and tables may be shorter than their dimensions."""
         for name, value in values.items():
             dimensions, array = self._arrays[name]
-            array[tuple(self._places[name][labels[name]] for name in dimensions if name in labels)] = value
+            place = tuple(self._places[dimension][labels[dimension]] for dimension in dimensions if dimension in labels)
+            array[place + tuple(slice(size) for size in np.shape(value))] = value
 
     def put_each(self, values: Sequence[Mapping[str, object]], labels: Sequence[Mapping[str, Label]]) -> None:
         """Write many cells, one variable at a time."""
@@ -130,13 +131,6 @@ class Filler:
         for name, value in values.items():
             array = self.data[name]
             array.loc[{dimension: labels[str(dimension)] for dimension in array.dims if dimension in labels}] = value
-
-    def put_rows(self, values: Mapping[str, Sequence[float] | np.ndarray], **labels: Label) -> None:
-        """Write rows or tables that may be shorter than their dimensions."""
-        for name, row in values.items():
-            dimensions, array = self._arrays[name]
-            place = tuple(self._places[dimension][labels[dimension]] for dimension in dimensions if dimension in labels)
-            array[place][tuple(map(slice, np.shape(row)))] = row
 
 
 def most_requested(root: xr.Dataset, dimension: str) -> str:

@@ -47,9 +47,7 @@ EXAMPLE = "accept the results anew, or see docs/how-to/compare-studies.md"
 # -- from a dataset ----------------------------------------------------------------------------------------------------
 
 
-def accepted(
-    tree: xr.DataTree, variables: Sequence[str] = (), tolerances: Mapping[str, Tolerance] | None = None
-) -> xr.DataTree:
+def accepted(tree: xr.DataTree, variables: Sequence[str] = ()) -> xr.DataTree:
     """Select accepted values of a dataset.
 
     Examples
@@ -73,7 +71,7 @@ def accepted(
     made.attrs = {
         ACCEPTED: str(tree.attrs.get("study", "unknown")),
         "springtune_version": str(tree.attrs.get("springtune_version", __version__)),
-        TOLERANCES: _tolerance_json(tolerances or {}),
+        TOLERANCES: _tolerance_json({}),
     }
     return made
 
@@ -137,7 +135,7 @@ def unsolved(tree: xr.DataTree) -> list[tuple[str, str, str, str]]:
 
 
 def tolerances(tree: xr.DataTree) -> dict[str, Tolerance]:
-    """Tolerances by variable name, see `accepted`."""
+    """Tolerances by variable name, see `with_tolerances`."""
     return {name: Tolerance(**one) for name, one in json.loads(tree.attrs.get(TOLERANCES, "{}")).items()}
 
 
@@ -160,7 +158,7 @@ def with_tolerances_of(tree: xr.DataTree, former: xr.DataTree) -> xr.DataTree:
 
 
 def with_tolerances(tree: xr.DataTree, given: Mapping[str, Tolerance]) -> xr.DataTree:
-    """Copy with other tolerances, see `accepted`."""
+    """Copy with other tolerances by variable name; ``""`` is for all others."""
     made = tree.copy()
     made.attrs = tree.attrs | {TOLERANCES: _tolerance_json(given)}
     return made

@@ -72,12 +72,7 @@ def open(path: str | os.PathLike[str]) -> "xarray.DataTree":
     Traceback (most recent call last):
     FileNotFoundError: results/nothing: there is no such dataset; run the study, or give its results/<study>/dataset.nc
     """
-    path = Path(path)
-    file = path / "dataset.nc" if path.is_dir() else path
-    if not file.is_file():
-        raise FileNotFoundError(
-            f"{path}: there is no such dataset; run the study, or give its results/<study>/dataset.nc"
-        )
+    file = dataset_file(path)
     texts = check_links(file)
     from .dataset import opened
 
@@ -90,6 +85,17 @@ def open(path: str | os.PathLike[str]) -> "xarray.DataTree":
         tree.close()
         raise ValueError(f"{file}: is not a dataset of springtune; {REMEDY}")
     return tree
+
+
+def dataset_file(path: str | os.PathLike[str]) -> Path:
+    """Path of the file of a dataset, given by itself or by its folder."""
+    path = Path(path)
+    file = path / "dataset.nc" if path.is_dir() else path
+    if not file.is_file():
+        raise FileNotFoundError(
+            f"{path}: there is no such dataset; run the study, or give its results/<study>/dataset.nc"
+        )
+    return file
 
 
 @contextmanager

@@ -58,7 +58,7 @@ def info(path: str | os.PathLike[str]) -> Info:
     (True, True)
     """
     with reading.open(path) as tree, reading.guarded(path):
-        return Info(info_text(tree, Path(path, "dataset.nc") if Path(path).is_dir() else Path(path)))
+        return Info(info_text(tree, reading.dataset_file(path)))
 
 
 def info_text(tree: xr.DataTree, path: Path) -> str:

@@ -82,7 +82,7 @@ def _strip(one, result, laid):
         values["area_error"] = result["area_under_strip"] / one.trapezoid.area - 1
     laid.put(values, **labels)
     if "outline" in result:
-        laid.put_rows(dict(zip(("strip_x", "strip_y"), result["outline"].T)), **labels)
+        laid.put(dict(zip(("strip_x", "strip_y"), result["outline"].T)), **labels)
 
 
 def _reference(meshes, labels, laid):
@@ -95,4 +95,4 @@ def _reference(meshes, labels, laid):
         all_values = [mesh[name] if mesh["status"] == Status.SOLVED else np.nan for mesh in meshes]
         values |= {variable: result[name], f"{variable}_error_estimate": band(all_values)}
     laid.put(values, **labels)
-    laid.put_rows(dict(zip(("reference_x", "reference_y"), result["outline"].T)), **labels)
+    laid.put(dict(zip(("reference_x", "reference_y"), result["outline"].T)), **labels)

@@ -162,11 +162,11 @@ def _scenes(study, folder, root, block, fields, objections):
             if "displacements" in result:  # of one value of what is swept
                 x, y = result["displacements"].T
                 of_springs = {"stiffness": result["spring_stiffnesses"], "spring_force": result["spring_forces"]}
-                fields.put_rows({"displacement_x": x, "displacement_y": y} | of_springs, **place)
+                fields.put({"displacement_x": x, "displacement_y": y} | of_springs, **place)
                 body = mesh.labels | {"material": scene.material.name, "load": scene.load}
                 if tuple(body.values()) not in compared:  # scenes differ in their definitions
                     compared.add(tuple(body.values()))
-                    fields.put_rows(_at_particles(study, folder, scene, fields.data), **body)
+                    fields.put(_at_particles(study, folder, scene, fields.data), **body)
 
 
 def with_objection(result, message, why):
@@ -307,16 +307,14 @@ def fields_on(group, axes, meshes, outlines):
     found.data.attrs["Conventions"] = "CF-1.11 UGRID-1.0"
     for (labels, mesh), corners in zip(meshes, cells):
         places = {"x": mesh.points[:, 0], "y": mesh.points[:, 1]}
-        found.put_rows(places | {"spring_nodes": mesh.edges, "cell_nodes": corners}, **labels)
+        found.put(places | {"spring_nodes": mesh.edges, "cell_nodes": corners}, **labels)
     return found
 
 
 def put_outline(fields, points, moved, **labels):
     """Write the outline of a reference at rest, and its displacements."""
     values = {"outline_x": points[:, 0], "outline_y": points[:, 1]}
-    fields.put_rows(
-        values | {"reference_displacement_x": moved[:, 0], "reference_displacement_y": moved[:, 1]}, **labels
-    )
+    fields.put(values | {"reference_displacement_x": moved[:, 0], "reference_displacement_y": moved[:, 1]}, **labels)
 
 
 def cells_of(mesh):

@@ -194,7 +194,7 @@ def _fields(study, folder):
         found.put(about, case=label)
         points, moved, rounds = outlines[case]
         put_outline(found, points, moved, case=label)
-        found.put_rows({"outline_round": rounds}, case=label)
+        found.put({"outline_round": rounds}, case=label)
         if not meshes[case]:
             continue
         path = folder / "solutions" / f"{kind.file_name(one)}.h5"
@@ -205,7 +205,7 @@ def _fields(study, folder):
             if kept:
                 x, y = kept["displacements"].T
                 values = {"displacement_x": x, "displacement_y": y, "spring_force": kept["spring_forces"]}
-                found.put_rows(values, case=label, definition=scene.definition)
+                found.put(values, case=label, definition=scene.definition)
     return {SHAPE_FIELDS.name: found.data}
 
 

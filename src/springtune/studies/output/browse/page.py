@@ -31,7 +31,7 @@ from springtune.safe_io.inputs import bounded
 from ...config.kind import modules
 from ...runs import records
 from ..colours import ERROR_COLOURS, ERROR_RANGE
-from ..reading import REMEDY, check_links, guarded, most_of
+from ..reading import REMEDY, check_links, dataset_file, guarded, most_of
 from . import View
 
 SCRIPTS = ("payload", "words", "charts", "table", "cells", "shape", "explorer", "main")
@@ -48,11 +48,7 @@ def views() -> dict[str, View]:
 
 def page(dataset: str | os.PathLike[str], files: Iterable[str] = ()) -> str:
     """Page of a dataset."""
-    path = Path(dataset)
-    if not path.is_file():
-        raise FileNotFoundError(
-            f"{path}: there is no such dataset; run the study, or give its results/<study>/dataset.nc"
-        )
+    path = dataset_file(dataset)
     try:
         check_links(path)
         with guarded(path), bounded(most_of(path)), h5py.File(path) as opened:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlsplit
 
+from ..reading import dataset_file
 from .page import page
 
 HOST = "127.0.0.1"
@@ -38,8 +39,7 @@ class Server(ThreadingHTTPServer):
     daemon_threads = True
 
     def __init__(self, dataset: str | os.PathLike[str], port: int = 0) -> None:
-        path = Path(dataset)
-        path = path / "dataset.nc" if path.is_dir() else path
+        path = dataset_file(dataset)
         self.served = _served(path)
         self.text = page(
             path, [name for name in self.served if name in ALONE or not name.endswith((".csv", ".nc", ".pdf"))]
