@@ -170,7 +170,7 @@ class TestScenes:
         path = tmp_path / "twice.yaml"
         path.write_text(f"{text}\n{grids}")
         lines = words(run("scenes", path).stdout)
-        assert "scenes 49 98 asked, 49 of them more than once" in lines
+        assert "scenes 50 100 asked, 50 of them more than once" in lines
         assert "steel 24 24 4 1 8" in lines
         assert "steel again 24 0 4 1 8" in lines
 

@@ -15,8 +15,8 @@ STRESSED = ("definition", "stressed_poisson_ratio")
 STRAINED = ("definition", "strain_load", "strain")
 PERTURBED = ("definition", "perturbation")
 ARCH = ("definition", "arch_point")
-COLUMN = ("definition", "rows")
-ALONE = ("definition",)
+SLENDER = ("definition", "rows")
+OF_DEFINITION = ("definition",)
 
 
 def _judged(name, dimensions, long_name):
@@ -77,11 +77,16 @@ STABILITY = Group(
         "perturbed_negative_pivots": (PERTURBED, "1", "negative pivots of the tangent", np.nan),
         "perturbed_error": (PERTURBED, "1", "displacement with particles moved over that without, less 1", np.nan),
         "perturbed_step_limit": (PERTURBED, "s", "largest stable step with particles moved", np.nan),
-        "inverted_starts_right": (ALONE, "1", "share of inverted starts that end in the right solution", np.nan),
-        "inverted_starts_wrong": (ALONE, "1", "share of inverted starts that end as solved elsewhere", np.nan),
-        "buckling_load": (COLUMN, "N", "buckling load of a column twenty times as long as high", np.nan),
-        "buckling_message": (COLUMN, "1", "what restricts the buckling load, or why there is none", ""),
-        "euler_load": (ALONE, "N", "its load by Euler", np.nan),
+        "inverted_starts_right": (
+            OF_DEFINITION,
+            "1",
+            "share of inverted starts that end in the right solution",
+            np.nan,
+        ),
+        "inverted_starts_wrong": (OF_DEFINITION, "1", "share of inverted starts that end as solved elsewhere", np.nan),
+        "buckling_load": (SLENDER, "N", "buckling load of a column twenty times as long as high", np.nan),
+        "buckling_message": (SLENDER, "1", "what restricts the buckling load, or why there is none", ""),
+        "euler_load": (OF_DEFINITION, "N", "its load by Euler", np.nan),
         "arch_load": (ARCH, "N", "force on the middle of a shallow arch along its path", np.nan),
         "arch_deflection": (ARCH, "m", "its deflection", np.nan),
         "arch_negative_pivots": (ARCH, "1", "negative pivots of the tangent there", np.nan),
