@@ -85,7 +85,7 @@ def test_boundary_elements_converge(references):
     assert errors[0] > 1.3 * errors[1] > 1.3**2 * errors[2]
 
 
-@pytest.mark.skipif(not calculix.installed(), reason="needs CalculiX (ccx; Debian package calculix-ccx)")
+@pytest.mark.skipif(not calculix.program(), reason="needs CalculiX (ccx; Debian package calculix-ccx)")
 @pytest.mark.parametrize("name", SCENES)
 def test_calculix_takes_part(name, references):
     assert answer(SCENES[name], "calculix-cps3")[0] == pytest.approx(references[name], rel=CLOSE[name][0])

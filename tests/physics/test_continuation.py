@@ -191,7 +191,7 @@ def exact(problem, s, displacements):
         pulls = (problem.network.stiffness * apart)[:, None] * normals
         np.add.at(missing, first, pulls)
         np.subtract.at(missing, second, pulls)
-        step = problem.rest_factor.solve(problem.network.reduce(missing).astype(float))
+        step = problem.network.rest_factor.solve(problem.network.reduce(missing).astype(float))
         moved = moved + problem.network.expand(step)
     assert np.abs(step).max() <= 1e-12 * np.abs(moved).max()
     return moved

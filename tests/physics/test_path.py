@@ -89,7 +89,9 @@ def random_curve(seed):
     sign, s = random.choice([-1, 1]), height * 10 ** random.uniform(-2, 0.3)
     if kind != AXIAL or sign < 0:
         small = 1e-6 * sign * height
-        critical = smallest_share(problem.network, None, small * problem.slope, problem.rest_factor) * abs(small)
+        critical = smallest_share(problem.network, None, small * problem.slope, problem.network.rest_factor) * abs(
+            small
+        )
         s = critical * random.uniform(0.3, 1.8) if kind == AXIAL else min(0.3 * s, critical)
     return problem, measured(mesh, kind), sign * min(s, 2 * height) / RATIOS
 
@@ -152,7 +154,7 @@ def test_series_error_falls_with_the_order():
     problem, weights = beam_problem("structured", 0.2, 0.04, 5e-3)
     loads = np.array([2e-5, 4e-5])
     for order in (1, 2, 3):
-        series = Expansion(problem.network, problem.load, 0.0, None, problem.rest_factor, order=order)
+        series = Expansion(problem.network, problem.load, 0.0, None, problem.network.rest_factor, order=order)
         series_errors = []
         for s in loads:
             found = problem.newton(s, s * problem.slope)

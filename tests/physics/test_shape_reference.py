@@ -13,8 +13,9 @@ from springtune.problem.geometry import Beam
 from springtune.problem.loads import BOTTOM, LEFT, LOAD_KINDS, RIGHT, TOP
 from springtune.problem.materials import Material
 from springtune.problem.shapes import Hole, LoadCase, Pressure, Quantity, Segment, Shape, Support, Traction
-from springtune.reference.shapes import converge, solve_each, solve_shape
+from springtune.reference.shapes import Level, solve_each, solve_shape
 from springtune.reference.small_strain import ReferenceNotConvergedError, solve_small_strain
+from springtune.reference.triangles import side_fit, side_functions
 
 STEEL = Material(210e9, 0.3, density=7850.0, name="steel")
 EVERY = [(make, name) for make in others.ALL for name in make()[0].loads]
@@ -29,6 +30,33 @@ class Sheet:
     plane_stress: np.ndarray
     density: float | None = None
     name: str = "sheet"
+
+
+def converge(shape, load, materials, tractions=None, displacements=None, **options):
+    """Solve as `solve_shape`, with tractions [Pa] and displacements [m] that vary along groups, those of a solution."""
+    tractions, displacements = tractions or {}, displacements or {}
+
+    class Prescribed(Level):
+        def forces(self):
+            parts = (self.integral(group, given) for group, given in tractions.items())
+            return super().forces() + self.problem.shape.thickness * sum(parts)
+
+        def supports(self):
+            (held, values), space = super().supports(), self.space
+            along, inverse = side_fit(space.degree)
+            places = side_functions(space.degree, np.concatenate([[-1.0, 1.0], along]))[0]
+            for group, given in displacements.items():
+                for ends, _ in self.group_sides(group):
+                    functions = space.on_side(ends)
+                    wanted = given(places @ space.places[functions], None)
+                    straight = (wanted[0] + wanted[1]) / 2 + along[:, None] * (wanted[1] - wanted[0]) / 2
+                    values[functions[:2]], values[functions[2:]] = wanted[:2], inverse @ (wanted[2:] - straight)
+                    assert held[functions].all()
+            return held, values
+
+    own = tuple(one for one in load.tractions if one.group not in tractions)
+    load = replace(load, tractions=(*own, *(Traction(group, (0.0, 0.0)) for group in tractions)))
+    return solve_shape(shape, load, materials, level_of=Prescribed, **options)
 
 
 def any_sheet(seed):

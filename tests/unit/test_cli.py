@@ -170,7 +170,7 @@ class TestScenes:
         path = tmp_path / "twice.yaml"
         path.write_text(f"{text}\n{grids}")
         lines = words(run("scenes", path).stdout)
-        assert "scenes 49 98 asked, 49 of them more than once" in lines
+        assert "scenes 50 100 asked, 50 of them more than once" in lines
         assert "steel 24 24 4 1 8" in lines
         assert "steel again 24 0 4 1 8" in lines
 
@@ -438,10 +438,13 @@ class TestPredictAMesh:
     def test_signs_are_told(self):
         size = (*self.STEEL, "--size", "5 mm", "--mesh", "right")
         text = run("predict", *size, "--loads", "compression,traction").stdout
-        assert "Positive: too soft; under compression, where displacements are negative, negative is too soft." in text
+        assert (
+            "Of errors, positive: too soft; under compression, where displacements are negative, negative is too soft."
+            in text
+        )
         assert "at worst: delingette" in text and "% (compression, too " in text
         text = run("predict", *size, "--loads", "pressure").stdout
-        assert "\nNegative: too soft.\n" in text and "% (pressure, too stiff)" in text
+        assert "\nOf errors, negative: too soft.\n" in text and "% (pressure, too stiff)" in text
 
     def test_json_of_a_prediction(self):
         result = run("predict", *self.STEEL, "--size", "5 mm", "--loads", "bending,pressure", "--json")

@@ -10,6 +10,7 @@ from click.testing import CliRunner
 
 import springtune as st
 from springtune.cli import main
+from springtune.studies.kinds.benchmark import BUSY
 from springtune.studies.kinds.benchmark.kind import VARIABLES
 from springtune.studies.kinds.scenes.variables import ROOT, SENSITIVITY
 from springtune.studies.output import dataset
@@ -142,6 +143,13 @@ class TestSame:
         after = before.assign({name: ((), 2.0) for name in measured})
         assert {"seconds", "spring_updates", "copy_bandwidth"} <= measured
         assert not compare(*(xr.DataTree.from_dict({"/benchmark": one}) for one in (before, after))).different
+
+    def test_whether_a_machine_was_busy_is_not_compared(self):
+        quiet, busy, failed = (
+            xr.DataTree.from_dict({"/benchmark": xr.Dataset({"message": ("case", [text])})})
+            for text in ("", BUSY, "not done")
+        )
+        assert not compare(quiet, busy).different and compare(busy, failed).different
 
     def test_flags_are_compared_as_words(self):
         other = made()

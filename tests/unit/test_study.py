@@ -208,7 +208,7 @@ def study():
 class TestPaper:
     def test_counts(self, study):
         counted = [len(items) for items in (study.meshes, study.scenes, study.curves, study.references)]
-        assert counted == [18, 45 * 3 * 2, 45 * 2, 9 + 6 - 6]
+        assert counted == [18, 45 * (3 * 2 + 2), 45 * 2, 9 + 6 - 6]
 
     def test_printed_cells_are_the_cells_of_the_grids(self, study):
         cells = {(s.mesh.beam.name, s.mesh.mesh_type, s.mesh.mesh_size, s.material.name, s.load) for s in study.scenes}
@@ -251,7 +251,7 @@ def _printed_range(text):
 
 def test_quick_is_small_but_has_everything():
     study = load_study(CONFIG / "quick.yaml")
-    assert len(study.scenes) < 50
+    assert len(study.scenes) <= 50
     assert min(mesh.mesh_size for mesh in study.meshes) >= 0.002
     assert {mesh.beam.name for mesh in study.meshes} == {"100x20"}
     whole = load_study(CONFIG / "paper.yaml").axes

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from .. import __version__
 from ..problem.compare import error_text, sign_sentence, sign_word
 from ..problem.shapes import QUANTITY_UNITS
@@ -38,7 +40,7 @@ class Subject:
     compared: dict[str, tuple[float, str]]
     load: str
     meaning: str
-    sign: str
+    sign: list[str]
     dense: bool
     references: list[list[str]]
 
@@ -47,11 +49,6 @@ class Subject:
         """Largest error estimate of the references."""
         estimates = [found.error_estimate for found in self.known.values() if not isinstance(found, str)]
         return f"{100 * max(estimates, default=0):.1g} %"
-
-    @property
-    def signs(self) -> list[str]:
-        """Line that says what the sign of an error means; none where no displacement has a reference."""
-        return [f"{self.sign[0].upper()}{self.sign[1:]}."] if self.sign else []
 
 
 def beam_subject(beam: "Beam", material: "Material", known: "References") -> Subject:
@@ -71,8 +68,8 @@ def beam_subject(beam: "Beam", material: "Material", known: "References") -> Sub
     signs = {load: LOADS[load].sign for load in known}
     meaning = f"{MEANT} the displacement of the loaded side"
     compared = {load: (sign, "displacement") for load, sign in signs.items()}
-    sign, dense = sign_sentence(signs), material.density is not None
-    return Subject(beam.label, made_of, about, known, compared, "", meaning, sign, dense, [])
+    sign = [f"Of errors, {sign_sentence(signs)}."]
+    return Subject(beam.label, made_of, about, known, compared, "", meaning, sign, material.density is not None, [])
 
 
 def shape_subject(statement: "ShapeStatement", known: "ShapeReferences") -> Subject:
@@ -80,7 +77,8 @@ def shape_subject(statement: "ShapeStatement", known: "ShapeReferences") -> Subj
     kind = {one.name: one.kind for one in statement.case.quantities}
     compared = {name: (found.value, kind[name]) for name, found in known.items() if not isinstance(found, str)}
     moved = {name: value for name, (value, of) in compared.items() if of == "displacement"}
-    sign = f"{'' if len(moved) == len(compared) else 'of displacements '}{sign_sentence(moved, 'of')}" if moved else ""
+    of = "errors" if len(moved) == len(compared) else "errors of displacements"
+    sign = [f"Of {of}, {sign_sentence(moved, 'of')}."] if moved else []
     about = {
         "shape": statement.shape.name,
         "load": statement.load,
@@ -143,7 +141,7 @@ def prediction_text(
         "",
         f"{subject.meaning}{': ' if of_beam else ', '}{how},",
         f"{KINEMATICS_TEXT} (error estimate {subject.estimate})." if of_beam else f"{KINEMATICS_TEXT}.",
-        *subject.signs,
+        *subject.sign,
         f"{ranked} E, its error, and nu are of a patch test between rollers." if of_beam else ranked,
     ]
     if subject.references:
@@ -195,7 +193,7 @@ def search_text(subject: Subject, search: "MeshSearch", springs_alone: bool = Fa
         "Meshes are ranked by their particles.",
         f"{subject.meaning}, solved on each mesh,",
         f"{KINEMATICS_TEXT} (error estimate {subject.estimate}).",
-        *subject.signs,
+        *subject.sign,
         "Static solve: of one load with its network assembled and factorized, measured here once.",
     ]
     lines += ["Largest step: of undamped explicit integrators, about rest, held nowhere."] if steps else []
@@ -255,13 +253,8 @@ def _at_worst(subject: Subject, choices: "Sequence[Choice]", names: Sequence[str
     texts = []
     for choice in choices:
         if choice.definition in names:
-            errors = [
-                (error, name)
-                for name, value in choice.errors.items()
-                for error in (value if isinstance(value, tuple) else (value,))
-                if error == error
-            ]
-            worst, name = max(errors, key=lambda one: abs(one[0]))
+            bounds = ((error, name) for name, value in choice.errors.items() for error in np.ravel(value))
+            worst, name = max((one for one in bounds if one[0] == one[0]), key=lambda one: abs(one[0]))
             word = sign_word(worst, *subject.compared[name])
             texts.append(f"{choice.definition} {error_text(worst)} ({name}{word and ', '}{word})")
     return [f"at worst: {', '.join(texts)}"] if texts else []

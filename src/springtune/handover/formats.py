@@ -24,11 +24,12 @@ from .xpbd import xpbd
 
 
 class Array(NamedTuple):
-    """An array of a net: type, titles of its columns in a table, and unit."""
+    """An array of a net: type, titles of its columns in a table, unit, and the array that it has a row for each of."""
 
     kind: type
     titles: tuple[str, ...]
     unit: str = ""
+    of: str = ""
 
     @property
     def columns(self) -> int:
@@ -38,12 +39,12 @@ class Array(NamedTuple):
 
 ARRAYS = {
     "points": Array(float, ("x", "y"), "m"),
-    "masses": Array(float, ("mass",), "kg"),
-    "held": Array(bool, ("held_x", "held_y")),
-    "forces": Array(float, ("force_x", "force_y"), "N"),
+    "masses": Array(float, ("mass",), "kg", of="points"),
+    "held": Array(bool, ("held_x", "held_y"), of="points"),
+    "forces": Array(float, ("force_x", "force_y"), "N", of="points"),
     "springs": Array(np.int64, ("first", "second")),
-    "rest_lengths": Array(float, ("rest_length",), "m"),
-    "stiffness": Array(float, ("stiffness",), "N/m"),
+    "rest_lengths": Array(float, ("rest_length",), "m", of="springs"),
+    "stiffness": Array(float, ("stiffness",), "N/m", of="springs"),
     "triangles": Array(np.int64, ("a", "b", "c")),
     "quads": Array(np.int64, ("a", "b", "c", "d")),
 }
@@ -123,13 +124,9 @@ def _checked(arrays: dict[str, np.ndarray], energies: Iterable[Terms], header: d
         if any(len(values) != len(terms.cells) for values in terms.values.values()):
             raise ValueError(f"{terms.kind} terms are not as many as cells")
     count = len(arrays["points"])
-    for names, length in (
-        (("masses", "held", "forces"), count),
-        (("rest_lengths", "stiffness"), len(arrays["springs"])),
-    ):
-        for name in names:
-            if name in arrays and len(arrays[name]) != length:
-                raise ValueError(f"{len(arrays[name])} {name} for {length}")
+    for name, about in ARRAYS.items():
+        if about.of and name in arrays and len(arrays[name]) != len(arrays[about.of]):
+            raise ValueError(f"{len(arrays[name])} {name} for {len(arrays[about.of])}")
     for name in ("springs", "triangles", "quads"):
         if len(arrays[name]) and not (0 <= arrays[name].min() and arrays[name].max() < count):
             raise ValueError(f"{name} of particles that it does not have")
@@ -156,11 +153,6 @@ def _counts(header: Mapping[str, Any]) -> dict[str, Any]:
 # -- tables of cells: the terms of their energies, column by column ------------------------------------------------
 
 
-def _columns(terms: Terms) -> dict[str, np.ndarray]:
-    """Columns of terms by name: ``area_modulus``; ``angle_rest_angle``, which has a component for each corner."""
-    return {f"{terms.kind}_{name}": values for name, values in terms.values.items()}
-
-
 def _terms(cells: np.ndarray, columns: Mapping[str, np.ndarray]) -> Iterable[Terms]:
     """Terms of the columns of cells."""
     for kind, names in VALUES.items():
@@ -177,10 +169,11 @@ def _terms_of(kind: str, cells: np.ndarray, values: Mapping[str, Any]) -> Terms:
 
 
 def _by_corners(energies: Iterable[Terms]) -> dict[int, dict[str, np.ndarray]]:
-    """Columns of all terms by the corners of their cells."""
+    """Columns of all terms by the corners of their cells: ``area_modulus``; ``angle_rest_angle``, one a corner."""
     found: dict[int, dict[str, np.ndarray]] = {}
     for terms in energies:
-        found.setdefault(terms.cells.shape[1], {}).update(_columns(terms))
+        columns = {f"{terms.kind}_{name}": values for name, values in terms.values.items()}
+        found.setdefault(terms.cells.shape[1], {}).update(columns)
     return found
 
 
@@ -220,17 +213,19 @@ def _write_csv(path: Path, net: Net) -> list[Path]:
     return [path, *tables]
 
 
+def _titled(titles: Iterable[str], unit: str, values: np.ndarray) -> dict[str, np.ndarray]:
+    """Columns of an array by title."""
+    ending = f" [{unit}]" if unit else ""
+    return {f"{title}{ending}": column for title, column in zip(titles, values.reshape(len(values), -1).T)}
+
+
 def _table(arrays: Mapping[str, np.ndarray], names: Iterable[str]) -> dict[str, np.ndarray]:
     """Columns of arrays by title."""
     table: dict[str, np.ndarray] = {}
     for name in names:
-        if name not in arrays:
-            continue
-        unit = f" [{ARRAYS[name].unit}]" if ARRAYS[name].unit else ""
-        values = arrays[name].astype(int) if arrays[name].dtype == bool else arrays[name]
-        table |= {
-            f"{title}{unit}": column for title, column in zip(ARRAYS[name].titles, values.reshape(len(values), -1).T)
-        }
+        if name in arrays:
+            values = arrays[name].astype(int) if arrays[name].dtype == bool else arrays[name]
+            table |= _titled(ARRAYS[name].titles, ARRAYS[name].unit, values)
     return table
 
 
@@ -239,9 +234,8 @@ def _corner_columns(columns: Mapping[str, np.ndarray], count: int) -> dict[str, 
     table: dict[str, np.ndarray] = {}
     for name, values in columns.items():
         kind, _, value = name.partition("_")
-        unit = VALUES[kind][value]
-        names = [f"{name}_{corner}" for corner in "abcd"[:count]] if values.ndim > 1 else [name]
-        table |= {f"{title} [{unit}]": column for title, column in zip(names, values.reshape(len(values), -1).T)}
+        titles = [f"{name}_{corner}" for corner in "abcd"[:count]] if values.ndim > 1 else [name]
+        table |= _titled(titles, VALUES[kind][value], values)
     return table
 
 

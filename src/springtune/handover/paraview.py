@@ -21,8 +21,8 @@ def write_vtu(
     cells: Mapping[int, np.ndarray],
     point_data: Mapping[str, np.ndarray],
     cell_data: Mapping[str, Mapping[int, np.ndarray]],
-    numbers: Mapping[str, float] | None = None,
-    comment: str = "",
+    numbers: Mapping[str, float],
+    comment: str,
 ) -> None:
     """Write points [m] and cells with their data; the file appears whole or not at all.
 
@@ -51,19 +51,16 @@ def write_vtu(
     )
     with replacing(path) as unfinished:
         grid.write(unfinished, file_format="vtu")
-        if numbers or comment:
-            added = "".join(
-                f'<DataArray type="Float64" Name={quoteattr(name)} NumberOfTuples="1" format="ascii">{value!r}'
-                "</DataArray>"
-                for name, value in (numbers or {}).items()
-            )
-            # A comment must not have two hyphens in a row; as JSON has them they are the same.
-            said = comment.replace("--", "-\\u002d")
-            head = f"<!--\n{said}\n-->" if comment else ""
-            fields = f"<FieldData>{added}</FieldData>" if added else ""
-            grid_tag = b"<UnstructuredGrid>"
-            content = unfinished.read_bytes()
-            unfinished.write_bytes(content.replace(grid_tag, head.encode() + grid_tag + fields.encode(), 1))
+        added = "".join(
+            f'<DataArray type="Float64" Name={quoteattr(name)} NumberOfTuples="1" format="ascii">{value!r}</DataArray>'
+            for name, value in numbers.items()
+        )
+        # A comment must not have two hyphens in a row; as JSON has them they are the same.
+        said = comment.replace("--", "-\\u002d")
+        fields = f"<FieldData>{added}</FieldData>" if added else ""
+        grid_tag = "<UnstructuredGrid>"
+        begin = f"<!--\n{said}\n-->{grid_tag}{fields}"
+        unfinished.write_bytes(unfinished.read_bytes().replace(grid_tag.encode(), begin.encode(), 1))
 
 
 def comment_of(path: str | Path) -> str:

@@ -156,9 +156,10 @@ def _check(net: Net, program: str, laws: Iterable[str]) -> None:
             "definition of springs alone, such as 'patch' or 'lattice'"
         )
     if net.masses is None:
+        materials = (net.header["material"], *net.header.get("other_materials", {}).values())
+        light = next(one["name"] for one in materials if one.get("density") is None)
         raise ValueError(
-            f"density: material '{_lacking(net)}' has none, and {program} moves masses; give a "
-            "density such as '7850 kg/m^3'"
+            f"density: material '{light}' has none, and {program} moves masses; give a density such as '7850 kg/m^3'"
         )
     load = net.header.get("load")
     if load and load["follower"]:
@@ -172,12 +173,6 @@ def _check(net: Net, program: str, laws: Iterable[str]) -> None:
             f"kinematics: 'linear', and springs of {program} keep their length law; take 'nonlinear', which is the "
             "same under small loads"
         )
-
-
-def _lacking(net: Net) -> str:
-    """Name of a material without a density."""
-    first, others = net.header["material"], net.header.get("other_materials", {})
-    return next(str(one["name"]) for one in (first, *others.values()) if one.get("density") is None)
 
 
 def _network(net: Net, reference: float) -> Network:

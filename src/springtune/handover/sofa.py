@@ -40,12 +40,17 @@ class Component(NamedTuple):
     data: Mapping[str, str]
 
 
+SCENE_ROOT = [
+    Component("DefaultAnimationLoop", {}),
+    Component("VisualStyle", {"displayFlags": "showBehaviorModels showForceFields"}),
+]
+
+
 class SofaScene(NamedTuple):
     """Nodes of a scene in SOFA's order; the first two components of `sheet` are integrator and solver; step in s."""
 
     step: float
     about: list[str]
-    root: list[Component]
     sheet: list[Component]
     predicted: list[Component]
 
@@ -69,7 +74,7 @@ def sofa_xml(net: Net) -> str:
         '<?xml version="1.0"?>',
         f'<Node name="root" dt="{scene.step!r}" gravity="0 0 0">',
         *commented(scene.about, "  "),
-        *_tags([*plugins, *scene.root], "  "),
+        *_tags([*plugins, *SCENE_ROOT], "  "),
         '  <Node name="sheet">',
         *_tags([Component(integrator, scene.sheet[0].data), *scene.sheet[1:]], "    "),
         "  </Node>",
@@ -126,7 +131,7 @@ def sofa_python(net: Net) -> str:
         "PLUGINS": repr(PLUGINS),
         "BACKWARD_EULER": repr(BACKWARD_EULER),
         "INTEGRATOR": repr(dict(scene.sheet[0].data)),
-        "ROOT": _rows(scene.root),
+        "ROOT": _rows(SCENE_ROOT),
         "SHEET": _rows(scene.sheet[1:]),
         "PREDICTED": _rows(scene.predicted),
     }
@@ -181,11 +186,7 @@ def _scene(net: Net) -> SofaScene:
         shown = {"showObject": "1", "showObjectScale": "4", "showColor": "0.1 0.6 0.2 1"}
         moved = _positions(net.points + simulation.displacements)
         predicted = [Component("MechanicalObject", vec3 | {"name": "particles", "position": moved} | shown)]
-    root = [
-        Component("DefaultAnimationLoop", {}),
-        Component("VisualStyle", {"displayFlags": "showBehaviorModels showForceFields"}),
-    ]
-    return SofaScene(simulation.implicit_step, about(net, simulation, said), root, sheet, predicted)
+    return SofaScene(simulation.implicit_step, about(net, simulation, said), sheet, predicted)
 
 
 def _positions(points: np.ndarray) -> str:

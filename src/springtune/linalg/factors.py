@@ -34,19 +34,15 @@ class Factor(Protocol):
     @property
     def negative_pivots(self) -> int:
         """Number of negative eigenvalues of the matrix; 0 where it is positive definite."""
-        ...
 
     def solve(self, right: np.ndarray) -> np.ndarray:
         """Solve for right-hand sides, shape (unknowns,) or (unknowns, n)."""
-        ...
 
     def step(self, right: np.ndarray) -> np.ndarray:
         """As `solve`, for a step of Newton's method."""
-        ...
 
     def estimate(self, right: np.ndarray) -> np.ndarray:
         """As `solve`, but only an estimate."""
-        ...
 
 
 class SuperLUFactor:
@@ -67,19 +63,14 @@ class SuperLUFactor:
         self._order = slice(None) if order is None else order
         chosen = "MMD_AT_PLUS_A" if order is None else "NATURAL"
         try:
-            self._lu = splu(matrix, permc_spec=chosen, diag_pivot_thresh=0.0, **SUPERLU)
+            self.lu = splu(matrix, permc_spec=chosen, diag_pivot_thresh=0.0, **SUPERLU)
         except RuntimeError as error:
             raise SingularError(str(error)) from error
-
-    @property
-    def fill(self) -> int:
-        """Number of entries of the lower triangular factor."""
-        return self._lu.L.nnz
 
     def solve(self, right: np.ndarray) -> np.ndarray:
         """Solution of the factorized system, shape (unknowns,) or (unknowns, n)."""
         solution = np.empty_like(right)
-        solution[self._order] = self._lu.solve(right[self._order])
+        solution[self._order] = self.lu.solve(right[self._order])
         return solution
 
     step = estimate = solve
@@ -87,16 +78,16 @@ class SuperLUFactor:
     @cached_property
     def negative_pivots(self) -> int:
         """Number of negative eigenvalues of the matrix (Sylvester's law of inertia)."""
-        if (self._lu.perm_r != self._lu.perm_c).any():
+        if (self.lu.perm_r != self.lu.perm_c).any():
             raise SingularError("a zero pivot")
-        return int((self._lu.U.diagonal() < 0).sum())
+        return int((self.lu.U.diagonal() < 0).sum())
 
 
 class Analysis:
     """Reusable symbolic factorization of all symmetric matrices of one sparsity.
 
     Supernodal Cholesky factorization (Chen, Davis, Hager and Rajamanickam, ACM Trans. Math. Softw. 35(3):22, 2008).
-    `symbolic_factors` is the largest number of numeric factors in use at a time.
+    `spare` are factors that nobody needs any more.
     """
 
     def __init__(self, indices: np.ndarray, pointers: np.ndarray, order: np.ndarray | None = None) -> None:
@@ -108,8 +99,7 @@ class Analysis:
         rows, columns = (matrix(part[self._lower].astype(np.int64)) for part in (indices, columns))
         self._matrix = spmatrix(np.zeros(len(self._lower)), rows, columns, (size, size))
         self._order = {} if order is None else {"p": matrix(order.astype(np.int64))}
-        self._spare: list[Any] = []
-        self.symbolic_factors = 0
+        self.spare: list[Any] = []
         cholmod.options["supernodal"] = 2
 
     def factorize(self, data: np.ndarray) -> "CholeskyFactor | None":
@@ -118,17 +108,13 @@ class Analysis:
 
         self._matrix.V = matrix(data[self._lower])
         # A factor is made in the place of its symbolic one, and gives that back when nobody needs it any more.
-        if self._spare:
-            factor = self._spare.pop()
-        else:
-            factor = cholmod.symbolic(self._matrix, uplo="L", **self._order)
-            self.symbolic_factors += 1
+        factor = self.spare.pop() if self.spare else cholmod.symbolic(self._matrix, uplo="L", **self._order)
         try:
             cholmod.numeric(self._matrix, factor)
         except ArithmeticError:
-            self._spare.append(factor)
+            self.spare.append(factor)
             return None
-        return CholeskyFactor(factor, self._spare, self._matrix.size[0])
+        return CholeskyFactor(factor, self.spare, self._matrix.size[0])
 
 
 class CholeskyFactor:

@@ -85,11 +85,10 @@ class Multigrid:
         self._certain = False
         self._levels: list[_Level] = []
         self._coarsest: Any = None
-        self._borrowed = like is not None and like._coarsest is not None
-        if like is not None and self._borrowed:
-            self._levels, self._coarsest = like._levels, like._coarsest
-        else:
+        if like is None or like._coarsest is None:
             self._lay_grids()
+        else:
+            self._borrowed, self._levels, self._coarsest = True, like._levels, like._coarsest
 
     def _lay_grids(self) -> None:
         """Levels and the factor of the coarsest one, of the matrix itself."""

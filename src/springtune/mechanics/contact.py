@@ -19,6 +19,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, fields
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve, cholesky, solve_triangular
@@ -226,6 +227,16 @@ class Contacts:
     gaps: np.ndarray
 
 
+class _Quadratic(NamedTuple):
+    """Problem of a Newton step: by body tangent, missing forces and rows of its contacts; gaps, and likely contacts."""
+
+    tangents: list[csc_array]
+    missing: list[np.ndarray]
+    rows: list[csc_array]
+    gaps: np.ndarray
+    likely: np.ndarray
+
+
 class Contact:
     """Bodies, rigid obstacles and a floor at y = 0.
 
@@ -264,7 +275,7 @@ class Contact:
                 parts.append(self._on_floor(owner, sides[owner]))
             for target in range(len(self.all)):
                 if target != owner and min(owner, target) < len(self.bodies):
-                    parts += self._between(owner, sides[owner], target, sides[target])
+                    parts.append(self._between(owner, sides[owner], target, sides[target]))
         return Contacts(*(np.concatenate([getattr(part, one.name) for part in parts]) for one in fields(Contacts)))
 
     def _on_floor(self, owner: int, sides: _Sides) -> Contacts:
@@ -282,18 +293,15 @@ class Contact:
             gaps=places[near, 1],
         )
 
-    def _between(self, owner: int, own: _Sides, target: int, met: _Sides) -> list[Contacts]:
-        """Corners of one body near edges of another one; an empty list where they are far from each other."""
+    def _between(self, owner: int, own: _Sides, target: int, met: _Sides) -> Contacts:
+        """Corners of one body near edges of another one."""
         places, (after, before) = self.all[owner].points[own.corners], self.all[target].neighbours
-        found = self._facing(places, own, met, before)
-        if found is None:
-            return []
-        rows, edge = found
+        rows, edge = self._facing(places, own, met, before)
         ahead, behind = met.turn[edge] < -STRAIGHT, met.turn[before[edge]] < -STRAIGHT
         rows = np.concatenate([rows, rows[ahead], rows[behind]])
         edge = np.concatenate([edge, after[edge[ahead]], before[edge[behind]]])
         offset = places[rows] - met.start[edge]
-        contacts = Contacts(
+        return Contacts(
             owners=np.full(len(rows), owner),
             corners=own.corners[rows],
             targets=np.full(len(rows), target),
@@ -302,17 +310,16 @@ class Contact:
             normals=met.normals[edge],
             gaps=np.einsum("na,na->n", offset, met.normals[edge]),
         )
-        return [contacts]
 
     def _facing(
         self, places: np.ndarray, own: _Sides, met: _Sides, before: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray] | None:
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Corners near an edge that faces them, by their number in the outline, and the nearest such edge of each."""
         reach = REACH * self.size
         near = _near(met.start, places, reach)
         shown = np.flatnonzero(_near(places, met.start, reach + met.length))
         if not near.any() or not len(shown):
-            return None
+            return np.zeros(0, dtype=int), np.zeros(0, dtype=int)
         start, along, length, normals = (part[shown] for part in (met.start, met.along, met.length, met.normals))
         offset = places[near][:, None, :] - start[None, :, :]
         gaps = np.einsum("nea,ea->ne", offset, normals)
@@ -420,9 +427,10 @@ class Contact:
         rows = self._rows(contacts, contacts.normals)
         try:
             tangents = [body.tangent(share, part) for body, part in zip(self.bodies, more)]
-            found = self._closed(tangents, missing, rows, contacts.gaps, known > 0) if near else None
+            quadratic = _Quadratic(tangents, missing, rows, contacts.gaps, known > 0)
+            found = self._closed(quadratic) if near else None
             if found is None:
-                found = self._opening(tangents, missing, rows, contacts.gaps, known > 0)
+                found = self._opening(quadratic)
         except (RuntimeError, SingularError, ValueError, np.linalg.LinAlgError):
             return None
         steps, forces = found
@@ -435,18 +443,12 @@ class Contact:
         self.contacts, self.forces, self.drag = contacts, forces, drag
         return longest
 
-    def _opening(
-        self,
-        tangents: list[csc_array],
-        missing: list[np.ndarray],
-        rows: list[csc_array],
-        gaps: np.ndarray,
-        likely: np.ndarray,
-    ) -> tuple[list[np.ndarray], np.ndarray]:
+    def _opening(self, quadratic: _Quadratic) -> tuple[list[np.ndarray], np.ndarray]:
         """Return steps and contact forces of the quadratic minimum under all contact conditions.
 
         Few of many contacts close: the minimum takes the likely ones, and then adds those that it violates.
         """
+        tangents, missing, rows, gaps, likely = quadratic
         solves = [body.solver(tangent) for body, tangent in zip(self.bodies, tangents)]
         steps = free = [solve(part) for solve, part in zip(solves, missing)]
         opening = gaps + sum(row.T @ part for row, part in zip(rows, free))
@@ -466,20 +468,14 @@ class Contact:
             more = np.flatnonzero(left < min(-GAP * self.size, 0.5 * left.min()))
         return steps, forces
 
-    def _closed(
-        self,
-        tangents: list[csc_array],
-        missing: list[np.ndarray],
-        rows: list[csc_array],
-        gaps: np.ndarray,
-        closed: np.ndarray,
-    ) -> tuple[list[np.ndarray], np.ndarray] | None:
+    def _closed(self, quadratic: _Quadratic) -> tuple[list[np.ndarray], np.ndarray] | None:
         """Return the Newton step with the contacts that were closed; None if the set of closed contacts is unclear.
 
         Contacts that pull are opened and those that close are added, a few times over. The tangent needs to be
         definite only on the motions that closed contacts leave free. This is a true Newton step; `_opening` adds
         resistance.
         """
+        tangents, missing, rows, gaps, closed = quadratic
         scale = np.mean([np.abs(tangent.diagonal()).mean() for tangent in tangents])
         stacked, stiffness = vstack(rows, format="csc"), block_diag(tangents)
         sizes = np.cumsum([len(part) for part in missing])

@@ -257,7 +257,7 @@ def buckling(problem: LoadedNetwork, guess: float) -> Buckling:
     for share in (1.0, 0.1):  # a first estimate, then of its own size, whatever the guess
         step = share * at_rest
         there, back = step * problem.slope, -step * problem.slope
-        at_rest = smallest_share(network, None, there, problem.rest_factor, back) * step
+        at_rest = smallest_share(network, None, there, network.rest_factor, back) * step
         if not abs(at_rest) < 100 * abs(guess):
             return Buckling(np.nan, "no buckling load up to a hundred times the load")
     first, second = (problem.newton(share * at_rest, share * at_rest * problem.slope) for share in (0.85, 0.95))

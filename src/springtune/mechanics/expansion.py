@@ -66,14 +66,12 @@ class Expansion:
 
     def _extend(self, order: int) -> None:
         network = self._network
-        d, length, inverse, coefficients = (
-            _grown(array, order + 1) for array in (self._d, self._length, self._inverse, self.coefficients)
+        d, length, inverse, coefficients, loads = (
+            _grown(array, order + 1) for array in (self._d, self._length, self._inverse, self.coefficients, self.loads)
         )
-        loads = np.zeros(order + 1)
-        loads[: len(self.loads)] = self.loads[: order + 1]
         weight = network.stiffness * network.rest_lengths
         for n in range(self.order + 1, order + 1):
-            right, length[n], inverse[n] = self._load, 0.0, 0.0
+            right = self._load
             if n > 1:
                 # What lower orders give of order n, as if d[n] were 0.
                 square = np.einsum("nji,nji->i", d[1:n], d[n - 1 : 0 : -1])
@@ -215,8 +213,8 @@ class Expansion:
 
 
 def _grown(array: np.ndarray, length: int) -> np.ndarray:
-    """The array with room for more along its first axis."""
-    grown = np.empty((length, *array.shape[1:]))
+    """The array with zeros behind it along its first axis."""
+    grown = np.zeros((length, *array.shape[1:]))
     grown[: len(array)] = array
     return grown
 

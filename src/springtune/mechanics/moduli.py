@@ -31,11 +31,7 @@ EVEN = 1e-6
 
 
 Elastic = Any
-"""Springs as patch tests need them, such as `springtune.springs.Springs`.
-
-`relative` (n_springs,) is stiffness over the reference stiffness [1], `energies` are those besides the springs', and
-`lateral` is the pull on the faces over the axial stress [1], or 0.
-"""
+"""A `springtune.springs.Springs`, which is of a room above: `relative`, `energies` and `lateral` of it are read."""
 
 
 def ends(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:

@@ -108,11 +108,6 @@ class LoadedNetwork:
             forces = np.where(network.held, network.linear_forces(self.slope), 0.0)
             self.load_norm = float(np.hypot(np.linalg.norm(self.load), np.linalg.norm(forces))) or self.load_norm
 
-    @property
-    def rest_factor(self) -> Factor:
-        """Tangent factorized at rest, shared by all loads of the network."""
-        return self.network.rest_factor
-
     @cached_property
     def _slope(self) -> tuple[np.ndarray, float, float]:
         """The linear network's displacements over ``s``, the residual [1] and the estimated error of them [1]."""
@@ -121,12 +116,12 @@ class LoadedNetwork:
             missing = self.load - self.network.linear_resistance(slope)
             return missing, norm(missing) / self.load_norm
 
+        network, factor = self.network, self.network.rest_factor
         if self.given is None:
-            first = self.network.expand(self.rest_factor.solve(self.load))
+            first = network.expand(factor.solve(self.load))
         else:
-            pull = self.load - self.network.linear_resistance(self.given)
-            first = self.given + self.network.expand(self.rest_factor.solve(pull))
-        here, error = refine(self.network, Iterate(first, *balance(first)), self.rest_factor, balance, linear=True)
+            first = self.given + network.expand(factor.solve(self.load - network.linear_resistance(self.given)))
+        here, error = refine(network, Iterate(first, *balance(first)), factor, balance, linear=True)
         return here.displacements, here.residual, error
 
     @property
@@ -136,7 +131,7 @@ class LoadedNetwork:
 
     def stability(self, s: float, displacements: np.ndarray, factor: Factor) -> tuple[int, bool]:
         """Return the number of negative pivots of an equilibrium's tangent, and whether it is singular."""
-        if self.follower is None or factor is self.rest_factor:
+        if self.follower is None or factor is self.network.rest_factor:
             return factor.negative_pivots, False
         modes = self.modes(s, displacements, factor)
         merged = np.abs(modes.imag) > MERGED * np.abs(modes)
@@ -199,15 +194,9 @@ class LoadedNetwork:
         """Factorize the tangent of resistance less load, see `Network.factorize_tangent`."""
         return self.network.factorize_tangent(displacements, self._follower_at(s))
 
-    def newton(
-        self,
-        s: float,
-        start: np.ndarray,
-        max_factorizations: int = MAX_FACTORIZATIONS,
-        keep_tangent: float = KEEP_TANGENT,
-    ) -> Equilibrium:
+    def newton(self, s: float, start: np.ndarray, max_factorizations: int = MAX_FACTORIZATIONS) -> Equilibrium:
         """Run Newton's method from displacements [m], shape (n_points, 2), see `Newton`."""
-        return Newton(self, s, max_factorizations, keep_tangent).solve(self.moved(s, start))
+        return Newton(self, s, max_factorizations).solve(self.moved(s, start))
 
     def _follower_at(self, s: float) -> tuple[float, FollowerPressure] | None:
         return None if self.follower is None else (s, self.follower)
@@ -218,13 +207,13 @@ class Newton:
 
     A few steps may leave the residual above its minimum. Then the best iterate is restored and steps are halved until
     the residual falls (watchdog technique: Chamberlain, Lemarechal, Pedersen and Powell, Math. Programming Study
-    16:1, 1982). No step may invert a cell. A factor is reused while its steps cut the residual by `keep_tangent`: a
+    16:1, 1982). No step may invert a cell. A factor is reused while its steps cut the residual by `KEEP_TANGENT`: a
     new one costs ten such steps.
     """
 
-    def __init__(self, problem: LoadedNetwork, s: float, max_factorizations: int, keep_tangent: float) -> None:
+    def __init__(self, problem: LoadedNetwork, s: float, max_factorizations: int) -> None:
         self.problem, self.network, self.s = problem, problem.network, s
-        self.max_factorizations, self.keep_tangent = max_factorizations, keep_tangent
+        self.max_factorizations = max_factorizations
 
     def solve(self, start: np.ndarray) -> Equilibrium:
         """Return the equilibrium from displacements [m], shape (n_points, 2), that contain the prescribed ones.
@@ -286,7 +275,7 @@ class Newton:
         if there is None:
             return "line search found no descent"
         self._steps += 1
-        self._keep = there.residual <= self.keep_tangent * self._here.residual
+        self._keep = there.residual <= KEEP_TANGENT * self._here.residual
         self._here = there
         self._best, self._since_best = (there, 0) if lower else (self._best, self._since_best + 1)
         return ""
@@ -328,12 +317,11 @@ class Newton:
         return Equilibrium(here.displacements, False, self._steps, here.residual, self._factor, reason)
 
 
-def error_estimate(
-    network: Network, factor: Factor, missing: np.ndarray, displacements: np.ndarray, linear: bool = False
-) -> float:
+def error_estimate(network: Network, factor: Factor, here: Iterate, linear: bool) -> float:
     """Return the estimated relative error of displacements [1], from the Newton step left and rounding of forces."""
-    rounding = network.rounding(displacements, linear)
-    return norm(factor.estimate(missing + _signs(len(rounding)) * rounding)) / (norm(displacements.ravel()) or 1.0)
+    rounding = network.rounding(here.displacements, linear)
+    step = factor.estimate(here.missing + _signs(len(rounding)) * rounding)
+    return norm(step) / (norm(here.displacements.ravel()) or 1.0)
 
 
 @lru_cache(maxsize=4)
@@ -350,11 +338,11 @@ def refine(
     linear: bool = False,
 ) -> tuple[Iterate, float]:
     """Take steps with one tangent while each halves the estimated error; return the iterate and that error [1]."""
-    error = error_estimate(network, factor, here.missing, here.displacements, linear)
+    error = error_estimate(network, factor, here, linear)
     while error > REFINED:
         displacements = here.displacements + network.expand(factor.solve(here.missing))
         there = Iterate(displacements, *balance(displacements))
-        better = error_estimate(network, factor, there.missing, displacements, linear)
+        better = error_estimate(network, factor, there, linear)
         if not better <= 0.5 * error or not linear and network.inverted(displacements):
             break
         here, error = there, better

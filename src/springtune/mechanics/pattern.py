@@ -113,14 +113,6 @@ class Pattern:
         indices, pointers = numbered.indices.astype(np.int32), pointers.astype(np.int32)
         return order, numbered.data.astype(np.int64), indices, pointers
 
-    def _codes(self, particles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return which entries of groups' matrices are kept, and one number for each one's place."""
-        local = self.number[particles].reshape(len(particles), -1)
-        width = local.shape[1]
-        rows, columns = np.repeat(local, width, axis=1).ravel(), np.tile(local, (1, width)).ravel()
-        kept = np.flatnonzero((rows >= 0) & (columns >= 0))
-        return kept, columns[kept] * self.size + rows[kept]
-
     def expand(self, unknowns: np.ndarray) -> np.ndarray:
         """Field of shape (n_points, 2) from the vector of unknowns, 0 where a direction is held."""
         full = np.zeros(self.shape)
@@ -197,8 +189,12 @@ class Pattern:
 
     def entries(self, particles: np.ndarray, matrices: np.ndarray) -> np.ndarray:
         """Entries of matrices of groups of joined particles, shape (n, 2 m, 2 m)."""
-        kept, codes = self._codes(particles)
-        return np.bincount(np.searchsorted(self.codes, codes), matrices.ravel()[kept], len(self.indices))
+        local = self.number[particles].reshape(len(particles), -1)
+        width = local.shape[1]
+        rows, columns = np.repeat(local, width, axis=1).ravel(), np.tile(local, (1, width)).ravel()
+        kept = np.flatnonzero((rows >= 0) & (columns >= 0))
+        places = np.searchsorted(self.codes, columns[kept] * self.size + rows[kept])
+        return np.bincount(places, matrices.ravel()[kept], len(self.indices))
 
     def matrix(self, data: np.ndarray) -> csc_array:
         """Sparse matrix of these entries."""

@@ -336,7 +336,7 @@ class StablePath:
         if self._pieces:
             return self._last
         if not self.stable_to:
-            return 0.0, None, self.problem.rest_factor
+            return 0.0, None, self.problem.network.rest_factor
         s = self._sign * self.stable_to
         return s, *self._solve(s, self._far.displacements)
 

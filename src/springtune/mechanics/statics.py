@@ -82,12 +82,12 @@ class StaticProblem(LoadedNetwork):
     @cached_property
     def start(self) -> Expansion:
         """Short series about rest: where Newton's method starts."""
-        return Expansion(self.network, self.load, 0.0, None, self.rest_factor, order=START_ORDER, rough=True)
+        return Expansion(self.network, self.load, 0.0, None, self.network.rest_factor, order=START_ORDER, rough=True)
 
     @cached_property
     def rest(self) -> Expansion:
         """Long series about rest, for a whole curve."""
-        return Expansion(self.network, self.load, 0.0, None, self.rest_factor)
+        return Expansion(self.network, self.load, 0.0, None, self.network.rest_factor)
 
     @cached_property
     def long_rest(self) -> Expansion:
@@ -98,18 +98,18 @@ class StaticProblem(LoadedNetwork):
         """Return the equilibrium with linear kinematics."""
         slope, residual, error = self._slope
         reason = uncertainty(error)
-        return Equilibrium(s * slope, not reason, 1, residual, self.rest_factor, reason, error)
+        return Equilibrium(s * slope, not reason, 1, residual, self.network.rest_factor, reason, error)
 
     def judge(self, s: float, found: Equilibrium) -> tuple[Status, str, float]:
         """Return status, message and negative pivots of an equilibrium; NaN pivots if it has no regular tangent."""
+        share = f"{100 * found.unstable_share:.3g} %"
         if found.limit_share < 1 and not found.unstable_share < found.limit_share:
-            share = f"{100 * found.limit_share:.3g} %"
-            said = f"limit point: the path from rest turns back, unstable, at {share} of the load"
+            at = f"{100 * found.limit_share:.3g} % of the load"
+            said = f"limit point: the path from rest turns back, unstable, at {at}"
             if found.snapped:
                 said += "; behind the snap it comes to a stable equilibrium that carries the load"
             return Status.UNSTABLE, said, np.nan
         if found.unstable_share < 1 and not found.converged:
-            share = f"{100 * found.unstable_share:.3g} %"
             return Status.UNSTABLE, f"the path from rest is unstable at {share} of the load: the body leaves it", np.nan
         if not found.converged:
             return Status.NOT_CONVERGED, f"{found.reason}; last residual {found.residual:.1e}", np.nan
@@ -118,17 +118,12 @@ class StaticProblem(LoadedNetwork):
             pivots, flutters = self.stability(s, found.displacements, found.factor)
         except SingularError:
             return Status.UNSTABLE, "limit point: the tangent is singular", np.nan
+        why = "it flutters, two modes have merged into a complex pair" if flutters else ""
         if pivots:
-            many = "s" if pivots > 1 else ""
-            return Status.UNSTABLE, f"unstable equilibrium: the tangent has {pivots} negative pivot{many}", pivots
-        if flutters:
-            return (
-                Status.UNSTABLE,
-                "unstable equilibrium: it flutters, two modes have merged into a complex pair",
-                pivots,
-            )
+            why = f"the tangent has {pivots} negative pivot{'s' if pivots > 1 else ''}"
+        if why:
+            return Status.UNSTABLE, f"unstable equilibrium: {why}", pivots
         if found.unstable_share < 1:
-            share = f"{100 * found.unstable_share:.3g} %"
             return Status.UNSTABLE, f"the path to it is unstable at {share} of the load: the beam leaves it", pivots
         objections = (energy.objection(found.displacements) for energy in self.network.energies)
         return Status.SOLVED, "; ".join(filter(None, objections)), pivots

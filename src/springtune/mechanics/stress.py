@@ -74,7 +74,6 @@ def particle_stresses(
     # Of the sides of these cells, those that have one of them are the outline.
     first, last = cells, np.roll(cells, -1, axis=1)
     triangles = cells[:, 3] < 0
-    last = last.copy()
     last[triangles, 2] = cells[triangles, 0]
     pairs = np.stack([first.ravel(), last.ravel()], axis=1)[(first >= 0).ravel()]
     code = np.sort(pairs, axis=1) @ np.array([count, 1])
@@ -86,17 +85,15 @@ def particle_stresses(
     found[inside] = fits[inside, 0]
     # Of neighbours inside, and where there are none of theirs, the fits are continued.
     joined = np.concatenate([pairs, pairs[:, ::-1]])
-    here = np.zeros(count, dtype=bool)
-    here[particle] = True
+    around = np.bincount(particle, minlength=count)
     sources = inside
     while True:
-        wanted = here & np.isnan(found[:, 0])
+        wanted = (around > 0) & np.isnan(found[:, 0])
         if not wanted.any():
             return found
         to, of = joined[wanted[joined[:, 0]] & sources[joined[:, 1]]].T
         if not len(to):
             # No particle inside: the fits to the cells around, or their mean.
-            around = np.bincount(particle, minlength=count)
             total = np.stack([np.bincount(particle, part, count) for part in value[cell].T], axis=1)
             mean = total[wanted] / around[wanted, None]
             found[wanted] = np.where(good[wanted, None], fits[wanted, 0], mean)
@@ -111,8 +108,7 @@ def particle_stresses(
         slopes = fits[of, 1:].reshape(len(of), -1)
         means = np.stack([np.bincount(to, part, count) for part in slopes.T], axis=1)[filled] / met[filled, None]
         fits[filled, 0], fits[filled, 1:] = found[filled], means.reshape(-1, 2, 3)
-        sources = np.zeros(count, dtype=bool)
-        sources[filled] = True
+        sources = met > 0
 
 
 def _fits(

@@ -17,7 +17,7 @@ from ..registry import NAME, NAME_RULE
 from ..safe_io.atomic import check_folder, replacing
 from ..safe_io.inputs import BeyondBound, DataElsewhere, bounded, check_alone, fault
 from .cells import Mesh, MeshError, no_cells, signed_areas
-from .groups import GroupedMesh
+from .groups import GroupedMesh, part_names
 from .sheets import DIGITS, box_fault, in_words, on_sides, outline_of, sheet_fault
 
 CELLS = {"triangle": 3, "quad": 4}
@@ -31,9 +31,6 @@ PART_NUMBERS = "part"
 
 PHYSICAL = "gmsh:physical"
 """Cell data in which meshio gives numbers of Gmsh's physical groups; 0 is none."""
-
-LEFT_OUT = ("line", "vertex")
-"""Cells that carry no springs: boundaries and tags, left out."""
 
 COMPANIONS = (".xdmf", ".xmf", ".node", ".ele")
 """Endings of files that hold only a part of a mesh."""
@@ -82,15 +79,12 @@ def write_mesh(path: str | Path, mesh: Mesh | GroupedMesh) -> None:
     # A named point that is no particle becomes a point of its own.
     places: list[np.ndarray] = []
     blocks: list[tuple[str, np.ndarray, list[str]]] = []
+    labels = part_names(grouped)
     for name, count in CELLS.items():
-        if count in mesh.cells:
-            inside = {part: masks[count] for part, masks in grouped.parts.items() if count in masks}
-            rest = ~np.any([*inside.values(), np.zeros(len(mesh.cells[count]), dtype=bool)], axis=0)
-            blocks += [
-                (name, mesh.cells[count][mask], [part] * bool(part))
-                for part, mask in {"": rest, **inside}.items()
-                if mask.any()
-            ]
+        for part in ("", *grouped.parts) if count in labels else ():
+            mask = labels[count] == part
+            if mask.any():
+                blocks.append((name, mesh.cells[count][mask], [part] * bool(part)))
     blocks += [("line", edges, [side]) for side, edges in grouped.sides.items()]
     for point, place in grouped.points.items():
         number = grouped.particle(point)
@@ -158,14 +152,11 @@ def read_mesh(path: str | Path, unit: float = 1.0) -> Mesh:
 def assembled(path: str | Path, content: Any, unit: float) -> tuple[Mesh, np.ndarray]:
     """Return the mesh of meshio's data, and its particles' numbers in the file; `unit` in m."""
     cells = _read_cells(path, content)
-    used, numbers = np.unique(np.concatenate([corners.ravel() for corners in cells.values()]), return_inverse=True)
+    used = np.unique(np.concatenate([corners.ravel() for corners in cells.values()]))
     with np.errstate(over="ignore"):  # what is too far away is refused
         points = _read_points(path, unit * coordinates(path, content), used)
-    start = 0
     for count, corners in cells.items():
-        corners = numbers[start : start + corners.size].reshape(corners.shape)
-        start += corners.size
-        cells[count] = _counter_clockwise(path, points, corners)
+        cells[count] = _counter_clockwise(path, points, np.searchsorted(used, corners))
     return Mesh(points, cells.get(3, no_cells(3)), cells.get(4, no_cells(4))), used
 
 
@@ -252,7 +243,7 @@ def _read_cells(path: str | Path, content: Any) -> dict[int, np.ndarray]:
                 shape = f"numbers {data.dtype} of shape {data.shape}"
                 raise MeshError(f"{path}: cells '{block.type}' by {shape}; write the mesh again")
             cells.setdefault(CELLS[block.type], []).append(data)
-        elif block.type not in LEFT_OUT:
+        elif block.type not in CELL_DIMENSIONS:
             raise MeshError(f"{path}: has cells '{block.type}'; write linear triangles and quadrilaterals only")
     if not cells:
         raise MeshError(f"{path}: no cell block 'triangle' or 'quad'; write the mesh with triangles or quadrilaterals")
@@ -386,7 +377,7 @@ class _Groups:
                     name, {n: np.zeros(len(found), dtype=bool) for n, found in self.mesh.cells.items()}
                 )
                 masks[CELLS[block.type]][offsets[number] + chosen] = True
-            elif block.type in LEFT_OUT:
+            elif block.type in CELL_DIMENSIONS:
                 (lines if block.type == "line" else points)[name].append(np.asarray(block.data)[chosen])
         for name, nodes in self._point_sets():
             if len(nodes):
@@ -485,19 +476,15 @@ class _Groups:
         if len(nodes) == 1:
             self.points[name] = self.places[nodes[0]]
             return
-        chosen = np.zeros(len(self.mesh.points) + 1, dtype=bool)
-        chosen[self.numbers[nodes]] = True
-        lost = int((self.numbers[nodes] < 0).sum())
-        chosen = chosen[:-1]
-        edges = self.outline[chosen[self.outline].all(axis=1)]
-        alone = chosen.copy()
-        alone[edges] = False
-        if lost or alone.any():
-            at_outline = np.zeros(len(chosen), dtype=bool)
-            at_outline[self.outline] = True
+        particles = self.numbers[nodes]
+        lost = int((particles < 0).sum())
+        edges = self.outline[np.isin(self.outline, particles).all(axis=1)]
+        alone = np.setdiff1d(particles[particles >= 0], edges)
+        if lost or len(alone):
+            at_outline = np.isin(alone, self.outline)
             counts = {
-                "are inside the body": (alone & ~at_outline).sum(),
-                "have no neighbour on the outline that is one": (alone & at_outline).sum(),
+                "are inside the body": (~at_outline).sum(),
+                "have no neighbour on the outline that is one": at_outline.sum(),
                 "belong to no cell": lost,
             }
             what = " and ".join(f"{count} {reason}" for reason, count in counts.items() if count)

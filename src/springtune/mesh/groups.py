@@ -130,3 +130,14 @@ class GroupedMesh:
             first = edge_in_words(self.mesh.points, wrong[0])
             return f"has edges with the body on their right, the first one {first}; turn them"
         return ""
+
+
+def part_names(grouped: GroupedMesh) -> dict[int, np.ndarray]:
+    """Return the part of each cell, by number of corners: ``""`` for the main part."""
+    found = {}
+    for count, corners in grouped.mesh.cells.items():
+        found[count] = np.full(len(corners), "", dtype=object)
+        for name, cells in grouped.parts.items():
+            if count in cells:
+                found[count][cells[count]] = name
+    return found

@@ -14,7 +14,7 @@ from .free import FITTING, triangulate, upright
 from .groups import GroupedMesh
 from .rows import ROW_HEIGHT
 from .sheets import nearer
-from .sides import OutlineSide, Point
+from .sides import OutlineSide, Point, winds_about
 from .types import too_many
 
 LEAST_AROUND = 6
@@ -194,7 +194,7 @@ def _lines(shape: Outlined, points: Mapping[Point, float]) -> list[tuple[Point, 
             ways = [(length * math.cos(turn), length * math.sin(turn)) for turn in (i * math.pi / 6 for i in range(12))]
             ends = [(point[0] + x, point[1] + y) for x, y in ways]
             end = max(ends, key=room)
-        around = [i for i, one in enumerate(shape.rounds) if one.winds_about(point)]
+        around = [i for i, one in enumerate(shape.rounds) if winds_about(one.sides, point)]
         found.append((point, end, 1 + min(around, key=lambda i: shape.rounds[i].area)))
     return found
 

@@ -294,12 +294,9 @@ def check_held(points: np.ndarray, edges: np.ndarray, held: np.ndarray, where: s
         of_body = components == number if count > 1 else slice(None)
         free = "" if held[of_body].all() else free_motion(points[of_body], held[of_body])
         if free:
-            x, y = 1e3 * points[of_body].mean(axis=0)
-            body = (
-                "the body"
-                if count == 1
-                else f"one of the {count} bodies that are not joined, at ({x:.6g}, {y:.6g}) mm,"
-            )
+            body = "the body"
+            if count > 1:
+                body = f"one of the {count} bodies that are not joined, at {in_words(points[of_body])},"
             raise ValueError(f"{where}: its supports leave {body} free to {free}; hold it")
 
 

@@ -97,10 +97,6 @@ class OutlineSide:
         """Whether it is an arc of a circle."""
         return self.arc is not None and self.arc[0] == self.arc[1]
 
-    def reversed(self) -> "OutlineSide":
-        """The same side from its end to its start."""
-        return OutlineSide(self.end, self.start, self.centre, self.group)
-
     def at(self, parameter: float) -> Point:
         """Point at a parameter [m]."""
         if parameter in (0.0, 1.0):
@@ -252,10 +248,6 @@ class Round:
         """Area within [m2]."""
         return enclosed(self.sides)
 
-    def winds_about(self, point: Point) -> bool:
-        """Whether it winds about a point that is not on it."""
-        return winds_about(self.sides, point)
-
 
 def enclosed(sides: Sequence[OutlineSide]) -> float:
     """Signed area within a round of sides [m2], positive where it runs counter-clockwise."""
@@ -265,7 +257,7 @@ def enclosed(sides: Sequence[OutlineSide]) -> float:
 
 def turned(sides: Sequence[OutlineSide]) -> tuple[OutlineSide, ...]:
     """The same round the other way, from the same corner."""
-    return tuple(side.reversed() for side in sides[::-1])
+    return tuple(OutlineSide(side.end, side.start, side.centre, side.group) for side in sides[::-1])
 
 
 def extent(sides: Sequence[OutlineSide]) -> tuple[Point, Point]:

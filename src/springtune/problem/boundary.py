@@ -9,10 +9,9 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from ..mesh.cells import Mesh, signed_areas
-from ..mesh.groups import GroupedMesh
+from ..mesh.groups import GroupedMesh, part_names
 from ..mesh.sheets import check_held, in_words
 from .loads import MIDDLE, LoadKind, Side
-from .quantities import nearest
 from .shapes import LoadCase, Quantity
 
 FACE_POSITIONS = np.linspace(0.0, 1.0, 101)
@@ -74,14 +73,14 @@ def supported(grouped: GroupedMesh, case: LoadCase) -> tuple[np.ndarray, np.ndar
     points = grouped.mesh.points
     held, given = np.zeros(points.shape, dtype=bool), np.zeros(points.shape)
     for support in case.supports:
-        particles = particles_of(grouped, support.group)
+        particles = grouped.particles(support.group)
         for axis, value in enumerate((support.x, support.y)):
             if value is None:
                 continue
             differ = held[particles, axis] & (given[particles, axis] != value)
             if differ.any():
                 particle = particles[np.argmax(differ)]
-                others = [one.group for one in case.supports if particle in particles_of(grouped, one.group)]
+                others = [one.group for one in case.supports if particle in grouped.particles(one.group)]
                 raise ValueError(
                     f"load {case.name!r}: supports on {others[0]!r} and {support.group!r} move the particle at "
                     f"{in_words(points[particle])} by different amounts along {'xy'[axis]}; make them agree there"
@@ -119,7 +118,7 @@ def forces(
                 field += force * even(grouped, traction.group, axis)
     for pressure in case.pressures:
         if followers or not pressure.follower:
-            edges = sides_of(grouped, pressure.group)
+            edges = grouped.sides[pressure.group]
             apart = grouped.mesh.points[edges[:, 1]] - grouped.mesh.points[edges[:, 0]]
             half = 0.5 * pressure.pressure * thickness * np.stack([-apart[:, 1], apart[:, 0]], axis=1)
             np.add.at(field, edges, half[:, None, :])
@@ -130,11 +129,12 @@ def forces(
 
 def followed(grouped: GroupedMesh, case: LoadCase, thickness: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
     """Return the edges (n, 2) with follower pressure, the body to the left, and it (n,) times the thickness [N/m]."""
-    found = [(sides_of(grouped, one.group), one.pressure * thickness) for one in case.pressures if one.follower]
-    edges = [np.zeros((0, 2), dtype=np.int64), *(edges for edges, _ in found)]
-    return np.concatenate(edges), np.concatenate(
-        [np.full(len(edges), value) for edges, value in [(edges[0], 0.0), *found]]
-    )
+    edges, pressures = [np.zeros((0, 2), dtype=np.int64)], [0.0]
+    for one in case.pressures:
+        if one.follower:
+            edges.append(grouped.sides[one.group])
+            pressures.append(one.pressure * thickness)
+    return np.concatenate(edges), np.repeat(pressures, [len(part) for part in edges])
 
 
 def particle_masses(grouped: GroupedMesh, thickness: float, densities: Mapping[str, float | None]) -> np.ndarray:
@@ -154,17 +154,6 @@ def particle_masses(grouped: GroupedMesh, thickness: float, densities: Mapping[s
         areas = signed_areas(points, corners)
         np.add.at(masses, corners, (density * thickness * areas / count)[:, None])
     return masses
-
-
-def part_names(grouped: GroupedMesh) -> dict[int, np.ndarray]:
-    """Return the part of each cell, by number of corners: ``""`` for the main part."""
-    found = {}
-    for count, corners in grouped.mesh.cells.items():
-        found[count] = np.full(len(corners), "", dtype=object)
-        for name, cells in grouped.parts.items():
-            if count in cells:
-                found[count][cells[count]] = name
-    return found
 
 
 def displacement_weights(grouped: GroupedMesh, quantity: Quantity) -> np.ndarray:
@@ -207,7 +196,7 @@ def _lengths(grouped: GroupedMesh, group: str) -> np.ndarray:
     """Length of a group at each particle [m], half of each edge's; 1 of a point."""
     field = np.zeros(len(grouped.mesh.points))
     if group not in grouped.sides:
-        field[particles_of(grouped, group)] = 1.0
+        field[grouped.particles(group)] = 1.0
         return field
     edges = grouped.sides[group]
     apart = grouped.mesh.points[edges[:, 1]] - grouped.mesh.points[edges[:, 0]]
@@ -215,38 +204,12 @@ def _lengths(grouped: GroupedMesh, group: str) -> np.ndarray:
     return field
 
 
-def sides_of(grouped: GroupedMesh, group: str) -> np.ndarray:
-    """Return the edges (n, 2) of a group."""
-    if group not in grouped.sides:
-        raise ValueError(f"group: {group!r} is no group of sides; {nearest(group, grouped.sides)}")
-    return grouped.sides[group]
-
-
-def particles_of(grouped: GroupedMesh, group: str) -> np.ndarray:
-    """Return the particles of a group of sides, some of them twice, or of a point."""
-    if group in grouped.sides:
-        return grouped.sides[group].ravel()
-    point, found = _point(grouped, group), grouped.particle(group)
-    if found is None:
-        raise ValueError(
-            f"point: {group!r} at {in_words(point)} is no particle of the mesh, and what is held or pulled has to be "
-            "one; make the mesh with it, or name a corner"
-        )
-    return np.array([found])
-
-
-def _point(grouped: GroupedMesh, name: str) -> np.ndarray:
-    if name not in grouped.points:
-        raise ValueError(f"group: {name!r} is unknown; {nearest(name, [*grouped.sides, *grouped.points])}")
-    return np.asarray(grouped.points[name], dtype=float)
-
-
 def interpolation(grouped: GroupedMesh, name: str) -> tuple[np.ndarray, np.ndarray]:
     """Return particles and weights, sum 1, that interpolate a field at a named point; exact at particles.
 
     Along its edge of the outline, or in its cell: linear in triangles, bilinear in quadrilaterals.
     """
-    mesh, point = grouped.mesh, _point(grouped, name)
+    mesh, point = grouped.mesh, np.asarray(grouped.points[name], dtype=float)
     outline = mesh.edges[mesh.on_outline]
     edge = _edge_at(mesh.points[outline], point, ON_POINT * np.ptp(mesh.points, axis=0).max())
     if edge is not None:
@@ -264,7 +227,7 @@ def cell_at(grouped: GroupedMesh, name: str) -> tuple[int, int, np.ndarray]:
 
     The nearest cell if a straight edge cuts off the arc that the point is on.
     """
-    mesh, point = grouped.mesh, _point(grouped, name)
+    mesh, point = grouped.mesh, np.asarray(grouped.points[name], dtype=float)
     slack, found = ON_POINT * np.ptp(mesh.points, axis=0).max(), None
     best = -OUTSIDE
     for count, corners in mesh.cells.items():

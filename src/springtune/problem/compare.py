@@ -42,10 +42,8 @@ def sign_word(error: float, reference: float, kind: str = "displacement") -> str
     >>> sign_word(-0.02, -9.5e-3), sign_word(-0.02, 9.5e-3)
     ('too soft', 'too stiff')
     """
-    beyond, words = error * reference, ("too soft", "too stiff")
-    if kind != "displacement":
-        words = ("too large", "too small")
-    return words[0] if beyond > 0 else words[1] if beyond < 0 else ""
+    more, less = ("too soft", "too stiff") if kind == "displacement" else ("too large", "too small")
+    return more if error * reference > 0 else less if error * reference < 0 else ""
 
 
 def sign_sentence(references: Mapping[str, float], where: str = "under") -> str:

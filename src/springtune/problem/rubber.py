@@ -9,7 +9,7 @@ import numpy as np
 
 from ..safe_io.inputs import LARGEST_CSV, read
 from .materials import MOST_TERMS, RUBBER_TESTS, Rubber
-from .quantities import Number, positive
+from .quantities import Number, positive, put
 
 LEAST_SHARE = 0.05
 """Share of the largest stress below which errors are relative to it: small stresses are read off coarsely."""
@@ -63,8 +63,7 @@ class TensileTest:
             )
         if len(np.unique(stretch[told])) < 3:
             raise TestDataError(f"{self.name}: has fewer than three stretches besides 1; give more points")
-        object.__setattr__(self, "stretch", stretch[told])
-        object.__setattr__(self, "stress", stress[told])
+        put(self, stretch=stretch[told], stress=stress[told])
 
     @classmethod
     def read(cls, path: str | Path) -> "TensileTest":
@@ -117,15 +116,10 @@ def told(test: TensileTest | str | Path) -> TensileTest:
     return test if isinstance(test, TensileTest) else TensileTest.read(test)
 
 
-def _weights(test: TensileTest) -> np.ndarray:
-    """Of relative errors."""
-    size = np.abs(test.stress)
-    return 1 / np.maximum(size, LEAST_SHARE * size.max())
-
-
 def fit(columns: np.ndarray, test: TensileTest) -> tuple[float, ...]:
     """Return coefficients of stress `columns` (n, n_terms) by least squares of relative errors."""
-    weights = _weights(test)
+    size = np.abs(test.stress)
+    weights = 1 / np.maximum(size, LEAST_SHARE * size.max())
     scaled = columns * weights[:, None]
     sizes = np.linalg.norm(scaled, axis=0)
     found = np.linalg.lstsq(scaled / sizes, test.stress * weights, rcond=None)[0] / sizes

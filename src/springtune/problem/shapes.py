@@ -713,7 +713,7 @@ class Shape:
         >>> plate.part_at((0.01, 0.01)), plate.part_at((0.05, 0.02))
         ('', None)
         """
-        around = [one for one in self.rounds if one.winds_about(point)]
+        around = [one for one in self.rounds if winds_about(one.sides, point)]
         return min(around, key=lambda one: one.area).inner if around else None
 
     @cached_property

@@ -16,11 +16,6 @@ import numpy as np
 from ..problem.materials import Material
 
 
-def installed() -> bool:
-    """Whether the program is on the machine."""
-    return bool(program())
-
-
 def quadratic_mesh(length: float, height: float, size: float) -> tuple[np.ndarray, np.ndarray]:
     """Return points (n_points, 2) [m] and serendipity quadrilaterals (n_elements, 8) of about even size [m].
 
@@ -38,19 +33,15 @@ def quadratic_mesh(length: float, height: float, size: float) -> tuple[np.ndarra
     return points, np.stack([number[first + di * count + dj] for di, dj in steps], axis=1)
 
 
-def side_weights(points: np.ndarray, normal: int, along: int, value: float, quadratic: bool) -> np.ndarray:
-    """Return each point's share, sum 1, of an even load on the side ``points[:, normal] == value`` [m]."""
-    tolerance = 1e-9 * np.ptp(points[:, normal])
+def side_weights(points: np.ndarray, normal: int, value: float) -> np.ndarray:
+    """Return each node's share, sum 1, of an even load on the side ``points[:, normal] == value`` [m] of a mesh."""
+    along, tolerance = 1 - normal, 1e-9 * np.ptp(points[:, normal])
     side = np.flatnonzero(np.abs(points[:, normal] - value) <= tolerance)
     side = side[np.argsort(points[side, along])]
     weights, lengths = np.zeros(len(points)), np.diff(points[side, along])
-    if quadratic:
-        whole = lengths[::2] + lengths[1::2]
-        for place, share in ((slice(0, -1, 2), 1 / 6), (slice(1, None, 2), 4 / 6), (slice(2, None, 2), 1 / 6)):
-            weights[side[place]] += share * whole
-    else:
-        weights[side[:-1]] += 0.5 * lengths
-        weights[side[1:]] += 0.5 * lengths
+    whole = lengths[::2] + lengths[1::2]
+    for place, share in ((slice(0, -1, 2), 1 / 6), (slice(1, None, 2), 4 / 6), (slice(2, None, 2), 1 / 6)):
+        weights[side[place]] += share * whole
     return weights / weights.sum()
 
 

@@ -19,7 +19,7 @@ from scipy import spatial
 
 from ..mesh.cells import signed_areas
 from ..mesh.free import triangulate, upright
-from ..mesh.groups import GroupedMesh
+from ..mesh.groups import GroupedMesh, part_names
 from ..mesh.sides import OutlineSide, Point
 from ..problem.shapes import Shape
 from .small_strain import ELEMENT_GROWTH, SHRINKAGE
@@ -245,9 +245,7 @@ class _Piece:
 
 def _refined(pieces: list[_Piece], extent: float, largest_turn: float) -> list[_Piece]:
     """Pieces that are short where others are near, and turn little."""
-    done = False
-    while not done:
-        done = True
+    while True:
         samples = np.array([piece.at(np.linspace(0, 1, PIECE_SAMPLES)) for piece in pieces])
         chords = samples[:, -1] - samples[:, 0]
         lengths = np.linalg.norm(np.diff(samples, axis=1), axis=2).sum(axis=1)
@@ -268,11 +266,11 @@ def _refined(pieces: list[_Piece], extent: float, largest_turn: float) -> list[_
             )
             if length > 1.01 * limit or piece.turn > 1.01 * largest_turn or sagitta > LARGEST_SAGITTA * nearest:
                 refined += piece.halves()
-                done = False
             else:
                 refined.append(piece)
+        if len(refined) == len(pieces):
+            return pieces
         pieces = refined
-    return pieces
 
 
 def _cut(side: OutlineSide, points: Mapping[str, Point], small: float) -> tuple[list[float], list[str]]:
@@ -355,12 +353,9 @@ def _polygons(grouped: GroupedMesh) -> tuple[tuple[str, ...], list[_Piece]]:
     """Names of parts, and straight pieces around and between the parts of a mesh."""
     mesh = grouped.mesh
     names = tuple(dict.fromkeys(["", *grouped.parts]))
-    ways, parts = [], []
+    ways, parts, labels = [], [], part_names(grouped)
     for count, cells in mesh.cells.items():
-        of_cells = np.zeros(len(cells), dtype=int)
-        for name, inside in grouped.parts.items():
-            if count in inside:
-                of_cells[inside[count]] = names.index(name)
+        of_cells = np.array([names.index(name) for name in labels[count]])
         for i in range(count):
             ways.append(cells[:, [i, (i + 1) % count]])
             parts.append(of_cells)

@@ -149,11 +149,6 @@ class _Sheet:
         self.rows, self.columns = np.repeat(unknowns, 18, axis=1).ravel(), np.tile(unknowns, 18).ravel()
         self.turning = _turning(side, shapes, kind.along) if follower else csr_array((places.size, places.size))
 
-        nodes = side.get_dofs(facets).all()
-        order = np.argsort(places[nodes, 1 - axis])
-        self.component, self.nodes = component, nodes[order]
-        self.places = places[self.nodes, 1 - axis]
-
     def solve(self, stress: float, name: str, watched: bool = True) -> FiniteStrainSolution:
         """Equilibrium under the whole load, reached in steps, which are watched for snaps.
 
@@ -172,18 +167,13 @@ class _Sheet:
                 raise FiniteStrainError(f"reference of {name}: no {what} beyond {100 * done:.3g} % of the load")
             else:
                 step /= 2
-        profile = moved[self.nodes, self.component]
         mean = float((self.load * moved).sum() / self.load.sum())
-        if not self.kind.symmetric:
-            positions = self.places / self.places[-1]
-        elif self.kind.cut == BOTTOM:  # the upper half of an end
-            positions = 0.5 + 0.5 * self.places
-        else:  # both halves
-            whole = 2 * self.places[-1]
-            positions = np.concatenate([self.places, whole - self.places[-2::-1]]) / whole
-            profile = np.concatenate([profile, profile[-2::-1]])
-        displacement = float(np.interp(0.5, positions, profile)) if self.kind.pressed else mean
-        return FiniteStrainSolution(displacement, mean, uncertain, positions, profile, *self._field(moved))
+        kind, (x, y, field) = self.kind, self._field(moved)
+        places = (x, y)[kind.along]
+        positions = places / places[-1]
+        profile = field.take(-1 if kind.loaded.far else 0, axis=kind.normal)[:, kind.axis]
+        displacement = float(np.interp(0.5, positions, profile)) if kind.pressed else mean
+        return FiniteStrainSolution(displacement, mean, uncertain, positions, profile, x, y, field)
 
     def _joined(self, path: list[tuple[float, np.ndarray]], share: float, moved: np.ndarray, stress: float) -> bool:
         """Whether no snap lies between a stable equilibrium and the last one: the middle is stable, too."""

@@ -49,7 +49,6 @@ They jump by a percent, since their grid changes with the aspect ratio.
 ROUNDING = 1e-9
 """How far beyond its box, relative to its width, an interpolant is evaluated: aspect ratios have twelve digits."""
 
-Solver = Callable[[float, float, LoadKind, float], ReferenceSolution]
 
 NAMES = ("displacement", "mean_displacement", "rotation", "strain")
 
@@ -100,7 +99,7 @@ class Interpolant:
         nu_range: tuple[float, float],
         tolerance: float = TOLERANCE,
         most: int | None = None,
-        solve: Solver = solve_unit,
+        solve: Callable[..., ReferenceSolution] = solve_unit,
     ) -> Self:
         """Build an interpolant over a box, with as many solves as it needs.
 
@@ -157,7 +156,7 @@ class _Box:
     nu_range: tuple[float, float]
     tolerance: float
     most: int | None
-    solver: Solver
+    solver: Callable[..., ReferenceSolution]
 
     def __post_init__(self) -> None:
         #: Answers in the order of `NAMES`, and error estimates, by place in the box: from -1 to 1 along each axis.
@@ -250,8 +249,6 @@ def lagrange_values(places: np.ndarray, count: int) -> np.ndarray:
 
     Barycentric formula (Berrut and Trefethen, SIAM Review 46:501, 2004, formula 4.2 with weights 5.4).
     """
-    if count == 1:
-        return np.ones((len(places), 1))
     weights = (-1.0) ** np.arange(count)
     weights[[0, -1]] /= 2
     distances = places[:, None] - chebyshev_points(count)

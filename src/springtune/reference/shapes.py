@@ -65,8 +65,7 @@ class ShapeReference:
     rotation: float
     strain: float
     unknowns: int
-    degree: int
-    _level: "_Level" = field(repr=False)
+    _level: "Level" = field(repr=False)
     _kinds: dict[str, str] = field(repr=False)
     negligible: tuple[str, ...] = ()
     _factor: float = 1.0
@@ -105,11 +104,13 @@ def solve_shape(
     materials: AnyMaterial | Mapping[str, AnyMaterial],
     grouped: GroupedMesh | None = None,
     tolerance: float = 1e-4,
+    level_of: "type[Level] | None" = None,
 ) -> ShapeReference:
     r"""Solve for the displacements of a shape under a load case, at small strain in plane stress.
 
     `grouped` is the mesh of a shape from a file: the polygon around its cells is the geometry. `tolerance` is the
-    largest accepted relative error estimate [1]; ten times as much for stresses.
+    largest accepted relative error estimate [1]; ten times as much for stresses. `level_of` is a `Level` with
+    other loads or supports.
 
     A level of degree p has p layers of triangles at each corner that is not smooth. With :math:`u \sim r^\lambda` one
     more layer scales the missing energy of the innermost triangles by :math:`.2^{2\lambda}`, and one more degree that
@@ -121,45 +122,7 @@ def solve_shape(
     Curves are polynomials of the level's degree (isoparametric), reactions are the work of the solution on a unit
     displacement of their group, and stresses are not smoothed.
     """
-    by_part = materials if isinstance(materials, Mapping) else {"": materials}
-    return converge(shape, load, by_part, grouped, tolerance)
-
-
-def solve_each(
-    shape: Shape,
-    load: LoadCase,
-    materials: AnyMaterial | Mapping[str, AnyMaterial],
-    grouped: GroupedMesh | None = None,
-) -> tuple[list[ShapeReference], dict[str, str]]:
-    """Return references that together have every quantity of interest that converges, and the faults of the others.
-
-    A quantity without a limit, such as the stress at a corner, does not affect the others.
-    """
-    try:
-        return [solve_shape(shape, load, materials, grouped)], {}
-    except (ReferenceNotConvergedError, ValueError) as error:
-        if len(load.quantities) < 2:
-            return [], dict.fromkeys([one.name for one in load.quantities] or [""], str(error))
-    found: list[ShapeReference] = []
-    lacking: dict[str, str] = {}
-    for one in load.quantities:
-        more, why = solve_each(shape, replace(load, quantities=(one,)), materials, grouped)
-        found += more
-        lacking |= why
-    return found, lacking
-
-
-def converge(
-    shape: Shape,
-    load: LoadCase,
-    materials: Mapping[str, AnyMaterial],
-    grouped: GroupedMesh | None = None,
-    tolerance: float = 1e-4,
-    tractions: Mapping[str, Field] | None = None,
-    displacements: Mapping[str, Field] | None = None,
-) -> ShapeReference:
-    """Solve as `solve_shape`, with tractions [Pa] and displacements [m] that may vary along groups."""
-    problem = _Problem(shape, load, materials, grouped, tractions or {}, displacements or {})
+    problem = _Problem(shape, load, materials if isinstance(materials, Mapping) else {"": materials}, grouped)
     names = [quantity.name for quantity in load.quantities]
     values: list[dict[str, float]] = []
     estimates: dict[str, float] = {}
@@ -169,7 +132,7 @@ def converge(
         if complaint and problem.size(degree) > LARGEST_LEVEL:
             complaint += "; the next level would not fit into memory: a simpler outline has fewer triangles"
             break
-        level = _Level(problem, degree)
+        level = (level_of or Level)(problem, degree)
         values.append(level.values())
         if len(values) < 3:
             continue
@@ -201,7 +164,6 @@ def converge(
                 rotation=rotation,
                 strain=strain,
                 unknowns=level.unknowns,
-                degree=degree,
                 negligible=tuple(
                     name for name in names if abs(values[-1][name]) < SMALLEST_SHARE * level.scale(problem.kinds[name])
                 ),
@@ -209,6 +171,30 @@ def converge(
                 _kinds=problem.kinds,
             )
     raise ReferenceNotConvergedError(f"reference of shape {shape.name!r}, load {load.name!r}: {complaint}")
+
+
+def solve_each(
+    shape: Shape,
+    load: LoadCase,
+    materials: AnyMaterial | Mapping[str, AnyMaterial],
+    grouped: GroupedMesh | None = None,
+) -> tuple[list[ShapeReference], dict[str, str]]:
+    """Return references that together have every quantity of interest that converges, and the faults of the others.
+
+    A quantity without a limit, such as the stress at a corner, does not affect the others.
+    """
+    try:
+        return [solve_shape(shape, load, materials, grouped)], {}
+    except (ReferenceNotConvergedError, ValueError) as error:
+        if len(load.quantities) < 2:
+            return [], dict.fromkeys([one.name for one in load.quantities] or [""], str(error))
+    found: list[ShapeReference] = []
+    lacking: dict[str, str] = {}
+    for one in load.quantities:
+        more, why = solve_each(shape, replace(load, quantities=(one,)), materials, grouped)
+        found += more
+        lacking |= why
+    return found, lacking
 
 
 def unmet(estimate: float, accepted: float, before: float, last: float) -> str:
@@ -242,10 +228,8 @@ class _Problem:
         load: LoadCase,
         materials: Mapping[str, AnyMaterial],
         grouped: GroupedMesh | None,
-        tractions: Mapping[str, Field],
-        displacements: Mapping[str, Field],
     ) -> None:
-        self.shape, self.load, self.tractions, self.displacements = shape, load, tractions, displacements
+        self.shape, self.load = shape, load
         self.points = {name: np.array(point, dtype=float) for name, point in shape.points.items()}
         if grouped is not None:
             self.points |= {name: np.array(point, dtype=float) for name, point in grouped.points.items()}
@@ -286,15 +270,11 @@ class _Problem:
         loads: dict[str, list[object]] = {}
         for number, traction in enumerate(load.tractions):
             loads.setdefault(traction.group, []).append(("traction", number))
-        for group in tractions:
-            loads.setdefault(group, []).append(("traction", group))
         for pressure in load.pressures:
             loads.setdefault(pressure.group, []).append(("pressure", pressure.pressure))
-        supported: dict[str, list[object]] = {}
+        supported: dict[str, list[tuple[float | None, float | None]]] = {}
         for support in load.supports:
             supported.setdefault(support.group, []).append((support.x, support.y))
-        for group in displacements:
-            supported[group] = [group]
 
         def condition(side: Side) -> object:
             found = [(group, supported.get(group, []), loads.get(group, [])) for group in side.groups]
@@ -304,9 +284,7 @@ class _Problem:
             if side.arc is not None or np.abs(self.stiffness[:, :2, 2]).max() > 1e-12 * self.stiffness.max():
                 return False
             conditions = [value for group in side.groups for value in supported.get(group, [])]
-            if any(group in loads for group in side.groups):
-                return False
-            if len(conditions) != 1 or not isinstance(conditions[0], tuple):
+            if any(group in loads for group in side.groups) or len(conditions) != 1:
                 return False
             x, y = conditions[0]
             flat = np.abs(way) < 1e-12
@@ -364,7 +342,7 @@ class _Problem:
                 f"{', '.join(sorted(self.loaded_points))} over a side"
             )
 
-    def look_at_reactions(self, level: "_Level") -> None:
+    def look_at_reactions(self, level: "Level") -> None:
         """Note point supports that carry a force: a continuum's displacements and energy are infinite there."""
         least = SMALLEST_REACTION * level.scale("reaction")
         held = [support.group for support in self.load.supports if support.group in self.points]
@@ -481,7 +459,7 @@ VOIGT = np.array([[0, 2], [2, 1]])
 """Place of a pair of axes among xx, yy and xy."""
 
 
-class _Level:
+class Level:
     """A shape solved on one level."""
 
     def __init__(self, problem: _Problem, degree: int) -> None:
@@ -493,8 +471,8 @@ class _Level:
         # Stiffness by axes: of strain d u_c / d x_a on stress along d, b.
         self._tensor = thickness * problem.stiffness[:, VOIGT[:, :, None, None], VOIGT[None, None]]
         matrices = self._matrices()
-        forces = self._forces()
-        held, prescribed = self._supports()
+        forces = self.forces()
+        held, prescribed = self.supports()
         solution, self.residual, self.energy = self._solve(matrices, forces, held, prescribed)
         self.field = solution
         self.held = held
@@ -533,7 +511,7 @@ class _Level:
                     result[rows, :, c, :, d] = flat.transpose(0, 2, 1) @ mixed.reshape(len(rows), -1, count)
         return result.reshape(n, 2 * count, 2 * count)
 
-    def _group_sides(self, group: str) -> list[tuple[tuple[int, int], float]]:
+    def group_sides(self, group: str) -> list[tuple[tuple[int, int], float]]:
         """Sides of a group, and 1 where the body is to the left of them from the lower number, else -1."""
         return [
             (ends, 1.0 if self.outlines[ends][0][1] else -1.0)
@@ -541,10 +519,10 @@ class _Level:
             if group in side.groups
         ]
 
-    def _integral(self, group: str, given: Field) -> np.ndarray:
+    def integral(self, group: str, given: Field) -> np.ndarray:
         """Integral over a group of the functions times vectors."""
         total = np.zeros((self.space.n_functions, 2))
-        for ends, sense in self._group_sides(group):
+        for ends, sense in self.group_sides(group):
             values, points, normals, weights = self.space.side_points(ends, sense, self.space.degree + 3)
             lengths = np.linalg.norm(normals, axis=1)
             total[self.space.on_side(ends)] += values.T @ (
@@ -554,26 +532,22 @@ class _Level:
 
     def _shares(self, group: str) -> np.ndarray:
         """Integral of the functions over a group, by its length."""
-        whole = self._integral(group, lambda points, _: np.ones_like(points))[:, 0]
+        whole = self.integral(group, lambda points, _: np.ones_like(points))[:, 0]
         return whole / whole[: len(self.space.mesh.points)].sum()
 
-    def _forces(self) -> np.ndarray:
+    def forces(self) -> np.ndarray:
         """Forces on the functions [N], shape (n_functions, 2)."""
         problem, space = self.problem, self.space
         load, thickness = problem.load, problem.shape.thickness
         total = np.zeros((space.n_functions, 2))
         for traction in load.tractions:
-            if traction.group in problem.tractions:
-                continue
             if traction.group in space.mesh.named:
                 total[space.mesh.named[traction.group]] += traction.force
             else:
                 shares = self._shares(traction.group)
                 total += shares[:, None] * traction.force
         for pressure in load.pressures:
-            total -= pressure.pressure * thickness * self._integral(pressure.group, lambda _, normals: normals)
-        for group, given in problem.tractions.items():
-            total += thickness * self._integral(group, given)
+            total -= pressure.pressure * thickness * self.integral(pressure.group, lambda _, normals: normals)
         if any(load.gravity):
             _, weights, values, gradients = tabulated(space.degree, 3 * space.degree)
             volume = weights * np.abs(space.jacobians(gradients)[1])
@@ -582,19 +556,19 @@ class _Level:
             total += by_function[:, None] * load.gravity
         return total
 
-    def _supports(self) -> tuple[np.ndarray, np.ndarray]:
+    def supports(self) -> tuple[np.ndarray, np.ndarray]:
         """What is held, and the coefficients that are prescribed, shape (n_functions, 2)."""
         problem, space = self.problem, self.space
         held, values = np.zeros((space.n_functions, 2), dtype=bool), np.zeros((space.n_functions, 2))
         for support in problem.load.supports:
             for axis, value in enumerate((support.x, support.y)):
-                if value is None or support.group in problem.displacements:
+                if value is None:
                     continue
                 if support.group in space.mesh.named:
                     corners = np.array([space.mesh.named[support.group]])
                     functions = corners
                 else:
-                    sides = [ends for ends, _ in self._group_sides(support.group)]
+                    sides = [ends for ends, _ in self.group_sides(support.group)]
                     functions = np.unique(np.concatenate([space.on_side(ends) for ends in sides]))
                     corners = np.unique(sides)
                 other = np.asarray(held[corners, axis] & (values[corners, axis] != value))
@@ -606,16 +580,6 @@ class _Level:
                         "energy is infinite: leave a gap between them"
                     )
                 held[functions, axis], values[corners, axis] = True, value
-        along, inverse = side_fit(space.degree)
-        for group, given in problem.displacements.items():
-            for ends, _ in self._group_sides(group):
-                functions = space.on_side(ends)
-                at = side_functions(space.degree, np.concatenate([[-1.0, 1.0], along]))[0] @ space.places[functions]
-                wanted = given(at, np.zeros_like(at))
-                values[functions[:2]] = wanted[:2]
-                straight = (wanted[0] + wanted[1]) / 2 + along[:, None] * (wanted[1] - wanted[0]) / 2
-                values[functions[2:]] = inverse @ (wanted[2:] - straight)
-                held[functions] = True
         where = f"load {problem.load.name!r} of shape {problem.shape.name!r}"
         check_held(space.mesh.points, space.edges, held[: len(space.mesh.points)], where)
         return held, values
@@ -680,8 +644,10 @@ class _Level:
         if quantity.kind == "area":
             return float(self._area_growth().sum())
         if quantity.kind == "stress":
-            place = ("xx", "yy", "xy").index(quantity.component)
-            return float(self._corner_stress(space.mesh.named[quantity.of])[place])
+            # The mean in the triangles at its corner.
+            rows, places = np.nonzero(space.corners == space.mesh.named[quantity.of])
+            stresses = self._stresses(rows, np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])[places])
+            return float(stresses.mean(axis=0)[("xx", "yy", "xy").index(quantity.component)])
         axis = "xy".index(quantity.component)
         if quantity.kind == "reaction":
             return self._reaction(quantity.of, axis)
@@ -697,11 +663,11 @@ class _Level:
         claims = np.zeros(len(space.mesh.points))
         for support in problem.load.supports:
             if (support.x, support.y)[axis] is not None and support.group not in space.mesh.named:
-                claims[np.unique([ends for ends, _ in self._group_sides(support.group)])] += 1
+                claims[np.unique([ends for ends, _ in self.group_sides(support.group)])] += 1
         if group in space.mesh.named:
             point = space.mesh.named[group]
             return 0.0 if claims[point] else float(self.residual[point, axis])
-        corners = np.unique([ends for ends, _ in self._group_sides(group)])
+        corners = np.unique([ends for ends, _ in self.group_sides(group)])
         return float((self.residual[corners, axis] / np.maximum(claims[corners], 1)).sum())
 
     def _area_growth(self) -> np.ndarray:
@@ -779,11 +745,6 @@ class _Level:
             local[curved] -= step
             curved = curved[np.flatnonzero(np.abs(step).max(axis=1) > 1e-13)]
         return found, local
-
-    def _corner_stress(self, point: int) -> np.ndarray:
-        """Mean of the stresses in the triangles at a corner [Pa], shape (3,)."""
-        rows, places = np.nonzero(self.space.corners == point)
-        return self._stresses(rows, np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])[places]).mean(axis=0)
 
     def displacements(self, points: np.ndarray) -> np.ndarray:
         """Displacements at points [m], shape (n, 2)."""

@@ -9,10 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from ..mesh.formats import read_shape as read_grouped
-from ..mesh.groups import GroupedMesh
+from ..mesh.groups import GroupedMesh, part_names
 from ..mesh.outlines import mesh_shape as mesh_outlined
 from ..mesh.sides import OutlineSide, in_mm
-from ..problem.boundary import part_names
 from ..problem.materials import AnyMaterial
 from ..problem.quantities import positive
 from ..problem.shapes import Shape

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..mechanics.network import FollowerPressure, Network
 from ..mesh import Mesh
-from ..mesh.groups import GroupedMesh
+from ..mesh.groups import GroupedMesh, part_names
 from ..problem.boundary import (
     cell_at,
     check_case,
@@ -22,7 +22,6 @@ from ..problem.boundary import (
     followed,
     forces,
     loaded_box,
-    part_names,
     particle_masses,
     reaction_weights,
     supported,

@@ -260,11 +260,6 @@ def membrane_stiffness(material: AnyMaterial, thickness: float) -> float:
     return float(np.diag(material.plane_stress).max()) * thickness
 
 
-def zero(mesh: Mesh) -> np.ndarray:
-    """No springs, shape (n_edges,)."""
-    return np.zeros(len(mesh.edges))
-
-
 def triangles_only(mesh: Mesh) -> None:
     """Refuse a mesh of quadrilaterals."""
     if len(mesh.quads):

@@ -26,7 +26,7 @@ import numpy as np
 
 from ..mesh import Mesh, corner_angles, signed_areas
 from ..problem.materials import AnyMaterial, Material
-from .base import Springs, definition, membrane_stiffness, triangles_only, zero
+from .base import Springs, definition, membrane_stiffness, triangles_only
 
 
 @definition("delingette", order=230, cells=(3,), anisotropic=True)
@@ -58,7 +58,7 @@ def _springs(mesh: Mesh, material: AnyMaterial, thickness: float, coupled: bool)
     squares = mesh.edge_lengths[mesh.cell_edges[3]] ** 2
     return Springs(
         membrane_stiffness(material, thickness),
-        zero(mesh),
+        np.zeros(len(mesh.edges)),
         (BiquadraticEnergy(mesh.points, mesh.triangles, stiffness, coupling if coupled else None),),
         linear_springs=mesh.sum_to_edges({3: 2 * squares * stiffness}),
     )

@@ -19,7 +19,7 @@ import numpy as np
 
 from ..mesh import Mesh, corner_angles
 from ..problem.materials import Material
-from .base import Springs, definition, triangles_only, zero
+from .base import Springs, definition, triangles_only
 
 
 @definition("neo-hooke", order=240, cells=(3,), finite_strain=True)
@@ -39,15 +39,12 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
         energy = YeohEnergy(mesh.points, mesh.triangles, 0.5 * shear * ones[:, None])
     else:
         energy = NeoHookeEnergy(mesh.points, mesh.triangles, shear * ones, ones / (3 * (1 - 2 * nu)))
-    return Springs(
-        material.young_modulus * thickness,
-        zero(mesh),
-        (energy,),
-        linear_springs=zero_length(mesh, shear),
-    )
+    return of_rubber(mesh, material, thickness, energy, shear)
 
 
-def zero_length(mesh: Mesh, shear: float) -> np.ndarray:
-    """Stiffnesses of the springs of zero rest length over a shear modulus's unit, shape (n_edges,)."""
+def of_rubber(mesh: Mesh, material: Material, thickness: float, energy: object, shear: float) -> Springs:
+    """Springs of an energy of rubber, whose share of springs of zero rest length has this shear modulus over E."""
     cotangents = 1 / np.tan(corner_angles(mesh.points, mesh.triangles))
-    return mesh.sum_to_edges({3: 0.5 * shear * cotangents})
+    linear_springs = mesh.sum_to_edges({3: 0.5 * shear * cotangents})
+    reference, none = material.young_modulus * thickness, np.zeros(len(mesh.edges))
+    return Springs(reference, none, (energy,), linear_springs=linear_springs)

@@ -19,7 +19,7 @@ import numpy as np
 
 from ..mesh import Mesh
 from ..mesh.cells import no_cells
-from ..mesh.groups import GroupedMesh
+from ..mesh.groups import GroupedMesh, part_names
 from ..problem.materials import AnyMaterial
 from .base import DefinitionError, Springs
 
@@ -38,8 +38,6 @@ def derive_by_parts(
 
     `definition` is one of the package or the user's own; `materials` has one for each part that has cells.
     """
-    from ..problem.boundary import part_names  # here: studies of beams need no shapes
-
     mesh, labels = grouped.mesh, part_names(grouped)
     groups: dict[AnyMaterial, list[str]] = {}
     for name in ("", *grouped.parts):

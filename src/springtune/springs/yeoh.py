@@ -16,7 +16,7 @@ import numpy as np
 
 from ..mesh import Mesh
 from ..problem.materials import Material, Rubber
-from .base import DefinitionError, Springs, definition, triangles_only, zero
+from .base import DefinitionError, Springs, definition, triangles_only
 
 
 @definition("yeoh", order=245, cells=(3,), finite_strain=True)
@@ -26,7 +26,7 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     The material must be a `springtune.Rubber`. Raises DefinitionError for others and on quadrilaterals.
     """
     from ..mechanics.energies import YeohEnergy  # here: see `springtune.springs`
-    from .neo_hooke import zero_length
+    from .neo_hooke import of_rubber
 
     triangles_only(mesh)
     if not isinstance(material, Rubber):
@@ -37,6 +37,4 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
         )
     over = np.array(material.coefficients) / material.young_modulus
     energy = YeohEnergy(mesh.points, mesh.triangles, np.tile(over, (len(mesh.triangles), 1)), material.largest)
-    return Springs(
-        material.young_modulus * thickness, zero(mesh), (energy,), linear_springs=zero_length(mesh, 2 * over[0])
-    )
+    return of_rubber(mesh, material, thickness, energy, 2 * over[0])

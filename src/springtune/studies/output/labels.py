@@ -254,28 +254,16 @@ def arranged(
         name_lines(panel, named)
 
 
+KEY_ROW, KEY_COLUMNS = 0.16, 2
+"""Height of a row of a key [inch], and the entries of a row."""
+
+
 def key_below(panel: Axes, shown: Sequence[tuple[str, Mapping[str, Any]]], below: float = 0.38) -> None:
-    """Explain looks `below` a panel's label [inch], in rows as wide as the panel; `KEY_ROW` is their height."""
+    """Explain looks `below` a panel's label [inch]."""
     handles = [panel.plot([], [], color="0.3", **look)[0] for _, look in shown]
     height = panel.get_window_extent().height / panel.figure.dpi
-    texts = [text for text, _ in shown]
-    panel.legend(handles, texts, loc="upper left", bbox_to_anchor=(0, -below / height), ncols=key_columns(panel, texts),
-                 handlelength=1.2, handletextpad=0.4, columnspacing=1.0, borderaxespad=0, borderpad=0)  # fmt: skip
-
-
-KEY_ROW = 0.16
-"""Height of a row of a key [inch]."""
-
-
-def key_columns(panel: Axes, texts: Sequence[str]) -> int:
-    """Number of columns of a key that the panel has room for, at least one."""
-    room, columns = panel.get_window_extent().width / panel.figure.dpi, len(texts)
-    while columns > 1:
-        rows = -(-len(texts) // columns)
-        if sum(max(map(width, texts[n : n + rows])) + 0.27 for n in range(0, len(texts), rows)) <= room:
-            break
-        columns -= 1
-    return max(columns, 1)
+    panel.legend(handles, [text for text, _ in shown], loc="upper left", bbox_to_anchor=(0, -below / height),
+                 ncols=KEY_COLUMNS, handlelength=1.2, borderaxespad=0, borderpad=0)  # fmt: skip
 
 
 def statuses(flags: np.ndarray) -> dict[str, int]:

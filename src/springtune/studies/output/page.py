@@ -30,21 +30,17 @@ def write(tree: xr.DataTree, folder: str | Path) -> list[str]:
     scenes = [_scenes(table, list(map(str, tree.kinematics.values))) for table in tables if "title" not in table]
     further = [shown(table) for table in tables if "title" in table]
     root = tree.to_dataset()
-    sign = sign_of_errors(root) if scenes else ""
-    written["index.html"] = html(scenes, further, _beams(root), tree.attrs, sign)
+    about = tree.attrs | {"sign": sign_of_errors(root) if scenes else ""}
+    written["index.html"] = html(scenes, further, _beams(root), about)
     for name, text in written.items():
         write_text(Path(folder) / name, text)
     return list(written)
 
 
 def html(
-    scenes: list[dict[str, Any]],
-    further: list[dict[str, Any]],
-    beams: list[str],
-    attributes: Mapping[Any, Any],
-    sign: str = "",
+    scenes: list[dict[str, Any]], further: list[dict[str, Any]], beams: list[str], attributes: Mapping[Any, Any]
 ) -> str:
-    """Page of tables prepared by `shown`, with the dataset's attributes; `sign` says what that of an error means."""
+    """Page of tables prepared by `shown`, with the dataset's attributes and the meaning of a `sign`."""
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("springtune.studies.output", ""),
         autoescape=True,
@@ -53,7 +49,7 @@ def html(
     )
     marks = {mark for table in scenes for mark in table["marks"]}
     return environment.get_template("page.html").render(
-        tables=scenes, further=further, beams=beams, marks=marks, attributes=attributes, sign=sign
+        tables=scenes, further=further, beams=beams, marks=marks, attributes=attributes
     )
 
 

@@ -118,10 +118,10 @@ def sign_of_errors(data: xr.Dataset) -> str:
     """Sentence on which sign of a group's errors means too soft, from its references; empty without any."""
     if "reference_displacement" not in data:
         return ""
-    known = data.reference_displacement
-    loads = known["load"].values.tolist() if "load" in known.dims else [""]
-    signs = {load: float(np.sign(known.sel(load=load) if load else known).sum()) for load in loads}
-    return sign_sentence({load: sign for load, sign in signs.items() if sign})
+    signs = np.sign(data.reference_displacement)
+    signs = signs if "load" in signs.dims else signs.expand_dims(load=[""])
+    signs = signs.sum([name for name in signs.dims if name != "load"])
+    return sign_sentence(dict(zip(signs["load"].values.tolist(), signs.values.tolist())))
 
 
 def labels_of(present: xr.DataArray, name: str) -> list[Label]:

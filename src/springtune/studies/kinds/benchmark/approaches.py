@@ -25,7 +25,7 @@ def network(scene, mesh, definition, clock):
         sheet, springs, problem = _problem(scene, mesh, definition)
         problem.network.tangent()
     with clock("factorizing"):
-        problem.rest_factor  # noqa: B018  factorized when first asked for
+        problem.network.rest_factor  # noqa: B018  factorized when first asked for
     with clock("solving"):
         found = problem.linear(scene.force / springs.reference)
     if not found.converged:
@@ -187,7 +187,7 @@ def condensation(scene, size, clock):
     with clock("assembling"):
         problem.network.tangent()
     with clock("factorizing"):
-        net, factor = problem.network, problem.rest_factor
+        net, factor = problem.network, problem.network.rest_factor
         loaded = np.flatnonzero(problem.load)
         responses = np.zeros((len(loaded), len(loaded)))
         watched = net.reduce(sheet.measured(scene.kind))
@@ -305,7 +305,7 @@ def calculix_cps8(scene, size, clock):
     value, along, axis = scene.side
     with clock("meshing"):
         points, elements = calculix.quadratic_mesh(scene.beam.length, scene.beam.height, size)
-        shares = calculix.side_weights(points, along, 1 - along, value, quadratic=True)
+        shares = calculix.side_weights(points, along, value)
         load = np.zeros(points.shape)
         load[:, axis] = scene.force * shares
         clamp = np.zeros(points.shape, dtype=bool)

@@ -101,7 +101,7 @@ def plot_benchmark(data, ax=None, *, scene=None):
     case = _scene(data, scene)
     rings = unbeaten(case.assured_error.values, case.seconds.values)
     ringed = "○: no other confirmed approach is both faster and more accurate" if rings.any() else ""
-    lost = "; ".join(filter(None, (ringed, _lost(case))))
+    lost = "; ".join(filter(None, (ringed, _lost(case) and f"not drawn: {_lost(case)}")))
     figure, axes = style.panels(ax, figsize=(style.PAGE, 4.0))
     place = dict(left=0.62, right=0.08, bottom=0.8 if lost else 0.62, top=0.3)
     style.arrange(figure, axes, **place)
@@ -146,24 +146,16 @@ def _scene(data, scene):
 
 
 def _lost(case):
-    """How many cases were asked for and have no numbers or times, in words; empty where all have."""
+    """How many cases have no numbers or times and why, in words; empty where all have."""
     flags = case.status.values if "status" in case else np.zeros(0, dtype=int)
-    asked, lost = int((flags != 0).sum()), int(((flags != 0) & (flags != Status.SOLVED)).sum())
-    said = [f"{lost} of {asked} cases have no numbers ({_statuses(case)}); the dataset says why"] if lost else []
-    busy = _busy(case)
-    return "; ".join([*said, f"{busy} are {BUSY}"] if busy else said)
-
-
-def _busy(case):
-    """Number of cases that are solved and not timed."""
-    return int((case.error.notnull() & case.seconds.isnull()).sum())
+    counts = labels.statuses(flags[flags != Status.SOLVED])
+    counts[BUSY] = int((case.error.notnull() & case.seconds.isnull()).sum())
+    return ", ".join(f"{count} {word}" for word, count in counts.items() if count)
 
 
 def _statuses(case):
-    """What became of the cases of a scene that have no numbers, in words."""
-    flags = case.status.values if "status" in case else np.zeros(0, dtype=int)
-    words = [*labels.statuses(flags[flags != Status.SOLVED]), *([BUSY] if _busy(case) else [])]
-    return ", ".join(words) or "none was asked for"
+    """As `_lost`, where there is nothing to draw."""
+    return _lost(case) or "none was asked for"
 
 
 def _lines(data, panel, x, y, approaches):

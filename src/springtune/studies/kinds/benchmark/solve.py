@@ -29,7 +29,7 @@ from springtune.problem.geometry import Beam
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import Material, material_of
 from springtune.problem.status import Status
-from springtune.reference.calculix import installed
+from springtune.reference import calculix
 from springtune.reference.small_strain import solve_small_strain
 from springtune.scene.motion import motion_of
 from springtune.scene.sheet import Sheet
@@ -256,7 +256,7 @@ def _second(scene, beam, approaches, sizes, solved, most_seconds):
 
 def _case(scene, approach, size, meshes, most_seconds, once=False):
     """Result of a case; the mesh of a definition is made before, and its time counted."""
-    if approach.startswith("calculix") and not installed():
+    if approach.startswith("calculix") and not calculix.program():
         return _failed("CalculiX (ccx) is not on this machine; install it, or ask for other approaches")
     mesh, meshing = None, 0.0
     if approach not in APPROACHES:

@@ -105,7 +105,7 @@ def _sensitivity(curves, root, selection, swept, ax):
         _mark_printed(panel, root.paper_stiffness.values, unit)
     over = labels.TITLE_LINE * max(0, labels.lines_of(panel.get_title("left")) - 2) if swept else 0.0
     key = [(text, look) for name, (text, look) in KEY.items() if name in seen]
-    rows = -(-len(key) // labels.key_columns(panel, [text for text, _ in key]))
+    rows = -(-len(key) // labels.KEY_COLUMNS)
     if ax is None:
         figure.set_size_inches(style.COLUMN, 2.45 + over + labels.KEY_ROW * rows)
     labels.settle(figure, axes, {**place, "top": place["top"] + over, "bottom": 0.4 + labels.KEY_ROW * rows})
@@ -153,7 +153,7 @@ KEY = {
     "unstable": ("thin: unstable", {"linewidth": 0.5}),
     "not converged": ("gap: not converged", {"linestyle": ""}),
     "failed": ("gap: failed", {"linestyle": ""}),
-    "beyond": (f"{BEYOND_SMALL_STRAIN}: not the network's error alone", {"linestyle": ""}),
+    "beyond": (BEYOND_SMALL_STRAIN, {"linestyle": ""}),
 }
 """What of a sensitivity figure is explained beside its curves, and how it looks."""
 

@@ -6,20 +6,8 @@ from matplotlib.colors import LinearSegmentedColormap
 
 from springtune.safe_io.escapes import no_mathematics
 
-from ...output import labels, style
+from ...output import drawing, labels, style
 from ...output.dataset import STATUS
-from ...output.drawing import (
-    NO_RESULT,
-    NOT_ASKED,
-    error_text,
-    extent,
-    heat_map,
-    in_words,
-    largest,
-    magnification,
-    plane,
-    spring_ends,
-)
 from ...output.selection import cells, choose, group, labels_of
 from .outputs import DEFORMED, ERRORS, figures
 
@@ -182,7 +170,7 @@ def _errors_of(panels, cut, name, points):
 
 def _why(cut):
     """Why there is no error."""
-    states = in_words(cut.status.values) or "not asked for"
+    states = drawing.in_words(cut.status.values) or "not asked for"
     message = next((text for text in cut.message.values.ravel().tolist() if text), "")
     if message:
         return f"No error: {states}. {message[:160]}"
@@ -225,14 +213,14 @@ def plot_shapes(data, ax=None, *, material=None, kinematics=None):
     rows = _rows(whole, material, kinematics)
     names = [name for name in whole.definition.values.tolist() if any(name in row["asked"] for row in rows)]
     errors = np.array([[row["errors"].get(name, np.nan) for name in names] for row in rows])
-    texts = [[error_text(row["errors"][name], "") if name in row["errors"] else
-              NO_RESULT if name in row["asked"] else NOT_ASKED for name in names] for row in rows]  # fmt: skip
+    texts = [[drawing.error_text(row["errors"][name], "") if name in row["errors"] else drawing.NO_RESULT
+              if name in row["asked"] else drawing.NOT_ASKED for name in names] for row in rows]  # fmt: skip
     heads = list(map(no_mathematics, names))
     references = np.array([row["reference"] for row in rows])
     if np.isfinite(references).any():
         heads.append("reference to expected")
         errors = np.column_stack([errors, references])
-        own = [error_text(one, "") if np.isfinite(one) else "" for one in references]
+        own = [drawing.error_text(one, "") if np.isfinite(one) else "" for one in references]
         texts = [[*row, one] for row, one in zip(texts, own)]
     under = 0.3 + max(map(labels.width, heads), default=0.5)
     figure, axes = style.panels(ax, figsize=(style.PAGE, 0.25 + under + 0.17 * max(len(rows), 3)))
@@ -243,11 +231,11 @@ def plot_shapes(data, ax=None, *, material=None, kinematics=None):
     if not np.isfinite(errors).any():
         labels.say(panel, "No quantity has an error: see status and message.")
         return panel
-    heat_map(panel, errors, np.array(texts, dtype=object))
+    drawing.heat_map(panel, errors, np.array(texts, dtype=object))
     panel.set_yticks(range(len(rows)), [no_mathematics(row["name"]) for row in rows])
     panel.set_xticks(range(len(heads)), heads, rotation=90)
     panel.tick_params(length=0)
-    said = {NO_RESULT: "no result that counts", NOT_ASKED: "not asked for"}
+    said = {drawing.NO_RESULT: "no result that counts", drawing.NOT_ASKED: "not asked for"}
     shown = {text for row in texts for text in row}
     labels.note(panel, "; ".join(f"{mark}: {word}" for mark, word in said.items() if mark in shown), under - 0.18)
     return panel
@@ -330,7 +318,9 @@ def plot_shape(data, ax=None, *, shape=None, load=None, definition=None):
     missing = [name for name in wanted if name not in asked]
     if missing:
         raise ValueError(f"nothing has definition {missing[0]!r}; there is {', '.join(asked)}")
-    width, height = extent(np.concatenate([plane(case, "{}"), plane(case, "outline_{}")]), (1.0, 1.0))
+    width, height = drawing.extent(
+        np.concatenate([drawing.plane(case, "{}"), drawing.plane(case, "outline_{}")]), (1.0, 1.0)
+    )
     columns = min(NETWORK_COLUMNS, len(wanted))
     page = style.COLUMN if columns == 1 else style.PAGE
     room = (page - 0.5 - 0.25 * columns) / columns
@@ -382,8 +372,8 @@ def _scale(case, networks, extent):
     sizes = np.hypot(case.reference_displacement_x.values, case.reference_displacement_y.values)
     if not np.isfinite(sizes).any():
         sizes = np.hypot(networks.displacement_x.values, networks.displacement_y.values)
-    factor = 0.08 * extent / (largest(sizes) or np.inf)
-    return 1.0 if 0.4 < factor < 2 or not factor else magnification(factor)
+    factor = 0.08 * extent / (drawing.largest(sizes) or np.inf)
+    return 1.0 if 0.4 < factor < 2 or not factor else drawing.magnification(factor)
 
 
 def _largest_force(networks):
@@ -397,7 +387,7 @@ def _network(panel, case, cut, name, scale, most):
     """Draw one network; return its lines, or None."""
     one = case.sel(definition=name) if name in case.definition.values else None
     drawn = one is not None and bool(np.isfinite(one.displacement_x.values).any())
-    outline, there = plane(case, "outline_{}"), plane(case, "reference_displacement_{}")
+    outline, there = drawing.plane(case, "outline_{}"), drawing.plane(case, "reference_displacement_{}")
     for number in range(int(case.outline_round.values.max(initial=-1)) + 1):
         places = np.flatnonzero(case.outline_round.values == number)
         closed = np.append(places, places[:1])
@@ -407,11 +397,11 @@ def _network(panel, case, cut, name, scale, most):
     flag = int(cut.status.sel(definition=name))
     lines = None
     if drawn:
-        springs, kept = spring_ends(case)
+        springs, kept = drawing.spring_ends(case)
         forces = one.spring_force.values[kept]
         width = float(np.clip(18 / np.sqrt(len(springs)), 0.25, 0.9))
         lines = LineCollection(
-            1e3 * (plane(case, "{}") + scale * plane(one, "displacement_{}"))[springs],
+            1e3 * (drawing.plane(case, "{}") + scale * drawing.plane(one, "displacement_{}"))[springs],
             array=forces,
             cmap=FORCES,
             clim=(-most, most),
@@ -424,7 +414,7 @@ def _network(panel, case, cut, name, scale, most):
             panel.set_title(f"{name}: forces in an energy")
     if flag != STATUS.index("solved"):
         message = str(cut.message.sel(definition=name).item())
-        text = f"{in_words(flag)}: {message[:120]}" if lines is None else STATUS[flag]
+        text = f"{drawing.in_words(flag)}: {message[:120]}" if lines is None else STATUS[flag]
         labels.say(panel, text, bare=False)
     return lines
 

@@ -379,7 +379,7 @@ def _refined(problem, s, displacements):
         pulls = (network.stiffness * (normals * network.stretch(moved)).sum(axis=1))[:, None] * normals
         np.add.at(missing, network.first, pulls)
         np.subtract.at(missing, network.second, pulls)
-        moved = moved + network.expand(problem.rest_factor.solve(network.reduce(missing).astype(float)))
+        moved = moved + network.expand(network.rest_factor.solve(network.reduce(missing).astype(float)))
     return moved
 
 
