@@ -3,7 +3,7 @@
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -99,9 +99,7 @@ def diff(
         raise click.UsageError("--definitions goes with --group and --json alone")
     try:
         paths = [dataset_path(before), dataset_path(after)]
-        with ExitStack() as stack:
-            one, other = (stack.enter_context(opened(path)) for path in paths)
-            stack.enter_context(reading.guarded(f"{paths[0]}, {paths[1]}"))
+        with opened(paths[0]) as one, opened(paths[1]) as other, reading.guarded(f"{paths[0]}, {paths[1]}"):
             kept = expected.ACCEPTED in one.attrs
             if expected.ACCEPTED in other.attrs:
                 raise ValueError(f"{paths[1]}: holds accepted values; give them first, and then results")
@@ -487,18 +485,13 @@ def _check(results: str | None, target: Path | None, every: bool) -> None:
     from ..studies.output import comparison, expected, reading
 
     try:
-        if results is None:
-            files = (
-                [target]
-                if target
-                else [path for ending in expected.EXPECTED_ENDINGS for path in EXPECTED_FOLDER.glob(f"*{ending}")]
-            )
-            if not files:
-                raise ValueError(
-                    f"{EXPECTED_FOLDER}: nothing is accepted; call `springtune accept results/<study>` first"
-                )
-        else:
-            files = [target or _usual_target(dataset_path(results).parent.name)]
+        files = [path for path in EXPECTED_FOLDER.glob("*") if path.suffix in expected.EXPECTED_ENDINGS]
+        if target is not None:
+            files = [target]
+        elif results is not None:
+            files = [_usual_target(dataset_path(results).parent.name)]
+        if not files:
+            raise ValueError(f"{EXPECTED_FOLDER}: nothing is accepted; call `springtune accept results/<study>` first")
         departed = False
         for file in sorted(files):
             kept = expected.read(file)

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
 from functools import reduce, wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import click
 from click.core import ParameterSource
@@ -476,18 +476,13 @@ def dataset_path(given: str) -> Path:
     )
 
 
-Command = TypeVar("Command", bound=Callable[..., Any])
-
-
-def max_scenes(command: Command) -> Command:
-    """Option of a command that reads a study: argument ``most``, for `allow`."""
-    option: Callable[[Command], Command] = click.option(
-        "--max-scenes",
-        "most",
-        type=click.IntRange(min=1),
-        help=f"A study of more scenes is refused before anything is made of it; {MOST_SCENES} without.",
-    )
-    return option(command)
+max_scenes = click.option(
+    "--max-scenes",
+    "most",
+    type=click.IntRange(min=1),
+    help=f"A study of more scenes is refused before anything is made of it; {MOST_SCENES} without.",
+)
+"""Option of a command that reads a study: argument ``most``, for `allow`."""
 
 
 def allow(most: int | None) -> None:

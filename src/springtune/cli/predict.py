@@ -217,7 +217,7 @@ def _on_shape(asked: "AskedShape", springs_alone: bool) -> _Answer:
         lambda: prediction_text(subject, asked.mesh_name, about, found),
         lambda: prediction_json(subject, mesh_json, found),
         recommended(found)[0],
-        lambda definition: net_of_shape(asked, definition),
+        partial(net_of_shape, asked),
     )
 
 

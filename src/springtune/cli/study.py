@@ -154,8 +154,9 @@ def split(config: Path, count: int, by: str, out: Path | None, most: int | None)
 
     written = write_parts(loaded(config), count, by, config.parent if out is None else out)
     click.echo(aligned(share_table(written), left=0, right=(1, 2, 3)))
-    results = " ".join(f"results/{one.study.name}" for one in written)
-    click.echo(f"\nspringtune run {written[0].path}   # and so on, each where it is to run; then, with all results in "
+    parts = [part for part, _ in written]
+    results = " ".join(f"results/{part.name}" for part in parts)
+    click.echo(f"\nspringtune run {parts[0].path}   # and so on, each where it is to run; then, with all results in "
                f"one place,\nspringtune merge {config} {results}")  # fmt: skip
 
 

@@ -9,6 +9,7 @@ meshes have whole numbers of cells across, and some sizes between, whose cells a
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import count, takewhile
@@ -290,17 +291,14 @@ class MeshSearch(Tabled):
 def asked_error(value: float | str) -> float:
     """Error to keep [1], of a number or a text such as "1 %"."""
     number = math.nan
-    if isinstance(value, str):
-        text = value.strip()
-        try:
-            number = float(text.removesuffix("%")) / 100 if text.endswith("%") else math.nan
-        except ValueError:
-            pass
-    elif isinstance(value, int | float) and not isinstance(value, bool):
-        number = float(value) if abs(value) < 1 else math.nan
+    if isinstance(value, str) and value.strip().endswith("%"):
+        with suppress(ValueError):
+            number = float(value.strip().removesuffix("%")) / 100
+    elif isinstance(value, int | float):
+        number = value
     if not 0 < number < 1:
         raise ValueError(f"error: {value!r} is no error above 0 and below 100 %; give one such as '1 %'")
-    return number
+    return float(number)
 
 
 def find_mesh(
@@ -606,13 +604,12 @@ class _Search:
         """Solve definitions on a mesh; whether it is not too large."""
         if self._particles(cells) > self._most:
             return False
-        size = self.size(cells)
-        statements = self.family.statements(size)
+        statements = self.family.statements(self.size(cells))
         particles = len(statements[0].mesh.points)
         whole = [(other, one.particles) for other, one in self._tried.items() if other == int(other)]
         # A mesh of its own has more particles than coarser ones and fewer than finer ones.
         if all((particles > count) == (cells > other) for other, count in whole):
-            self._solve(cells, size, statements, names)
+            self._solve(cells, statements, names)
         return True
 
     def _check(self, cells: float, names: Sequence[str]) -> bool:
@@ -620,15 +617,14 @@ class _Search:
         cells = self._same.get(cells, cells)
         if cells in self._tried and all(name in self._tried[cells].errors for name in names):
             return False
-        size = self.size(cells)
-        statements = self.family.statements(size)
+        statements = self.family.statements(self.size(cells))
         same = self._same[cells] = self._first.setdefault(statements[0].mesh.points.tobytes(), cells)
         if same != cells:
             return self._check(same, names)
-        self._solve(cells, size, statements, names)
+        self._solve(cells, statements, names)
         return True
 
-    def _solve(self, cells: float, size: float, statements: Sequence[Statement], names: Sequence[str]) -> None:
+    def _solve(self, cells: float, statements: Sequence[Statement], names: Sequence[str]) -> None:
         """Solve the definitions that were not solved on a mesh before."""
         mesh = statements[0].mesh
         self._first.setdefault(mesh.points.tobytes(), cells)
@@ -638,7 +634,7 @@ class _Search:
             found = tried.errors(same)
             errors[name] = {load: math.nan if isinstance(one, str) else one for load, one in found.items()}
         errors |= {name: dict.fromkeys(self.known, math.nan) for name in tried.failures}
-        self._tried[cells] = SolvedMesh(self.name, size, cells, len(mesh.points), len(mesh.edges), errors)
+        self._tried[cells] = SolvedMesh(self.name, self.size(cells), cells, len(mesh.points), len(mesh.edges), errors)
 
     def _keeps(self, name: str, cells: float) -> bool:
         """Whether a definition keeps the error on a mesh, even if the reference is off by its estimate."""

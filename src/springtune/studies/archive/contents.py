@@ -87,11 +87,6 @@ class Packed:
     size: int
     original: str = ""
 
-    @property
-    def runs(self) -> bool:
-        """Whether it is executable."""
-        return isinstance(self.source, Path) and os.access(self.source, os.X_OK)
-
 
 @dataclass(frozen=True)
 class Code:

@@ -16,6 +16,7 @@ in CITATION.cff are named.
 """
 
 import json
+import os
 import shutil
 import tempfile
 import zipfile
@@ -71,12 +72,17 @@ DONE = "http://schema.org/CompletedActionStatus"
 
 MEDIA = {
     ".cff": "application/yaml",
+    ".js": "text/javascript",
+    ".md": "text/markdown",
     ".toml": "application/toml",
     ".vtu": "application/xml",
     ".pvd": "application/xml",
     ".yaml": "application/yaml",
 }
-"""Media types by file ending, besides those that Python knows."""
+"""Media types by file ending that some versions of Python lack."""
+
+OF_PYTHON = MimeTypes()
+"""Python's own media types, without those of this machine."""
 
 TEXT, BYTES = "text/plain", "application/octet-stream"
 """Media types of other files."""
@@ -167,7 +173,7 @@ class _Crate:
         one, path = self.found.files[name], PurePosixPath(name)
         other = BYTES if name in self.found.inputs else TEXT
         properties: dict[str, Any] = {"name": path.name, "sha256": one.sha256, "contentSize": str(one.size)}
-        known, _ = MimeTypes().guess_type(name)  # of Python alone, not of this machine
+        known, _ = OF_PYTHON.guess_type(name)
         properties["encodingFormat"] = MEDIA.get(path.suffix, known or other)
         if name == f"{CODE}/Snakefile":
             properties |= {"@type": ["File", "SoftwareSourceCode", "ComputationalWorkflow", "HowTo"]}
@@ -437,8 +443,7 @@ def write(
         cited = citation(Path(CITATION))
         if tell:
             tell(found)
-        packed = dict(found.files)
-        packed |= {METADATA: of_text(METADATA, metadata(found, cited))}
+        packed = found.files | {METADATA: of_text(METADATA, metadata(found, cited))}
         sums = "".join(f"{one.sha256}  {name}\n" for name, one in sorted(packed.items()))
         packed |= {SUMS: of_text(SUMS, sums)}
         check_limits(packed)
@@ -465,7 +470,8 @@ def _zip(target: Path, packed: "Iterable[Packed]") -> None:
         for one in sorted(packed, key=lambda one: (one.name != METADATA, one.name)):
             info = zipfile.ZipInfo(one.name, PACKED_AT)
             info.compress_type, info.create_system = zipfile.ZIP_DEFLATED, 3  # Unix, whatever this system is
-            info.external_attr = (0o100755 if one.runs else 0o100644) << 16
+            runs = isinstance(one.source, Path) and os.access(one.source, os.X_OK)
+            info.external_attr = (0o100755 if runs else 0o100644) << 16
             info.file_size = one.size
             source = BytesIO(one.source) if isinstance(one.source, bytes) else open(one.source, "rb")  # noqa: SIM115
             with source, archive.open(info, "w", force_zip64=one.size > zipfile.ZIP64_LIMIT) as written:

@@ -80,10 +80,6 @@ class Site:
     study: "Study"
     attributes: dict[str, str]
 
-    def place(self, product: str) -> Path:
-        """Path of a product in any results folder."""
-        return Path(product).relative_to(Path("results", self.attributes["study"]))
-
 
 @dataclass(frozen=True)
 class Merged:
@@ -208,10 +204,11 @@ def _examined(site: Site) -> tuple[list[Path], list[str]]:
         for product, known in record["products"].items():
             if known is None:
                 continue
-            file = site.folder / site.place(product)
+            place = Path(product).relative_to(Path("results", site.attributes["study"]))
+            file = site.folder / place
             if file.is_file() and file.stat().st_size == known[0] and records.checksum(file) == known[2]:
-                if is_stored(site.place(product)):
-                    found[site.place(product)] = None
+                if is_stored(place):
+                    found[place] = None
             else:
                 damaged.append(f"{file} is {'damaged' if file.is_file() else 'missing'}")
                 whole = False
@@ -345,17 +342,8 @@ def merge_text(merged: Merged, parts: Iterable[Path]) -> str:
 # -- split -------------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Written:
-    """A written part, with its share of the study's expected time [1]."""
-
-    path: Path
-    study: "Study"
-    share: float
-
-
-def write_parts(study: "Study", count: int, by: str, folder: Path) -> list[Written]:
-    """Write the files of all parts, or none."""
+def write_parts(study: "Study", count: int, by: str, folder: Path) -> "list[tuple[Study, float]]":
+    """Write the files of all parts, or none; return each with its share of the study's expected time [1]."""
     if study.part:
         which = f"part {study.part.number} of {study.part.of}"
         raise StudyError(f"{study.path}: is {which} of a study already; split the whole one")
@@ -367,13 +355,13 @@ def write_parts(study: "Study", count: int, by: str, folder: Path) -> list[Writt
         if path.exists() and not is_part(path.read_text(errors="replace")):
             raise StudyError(f"{path}: is another study, and no part of one; rename it, or write to another folder")
         own = taken(replace(study, name=path.stem, path=path, part=Part(number, count, by, digest)), share)
-        written.append(Written(path, own, cost))
+        written.append((own, cost))
     copied = _named_files(study, folder)
     for place, content in copied.items():
         atomic.write_bytes(place, content)
-    for one in written:
-        if one.study.part:
-            atomic.write_text(one.path, part_text(study.text, one.study.part))
+    for own, _ in written:
+        if own.part:
+            atomic.write_text(own.path, part_text(study.text, own.part))
     return written
 
 
@@ -390,13 +378,12 @@ def _named_files(study: "Study", folder: Path) -> dict[Path, bytes]:
     return {folder / file.relative_to(beside): file.read_bytes() for file in files}
 
 
-def share_table(written: Iterable[Written]) -> list[list[object]]:
+def share_table(written: "Iterable[tuple[Study, float]]") -> list[list[object]]:
     """Table of the parts, with a head."""
     rows: list[list[object]] = [["part", "scenes", "curves", "of the cost", "besides"]]
-    for one in written:
-        besides = ", ".join(kind for kind, held in one.study.parts.items() if held and kind != "scenes")
-        share = f"{100 * one.share:.0f} %"
-        rows.append([str(one.path), len(one.study.scenes), len(one.study.curves), share, besides])
+    for own, share in written:
+        besides = ", ".join(kind for kind, held in own.parts.items() if held and kind != "scenes")
+        rows.append([str(own.path), len(own.scenes), len(own.curves), f"{100 * share:.0f} %", besides])
     return rows
 
 

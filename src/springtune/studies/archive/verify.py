@@ -130,6 +130,10 @@ def left(folder: Path) -> list[Path]:
 
 def again(folder: Path, beside: Path, number: int, seed: int) -> Iterator[Again]:
     """Recompute random scenes of a dataset by its own config."""
+    import xarray as xr
+
+    from ..output.comparison import Tolerance, compare
+
     with reading.open(folder) as tree, tempfile.TemporaryDirectory() as temporary:
         before = {name: tree[name].to_dataset().load() for name in COMPARED if name == SCENES or name in tree.groups}
         root = before[SCENES]
@@ -149,10 +153,17 @@ def again(folder: Path, beside: Path, number: int, seed: int) -> Iterator[Again]
     software = json.loads(root.attrs["software"])
     same = all(installed(name) == version for name, version in software.items() if name != "python")
     for name, scenes in _scenes(part).items():
+        kept = [data[name][[*COMPARED[name], "status"]].drop_attrs(deep=False) for data in (before, made)]
         for scene, labels in scenes.items():
-            called = study.name_of(scene) if isinstance(scene, SceneSpec) else scene.name
-            limit = SAME_SOFTWARE if same else OTHER_SOFTWARE
-            yield _compared(called, labels, before[name], made[name], COMPARED[name], limit)
+            own = [data.sel({dim: at for dim, at in labels.items() if dim in data.dims}, drop=True) for data in kept]
+            found = compare(xr.DataTree(own[0]), xr.DataTree(own[1]), Tolerance(SMALLEST_SEEN))
+            yield Again(
+                study.name_of(scene) if isinstance(scene, SceneSpec) else scene.name,
+                str(Status(int(own[0].status))),
+                str(Status(int(own[1].status))),
+                SMALLEST_SEEN * max((row.excess for row in found.changes), default=0.0),
+                SAME_SOFTWARE if same else OTHER_SOFTWARE,
+            )
 
 
 def _scenes(study: "Study") -> "dict[str, dict[SceneSpec | ShapeScene, dict[str, Label]]]":
@@ -184,24 +195,3 @@ def _made(study: "Study", folder: Path) -> "dict[str, xr.Dataset]":
         if kind.name in ("scenes", "shapes") and study.parts[kind.name]:
             found |= kind.module("collect").groups(study, folder)
     return found
-
-
-def _compared(
-    name: str,
-    labels: "dict[str, Label]",
-    before: "xr.Dataset",
-    after: "xr.Dataset",
-    numbers: tuple[str, ...],
-    limit: float,
-) -> Again:
-    import xarray as xr
-
-    from ..output.comparison import Tolerance, compare
-
-    one, other = (
-        data[[*numbers, "status"]].sel({name: label for name, label in labels.items() if name in data.dims}, drop=True)
-        for data in (before.drop_attrs(deep=False), after.drop_attrs(deep=False))
-    )
-    found = compare(xr.DataTree(one), xr.DataTree(other), Tolerance(SMALLEST_SEEN))
-    difference = SMALLEST_SEEN * max((row.excess for row in found.changes), default=0.0)
-    return Again(name, str(Status(int(one.status))), str(Status(int(other.status))), difference, limit)

@@ -5,6 +5,7 @@ import shutil
 from collections.abc import Collection, Hashable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -218,15 +219,9 @@ def _small_cache() -> Iterator[None]:
 
 
 def _runs(data: xr.Dataset) -> list[list[Hashable]]:
-    """Split a group's variables into runs before and after sparse texts."""
-    runs: list[list[Hashable]] = [[]]
-    apart = False
-    for name, array in data.data_vars.items():
-        before, apart = apart, _mostly_holes(array)
-        if apart or before:
-            runs.append([])
-        runs[-1].append(name)
-    return runs
+    """Split a group's variables into runs of sparse texts and of others, which come first."""
+    runs = [[*names] for _, names in groupby(data.data_vars, lambda name: _mostly_holes(data[name]))]
+    return [[], *runs] if runs and _mostly_holes(data[runs[0][0]]) else runs or [[]]
 
 
 def _mostly_holes(array: xr.DataArray) -> bool:
@@ -244,17 +239,16 @@ def _append(path: str | os.PathLike[str], group: str, data: xr.Dataset, names: S
         between.to_netcdf(path, mode="a", group=group, engine="netcdf4", encoding=encoding)
         return
     # Not netCDF's own library: HDF5 would then have to write into a file to read texts that were never stored.
-    (name,) = names
-    array = data[name]
-    chunk = _block(array.shape)
     with h5netcdf.File(path, "a") as file:
-        at = f"{group.rstrip('/')}/{name}"
-        variable = file.create_variable(at, array.dims, h5py.string_dtype(), chunks=chunk)
-        variable.attrs.update(array.attrs)
-        # HDF5 stores a chunk when something is written into it, and says of others that there is no text.
-        for place in np.unique(np.argwhere(array.values != "") // chunk, axis=0).tolist():
-            cells = tuple(slice(number * length, (number + 1) * length) for number, length in zip(place, chunk))
-            variable[cells] = array.values[cells]
+        for name, array in data[names].data_vars.items():
+            chunk = _block(array.shape)
+            at = f"{group.rstrip('/')}/{name}"
+            variable = file.create_variable(at, array.dims, h5py.string_dtype(), chunks=chunk)
+            variable.attrs.update(array.attrs)
+            # HDF5 stores a chunk when something is written into it, and says of others that there is no text.
+            for place in np.unique(np.argwhere(array.values != "") // chunk, axis=0).tolist():
+                cells = tuple(slice(number * length, (number + 1) * length) for number, length in zip(place, chunk))
+                variable[cells] = array.values[cells]
 
 
 def _block(shape: Sequence[int]) -> tuple[int, ...]:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -57,31 +57,28 @@ def draw_springs(ax: Axes | None, mesh: "Mesh", displacements: np.ndarray, force
 @style.styled
 def draw_curve(ax: Axes | None, curve: "Curve") -> Axes:
     """Draw the deformation error over uniform stiffness, and its zero."""
-    figure, axes = style.panels(ax, figsize=(style.COLUMN, 2.5))
-    place: dict[str, Any] = {"left": 0.5, "right": 0.08, "bottom": 0.66, "top": 0.28}
-    style.arrange(figure, axes, **place)
-    panel, error = axes[0, 0], 100 * curve.error
-    unit, written = labels.power_of_ten(float(curve.stiffness.max()))
-    panel.axhline(0.0, color="0.6", linewidth=0.7)
-    colour, stiffness = style.line(0)["color"], curve.stiffness / unit
-    panel.plot(stiffness, np.where(curve.stable, error, np.nan), color=colour, label="network")
-    unstable, said = np.where(curve.stable, np.nan, error), []
-    if np.isfinite(unstable).any():
-        panel.plot(stiffness, unstable, color=colour, linewidth=0.5, label="not stable")
-        said.append("thin: not stable")
-    marks = (("dashes", "best", curve.best_stiffness), ("dash-dots", "closed form", curve.predicted_stiffness))
-    for number, (dashes, name, value) in enumerate(marks):
-        if np.isfinite(value):
-            look = style.line(1 + number)
-            panel.axvline(value / unit, color=look["color"], linestyle=look["linestyle"], linewidth=0.9, label=name)
-            said.append(f"{dashes}: {name}, {value / unit:.4g} {written}N/m")
-    panel.set(xlabel=f"Stiffness [{written}N/m]", ylabel="Deformation error [%]", title=curve.title)
-    known = error[np.isfinite(error)]
-    if len(known):  # a beam that buckled errs by thousands
-        panel.set_ylim(
-            max(min(1.1 * known.min(), 0.0), -LARGEST_SHOWN), min(max(1.1 * known.max(), 1.0), LARGEST_SHOWN)
-        )
-    labels.settle(figure, axes, place)
+    with labels.arranged(ax, figsize=(style.COLUMN, 2.5), bottom=0.66) as (axes, _):
+        panel, error = axes[0, 0], 100 * curve.error
+        unit, written = labels.power_of_ten(float(curve.stiffness.max()))
+        panel.axhline(0.0, color="0.6", linewidth=0.7)
+        colour, stiffness = style.line(0)["color"], curve.stiffness / unit
+        panel.plot(stiffness, np.where(curve.stable, error, np.nan), color=colour, label="network")
+        unstable, said = np.where(curve.stable, np.nan, error), []
+        if np.isfinite(unstable).any():
+            panel.plot(stiffness, unstable, color=colour, linewidth=0.5, label="not stable")
+            said.append("thin: not stable")
+        marks = (("dashes", "best", curve.best_stiffness), ("dash-dots", "closed form", curve.predicted_stiffness))
+        for number, (dashes, name, value) in enumerate(marks):
+            if np.isfinite(value):
+                look = style.line(1 + number)
+                panel.axvline(value / unit, color=look["color"], linestyle=look["linestyle"], linewidth=0.9, label=name)
+                said.append(f"{dashes}: {name}, {value / unit:.4g} {written}N/m")
+        panel.set(xlabel=f"Stiffness [{written}N/m]", ylabel="Deformation error [%]", title=curve.title)
+        known = error[np.isfinite(error)]
+        if len(known):  # a beam that buckled errs by thousands
+            panel.set_ylim(
+                max(min(1.1 * known.min(), 0.0), -LARGEST_SHOWN), min(max(1.1 * known.max(), 1.0), LARGEST_SHOWN)
+            )
     if not len(known):
         labels.say(panel, curve.message or "There is no reference, and so no error.", bare=False)
     elif np.isfinite(error).any():

@@ -11,7 +11,9 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -23,7 +25,7 @@ from springtune.units import QUANTITY_KINDS, UnitError, parse
 from . import reading
 from .dataset import flag_words, is_flagged
 from .selection import at, shown_swept
-from .text import how_to_install, label_text
+from .text import cell_text, how_to_install
 
 
 class RequestError(ValueError):
@@ -190,7 +192,7 @@ def write_csv(path: str | os.PathLike[str], columns: Sequence[Column]) -> None:
     write_text(Path(path), text.getvalue())
 
 
-def write_parquet(path: str | os.PathLike[str], columns: Sequence[Column], attributes: Mapping[str, object]) -> None:
+def write_parquet(path: str | os.PathLike[str], columns: Sequence[Column], attributes: Mapping[Any, object]) -> None:
     """Write a long table as Parquet with units, long names and attributes."""
     try:
         import pyarrow as pa
@@ -210,10 +212,8 @@ def write_parquet(path: str | os.PathLike[str], columns: Sequence[Column], attri
 
 def write_zarr(path: str | os.PathLike[str], tree: xr.DataTree) -> None:
     """Write a Zarr store atomically."""
-    try:
-        import zarr  # noqa: F401
-    except ImportError:
-        raise ValueError(f"{path}: Zarr needs zarr; {how_to_install('export')}") from None
+    if find_spec("zarr") is None:
+        raise ValueError(f"{path}: Zarr needs zarr; {how_to_install('export')}")
     path = Path(path)
     unfinished, before = (path.with_name(f"{path.name}.{mark}{UNFINISHED}") for mark in (writer(), "before"))
     tree = tree.load()
@@ -284,10 +284,7 @@ def export(
     if ending == ".csv":
         write_csv(path, columns)
     else:
-        attributes: dict[str, object] = {
-            str(name): value for name, value in tree.attrs.items() if isinstance(value, str)
-        }
-        write_parquet(path, columns, attributes | {"springtune_group": "/" + group.strip("/")})
+        write_parquet(path, columns, tree.attrs | {"springtune_group": "/" + group.strip("/")})
     return f"{path}: {len(columns[0].values) if columns else 0} rows, {len(columns)} columns of group '{group}'"
 
 
@@ -348,7 +345,8 @@ def _write_series(networks: _Scenes | _Shapes, path: Path) -> None:
 
     with series(path) as add:
         for number, labels in enumerate(networks.labels):
-            add(float(number), partial(networks.write, labels=labels), networks.named(labels, "_").replace(" ", ""))
+            name = networks.named(labels).replace(", ", "_").replace(" ", "")
+            add(float(number), partial(networks.write, labels=labels), name)
 
 
 NETWORKS_OF_SHAPES = "shape_fields"
@@ -381,10 +379,9 @@ class _Scenes:
         self.numbers = at(root[names], swept)[names].assign(swept).load()
         self.mesh: dict[str, str | float] = {}  # the one of before: scenes of one follow each other
 
-    def named(self, labels: Mapping[str, str | float], between: str = ", ") -> str:
+    def named(self, labels: Mapping[str, str | float]) -> str:
         """Labels of a scene in words."""
-        units = {name: str(self.tree["/fields"][name].attrs.get("units", "1")) for name in labels}
-        return between.join(label_text(name, label, units[name]) for name, label in labels.items())
+        return cell_text(labels, {name: str(self.tree["/fields"][name].attrs.get("units", "1")) for name in labels})
 
     def write(self, path: Path, labels: Mapping[str, str | float]) -> None:
         """Write a scene."""
@@ -465,9 +462,9 @@ class _Shapes:
         ]
         self.labels = [one for one in found if all(one[name] in wanted for name, wanted in selection.items())]
 
-    def named(self, labels: Mapping[str, str | float], between: str = ", ") -> str:
+    def named(self, labels: Mapping[str, str | float]) -> str:
         """Labels of a network in words."""
-        return between.join(map(str, labels.values()))
+        return ", ".join(map(str, labels.values()))
 
     def write(self, path: Path, labels: Mapping[str, str | float]) -> None:
         """Write a network."""

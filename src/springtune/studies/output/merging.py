@@ -136,7 +136,13 @@ class _Merger:
                     )
         dims = [str(one) for one in first.dims]
         shape = [len(self.axes[path, one]) for one in dims]
-        _check_size(full, dims, shape)
+        size = 8.0 * float(np.prod(np.array(shape, dtype=float)))
+        if size > MOST_BYTES:
+            sizes = ", ".join(f"{one} {count}" for one, count in zip(dims, shape))
+            raise ValueError(
+                f"{full}: {size / 1e9:.3g} GB over all labels together ({sizes}); select what is needed of each "
+                "dataset first"
+            )
         empty, dtype = nothing([*arrays.values()])
         values = np.full(shape, empty, dtype)
         source = np.full(shape, -1, dtype="int32")
@@ -156,8 +162,9 @@ class _Merger:
                 if (both & (excess > 1.0)).any():
                     at = tuple(int(one) for one in np.argwhere(both & (excess > 1.0))[0])
                     labels = {one: self.axes[path, one][own[n]] for one, own, n in zip(dims, places, at)}
-                    said = (of_both.said(0, known[at]), of_both.said(1, own[at]))
-                    self._refuse(path, full, labels, (int(source[place][at]), number), said, of_both.units)
+                    sides = ((of_both.said(0, known[at]), source[place][at]), (of_both.said(1, own[at]), number))
+                    two = (f"{_value(value, of_both.units)} in {self.names[side]}" for value, side in sides)
+                    self._refuse(path, full, labels, " and ".join(two))
             new = there & ~both
             values[place] = np.where(new, own, known)
             source[place] = np.where(new, number, source[place])
@@ -169,17 +176,8 @@ class _Merger:
             values = values.astype(first.dtype)
         return xr.Variable(dims, values, first.attrs)
 
-    def _refuse(
-        self,
-        path: str,
-        full: str,
-        labels: dict[str, object],
-        numbers: tuple[int, int],
-        values: tuple[float | str, float | str],
-        units: str,
-    ) -> None:
+    def _refuse(self, path: str, full: str, labels: dict[str, object], two: str) -> None:
         """Raise for a cell with two values."""
-        two = " and ".join(f"{_value(value, units)} in {self.names[number]}" for number, value in zip(numbers, values))
         held = [data[one] for one in labels for data in self.held[path].values() if one in data.indexes]
         at = cell_text(labels, {str(one.name): str(one.attrs.get("units", "1")) for one in reversed(held)})
         if len(labels) == 1:
@@ -223,16 +221,6 @@ class _Merger:
         histories = [own["history"] for own in every if "history" in own]
         found["history"] = "\n".join(dict.fromkeys([*histories, f"merged from {', '.join(self.names)}"]))
         return found
-
-
-def _check_size(full: str, dims: Sequence[str], shape: Sequence[int]) -> None:
-    size = 8.0 * float(np.prod(np.array(shape, dtype=float)))
-    if size > MOST_BYTES:
-        sizes = ", ".join(f"{one} {count}" for one, count in zip(dims, shape))
-        raise ValueError(
-            f"{full}: {size / 1e9:.3g} GB over all labels together ({sizes}); select what is needed of each dataset "
-            "first"
-        )
 
 
 def _value(value: float | str, units: str) -> str:

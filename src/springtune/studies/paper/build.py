@@ -19,6 +19,7 @@ from pydantic import BaseModel, ConfigDict
 
 from springtune.safe_io import atomic
 
+from ..output.text import cell_text
 from ..runs import records
 from . import PaperError, check_typst, numbers
 from .numbers import HASH_SHOWN, Dataset, checked, chosen
@@ -249,21 +250,15 @@ def _origin(drawing: Drawing, datasets: Mapping[str, Dataset], name: str) -> str
         return f"none, drawn by examples/{drawing.example}.py"
     told: dict[str, list[str]] = {}
     for panel in drawing.panels:
-        labels = [_label(key, value) for key, value in panel.at.items()]
-        if ", ".join(labels) not in told.setdefault(panel.study, []):
-            told[panel.study].append(", ".join(labels))
+        place = cell_text(panel.at, {"mesh_size": "m"})
+        if place not in told.setdefault(panel.study, []):
+            told[panel.study].append(place)
     parts = []
     for study, labels in told.items():
         selection = "; ".join(filter(None, labels))
         sha256 = chosen(datasets, study, name).sha256[:HASH_SHOWN]
         parts.append(f"{study}{': ' if selection else ''}{selection}, sha256 {sha256}")
     return "; ".join(parts)
-
-
-def _label(key: str, value: object) -> str:
-    if key == "mesh_size" and isinstance(value, float):
-        return f"{1e3 * value:g} mm"
-    return f"{key.replace('_', ' ')} {value:g}" if isinstance(value, float) else str(value)
 
 
 # -- sketches of what is loaded and how --------------------------------------------------------------------------------

@@ -263,7 +263,10 @@ def _rows(row: dict[str, Any], values: np.ndarray, present: np.ndarray) -> tuple
         numbers = numbers[kept]
     if row["type"] == "float":
         row["cleared"] = CLEARED_OF_LINES if points > 1 else CLEARED_OF_CELLS
-        bits = _rounded(numbers, row["cleared"])
+        numbers = np.where(np.isnan(numbers), np.float32(np.nan), numbers)  # all NaN are equal
+        bits = numbers.view(np.int32).copy()
+        bits[np.isfinite(numbers)] += 1 << (row["cleared"] - 1)
+        bits >>= row["cleared"]
     else:
         bits = np.ascontiguousarray(numbers)
     if points > 1:
@@ -272,15 +275,6 @@ def _rows(row: dict[str, Any], values: np.ndarray, present: np.ndarray) -> tuple
     folded = (bits << 1) ^ (bits >> 31)
     parts.append(np.ascontiguousarray(folded.reshape(-1).view(np.uint8).reshape(-1, 4).T).tobytes())
     return row, b"".join(parts)
-
-
-def _rounded(numbers: np.ndarray, cleared: int) -> np.ndarray:
-    """Bits of float32 numbers, rounded to the kept ones; all NaN are equal."""
-    numbers = np.where(np.isnan(numbers), np.float32(np.nan), numbers)
-    bits = numbers.view(np.int32).copy()
-    finite = np.isfinite(numbers)
-    bits[finite] += 1 << (cleared - 1)
-    return bits >> cleared
 
 
 def main(dataset: str, output: str, record: str, digest: str, *files: str) -> None:
