@@ -205,7 +205,7 @@ def test_what_was_asked_for_is_solved_and_nothing_else(tree):
     meanings = np.array(root.status.attrs["flag_meanings"].split())[root.status.values]
     assert set(np.unique(meanings)) == {"not_requested", "solved"}
     assert (root.displacement.notnull() == (root.status == 1)).all()
-    assert int((root.status == 1).sum()) == 24 + 2 + 6 + 3 + 8 + 6
+    assert int((root.status == 1).sum()) == 24 + 3 + 6 + 3 + 8 + 6
     assert (root.residual.where(root.status == 1, 0) <= 1e-10).all()
     assert (root.reference_error_estimate.max() <= 1e-4).all()
 

@@ -61,7 +61,8 @@ def left_empty():
 
 
 # Keys of results have the versions of the packages that Snakemake sees, so jobs must run on these.
-ENVIRONMENT = None if DEPLOYED else "../envs/springtune.yaml"
+# Snakemake takes braces in a path of it for wildcards.
+ENVIRONMENT = None if DEPLOYED or "{" in str(SOURCE) else "../envs/springtune.yaml"
 """What rules need, for readers and for `--lint`; see docs/how-to/use-conda.md."""
 
 if DEPLOYED and not IS_CHILD:

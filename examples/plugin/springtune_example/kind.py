@@ -25,13 +25,11 @@ class LengthsConfig(Section):
 
 
 def _check(config, problems):
-    if config.lengths:
-        check_known(problems, ("lengths", "beam"), "beam", config.lengths.beam, config.beams)
+    check_known(problems, ("lengths", "beam"), "beam", config.lengths.beam, config.beams)
 
 
 def _expand(config, declared):
-    if not (section := config.lengths):
-        return ()
+    section = config.lengths
     beam = declared.beams[section.beam]
     box = {"length": beam.length, "height": beam.height, "mesh_size": section.mesh_size}
     return tuple(box | {"mesh_type": name} for name in section.mesh_type)

@@ -60,22 +60,19 @@ def particle_stresses(
     `chosen` selects the cells of one part of the body, by number of corners, since stress jumps between materials.
     NaN at particles without such a cell.
     """
-    corners, values, middles = [], [], []
+    # Corner by corner of the cells: the side to the next corner, and stress and middle of the cell.
+    sides_of, values, middles, number = [], [], [], 0
     for count, cells in mesh.cells.items():
         kept = slice(None) if chosen is None else chosen[count]
-        corners.append(np.pad(cells[kept], ((0, 0), (0, 4 - count)), constant_values=-1))
-        values.append(stresses[count][kept])
-        middles.append(mesh.points[cells[kept]].mean(axis=1))
-    cells, value, middle = np.concatenate(corners), np.concatenate(values), np.concatenate(middles)
-    count, size = len(mesh.points), np.sqrt(mesh.area / len(cells))
-    cell, corner = np.nonzero(cells >= 0)
-    particle = cells[cell, corner]
-    fits, good = _fits(mesh.points, particle, middle[cell], value[cell], count, size)
+        corners = cells[kept]
+        sides_of.append(np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2))
+        values.append(np.repeat(stresses[count][kept], count, axis=0))
+        middles.append(np.repeat(mesh.points[corners].mean(axis=1), count, axis=0))
+        number += len(corners)
+    pairs, value, middle = np.concatenate(sides_of), np.concatenate(values), np.concatenate(middles)
+    count, size, particle = len(mesh.points), np.sqrt(mesh.area / number), pairs[:, 0]
+    fits, good = _fits(mesh.points, particle, middle, value, count, size)
     # Of the sides of these cells, those that have one of them are the outline.
-    first, last = cells, np.roll(cells, -1, axis=1)
-    triangles = cells[:, 3] < 0
-    last[triangles, 2] = cells[triangles, 0]
-    pairs = np.stack([first.ravel(), last.ravel()], axis=1)[(first >= 0).ravel()]
     code = np.sort(pairs, axis=1) @ np.array([count, 1])
     sides, times = np.unique(code, return_counts=True)
     rim = np.zeros(count, dtype=bool)
@@ -94,7 +91,7 @@ def particle_stresses(
         to, of = joined[wanted[joined[:, 0]] & sources[joined[:, 1]]].T
         if not len(to):
             # No particle inside: the fits to the cells around, or their mean.
-            total = np.stack([np.bincount(particle, part, count) for part in value[cell].T], axis=1)
+            total = np.stack([np.bincount(particle, part, count) for part in value.T], axis=1)
             mean = total[wanted] / around[wanted, None]
             found[wanted] = np.where(good[wanted, None], fits[wanted, 0], mean)
             return found

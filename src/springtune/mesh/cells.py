@@ -120,11 +120,8 @@ class Mesh:
 
     @cached_property
     def _edges(self) -> tuple[np.ndarray, np.ndarray, dict[int, np.ndarray]]:
-        joins = [
-            corners[:, joined] for count, corners in self.cells.items() for joined in SIDES[count] + DIAGONALS[count]
-        ]
-        sizes = np.cumsum([0, *map(len, joins)])
-        pairs = np.sort(np.concatenate(joins), axis=1)
+        joins = [corners[:, SIDES[count] + DIAGONALS[count]] for count, corners in self.cells.items()]
+        pairs = np.sort(np.concatenate([joined.reshape(-1, 2) for joined in joins]), axis=1)
         # One integer per edge sorts ten times faster than rows do.
         codes, places, counts = np.unique(
             pairs[:, 0] * len(self.points) + pairs[:, 1], return_inverse=True, return_counts=True
@@ -135,10 +132,8 @@ class Mesh:
             raise MeshError(
                 f"the edge of points {first} has {counts.max()} cells, and a plane has two sides; remove some"
             )
-        parts = iter(np.split(places, sizes[1:-1]))
-        of_cells = {
-            count: np.stack([next(parts) for _ in SIDES[count] + DIAGONALS[count]], axis=1) for count in self.cells
-        }
+        parts = np.split(places.ravel(), [joins[0].size // 2])
+        of_cells = {count: part.reshape(-1, joined.shape[1]) for count, joined, part in zip(self.cells, joins, parts)}
         return edges, counts, of_cells
 
     def shares_cells(self, other: "Mesh") -> bool:

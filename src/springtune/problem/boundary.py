@@ -211,10 +211,17 @@ def interpolation(grouped: GroupedMesh, name: str) -> tuple[np.ndarray, np.ndarr
     """
     mesh, point = grouped.mesh, np.asarray(grouped.points[name], dtype=float)
     outline = mesh.edges[mesh.on_outline]
-    edge = _edge_at(mesh.points[outline], point, ON_POINT * np.ptp(mesh.points, axis=0).max())
-    if edge is not None:
-        along, share = edge
-        return outline[along], np.array([1 - share, share])
+    ends, tolerance = mesh.points[outline], ON_POINT * np.ptp(mesh.points, axis=0).max()
+    (x, y), (dx, dy) = (point - ends[:, 0]).T, (ends[:, 1] - ends[:, 0]).T
+    squares = dx**2 + dy**2
+    away, along = np.abs(x * dy - y * dx) / np.sqrt(squares), (x * dx + y * dy) / squares
+    met = (away <= tolerance) & (along >= 0) & (along <= 1)
+    if met.any():  # on an edge
+        found = int(np.argmax(met))
+        axis = int(np.argmax(np.abs(ends[found, 1] - ends[found, 0])))
+        first, last = ends[found, :, axis]
+        share = float((point[axis] - first) / (last - first))
+        return outline[found], np.array([1 - share, share])
     particle = grouped.particle(name)
     if particle is not None:
         return np.array([particle]), np.ones(1)
@@ -242,20 +249,6 @@ def cell_at(grouped: GroupedMesh, name: str) -> tuple[int, int, np.ndarray]:
     if found is None:
         raise ValueError(f"point: {name!r} at {in_words(point)} is outside of the mesh; move it, or correct its unit")
     return found
-
-
-def _edge_at(ends: np.ndarray, point: np.ndarray, tolerance: float) -> tuple[int, float] | None:
-    """First edge that a point lies on, and how far along it; None where there is none."""
-    (x, y), (dx, dy) = (point - ends[:, 0]).T, (ends[:, 1] - ends[:, 0]).T
-    squares = dx**2 + dy**2
-    away, along = np.abs(x * dy - y * dx) / np.sqrt(squares), (x * dx + y * dy) / squares
-    met = (away <= tolerance) & (along >= 0) & (along <= 1)
-    if not met.any():
-        return None
-    found = int(np.argmax(met))
-    axis = int(np.argmax(np.abs(ends[found, 1] - ends[found, 0])))
-    first, last = ends[found, :, axis]
-    return found, float((point[axis] - first) / (last - first))
 
 
 def _shares(corners: np.ndarray) -> np.ndarray | None:

@@ -11,15 +11,18 @@ class AssumptionWarning(UserWarning):
     """An input violates an assumption of the model, such as that of a thin sheet."""
 
 
+def _warn(said: str) -> None:
+    """Warn whoever makes the body."""
+    warnings.warn(said, AssumptionWarning, stacklevel=5)
+
+
 def warn_of_thickness(thickness: float, sides: tuple[float, float], what: str) -> None:
     """Warn if a body is thicker than its smaller side [m]: plane stress is for thin sheets."""
     smaller = min(sides)
     if thickness > smaller:
-        warnings.warn(
+        _warn(
             f"{what}, thickness: {1e3 * thickness:g} mm exceeds its smaller side, {1e3 * smaller:.6g} mm, and plane "
-            "stress is an assumption about thin sheets; give a smaller thickness",
-            AssumptionWarning,
-            stacklevel=4,  # whoever makes the body
+            "stress is an assumption about thin sheets; give a smaller thickness"
         )
 
 
@@ -32,11 +35,9 @@ def warn_of_size(sides: Iterable[float], what: str) -> None:
     longer = max(sides)
     if not LEAST_SIDE <= longer <= MOST_SIDE:
         usual = f"more than {MOST_SIDE:g} m" if longer > MOST_SIDE else f"less than {1e6 * LEAST_SIDE:g} um"
-        warnings.warn(
+        _warn(
             f"{what}: its longer side is {longer:.6g} m, {usual}; check the unit: numbers in Python are in m, a text "
-            "such as '200 mm' has its own",
-            AssumptionWarning,
-            stacklevel=4,  # whoever makes the body
+            "such as '200 mm' has its own"
         )
 
 

@@ -385,10 +385,8 @@ class _PlaneLaw(ABC):
         S = 2 (W_t 1 + W_d a).
         """
         c = np.stack([1 + 2 * strain[..., 0], 1 + 2 * strain[..., 1], strain[..., 2]], axis=-1)
-        determinant, turned = (
-            c[..., 0] * c[..., 1] - c[..., 2] ** 2,
-            np.stack([c[..., 1], c[..., 0], -c[..., 2]], axis=-1),
-        )
+        determinant = c[..., 0] * c[..., 1] - c[..., 2] ** 2
+        turned = np.stack([c[..., 1], c[..., 0], -c[..., 2]], axis=-1)
         first, second = self.derivatives(c[..., 0] + c[..., 1], determinant)
         unit = np.array([1.0, 1.0, 0.0])
         stress = 2 * (first[0][..., None] * unit + first[1][..., None] * turned)

@@ -264,13 +264,16 @@ class _Grid:
         self._unknowns = self._free()
         self._direct, self._lateral, self._shear = self._matrices()
         self._split = len(self._unknowns[0][0]) * len(self._unknowns[0][1])
-        loaded = self._on_loaded_side()
+        # Along x and along y factors of the integrals over the loaded side of what moves along the force.
+        lines, numbers = (self._x, self._y), self._unknowns[kind.axis]
+        loaded, across = [line.integrals[of] for line, of in zip(lines, numbers)], lines[kind.normal]
+        loaded[kind.normal] = numbers[kind.normal] == (across.last if kind.loaded.far else across.first)
         self.load = self._along_force(np.kron(*loaded))
         self.middle = None
         if kind.pressed:
             # The middle of the side is the end of its half that lies on the axis of symmetry.
-            line, numbers = (self._x, self._y)[kind.along], self._unknowns[kind.axis][kind.along]
-            loaded[kind.along] = numbers == (line.last if kind.cut.far else line.first)
+            line = lines[kind.along]
+            loaded[kind.along] = numbers[kind.along] == (line.last if kind.cut.far else line.first)
             self.middle = self._along_force(np.kron(*loaded)).astype(float)
 
     def _free(self) -> list[list[np.ndarray]]:
@@ -280,14 +283,6 @@ class _Grid:
         held = [[[ends[side] for side, axes in self._kind.half_held if side.axis == across and axis in axes]
                  for across in range(2)] for axis in range(2)]  # fmt: skip
         return [[line.all[~np.isin(line.all, there)] for line, there in zip(lines, sides)] for sides in held]
-
-    def _on_loaded_side(self) -> list[np.ndarray]:
-        """Along x and along y factors of the integrals over the loaded side of what moves along the force."""
-        kind, lines = self._kind, (self._x, self._y)
-        numbers, across = self._unknowns[kind.axis], lines[kind.normal]
-        factors = [line.integrals[of] for line, of in zip(lines, numbers)]
-        factors[kind.normal] = numbers[kind.normal] == (across.last if kind.loaded.far else across.first)
-        return factors
 
     def _along_force(self, part: np.ndarray) -> np.ndarray:
         """Values of all unknowns, of which those across the force are zero."""
