@@ -485,7 +485,13 @@ class Trial:
             failures = {self.statements[0].load: next(iter(failures.values()))}
         young = poisson = nan
         if self._test is not None:
-            moduli = self._axial_moduli(springs)
+            key = key_of(springs)
+            if key not in self._moduli:
+                try:
+                    self._moduli[key] = self._test.axial(springs)
+                except SingularError as error:
+                    self._moduli[key] = f"unstable: {error}"
+            moduli = self._moduli[key]
             if isinstance(moduli, str):
                 failures["patch test"] = moduli
             else:
@@ -501,17 +507,6 @@ class Trial:
             poisson_ratio=poisson,
             failures=failures,
         )
-
-    def _axial_moduli(self, springs: Springs) -> tuple[float, float] | str:
-        """Young's modulus over the reference stiffness and Poisson's ratio between rollers; or why they are missing."""
-        assert self._test is not None
-        key = key_of(springs)
-        if key not in self._moduli:
-            try:
-                self._moduli[key] = self._test.axial(springs)
-            except SingularError as error:
-                self._moduli[key] = f"unstable: {error}"
-        return self._moduli[key]
 
     def cost(self, name: str) -> tuple[float, float]:
         """Seconds of the longest static solve, and the largest stable explicit step [s], NaN where it is not found."""

@@ -6,7 +6,7 @@ import os
 import platform
 import shutil
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from filecmp import cmpfiles
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
@@ -396,8 +396,7 @@ def _without(dataset: Packed, names: Collection[str], scratch: Path) -> tuple[Pa
                 )
             if text:
                 file.attrs.modify(name, np.bytes_(b"-" * len(text)))
-    packed = _of_file(dataset.name, copy)
-    return Packed(packed.name, packed.source, packed.sha256, packed.size, dataset.sha256), found, host
+    return replace(_of_file(dataset.name, copy), original=dataset.sha256), found, host
 
 
 def _departures(checkout: Path, told: dict[str, str]) -> dict[str, tuple[str, str]]:

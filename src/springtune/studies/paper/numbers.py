@@ -374,10 +374,8 @@ def _marks(number: Number, datasets: Mapping[str, Dataset], name: str) -> str:
         array = data[variable]
         here = {dimension: label for dimension, label in number.at[0].items() if dimension in array.dims}
         found = np.ravel(_selected(array, here, name).values)
-        if variable == "status":
-            text += mark * bool((found != STATUS.index("solved")).any())
-        else:
-            text += mark * any(map(str, found))
+        marked = (found != STATUS.index("solved")).any() if variable == "status" else any(map(str, found))
+        text += mark if marked else ""
     return text
 
 
