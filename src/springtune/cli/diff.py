@@ -207,14 +207,13 @@ def _of_group(group: "GroupChanges", sides: Sequence[str], most: int | None) -> 
             shown = own[:most]
             if own:
                 said = ", ".join(_place(group, {name: label}) for label in shown)
-                lines.append(
-                    f"  {name} only {side}: {said}" + (f", and {len(own) - len(shown)} more" * (len(own) > len(shown)))
-                )
+                more = f", and {len(own) - len(shown)} more" if len(own) > len(shown) else ""
+                lines.append(f"  {name} only {side}: {said}{more}")
     if lines:
         yield [f"labels of {group.name}", *lines]
     for side, alone in zip(sides, group.cells):
         if alone.count:
-            lines = [f"  {_place(group, _telling(group, labels))}" for labels in alone.rows]
+            lines = [f"  {_place(group, labels)}" for labels in alone.rows]
             yield [f"{what} only {side}: {alone.count}", *lines, *_more(alone.count - len(lines))]
     lines = [f"  {name} only {side}" for side, own in zip(sides, group.variables) for name in own]
     lines += [f"  {name} {why}" for name, why in group.unlike.items()]
@@ -224,7 +223,7 @@ def _of_group(group: "GroupChanges", sides: Sequence[str], most: int | None) -> 
         if one.changed:
             rows = [
                 [
-                    f"  {_place(group, _telling(group, row.labels | row.point)) or 'all'}",
+                    f"  {_place(group, row.labels | row.point) or 'all'}",
                     f"{row.before or 'nothing'} -> {row.after or 'nothing'}",
                 ]
                 for row in one.rows
@@ -237,7 +236,8 @@ def _of_group(group: "GroupChanges", sides: Sequence[str], most: int | None) -> 
 
 
 def _place(group: "GroupChanges", labels: "Mapping[str, str | float]") -> str:
-    return cell_text(labels, group.units)
+    """Labels of dimensions with several labels, for readers."""
+    return cell_text({name: label for name, label in labels.items() if group.sizes[name] > 1}, group.units)
 
 
 def _changes(found: "Comparison", changes: "list[Change]", sides: Sequence[str], most: int | None) -> list[str]:
@@ -253,7 +253,7 @@ def _changes(found: "Comparison", changes: "list[Change]", sides: Sequence[str],
     rows = [["  variable", *sides, "change", "at"]]
     for row in changes[:most]:
         group = axes[row.group]
-        at = _place(group, _telling(group, row.labels) | row.point)
+        at = _place(group, row.labels | row.point)
         rows.append(
             [f"  {variable_name(row.group, row.variable)}", _value(row.before), _value(row.after), _difference(row), at]
         )
@@ -277,9 +277,8 @@ def _told(found: "Comparison", config: bool) -> list[str]:
     lines += aligned(rows, 0).splitlines()
     if found.config:
         less, more = (sum(line.startswith(sign) for line in found.config[2:]) for sign in "-+")
-        lines.append(
-            f"  the studies' files: {less} lines less, {more} more" + ("" if config else "; --config shows them")
-        )
+        told = "" if config else "; --config shows them"
+        lines.append(f"  the studies' files: {less} lines less, {more} more{told}")
         lines += found.config if config else []
     return lines
 
@@ -291,11 +290,6 @@ def _short(text: str) -> str:
 def _more(count: int) -> list[str]:
     """Line on rows that are left out, if any."""
     return [f"  and {count} more; --all shows them"] if count > 0 else []
-
-
-def _telling(group: "GroupChanges", labels: "dict[str, str | float]") -> "dict[str, str | float]":
-    """Labels of dimensions with several labels."""
-    return {name: label for name, label in labels.items() if group.sizes[name] > 1}
 
 
 def _value(value: float | str) -> str:

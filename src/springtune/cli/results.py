@@ -300,7 +300,8 @@ def _tell_contents(found: "Contents") -> None:
     """Print what is packed, and what matters for computing it again."""
     from ..studies.archive.contents import DIFF, FOLDERS
 
-    click.echo(f"{found.folder}: packing {len(found.files)} files, {bytes_text(found.size)}")
+    size = sum(one.size for one in found.files.values())
+    click.echo(f"{found.folder}: packing {len(found.files)} files, {bytes_text(size)}")
     code = found.code
     if not code.commit:
         endings = "; ".join(f"{name}/ {', '.join(known)}" for name, known in FOLDERS.items())
@@ -384,11 +385,8 @@ def _compared(made: "Reproduced") -> bool:
         return True
     from .diff import comparison_text
 
-    click.echo(
-        comparison_text(
-            near if near.different else exact, [Path("the archive"), Path("computed again")], ("before", "after"), 5
-        )
-    )
+    found, sides = near if near.different else exact, [Path("the archive"), Path("computed again")]
+    click.echo(comparison_text(found, sides, ("before", "after"), 5))
     if not made.others:
         click.echo("  software and machine are the same, so all bits should be")
     click.echo("not reproduced: the values above differ")

@@ -37,9 +37,8 @@ def new(study: str, shape: bool) -> None:
     try:
         write_text(path, template_text(path, "shape" if shape else "beam"))
     except OSError as error:
-        raise click.ClickException(
-            f"{path}: cannot be written: {error.strerror or error}; name another place"
-        ) from None
+        why = error.strerror or error
+        raise click.ClickException(f"{path}: cannot be written: {why}; name another place") from None
     if not path.resolve().is_relative_to(Path.cwd().resolve()):
         click.echo(f"written outside of this folder: {path.resolve()}")
     scenes = 4 if shape else 2

@@ -149,9 +149,8 @@ class Choice(Tabled):
             yield label, bounds_text(value, "{:.5g} N/m".format, "each its own")
         for name, error in self.errors.items():
             yield name, bounds_text(error, error_text, self._missing(name))
-        if (
-            missing := self._missing("patch test")
-        ) != NO_REFERENCE or self.young_modulus_error == self.young_modulus_error:
+        missing = self._missing("patch test")
+        if missing != NO_REFERENCE or self.young_modulus_error == self.young_modulus_error:
             yield "E", bounds_text(self.young_modulus_error, error_text, missing)
             yield "nu", bounds_text(self.poisson_ratio, lambda ratio: f"{round(ratio, 3) + 0.0:.3f}", missing)
         yield "besides springs", self.extra

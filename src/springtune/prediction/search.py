@@ -548,9 +548,8 @@ class _Search:
     def _between(self, cells: int) -> list[float]:
         """Cells across the meshes between whole divisions that an answer is tried on."""
         size = self.size(cells)
-        parts = BETWEEN_DIVISIONS + (
-            FINER[4::5] if cells < FEWEST_CELLS else ()
-        )  # errors are irregular on so few cells
+        # Errors are irregular on few cells.
+        parts = BETWEEN_DIVISIONS + (FINER[4::5] if cells < FEWEST_CELLS else ())
         sizes = (*(size * part for part in parts), *self._stretched(size))
         found = (round(self.family.one_cell / one, ACROSS_DECIMALS) for one in sizes)
         return [int(one) if one == int(one) else one for one in found]

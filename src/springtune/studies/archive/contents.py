@@ -140,11 +140,6 @@ class Contents:
         """Versions that made the dataset."""
         return dict(json.loads(self.attributes["software"]))
 
-    @property
-    def size(self) -> int:
-        """Uncompressed size of all files [B]."""
-        return sum(one.size for one in self.files.values())
-
 
 def gather(
     study: "Study",
@@ -344,10 +339,8 @@ def archived_names(study: "Study", given: set[Path], checkout: Path) -> dict[Pat
 def _beside(path: Path, checkout: Path) -> str:
     """Name of a file in a folder beside the checkout; empty for others."""
     parts = Path(os.path.relpath(path, checkout)).parts
-    kept = (
-        parts[:1] == ("..",) and parts[1:2] != ("..",) and len(parts) > 2 and parts[1] not in (CODE, OF_RESULTS, INPUTS)
-    )
-    return "/".join(parts[1:]) if kept else ""
+    beside = len(parts) > 2 and parts[0] == ".." and parts[1] not in ("..", CODE, OF_RESULTS, INPUTS)
+    return "/".join(parts[1:]) if beside else ""
 
 
 # -- results -----------------------------------------------------------------------------------------------------------
@@ -423,9 +416,8 @@ def _readme(found: Contents) -> str:
     commit = f"commit {found.code.commit}" if found.code.commit else "from no git checkout"
     version = found.attributes["springtune_version"]
     changed = ", changed" if found.code.changed else ""
-    changed += (
-        f"; what of package, rules and study differs from the commit is in `{DIFF}`" if DIFF in found.files else ""
-    )
+    if DIFF in found.files:
+        changed += f"; what of package, rules and study differs from the commit is in `{DIFF}`"
     return f"""# {markdown(found.study.title)}
 
 The study `{found.study.name}`, computed by springtune {version} ({commit}{changed}). Every file is

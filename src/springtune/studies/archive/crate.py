@@ -90,16 +90,6 @@ TEXT, BYTES = "text/plain", "application/octet-stream"
 USED = {"s": ("wall time", "SEC"), "cpu_time": ("time of processors", "SEC"), "max_rss": ("most memory", "E63")}
 """Reported columns of Snakemake's benchmarks: name and UN/CEFACT unit code."""
 
-PAGES = {
-    "cvxopt": "https://cvxopt.org", "h5netcdf": "https://h5netcdf.org", "h5py": "https://www.h5py.org",
-    "meshio": "https://github.com/nschloe/meshio", "netcdf4": "https://unidata.github.io/netcdf4-python",
-    "netgen-mesher": "https://ngsolve.org", "numba": "https://numba.pydata.org", "numpy": "https://numpy.org",
-    "pyamg": "https://github.com/pyamg/pyamg", "python": "https://www.python.org",
-    "scikit-fem": "https://scikit-fem.readthedocs.io", "scipy": "https://scipy.org",
-    "snakemake": "https://snakemake.readthedocs.io", "xarray": "https://xarray.dev",
-}  # fmt: skip
-"""Web pages of software."""
-
 
 class CitationError(ValueError):
     """CITATION.cff lacks what an archive states."""
@@ -336,9 +326,8 @@ class _Crate:
             actions = [self._job(name, tool, message) for name in names]
             jobs += actions
             about = {"name": f"Jobs of the rule {rule}", "description": message}
-            controls.append(
-                self._add(f"#control-{rule}", "ControlAction", **about, instrument=steps[-1], object=actions)
-            )
+            control = self._add(f"#control-{rule}", "ControlAction", **about, instrument=steps[-1], object=actions)
+            controls.append(control)
         workflow["step"] = steps
         notes = tuple(f"{found.folder}/{name}/" for name in ("done", "benchmarks", "tasks"))
         machine = [
@@ -371,10 +360,11 @@ class _Crate:
         self.crate.root_dataset["mentions"] = [run, engine, *controls, *jobs]
 
     def _software(self, name: str, version: str) -> "Entity":
-        page = PAGES.get(name)
-        place = f"pkg:generic/python@{version}" if name == "python" else f"pkg:pypi/{name}@{version}"
-        about = {"name": name, "softwareVersion": version, "url": {"@id": page} if page else None}
-        return self._add(place, "SoftwareApplication", **about)
+        kind, page = ("pypi", f"https://pypi.org/project/{name}/")
+        if name == "python":
+            kind, page = ("generic", "https://www.python.org")
+        about = {"name": name, "softwareVersion": version, "url": {"@id": page}}
+        return self._add(f"pkg:{kind}/{name}@{version}", "SoftwareApplication", **about)
 
     def _job(self, name: str, tool: "Entity", message: str) -> "Entity":
         """Add the action of a job."""

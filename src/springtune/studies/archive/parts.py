@@ -356,26 +356,19 @@ def write_parts(study: "Study", count: int, by: str, folder: Path) -> "list[tupl
             raise StudyError(f"{path}: is another study, and no part of one; rename it, or write to another folder")
         own = taken(replace(study, name=path.stem, path=path, part=Part(number, count, by, digest)), share)
         written.append((own, cost))
-    copied = _named_files(study, folder)
+    beside = study.path.parent.resolve()
+    named = named_files(study.text, study.path) if folder.resolve() != beside else ()
+    for file in named:
+        if not file.is_relative_to(beside):
+            raise StudyError(f"{file}: the study names it, and it is not beside the study; copy it there, or write the "
+                             "parts beside the study")  # fmt: skip
+    copied = {folder / file.relative_to(beside): file.read_bytes() for file in named}
     for place, content in copied.items():
         atomic.write_bytes(place, content)
     for own, _ in written:
         if own.part:
             atomic.write_text(own.path, part_text(study.text, own.part))
     return written
-
-
-def _named_files(study: "Study", folder: Path) -> dict[Path, bytes]:
-    """Copies that parts in a folder need of a study's named files."""
-    beside = study.path.parent.resolve()
-    if folder.resolve() == beside:
-        return {}
-    files = named_files(study.text, study.path)
-    for file in files:
-        if not file.is_relative_to(beside):
-            raise StudyError(f"{file}: the study names it, and it is not beside the study; copy it there, or write the "
-                             "parts beside the study")  # fmt: skip
-    return {folder / file.relative_to(beside): file.read_bytes() for file in files}
 
 
 def share_table(written: "Iterable[tuple[Study, float]]") -> list[list[object]]:

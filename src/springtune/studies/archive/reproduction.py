@@ -285,12 +285,8 @@ def _python(code: Path, python: str, fresh: bool, say: Callable[[str], None]) ->
     if not others and not fresh:
         say("environment: this one, whose packages are those of the archive's lock file")
         return Path(sys.executable)
-    why = (
-        "as asked"
-        if not others
-        else "since here "
-        + ", ".join(f"{name} is {here}, not {wanted}" for name, (wanted, here) in list(others.items())[:5])
-    )
+    told = ", ".join(f"{name} is {here}, not {wanted}" for name, (wanted, here) in list(others.items())[:5])
+    why = f"since here {told}" if others else "as asked"
     say(f"environment: a new one from the archive's lock file, {why}; this downloads packages")
     around = {name: value for name, value in os.environ.items() if name not in UNWANTED}
     done = subprocess.run(["sh", "tools/setup.sh", "run"], cwd=code, env=around, stdout=sys.stderr)

@@ -58,7 +58,7 @@ def accepted(tree: xr.DataTree, variables: Sequence[str] = ()) -> xr.DataTree:
     """
     groups: dict[str, xr.Dataset] = {}
     for path, names in _chosen(tree, variables).items():
-        data = tree[path].to_dataset() if path != "/" else tree.to_dataset()
+        data = tree[path].to_dataset()
         kept = {name: data[name].variable.compute() for name in names}
         found = xr.Dataset(
             kept, {name: data[name].variable for one in kept.values() for name in one.dims if name in data.coords}

@@ -168,11 +168,8 @@ class _Merger:
             new = there & ~both
             values[place] = np.where(new, own, known)
             source[place] = np.where(new, number, source[place])
-        if (
-            values.dtype.kind == "f"
-            and all(array.dtype.kind in "iu" for array in arrays.values())
-            and not np.isnan(values).any()
-        ):
+        whole = all(array.dtype.kind in "iu" for array in arrays.values())
+        if whole and values.dtype.kind == "f" and not np.isnan(values).any():
             values = values.astype(first.dtype)
         return xr.Variable(dims, values, first.attrs)
 

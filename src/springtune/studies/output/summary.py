@@ -147,12 +147,10 @@ def _worst(root: "xr.Dataset", finite: "xr.Dataset | None" = None) -> Iterator[s
 def _unreferenced(root: "xr.Dataset", called: str) -> Iterator[str]:
     """Missing or inapplicable references with their scenes."""
     requested, there = root.status != Status.NOT_REQUESTED, root.reference_displacement.notnull()
+    beyond = root.status.isin((Status.SOLVED, Status.UNSTABLE)) & there & (root.reference_applies == 0)
     for scenes, what in (
         (requested & ~there, "without a reference, and so without an error"),
-        (
-            root.status.isin((Status.SOLVED, Status.UNSTABLE)) & there & (root.reference_applies == 0),
-            "beyond small strain, so the error is not the network's alone",
-        ),
+        (beyond, "beyond small strain, so the error is not the network's alone"),
     ):
         if not scenes.any():
             continue

@@ -145,9 +145,8 @@ def _groups(tree: xr.DataTree) -> list[str]:
     rows = []
     for node in tree.subtree:
         sizes = node.to_dataset().drop_vars(node.coords).sizes  # without inherited dimensions
-        rows.append(
-            [f"  {node.path}", len(node.data_vars), ", ".join(f"{name} {size}" for name, size in sizes.items())]
-        )
+        counts = ", ".join(f"{name} {size}" for name, size in sizes.items())
+        rows.append([f"  {node.path}", len(node.data_vars), counts])
     return ["groups, their variables and dimensions", *aligned(rows, 0, (1,)).splitlines()]
 
 
