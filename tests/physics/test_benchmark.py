@@ -255,13 +255,16 @@ def test_parts_beside_the_cases_are_holes_too():
     assert systems["solver_status"][multigrid] == Status.FAILED and systems["solver_message"][multigrid].all()
 
 
-def test_explicit_steps_are_timed_in_threads_and_precisions():
+def test_explicit_steps_are_timed_in_threads_and_precisions(monkeypatch):
     found = benchmark.explicit(SCENES["traction"], (5e-3,), 30.0, updates=1)
     assert (found["explicit_status"] == Status.SOLVED).all() and (found["spring_updates"] > 0).all()
     springs = len(MESH_TYPES["structured"](0.1, 0.02, 5e-3).edges)
     assert found["spring_updates"][0] == pytest.approx(springs * found["explicit_steps"][0])
     assert (found["explicit_error"][:, 0] == 0).all() and (found["explicit_error"][:, 1] > 0).all()
     assert (found["explicit_error"] < 1e-4).all() and (found["copy_bandwidth"] > 0).all()
+    clocks(monkeypatch, 0.1, 0.01)  # a busy machine, on which runs are repeated more often
+    repeated = benchmark.explicit(SCENES["traction"], (5e-3,), 30.0, updates=1)
+    assert (repeated["explicit_error"] == found["explicit_error"]).all()
 
 
 def test_errors_are_checked_on_a_second_beam():

@@ -455,8 +455,8 @@ def _explicit(alarm, scene, size, updates):
             with closing(make_stepper(motion, "central-difference", step, precision, threads)) as stepper:
                 stepper.begin(*np.zeros((2, *motion.load.shape)))
                 stepper.advance(steps)  # with the first ones threads begin
+                displacements, _ = stepper.state()  # after as many steps on any machine
                 seconds[t, k] = _median(alarm, lambda stepper=stepper: stepper.advance(steps))
-                displacements, _ = stepper.state()
             if not np.isfinite(displacements).all():
                 raise ArithmeticError(f"diverged with steps of {step:.3g} s")
         ends.append(displacements)
