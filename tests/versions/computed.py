@@ -68,13 +68,13 @@ def installed(name):
 
 def collected(study, output):
     """Write the dataset of a study, all stages in this process."""
-    from springtune.studies.kinds import collect  # here: the oldest packages have no xarray
+    from springtune.studies.kinds import collect  # here: what solves physics alone does without xarray
 
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch) / "results"
         for job in plan(load_study(study), folder, 1).jobs.values():
             driver.run(job.stage.module, job.content, TaskCosts())
-        collect.run(load_study(study), study, folder, output)
+        collect.run(load_study(study), study, folder, Path(output))
 
 
 if __name__ == "__main__":
