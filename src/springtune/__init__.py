@@ -15,6 +15,8 @@ solved: 9.51 mm, error +0.1 %
 __version__ = "0.1.0"
 
 _NAMES = {
+    "engines.base": ("ENGINES", "Engine", "EngineError", "Setting", "engine"),
+    "engines.run": ("EngineResult", "in_engine"),
     "handover.net": ("SpringNet",),
     "studies.kinds": ("load_study",),
     "studies.kinds.benchmark.figures": (

@@ -1,5 +1,12 @@
 """Types of the public names, for checkers and editors; `__init__.py` imports each when it is first asked for."""
 
+from .engines.base import ENGINES as ENGINES
+from .engines.base import Engine as Engine
+from .engines.base import EngineError as EngineError
+from .engines.base import Setting as Setting
+from .engines.base import engine as engine
+from .engines.run import EngineResult as EngineResult
+from .engines.run import in_engine as in_engine
 from .handover.net import SpringNet as SpringNet
 from .mesh import MESH_TYPES as MESH_TYPES
 from .mesh import Mesh as Mesh

@@ -2,8 +2,8 @@
 
 A decorator adds a function to a mapping. On first use the mapping imports all modules of a package to find what they
 declare. Code outside the package uses the same decorator. Other packages declare more by entry points of the groups
-``springtune.definitions``, ``springtune.loads``, ``springtune.mesh_types`` and ``springtune.kinds``. They are imported
-when their name is asked for, or all names.
+``springtune.definitions``, ``springtune.engines``, ``springtune.loads``, ``springtune.mesh_types`` and
+``springtune.kinds``. They are imported when their name is asked for, or all names.
 """
 
 import inspect
@@ -33,7 +33,7 @@ class PluginWarning(UserWarning):
     """What another package declares is left out; the message says why."""
 
 
-GROUPS = ("definitions", "loads", "mesh_types", "kinds")
+GROUPS = ("definitions", "engines", "loads", "mesh_types", "kinds")
 """Groups of entry points, after ``springtune.``."""
 
 
@@ -227,3 +227,17 @@ class Registry(Extended[Function]):
         """Check that an imported function declared itself under the name of its entry point."""
         if name not in self._entries or self._entries[name].function is not found:
             raise ValueError(f"{found!r} is not declared as '{name}'; its decorator and entry point need one name")
+
+
+def how_to_install(extra: str) -> str:
+    """Return how an extra is installed; no package index has springtune.
+
+    Examples
+    --------
+    >>> print(how_to_install("export"))
+    install the extra, in a clone `pip install '.[export]'`, of a wheel `pip install 'springtune-...whl[export]'`
+    """
+    from . import __version__
+
+    wheel = f"springtune-{__version__}-py3-none-any.whl[{extra}]"
+    return f"install the extra, in a clone `pip install '.[{extra}]'`, of a wheel `pip install '{wheel}'`"

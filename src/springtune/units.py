@@ -48,6 +48,7 @@ QUANTITY_KINDS = {
         Kind("energy", "J", "3.5 J"),
         Kind("acceleration", "m/s^2", "9.81 m/s^2"),
         Kind("angle", "rad", "30 deg"),
+        Kind("time", "s", "5 ms"),
     )
 }
 """Kinds of quantity by name."""
@@ -61,6 +62,7 @@ COMMON = {
     "area": {"m^2": "1", "cm^2": "1e-4", "mm^2": "1e-6"},
     "energy": {"J": "1", "mJ": "1e-3", "kJ": "1e3", "N*m": "1", "N*mm": "1e-3"},
     "acceleration": {"m/s^2": "1", "mm/s^2": "1e-3"},
+    "time": {"s": "1", "ms": "1e-3", "us": "1e-6", "min": "60"},
     "angle": {"rad": "1", "deg": "0.01745329251994329576923690768488612713", "mrad": "1e-3"},
 }
 """Usual units of each kind and their size in its SI unit."""

@@ -55,7 +55,7 @@ def test_examples_in_messages_are_right(kind):
     [
         ("200", "length", "'200' has no unit; give a length such as '200 mm'"),
         ("200 mN", "length", "'200 mN' is a force; give a length such as '200 mm'"),
-        ("5 s", "force", "'5 s' is of dimension [time]; give a force such as '400 kN'"),
+        ("5 s", "force", "'5 s' is a time; give a force such as '400 kN'"),
         ("200 mmm", "length", "unknown unit 'mmm', did you mean 'mm'?"),
         ("0,5 mm", "length", "unknown unit ',5 mm'"),
         ("1 mm*", "length", "unknown unit 'mm*'"),

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 import click
 from click.core import ParameterSource
 
+from ..registry import how_to_install
 from ..safe_io.escapes import shown
 from ..safe_io.tables import aligned
-from ..studies.output.text import bytes_text, how_to_install
+from ..studies.output.text import bytes_text
 from . import examples
 from .options import idle, studies
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..studies.output.text import how_to_install
+from ..registry import how_to_install
 from ..studies.runs.source import USUAL_STUDY, config_file, workflow_folder
 from . import examples, studies_here
 from .options import allow, max_scenes

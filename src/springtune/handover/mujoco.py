@@ -24,8 +24,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from ..mesh import corner_angles, signed_areas
-from .simulation import Simulation, about, commented, load_in_words, numbers, simulate
+from .simulation import Simulation, about, commented, lame, load_in_words, numbers, simulate
 from .terms import Net, Terms
 
 VERSIONS = (3, 4)
@@ -185,7 +184,7 @@ def _refused_before_3_15(net: Net) -> list[str]:
 
 def _flex(net: Net, terms: Terms, size: float, version: int) -> str:
     """Triangles whose sides are coupled, as a flex: where all have one pair of Lame constants."""
-    first, second = _lame(net, terms)
+    first, second = lame(net, terms, "MuJoCo's flex")
     ratio = first / second
     # MuJoCo refuses a half, which plane stress allows in MuJoCo 4.
     poisson = ratio / (4 + 2 * ratio) if version == 3 else min(ratio / (2 + ratio), float(np.nextafter(0.5, 0)))
@@ -211,27 +210,6 @@ def _flex(net: Net, terms: Terms, size: float, version: int) -> str:
             "  </deformable>",
         ]
     )
-
-
-def _lame(net: Net, terms: Terms) -> tuple[float, float]:
-    """Lame constants of plane stress, times the thickness [N/m], that give all triangles their springs."""
-    areas = 16 * signed_areas(net.points, terms.cells)[:, None]
-    cotangents = 1 / np.tan(corner_angles(net.points, terms.cells))
-    products = np.roll(cotangents, -1, axis=1) * np.roll(cotangents, -2, axis=1)
-    # tensile and coupling are linear in (lambda + 2 mu) t and 2 mu t, see `springtune.springs.delingette`.
-    given = np.concatenate([(areas * terms.values[name]).ravel() for name in ("tensile", "coupling")])
-    factors = np.concatenate([2 * cotangents.ravel() ** 2, 2 * products.ravel()])
-    signs = np.repeat([1.0, -1.0], cotangents.size)
-    (total, twice), *_ = np.linalg.lstsq(np.column_stack([factors, signs]), given, rcond=None)
-    first = float(total - twice)
-    away = np.abs(factors * total + signs * twice - given).max() / np.abs(given).max()
-    if away > 1e-9 or not (twice > 0 and -1e-9 * twice < first < (1 + 1e-9) * twice):
-        raise ValueError(
-            f"definition '{net.header['definition']}': its springs of squared lengths are those of no material, and "
-            f"MuJoCo's flex has the law of a material alone; take 'delingette', or a definition of springs alone, "
-            "such as 'patch'"
-        )
-    return max(first, 0.0), float(twice) / 2
 
 
 def _load(net: Net, simulation: Simulation) -> list[str]:

@@ -13,9 +13,9 @@ from ..mechanics.dynamics import Motion
 from ..mechanics.energies import BiquadraticEnergy
 from ..mechanics.network import Network
 from ..mechanics.statics import SingularError, StaticProblem
-from ..mesh import Mesh
+from ..mesh import Mesh, corner_angles, signed_areas
 from ..problem.status import Status
-from .terms import Net
+from .terms import Net, Terms
 
 STEP_SHARE = 0.8
 """Written step over the largest stable one, at rest, in equilibrium and as far as the net swings: fronts of waves
@@ -187,6 +187,27 @@ def _network(net: Net, reference: float) -> Network:
         for terms in net.energies
     ]
     return Network(mesh, net.held, net.stiffness / reference, energies)
+
+
+def lame(net: Net, terms: Terms, program: str) -> tuple[float, float]:
+    """Lame constants of plane stress, times the thickness [N/m], that give all triangles their springs."""
+    areas = 16 * signed_areas(net.points, terms.cells)[:, None]
+    cotangents = 1 / np.tan(corner_angles(net.points, terms.cells))
+    products = np.roll(cotangents, -1, axis=1) * np.roll(cotangents, -2, axis=1)
+    # tensile and coupling are linear in (lambda + 2 mu) t and 2 mu t, see `springtune.springs.delingette`.
+    given = np.concatenate([(areas * terms.values[name]).ravel() for name in ("tensile", "coupling")])
+    factors = np.concatenate([2 * cotangents.ravel() ** 2, 2 * products.ravel()])
+    signs = np.repeat([1.0, -1.0], cotangents.size)
+    (total, twice), *_ = np.linalg.lstsq(np.column_stack([factors, signs]), given, rcond=None)
+    first = float(total - twice)
+    away = np.abs(factors * total + signs * twice - given).max() / np.abs(given).max()
+    if away > 1e-9 or not (twice > 0 and -1e-9 * twice < first < (1 + 1e-9) * twice):
+        raise ValueError(
+            f"definition '{net.header['definition']}': its springs of squared lengths are those of no material, and "
+            f"{program} has the law of a material alone; take 'delingette', or a definition of springs alone, such as "
+            "'patch'"
+        )
+    return max(first, 0.0), float(twice) / 2
 
 
 def about(net: Net, simulation: Simulation, integrator: str) -> list[str]:

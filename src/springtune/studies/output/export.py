@@ -22,10 +22,11 @@ from springtune.problem.quantities import nearest
 from springtune.safe_io.atomic import UNFINISHED, check_folder, replacing, write_bytes, write_text, writer
 from springtune.units import QUANTITY_KINDS, UnitError, parse
 
+from ...registry import how_to_install
 from . import reading
 from .dataset import flag_words, is_flagged
 from .selection import at, shown_swept
-from .text import cell_text, how_to_install
+from .text import cell_text
 
 
 class RequestError(ValueError):

@@ -8,7 +8,6 @@ import re
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, SupportsFloat
 
-from springtune import __version__
 from springtune.problem.parameters import SWEPT, with_unit
 from springtune.safe_io.escapes import shown
 from springtune.safe_io.tables import number_text
@@ -159,15 +158,3 @@ def number(value: float, places: int | None, sign: bool = False) -> str:
     text = f"{value:{'+' if sign else ''}{'.4g' if places is None else f'.{places}f'}}"
     text = text.lstrip("-+") if not float(text) else text  # zero has no sign
     return text.replace("-", "−")
-
-
-def how_to_install(extra: str) -> str:
-    """Return how an extra is installed; no package index has springtune.
-
-    Examples
-    --------
-    >>> print(how_to_install("export"))
-    install the extra, in a clone `pip install '.[export]'`, of a wheel `pip install 'springtune-...whl[export]'`
-    """
-    wheel = f"springtune-{__version__}-py3-none-any.whl[{extra}]"
-    return f"install the extra, in a clone `pip install '.[{extra}]'`, of a wheel `pip install '{wheel}'`"

@@ -2,7 +2,7 @@
 
 from importlib.util import find_spec
 
-from ..output.text import how_to_install
+from ...registry import how_to_install
 
 
 class PaperError(Exception):

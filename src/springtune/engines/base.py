@@ -1,0 +1,322 @@
+"""Declaration of engines: what they take, what is typed into them, and how they step.
+
+An engine gets a net in SI units, a `Setting` and a damping over mass, and returns a `Session` that advances by frames.
+A frame of `dt` has `substeps` steps of ``h = dt / substeps``, each with `iterations` of the engine's solver. After each
+step velocities go down to their share ``1 / (1 + damping h)``: that brings every engine to rest in the same way, and
+does not move an equilibrium. Forces of the load are dead, and on from the first step.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from importlib.util import find_spec
+from typing import Any, Protocol, TypeVar
+
+import numpy as np
+
+from ..handover.net import SpringNet
+from ..handover.simulation import WORDS
+from ..mechanics.integrators import PRECISIONS
+from ..problem.quantities import positive
+from ..registry import Declared, Registry, how_to_install
+from ..safe_io.tables import number_text
+
+
+class EngineError(ValueError):
+    """An engine that cannot run a scene; the message says why and what to do.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> try:
+    ...     st.ENGINES["xpbd"].check(st.Setting(precision="float16"))
+    ... except st.EngineError as error:
+    ...     print(error)
+    precision: 'float16' is unknown to engine 'xpbd'; give one of float64, float32
+    """
+
+
+class EngineAbsentError(EngineError):
+    """An engine whose program is not installed; the message says how it is installed."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """How an engine takes its time.
+
+    Attributes
+    ----------
+    dt : float or str
+        Time of a frame [s]; a text such as ``"1/60"`` or ``"5 ms"`` becomes a number.
+    substeps : int
+        Steps of a frame.
+    iterations : int
+        Of the engine's solver in a step; without meaning where an engine has none.
+    precision : str
+        ``"float64"`` or ``"float32"``; by default the first one that an engine has.
+
+    Raises
+    ------
+    ValueError
+        If a number is out of its range.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> setting = st.Setting("1/60", substeps=4)
+    >>> print(setting, f"{1e3 * setting.step:.3f} ms")
+    dt 1/60 s, 4 substeps, 10 iterations 4.167 ms
+    """
+
+    dt: Any = 1 / 60
+    substeps: int = 1
+    iterations: int = 10
+    precision: str = ""
+
+    def __post_init__(self) -> None:
+        dt = self.dt
+        if isinstance(dt, str) and "/" in dt and dt.replace("/", "", 1).replace(" ", "").isdigit():
+            above, below = map(int, dt.split("/"))
+            dt = above / below if below else 0.0
+        object.__setattr__(self, "dt", positive(dt, "time", "dt"))
+        for name in ("substeps", "iterations"):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, int) or value < 1:
+                raise ValueError(f"{name}: {value!r} is not a whole number above zero; give one")
+
+    @property
+    def step(self) -> float:
+        """Time of a step [s]."""
+        return float(self.dt / self.substeps)
+
+    def __str__(self) -> str:
+        rate = round(1 / self.dt)
+        frame = f"1/{rate} s" if abs(rate * self.dt - 1) < 1e-9 else number_text(self.dt, "s")
+        parts = [f"dt {frame}"]
+        for name in ("substeps", "iterations"):
+            value = getattr(self, name)
+            parts.append(f"{value} {name if value > 1 else name[:-1]}")
+        return ", ".join([*parts, self.precision] if self.precision else parts)
+
+
+class Session(Protocol):
+    """A net in an engine, at rest and without load displacements at first."""
+
+    def advance(self, frames: int) -> None:
+        """Take a number of frames."""
+
+    def displacements(self) -> np.ndarray:
+        """Displacement of each particle [m], shape (n_points, 2)."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number that is typed into an engine: the unit that it really has, and its formula.
+
+    Attributes
+    ----------
+    unit : str
+    formula : str
+        From Young's modulus E, Poisson's ratio nu, the thickness h of the sheet, and the mesh.
+    """
+
+    unit: str
+    formula: str
+
+
+SPRING = Parameter("N/m", "k of the definition, one for each spring")
+"""Stiffness of a spring."""
+
+
+def typed_springs(net: SpringNet) -> dict[str, Any]:
+    """Stiffness of each spring [N/m] and moduli of energies, as they are."""
+    values = {f"{one.kind} {name}": value for one in net.energies for name, value in one.values.items()}
+    return ({"stiffness": net.stiffness} if np.any(net.stiffness) else {}) | values
+
+
+@dataclass(frozen=True, eq=False)
+class Engine(Declared):
+    """An engine with one of its solvers; made by the decorator `engine`.
+
+    Attributes
+    ----------
+    name : str
+        Program and solver, such as ``newton-vbd``; a label of datasets.
+    function : callable
+        (net, setting, damping over mass [1/s]) -> `Session`.
+    order : float
+        Place in the order of labels.
+    program : str
+        ``springtune`` for the textbook solvers.
+    needs : tuple of str
+        Modules that it imports.
+    extra : str
+        Optional dependencies of springtune that have them.
+    laws : tuple of str
+        Energies that it has besides springs, keys of `springtune.handover.terms.FORMULAS`.
+    springs : bool
+        Whether it has springs.
+    precisions : tuple of str
+        Its own first.
+    parameters : dict of str to Parameter
+        Numbers that are typed into it.
+    iterates : bool
+        Whether iterations mean something to it.
+    typed : callable
+        (net) -> dict of the numbers to type by the names of `parameters`: arrays, or one number for all.
+    source : str
+        Where it is described.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> st.ENGINES["xpbd"].summary
+    'Extended position-based dynamics: springs as constraints with compliance, multipliers reset in each step'
+    >>> st.ENGINES["xpbd"].parameters["compliance"].unit, st.ENGINES["xpbd"].absent
+    ('m/N', '')
+
+    A net in it, by hand:
+
+    >>> beam, rubber = st.Beam("200 mm", "40 mm"), st.Material("1 MPa", 0.3, density="1000 kg/m^3")
+    >>> scene = st.Scene(beam, st.make_mesh(beam, "right", "20 mm"), rubber, "traction", "0.2 N", definition="lattice")
+    >>> net, setting = st.SpringNet.from_scene(scene), st.Setting("1 ms", iterations=100)
+    >>> st.ENGINES["xpbd"].check(setting, net)
+    >>> session = st.ENGINES["xpbd"].start(net, setting, damping=100.0)
+    >>> session.advance(200)
+    >>> session.displacements().shape == net.points.shape
+    True
+    """
+
+    program: str = "springtune"
+    needs: tuple[str, ...] = ()
+    extra: str = ""
+    laws: tuple[str, ...] = ()
+    springs: bool = True
+    precisions: tuple[str, ...] = PRECISIONS
+    parameters: Mapping[str, Parameter] = field(default_factory=lambda: {"stiffness": SPRING})
+    iterates: bool = True
+    typed: Callable[[SpringNet], dict[str, Any]] = field(default_factory=lambda: typed_springs)
+    source: str = ""
+
+    @property
+    def absent(self) -> str:
+        """Why it cannot run here, and how to install it; empty where it can."""
+        lacking = [name for name in self.needs if find_spec(name) is None]
+        if not lacking:
+            return ""
+        return f"engine '{self.name}' needs {' and '.join(lacking)}; {how_to_install(self.extra)}"
+
+    def check(self, setting: Setting, net: SpringNet | None = None) -> None:
+        """Refuse what the engine cannot run.
+
+        Parameters
+        ----------
+        setting : Setting
+        net : SpringNet, optional
+
+        Raises
+        ------
+        EngineAbsentError
+            If it is not installed.
+        EngineError
+            If it has no such precision, or lacks an energy or the springs of a net.
+        """
+        if setting.precision not in ("", *self.precisions):
+            known = ", ".join(self.precisions)
+            raise EngineError(
+                f"precision: '{setting.precision}' is unknown to engine '{self.name}'; give one of {known}"
+            )
+        if net is not None:
+            name = net.header["definition"]
+            lacking = [WORDS[one.kind] for one in net.energies if one.kind not in self.laws]
+            if not self.springs and np.any(net.stiffness):
+                lacking.append("springs")
+            if lacking:
+                others = [one.name for one in ENGINES.values() if not _lacks(one, net)]
+                raise EngineError(
+                    f"engine '{self.name}' has no {' and no '.join(lacking)}, and definition '{name}' has; take "
+                    f"another definition, or engine {' or '.join(others) or 'none of these'}"
+                )
+        if self.absent:
+            raise EngineAbsentError(self.absent)
+
+    def start(self, net: SpringNet, setting: Setting, damping: float) -> Session:
+        """Start a session.
+
+        Parameters
+        ----------
+        net : SpringNet
+            With masses, supports and forces.
+        setting : Setting
+        damping : float
+            Over mass [1/s].
+
+        Returns
+        -------
+        Session
+        """
+        self.check(setting, net)
+        session: Session = self.function(net, setting, damping)
+        return session
+
+
+def _lacks(engine: Engine, net: SpringNet) -> bool:
+    return (
+        any(one.kind not in engine.laws for one in net.energies) or not engine.springs and bool(np.any(net.stiffness))
+    )
+
+
+ENGINES: Registry[Engine] = Registry(__package__, "engine", "engines")
+"""Engines by name."""
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def engine(name: str, *, order: float = 1000, **declared: Any) -> Callable[[Function], Function]:
+    """Declare a function as an engine, by a decorator that returns it unchanged.
+
+    Parameters
+    ----------
+    name : str
+        Program and solver; a label of datasets.
+    order : float, optional
+        Place in the order of labels.
+    **declared
+        As the attributes of `Engine`.
+
+    Returns
+    -------
+    callable
+        Decorator of a function (net, setting, damping) -> `Session`.
+
+    Raises
+    ------
+    ValueError
+        If another function has that name; the same function, declared again, replaces the former.
+
+    Examples
+    --------
+    An engine in which nothing moves:
+
+    >>> import numpy as np
+    >>> import springtune as st
+    >>> @st.engine("still", precisions=("float64",))
+    ... class Still:
+    ...     "Nothing moves."
+    ...     def __init__(self, net, setting, damping):
+    ...         self.points = net.points
+    ...     def advance(self, frames):
+    ...         pass
+    ...     def displacements(self):
+    ...         return 0 * self.points
+    >>> beam, rubber = st.Beam("200 mm", "40 mm"), st.Material("1 MPa", 0.3, density="1000 kg/m^3")
+    >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "10 mm"), rubber, "traction", "0.2 N")
+    >>> print(f"{100 * st.in_engine(scene, 'still').error:+.0f} %")
+    -100 %
+    >>> st.ENGINES.discard("still")
+    """
+
+    def declare(function: Function) -> Function:
+        ENGINES.declare(Engine(name, function, order, **declared))
+        return function
+
+    return declare

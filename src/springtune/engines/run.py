@@ -1,0 +1,287 @@
+"""A scene in an engine: moved until it rests, swings or flies apart, and compared."""
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from math import ceil
+from typing import Any
+
+import numpy as np
+
+from ..handover.net import SpringNet
+from ..problem.compare import error_text
+from ..safe_io.tables import Tabled, number_text
+from ..scene.single import Result, Scene
+from .base import ENGINES, Engine, EngineError, Session, Setting
+
+MOST_FRAMES = 600
+"""Frames after which a run ends that has not come to rest; more where the scene's period is long."""
+
+PERIODS = 30
+"""Periods of the loaded mode that a run has at least."""
+
+WINDOW = 0.5
+"""Time between two looks at a run, over the period of the loaded mode; at least a frame."""
+
+REST = {"float64": 1e-7, "float32": 1e-4}
+"""Distance from rest, over the largest displacement, that a run stops at, by precision."""
+
+BLOWN = 1e2
+"""Displacement over the body's extent beyond which a run has diverged."""
+
+RECALLED = 16
+"""Looks at a run that tell whether it swings."""
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How a session ended: `displacements` (n_points, 2), mean ones where it swings [m]; `swing`, largest one [m]."""
+
+    displacements: np.ndarray
+    status: str
+    message: str
+    frames: int
+    frame_seconds: float
+    swing: float
+
+
+@dataclass(frozen=True, repr=False)
+class EngineResult(Tabled):
+    """What a scene comes to in an engine.
+
+    Attributes
+    ----------
+    scene : Scene
+    engine : str
+    setting : Setting
+    factor : float
+        On all stiffnesses and moduli that were typed [1].
+    displacements : ndarray of float, shape (n_points, 2)
+        Of the particles [m]; mean ones where it swings, NaN where it diverged.
+    status : str
+        ``"rest"``; ``"swings"``: it ends in a periodic state; ``"moving"``: it still creeps after the last frame; or
+        ``"diverged"``.
+    message : str
+        Why it is not at rest; empty where it is.
+    frames : int
+    frame_seconds : float
+        Time that a frame took, without the first ones [s].
+    swing : float
+        Largest amplitude about the mean, where it swings [m].
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> beam, rubber = st.Beam("200 mm", "40 mm"), st.Material("1 MPa", 0.3, density="1000 kg/m^3")
+    >>> mesh = st.make_mesh(beam, "structured", "10 mm")
+    >>> scene = st.Scene(beam, mesh, rubber, "traction", "0.2 N", definition="patch")
+    >>> found = st.in_engine(scene, "xpbd", dt="1/60", substeps=10, iterations=20)
+    >>> print(f"{found.status}: {1e3 * found.displacement:.3f} mm, by the definition {1e3 * found.exact:.3f} mm")
+    rest: 1.776 mm, by the definition 1.000 mm
+    >>> f"{found.error:.2f} = {found.definition_error:.2f} + {found.solver_error:.2f}", f"{found.residual:.2f}"
+    ('0.78 = 0.00 + 0.78', '0.65')
+    >>> found.network.status, f"{1e3 * found.reference:.3f} mm"
+    (<Status.SOLVED: 1>, '0.998 mm')
+    """
+
+    scene: Scene = field(repr=False)
+    engine: str
+    setting: Setting
+    factor: float
+    displacements: np.ndarray = field(repr=False)
+    status: str
+    message: str
+    frames: int
+    frame_seconds: float
+    swing: float
+
+    @property
+    def displacement(self) -> float:
+        """Displacement of the load [m]; of a shape its first quantity that is one."""
+        return self.scene.displacement_of(self.displacements)
+
+    @cached_property
+    def network(self) -> Result:
+        """Equilibrium of the network itself, with a factor of 1."""
+        return self.scene.solve()
+
+    @property
+    def exact(self) -> float:
+        """Displacement of the load in the network's equilibrium, with a factor of 1 [m]."""
+        return self.scene.displacement_of(self.network.displacements)
+
+    @cached_property
+    def reference(self) -> float:
+        """Displacement of the load by finite elements [m]."""
+        return next(iter(self.scene.reference_values().values()))
+
+    @property
+    def error(self) -> float:
+        """Error in the engine: (engine - reference) / abs(reference) [1], the sum of the next two."""
+        return (self.displacement - self.reference) / abs(self.reference)
+
+    @property
+    def definition_error(self) -> float:
+        """Error of the definition: that of the network's equilibrium, with a factor of 1 [1]."""
+        return (self.exact - self.reference) / abs(self.reference)
+
+    @property
+    def solver_error(self) -> float:
+        """What the engine adds to it: (engine - network's equilibrium) / abs(reference) [1]."""
+        return (self.displacement - self.exact) / abs(self.reference)
+
+    @property
+    def residual(self) -> float:
+        """Out-of-balance force of the network at the engine's displacements, over the load, with `factor` in it [1]."""
+        network, reference = self.scene.network, self.factor * self.scene.springs.reference
+        load = network.reduce(self.scene.forces) / reference
+        with np.errstate(over="ignore", invalid="ignore"):
+            return float(np.linalg.norm(load - network.resistance(self.displacements)) / np.linalg.norm(load))
+
+    def _rows(self) -> Iterator[tuple[str, str]]:
+        yield "engine", f"{self.engine}, {self.setting}"
+        yield "status", self.status
+        yield "reason", self.message
+        yield "displacement", number_text(self.displacement, "m")
+        yield "a frame", number_text(self.frame_seconds, "s")
+
+    def _computed_rows(self) -> Iterator[tuple[str, str]]:
+        yield "error", error_text(self.error)
+        yield "of it definition", error_text(self.definition_error)
+        yield "of it solver", error_text(self.solver_error)
+
+
+def in_engine(
+    scene: Scene,
+    engine: str,
+    setting: Setting | None = None,
+    *,
+    factor: float = 1.0,
+    frames: int | None = None,
+    tolerance: float | None = None,
+    damping: float | None = None,
+    **parts: Any,
+) -> EngineResult:
+    """Move a scene in an engine, at the setting that it is used at, until it rests.
+
+    Parameters
+    ----------
+    scene : Scene
+        In nonlinear kinematics, of materials that have a density.
+    engine : str
+        Key of `springtune.ENGINES`.
+    setting : Setting, optional
+    factor : float, optional
+        On all stiffnesses and moduli that are typed [1].
+    frames : int, optional
+        At most; by default `MOST_FRAMES`, or `PERIODS` of the loaded mode.
+    tolerance : float, optional
+        Distance from rest over the largest displacement that ends the run [1]; by default `REST` of the precision.
+    damping : float, optional
+        Over mass [1/s]; by default the critical one of the loaded mode.
+    **parts
+        In the place of a setting its parts: ``dt``, ``substeps``, ``iterations``, ``precision``.
+
+    Returns
+    -------
+    EngineResult
+
+    Raises
+    ------
+    KeyError
+        If no engine has the name.
+    EngineError
+        If the engine is not installed, or lacks what the scene has; the message says what to do.
+
+    Examples
+    --------
+    Too few iterations leave springs soft:
+
+    >>> import springtune as st
+    >>> beam, rubber = st.Beam("200 mm", "40 mm"), st.Material("1 MPa", 0.3, density="1000 kg/m^3")
+    >>> mesh = st.make_mesh(beam, "structured", "10 mm")
+    >>> scene = st.Scene(beam, mesh, rubber, "traction", "0.2 N", definition="patch")
+    >>> for iterations in (10, 100):
+    ...     found = st.in_engine(scene, "xpbd", dt="1/60", iterations=iterations)
+    ...     print(f"{1e3 * found.displacement:.1f} mm in place of {1e3 * found.exact:.1f}")
+    210.7 mm in place of 1.0
+    16.5 mm in place of 1.0
+    """
+    chosen = ENGINES[engine]
+    setting = _complete(chosen, setting or Setting(**parts))
+    net = net_of(scene, factor)
+    chosen.check(setting, net)
+    frequency = scene.motion().loaded_frequency * factor**0.5
+    session = chosen.start(net, setting, 2 * frequency if damping is None else damping)
+    window = max(1, round(WINDOW * 2 * np.pi / frequency / setting.dt))
+    most = frames or max(MOST_FRAMES, ceil(PERIODS / WINDOW) * window)
+    extent = float(np.ptp(net.points, axis=0).max())
+    ended = follow(session, window, most, REST[setting.precision] if tolerance is None else tolerance, extent)
+    return EngineResult(scene, engine, setting, factor, **vars(ended))
+
+
+def _complete(engine: Engine, setting: Setting) -> Setting:
+    """Return a setting with the engine's own precision where it has none."""
+    return setting if setting.precision else replace(setting, precision=engine.precisions[0])
+
+
+def net_of(scene: Scene, factor: float = 1.0) -> SpringNet:
+    """Net of a scene with all stiffnesses and moduli times a factor; refuse what no engine runs."""
+    if scene.kinematics == "linear":
+        raise EngineError("kinematics: 'linear', and engines keep the length law of springs; take 'nonlinear'")
+    scene.motion()  # refuses what has no masses, and loads that turn or prescribe displacements
+    net = SpringNet.from_scene(scene, errors=False)
+    if factor == 1:
+        return net
+    energies = []
+    for one in net.energies:
+        moduli = {name: factor * values for name, values in one.values.items() if not name.startswith("rest_")}
+        energies.append(replace(one, values=one.values | moduli))
+    return replace(net, stiffness=factor * net.stiffness, energies=tuple(energies))
+
+
+def follow(session: Session, window: int, most: int, tolerance: float, extent: float) -> Ended:
+    """Advance a session until it rests.
+
+    Looks are `window` frames apart. Where the changes between them shrink by a ratio r, the rest of the way is the last
+    change times r / (1 - r). A run rests where that is below `tolerance` of the displacement in two looks.
+    """
+    seen: list[np.ndarray] = [session.displacements()]
+    seconds: list[float] = []
+    done, change, calm = 0, np.nan, 0
+    while done < most:
+        count = min(window, most - done)
+        begin = time.perf_counter()
+        session.advance(count)
+        seconds.append((time.perf_counter() - begin) / count)
+        done += count
+        now = session.displacements()
+        size = float(np.abs(now).max())
+        if not size <= BLOWN * extent:
+            return Ended(np.full(now.shape, np.nan), "diverged", _why(done), done, _frame(seconds), np.nan)
+        before, change = change, float(np.abs(now - seen[-1]).max())
+        ratio = change / before if before else 0.0
+        left = change * max(1.0, ratio / (1 - ratio)) if ratio < 1 else np.inf
+        calm = calm + 1 if left <= tolerance * size or change == 0 else 0
+        seen = [*seen[1 - RECALLED :], now]
+        if calm == 2:
+            return Ended(now, "rest", "", done, _frame(seconds), 0.0)
+    recalled = np.array(seen[-(len(seen) // 2 * 2) :])
+    earlier, later = np.split(recalled, 2)
+    drift = float(np.abs(later.mean(axis=0) - earlier.mean(axis=0)).max())
+    swing = float(np.ptp(later, axis=0).max() / 2)
+    if swing > 2 * drift:
+        said = f"swings by {swing:.3g} m about its mean after {done} frames; take more substeps or damping"
+        return Ended(recalled.mean(axis=0), "swings", said, done, _frame(seconds), swing)
+    said = f"not at rest after {done} frames, still moving by {change:.3g} m in {window}; give more frames"
+    return Ended(seen[-1], "moving", said, done, _frame(seconds), swing)
+
+
+def _why(done: int) -> str:
+    return f"diverged within {done} frames; take more substeps, or a smaller stiffness"
+
+
+def _frame(seconds: list[float]) -> float:
+    """Seconds a frame: the median, without the first look, which may compile."""
+    return float(np.median(seconds[1:] or seconds))

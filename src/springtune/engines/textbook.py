@@ -1,0 +1,55 @@
+"""What the textbook solvers share: a step from the inertial position, and the velocity that it leaves."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from ..handover.net import SpringNet
+from .base import Setting
+
+
+def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile on the first call, and cache on disk if possible."""
+    try:
+        return njit(cache=True, error_model="numpy", nogil=True)(function)
+    except RuntimeError:  # no folder to keep it in
+        return njit(error_model="numpy", nogil=True)(function)
+
+
+class Textbook:
+    """Session of implicit Euler steps ``M (x - y) / h^2 + dW/dx = 0``, solved as `solve` of a subclass does.
+
+    ``y = x + h v + h^2 f / m`` is the inertial position. All arrays are of the setting's precision: `points`, `x`, `v`
+    and `forces` (n_points, 2), `weights` (n_points, 2), the inverse masses, 0 where a direction is held.
+    """
+
+    def __init__(self, net: SpringNet, setting: Setting, damping: float) -> None:
+        assert net.masses is not None  # of a scene that moves
+        kind = np.dtype(setting.precision or "float64")
+        self.kind, self.h = kind, kind.type(setting.step)
+        self.substeps, self.iterations = setting.substeps, setting.iterations
+        self.kept = kind.type(1 / (1 + damping * setting.step))
+        self.points = net.points.astype(kind)
+        self.weights = np.where(net.held, 0, 1 / net.masses[:, None]).astype(kind)
+        self.push = (setting.step**2 * np.where(net.held, 0, net.forces / net.masses[:, None])).astype(kind)
+        self.x, self.v = self.points.copy(), np.zeros_like(self.points)
+        there = net.stiffness != 0
+        self.springs = net.springs[there]
+        self.lengths, self.stiffness = net.rest_lengths[there].astype(kind), net.stiffness[there].astype(kind)
+
+    def solve(self, before: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """Return the positions at the end of a step from those before it and the inertial ones."""
+        raise NotImplementedError
+
+    def advance(self, frames: int) -> None:
+        """Take a number of frames."""
+        for _ in range(frames * self.substeps):
+            before = self.x
+            self.x = self.solve(before, before + self.h * self.v + self.push)
+            self.v = self.kept / self.h * (self.x - before)
+
+    def displacements(self) -> np.ndarray:
+        """Displacement of each particle [m]."""
+        return (self.x - self.points).astype(float)
