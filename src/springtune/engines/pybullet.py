@@ -100,10 +100,10 @@ class _Session:
         mass, place = float(self.net.masses.mean()), [*self.rest[node].tolist(), 0.0]
         rail: dict[str, Any] = {}
         if held.any():
-            one = {"Masses": mass, "CollisionShapeIndices": -1, "VisualShapeIndices": -1, "ParentIndices": 0}
-            one |= {"Positions": [0, 0, 0], "InertialFramePositions": [0, 0, 0], "JointTypes": program.JOINT_PRISMATIC}
-            one |= {"Orientations": [0, 0, 0, 1], "InertialFrameOrientations": [0, 0, 0, 1]}
-            one |= {"JointAxis": [*np.where(held, 0, 1).tolist(), 0]}
+            one: dict[str, Any] = {"Masses": mass, "ParentIndices": 0, "JointTypes": program.JOINT_PRISMATIC}
+            one |= {"JointAxis": [*np.where(held, 0, 1).tolist(), 0], "Positions": [0, 0, 0]}
+            one |= {"CollisionShapeIndices": -1, "VisualShapeIndices": -1, "Orientations": [0, 0, 0, 1]}
+            one |= {"InertialFramePositions": [0, 0, 0], "InertialFrameOrientations": [0, 0, 0, 1]}
             rail = {f"link{name}": [value] for name, value in one.items()}
         body = program.createMultiBody(0 if rail else mass, -1, -1, place, **rail, **self.here)
         link = 0 if rail else -1
