@@ -8,6 +8,7 @@ does not move an equilibrium. Forces of the load are dead, and on from the first
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from typing import Any, Protocol, TypeVar
 
@@ -148,7 +149,7 @@ class Engine(Declared):
     program : str
         ``springtune`` for the textbook solvers.
     needs : tuple of str
-        Modules that it imports.
+        Modules that it imports; with the first version that will do, ``"mujoco>=3.13"``.
     extra : str
         Optional dependencies of springtune that have them.
     laws : tuple of str
@@ -200,7 +201,7 @@ class Engine(Declared):
     @property
     def absent(self) -> str:
         """Why it cannot run here, and how to install it; empty where it can."""
-        lacking = [name for name in self.needs if find_spec(name) is None]
+        lacking = [need for need in self.needs if not _there(need)]
         if not lacking:
             return ""
         return f"engine '{self.name}' needs {' and '.join(lacking)}; {how_to_install(self.extra)}"
@@ -257,6 +258,22 @@ class Engine(Declared):
         self.check(setting, net)
         session: Session = self.function(net, setting, damping)
         return session
+
+
+def release(text: str) -> tuple[int, ...]:
+    """Numbers of a version, such as (3, 13)."""
+    return tuple(int(part) for part in text.split(".") if part.isdigit())
+
+
+def _there(need: str) -> bool:
+    """Whether a module is installed, in the version that is asked for."""
+    name, _, least = need.partition(">=")
+    if find_spec(name) is None:
+        return False
+    try:
+        return not least or release(version(name)) >= release(least)
+    except PackageNotFoundError:  # installed under another name
+        return True
 
 
 def _lacks(engine: Engine, net: SpringNet) -> bool:
