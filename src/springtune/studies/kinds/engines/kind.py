@@ -123,7 +123,10 @@ class EnginesConfig(Section):
 
 @dataclass(frozen=True)
 class EngineRun:
-    """A scene in an engine at a setting; the force is a magnitude [N], `dt` the time of a frame [s]."""
+    """A scene in an engine at a setting; the force is a magnitude [N], `dt` the time of a frame [s].
+
+    Runs `of_curve` have factors on what is typed.
+    """
 
     scene: str
     beam: Beam
@@ -140,11 +143,7 @@ class EngineRun:
     iterations: int
     stiffness_factor: float
     frames: int | None
-
-    @property
-    def setting(self):
-        """The same for all runs of a curve."""
-        return self.scene, self.definition, self.engine, *(getattr(self, name) for name in SETTING)
+    of_curve: bool
 
 
 def _engines():
@@ -211,12 +210,14 @@ def _expand(config, declared):
             scene = section.scenes[name]
             body = declared.beams[scene.beam], scene.mesh_type, scene.mesh_size, declared.materials[scene.material]
             how = definition, engine, precision, dt, substeps, iterations, factor, section.frames
-            found[EngineRun(name, *body, scene.load, scene.force, *how)] = None
+            of_curve = runs.stiffness_factor != [1.0]
+            found[EngineRun(name, *body, scene.load, scene.force, *how, of_curve)] = None
     ranks = [list(one) for one in (section.scenes, DEFINITIONS, engines)]
 
     def order(run):
         names = (run.scene, run.definition, run.engine)
-        return [rank.index(name) for rank, name in zip(ranks, names)], run.setting[3:], run.stiffness_factor
+        numbers = [getattr(run, name) for name in (*SETTING, "stiffness_factor", "of_curve")]
+        return [rank.index(name) for rank, name in zip(ranks, names)], numbers
 
     return tuple(sorted(found, key=order))
 

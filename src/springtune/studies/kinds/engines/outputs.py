@@ -19,10 +19,9 @@ def figures(scenes: Iterable[object], curves: Iterable[object]) -> dict[str, dic
 
 
 def divided(runs: Iterable[Any]) -> tuple[list[Any], list[Any]]:
-    """Runs with what is typed as it is, and those of settings that have other factors, too."""
+    """Runs with what is typed as it is, and those of curves."""
     runs = list(runs)
-    swept = {run.setting for run in runs if run.stiffness_factor != 1}
-    return [run for run in runs if run.stiffness_factor == 1], [run for run in runs if run.setting in swept]
+    return [run for run in runs if not run.of_curve], [run for run in runs if run.of_curve]
 
 
 OUTPUTS = (
