@@ -163,7 +163,7 @@ REFUSED_STUDIES = {
     "stiffness_factor: 0": "'0' is out of range; give a number above 0",
     "scene: push": "engines.runs.map.scene: unknown scene 'push'; known: pull; or declare it under engines.scenes",
     "definition: calibrated": "engines.runs.map.definition: 'calibrated' needs a reference or a stated stiffness",
-    "definition: baudet": "engines.runs.map.definition: 'baudet' needs a reference or a stated stiffness, or other cells",
+    "definition: baudet": "'baudet' needs a reference or a stated stiffness, or other cells or loads than scene 'pull'",
 }
 
 
@@ -219,7 +219,8 @@ def test_every_end_is_in_the_dataset_with_its_reason(collected):
     assert (np.isfinite(data.displacement) == solved).all() and (np.isfinite(data.error) == solved).all()
     assert (data.message.values[~solved & (data.status.values != 0)] != "").all()
     refused = data.sel(precision="float32", engine="toy")
-    assert ENDS[refused.engine_status.item()] == "refused" and "'float32' is unknown to engine 'toy'" in refused.message.item()
+    assert ENDS[refused.engine_status.item()] == "refused"
+    assert "'float32' is unknown to engine 'toy'" in refused.message.item()
     absent = data.sel(precision="float32", engine="missing")
     assert f"needs {ABSENT}; install the extra" in absent.message.item()
     assert "broken: TypeError: a new version takes no frames" in data.message.sel(precision="float64").values
@@ -251,8 +252,10 @@ def test_a_crash_loses_one_run_and_what_is_stored_is_kept(collected):
 
 def test_the_best_factor_gives_the_references_displacement(collected):
     text = STUDY.replace("iterations: [1, 100], substeps: [1, 4], dt: [1/60 s, 5 ms]", "iterations: 7")
-    tree = collected("toy", text=text + CURVE.replace("0.5, to: 8, points: 5", "0.01, to: 100, points: 4")
-                     .replace("[2, 50]", "[1, 50]"))
+    tree = collected(
+        "toy",
+        text=text + CURVE.replace("0.5, to: 8, points: 5", "0.01, to: 100, points: 4").replace("[2, 50]", "[1, 50]"),
+    )
     curves = tree["engine_curves"].to_dataset().squeeze()
     assert "iterations" not in tree["engines"].to_dataset().squeeze().dims  # curves add no holes to the other group
     beam, rubber = st.Beam("100 mm", "40 mm"), st.Material("1 MPa", 0.3, density="1000 kg/m^3")
@@ -261,7 +264,8 @@ def test_the_best_factor_gives_the_references_displacement(collected):
     assert best.best_factor_message.item() == ""
     assert abs(st.in_engine(scene, "toy", iterations=50, factor=best.best_factor.item()).error) < 1e-9
     hopeless = curves.sel(iterations=1)
-    assert np.isnan(hopeless.best_factor) and "no factor from 0.01 to 100 is right" in hopeless.best_factor_message.item()
+    assert np.isnan(hopeless.best_factor)
+    assert "no factor from 0.01 to 100 is right" in hopeless.best_factor_message.item()
 
 
 # -- what is computed again --------------------------------------------------------------------------------------------

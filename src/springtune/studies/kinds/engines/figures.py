@@ -59,14 +59,17 @@ def _runs(data, name, scene):
 
 def _lost(runs):
     """How many runs have no error and why, with the names of what was not run at all; empty where all have one."""
-    ends = Counter(ENDS[row["engine_status"]] for rows in runs.values() for row in rows if not np.isfinite(row["error"]))
-    names = {end: [name for name, rows in runs.items() if {ENDS[row["engine_status"]] for row in rows} == {end}]
-             for end in WITHOUT_RUN}  # fmt: skip
-    return ", ".join(
-        f"{count} {end if end != 'rest' else 'without a reference'}"
-        + (f" ({'; '.join(names[end])})" if names.get(end) else "")
-        for end, count in sorted(ends.items(), key=lambda one: ENDS.index(one[0]))
-    )
+    counts, alone = Counter(), defaultdict(list)
+    for name, rows in runs.items():
+        ends = [row["engine_status"] for row in rows if not np.isfinite(row["error"])]
+        counts.update(ends)
+        if len(set(ends)) == 1 and ENDS[ends[0]] in WITHOUT_RUN:
+            alone[ends[0]].append(name)
+    said = []
+    for end, count in sorted(counts.items()):
+        names = f" ({'; '.join(alone[end])})" if end in alone else ""
+        said.append(f"{count} {ENDS[end] if ENDS[end] != 'rest' else 'without a reference'}{names}")
+    return ", ".join(said)
 
 
 def _frame(dt):

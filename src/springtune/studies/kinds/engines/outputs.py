@@ -13,9 +13,7 @@ if TYPE_CHECKING:
 def figures(scenes: Iterable[object], curves: Iterable[object]) -> dict[str, dict[str, object]]:
     """Figures by stem: of scenes that were run, and of those with curves."""
     shown = {"errors": scenes, "maps": scenes, "curves": curves, "factors": curves}
-    return {
-        f"engines_{name}_{scene}": {"scene": scene} for name, own in shown.items() for scene in dict.fromkeys(own)
-    }
+    return {f"engines_{name}_{scene}": {"scene": scene} for name, own in shown.items() for scene in dict.fromkeys(own)}
 
 
 def divided(runs: Iterable[Any]) -> tuple[list[Any], list[Any]]:
