@@ -12,8 +12,8 @@ import xarray as xr
 import yaml
 
 import springtune as st
-from springtune.studies.kinds.engines import ENDS
-from springtune.studies.kinds.engines.collect import CURVES, RUNS
+from springtune.studies.kinds.engines import RUN_ENDS
+from springtune.studies.kinds.engines.collect import ENGINE_CURVES, ENGINE_RUNS
 from springtune.studies.output.comparison import compare
 from springtune.studies.runs import keys
 
@@ -123,7 +123,7 @@ def collected(tmp_path, monkeypatch):
 
 def ends(data):
     """Words of how the runs of a group ended, each once."""
-    return {ENDS[flag] for flag in np.unique(data.engine_status.values)}
+    return {RUN_ENDS[flag] for flag in np.unique(data.engine_status.values)}
 
 
 def stages_due():
@@ -209,17 +209,19 @@ def test_every_end_is_in_the_dataset_with_its_reason(collected):
     tree = collected(*TOYS, "missing", text=text.replace("aborting, ", ""))
     data = tree["engines"].to_dataset().squeeze()
     found = {
-        name: ENDS[data.sel(engine=name, precision="float32" if name == "missing" else "float64").engine_status.item()]
+        name: RUN_ENDS[
+            data.sel(engine=name, precision="float32" if name == "missing" else "float64").engine_status.item()
+        ]
         for name in data.engine.values
     }
     assert found == {"toy": "rest", "swinging": "swings", "creeping": "moving", "exploding": "diverged",
                      "broken": "failed", "aborting": "failed", "missing": "absent"}  # fmt: skip
     solved = data.status == st.Status.SOLVED
-    assert (solved == (data.engine_status == ENDS.index("rest"))).all()
+    assert (solved == (data.engine_status == RUN_ENDS.index("rest"))).all()
     assert (np.isfinite(data.displacement) == solved).all() and (np.isfinite(data.error) == solved).all()
     assert (data.message.values[~solved & (data.status.values != 0)] != "").all()
     refused = data.sel(precision="float32", engine="toy")
-    assert ENDS[refused.engine_status.item()] == "refused"
+    assert RUN_ENDS[refused.engine_status.item()] == "refused"
     assert "'float32' is unknown to engine 'toy'" in refused.message.item()
     absent = data.sel(precision="float32", engine="missing")
     assert f"needs {ABSENT}; install the extra" in absent.message.item()
@@ -228,7 +230,7 @@ def test_every_end_is_in_the_dataset_with_its_reason(collected):
     assert data.program.sel(engine="missing").item() == "others" and data.scene_load.item() == "traction"
     swinging = data.sel(engine="swinging", precision="float64")
     assert swinging.swing > 0 and np.isfinite(swinging.last_displacement)
-    assert data.engine_status.attrs["flag_meanings"].split() == list(ENDS)
+    assert data.engine_status.attrs["flag_meanings"].split() == list(RUN_ENDS)
 
 
 def test_errors_are_the_sum_of_their_parts_and_times_are_measured(collected):
@@ -245,8 +247,8 @@ def test_errors_are_the_sum_of_their_parts_and_times_are_measured(collected):
 def test_a_crash_loses_one_run_and_what_is_stored_is_kept(collected):
     text = STUDY.replace("dt: [1/60 s, 5 ms]", "dt: 5 ms")
     data = collected("aborting", text=text)["engines"].to_dataset().squeeze()
-    assert {ENDS[flag] for flag in data.engine_status.sel(substeps=1).values} == {"failed"}
-    assert {ENDS[flag] for flag in data.engine_status.sel(substeps=4).values} == {"rest"}
+    assert {RUN_ENDS[flag] for flag in data.engine_status.sel(substeps=1).values} == {"failed"}
+    assert {RUN_ENDS[flag] for flag in data.engine_status.sel(substeps=4).values} == {"rest"}
     assert not stages_due()
 
 
@@ -336,6 +338,6 @@ def test_outputs_are_figures_of_each_scene_and_a_table(collected):
 
 
 def test_the_groups_have_units_and_names():
-    for group in (RUNS, CURVES):
+    for group in (ENGINE_RUNS, ENGINE_CURVES):
         for dimensions, units, long_name, _ in group.variables.values():
             assert units and long_name and set(dimensions) <= {"scene", "definition", *group.dimensions}

@@ -6,13 +6,13 @@ import numpy as np
 
 from ...output.dataset import Filler, Group
 from ...runs.stages import results
-from . import ENDS, SETTING
+from . import RUN_ENDS, SETTING
 from .kind import STAGE
 from .outputs import divided
 
 NETWORK = ("scene", "definition")
-RUN = (*NETWORK, "engine", *SETTING)
-CURVE = (*RUN, "stiffness_factor")
+OF_A_RUN = (*NETWORK, "engine", *SETTING)
+OF_A_CURVE = (*OF_A_RUN, "stiffness_factor")
 
 OF_NETWORK = {
     "network_displacement": (NETWORK, "m", "displacement of the network in equilibrium", np.nan),
@@ -40,7 +40,7 @@ def _of_runs(cell):
     }  # fmt: skip
 
 
-COORDINATES = {
+SCENE_AND_PROGRAM = {
     "scene_beam": (("scene",), "1", "beam", ""),
     "scene_mesh_type": (("scene",), "1", "mesh type", ""),
     "scene_mesh_size": (("scene",), "m", "asked length of an edge", np.nan),
@@ -50,16 +50,18 @@ COORDINATES = {
     "program": (("engine",), "1", "program that the engine is of", ""),
 }
 
-OF_ALL = (
+IN_BOTH = (
     OF_NETWORK
     | {"engine_version": (("engine",), "1", "versions of what the engine needs, as it was run", "")}
-    | COORDINATES
+    | SCENE_AND_PROGRAM
 )
 """Variables of both groups."""
 
-FURTHER = {"engine_status": {"flag_values": np.arange(len(ENDS), dtype="int8"), "flag_meanings": " ".join(ENDS)}}
+END_FLAGS = {
+    "engine_status": {"flag_values": np.arange(len(RUN_ENDS), dtype="int8"), "flag_meanings": " ".join(RUN_ENDS)}
+}
 
-WORDS = {
+ENGINE_DIMENSIONS = {
     "scene": "scene in engines",
     "engine": "program and solver",
     "precision": "floating-point numbers",
@@ -71,36 +73,36 @@ WORDS = {
 """Own dimensions."""
 
 BEST = {
-    "best_factor": (RUN, "1", "factor at which the displacement is the reference's", np.nan),
-    "best_factor_message": (RUN, "1", "why no factor is the best", ""),
+    "best_factor": (OF_A_RUN, "1", "factor at which the displacement is the reference's", np.nan),
+    "best_factor_message": (OF_A_RUN, "1", "why no factor is the best", ""),
 }
 
-RUNS = Group("/engines", _of_runs(RUN) | OF_ALL, WORDS, further=FURTHER)
-CURVES = Group("/engine_curves", _of_runs(CURVE) | BEST | OF_ALL, WORDS, further=FURTHER)
+ENGINE_RUNS = Group("/engines", _of_runs(OF_A_RUN) | IN_BOTH, ENGINE_DIMENSIONS, further=END_FLAGS)
+ENGINE_CURVES = Group("/engine_curves", _of_runs(OF_A_CURVE) | BEST | IN_BOTH, ENGINE_DIMENSIONS, further=END_FLAGS)
 
 
 def groups(study, folder):
     """Groups of a dataset, see `springtune.studies.kinds.scenes.collect.groups`."""
     found = {task.of: (task.labels, result) for task, result in results(STAGE, study, folder)}
     made = {}
-    for group, runs in zip((RUNS, CURVES), divided(found)):
+    for group, runs in zip((ENGINE_RUNS, ENGINE_CURVES), divided(found)):
         if runs:
             made[group.name] = _gathered(group, study, [(run, *found[run]) for run in runs])
     return made
 
 
 def _gathered(group, study, found):
-    axes = {name: tuple(dict.fromkeys(labels[name] for _, labels, _ in found)) for name in WORDS}
+    axes = {name: tuple(dict.fromkeys(labels[name] for _, labels, _ in found)) for name in ENGINE_DIMENSIONS}
     axes |= {name: tuple(sorted(axes[name])) for name in ("dt", "substeps", "iterations", "stiffness_factor")}
     filler, curves = Filler(group.empty(study.axes | axes)), defaultdict(list)
     for run, labels, result in found:
         about = {"scene_beam": run.beam.name, "scene_material": run.material.name, "program": run.program}
         about |= {f"scene_{name}": getattr(run, name) for name in ("mesh_type", "mesh_size", "load", "force")}
         filler.put({name: value for name, value in (result | about).items() if name in group.variables}, **labels)
-        curves[tuple(labels[name] for name in RUN)].append((labels["stiffness_factor"], result))
-    for setting, points in curves.items() if group is CURVES else ():
-        filler.put(_best(points), **dict(zip(RUN, setting)))
-    return filler.data.set_coords([*COORDINATES])
+        curves[tuple(labels[name] for name in OF_A_RUN)].append((labels["stiffness_factor"], result))
+    for setting, points in curves.items() if group is ENGINE_CURVES else ():
+        filler.put(_best(points), **dict(zip(OF_A_RUN, setting)))
+    return filler.data.set_coords([*SCENE_AND_PROGRAM])
 
 
 def _best(points):

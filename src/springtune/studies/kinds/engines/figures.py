@@ -10,7 +10,7 @@ from springtune.problem.compare import unbeaten
 from ...output import labels, style
 from ...output.drawing import NOT_ASKED, error_text, heat_map
 from ...output.selection import choose, group, labels_of, records
-from . import ENDS, SETTING, WITHOUT_RUN
+from . import RUN_ENDS, SETTING, WITHOUT_RUN
 from .outputs import figures
 
 FRAME = 1 / 60
@@ -19,13 +19,13 @@ FRAME = 1 / 60
 END_COLOURS = {"swings": "#b5cfe3", "moving": "#dcdcdc", "diverged": "#4a0d1a", "no run": "#8a8a8a"}
 """Of runs without an error, on the map of settings."""
 
-COLUMNS = 3
+PANELS_IN_ROW = 3
 """Panels in a row."""
 
 NARROW = 5
 """Largest over smallest best factor up to which their axis is not logarithmic."""
 
-NUMBERS = "numbers: error [%]; ×: displacement over the reference's"
+MAP_NUMBERS = "numbers: error [%]; ×: displacement over the reference's"
 
 LARGEST_PERCENT = 100
 """Error from which a map shows the displacement as a multiple of the reference's [%]."""
@@ -63,12 +63,12 @@ def _lost(runs):
     for name, rows in runs.items():
         ends = [row["engine_status"] for row in rows if not np.isfinite(row["error"])]
         counts.update(ends)
-        if len(set(ends)) == 1 and ENDS[ends[0]] in WITHOUT_RUN:
+        if len(set(ends)) == 1 and RUN_ENDS[ends[0]] in WITHOUT_RUN:
             alone[ends[0]].append(name)
     said = []
     for end, count in sorted(counts.items()):
         names = f" ({'; '.join(alone[end])})" if end in alone else ""
-        said.append(f"{count} {ENDS[end] if ENDS[end] != 'rest' else 'without a reference'}{names}")
+        said.append(f"{count} {RUN_ENDS[end] if RUN_ENDS[end] != 'rest' else 'without a reference'}{names}")
     return ", ".join(said)
 
 
@@ -202,18 +202,18 @@ def plot_engine_maps(data, ax=None, *, scene=None):
     >>> import springtune as st  # tree = st.open("results/mine")
     >>> axes = st.plot_engine_maps(tree, scene="sheet")
     >>> [panel.get_title(loc="left") for panel in axes]
-    ['xpbd', 'vbd']
+    ['xpbd, paper', 'vbd, paper', 'xpbd, area', 'vbd, area']
     """
     case, runs = _runs(data, "engines", scene)
     shown = {name: rows for name, rows in runs.items()
-             if any(ENDS[row["engine_status"]] not in WITHOUT_RUN for row in rows)}  # fmt: skip
+             if any(RUN_ENDS[row["engine_status"]] not in WITHOUT_RUN for row in rows)}  # fmt: skip
     every = [row for rows in shown.values() for row in rows]
     steps = {tuple(row[name] for name in SETTING[:3]) for row in every}
     steps = sorted(steps, key=lambda one: (one[0], one[1] / one[2], one[2]))
     counts = sorted({row["iterations"] for row in every})
     lost = _lost({name: rows for name, rows in runs.items() if name not in shown})
-    columns = min(COLUMNS, max(len(shown), 1))
-    said = "; ".join(filter(None, (NUMBERS if shown else "", f"not drawn: {lost}" if lost and shown else "")))
+    columns = min(PANELS_IN_ROW, max(len(shown), 1))
+    said = "; ".join(filter(None, (MAP_NUMBERS if shown else "", f"not drawn: {lost}" if lost and shown else "")))
     said = labels.wrapped(said, (style.PAGE if columns > 1 else style.COLUMN) - 0.2)
     under = 0.24 + labels.LINE * labels.lines_of(said)
     height = 0.8 + 0.19 * max(len(steps), 3)
@@ -254,7 +254,7 @@ def _map(panel, rows, steps, counts):
     names = list(END_COLOURS)
     for row in rows:
         place = steps.index(tuple(row[name] for name in SETTING[:3])), counts.index(row["iterations"])
-        end, error = ENDS[row["engine_status"]], 100 * row["error"]
+        end, error = RUN_ENDS[row["engine_status"]], 100 * row["error"]
         texts[place] = ""
         if np.isfinite(error):
             errors[place], times = error, 1 + error / 100
@@ -295,11 +295,11 @@ def plot_engine_curves(data, ax=None, *, scene=None):
     >>> import springtune as st  # tree = st.open("results/mine")
     >>> axes = st.plot_engine_curves(tree, scene="sheet")
     >>> [panel.get_title(loc="left") for panel in axes]
-    ['xpbd', 'vbd']
+    ['xpbd, paper', 'vbd, paper', 'xpbd, area', 'vbd, area']
     """
     case, runs = _runs(data, "engine_curves", scene)
     shown = {name: rows for name, rows in runs.items() if any(np.isfinite(row["error"]) for row in rows)}
-    columns = min(COLUMNS, max(len(shown), 1))
+    columns = min(PANELS_IN_ROW, max(len(shown), 1))
     lost = _lost(runs)
     said = f"+: the network in equilibrium{'; not drawn: ' + lost if lost else ''}" if shown else ""
     said = labels.wrapped(said, (style.PAGE if columns > 1 else style.COLUMN) - 0.2)

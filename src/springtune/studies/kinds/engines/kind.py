@@ -246,7 +246,7 @@ def _tasks(study):
         values["engine_version"] = _version(engine)
         also = mesh_type_key(run.mesh_type), definition_key(run.definition), declared_key(engine)
         particles = run.beam.length * run.beam.height / (COEFFICIENT * run.mesh_size**2)
-        name = f"engines {run.program}"
+        name = f"engines {run.program.lower()}"
         cost = name if name in COSTS else "engines", run.substeps * run.iterations * particles
         yield Task(values, also, {name: getattr(run, name) for name in of_cell}, run, [cost], run.engine)
 

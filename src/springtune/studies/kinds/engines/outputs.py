@@ -58,7 +58,7 @@ VIEWS = (
     ),
 )
 
-COLUMNS = {
+ENGINE_COLUMNS = {
     "dt_ms": ("dt", 1e3),
     "displacement_mm": ("displacement", 1e3),
     "reference_mm": ("reference_displacement", 1e3),
@@ -73,16 +73,16 @@ COLUMNS = {
 def tables(tree: "xr.DataTree") -> list[dict[str, Any]]:
     """Tables of the page, see `springtune.studies.kinds.scenes.tables.tables`."""
     from ...output.selection import records  # here, since a plan does without xarray
-    from . import ENDS
+    from . import RUN_ENDS
 
     if "engines" not in tree:
         return []
     data = tree["engines"].to_dataset()
-    names = [name for name, _ in COLUMNS.values() if name in data.data_vars]
+    names = [name for name, _ in ENGINE_COLUMNS.values() if name in data.data_vars]
     rows = [
         {name: one[name] for name in ("scene", "definition", "engine", "precision", "substeps", "iterations")}
-        | {column: factor * one[name] for column, (name, factor) in COLUMNS.items()}
-        | {"end": ENDS[int(one["engine_status"])], "why": one["message"]}
+        | {column: factor * one[name] for column, (name, factor) in ENGINE_COLUMNS.items()}
+        | {"end": RUN_ENDS[int(one["engine_status"])], "why": one["message"]}
         for one in records(data, data.status != 0, (*names, "engine_status", "message"))
     ]
     note = (
