@@ -51,7 +51,7 @@ class _Session(Textbook):
         return found
 
 
-@engine("xpbd", order=20, parameters={"compliance": Parameter("m/N", "1 / k")}, source="Macklin 2016")
+@engine("xpbd", order=20, parameters={"compliance": Parameter("m/N", "1 / k")}, implicit=True, source="Macklin 2016")
 def session(net: SpringNet, setting: Setting, damping: float) -> Session:
     """Extended position-based dynamics: springs as constraints with compliance, multipliers reset in each step."""
     return _Session(net, setting, damping)
