@@ -14,7 +14,7 @@ export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 # Jobs and tests are many processes: Python is to keep what it compiles.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: study report paper test test-browser test-faults test-fuzz test-versions test-reruns release-check slow lint licences docs site pictures lock test-slurm test-archive test-storage scale test-container million mutants clean
+.PHONY: study report paper test test-browser test-engines test-faults test-fuzz test-versions test-reruns release-check slow lint licences docs site pictures lock test-slurm test-archive test-storage scale test-container million mutants clean
 
 study: $(VENV)/.run
 	springtune run "$$STUDY"
@@ -36,6 +36,18 @@ test: $(VENV)/.test
 # The page to browse, in a headless Chromium: apt-get install chromium chromium-driver.
 test-browser: $(VENV)/.test
 	pytest -m "not slow" tests/browser
+
+# Springs in the programs of the extra `engines`, and the study of them. Newton compiles its kernels at the first time, in
+# half a minute; what this machine cannot install is named, and its tests are skipped.
+ENGINES := build/engines
+test-engines: export PYTHONPATH = $(CURDIR)/src:$(CURDIR)/$(ENGINES)
+test-engines: $(VENV)/.test $(ENGINES)/.done
+	pytest -n 2 --dist loadfile -rs -m "not slow" tests/engines
+	springtune run config/engines.yaml
+
+$(ENGINES)/.done: requirements/engines.txt | $(VENV)/.test
+	sh tools/engines.sh $(ENGINES)
+	touch $@
 
 # Every write, rename and opening of a file of a small study failed once, by an error, by a full disk and by a kill.
 test-faults: $(VENV)/.test
@@ -145,6 +157,7 @@ lock: $(VENV)/.run
 	$(LOCK) requirements/release.in --output-file requirements/release.txt
 	$(LOCK) requirements/slurm.in --constraints requirements/run.txt --output-file requirements/slurm.txt
 	$(LOCK) pyproject.toml requirements/build.in requirements/storage.in --extra s3 --output-file requirements/storage.txt
+	$(LOCK) requirements/engines.in --constraints requirements/test.txt --output-file requirements/engines.txt
 	$(LOCK) requirements/mutants.in --constraints requirements/test.txt --output-file requirements/mutants.txt
 	$(LOCK) requirements/cholesky.in --constraints requirements/test.txt --output-file requirements/cholesky.txt
 	$(LOCK) requirements/validator.in --output-file requirements/validator.txt

@@ -173,10 +173,13 @@ def test_a_page_can_be_followed(page, repository, monkeypatch):
     from matplotlib import pyplot
 
     monkeypatch.chdir(repository)
+    known = set(st.ENGINES)
     with matplotlib.rc_context():
         pyplot.switch_backend("agg")
         assert list(follow(page, repository, run=_run if page.name == "sweep-parameters.md" else None))
     pyplot.close("all")
+    for name in set(st.ENGINES) - known:
+        st.ENGINES.discard(name)
 
 
 def _run(study):
