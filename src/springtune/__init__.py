@@ -25,6 +25,12 @@ _NAMES = {
         "plot_benchmark_curve",
         "plot_benchmark_rates",
     ),
+    "studies.kinds.engines.figures": (
+        "plot_engine_curves",
+        "plot_engine_errors",
+        "plot_engine_factors",
+        "plot_engine_maps",
+    ),
     "studies.kinds.laying.figures": ("plot_laying",),
     "studies.kinds.moduli.figures": ("plot_definitions_loads", "plot_definitions_size", "plot_moduli"),
     "studies.kinds.refinement.figures": ("plot_refinement",),

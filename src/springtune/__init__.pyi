@@ -55,6 +55,10 @@ from .studies.kinds.benchmark.figures import plot_benchmark as plot_benchmark
 from .studies.kinds.benchmark.figures import plot_benchmark_costs as plot_benchmark_costs
 from .studies.kinds.benchmark.figures import plot_benchmark_curve as plot_benchmark_curve
 from .studies.kinds.benchmark.figures import plot_benchmark_rates as plot_benchmark_rates
+from .studies.kinds.engines.figures import plot_engine_curves as plot_engine_curves
+from .studies.kinds.engines.figures import plot_engine_errors as plot_engine_errors
+from .studies.kinds.engines.figures import plot_engine_factors as plot_engine_factors
+from .studies.kinds.engines.figures import plot_engine_maps as plot_engine_maps
 from .studies.kinds.laying.figures import plot_laying as plot_laying
 from .studies.kinds.moduli.figures import plot_definitions_loads as plot_definitions_loads
 from .studies.kinds.moduli.figures import plot_definitions_size as plot_definitions_size

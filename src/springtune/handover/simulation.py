@@ -10,7 +10,7 @@ from scipy.sparse import diags_array
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from ..mechanics.dynamics import Motion
-from ..mechanics.energies import BiquadraticEnergy
+from ..mechanics.energies import AreaEnergy, BiquadraticEnergy, Energy, NeoHookeEnergy, YeohEnergy
 from ..mechanics.network import Network
 from ..mechanics.statics import SingularError, StaticProblem
 from ..mesh import Mesh, corner_angles, signed_areas
@@ -180,13 +180,26 @@ def _network(net: Net, reference: float) -> Network:
     mesh = Mesh(net.points, net.triangles, net.quads)
     if not np.array_equal(mesh.edges, net.springs):
         raise ValueError("springs: are not the edges of the cells in their order; write the springs of a scene anew")
-    energies = [
-        BiquadraticEnergy(
-            net.points, terms.cells, terms.values["tensile"] / reference, terms.values["coupling"] / reference
-        )
-        for terms in net.energies
-    ]
+    energies = [_energy(net.points, terms, reference) for terms in net.energies]
     return Network(mesh, net.held, net.stiffness / reference, energies)
+
+
+ENERGIES: dict[str, tuple[type[Energy], tuple[str, ...]]] = {
+    "area": (AreaEnergy, ("modulus",)),
+    "biquadratic": (BiquadraticEnergy, ("tensile", "coupling")),
+    "compressible": (NeoHookeEnergy, ("shear", "bulk")),
+    "incompressible": (YeohEnergy, ("c1", "c2", "c3")),
+}
+"""Classes of energies that a network is made of again, and their moduli in order."""
+
+
+def _energy(points: np.ndarray, terms: Terms, reference: float) -> Energy:
+    """Energy that terms were written from."""
+    made, names = ENERGIES[terms.kind]
+    moduli = [terms.values[name] / reference for name in names]
+    there = np.any([one.reshape(len(one), -1).any(axis=1) for one in moduli], axis=0)  # others have no such energy
+    moduli = [one[there] for one in moduli]
+    return made(points, terms.cells[there], *([np.column_stack(moduli)] if made is YeohEnergy else moduli))
 
 
 def lame(net: Net, terms: Terms, program: str) -> tuple[float, float]:
