@@ -16,7 +16,7 @@ LEAST_POINTS = 12
 MOST_MISFIT = 0.5
 """Misfit from which points are no damped swing [1]."""
 
-TWO_COLUMNS = "give two columns with a head such as 'time [s],displacement [mm]'"
+COLUMNS_OF_DECAY = "give two columns with a head such as 'time [s],displacement [mm]'"
 
 
 @dataclass(frozen=True, repr=False)
@@ -151,11 +151,11 @@ def _check(t: np.ndarray, x: np.ndarray) -> None:
 
 def _read(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
     """Times [s] and displacements [m] of a CSV file."""
-    rows = csv_rows(path, ValueError, TWO_COLUMNS)
+    rows = csv_rows(path, ValueError, COLUMNS_OF_DECAY)
     head = rows[0][1]
     units = [column.partition("[")[2].partition("]")[0] for column in head]
     if len(head) != 2 or not all(units):
-        raise ValueError(f"'{path}', line {rows[0][0]}: {','.join(head)!r} is no head of a decay; {TWO_COLUMNS}")
+        raise ValueError(f"'{path}', line {rows[0][0]}: {','.join(head)!r} is no head of a decay; {COLUMNS_OF_DECAY}")
     scales = [positive(f"1 {unit}", kind, f"'{path}', head") for unit, kind in zip(units, ("time", "length"))]
     times, moved = np.array(two_numbers(path, rows[1:], ValueError)).reshape(-1, 2).T
     return scales[0] * times, scales[1] * moved
