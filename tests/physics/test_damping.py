@@ -206,6 +206,17 @@ def test_measures_that_say_nothing_are_refused(given, says):
         st.damping_of(scene(), **given)
 
 
+def falling_apart(mesh, material, thickness):
+    """Springs that push so much that the beam is unstable without any load."""
+    springs = st.DEFINITIONS["lattice"].springs(mesh, material, thickness)
+    return st.Springs(springs.reference, np.where(np.arange(len(mesh.edges)) % 3, springs.relative, -1.0))
+
+
+def test_what_is_unstable_at_rest_does_not_swing():
+    with pytest.raises(ValueError, match="definition 'falling_apart': is unstable at rest"):
+        st.damping_of(scene(falling_apart), ratio=0.1)
+
+
 def test_unknown_choices_and_bodies_without_masses_are_refused():
     with pytest.raises(ValueError, match="over: 'time' is unknown; give one of mass, springs, both"):
         st.damping_of(scene(), ratio=0.1).options("time")

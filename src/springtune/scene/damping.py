@@ -65,10 +65,12 @@ class Damping(Tabled):
     >>> print(f"{damping.mass_damping:.2f} 1/s or {1e3 * damping.stiffness_damping:.2f} ms")
     3.57 1/s or 2.55 ms
 
-    One dashpot for each spring, in proportion to its stiffness:
+    One dashpot for each spring, in proportion to its stiffness, or one damper for each particle:
 
     >>> bool(abs(damping.dashpots - damping.stiffness_damping * st.SpringNet.from_scene(scene).stiffness).max() < 1e-12)
     True
+    >>> f"{1e6 * damping.particle_dampers.max():.0f} uN s/m"
+    '0 uN s/m'
     """
 
     scene: Scene = field(repr=False)
@@ -102,6 +104,11 @@ class Damping(Tabled):
         '0.3146'
         """
         return float(2 * np.pi * self.ratio / np.sqrt(1 - self.ratio**2))
+
+    @property
+    def particle_dampers(self) -> np.ndarray:
+        """Damper of each particle over mass, ``alpha m`` [N s/m], shape (n_points,)."""
+        return self.mass_damping * np.asarray(self.scene.statement.masses())
 
     @cached_property
     def dashpots(self) -> np.ndarray:
@@ -264,7 +271,7 @@ def damping_of(
     ------
     ValueError
         If none or several of the measures are given, a number is out of its range, or no Rayleigh damping has the
-        ratios of two modes; the message says what to give.
+        ratios of two modes; or if the scene has no masses, or is unstable at rest. The message says what to give.
 
     See Also
     --------
@@ -312,6 +319,11 @@ def damping_of(
     values = [] if given is None else _values(timed, given)
     if values and len(values) != len(ratios):
         raise ValueError(f"{timed}: {given!r} and {name} are not as many; give one for each mode, or two of two")
+    if scene.network.rest_factor.negative_pivots:
+        raise ValueError(
+            f"definition '{scene.definition.name}': is unstable at rest, so that nothing swings; take another "
+            "definition or mesh"
+        )
     own = _loaded(scene).loaded_frequency
     alpha, beta, factor = ratios[0] * own, ratios[0] / own, 1.0
     if timed == "at":
