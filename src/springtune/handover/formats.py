@@ -17,6 +17,7 @@ from ..mesh.formats import LONGEST_SAID, library
 from ..safe_io.atomic import check_folder, replacing, write_text
 from ..safe_io.inputs import DataElsewhere, check_alone
 from .mujoco import mjcf
+from .newton import newton_script, newton_usd
 from .paraview import comment_of, write_vtu
 from .sofa import sofa_python, sofa_xml
 from .terms import OF_CORNERS, VALUES, Net, Terms
@@ -490,6 +491,8 @@ _SIMULATORS = {
     ".scn": _for_simulator("SOFA", sofa_xml),
     ".py": _for_simulator("SOFA", sofa_python),
     ".xpbd.json": _for_simulator("XPBD", xpbd),
+    ".newton.py": _for_simulator("Newton", newton_script),
+    ".usda": _for_simulator("Newton", newton_usd),
 }
 
 
