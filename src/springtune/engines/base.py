@@ -20,6 +20,7 @@ from ..mechanics.integrators import PRECISIONS
 from ..problem.quantities import positive
 from ..registry import Declared, Registry, how_to_install
 from ..safe_io.tables import number_text
+from ..scene.damping import Damping
 
 
 class EngineError(ValueError):
@@ -128,6 +129,18 @@ SPRING = Parameter("N/m", "k of the definition, one for each spring")
 """Stiffness of a spring."""
 
 
+DAMPERS: dict[str, Callable[[Damping], Any]] = {
+    "alpha": lambda damping: damping.mass_damping,
+    "alpha m, one for each particle": lambda damping: damping.mass_damping * damping.scene.statement.masses(),
+    "beta": lambda damping: damping.stiffness_damping,
+    "beta k, one for each spring": lambda damping: damping.dashpots,
+}
+"""Dampers that are typed into engines, by the formula of their parameter; each alone has the damping ratio."""
+
+VELOCITIES = Parameter("1/s", "alpha")
+"""Damping over mass by `springtune.in_engine`, which every engine has."""
+
+
 def typed_springs(net: SpringNet) -> dict[str, Any]:
     """Stiffness of each spring [N/m] and moduli of energies, as they are."""
     values = {f"{one.kind} {name}": value for one in net.energies for name, value in one.values.items()}
@@ -162,6 +175,10 @@ class Engine(Declared):
         Numbers that are typed into it.
     iterates : bool
         Whether iterations mean something to it.
+    dampers : dict of str to Parameter
+        Dampers that are typed into it; their formulas are keys of `DAMPERS`.
+    implicit : bool
+        Whether its steps, iterated to the end, are of implicit Euler, which damps by itself.
     typed : callable
         (net) -> dict of the numbers to type by the names of `parameters`: arrays, or one number for all.
     source : str
@@ -195,6 +212,8 @@ class Engine(Declared):
     precisions: tuple[str, ...] = PRECISIONS
     parameters: Mapping[str, Parameter] = field(default_factory=lambda: {"stiffness": SPRING})
     iterates: bool = True
+    dampers: Mapping[str, Parameter] = field(default_factory=lambda: {"damping": VELOCITIES})
+    implicit: bool = False
     typed: Callable[[SpringNet], dict[str, Any]] = field(default_factory=lambda: typed_springs)
     source: str = ""
 
@@ -239,6 +258,37 @@ class Engine(Declared):
                 )
         if self.absent:
             raise EngineAbsentError(self.absent)
+
+    def typed_dampers(self, damping: Damping, setting: Setting) -> dict[str, Any]:
+        """Dampers to type for a measured decay, each alone; what the steps damp by themselves is taken off.
+
+        Parameters
+        ----------
+        damping : Damping
+            Of a scene, see `springtune.damping_of`.
+        setting : Setting
+
+        Returns
+        -------
+        dict of str to float or ndarray
+            In the units of `dampers`.
+
+        Raises
+        ------
+        ValueError
+            If the steps of the setting alone damp more than was measured.
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> beam, rubber = st.Beam("100 mm", "10 mm"), st.Material("1 MPa", 0.45, density="1100 kg/m^3")
+        >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "5 mm"), rubber, "bending", "1 mN")
+        >>> damping = st.damping_of(scene, decrement=0.3)
+        >>> st.ENGINES["xpbd"].typed_dampers(damping, st.Setting("1/60", substeps=20))["damping"].round(3).item()
+        2.402
+        """
+        left = damping.implicit_euler(setting.step) if self.implicit else damping
+        return {name: DAMPERS[one.formula](left) for name, one in self.dampers.items()}
 
     def start(self, net: SpringNet, setting: Setting, damping: float) -> Session:
         """Start a session.

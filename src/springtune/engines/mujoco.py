@@ -34,6 +34,11 @@ TYPED = {
 }
 """Stiffness of a tendon; or what an ``elastic2d="stretch"`` flex has."""
 
+JOINTS = {"joint damping": Parameter("N s/m", "alpha m, one for each particle")}
+STIFF = {"tendon damping": Parameter("N s/m", "beta k, one for each spring"), "flex damping": Parameter("s", "beta")}
+"""Dampers over stiffness. `implicit` and `implicitfast` leave out what a tendon between two bodies does to the other
+one, so that it slows them as a mass does: there, joints alone damp as they should."""
+
 
 def typed(net: SpringNet) -> dict[str, Any]:
     """Stiffness of each tendon, or the constants of the flex."""
@@ -111,8 +116,16 @@ def _declare(order: float, integrator: str, summary: str, **declared: Any) -> No
     )(session)
 
 
-_declare(110, "Euler", "springs explicit")
-_declare(111, "implicitfast", "springs explicit, dampers implicit", laws=())
-_declare(112, "implicit", "springs explicit, dampers implicit", laws=())
-_declare(113, "RK4", "springs explicit, of fourth order")
-_declare(114, "discrete", "springs and dampers implicit", needs=("mujoco>=3.13",), iterates=True)
+_declare(110, "Euler", "springs explicit", dampers=JOINTS | STIFF)
+_declare(111, "implicitfast", "springs explicit, dampers implicit", laws=(), dampers=JOINTS)
+_declare(112, "implicit", "springs explicit, dampers implicit", laws=(), dampers=JOINTS)
+_declare(113, "RK4", "springs explicit, of fourth order", dampers=JOINTS | STIFF)
+_declare(
+    114,
+    "discrete",
+    "springs and dampers implicit",
+    needs=("mujoco>=3.13",),
+    iterates=True,
+    dampers=JOINTS | STIFF,
+    implicit=True,
+)

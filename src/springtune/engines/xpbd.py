@@ -4,19 +4,30 @@ A spring is the constraint ``C = l - L`` with compliance ``1 / k``. An iteration
 other; each changes its multiplier by ``(-C - a lambda) / (sum of w |grad C|^2 + a)`` with ``a = 1 / (k h^2)``.
 Multipliers begin each step at zero. Few iterations of small steps are better than many of large ones (Macklin et al.,
 Small steps in physics simulation, SCA 2019). Read: both papers' methods as they are described in later ones.
+
+Areas, squared lengths and rubber are blocks of constraints of a cell, solved at once; `springtune.handover.xpbd` has
+their formulas, which are exact for each energy. The volume of compressible rubber is found before each projection.
 """
+
+from typing import Any
 
 import numpy as np
 
 from ..handover.net import SpringNet
+from ..handover.xpbd import COMPLIANCE_UNITS, Blocks, blocks
 from .base import EngineError, Parameter, Session, Setting, engine
 from .textbook import Textbook, compiled
 
+KINDS = {kind: number for number, kind in enumerate(COMPLIANCE_UNITS)}
+"""Numbers of kinds of blocks."""
+
+FLATTEST = 0.05
+"""Area over the one at rest below which a triangle of rubber is taken for one that has it: steps may turn it over."""
+
 
 @compiled
-def _project(x, weights, springs, lengths, compliance, iterations):  # type: ignore[no-untyped-def]
-    """Positions after iterations over all springs; compliance over the squared step."""
-    multipliers = np.zeros_like(lengths)
+def _project_springs(x, weights, springs, lengths, compliance, multipliers, iterations):  # type: ignore[no-untyped-def]
+    """Project all springs some times; compliance over the squared step."""
     for _ in range(iterations):
         for e in range(len(lengths)):
             i, j = springs[e]
@@ -32,26 +43,145 @@ def _project(x, weights, springs, lengths, compliance, iterations):  # type: ign
             x[i, 1] -= weights[i, 1] * change * dy
             x[j, 0] += weights[j, 0] * change * dx
             x[j, 1] += weights[j, 1] * change * dy
-    return x
+
+
+@compiled
+def _volume(trace, area, shear, bulk):  # type: ignore[no-untyped-def]
+    """Logarithm of the volume of compressible rubber, by Newton's method."""
+    v = 0.0
+    for _ in range(8):
+        pull, press, grown = trace * np.exp(-2 * v / 3), np.exp(4 * v / 3) / area**2, np.exp(v)
+        slope = shear / 3 * (2 * press - pull) + bulk * grown * (grown - 1)
+        bend = shear / 9 * (2 * pull + 8 * press) + bulk * grown * (2 * grown - 1)
+        v = max(v - slope / bend, -0.6)
+    return v
+
+
+@compiled
+def _rubber(here, slopes, area, growth, law, compressible, value, by):  # type: ignore[no-untyped-def]
+    """Constraints of a triangle of rubber, and their derivatives; `growth` is that of its area by its corners."""
+    across, turned, share = 0.0, 0.0, 1.0
+    for c in range(3):
+        across += here[c, 0] * slopes[c, 0] - here[c, 1] * slopes[c, 1]
+        turned += here[c, 0] * slopes[c, 1] + here[c, 1] * slopes[c, 0]
+    if compressible:
+        share = np.exp(-_volume(across**2 + turned**2 + 2 * area, area, law[0], law[1]) / 3)
+    r = area * share**2
+    root = np.sqrt(2 * r + 1)
+    value[0], value[1], value[2] = share * across, share * turned, (r - 1) * root / r
+    rise = (root / r**2 + (r - 1) / (r * root)) * share**2
+    for c in range(3):
+        by[0, c, 0], by[0, c, 1] = share * slopes[c, 0], -share * slopes[c, 1]
+        by[1, c, 0], by[1, c, 1] = share * slopes[c, 1], share * slopes[c, 0]
+        by[2, c, 0], by[2, c, 1] = rise * growth[c, 0], rise * growth[c, 1]
+    if not compressible:
+        excess = value[0] ** 2 + value[1] ** 2 + value[2] ** 2
+        scale = np.sqrt(1 + law[0] * excess + law[1] * excess**2)
+        more = (law[0] + 2 * law[1] * excess) / scale
+        for c in range(3):
+            for d in range(2):
+                whole = value[0] * by[0, c, d] + value[1] * by[1, c, d] + value[2] * by[2, c, d]
+                for a in range(3):
+                    by[a, c, d] = scale * by[a, c, d] + more * value[a] * whole
+        value *= scale
+
+
+@compiled
+def _project_cells(x, weights, kind, cells, rest, slopes, law, compliance, multipliers):  # type: ignore[no-untyped-def]
+    """Project all blocks of a kind once."""
+    size, corners = multipliers.shape[1], cells.shape[1]
+    here, growth, value = np.empty((corners, 2), x.dtype), np.empty((corners, 2), x.dtype), np.empty(size, x.dtype)
+    by, matrix = np.zeros((size, corners, 2), x.dtype), np.empty((size, size), x.dtype)
+    for e in range(len(cells)):
+        cell, area = cells[e], 0.0
+        for c in range(corners):
+            after, before = cell[(c + 1) % corners], cell[c - 1]
+            here[c, 0], here[c, 1] = x[cell[c], 0] - x[cell[0], 0], x[cell[c], 1] - x[cell[0], 1]
+            growth[c, 0], growth[c, 1] = 0.5 * (x[after, 1] - x[before, 1]), 0.5 * (x[before, 0] - x[after, 0])
+            area += 0.5 * (here[c, 0] * growth[c, 0] + here[c, 1] * growth[c, 1])
+        if kind == 0:
+            value[0], by[0] = area - rest[e, 0], growth
+        elif kind == 1:
+            for c in range(3):
+                after, before = (c + 1) % 3, c - 1
+                dx, dy = here[before, 0] - here[after, 0], here[before, 1] - here[after, 1]
+                value[c] = dx * dx + dy * dy - rest[e, c]
+                by[c, before, 0], by[c, before, 1] = 2 * dx, 2 * dy
+                by[c, after, 0], by[c, after, 1] = -2 * dx, -2 * dy
+        else:
+            ratio = max(area / rest[e, 0], FLATTEST)
+            _rubber(here, slopes[e], ratio, growth / rest[e, 0], law[e], kind == 3, value, by)
+        for a in range(size):
+            for b in range(size):
+                value[a] += compliance[e, a, b] * multipliers[e, b]
+                matrix[a, b] = compliance[e, a, b]
+                for c in range(corners):
+                    for d in range(2):
+                        matrix[a, b] += weights[cell[c], d] * by[a, c, d] * by[b, c, d]
+        for a in range(size):  # elimination: the matrix is positive
+            for b in range(a + 1, size):
+                factor = matrix[b, a] / matrix[a, a]
+                matrix[b] -= factor * matrix[a]
+                value[b] -= factor * value[a]
+        for a in range(size - 1, -1, -1):
+            for b in range(a + 1, size):
+                value[a] -= matrix[a, b] * value[b]
+            value[a] /= matrix[a, a]
+            multipliers[e, a] -= value[a]
+            for c in range(corners):
+                for d in range(2):
+                    x[cell[c], d] -= weights[cell[c], d] * by[a, c, d] * value[a]
 
 
 class _Session(Textbook):
     def __init__(self, net: SpringNet, setting: Setting, damping: float) -> None:
         super().__init__(net, setting, damping)
-        if self.stiffness.min() < 0:
-            raise EngineError(
-                f"definition '{net.header['definition']}': has springs of negative stiffness, and no compliance is "
-                "negative; take 'patch' or 'lattice', whose springs all pull"
-            )
+        try:
+            self.groups = [self._group(one) for one in blocks(net)]
+        except ValueError as error:
+            raise EngineError(str(error)) from None
         self.compliance = (1 / (self.stiffness * self.h**2)).astype(self.kind)
+
+    def _group(self, one: Blocks) -> tuple[Any, ...]:
+        """Arrays of a kind of blocks, as `_cells` takes them."""
+        values = one.values
+        rest = values["rest_length"] ** 2 if "rest_length" in values else values["rest_area"][:, None]
+        slopes = values.get("rest_slope", np.zeros((0, 3, 2)))
+        law = values.get("stiffening", np.zeros((0, 2)))
+        if one.kind == "compressible":
+            law = np.column_stack([values["shear"], values["bulk"]]) / values["bulk"][:, None]
+        compliance = one.compliance / float(self.h) ** 2
+        arrays = (part.astype(self.kind) for part in (rest, slopes, law, compliance))
+        return KINDS[one.kind], one.cells, *arrays
 
     def solve(self, before: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Project the inertial positions."""
-        found: np.ndarray = _project(y, self.weights, self.springs, self.lengths, self.compliance, self.iterations)
-        return found
+        springs = self.weights, self.springs, self.lengths, self.compliance
+        pulls = np.zeros_like(self.lengths)
+        groups = [(*one, np.zeros(one[-1].shape[:2], self.kind)) for one in self.groups]
+        rounds, each = (self.iterations, 1) if groups else (1, self.iterations)
+        for _ in range(rounds):
+            _project_springs(y, *springs, pulls, each)
+            for group in groups:
+                _project_cells(y, self.weights, *group)
+        return y
 
 
-@engine("xpbd", order=20, parameters={"compliance": Parameter("m/N", "1 / k")}, source="Macklin 2016")
+@engine(
+    "xpbd",
+    order=20,
+    laws=tuple(KINDS),
+    parameters={
+        "compliance": Parameter("m/N", "1 / k of a spring"),
+        "area compliance": Parameter("m3/N", "A0 / modulus, of C = A - A0"),
+        "squared-length compliance": Parameter(
+            "m3/N", "inverse of [[k1, g3, g2], [g3, k2, g1], [g2, g1, k3]] / 2, tensile k, coupling g, of l^2 - L^2"
+        ),
+        "rubber compliance": Parameter("1/(N m)", "1 / (G h A0), G = E / (2 (1 + nu))"),
+    },
+    implicit=True,
+    source="Macklin 2016",
+)
 def session(net: SpringNet, setting: Setting, damping: float) -> Session:
     """Extended position-based dynamics: springs as constraints with compliance, multipliers reset in each step."""
     return _Session(net, setting, damping)

@@ -18,6 +18,7 @@ from ..safe_io.atomic import check_folder, replacing, write_text
 from ..safe_io.inputs import DataElsewhere, check_alone
 from .lammps import lammps
 from .mujoco import mjcf
+from .newton import newton_script, newton_usd
 from .paraview import comment_of, write_vtu
 from .sofa import sofa_python, sofa_xml
 from .terms import OF_CORNERS, VALUES, Net, Terms
@@ -509,6 +510,8 @@ _SIMULATORS = {
     ".py": _for_simulator("SOFA", _as_text(sofa_python)),
     ".lmp": _for_simulator("LAMMPS", _write_lammps),
     ".xpbd.json": _for_simulator("XPBD", _as_text(xpbd)),
+    ".newton.py": _for_simulator("Newton", _as_text(newton_script)),
+    ".usda": _for_simulator("Newton", _as_text(newton_usd)),
 }
 
 

@@ -32,6 +32,7 @@ from ..problem.geometry import Beam
 from ..problem.loads import LOADS
 from ..problem.materials import AnyMaterial, Material
 from ..problem.quantities import positive
+from ..registry import hook
 from ..safe_io.tables import Tabled
 from ..scene.meshes import A_BEAM, A_MATERIAL, A_MESH, check_filled, is_a
 from ..scene.motion import stable_steps
@@ -39,7 +40,6 @@ from ..scene.sheet import AnyDefinition, Sheet, check_stiffness, definition_of, 
 from ..scene.single import Scene
 from ..scene.statements import BeamStatement, ShapeStatement
 from ..springs import Definition, DefinitionError, Springs
-from .formats import read, write
 from .terms import Net, Terms
 
 if TYPE_CHECKING:
@@ -301,7 +301,8 @@ class SpringNet(Tabled, Net):
                 f"load {load['name']!r}: prescribes displacements, and a file of springs has forces and directions "
                 "that are held; take a load of forces, or give SpringNet.from_mesh the mesh and the scene's springs"
             )
-        return write(path, self, mujoco)
+        written: list[Path] = hook("files").write(path, self, mujoco)
+        return written
 
     @classmethod
     def read(cls, path: str | Path) -> "SpringNet":
@@ -321,7 +322,7 @@ class SpringNet(Tabled, Net):
         ValueError
             If there is no such file, or it is not as `write` writes it.
         """
-        return cls(**vars(read(path)))
+        return cls(**vars(hook("files").read(path)))
 
 
 def terms(energy: Energy, reference: float) -> Terms:
