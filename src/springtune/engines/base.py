@@ -8,7 +8,7 @@ does not move an equilibrium. Forces of the load are dead, and on from the first
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from importlib.metadata import PackageNotFoundError, version
+from importlib import metadata
 from importlib.util import find_spec
 from typing import Any, Protocol, TypeVar
 
@@ -338,8 +338,8 @@ def _there(need: str) -> bool:
     if find_spec(name) is None:
         return False
     try:
-        return not least or release(version(name)) >= release(least)
-    except PackageNotFoundError:  # installed under another name
+        return not least or release(metadata.version(name)) >= release(least)
+    except metadata.PackageNotFoundError:  # installed under another name
         return True
 
 
