@@ -57,9 +57,7 @@ IN_BOTH = (
 )
 """Variables of both groups."""
 
-END_FLAGS = {
-    "engine_status": {"flag_values": np.arange(len(RUN_ENDS), dtype="int8"), "flag_meanings": " ".join(RUN_ENDS)}
-}
+END_FLAGS = {"flag_values": np.arange(len(RUN_ENDS), dtype="int8"), "flag_meanings": " ".join(RUN_ENDS)}
 
 ENGINE_DIMENSIONS = {
     "scene": "scene in engines",
@@ -77,8 +75,10 @@ BEST = {
     "best_factor_message": (OF_A_RUN, "1", "why no factor is the best", ""),
 }
 
-ENGINE_RUNS = Group("/engines", _of_runs(OF_A_RUN) | IN_BOTH, ENGINE_DIMENSIONS, further=END_FLAGS)
-ENGINE_CURVES = Group("/engine_curves", _of_runs(OF_A_CURVE) | BEST | IN_BOTH, ENGINE_DIMENSIONS, further=END_FLAGS)
+ENGINE_RUNS = Group("/engines", _of_runs(OF_A_RUN) | IN_BOTH, ENGINE_DIMENSIONS, further={"engine_status": END_FLAGS})
+ENGINE_CURVES = Group(
+    "/engine_curves", _of_runs(OF_A_CURVE) | BEST | IN_BOTH, ENGINE_DIMENSIONS, further={"engine_status": END_FLAGS}
+)
 
 
 def groups(study, folder):
