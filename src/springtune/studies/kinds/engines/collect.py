@@ -57,7 +57,8 @@ IN_BOTH = (
 )
 """Variables of both groups."""
 
-END_FLAGS = {"flag_values": np.arange(len(RUN_ENDS), dtype="int8"), "flag_meanings": " ".join(RUN_ENDS)}
+_FLAGS = {"flag_values": np.arange(len(RUN_ENDS), dtype="int8"), "flag_meanings": " ".join(RUN_ENDS)}
+END_FLAGS = {"engine_status": _FLAGS}
 
 ENGINE_DIMENSIONS = {
     "scene": "scene in engines",
@@ -75,10 +76,8 @@ BEST = {
     "best_factor_message": (OF_A_RUN, "1", "why no factor is the best", ""),
 }
 
-ENGINE_RUNS = Group("/engines", _of_runs(OF_A_RUN) | IN_BOTH, ENGINE_DIMENSIONS, further={"engine_status": END_FLAGS})
-ENGINE_CURVES = Group(
-    "/engine_curves", _of_runs(OF_A_CURVE) | BEST | IN_BOTH, ENGINE_DIMENSIONS, further={"engine_status": END_FLAGS}
-)
+ENGINE_RUNS = Group("/engines", _of_runs(OF_A_RUN) | IN_BOTH, ENGINE_DIMENSIONS, further=END_FLAGS)
+ENGINE_CURVES = Group("/engine_curves", _of_runs(OF_A_CURVE) | BEST | IN_BOTH, ENGINE_DIMENSIONS, further=END_FLAGS)
 
 
 def groups(study, folder):
