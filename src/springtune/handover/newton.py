@@ -1,0 +1,252 @@
+"""Sheets for Newton (newton-physics): a script of its `ModelBuilder`, and OpenUSD as its importer reads it.
+
+Read and run with Newton 1.8. Springs have our law and [N/m]. A triangle of Newton's solver VBD has Lame's constants of
+plane stress times the thickness h [N/m]
+
+    tri_ke = mu h = E h / (2 (1 + nu)),    tri_ka = lambda h = E h nu / (1 - nu^2)
+
+and the law of `springtune.mechanics.energies.StableNeoHookeEnergy`. At small strain it is St. Venant-Kirchhoff's, which
+`delingette` is; files have the equilibrium of Newton's law.
+
+Its importer of USD takes tri_ke = E h / (1 - nu^2), tri_ka = 0, which is no material of that E and nu, and neither
+springs, loads nor supports. So scripts have to type them, and files say which.
+"""
+
+import numpy as np
+
+from ..mechanics.energies import Energy, StableNeoHookeEnergy
+from .simulation import Simulation, about, lame, simulate
+from .terms import Net
+
+LAWS = ("biquadratic",)
+"""Energies that triangles of Newton stand for."""
+
+STEPS = 4
+"""Step of a script over the largest stable one of explicit schemes: VBD then converges in `ITERATIONS`."""
+
+ITERATIONS = 10
+
+DECAYS = 12
+"""Times in which the slowest mode comes down to 1/e that a script runs for."""
+
+
+def membrane(net: Net) -> tuple[float, float]:
+    """Return ``tri_ke`` and ``tri_ka`` [N/m] of all triangles; 0 where a net has springs alone."""
+    for terms in net.energies:
+        first, shear = lame(net, terms, "Newton")
+        return shear, first
+    return 0.0, 0.0
+
+
+def membrane_energies(net: Net, reference: float) -> list[Energy]:
+    """Energies of the triangles by Newton's law, over the reference stiffness."""
+    shear, first = membrane(net)
+    ones = np.ones(len(net.triangles)) / reference
+    return [StableNeoHookeEnergy(net.points, net.triangles, shear * ones, first * ones)] if net.energies else []
+
+
+SCRIPT = '''
+def build():
+    """The sheet as a model; particles without mass are held."""
+    builder = newton.ModelBuilder(gravity=(0.0, 0.0, 0.0))
+    for (x, y), mass, held in zip(POINTS, MASSES, HELD):
+        builder.add_particle(wp.vec3(x, y, 0.0), wp.vec3(0.0), 0.0 if held else mass)
+    for (first, second), stiffness, length in zip(SPRINGS, STIFFNESS, REST_LENGTHS):
+        builder.add_spring(first, second, ke=stiffness, kd=0.0, control=0.0)
+        builder.spring_rest_length[-1] = length
+    for corners in TRIANGLES:
+        builder.add_triangle(*corners, tri_ke=TRI_KE, tri_ka=TRI_KA, tri_kd=0.0, tri_drag=0.0, tri_lift=0.0)
+    builder.color()
+    return builder.finalize()
+
+
+def run(model, step=STEP, iterations=ITERATIONS, seconds=SECONDS):
+    """Displacements [m] after a damped motion from rest."""
+    solver = newton.solvers.SolverVBD(model, iterations=iterations)
+    state, after, control = model.state(), model.state(), model.control()
+    rest = state.particle_q.numpy().copy()
+    forces = np.column_stack([FORCES, np.zeros(len(FORCES))]).astype(np.float32)
+    for _ in range(round(seconds / step)):
+        state.particle_f.assign(forces)
+        solver.step(state, after, control, None, step)
+        after.particle_qd.assign(after.particle_qd.numpy() / np.float32(1 + MASS_DAMPING * step))
+        state, after = after, state
+    return (state.particle_q.numpy() - rest)[:, :2]
+
+
+def along(displacements):
+    """Mean displacement along the forces [m]."""
+    return np.sum(FORCES * displacements) / np.abs(FORCES).sum()
+
+
+def main():
+    found = along(run(build()))
+    print(f"displacement along the load: {1e3 * found:.6g} mm")
+    if EXPECTED is not None:
+        print(f"expected at rest:            {1e3 * along(EXPECTED):.6g} mm")
+
+
+if __name__ == "__main__":
+    main()
+'''
+
+
+def newton_script(net: Net) -> str:
+    """Script of a net for Newton's `ModelBuilder` and its solver VBD.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> beam, rubber = st.Beam("40 mm", "20 mm"), st.Material("1 MPa", 0.3, density="1000 kg/m^3")
+    >>> scene = st.Scene(beam, st.make_mesh(beam, "right", "20 mm"), rubber, "traction", "1 N", definition="delingette")
+    >>> [path] = scene.springs.write("net.newton.py")
+    >>> [line for line in path.read_text().splitlines() if line.startswith("TRI_K")]
+    ['TRI_KE = 384.61538461538464', 'TRI_KA = 329.6703296703297']
+    """
+    simulation = _simulated(net)
+    shear, first = membrane(net)
+    there = net.stiffness != 0
+    step = STEPS * simulation.step
+    expected = simulation.displacements
+    values = {
+        "POINTS": net.points.tolist(),
+        "MASSES": simulation.masses.tolist(),
+        "HELD": net.held.all(axis=1).tolist(),
+        "SPRINGS": net.springs[there].tolist(),
+        "STIFFNESS": net.stiffness[there].tolist(),
+        "REST_LENGTHS": net.rest_lengths[there].tolist(),
+        "TRIANGLES": net.triangles.tolist() if net.energies else [],
+        "TRI_KE": shear,
+        "TRI_KA": first,
+        "STEP": step,
+        "ITERATIONS": ITERATIONS,
+        "SECONDS": _seconds(simulation),
+        "MASS_DAMPING": simulation.mass_damping,
+    }
+    said = (
+        f"the one here is {STEPS * simulation.step / simulation.largest_step:.2g} times as long, which VBD converges in"
+    )
+    lines = [f"# {line}" for line in [*about(net, simulation, said), *_law(net)]]
+    lines += ["", *(f"{verb} {name}" for verb, name in IMPORTS), ""]
+    lines += [f"{name} = {value!r}" for name, value in values.items()]
+    lines += [f"FORCES = np.array({net.forces.tolist()!r})"]
+    lines += [f"EXPECTED = {None if expected is None else f'np.array({expected.tolist()!r})'}", ""]
+    return "\n".join(lines) + SCRIPT
+
+
+IMPORTS = (("import", "newton"), ("import", "numpy as np"), ("import", "warp as wp"))
+
+
+def _simulated(net: Net) -> Simulation:
+    """Simulation by Newton's law; ValueError for what Newton lacks."""
+    simulation = simulate(net, "Newton", LAWS, membrane_energies)
+    partly = int((net.held.any(axis=1) & ~net.held.all(axis=1)).sum())
+    if partly:
+        raise ValueError(
+            f"supports: {partly} particles are held in one direction alone, and Newton holds particles as a whole; "
+            "hold both directions, or take another format such as .xml for MuJoCo"
+        )
+    return simulation
+
+
+def _seconds(simulation: Simulation) -> float:
+    """Time in which the slowest mode that the load excites comes to rest [s]."""
+    lowest, damping = simulation.frequency, simulation.mass_damping
+    rate = damping / 2 - max(damping**2 / 4 - lowest**2, 0.0) ** 0.5
+    return DECAYS / rate if rate else 100 * simulation.step
+
+
+def _law(net: Net) -> list[str]:
+    if not net.energies:
+        return []
+    return [
+        "Triangles have Newton's law: mu/2 (tr C - 2 J) + (lambda + mu)/2 (J - 1)^2, mu = tri_ke, lambda = tri_ka.",
+        "At small strain it is that of the definition; the displacement expected here is by Newton's law.",
+    ]
+
+
+USD = '''#usda 1.0
+(
+    defaultPrim = "sheet"
+    doc = """{about}"""
+    metersPerUnit = 1
+    upAxis = "Z"
+)
+
+def Xform "sheet" (prepend apiSchemas = ["PhysicsDeformableBodyAPI"])
+{{
+    bool physics:bodyEnabled = 1
+
+    def Mesh "cloth" (prepend apiSchemas = ["PhysicsSurfaceDeformableSimAPI", "MaterialBindingAPI"])
+    {{
+        int[] faceVertexCounts = {counts}
+        int[] faceVertexIndices = {indices}
+        point3f[] points = {points}
+        point3f[] physics:restShapePoints = {points}
+        float[] physics:thicknesses = [{thickness}]
+        uniform token physics:thicknesses:elementType = "constant"
+        uniform token subdivisionScheme = "none"
+        rel material:binding:physics = </sheet/material>
+        custom int[] springtune:held = {held}
+        custom vector3f[] springtune:forces = {forces}
+        custom vector3f[] springtune:expectedDisplacements = {expected}
+        custom float springtune:triKe = {tri_ke}
+        custom float springtune:triKa = {tri_ka}
+        custom float springtune:massDamping = {damping}
+        custom float springtune:step = {step}
+        custom float springtune:seconds = {seconds}
+    }}
+
+    def Material "material" (prepend apiSchemas = ["PhysicsMaterialAPI", "PhysicsSurfaceDeformableMaterialAPI"])
+    {{
+        float physics:density = {density}
+        float physics:youngsModulus = {young}
+        float physics:poissonsRatio = {poisson}
+    }}
+}}
+'''
+
+LEFT = (
+    "Newton's importer reads particles, masses and triangles. It takes tri_ke = E h / (1 - nu^2) and tri_ka = 0, which",
+    "is another material. A script sets, before builder.color() and builder.finalize():",
+    "  builder.tri_materials[t] = (triKe, triKa, 0, 0, 0) for each triangle t, builder.particle_mass[i] = 0 for each i",
+    "  of held; and state.particle_f = forces ahead of each step. These are attributes springtune:... of the mesh.",
+)
+"""What a user's script has to do with a file in USD."""
+
+
+def newton_usd(net: Net) -> str:
+    """Sheet of a net of triangles as OpenUSD's deformable cloth, as Newton's importer reads it."""
+    simulation = _simulated(net)
+    name, material = net.header["definition"], net.header["material"]
+    if not net.energies or np.any(net.stiffness):
+        raise ValueError(
+            f"definition '{name}': has springs, and deformable cloth of OpenUSD is triangles of a material; take "
+            "'delingette', or a name ending in .newton.py"
+        )
+    shear, first = membrane(net)
+    moved = np.zeros((0, 2)) if simulation.displacements is None else simulation.displacements
+    said = f"a solver such as VBD may take {STEPS} times as long ones"
+    return USD.format(
+        about="\n".join([*about(net, simulation, said), *_law(net), *LEFT]).replace("\\", "/").replace('"', "'"),
+        counts=[3] * len(net.triangles),
+        indices=net.triangles.ravel().tolist(),
+        points=_vectors(net.points),
+        thickness=net.thickness,
+        held=np.flatnonzero(net.held.all(axis=1)).tolist(),
+        forces=_vectors(net.forces),
+        expected=_vectors(moved),
+        tri_ke=shear,
+        tri_ka=first,
+        damping=simulation.mass_damping,
+        step=STEPS * simulation.step,
+        seconds=_seconds(simulation),
+        density=material["density"],
+        young=material["young_modulus"],
+        poisson=material["poisson_ratio"],
+    )
+
+
+def _vectors(points: np.ndarray) -> str:
+    """Vectors of three dimensions as USD has them."""
+    return "[" + ", ".join(f"({x!r}, {y!r}, 0)" for x, y in points.tolist()) + "]"
