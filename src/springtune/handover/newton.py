@@ -179,9 +179,9 @@ USD = '''#usda 1.0
 
 def Xform "sheet" (prepend apiSchemas = ["PhysicsDeformableBodyAPI"])
 {{
-    bool physics:bodyEnabled = 1
-
-    def Mesh "cloth" (prepend apiSchemas = ["PhysicsSurfaceDeformableSimAPI", "PhysicsCollisionAPI", "MaterialBindingAPI"])
+    def Mesh "cloth" (
+        prepend apiSchemas = ["PhysicsSurfaceDeformableSimAPI", "PhysicsCollisionAPI", "MaterialBindingAPI"]
+    )
     {{
         int[] faceVertexCounts = {counts}
         int[] faceVertexIndices = {indices}
@@ -195,9 +195,6 @@ def Xform "sheet" (prepend apiSchemas = ["PhysicsDeformableBodyAPI"])
         custom vector3f[] springtune:expectedDisplacements = {expected}
         custom float springtune:triKe = {tri_ke}
         custom float springtune:triKa = {tri_ka}
-        custom float springtune:massDamping = {damping}
-        custom float springtune:step = {step}
-        custom float springtune:seconds = {seconds}
     }}
 
     def Material "material" (prepend apiSchemas = ["PhysicsMaterialAPI", "PhysicsSurfaceDeformableMaterialAPI"])
@@ -230,10 +227,9 @@ def newton_usd(net: Net) -> str:
         )
     shear, first = membrane(net)
     moved = np.zeros((0, 2)) if simulation.displacements is None else simulation.displacements
+    said = "\n".join([*about(net, simulation, _step(simulation)), *_law(net), *LEFT])
     return USD.format(
-        about="\n".join([*about(net, simulation, _step(simulation)), *_law(net), *LEFT])
-        .replace("\\", "/")
-        .replace('"', "'"),
+        about=said.replace("\\", "/").replace('"', "'"),
         counts=[3] * len(net.triangles),
         indices=net.triangles.ravel().tolist(),
         points=_vectors(net.points),
@@ -243,9 +239,6 @@ def newton_usd(net: Net) -> str:
         expected=_vectors(moved),
         tri_ke=shear,
         tri_ka=first,
-        damping=simulation.mass_damping,
-        step=simulation.step,
-        seconds=_seconds(simulation),
         density=material["density"],
         young=material["young_modulus"],
         poisson=material["poisson_ratio"],
