@@ -14,7 +14,7 @@ export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 # Jobs and tests are many processes: Python is to keep what it compiles.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: study report paper test test-browser test-faults test-fuzz test-versions test-reruns release-check slow lint licences docs site pictures lock test-slurm test-archive test-storage scale test-container million mutants clean
+.PHONY: study report paper test test-browser test-engines test-faults test-fuzz test-versions test-reruns release-check slow lint licences docs site pictures lock test-slurm test-archive test-storage scale test-container million mutants clean
 
 study: $(VENV)/.run
 	springtune run "$$STUDY"
@@ -36,6 +36,19 @@ test: $(VENV)/.test
 # The page to browse, in a headless Chromium: apt-get install chromium chromium-driver.
 test-browser: $(VENV)/.test
 	pytest -m "not slow" tests/browser
+
+# Springs in the programs of the extra `engines`, and the study of them, which takes minutes; ENGINES_STUDY= leaves it out.
+# Newton compiles its kernels at the first time, in half a minute. What this machine cannot install is named, and skipped.
+ENGINES := build/engines
+ENGINES_STUDY ?= config/engines.yaml
+WITH_ENGINES = PYTHONPATH="$(CURDIR)/src:$(CURDIR)/$(ENGINES)"
+test-engines: $(VENV)/.test $(ENGINES)/.done
+	$(WITH_ENGINES) pytest -n 2 --dist loadfile -rs -m "not slow" tests/engines
+	$(if $(ENGINES_STUDY),$(WITH_ENGINES) springtune run $(ENGINES_STUDY))
+
+$(ENGINES)/.done: requirements/engines.txt | $(VENV)/.test
+	sh tools/engines.sh $(ENGINES)
+	touch $@
 
 # Every write, rename and opening of a file of a small study failed once, by an error, by a full disk and by a kill.
 test-faults: $(VENV)/.test
@@ -94,9 +107,10 @@ $(MUTANTS): requirements/mutants.txt
 	python -m uv pip install --quiet --require-hashes --no-deps --target $@ --requirement $<
 	touch $@
 
-slow: $(VENV)/.test
+slow: $(VENV)/.test $(ENGINES)/.done
 	pytest -n 2 -m slow tests/workflow tests/fuzz tests/browser tests/physics tests/unit src
 	HYPOTHESIS_PROFILE=anew pytest -n 2 -m "not slow" tests/unit tests/physics
+	$(WITH_ENGINES) pytest -n 2 --dist loadfile -rs -m slow tests/engines
 
 # Format, lint, types and spelling, as before each commit: .pre-commit-config.yaml. What can be mended is.
 lint: $(VENV)/.test
@@ -118,8 +132,8 @@ results/quick/dataset.nc: | $(VENV)/.run
 	snakemake --configfile config/quick.yaml
 
 # The pictures and tables of the pages, from their studies; the benchmark among them takes minutes.
-pictures: $(VENV)/.run
-	python tools/pictures.py
+pictures: $(VENV)/.run $(ENGINES)/.done
+	$(WITH_ENGINES) python tools/pictures.py
 	python tools/pages.py
 
 # The tables of a million particles in docs/speed.md, measured on this machine; some minutes and 3 GB.
@@ -145,6 +159,7 @@ lock: $(VENV)/.run
 	$(LOCK) requirements/release.in --output-file requirements/release.txt
 	$(LOCK) requirements/slurm.in --constraints requirements/run.txt --output-file requirements/slurm.txt
 	$(LOCK) pyproject.toml requirements/build.in requirements/storage.in --extra s3 --output-file requirements/storage.txt
+	$(LOCK) requirements/engines.in --constraints requirements/test.txt --output-file requirements/engines.txt
 	$(LOCK) requirements/mutants.in --constraints requirements/test.txt --output-file requirements/mutants.txt
 	$(LOCK) requirements/cholesky.in --constraints requirements/test.txt --output-file requirements/cholesky.txt
 	$(LOCK) requirements/validator.in --output-file requirements/validator.txt

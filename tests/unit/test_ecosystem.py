@@ -32,6 +32,18 @@ def test_conda_environments_have_what_the_package_needs():
     assert environment("environment.yml") == (packages, [*pip, "--editable ."])
 
 
+def test_the_extra_of_all_engines_is_what_their_lock_file_is_made_of():
+    extras = {name: [Requirement(one) for one in ones] for name, ones in PROJECT["optional-dependencies"].items()}
+    needed = {}
+    for whole in extras["engines"]:
+        for one in (one for extra in whole.extras for one in extras[extra]):
+            one.marker = whole.marker
+            needed[one.name] = one
+    lines = (REPOSITORY / "requirements/engines.in").read_text().splitlines()
+    asked = {one.name: one for one in map(Requirement, lines[1:])}
+    assert asked == needed
+
+
 def test_hosted_ci_runs_ours_with_pinned_actions():
     found = yaml.safe_load((REPOSITORY / ".github/workflows/ci.yml").read_text())
     assert set(found) == {"name", True, "permissions", "jobs"} and found["permissions"] == {

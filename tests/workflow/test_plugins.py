@@ -1,4 +1,4 @@
-"""Definitions, loads, mesh types and study kinds of other packages, by entry points."""
+"""Definitions, loads, mesh types, engines and study kinds of other packages, by entry points."""
 
 import json
 import os
@@ -67,6 +67,21 @@ def test_commands_list_what_packages_declare(run, site):
     assert "for the example's sake (springtune-example)" in python(run, site, "-m", "springtune", "definitions")
     shown = python(run, site, "-m", "springtune", "scenes", "config/even.yaml")
     assert "measured     2  meshes, their shortest and longest spring" in shown
+
+
+IN_ENGINE = """
+import springtune as st
+beam, rubber = st.Beam("200 mm", "40 mm"), st.Material("1 MPa", 0.3, density="1000 kg/m^3")
+scene = st.Scene(beam, st.make_mesh(beam, "structured", "20 mm"), rubber, "traction", "0.2 N", definition="patch")
+found = st.in_engine(scene, "explicit", dt="1/60", substeps=100)
+print(found.status, abs(found.solver_error) < 1e-6)
+"""
+
+
+def test_a_scene_moves_in_an_engine_of_a_package(run, site):
+    assert python(run, site, "-c", IN_ENGINE) == "rest True\n"
+    page = (REPOSITORY / "docs/how-to/add-an-engine.md").read_text()
+    assert (PLUGIN / "springtune_example/engines.py").read_text() in page and len(page.splitlines()) <= 40
 
 
 JOBS = """

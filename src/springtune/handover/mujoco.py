@@ -55,7 +55,11 @@ def mjcf(net: Net, version: int = VERSIONS[-1]) -> str:
     if version not in VERSIONS:
         known = " or ".join(map(str, VERSIONS))
         raise ValueError(f"mujoco: {version!r} is no version of MuJoCo that files are written for; give {known}")
-    simulation = simulate(net, "MuJoCo", ("biquadratic",))
+    return model(net, simulate(net, "MuJoCo", ("biquadratic",)), version)
+
+
+def model(net: Net, simulation: Simulation, version: int, integrator: str = "Euler") -> str:
+    """Model of a net that moves as a simulation says, by one of MuJoCo's integrators."""
     moving = ~net.held.all(axis=1)
     least = float(simulation.masses[moving].min())
     if least < LEAST_MASS:
@@ -74,10 +78,12 @@ def mjcf(net: Net, version: int = VERSIONS[-1]) -> str:
     load = net.header.get("load")
     title = net.header["definition"] + (f", {load_in_words(load)}" if load else "")
     flex = [_flex(net, terms, size, version) for terms in net.energies]
+    # MuJoCo 3 has no other solver for a flex under it.
+    solver = ' solver="CG"' if flex and version == 3 and integrator == "discrete" else ""
     lines = [
         f"<mujoco model={quoteattr(title)}>",
         *commented([*about(net, simulation, said), f"Written {for_versions(net.energies, version)}."], "  "),
-        f'  <option timestep="{simulation.step!r}" integrator="Euler" gravity="0 0 0">',
+        f'  <option timestep="{simulation.step!r}" integrator="{integrator}"{solver} gravity="0 0 0">',
         f'    <flag contact="disable"{keep}/>',
         "  </option>",
         f'  <statistic center="{centre} 0" extent="{0.6 * float(np.hypot(*(high - low))):.6g}" meansize="{size:.6g}"/>',
@@ -182,13 +188,18 @@ def _refused_before_3_15(net: Net) -> list[str]:
     ]
 
 
-def _flex(net: Net, terms: Terms, size: float, version: int) -> str:
-    """Triangles whose sides are coupled, as a flex: where all have one pair of Lame constants."""
-    first, second = lame(net, terms, "MuJoCo's flex")
+def elasticity(first: float, second: float, version: int) -> tuple[float, float]:
+    """Young [N/m] and poisson [1] of a flex of thickness 1 that has two Lame constants, times the thickness [N/m]."""
     ratio = first / second
     # MuJoCo refuses a half, which plane stress allows in MuJoCo 4.
     poisson = ratio / (4 + 2 * ratio) if version == 3 else min(ratio / (2 + ratio), float(np.nextafter(0.5, 0)))
-    young = (8 if version == 3 else 2) * (1 + poisson) * second
+    return (8 if version == 3 else 2) * (1 + poisson) * second, poisson
+
+
+def _flex(net: Net, terms: Terms, size: float, version: int) -> str:
+    """Triangles whose sides are coupled, as a flex: where all have one pair of Lame constants."""
+    first, second = lame(net, terms, "MuJoCo's flex")
+    young, poisson = elasticity(first, second, version)
     # An attribute that MuJoCo 3 does not know, and refuses; 0 turns it off.
     only = "" if version == 3 else ' yield="0"'
     bodies = " ".join(f"b{number}" for number in range(len(net.points)))

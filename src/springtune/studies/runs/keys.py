@@ -465,6 +465,11 @@ def definition_key(name: str) -> str:
     return code_key(definition_closure(name))
 
 
+def declared_key(one: Declared) -> str:
+    """Key of the code of a declared function, such as an engine."""
+    return code_key(_declared_closure(one, OURS))
+
+
 def mesh_type_key(name: str) -> str:
     """Key of a mesh type's code; for mesh files of the reader's."""
     if name not in MESH_TYPES:

@@ -1,0 +1,131 @@
+"""MuJoCo: springs as tendons, triangles of a material as a flex; one engine for each integrator.
+
+The model is that of `springtune.handover.mujoco`, with the step and the integrator of a setting. `Euler`, `implicit`
+and `implicitfast` are implicit in dampers alone: as with `RK4`, springs need steps below the stable one. `discrete`,
+since MuJoCo 3.13, is implicit in springs, too, by one linear system a step: `iterations` are those of its conjugate
+gradients, of which MuJoCo allows 100 where nothing is said; they stop at a ten-thousandth of the load. The others do
+not iterate without contacts. MuJoCo computes in double precision.
+
+Velocities are scaled after each step, so joints have no damping. MuJoCo's own way is `damping` = mass times the damping
+over mass in each joint, which `RK4` takes explicitly and the others implicitly. A state that diverges is put back to
+the beginning by default; that is turned off here, so that it is seen.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from ..handover.mujoco import VERSIONS, elasticity, model
+from ..handover.net import SpringNet
+from ..handover.simulation import Simulation, lame
+from .base import SPRING, EngineError, Parameter, Session, Setting, engine, release
+
+FLEX_SINCE = (3, 3, 7)
+"""Version of MuJoCo that first has the law of a flex."""
+
+PARAMETERS = {
+    "stiffness": SPRING,
+    "young": Parameter("Pa", "E; for MuJoCo 3 it is 2 E (2 + nu) / (1 + nu)"),
+    "poisson": Parameter("1", "nu; for MuJoCo 3 it is nu / 2"),
+    "thickness": Parameter("m", "h"),
+}
+"""Stiffness of a tendon; or what an ``elastic2d="stretch"`` flex has."""
+
+JOINTS = {"joint damping": Parameter("N s/m", "alpha m, one for each particle")}
+STIFF = {"tendon damping": Parameter("N s/m", "beta k, one for each spring"), "flex damping": Parameter("s", "beta")}
+"""Dampers over stiffness. `implicit` and `implicitfast` leave out what a tendon between two bodies does to the other
+one, so that it slows them as a mass does: there, joints alone damp as they should."""
+
+
+def typed(net: SpringNet) -> dict[str, Any]:
+    """Stiffness of each tendon, or the constants of the flex."""
+    if not net.energies:
+        return {"stiffness": net.stiffness}
+    young, poisson = elasticity(*lame(net, net.energies[0], "MuJoCo's flex"), release(version("mujoco"))[0])
+    return {"young": young / net.thickness, "poisson": poisson, "thickness": net.thickness}
+
+
+@contextmanager
+def _no_log() -> Iterator[None]:
+    """Keep MuJoCo from writing warnings into a file of the current folder."""
+    import mujoco
+
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda said: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)
+
+
+class _Session:
+    """A model of MuJoCo, damped over mass."""
+
+    def __init__(self, net: SpringNet, setting: Setting, damping: float, integrator: str) -> None:
+        import mujoco
+
+        found = release(mujoco.__version__)
+        if found[0] not in VERSIONS or net.energies and found < FLEX_SINCE:
+            raise EngineError(f"MuJoCo {mujoco.__version__}: models are for 3.3.7 to 4; install one of these")
+        assert net.masses is not None  # of a scene that moves
+        loaded = float(np.any(net.forces))
+        moves = Simulation(net.masses, loaded, setting.step, setting.step, 0.0, 0.0, 0.0, None, "")
+        with _no_log():
+            try:
+                self.model = mujoco.MjModel.from_xml_string(model(net, moves, found[0], integrator))
+            except ValueError as error:
+                raise EngineError(f"MuJoCo {mujoco.__version__} refuses the net: {error}") from None
+        self.model.opt.iterations = setting.iterations
+        self.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+        self.data, self.step, self.moving = mujoco.MjData(self.model), mujoco.mj_step, ~net.held
+        self.substeps, self.kept = setting.substeps, 1 / (1 + damping * setting.step)
+
+    def advance(self, frames: int) -> None:
+        """Take a number of frames."""
+        with _no_log():
+            for _ in range(frames * self.substeps):
+                self.step(self.model, self.data)
+                self.data.qvel *= self.kept
+
+    def displacements(self) -> np.ndarray:
+        """Displacement of each particle [m]."""
+        moved = np.zeros(self.moving.shape)
+        moved[self.moving] = self.data.qpos
+        return moved
+
+
+def _declare(order: float, integrator: str, summary: str, **declared: Any) -> None:
+    def session(net: SpringNet, setting: Setting, damping: float) -> Session:
+        return _Session(net, setting, damping, integrator)
+
+    session.__doc__ = f"MuJoCo with the integrator {integrator}: {summary}."
+    common: dict[str, Any] = {"laws": ("biquadratic",), "needs": ("mujoco",), "iterates": False}
+    engine(
+        f"mujoco-{integrator.lower()}",
+        order=order,
+        program="MuJoCo",
+        extra="mujoco",
+        precisions=("float64",),
+        parameters=PARAMETERS,
+        typed=typed,
+        source="MuJoCo's documentation, Computation",
+        **common | declared,
+    )(session)
+
+
+_declare(110, "Euler", "springs explicit", dampers=JOINTS | STIFF)
+_declare(111, "implicitfast", "springs explicit, dampers implicit", laws=(), dampers=JOINTS)
+_declare(112, "implicit", "springs explicit, dampers implicit", laws=(), dampers=JOINTS)
+_declare(113, "RK4", "springs explicit, of fourth order", dampers=JOINTS | STIFF)
+_declare(
+    114,
+    "discrete",
+    "springs and dampers implicit",
+    needs=("mujoco>=3.13",),
+    iterates=True,
+    dampers=JOINTS | STIFF,
+    implicit=True,
+)

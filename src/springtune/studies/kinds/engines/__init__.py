@@ -1,0 +1,10 @@
+"""Scenes in engines: how far off they are at a setting, and what a frame takes."""
+
+SETTING = ("precision", "dt", "substeps", "iterations")
+"""Parameters of a setting; a run has a factor on the typed stiffness besides."""
+
+RUN_ENDS = ("not_requested", "rest", "swings", "moving", "diverged", "absent", "refused", "failed")
+"""How a run ends, in order of the flags of `engine_status`."""
+
+WITHOUT_RUN = ("absent", "refused", "failed")
+"""Ends of runs in which nothing moved."""

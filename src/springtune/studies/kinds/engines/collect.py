@@ -1,0 +1,122 @@
+"""Scenes in engines, gathered in the groups ``/engines`` and ``/engine_curves``."""
+
+from collections import defaultdict
+
+import numpy as np
+
+from ...output.dataset import Filler, Group
+from ...runs.stages import results
+from . import RUN_ENDS, SETTING
+from .kind import STAGE
+from .outputs import divided
+
+NETWORK = ("scene", "definition")
+OF_A_RUN = (*NETWORK, "engine", *SETTING)
+OF_A_CURVE = (*OF_A_RUN, "stiffness_factor")
+
+OF_NETWORK = {
+    "network_displacement": (NETWORK, "m", "displacement of the network in equilibrium", np.nan),
+    "reference_displacement": (NETWORK, "m", "displacement of the converged finite elements", np.nan),
+    "definition_error": (NETWORK, "1", "error of the network in equilibrium: that of the definition", np.nan),
+    "particles": (NETWORK, "1", "number of particles", np.nan),
+}
+
+
+def _of_runs(cell):
+    """Variables of single runs."""
+    return {
+        "displacement": (cell, "m", "displacement at rest", np.nan),
+        "last_displacement": (cell, "m", "displacement that a run ends with that is not at rest, mean where it swings",
+                              np.nan),
+        "error": (cell, "1", "error in the engine, (displacement - reference) / |reference|", np.nan),
+        "solver_error": (cell, "1", "what the engine adds to the definition's error", np.nan),
+        "residual": (cell, "1", "out-of-balance force of the network at rest in the engine, over the load", np.nan),
+        "frame_seconds": (cell, "s", "time of a frame, without the first ones", np.nan),
+        "frames": (cell, "1", "frames that were taken", np.nan),
+        "swing": (cell, "m", "largest amplitude about the mean", np.nan),
+        "status": (cell, "1", "what became of the run", 0),
+        "engine_status": (cell, "1", "how the run ended", 0),
+        "message": (cell, "1", "why it is not at rest, or not comparable", ""),
+    }  # fmt: skip
+
+
+SCENE_AND_PROGRAM = {
+    "scene_beam": (("scene",), "1", "beam", ""),
+    "scene_mesh_type": (("scene",), "1", "mesh type", ""),
+    "scene_mesh_size": (("scene",), "m", "asked length of an edge", np.nan),
+    "scene_material": (("scene",), "1", "material", ""),
+    "scene_load": (("scene",), "1", "load", ""),
+    "scene_force": (("scene",), "N", "magnitude of the force", np.nan),
+    "program": (("engine",), "1", "program that the engine is of", ""),
+}
+
+IN_BOTH = (
+    OF_NETWORK
+    | {"engine_version": (("engine",), "1", "versions of what the engine needs, as it was run", "")}
+    | SCENE_AND_PROGRAM
+)
+"""Variables of both groups."""
+
+END_FLAGS = {
+    "engine_status": {"flag_values": np.arange(len(RUN_ENDS), dtype="int8"), "flag_meanings": " ".join(RUN_ENDS)}
+}
+
+ENGINE_DIMENSIONS = {
+    "scene": "scene in engines",
+    "engine": "program and solver",
+    "precision": "floating-point numbers",
+    "dt": ("time of a frame", "s"),
+    "substeps": "steps of a frame",
+    "iterations": "iterations of the solver in a step",
+    "stiffness_factor": "factor on all stiffnesses that are typed",
+}
+"""Own dimensions."""
+
+BEST = {
+    "best_factor": (OF_A_RUN, "1", "factor at which the displacement is the reference's", np.nan),
+    "best_factor_message": (OF_A_RUN, "1", "why no factor is the best", ""),
+}
+
+ENGINE_RUNS = Group("/engines", _of_runs(OF_A_RUN) | IN_BOTH, ENGINE_DIMENSIONS, further=END_FLAGS)
+ENGINE_CURVES = Group("/engine_curves", _of_runs(OF_A_CURVE) | BEST | IN_BOTH, ENGINE_DIMENSIONS, further=END_FLAGS)
+
+
+def groups(study, folder):
+    """Groups of a dataset, see `springtune.studies.kinds.scenes.collect.groups`."""
+    found = {task.of: (task.labels, result) for task, result in results(STAGE, study, folder)}
+    made = {}
+    for group, runs in zip((ENGINE_RUNS, ENGINE_CURVES), divided(found)):
+        if runs:
+            made[group.name] = _gathered(group, study, [(run, *found[run]) for run in runs])
+    return made
+
+
+def _gathered(group, study, found):
+    axes = {name: tuple(dict.fromkeys(labels[name] for _, labels, _ in found)) for name in ENGINE_DIMENSIONS}
+    axes |= {name: tuple(sorted(axes[name])) for name in ("dt", "substeps", "iterations", "stiffness_factor")}
+    filler, curves = Filler(group.empty(study.axes | axes)), defaultdict(list)
+    for run, labels, result in found:
+        about = {"scene_beam": run.beam.name, "scene_material": run.material.name, "program": run.program}
+        about |= {f"scene_{name}": getattr(run, name) for name in ("mesh_type", "mesh_size", "load", "force")}
+        filler.put({name: value for name, value in (result | about).items() if name in group.variables}, **labels)
+        curves[tuple(labels[name] for name in OF_A_RUN)].append((labels["stiffness_factor"], result))
+    for setting, points in curves.items() if group is ENGINE_CURVES else ():
+        filler.put(_best(points), **dict(zip(OF_A_RUN, setting)))
+    return filler.data.set_coords([*SCENE_AND_PROGRAM])
+
+
+def _best(points):
+    """Factor at which the displacement is the reference's: between two, displacements are linear in 1 / factor."""
+    known = sorted((factor, result["error"]) for factor, result in points if np.isfinite(result.get("error", np.nan)))
+    found = []
+    for (below, high), (above, low) in zip(known, known[1:]):
+        if high * low <= 0 and high != low:
+            share = high / (high - low)
+            found.append(1 / ((1 - share) / below + share / above))
+    if found:
+        return {"best_factor": min(found, key=lambda factor: abs(np.log(factor)))}
+    if len(known) < 2:
+        return {"best_factor_message": f"{len(known)} of {len(points)} runs are at rest, and two are needed"}
+    factor, error = min(known, key=lambda one: abs(one[1]))
+    said = f"no factor from {known[0][0]:g} to {known[-1][0]:g} is right; {factor:g} is off by {100 * error:+.3g} %"
+    return {"best_factor_message": said}

@@ -1,0 +1,279 @@
+"""Scenes in engines: every combination of the values of a study's section ``engines``."""
+
+from dataclasses import dataclass
+from itertools import product
+from math import prod
+from typing import Annotated
+
+from pydantic import Field
+
+from springtune.mechanics.integrators import PRECISIONS
+from springtune.mesh import MESH_TYPES
+from springtune.problem.geometry import Beam
+from springtune.problem.loads import LOADS
+from springtune.problem.materials import Material
+from springtune.problem.quantities import nearest
+from springtune.springs import DEFINITIONS
+from springtune.springs.lattice import COEFFICIENT
+
+from ...config.checks import (
+    FEWER,
+    MOST_CELLS,
+    check_able,
+    check_beam_material,
+    check_density,
+    check_known,
+    check_particles,
+    check_product,
+)
+from ...config.fields import (
+    BeamName,
+    DefinitionName,
+    Force,
+    Length,
+    Load,
+    MaterialName,
+    Named,
+    OneOrMore,
+    Ratios,
+    Scalar,
+    number,
+    one_of,
+    quantity,
+)
+from ...config.kind import Kind
+from ...config.sections import Section, default, optional
+from ...runs.keys import beam_key, declared_key, definition_key, distribution, installed, material_key, mesh_type_key
+from ...runs.stages import Task, stage
+from . import SETTING
+from .outputs import OUTPUTS
+
+MOST_ENGINE_RUNS = 10_000
+"""Most combinations of one set of runs; each takes a tenth of a second and more."""
+
+OWN_PRECISION = "own"
+"""The first precision of each engine."""
+
+
+def _read_frame(value: str) -> float:
+    above, slash, below = value.strip().removesuffix("s").strip().partition("/")
+    if slash and above.isdecimal() and below.isdecimal() and int(above) and int(below):
+        return int(above) / int(below)
+    found: float = quantity("time").read(value)
+    return found
+
+
+_COUNT = number("a whole number from 1 to 100000, such as 10", 1, 100_000, whole=True)
+Count = Annotated[int, _COUNT]
+EngineName = Annotated[str, Scalar(str, {"type": "string", "examples": ["xpbd"]}, "an engine such as 'xpbd'")]
+FrameTime = Annotated[
+    float, Scalar(_read_frame, {"type": "string", "examples": ["1/60 s"]}, "a time such as '1/60 s' or '5 ms'")
+]
+MadeType = Annotated[str, one_of("mesh type", MESH_TYPES)]
+Precision = Annotated[str, one_of("precision", (OWN_PRECISION, *PRECISIONS))]
+SceneName = Annotated[str, Scalar(str, {"type": "string"}, "the name of a scene")]
+
+
+class EngineSceneConfig(Section):
+    """A scene that is run in engines."""
+
+    beam: BeamName = Field(description="Beam.")
+    mesh_type: MadeType = default("right", description="Generated mesh type.")
+    mesh_size: Length = Field(description="Length of an edge.")
+    material: MaterialName = Field(description="Material, with a density.")
+    load: Load = Field(description="Load whose forces keep their direction.")
+    force: Force = Field(description="Magnitude of the force.")
+
+
+class EngineRunsConfig(Section):
+    """Runs in engines: every combination of the values listed, as in a grid."""
+
+    scene: Annotated[list[SceneName], OneOrMore()] | None = Field(None, description="Scenes; all of them without.")
+    definition: Annotated[list[DefinitionName], OneOrMore()] = Field(
+        description="Definitions that derive a stiffness and need no reference. An engine that lacks an energy of one "
+        "refuses it, in a hole that says so."
+    )
+    engine: Annotated[list[EngineName], OneOrMore()] = Field(
+        description="Engines, keys of `springtune.ENGINES`. One that is not installed is a hole that says how it is."
+    )
+    iterations: Annotated[list[Count], OneOrMore()] = default(
+        "10", description="Iterations of the engine's solver in a step; 1 where an engine has none."
+    )
+    substeps: Annotated[list[Count], OneOrMore()] = default("1", description="Steps of a frame.")
+    dt: Annotated[list[FrameTime], OneOrMore()] = default("1/60 s", description="Time of a frame.")
+    precision: Annotated[list[Precision], OneOrMore()] = default(
+        OWN_PRECISION, description="Floating-point numbers; `own` is what an engine has by itself."
+    )
+    stiffness_factor: Ratios = default(
+        "1",
+        description="Factors on all stiffnesses that are typed; several give a sensitivity curve in the engine, and "
+        "the factor at which its displacement is right.",
+    )
+
+
+class EnginesConfig(Section):
+    """Scenes in the engines that people run, at the settings that they run them at."""
+
+    scenes: Annotated[dict[str, EngineSceneConfig], Named("scene")] = Field(description="Scenes.")
+    runs: Annotated[dict[str, EngineRunsConfig], Named("set of runs", for_files=False)] = Field(
+        description="Sets of runs."
+    )
+    frames: Count | None = Field(None, description="Most frames of a run; by default as many as its motion needs.")
+
+
+@dataclass(frozen=True)
+class EngineRun:
+    """A scene in an engine at a setting; the force is a magnitude [N], `dt` the time of a frame [s].
+
+    Runs `of_curve` have factors on what is typed.
+    """
+
+    scene: str
+    beam: Beam
+    mesh_type: str
+    mesh_size: float
+    material: Material
+    load: str
+    force: float
+    definition: str
+    engine: str
+    program: str
+    precision: str
+    dt: float
+    substeps: int
+    iterations: int
+    stiffness_factor: float
+    frames: int | None
+    of_curve: bool
+
+
+def _engines():
+    # Here, since a study without engines needs none of their modules.
+    from springtune.engines.base import ENGINES
+
+    return ENGINES
+
+
+def _check(config, problems):
+    section = config.engines
+    for name, scene in section.scenes.items():
+        _check_scene(scene, ("engines", "scenes", name), config, problems)
+    for name, runs in section.runs.items():
+        place, engines = ("engines", "runs", name), _engines()
+        for engine in runs.engine:
+            if engine not in engines:
+                problems.add((*place, "engine"), f"unknown engine '{engine}'; {nearest(engine, engines)}")
+        for one in runs.scene or section.scenes:
+            check_known(problems, (*place, "scene"), "scene", one, section.scenes, "engines.scenes")
+            if one in section.scenes:
+                _check_definitions(runs, section.scenes[one], one, (*place, "definition"), problems)
+        labels = ("definition", "engine", *SETTING, "stiffness_factor")
+        check_product(problems, runs, place, labels, MOST_ENGINE_RUNS)
+    lists = [{value for runs in section.runs.values() for value in getattr(runs, name)} for name in labels]
+    cells = len(section.scenes) * prod(map(len, lists))
+    if cells > MOST_CELLS:
+        message = f"{cells:.3g} cells of all labels together; a dataset has at most {MOST_CELLS}: {FEWER}"
+        problems.add(("engines", "runs"), message)
+
+
+def _check_scene(scene, place, config, problems):
+    check_known(problems, (*place, "beam"), "beam", scene.beam, config.beams)
+    check_beam_material(problems, (*place, "material"), scene.material, config)
+    check_density(config, scene.material, (*place, "material"), problems)
+    if LOADS[scene.load].follower:
+        able = ", ".join(name for name, load in LOADS.items() if not load.follower)
+        message = f"'{scene.load}' turns with its side, and forces in engines do not; choose of {able}"
+        problems.add((*place, "load"), message)
+    if scene.beam in config.beams:
+        extent = config.beams[scene.beam].length, config.beams[scene.beam].height
+        refusal = MESH_TYPES[scene.mesh_type].refusal(*extent, scene.mesh_size, f"beam '{scene.beam}'")
+        if refusal:
+            problems.add((*place, "mesh_size"), f"{1e3 * scene.mesh_size:g} mm {refusal}")
+        else:
+            check_particles(problems, (*place, "mesh_size"), [scene.mesh_size], *extent)
+
+
+def _check_definitions(runs, scene, name, place, problems):
+    mesh_type, kind = MESH_TYPES[scene.mesh_type], LOADS[scene.load].kind
+    why = f"needs a reference or a stated stiffness, or other cells or loads than scene '{name}' has;"
+    check_able(problems, place, runs.definition, why, mesh_type.corners, kind.uniaxial)
+
+
+def _expand(config, declared):
+    section, engines, found = config.engines, _engines(), {}
+    for runs in section.runs.values():
+        values = (runs.precision, runs.dt, runs.substeps, runs.iterations, runs.stiffness_factor)
+        names = runs.scene or section.scenes
+        for name, definition, engine, setting in product(names, runs.definition, runs.engine, product(*values)):
+            precision, dt, substeps, iterations, factor = setting
+            scene, solver = section.scenes[name], engines[engine]
+            precision = solver.precisions[0] if precision == OWN_PRECISION else precision
+            body = declared.beams[scene.beam], scene.mesh_type, scene.mesh_size, declared.materials[scene.material]
+            how = definition, engine, solver.program, precision, dt, substeps, iterations if solver.iterates else 1
+            of_curve = runs.stiffness_factor != [1.0]
+            run = EngineRun(name, *body, scene.load, scene.force, *how, factor, section.frames, of_curve)
+            found[run] = None
+    ranks = [list(one) for one in (section.scenes, DEFINITIONS, engines)]
+
+    def order(run):
+        names = (run.scene, run.definition, run.engine)
+        numbers = [getattr(run, name) for name in (*SETTING, "stiffness_factor", "of_curve")]
+        return [rank.index(name) for rank, name in zip(ranks, names)], numbers
+
+    return tuple(sorted(found, key=order))
+
+
+def _summary(runs):
+    engines = dict.fromkeys(run.engine for run in runs)
+    absent = [name for name in engines if _engines()[name].absent]
+    told = f"; not installed: {', '.join(absent)}" if absent else ""
+    return [["engines", len(runs), f"runs in {', '.join(engines)}{told}"]]
+
+
+def _version(engine):
+    """Versions of what an engine needs, "none" of what is absent: a new one runs it again."""
+    return ", ".join(f"{name} {installed(name)}" for name in map(distribution, engine.needs))
+
+
+def _tasks(study):
+    """Runs of an engine follow each other in one job, since their seconds are measured."""
+    of_cell = ("scene", "definition", "engine", *SETTING, "stiffness_factor")
+    for run in study.parts["engines"]:
+        engine = _engines()[run.engine]
+        of_task = (*of_cell[1:], "mesh_type", "mesh_size", "load", "force", "frames")
+        values = {name: getattr(run, name) for name in of_task}
+        values |= {"beam": beam_key(run.beam), "material": material_key(run.material, density=True)}
+        values["engine_version"] = _version(engine)
+        also = mesh_type_key(run.mesh_type), definition_key(run.definition), declared_key(engine)
+        particles = run.beam.length * run.beam.height / (COEFFICIENT * run.mesh_size**2)
+        name = f"engines {run.program.lower()}"
+        cost = name if name in COSTS else "engines", run.substeps * run.iterations * particles
+        yield Task(values, also, {name: getattr(run, name) for name in of_cell}, run, [cost], run.engine)
+
+
+COSTS = {
+    "engines": (0.2, 1e-5),
+    "engines springtune": (0.1, 2e-6),
+    "engines newton": (1.0, 2e-5),
+    "engines mujoco": (0.2, 5e-6),
+    "engines pybullet": (0.2, 5e-6),
+}
+"""Seconds of a run by program, and by particles, substeps and iterations."""
+
+
+STAGE = stage("engines", "studies.kinds.engines.solve", "Running scenes in engines", _tasks, alone=True)
+
+KIND = Kind(
+    "engines",
+    study_fields={"engines": optional(EnginesConfig, "Scenes in engines; they make the groups `/engines` and "
+                                      "`/engine_curves`.")},
+    check=_check,
+    expand=_expand,
+    axes=lambda runs: {"definition": {run.definition for run in runs}},
+    summary=_summary,
+    stages=(STAGE,),
+    outputs=OUTPUTS,
+    tables=lambda study: ["engines"] if study.parts["engines"] else [],
+    tables_by="outputs",
+    costs=COSTS,
+)  # fmt: skip

@@ -1,0 +1,92 @@
+"""Figures and table of runs in engines, and what the page to browse shows of them."""
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+from ...config.kind import Output, needs
+from ...output.browse import Plot, View
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def figures(scenes: Iterable[object], curves: Iterable[object]) -> dict[str, dict[str, object]]:
+    """Figures by stem: of scenes that were run, and of those with curves."""
+    shown = {"errors": scenes, "maps": scenes, "curves": curves, "factors": curves}
+    return {f"engines_{name}_{scene}": {"scene": scene} for name, own in shown.items() for scene in dict.fromkeys(own)}
+
+
+def divided(runs: Iterable[Any]) -> tuple[list[Any], list[Any]]:
+    """Runs with what is typed as it is, and those of curves."""
+    runs = list(runs)
+    return [run for run in runs if not run.of_curve], [run for run in runs if run.of_curve]
+
+
+OUTPUTS = (
+    Output(
+        "engines",
+        "figures of scenes in engines: error over the time of a frame, maps of settings, sensitivity curves",
+        figures=lambda study: figures(*([run.scene for run in own] for own in divided(study.parts["engines"]))),
+        plot="studies.kinds.engines.figures:engines",
+        lack=needs("engines", "shows scenes in engines and the study has none; add a section 'engines'"),
+    ),
+)
+
+VIEWS = (
+    View(
+        "/engines",
+        "Engines",
+        "Scenes in engines at rest: how far off at a setting, and what a frame takes.",
+        (
+            Plot("error over iterations", "error", "iterations", "engine", log="xy"),
+            Plot("error over the time of a frame", "error", "frame_seconds", "engine", along="iterations", log="xy"),
+            Plot("error over substeps", "error", "substeps", "engine", log="xy"),
+            Plot("how runs end", "engine_status", "iterations", "substeps", "map"),
+            Plot("error by engine and definition", "error", "engine", "definition", "map"),
+            Plot("time of a frame", "frame_seconds", "iterations", "engine", log="xy"),
+        ),
+    ),
+    View(
+        "/engine_curves",
+        "Engine curves",
+        "Sensitivity curves in engines: the error over a factor on the stiffness that is typed.",
+        (
+            Plot("error over the typed factor", "error", "stiffness_factor", "engine", log="xy"),
+            Plot("error over the typed factor, by iterations", "error", "stiffness_factor", "iterations", log="xy"),
+            Plot("best factor over iterations", "best_factor", "iterations", "engine", log="xy"),
+        ),
+    ),
+)
+
+ENGINE_COLUMNS = {
+    "dt_ms": ("dt", 1e3),
+    "displacement_mm": ("displacement", 1e3),
+    "reference_mm": ("reference_displacement", 1e3),
+    "error_percent": ("error", 100),
+    "definition_error_percent": ("definition_error", 100),
+    "solver_error_percent": ("solver_error", 100),
+    "frame_ms": ("frame_seconds", 1e3),
+}
+"""Columns of the table: variable, and factor on it."""
+
+
+def tables(tree: "xr.DataTree") -> list[dict[str, Any]]:
+    """Tables of the page, see `springtune.studies.kinds.scenes.tables.tables`."""
+    from ...output.selection import records  # here, since a plan does without xarray
+    from . import RUN_ENDS
+
+    if "engines" not in tree:
+        return []
+    data = tree["engines"].to_dataset()
+    names = [name for name, _ in ENGINE_COLUMNS.values() if name in data.data_vars]
+    rows = [
+        {name: one[name] for name in ("scene", "definition", "engine", "precision", "substeps", "iterations")}
+        | {column: factor * one[name] for column, (name, factor) in ENGINE_COLUMNS.items()}
+        | {"end": RUN_ENDS[int(one["engine_status"])], "why": one["message"]}
+        for one in records(data, data.status != 0, (*names, "engine_status", "message"))
+    ]
+    note = (
+        "Displacement of the load where it rests in an engine, beside finite elements. The error is that of the "
+        "definition, which its network has in equilibrium, and what the engine's solver adds at this setting."
+    )
+    return [{"stem": "engines", "title": "Scenes in engines", "note": note, "rows": rows}]

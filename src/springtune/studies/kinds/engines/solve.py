@@ -1,0 +1,85 @@
+"""Stage `engines`: a scene in an engine at a setting, beside its network's equilibrium and the reference."""
+
+from functools import lru_cache
+
+from springtune.engines.base import ENGINES, EngineAbsentError, EngineError, Setting
+from springtune.engines.run import in_engine
+from springtune.problem.compare import deformation_error
+from springtune.problem.geometry import Beam
+from springtune.problem.materials import material_of
+from springtune.problem.status import Status
+from springtune.reference.small_strain import ReferenceNotConvergedError
+from springtune.scene.meshes import make_mesh
+from springtune.scene.single import Scene
+
+from . import RUN_ENDS
+
+OUR_PROGRAM = "springtune"
+"""Program of the engines whose errors are errors of this package."""
+
+OF_THE_SCENE = ("mesh_type", "mesh_size", "load", "force", "definition")
+"""Values of a task that its scene depends on, besides beam and material."""
+
+
+def failed(task, why, end="failed"):
+    """Result of a run that did not begin, or did not end by itself."""
+    return {"status": Status.FAILED, "engine_status": RUN_ENDS.index(end), "message": why}
+
+
+def solve(task):
+    """Result of a run; what an engine refuses, or fails in, is a hole with a reason."""
+    body = Beam(**task["beam"]), material_of(task["material"])
+    scene, known, objection = _scene(*body, *(task[name] for name in OF_THE_SCENE))
+    engine, setting = ENGINES[task["engine"]], (task["dt"], task["substeps"], task["iterations"], task["precision"])
+    try:
+        found = in_engine(scene, engine.name, Setting(*setting), factor=task["stiffness_factor"], frames=task["frames"])
+    except EngineError as error:
+        end = "absent" if isinstance(error, EngineAbsentError) else "refused"
+        return known | failed(task, str(error), end)
+    except MemoryError:
+        raise
+    except Exception as error:  # a program of others may raise anything, and other runs go on
+        if engine.program == OUR_PROGRAM:
+            raise
+        return known | failed(task, f"{engine.name}: {type(error).__name__}: {error}")
+    at_rest = found.status == "rest"
+    result = {
+        "status": Status.SOLVED if at_rest else Status.NOT_CONVERGED,
+        "engine_status": RUN_ENDS.index(found.status),
+        "message": "; ".join(filter(None, (found.message, objection))),
+        "displacement" if at_rest else "last_displacement": found.displacement,
+        "swing": found.swing,
+        "frames": found.frames,
+        "frame_seconds": found.frame_seconds,
+        "engine_version": task["engine_version"],
+    }
+    if at_rest:
+        reference = known["reference_displacement"]
+        result |= {
+            "residual": found.residual,
+            "error": float(deformation_error(found.displacement, reference)),
+            "solver_error": (found.displacement - known["network_displacement"]) / abs(reference),
+        }
+    return known | result
+
+
+@lru_cache(maxsize=8)
+def _scene(beam, material, mesh_type, mesh_size, load, force, definition):
+    """Scene, its network's and its reference's displacement [m], and why the two are not to be compared."""
+    mesh = make_mesh(beam, mesh_type, mesh_size)
+    scene = Scene(beam, mesh, material, load, force, definition=definition)
+    solved = scene.solve()
+    why = [f"network: {solved.status}, {solved.message}"] if solved.status != Status.SOLVED else []
+    try:
+        reference = next(iter(scene.reference_values().values()))
+        why += filter(None, [scene.objection])
+    except ReferenceNotConvergedError as error:
+        reference = float("nan")
+        why.append(f"no reference: {error}")
+    known = {
+        "network_displacement": solved.displacement,
+        "reference_displacement": reference,
+        "definition_error": float(deformation_error(solved.displacement, reference)),
+        "particles": len(mesh.points),
+    }
+    return scene, known, "; ".join(why)
