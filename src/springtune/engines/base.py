@@ -134,8 +134,12 @@ DAMPERS: dict[str, Callable[[Damping], Any]] = {
     "alpha m, one for each particle": lambda damping: damping.mass_damping * damping.scene.statement.masses(),
     "beta": lambda damping: damping.stiffness_damping,
     "beta k, one for each spring": lambda damping: damping.dashpots,
+    "beta k, one for all springs": lambda damping: damping.dashpots.mean(),
 }
 """Dampers that are typed into engines, by the formula of their parameter; each alone has the damping ratio."""
+
+DASHPOT = Parameter("N s/m", "beta k, one for each spring")
+"""Damper of a spring."""
 
 VELOCITIES = Parameter("1/s", "alpha")
 """Damping over mass by `springtune.in_engine`, which every engine has."""
