@@ -70,7 +70,7 @@ class Damping(Tabled):
     >>> bool(abs(damping.dashpots - damping.stiffness_damping * st.SpringNet.from_scene(scene).stiffness).max() < 1e-12)
     True
     >>> f"{1e6 * damping.particle_dampers.max():.0f} uN s/m"
-    '0 uN s/m'
+    '98 uN s/m'
     """
 
     scene: Scene = field(repr=False)
