@@ -121,10 +121,13 @@ def fit_decay(times: np.ndarray | str | Path, displacements: np.ndarray | None =
                key=lambda found: found.cost)  # fmt: skip
     decay, frequency = best.x
     misfit = np.sqrt(2 * best.cost / len(x))
-    if not decay > 0 or frequency * span < 2 * np.pi or misfit > MOST_MISFIT:
+    if not decay > 0 or misfit > MOST_MISFIT or frequency * span < 2 * np.pi:
+        why = f"a damped cosine leaves {100 * misfit:.0f} %" if decay > 0 else "they grow"
+        if decay > 0 and misfit <= MOST_MISFIT:
+            why = f"they are {frequency * span / (2 * np.pi):.2g} of a period"
         raise ValueError(
-            f"displacements: are no swing that decays, a damped cosine leaves {100 * misfit:.0f} %; give a whole "
-            "period or more of one mode that swings freely, from after it is let go"
+            f"displacements: are no swing that decays, {why}; give a whole period or more of one mode that swings "
+            "freely, from after it is let go"
         )
     covariance = 2 * best.cost / (len(t) - 5) * np.linalg.inv(best.jac.T @ best.jac)
     slope = 2 * np.pi / frequency * np.array([1, -decay / frequency])
