@@ -122,22 +122,15 @@ def fit_decay(times: np.ndarray | str | Path, displacements: np.ndarray | None =
     decay, frequency = best.x
     misfit = np.sqrt(2 * best.cost / len(x))
     if not decay > 0 or misfit > MOST_MISFIT or frequency * span < 2 * np.pi:
-        why = f"a damped cosine leaves {100 * misfit:.0f} %" if decay > 0 else "they grow"
-        if decay > 0 and misfit <= MOST_MISFIT:
-            why = f"they are {frequency * span / (2 * np.pi):.2g} of a period"
         raise ValueError(
-            f"displacements: are no swing that decays, {why}; give a whole period or more of one mode that swings "
-            "freely, from after it is let go"
+            "displacements: are no swing that decays over a period or more; give those of one mode that swings freely, "
+            "from after it is let go"
         )
+    period, decrement = 2 * np.pi / frequency, 2 * np.pi * decay / frequency
     covariance = 2 * best.cost / (len(t) - 5) * np.linalg.inv(best.jac.T @ best.jac)
-    slope = 2 * np.pi / frequency * np.array([1, -decay / frequency])
-    return Decay(
-        float(2 * np.pi / frequency),
-        float(2 * np.pi * decay / frequency),
-        float(2 * np.pi / frequency**2 * np.sqrt(covariance[1, 1])),
-        float(np.sqrt(slope @ covariance @ slope)),
-        float(misfit),
-    )
+    slopes = np.array([[0, -period / frequency], [period, -decrement / frequency]])
+    errors = np.sqrt(np.diag(slopes @ covariance @ slopes.T))
+    return Decay(*map(float, (period, decrement, *errors, misfit)))
 
 
 def _check(t: np.ndarray, x: np.ndarray) -> None:
