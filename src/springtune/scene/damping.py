@@ -297,7 +297,7 @@ def damping_of(
     >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "5 mm"), rubber, "bending", "1 mN")
     >>> damping = st.damping_of(scene, decrement=0.3, period="0.19 s")
     >>> print(*damping.notes[0].split("; "), sep="\n")
-    the measured period is 13 % longer than the scene's
+    the measured period is 1.13 times the scene's
     multiply stiffnesses by 0.784 or the density by 1.28, and ask again
 
     Two modes, and one number too few:
@@ -382,13 +382,13 @@ def _rayleigh(name: str, ratios: list[float], frequencies: list[float]) -> tuple
 
 def _notes(factor: float, measured: list[float], own: float) -> tuple[str, ...]:
     """What a measured period says of the stiffness, and the frequency of a loss factor of what it is for."""
-    longer = 1 / np.sqrt(factor) - 1
-    if abs(longer) > CLOSE:
-        return (
-            f"the measured period is {100 * abs(longer):.2g} % {'longer' if longer > 0 else 'shorter'} than the "
-            f"scene's; multiply stiffnesses by {factor:.3g} or the density by {1 / factor:.3g}, and ask again",
-        )
+    longer = 1 / np.sqrt(factor)
+    if abs(longer - 1) > CLOSE:
+        remedy = f"multiply stiffnesses by {factor:.3g} or the density by {1 / factor:.3g}, and ask again"
+        return (f"the measured period is {longer:.3g} times the scene's; {remedy}",)
     if len(measured) == 1 and abs(measured[0] / own - 1) > CLOSE:
-        hertz, loaded = measured[0] / (2 * np.pi), own / (2 * np.pi)
-        return (f"the loss factor is of {hertz:.3g} Hz, and the loaded mode at {loaded:.3g} Hz; give the one of there",)
+        there, here = measured[0] / (2 * np.pi), own / (2 * np.pi)
+        return (
+            f"the loss factor is of {there:.3g} Hz, and the loaded mode at {here:.3g} Hz; give the one of {here:.3g}",
+        )
     return ()
