@@ -21,7 +21,7 @@ import numpy as np
 from ..handover.mujoco import VERSIONS, elasticity, model
 from ..handover.net import SpringNet
 from ..handover.simulation import Simulation, lame
-from .base import SPRING, EngineError, Parameter, Session, Setting, engine, release
+from .base import DASHPOT, SPRING, EngineError, Parameter, Session, Setting, engine, release
 
 FLEX_SINCE = (3, 3, 7)
 """Version of MuJoCo that first has the law of a flex."""
@@ -35,7 +35,7 @@ TYPED = {
 """Stiffness of a tendon; or what an ``elastic2d="stretch"`` flex has."""
 
 JOINTS = {"joint damping": Parameter("N s/m", "alpha m, one for each particle")}
-STIFF = {"tendon damping": Parameter("N s/m", "beta k, one for each spring"), "flex damping": Parameter("s", "beta")}
+STIFF = {"tendon damping": DASHPOT, "flex damping": Parameter("s", "beta")}
 """Dampers over stiffness. `implicit` and `implicitfast` leave out what a tendon between two bodies does to the other
 one, so that it slows them as a mass does: there, joints alone damp as they should."""
 

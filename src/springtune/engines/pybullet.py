@@ -143,7 +143,7 @@ class _Session:
         "springBendingStiffness": Parameter("N/m", "0; it is 0.1 where it is not given"),
     },
     iterates=False,
-    dampers={"springDampingStiffness": Parameter("N s/m", "beta k, one for each spring")},
+    dampers={"springDampingStiffness": Parameter("N s/m", "beta k, one for all springs")},
     typed=typed,
     source="Bullet's source, btDeformableMassSpringForce.h",
 )
