@@ -95,7 +95,7 @@ REFUSED = {
 
 @pytest.mark.parametrize("case", REFUSED)
 def test_what_has_no_positive_compliance_is_refused(case, monkeypatch, tmp_path):
-    (definition, mesh_type, name), (material, what) = CASES[case], REFUSED[case]
+    (definition, _, name), (material, what) = CASES[case], REFUSED[case]
     monkeypatch.setitem(MATERIALS, name, material)
     one = scene(case, share=0.01)
     said = rf"definition '{definition}': \d+ of \d+ {what}, and no compliance of XPBD is negative; take"

@@ -49,27 +49,23 @@ def _project_springs(x, weights, springs, lengths, compliance, multipliers, iter
 def _volume(trace, area, shear, bulk):  # type: ignore[no-untyped-def]
     """Logarithm of the volume of compressible rubber, by Newton's method."""
     v = 0.0
-    for _ in range(12):
+    for _ in range(8):
         pull, press, grown = trace * np.exp(-2 * v / 3), np.exp(4 * v / 3) / area**2, np.exp(v)
         slope = shear / 3 * (2 * press - pull) + bulk * grown * (grown - 1)
         bend = shear / 9 * (2 * pull + 8 * press) + bulk * grown * (2 * grown - 1)
         v = max(v - slope / bend, -0.6)
-        if abs(slope) < 1e-15 * bend:
-            break
     return v
 
 
 @compiled
-def _rubber(here, slopes, growth, law, compressible, value, by):  # type: ignore[no-untyped-def]
+def _rubber(here, slopes, area, growth, law, compressible, value, by):  # type: ignore[no-untyped-def]
     """Constraints of a triangle of rubber, and their derivatives; `growth` is that of its area by its corners."""
-    area, across, turned = 0.0, 0.0, 0.0
+    across, turned, share = 0.0, 0.0, 1.0
     for c in range(3):
-        area += 0.5 * (here[c, 0] * growth[c, 0] + here[c, 1] * growth[c, 1])
         across += here[c, 0] * slopes[c, 0] - here[c, 1] * slopes[c, 1]
         turned += here[c, 0] * slopes[c, 1] + here[c, 1] * slopes[c, 0]
-    area = max(area, FLATTEST)
-    volume = _volume(across**2 + turned**2 + 2 * area, area, law[0], law[1]) if compressible else 0.0
-    share = np.exp(-volume / 3)
+    if compressible:
+        share = np.exp(-_volume(across**2 + turned**2 + 2 * area, area, law[0], law[1]) / 3)
     r = area * share**2
     root = np.sqrt(2 * r + 1)
     value[0], value[1], value[2] = share * across, share * turned, (r - 1) * root / r
@@ -87,8 +83,7 @@ def _rubber(here, slopes, growth, law, compressible, value, by):  # type: ignore
                 whole = value[0] * by[0, c, d] + value[1] * by[1, c, d] + value[2] * by[2, c, d]
                 for a in range(3):
                     by[a, c, d] = scale * by[a, c, d] + more * value[a] * whole
-        for a in range(3):
-            value[a] *= scale
+        value *= scale
 
 
 @compiled
@@ -98,15 +93,14 @@ def _project_cells(x, weights, kind, cells, rest, slopes, law, compliance, multi
     here, growth, value = np.empty((corners, 2), x.dtype), np.empty((corners, 2), x.dtype), np.empty(size, x.dtype)
     by, matrix = np.zeros((size, corners, 2), x.dtype), np.empty((size, size), x.dtype)
     for e in range(len(cells)):
-        cell = cells[e]
+        cell, area = cells[e], 0.0
         for c in range(corners):
+            after, before = cell[(c + 1) % corners], cell[c - 1]
             here[c, 0], here[c, 1] = x[cell[c], 0] - x[cell[0], 0], x[cell[c], 1] - x[cell[0], 1]
-        for c in range(corners):
-            after, before = (c + 1) % corners, c - 1
-            growth[c, 0] = 0.5 * (here[after, 1] - here[before, 1])
-            growth[c, 1] = 0.5 * (here[before, 0] - here[after, 0])
+            growth[c, 0], growth[c, 1] = 0.5 * (x[after, 1] - x[before, 1]), 0.5 * (x[before, 0] - x[after, 0])
+            area += 0.5 * (here[c, 0] * growth[c, 0] + here[c, 1] * growth[c, 1])
         if kind == 0:
-            value[0], by[0] = 0.5 * (here * growth).sum() - rest[e, 0], growth
+            value[0], by[0] = area - rest[e, 0], growth
         elif kind == 1:
             for c in range(3):
                 after, before = (c + 1) % 3, c - 1
@@ -115,11 +109,11 @@ def _project_cells(x, weights, kind, cells, rest, slopes, law, compliance, multi
                 by[c, before, 0], by[c, before, 1] = 2 * dx, 2 * dy
                 by[c, after, 0], by[c, after, 1] = -2 * dx, -2 * dy
         else:
-            _rubber(here, slopes[e], growth / rest[e, 0], law[e], kind == 3, value, by)
+            ratio = max(area / rest[e, 0], FLATTEST)
+            _rubber(here, slopes[e], ratio, growth / rest[e, 0], law[e], kind == 3, value, by)
         for a in range(size):
-            value[a] = -value[a]
             for b in range(size):
-                value[a] -= compliance[e, a, b] * multipliers[e, b]
+                value[a] += compliance[e, a, b] * multipliers[e, b]
                 matrix[a, b] = compliance[e, a, b]
                 for c in range(corners):
                     for d in range(2):
@@ -133,10 +127,10 @@ def _project_cells(x, weights, kind, cells, rest, slopes, law, compliance, multi
             for b in range(a + 1, size):
                 value[a] -= matrix[a, b] * value[b]
             value[a] /= matrix[a, a]
-            multipliers[e, a] += value[a]
+            multipliers[e, a] -= value[a]
             for c in range(corners):
                 for d in range(2):
-                    x[cell[c], d] += weights[cell[c], d] * by[a, c, d] * value[a]
+                    x[cell[c], d] -= weights[cell[c], d] * by[a, c, d] * value[a]
 
 
 class _Session(Textbook):
@@ -150,10 +144,10 @@ class _Session(Textbook):
 
     def _group(self, one: Blocks) -> tuple[Any, ...]:
         """Arrays of a kind of blocks, as `_cells` takes them."""
-        values, count = one.values, len(one.cells)
+        values = one.values
         rest = values["rest_length"] ** 2 if "rest_length" in values else values["rest_area"][:, None]
-        slopes = values.get("rest_slope", np.zeros((count, 3, 2)))
-        law = values.get("stiffening", np.zeros((count, 2)))
+        slopes = values.get("rest_slope", np.zeros((0, 3, 2)))
+        law = values.get("stiffening", np.zeros((0, 2)))
         if one.kind == "compressible":
             law = np.column_stack([values["shear"], values["bulk"]]) / values["bulk"][:, None]
         compliance = one.compliance / float(self.h) ** 2
@@ -165,10 +159,9 @@ class _Session(Textbook):
         springs = self.weights, self.springs, self.lengths, self.compliance
         pulls = np.zeros_like(self.lengths)
         groups = [(*one, np.zeros(one[-1].shape[:2], self.kind)) for one in self.groups]
-        if not groups:
-            _project_springs(y, *springs, pulls, self.iterations)
-        for _ in range(self.iterations if groups else 0):
-            _project_springs(y, *springs, pulls, 1)
+        rounds, each = (self.iterations, 1) if groups else (1, self.iterations)
+        for _ in range(rounds):
+            _project_springs(y, *springs, pulls, each)
             for group in groups:
                 _project_cells(y, self.weights, *group)
         return y
@@ -186,6 +179,7 @@ class _Session(Textbook):
         ),
         "rubber compliance": Parameter("1/(N m)", "1 / (G h A0), G = E / (2 (1 + nu))"),
     },
+    implicit=True,
     source="Macklin 2016",
 )
 def session(net: SpringNet, setting: Setting, damping: float) -> Session:

@@ -1,7 +1,7 @@
 """What simulators need besides springs: masses, damping, a stable step, and the equilibrium to expect."""
 
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,7 +10,7 @@ from scipy.sparse import diags_array
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from ..mechanics.dynamics import Motion
-from ..mechanics.energies import AreaEnergy, BiquadraticEnergy, Energy, NeoHookeEnergy, YeohEnergy
+from ..mechanics.energies import AngleEnergy, AreaEnergy, BiquadraticEnergy, Energy, NeoHookeEnergy, YeohEnergy
 from ..mechanics.network import Network
 from ..mechanics.statics import SingularError, StaticProblem
 from ..mesh import Mesh, corner_angles, signed_areas
@@ -66,8 +66,10 @@ class Simulation:
         return float(2 * np.pi / self.loaded_frequency / PERIOD) if self.loaded_frequency else self.step
 
 
-def simulate(net: Net, program: str, laws: Iterable[str] = ()) -> Simulation:
-    """Masses, damping, step and equilibrium of a net for a simulator.
+def simulate(
+    net: Net, program: str, laws: Iterable[str] = (), energies: Callable[[Net, float], list[Energy]] | None = None
+) -> Simulation:
+    """Masses, damping, step and equilibrium of a net for a simulator, whose own `energies` may stand for the net's.
 
     Frequencies are at rest; the springs keep their length law. A mode of frequency w under a damping over mass c > 2 w
     comes to rest with the rate c/2 - sqrt(c^2/4 - w^2), which is the lowest frequency w1 for c = w1 + w^2/w1.
@@ -78,7 +80,7 @@ def simulate(net: Net, program: str, laws: Iterable[str] = ()) -> Simulation:
     load = net.header.get("load")
     # Of a shape, whose load case is of several forces, the factor on it.
     force = float(load.get("force", 1.0)) if load else 0.0
-    network = _network(net, reference)
+    network = network_of(net, reference, energies)
     motion = Motion(network, net.masses / reference, net.forces / reference)
     largest = motion.step_limit("symplectic-euler")
     displacements, lowest, loaded, why = None, 0.0, 0.0, "there is no load"
@@ -175,17 +177,19 @@ def _check(net: Net, program: str, laws: Iterable[str]) -> None:
         )
 
 
-def _network(net: Net, reference: float) -> Network:
+def network_of(
+    net: Net, reference: float, energies: Callable[[Net, float], list[Energy]] | None = None
+) -> Network:
     """The network that a net was written from; everything over the reference stiffness."""
     mesh = Mesh(net.points, net.triangles, net.quads)
     if not np.array_equal(mesh.edges, net.springs):
         raise ValueError("springs: are not the edges of the cells in their order; write the springs of a scene anew")
-    energies = [_energy(net.points, terms, reference) for terms in net.energies]
-    return Network(mesh, net.held, net.stiffness / reference, energies)
+    return Network(mesh, net.held, net.stiffness / reference, (energies or _energies)(net, reference))
 
 
 ENERGIES: dict[str, tuple[type[Energy], tuple[str, ...]]] = {
     "area": (AreaEnergy, ("modulus",)),
+    "angle": (AngleEnergy, ("modulus",)),
     "biquadratic": (BiquadraticEnergy, ("tensile", "coupling")),
     "compressible": (NeoHookeEnergy, ("shear", "bulk")),
     "incompressible": (YeohEnergy, ("c1", "c2", "c3")),
@@ -193,13 +197,18 @@ ENERGIES: dict[str, tuple[type[Energy], tuple[str, ...]]] = {
 """Classes of energies that a network is made of again, and their moduli in order."""
 
 
-def _energy(points: np.ndarray, terms: Terms, reference: float) -> Energy:
-    """Energy that terms were written from."""
-    made, names = ENERGIES[terms.kind]
-    moduli = [terms.values[name] / reference for name in names]
-    there = np.any([one.reshape(len(one), -1).any(axis=1) for one in moduli], axis=0)  # others have no such energy
-    moduli = [one[there] for one in moduli]
-    return made(points, terms.cells[there], *([np.column_stack(moduli)] if made is YeohEnergy else moduli))
+def _energies(net: Net, reference: float) -> list[Energy]:
+    """Energies that the terms of a net were written from."""
+    found = []
+    for terms in net.energies:
+        made, names = ENERGIES[terms.kind]
+        moduli = [terms.values[name] / reference for name in names]
+        there = np.any([one.reshape(len(one), -1).any(axis=1) for one in moduli], axis=0)  # others have no such energy
+        moduli = [one[there] for one in moduli]
+        if made is YeohEnergy:
+            moduli = [np.column_stack(moduli)]
+        found.append(made(net.points, terms.cells[there], *moduli))
+    return found
 
 
 def lame(net: Net, terms: Terms, program: str) -> tuple[float, float]:

@@ -406,6 +406,25 @@ class YeohEnergy(_SheetEnergy):
         return value, first, first * first_j, second, mixed, mixed * first_j + first * second_j
 
 
+@dataclass(frozen=True)
+class StableNeoHookeEnergy(_SheetEnergy):
+    r"""Energy of the neo-Hookean membrane that engines have; `shear` and `first` (n_cells,) are Lame's constants [1].
+
+    .. math:: W = A_0 \left[ \tfrac{\mu}{2} (tr C - 2 J) + \tfrac{\lambda + \mu}{2} (J - 1)^2 \right]
+
+    It is ``mu/2 (tr C - 2) + (lambda + mu)/2 (J - 1 - mu / (lambda + mu))^2`` but for a constant, the law of Smith, de
+    Goes and Kim (Stable neo-Hookean flesh simulation, ACM TOG 37(2), 2018) in the plane. Both constants are over the
+    reference stiffness, times the thickness. No sheet of rubber has this law: its thickness plays no part.
+    """
+
+    shear: np.ndarray
+    first: np.ndarray
+
+    def _law(self, distortion: np.ndarray, growth: np.ndarray) -> tuple[np.ndarray, ...]:
+        half, bulk, none = 0.5 * self.shear, self.first + self.shear, np.zeros_like(growth)
+        return half * distortion + 0.5 * bulk * growth**2, half, bulk * growth, none, none, bulk
+
+
 HALVED = np.log(0.5)
 """Logarithm of the smallest volume with an equilibrium across the sheet in `NeoHookeEnergy`."""
 
