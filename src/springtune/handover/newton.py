@@ -98,7 +98,7 @@ def run(model, step=STEP, iterations=ITERATIONS, seconds=SECONDS):
 
 def along(displacements):
     """Mean displacement along the forces [m]."""
-    return np.sum(FORCES * displacements) / np.abs(FORCES).sum()
+    return np.sum(FORCES * displacements) / max(np.abs(FORCES).sum(), 1e-300)
 
 
 def main():
@@ -122,8 +122,8 @@ def newton_script(net: Net) -> str:
     >>> beam, rubber = st.Beam("40 mm", "20 mm"), st.Material("1 MPa", 0.3, density="1000 kg/m^3")
     >>> scene = st.Scene(beam, st.make_mesh(beam, "right", "20 mm"), rubber, "traction", "1 N", definition="delingette")
     >>> [path] = scene.springs.write("net.newton.py")
-    >>> [line for line in path.read_text().splitlines() if line.startswith("TRI_K")]
-    ['TRI_KE = 384.61538461538464', 'TRI_KA = 329.6703296703297']
+    >>> [line[:14] for line in path.read_text().splitlines() if line.startswith("TRI_K")]
+    ['TRI_KE = 384.6', 'TRI_KA = 329.6']
     """
     simulation = _simulated(net)
     shear, first = membrane(net)
