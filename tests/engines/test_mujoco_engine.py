@@ -1,5 +1,7 @@
 """MuJoCo as an engine: where it comes to rest, what it refuses, and what diverges."""
 
+from importlib import metadata
+
 import mujoco
 import numpy as np
 import pytest
@@ -87,7 +89,7 @@ def test_constants_of_a_flex_are_those_of_the_material(nu):
 
 
 def test_an_integrator_that_came_later_is_absent_by_name(monkeypatch):
-    monkeypatch.setattr("springtune.engines.base.version", lambda name: "3.12.0")
+    monkeypatch.setattr(metadata, "version", lambda name: "3.12.0")
     assert st.ENGINES["mujoco-discrete"].absent.startswith("engine 'mujoco-discrete' needs mujoco>=3.13; install the")
     with pytest.raises(EngineAbsentError, match="needs mujoco>=3.13"):
         st.in_engine(scene(*STRIP, "patch"), "mujoco-discrete")

@@ -52,5 +52,5 @@ def test_steps_beyond_the_stable_one_diverge():
 
 
 def test_several_stiffnesses_are_refused():
-    with pytest.raises(st.EngineError, match="'patch': has springs of .* one stiffness for all .*; take 'paper', or"):
+    with pytest.raises(st.EngineError, match="'patch': has springs of .* one stiffness for all .*; take 'uniform', or"):
         st.in_engine(scene(*QUICK[0], "patch"), "pybullet")

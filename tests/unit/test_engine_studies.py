@@ -208,12 +208,8 @@ def test_every_end_is_in_the_dataset_with_its_reason(collected):
     text = STUDY.replace("iterations: [1, 100], substeps: [1, 4], dt: [1/60 s, 5 ms]", "precision: [own, float32]")
     tree = collected(*TOYS, "missing", text=text.replace("aborting, ", ""))
     data = tree["engines"].to_dataset().squeeze()
-    found = {
-        name: RUN_ENDS[
-            data.sel(engine=name, precision="float32" if name == "missing" else "float64").engine_status.item()
-        ]
-        for name in data.engine.values
-    }
+    own = {name: "float32" if name == "missing" else "float64" for name in data.engine.values}
+    found = {name: RUN_ENDS[data.engine_status.sel(engine=name, precision=own[name]).item()] for name in own}
     assert found == {"toy": "rest", "swinging": "swings", "creeping": "moving", "exploding": "diverged",
                      "broken": "failed", "aborting": "failed", "missing": "absent"}  # fmt: skip
     solved = data.status == st.Status.SOLVED

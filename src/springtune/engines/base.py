@@ -8,7 +8,7 @@ does not move an equilibrium. Forces of the load are dead, and on from the first
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from importlib.metadata import PackageNotFoundError, version
+from importlib import metadata
 from importlib.util import find_spec
 from typing import Any, Protocol, TypeVar
 
@@ -134,8 +134,12 @@ DAMPERS: dict[str, Callable[[Damping], Any]] = {
     "alpha m, one for each particle": lambda damping: damping.mass_damping * damping.scene.statement.masses(),
     "beta": lambda damping: damping.stiffness_damping,
     "beta k, one for each spring": lambda damping: damping.dashpots,
+    "beta k, one for all springs": lambda damping: damping.dashpots.mean(),
 }
 """Dampers that are typed into engines, by the formula of their parameter; each alone has the damping ratio."""
+
+DASHPOT = Parameter("N s/m", "beta k, one for each spring")
+"""Damper of a spring."""
 
 VELOCITIES = Parameter("1/s", "alpha")
 """Damping over mass by `springtune.in_engine`, which every engine has."""
@@ -180,7 +184,9 @@ class Engine(Declared):
     implicit : bool
         Whether its steps, iterated to the end, are of implicit Euler, which damps by itself.
     typed : callable
-        (net) -> dict of the numbers to type by the names of `parameters`: arrays, or one number for all.
+        (net) -> dict of the numbers to type by the names of `parameters`: arrays, or one number for all. Call `numbers`.
+    of_setting : bool
+        Whether these numbers follow the setting: `typed` takes (net, setting).
     source : str
         Where it is described.
 
@@ -214,7 +220,8 @@ class Engine(Declared):
     iterates: bool = True
     dampers: Mapping[str, Parameter] = field(default_factory=lambda: {"damping": VELOCITIES})
     implicit: bool = False
-    typed: Callable[[SpringNet], dict[str, Any]] = field(default_factory=lambda: typed_springs)
+    typed: Callable[..., dict[str, Any]] = field(default_factory=lambda: typed_springs)
+    of_setting: bool = False
     source: str = ""
 
     @property
@@ -258,6 +265,20 @@ class Engine(Declared):
                 )
         if self.absent:
             raise EngineAbsentError(self.absent)
+
+    def numbers(self, net: SpringNet, setting: Setting) -> dict[str, Any]:
+        """Numbers to type, by the names of `parameters`.
+
+        Parameters
+        ----------
+        net : SpringNet
+        setting : Setting
+
+        Returns
+        -------
+        dict of str to float or ndarray
+        """
+        return self.typed(net, setting) if self.of_setting else self.typed(net)
 
     def typed_dampers(self, damping: Damping, setting: Setting) -> dict[str, Any]:
         """Dampers to type for a measured decay, each alone; what the steps damp by themselves is taken off.
@@ -321,8 +342,8 @@ def _there(need: str) -> bool:
     if find_spec(name) is None:
         return False
     try:
-        return not least or release(version(name)) >= release(least)
-    except PackageNotFoundError:  # installed under another name
+        return not least or release(metadata.version(name)) >= release(least)
+    except metadata.PackageNotFoundError:  # installed under another name
         return True
 
 
