@@ -179,10 +179,18 @@ def _declare(order: float, name: str, solver: str, summary: str, parameters: dic
     )(session)
 
 
-IMPLICIT = {"implicit": True, "dampers": {"kd": DASHPOT}}
+IMPLICIT_WITH_KD = {"implicit": True, "dampers": {"kd": DASHPOT}}
 
-_declare(150, "newton-vbd", "VBD", "implicit steps by vertex block descent", VBD, **IMPLICIT)
-_declare(151, "newton-xpbd", "XPBD", "springs alone, all at once in an iteration", {"ke": SPRING}, laws=(), **IMPLICIT)
+_declare(150, "newton-vbd", "VBD", "implicit steps by vertex block descent", VBD, **IMPLICIT_WITH_KD)
+_declare(
+    151,
+    "newton-xpbd",
+    "XPBD",
+    "springs alone, all at once in an iteration",
+    {"ke": SPRING},
+    laws=(),
+    **IMPLICIT_WITH_KD,
+)
 _declare(
     152,
     "newton-semi-implicit",
