@@ -156,7 +156,7 @@ def test_an_engine_without_iterations_has_one(load):
 
 def test_what_is_not_installed_is_said_before_a_run(load):
     ((what, count, said),) = KIND.summary(load(STUDY.replace("ENGINES", "toy, missing")).parts["engines"])
-    assert (what, count) == ("engines", 16) and said == "runs in toy, missing; not installed: missing"
+    assert (what, count) == ("engines", 16) and said == "runs in missing, toy; not installed: missing"
 
 
 REFUSED_STUDIES = {
