@@ -143,11 +143,14 @@ def _model(net: SpringNet, solver: str) -> Any:
         numbers |= triangle_numbers(net, solver)
         each = {name: [value] * len(cells) for name, value in numbers.items()}
         own = {f"style3d:{name}": each.pop(name) for name in STYLE3D if name in each}
-        if own:  # its collision, though off, wants an edge: one without bending
+        builder.add_triangles(*cells.T.tolist(), custom_attributes=own, **each)
+        if own:
+            edges = net.points[cells[:, 1:]] - net.points[cells[:, :1]]
+            builder.tri_poses = np.linalg.inv(np.swapaxes(edges, 1, 2)).tolist()  # along and across are x and y
+            # The collision of Style3D, though off, wants an edge: one without bending.
             first, second = map(int, cells[0, :2])
             free = {"style3d:edge_rest_area": 1.0}
             builder.add_edge(-1, -1, first, second, rest=0.0, edge_ke=0.0, edge_kd=0.0, custom_attributes=free)
-        builder.add_triangles(*cells.T.tolist(), custom_attributes=own, **each)
     builder.set_coloring(colours(net))
     builder.particle_max_velocity = FASTEST
     model = builder.finalize(device="cpu")
