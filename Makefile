@@ -37,13 +37,14 @@ test: $(VENV)/.test
 test-browser: $(VENV)/.test
 	pytest -m "not slow" tests/browser
 
-# Springs in the programs of the extra `engines`, and the study of them. Newton compiles its kernels at the first time, in
-# half a minute; what this machine cannot install is named, and its tests are skipped.
+# Springs in the programs of the extra `engines`, and the study of them, which takes minutes; ENGINES_STUDY= leaves it out.
+# Newton compiles its kernels at the first time, in half a minute. What this machine cannot install is named, and skipped.
 ENGINES := build/engines
-test-engines: export PYTHONPATH = $(CURDIR)/src:$(CURDIR)/$(ENGINES)
+ENGINES_STUDY ?= config/engines.yaml
+WITH_ENGINES = PYTHONPATH="$(CURDIR)/src:$(CURDIR)/$(ENGINES)"
 test-engines: $(VENV)/.test $(ENGINES)/.done
-	pytest -n 2 --dist loadfile -rs -m "not slow" tests/engines
-	springtune run config/engines.yaml
+	$(WITH_ENGINES) pytest -n 2 --dist loadfile -rs -m "not slow" tests/engines
+	$(if $(ENGINES_STUDY),$(WITH_ENGINES) springtune run $(ENGINES_STUDY))
 
 $(ENGINES)/.done: requirements/engines.txt | $(VENV)/.test
 	sh tools/engines.sh $(ENGINES)
@@ -106,9 +107,10 @@ $(MUTANTS): requirements/mutants.txt
 	python -m uv pip install --quiet --require-hashes --no-deps --target $@ --requirement $<
 	touch $@
 
-slow: $(VENV)/.test
+slow: $(VENV)/.test $(ENGINES)/.done
 	pytest -n 2 -m slow tests/workflow tests/fuzz tests/browser tests/physics tests/unit src
 	HYPOTHESIS_PROFILE=anew pytest -n 2 -m "not slow" tests/unit tests/physics
+	$(WITH_ENGINES) pytest -n 2 --dist loadfile -rs -m slow tests/engines
 
 # Format, lint, types and spelling, as before each commit: .pre-commit-config.yaml. What can be mended is.
 lint: $(VENV)/.test
@@ -130,8 +132,8 @@ results/quick/dataset.nc: | $(VENV)/.run
 	snakemake --configfile config/quick.yaml
 
 # The pictures and tables of the pages, from their studies; the benchmark among them takes minutes.
-pictures: $(VENV)/.run
-	python tools/pictures.py
+pictures: $(VENV)/.run $(ENGINES)/.done
+	$(WITH_ENGINES) python tools/pictures.py
 	python tools/pages.py
 
 # The tables of a million particles in docs/speed.md, measured on this machine; some minutes and 3 GB.

@@ -24,6 +24,12 @@ TABLES = {
 }
 """Tables that each page shows, in the folder of all results."""
 
+IN_ENGINES = "which-numbers.md"
+"""Page that shows runs in engines, from the dataset of config/engines.yaml."""
+
+USUAL, GOOD = 10, 0.02
+"""Iterations of a step in the tables of engines, and solver error that counts as converged."""
+
 LONG, KEPT = 30, 15
 """Rows above which a table is shortened, and rows that it keeps on its page."""
 
@@ -51,6 +57,48 @@ def shorten(tables: str, file: str) -> str:
 
     numbers = re.sub(r"^### [^\n]*: what has no numbers\n.*?(?=^###|\Z)", "", tables, flags=re.MULTILINE | re.DOTALL)
     return re.sub(r"(?:^\|.*\n)+", first, numbers, flags=re.MULTILINE)
+
+
+def in_engines(data: xr.Dataset) -> str:
+    """Table of each scene: solver error over substeps, and the cheapest setting that is converged."""
+    return "\n".join(f"**{scene.item()}**\n\n{_of_scene(data.sel(scene=scene))}" for scene in data.scene)
+
+
+def _of_scene(data: xr.Dataset) -> str:
+    data = data.squeeze(["precision", "dt"]).dropna("substeps", subset=["solver_error"], how="all")
+    head = ["engine", "definition", *(f"{n} substep{'s' if n > 1 else ''}" for n in data.substeps.values)]
+    head += ["converged from", "ms a frame"]
+    rows = [head, ["---"] * 2 + ["---:"] * (len(head) - 2)]
+    for engine in data.engine.values:
+        for definition in data.definition.values:
+            runs = data.sel(engine=engine, definition=definition)
+            if (runs.engine_status != 0).any() and set(np.unique(runs.engine_status)) - {0, _status(data, "refused")}:
+                rows.append([engine, f"`{definition}`", *_of_engine(runs)])
+    return "".join(f"| {' | '.join(row)} |\n" for row in rows)
+
+
+def _status(data: xr.Dataset, word: str) -> int:
+    return data.engine_status.attrs["flag_meanings"].split().index(word)
+
+
+def _of_engine(runs: xr.Dataset) -> list[str]:
+    """Cells of an engine: errors at `USUAL` iterations or its only ones, and the fastest that is converged."""
+    tried = runs.iterations.values[(runs.engine_status != 0).any("substeps")]
+    usual = runs.sel(iterations=USUAL if USUAL in tried else tried[0])
+    words = runs.engine_status.attrs["flag_meanings"].split()
+    ends = zip(usual.solver_error.values, usual.engine_status.values)
+    cells = [_off(error) if np.isfinite(error) else words[status] for error, status in ends]
+    good = runs.frame_seconds.where(abs(runs.solver_error) <= GOOD)
+    if not good.notnull().any():
+        return [*cells, "none tried", ""]
+    best = good.isel(good.argmin(...))
+    setting = f"{best.substeps.item()} x {best.iterations.item()}" if len(tried) > 1 else f"{best.substeps.item()}"
+    return [*cells, setting, f"{1e3 * best.item():.2g}"]
+
+
+def _off(error: float) -> str:
+    """Error of a displacement, or how many times it is too large."""
+    return f"x {1 + error:.2g}" if error >= 1 else f"{100 * error:+.1f} %".replace("-", "−")
 
 
 def benchmark(path: Path) -> xr.Dataset:
@@ -98,6 +146,8 @@ def main() -> None:
     if not (compared := parser.parse_args().compare):
         for page, tables in TABLES.items():
             put(REPOSITORY / "docs" / page, shorten((REPOSITORY / "results" / tables).read_text(), tables))
+        with reading.open(REPOSITORY / "results/engines/dataset.nc") as tree:
+            put(REPOSITORY / "docs" / IN_ENGINES, in_engines(tree["engines"].to_dataset().load()))
         return
     lines, flagged = comparison(*map(benchmark, compared))
     print("\n".join(lines))

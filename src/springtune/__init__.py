@@ -16,6 +16,8 @@ __version__ = "0.1.0"
 
 _NAMES = {
     "engines.base": ("ENGINES", "Engine", "EngineError", "Setting", "engine"),
+    "engines.budget": ("BudgetChoice", "BudgetSearch", "fit_budget"),
+    "engines.calibration": ("EngineFit", "LoadBand", "NeededSetting", "fit_engine"),
     "engines.run": ("EngineResult", "in_engine"),
     "handover.net": ("SpringNet",),
     "studies.kinds": ("load_study",),
@@ -54,6 +56,7 @@ _NAMES = {
     "studies.output.summing_up": ("info",),
     "prediction.choices": ("Choice", "predict"),
     "prediction.search": ("MeshChoice", "MeshSearch", "SolvedMesh", "find_mesh"),
+    "problem.decay": ("Decay", "fit_decay"),
     "problem.geometry": ("Beam",),
     "problem.loads": ("LOADS",),
     "problem.materials": ("AnisotropicMaterial", "Material", "Rubber"),
@@ -61,6 +64,7 @@ _NAMES = {
     "problem.shapes": ("Hole", "LoadCase", "Pressure", "Quantity", "Segment", "Shape", "Support", "Traction"),
     "problem.status": ("Status",),
     "scene.curve": ("Curve", "sensitivity"),
+    "scene.damping": ("Damping", "damping_of"),
     "scene.meshes": ("make_mesh", "read_mesh"),
     "scene.moduli": ("Moduli", "moduli"),
     "scene.shape_meshes": ("mesh_shape", "read_shape"),

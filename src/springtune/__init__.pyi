@@ -19,6 +19,8 @@ from .prediction.search import MeshChoice as MeshChoice
 from .prediction.search import MeshSearch as MeshSearch
 from .prediction.search import SolvedMesh as SolvedMesh
 from .prediction.search import find_mesh as find_mesh
+from .problem.decay import Decay as Decay
+from .problem.decay import fit_decay as fit_decay
 from .problem.geometry import Beam as Beam
 from .problem.loads import LOADS as LOADS
 from .problem.materials import AnisotropicMaterial as AnisotropicMaterial
@@ -36,6 +38,8 @@ from .problem.shapes import Traction as Traction
 from .problem.status import Status as Status
 from .scene.curve import Curve as Curve
 from .scene.curve import sensitivity as sensitivity
+from .scene.damping import Damping as Damping
+from .scene.damping import damping_of as damping_of
 from .scene.meshes import make_mesh as make_mesh
 from .scene.meshes import read_mesh as read_mesh
 from .scene.moduli import Moduli as Moduli

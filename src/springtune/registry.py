@@ -21,8 +21,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
-HOOKS = {"drawing": "studies.output.drawing", "writing": "handover.written"}
-"""Modules of upper layers that lower ones call by name, so that no result depends on them."""
+HOOKS = {"drawing": "studies.output.drawing", "files": "handover.formats", "writing": "handover.written"}
+"""Modules that others call by name, mostly those of upper layers, so that no result depends on them."""
 
 
 PLUGINS_VARIABLE = "SPRINGTUNE_PLUGINS"

@@ -49,6 +49,7 @@ QUANTITY_KINDS = {
         Kind("acceleration", "m/s^2", "9.81 m/s^2"),
         Kind("angle", "rad", "30 deg"),
         Kind("time", "s", "5 ms"),
+        Kind("frequency", "Hz", "10 Hz"),
     )
 }
 """Kinds of quantity by name."""
@@ -63,6 +64,7 @@ COMMON = {
     "energy": {"J": "1", "mJ": "1e-3", "kJ": "1e3", "N*m": "1", "N*mm": "1e-3"},
     "acceleration": {"m/s^2": "1", "mm/s^2": "1e-3"},
     "time": {"s": "1", "ms": "1e-3", "us": "1e-6", "min": "60"},
+    "frequency": {"Hz": "1", "mHz": "1e-3", "kHz": "1e3"},
     "angle": {"rad": "1", "deg": "0.01745329251994329576923690768488612713", "mrad": "1e-3"},
 }
 """Usual units of each kind and their size in its SI unit."""
@@ -170,8 +172,8 @@ def _ask_pint(unit: str) -> tuple[str, Decimal] | None:
     except Exception:  # pint raises many kinds, tokenizer's and its own
         return None
     for kind in QUANTITY_KINDS.values():
-        if kind.name == "angle":
-            continue  # to pint it is a number, as a percentage is
+        if kind.name in ("angle", "frequency"):
+            continue  # to pint an angle is a number, as a percentage is, and a speed of rotation a frequency
         if given.dimensionality == registry.parse_units(kind.unit).dimensionality:
             return kind.name, Decimal(f"{size:.15g}")
     return f"of dimension {given.dimensionality}", Decimal(1)

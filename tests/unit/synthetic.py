@@ -170,6 +170,26 @@ def benchmark():
     )  # fmt: skip
 
 
+def engines(factors=()):
+    """Two engines at two numbers of iterations and of substeps; of curves with factors on what is typed."""
+    labels = {
+        "scene": ["sheet", "strip"], "definition": DEFINITIONS, "engine": ["xpbd", "vbd"], "precision": ["float64"],
+        "dt": [1 / 60], "substeps": [1, 4], "iterations": [1, 10],
+    }  # fmt: skip
+    run = (*labels, *(["stiffness_factor"] if factors else []))
+    data = variables(labels | ({"stiffness_factor": factors} if factors else {}), error=run, frame_seconds=run)
+    data["definition_error"] = ("scene", "definition"), np.full((2, 2), 0.01)
+    data["message"] = xr.full_like(data.error, "", dtype=object)
+    flags = xr.ones_like(data.error, dtype=np.int8)
+    return data.assign(status=flags, engine_status=flags)
+
+
+def engine_curves():
+    data = engines([0.5, 1.0, 2.0])
+    best = 1 + data.error.isel(stiffness_factor=0, drop=True)
+    return data.assign(best_factor=best, best_factor_message=xr.full_like(best, "", dtype=object))
+
+
 def samples():
     """Rows of four base samples of two parameters."""
     labels = {"sample": range(16), "load": LOADS, "definition": DEFINITIONS}
@@ -256,6 +276,7 @@ def dataset(*names):
 def _dataset():
     groups = {"sensitivity": sensitivity, "fields": fields, "block": block, "moduli": moduli, "laying": laying}
     groups |= {"stability": stability, "benchmark": benchmark, "refinement": refinement}
+    groups |= {"engines": engines, "engine_curves": engine_curves}
     groups |= {"shapes": shapes, "shape_fields": shape_fields}
     groups |= {"samples": samples, "effects": effects, "sobol": sobol}
     # Groups are written and read one by one, so that labels of one need not be those of another.

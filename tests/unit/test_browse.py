@@ -112,6 +112,7 @@ class TestPage:
         """A plot whose variable is misspelt would be left out silently."""
         from springtune.studies.kinds.benchmark.kind import KIND as BENCHMARK
         from springtune.studies.kinds.collect import group_of
+        from springtune.studies.kinds.engines.collect import ENGINE_CURVES, ENGINE_RUNS
         from springtune.studies.kinds.laying.collect import LAYING
         from springtune.studies.kinds.moduli.kind import KIND as MODULI
         from springtune.studies.kinds.refinement.collect import REFINEMENT
@@ -122,7 +123,7 @@ class TestPage:
         from springtune.studies.kinds.stability.collect import STABILITY
         from springtune.studies.output.browse.page import views
 
-        groups = (ROOT, SENSITIVITY, FINITE_STRAIN, BLOCK, FIELDS, LAYING, STABILITY)
+        groups = (ROOT, SENSITIVITY, FINITE_STRAIN, BLOCK, FIELDS, LAYING, STABILITY, ENGINE_RUNS, ENGINE_CURVES)
         groups += tuple(map(group_of, (MODULI, BENCHMARK)))
         groups += (SAMPLES, EFFECTS, SOBOL, REFINEMENT, SHAPES, SHAPE_FIELDS)
         coordinates = {"/samples": {*PARAMETERS, "sample_mesh_size"}}

@@ -189,16 +189,16 @@ def known():
     return _keys()
 
 
-KINDS = ("moduli", "laying", "stability", "benchmark", "refinement", "samples", "shapes")
+KINDS = ("moduli", "laying", "stability", "benchmark", "refinement", "samples", "shapes", "engines")
 SOLVING = {"scenes.solve", "scenes.sensitivity", "patch", "annealed", *(f"{name}.solve" for name in KINDS)}
 REFERENCE = {"scenes.reference", "samples.interpolate", "shapes.reference", "unit"}
 
 VERSIONS = {
     **dict.fromkeys(("matplotlib", "xarray", "h5py", "pint", "pydantic", "snakemake"), set()),
-    "netgen-mesher": {"free", "shapes.mesh", "shapes.reference", "shapes.solve"},
+    "netgen-mesher": {"free", "shapes.mesh", "shapes.reference", "shapes.solve", "engines.solve"},
     "meshio": {"from a file"},
-    "numba": {"stability.solve", "benchmark.solve", "shapes.solve"},
-    "scikit-fem": {"scenes.reference", "benchmark.solve", "shapes.solve"},
+    "numba": {"stability.solve", "benchmark.solve", "shapes.solve", "engines.solve"},
+    "scikit-fem": {"scenes.reference", "benchmark.solve", "shapes.solve", "engines.solve"},
     "pyamg": SOLVING,
     "cvxopt": SOLVING | REFERENCE,
     "scipy": SOLVING | REFERENCE | {"scenes.mesh", "shapes.mesh", "from a file"},

@@ -11,6 +11,7 @@ import matplotlib
 import mujoco
 import numpy as np
 import pytest
+import xarray as xr
 import yaml
 from click.testing import CliRunner
 
@@ -218,7 +219,7 @@ def test_every_module_of_the_rooms_shown_is_on_the_site():
 
 def test_tables_of_studies_are_put_between_the_marks_of_their_pages(tmp_path):
     pages = run_path(str(REPOSITORY / "tools/pages.py"))
-    for name in pages["TABLES"]:
+    for name in (*pages["TABLES"], pages["IN_ENGINES"]):
         text, page = (REPOSITORY / "docs" / name).read_text(), tmp_path / name
         page.write_text(text)
         pages["put"](page, "new tables\n")
@@ -228,6 +229,25 @@ def test_tables_of_studies_are_put_between_the_marks_of_their_pages(tmp_path):
     page.write_text("no marks")
     with pytest.raises(SystemExit, match="the marks around the tables are missing"):
         pages["put"](page, "new tables\n")
+
+
+def test_a_table_of_engines_has_errors_words_and_the_cheapest_setting():
+    words = "not_requested rest swings moving diverged absent refused failed"
+    parts = {"scene": ["sheet"], "definition": ["patch", "area"], "engine": ["a"], "precision": ["float64"],
+             "dt": [1 / 60], "substeps": [1, 4], "iterations": [10, 100]}  # fmt: skip
+    shape = tuple(map(len, parts.values()))
+    errors, ends = np.full(shape, np.nan), np.zeros(shape, int)
+    errors[0, 0, 0, 0, 0] = [[np.nan, 2.0], [-0.3, 0.01]]
+    ends[0, 0, 0, 0, 0] = [[4, 1], [1, 1]]
+    ends[0, 1] = 6
+    data = xr.Dataset(coords=parts).assign(
+        solver_error=(tuple(parts), errors),
+        frame_seconds=(tuple(parts), np.full(shape, 2e-3)),
+        engine_status=(tuple(parts), ends, {"flag_meanings": words}),
+    )
+    *_, head, _, row = run_path(str(REPOSITORY / "tools/pages.py"))["in_engines"](data).splitlines()
+    assert head == "| engine | definition | 1 substep | 4 substeps | converged from | ms a frame |"
+    assert row == "| a | `patch` | diverged | −30.0 % | 4 x 100 | 2 |"
 
 
 def test_long_tables_are_shortened_on_pages():

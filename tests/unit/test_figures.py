@@ -56,6 +56,10 @@ EVERY_PLOT = {
     st.plot_definitions_size: ({"beam": "100x20", "material": "steel", "load": "traction", "kinematics": "linear"}, 2),
     st.plot_definitions_loads: ({"beam": "100x20", "mesh_type": "free", "kinematics": "linear"}, 2),
     st.plot_laying: ({}, (4, 3)),
+    st.plot_engine_errors: ({"scene": "sheet"}, None),
+    st.plot_engine_maps: ({"scene": "sheet"}, 4),
+    st.plot_engine_curves: ({"scene": "strip"}, 4),
+    st.plot_engine_factors: ({"scene": "strip"}, None),
     st.plot_refinement: ({}, 2),
     st.plot_shapes: ({}, None),
     st.plot_shape_errors: ({"shape": "cook", "load": "traction"}, (2, 2)),
@@ -271,6 +275,15 @@ def test_an_approach_carries_its_errors_and_seconds(tree):
     line = drawn(panel, "in motion")
     assert line.get_xdata() == pytest.approx(here.seconds.values)
     assert line.get_ydata() == pytest.approx(100 * here.error.values)
+
+
+def test_an_engine_carries_its_least_errors_over_the_time_of_a_frame(tree):
+    panel = st.plot_engine_errors(tree, scene="strip")
+    here = tree["engines"].to_dataset().sel(scene="strip", definition="area", engine="vbd").squeeze()
+    line = drawn(panel, "vbd, area")
+    best = here.error.argmin(...)  # all take longer, the larger their error
+    assert line.get_ydata() == pytest.approx([100 * here.error[best].item()])
+    assert line.get_xdata() == pytest.approx([1e3 * here.frame_seconds[best].item()])
 
 
 def test_the_stable_step_carries_the_predicted_limit(tree):

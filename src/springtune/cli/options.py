@@ -64,7 +64,10 @@ def check_target(option: str, target: Path) -> None:
         raise ValueError(f"{option}: {error}") from None
 
 
-SPRING_FILES = ".csv, .json, .vtu (ParaView), .h5, .xml or .mjcf (MuJoCo), .scn or .py (SOFA), or .xpbd.json (XPBD)"
+SPRING_FILES = (
+    ".csv, .json, .vtu (ParaView), .h5, .xml or .mjcf (MuJoCo), .scn or .py (SOFA), .newton.py or .usda (Newton), "
+    ".xpbd.json (XPBD), or .lmp (LAMMPS)"
+)
 """Endings of files of springs, for the help."""
 
 MATERIALS = {"steel": ("210 GPa", "0.3"), "rubber": ("1 MPa", "0.5")}

@@ -369,8 +369,8 @@ def _compared(made: "Reproduced") -> bool:
 
     if made.ended_otherwise:
         click.echo(
-            f"  {made.ended_otherwise} cases of the benchmark ended otherwise, by this machine's speed or programs: "
-            "the group /benchmark is not compared"
+            f"  {made.ended_otherwise} cases of the benchmark or engines ended otherwise, by this machine's speed or "
+            "programs: these groups are not compared"
         )
     exact, near = made.exact, made.near
     count = sum(one.compared for group in exact.groups for one in (*group.flags, *group.values))

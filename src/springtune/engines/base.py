@@ -8,6 +8,7 @@ does not move an equilibrium. Forces of the load are dead, and on from the first
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from importlib import metadata
 from importlib.util import find_spec
 from typing import Any, Protocol, TypeVar
 
@@ -19,6 +20,7 @@ from ..mechanics.integrators import PRECISIONS
 from ..problem.quantities import positive
 from ..registry import Declared, Registry, how_to_install
 from ..safe_io.tables import number_text
+from ..scene.damping import Damping
 
 
 class EngineError(ValueError):
@@ -127,6 +129,24 @@ SPRING = Parameter("N/m", "k of the definition, one for each spring")
 """Stiffness of a spring."""
 
 
+DAMPERS: dict[str, Callable[[Damping], Any]] = {
+    "alpha": lambda damping: damping.mass_damping,
+    "alpha m, one for each particle": lambda damping: (
+        damping.mass_damping * np.asarray(damping.scene.statement.masses())
+    ),
+    "beta": lambda damping: damping.stiffness_damping,
+    "beta k, one for each spring": lambda damping: damping.dashpots,
+    "beta k, one for all springs": lambda damping: damping.dashpots.mean(),
+}
+"""Dampers that are typed into engines, by the formula of their parameter; each alone has the damping ratio."""
+
+DASHPOT = Parameter("N s/m", "beta k, one for each spring")
+"""Damper of a spring."""
+
+VELOCITIES = Parameter("1/s", "alpha")
+"""Damping over mass by `springtune.in_engine`, which every engine has."""
+
+
 def typed_springs(net: SpringNet) -> dict[str, Any]:
     """Stiffness of each spring [N/m] and moduli of energies, as they are."""
     values = {f"{one.kind} {name}": value for one in net.energies for name, value in one.values.items()}
@@ -148,7 +168,7 @@ class Engine(Declared):
     program : str
         ``springtune`` for the textbook solvers.
     needs : tuple of str
-        Modules that it imports.
+        Modules that it imports; with the first version that will do, ``"mujoco>=3.13"``.
     extra : str
         Optional dependencies of springtune that have them.
     laws : tuple of str
@@ -161,8 +181,14 @@ class Engine(Declared):
         Numbers that are typed into it.
     iterates : bool
         Whether iterations mean something to it.
+    dampers : dict of str to Parameter
+        Dampers that are typed into it; their formulas are keys of `DAMPERS`.
+    implicit : bool
+        Whether its steps, iterated to the end, are of implicit Euler, which damps by itself.
     typed : callable
-        (net) -> dict of the numbers to type by the names of `parameters`: arrays, or one number for all.
+        (net) -> dict of the numbers to type by the names of `parameters`: arrays, or one number for all. Call `numbers`.
+    of_setting : bool
+        Whether these numbers follow the setting: `typed` takes (net, setting).
     source : str
         Where it is described.
 
@@ -194,13 +220,16 @@ class Engine(Declared):
     precisions: tuple[str, ...] = PRECISIONS
     parameters: Mapping[str, Parameter] = field(default_factory=lambda: {"stiffness": SPRING})
     iterates: bool = True
-    typed: Callable[[SpringNet], dict[str, Any]] = field(default_factory=lambda: typed_springs)
+    dampers: Mapping[str, Parameter] = field(default_factory=lambda: {"damping": VELOCITIES})
+    implicit: bool = False
+    typed: Callable[..., dict[str, Any]] = field(default_factory=lambda: typed_springs)
+    of_setting: bool = False
     source: str = ""
 
     @property
     def absent(self) -> str:
         """Why it cannot run here, and how to install it; empty where it can."""
-        lacking = [name for name in self.needs if find_spec(name) is None]
+        lacking = [need for need in self.needs if not _there(need)]
         if not lacking:
             return ""
         return f"engine '{self.name}' needs {' and '.join(lacking)}; {how_to_install(self.extra)}"
@@ -239,6 +268,51 @@ class Engine(Declared):
         if self.absent:
             raise EngineAbsentError(self.absent)
 
+    def numbers(self, net: SpringNet, setting: Setting) -> dict[str, Any]:
+        """Numbers to type, by the names of `parameters`.
+
+        Parameters
+        ----------
+        net : SpringNet
+        setting : Setting
+
+        Returns
+        -------
+        dict of str to float or ndarray
+        """
+        return self.typed(net, setting) if self.of_setting else self.typed(net)
+
+    def typed_dampers(self, damping: Damping, setting: Setting) -> dict[str, Any]:
+        """Dampers to type for a measured decay, each alone; what the steps damp by themselves is taken off.
+
+        Parameters
+        ----------
+        damping : Damping
+            Of a scene, see `springtune.damping_of`.
+        setting : Setting
+
+        Returns
+        -------
+        dict of str to float or ndarray
+            In the units of `dampers`.
+
+        Raises
+        ------
+        ValueError
+            If the steps of the setting alone damp more than was measured.
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> beam, rubber = st.Beam("100 mm", "10 mm"), st.Material("1 MPa", 0.45, density="1100 kg/m^3")
+        >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "5 mm"), rubber, "bending", "1 mN")
+        >>> damping = st.damping_of(scene, decrement=0.3)
+        >>> st.ENGINES["xpbd"].typed_dampers(damping, st.Setting("1/60", substeps=20))["damping"].round(3).item()
+        2.402
+        """
+        left = damping.implicit_euler(setting.step) if self.implicit else damping
+        return {name: DAMPERS[one.formula](left) for name, one in self.dampers.items()}
+
     def start(self, net: SpringNet, setting: Setting, damping: float) -> Session:
         """Start a session.
 
@@ -257,6 +331,22 @@ class Engine(Declared):
         self.check(setting, net)
         session: Session = self.function(net, setting, damping)
         return session
+
+
+def release(text: str) -> tuple[int, ...]:
+    """Numbers of a version, such as (3, 13)."""
+    return tuple(int(part) for part in text.split(".") if part.isdigit())
+
+
+def _there(need: str) -> bool:
+    """Whether a module is installed, in the version that is asked for."""
+    name, _, least = need.partition(">=")
+    if find_spec(name) is None:
+        return False
+    try:
+        return not least or release(metadata.version(name)) >= release(least)
+    except metadata.PackageNotFoundError:  # installed under another name
+        return True
 
 
 def _lacks(engine: Engine, net: SpringNet) -> bool:

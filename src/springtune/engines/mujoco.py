@@ -2,17 +2,18 @@
 
 The model is that of `springtune.handover.mujoco`, with the step and the integrator of a setting. `Euler`, `implicit`
 and `implicitfast` are implicit in dampers alone: as with `RK4`, springs need steps below the stable one. `discrete`,
-since MuJoCo 3.13, is implicit in springs, too: one linear solve a step. MuJoCo iterates for contacts alone, of which
-there are none, and computes in double precision.
+since MuJoCo 3.13, is implicit in springs, too, by one linear system a step: `iterations` are those of its conjugate
+gradients, of which MuJoCo allows 100 where nothing is said; they stop at a ten-thousandth of the load. The others do
+not iterate without contacts. MuJoCo computes in double precision.
 
-Velocities are scaled after each step, so joints have no damping. MuJoCo's own way is `damping` = mass times the damping
-over mass in each joint, which `RK4` takes explicitly and the others implicitly. A state that diverges is put back to
+Velocities are scaled after each step, so joints have no damping. MuJoCo's own way is `damping` in joints and tendons,
+which `RK4` takes explicitly, `Euler` those of tendons, and the others implicitly. A state that diverges is put back to
 the beginning by default; that is turned off here, so that it is seen.
 """
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib.metadata import version
+from importlib import metadata
 from typing import Any
 
 import numpy as np
@@ -20,12 +21,12 @@ import numpy as np
 from ..handover.mujoco import VERSIONS, elasticity, model
 from ..handover.net import SpringNet
 from ..handover.simulation import Simulation, lame
-from .base import SPRING, EngineAbsentError, EngineError, Parameter, Session, Setting, engine
+from .base import DASHPOT, SPRING, EngineError, Parameter, Session, Setting, engine, release
 
 FLEX_SINCE = (3, 3, 7)
 """Version of MuJoCo that first has the law of a flex."""
 
-PARAMETERS = {
+TYPED = {
     "stiffness": SPRING,
     "young": Parameter("Pa", "E; for MuJoCo 3 it is 2 E (2 + nu) / (1 + nu)"),
     "poisson": Parameter("1", "nu; for MuJoCo 3 it is nu / 2"),
@@ -33,18 +34,18 @@ PARAMETERS = {
 }
 """Stiffness of a tendon; or what an ``elastic2d="stretch"`` flex has."""
 
+JOINTS = {"joint damping": Parameter("N s/m", "alpha m, one for each particle")}
+STIFF = {"tendon damping": DASHPOT, "flex damping": Parameter("s", "beta")}
+"""Dampers over stiffness. `implicit` and `implicitfast` leave out what a tendon between two bodies does to the other
+one, so that it slows them as a mass does: there, joints alone damp as they should."""
+
 
 def typed(net: SpringNet) -> dict[str, Any]:
     """Stiffness of each tendon, or the constants of the flex."""
     if not net.energies:
         return {"stiffness": net.stiffness}
-    young, poisson = elasticity(*lame(net, net.energies[0], "MuJoCo's flex"), _release()[0])
+    young, poisson = elasticity(*lame(net, net.energies[0], "MuJoCo's flex"), release(metadata.version("mujoco"))[0])
     return {"young": young / net.thickness, "poisson": poisson, "thickness": net.thickness}
-
-
-def _release() -> tuple[int, ...]:
-    """Version of MuJoCo."""
-    return tuple(int(part) for part in version("mujoco").split(".")[:3] if part.isdigit())
 
 
 @contextmanager
@@ -66,22 +67,18 @@ class _Session:
     def __init__(self, net: SpringNet, setting: Setting, damping: float, integrator: str) -> None:
         import mujoco
 
-        if not hasattr(mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}"):
-            raise EngineAbsentError(
-                f"engine 'mujoco-{integrator.lower()}': MuJoCo {mujoco.__version__} has no such integrator; install "
-                "a newer one by `pip install --upgrade mujoco`"
-            )
-        release = _release()
-        if release[0] not in VERSIONS or net.energies and release < FLEX_SINCE:
-            raise EngineError(f"MuJoCo {mujoco.__version__} is not one that models are for; take 3.3.7 to 4")
+        found = release(mujoco.__version__)
+        if found[0] not in VERSIONS or net.energies and found < FLEX_SINCE:
+            raise EngineError(f"MuJoCo {mujoco.__version__}: models are for 3.3.7 to 4; install one of these")
         assert net.masses is not None  # of a scene that moves
         loaded = float(np.any(net.forces))
         moves = Simulation(net.masses, loaded, setting.step, setting.step, 0.0, 0.0, 0.0, None, "")
         with _no_log():
             try:
-                self.model = mujoco.MjModel.from_xml_string(model(net, moves, release[0], integrator))
+                self.model = mujoco.MjModel.from_xml_string(model(net, moves, found[0], integrator))
             except ValueError as error:
                 raise EngineError(f"MuJoCo {mujoco.__version__} refuses the net: {error}") from None
+        self.model.opt.iterations = setting.iterations
         self.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
         self.data, self.step, self.moving = mujoco.MjData(self.model), mujoco.mj_step, ~net.held
         self.substeps, self.kept = setting.substeps, 1 / (1 + damping * setting.step)
@@ -100,28 +97,35 @@ class _Session:
         return moved
 
 
-def _declare(order: float, integrator: str, summary: str) -> None:
+def _declare(order: float, integrator: str, summary: str, **declared: Any) -> None:
     def session(net: SpringNet, setting: Setting, damping: float) -> Session:
         return _Session(net, setting, damping, integrator)
 
-    session.__doc__ = f"MuJoCo with the integrator {integrator}: {summary}"
+    session.__doc__ = f"MuJoCo with the integrator {integrator}: {summary}."
+    common: dict[str, Any] = {"laws": ("biquadratic",), "needs": ("mujoco",), "iterates": False}
     engine(
         f"mujoco-{integrator.lower()}",
         order=order,
         program="MuJoCo",
-        needs=("mujoco",),
         extra="mujoco",
-        laws=("biquadratic",),
         precisions=("float64",),
-        parameters=PARAMETERS,
-        iterates=False,
+        parameters=TYPED,
         typed=typed,
         source="MuJoCo's documentation, Computation",
+        **common | declared,
     )(session)
 
 
-_declare(110, "Euler", "springs explicit")
-_declare(111, "implicitfast", "springs explicit, dampers implicit")
-_declare(112, "implicit", "springs explicit, dampers implicit")
-_declare(113, "RK4", "springs explicit, of fourth order")
-_declare(114, "discrete", "springs and dampers implicit, since 3.13")
+_declare(110, "Euler", "springs explicit", dampers=JOINTS | STIFF)
+_declare(111, "implicitfast", "springs explicit, dampers implicit", laws=(), dampers=JOINTS)
+_declare(112, "implicit", "springs explicit, dampers implicit", laws=(), dampers=JOINTS)
+_declare(113, "RK4", "springs explicit, of fourth order", dampers=JOINTS | STIFF)
+_declare(
+    114,
+    "discrete",
+    "springs and dampers implicit",
+    needs=("mujoco>=3.13",),
+    iterates=True,
+    dampers=JOINTS | STIFF,
+    implicit=True,
+)

@@ -26,7 +26,7 @@ import numpy as np
 
 from ..handover.net import SpringNet
 from ..handover.simulation import lame
-from .base import SPRING, EngineError, Parameter, Session, Setting, engine
+from .base import DASHPOT, SPRING, EngineError, Parameter, Session, Setting, engine
 
 FASTEST = 1e30
 """Largest velocity [m/s]: none. By default Newton has 1e5."""
@@ -94,7 +94,9 @@ class _Session:
                 self.solver = made(self.model, config=made.Config(iterations=setting.iterations))
                 self.solver.collision = None
             else:
-                self.solver = made(self.model, **({} if solver == "SemiImplicit" else {"iterations": setting.iterations}))
+                self.solver = made(
+                    self.model, **({} if solver == "SemiImplicit" else {"iterations": setting.iterations})
+                )
             self.now, self.next, self.control = self.model.state(), self.model.state(), self.model.control()
         self.step, self.substeps = setting.step, setting.substeps
         self.kept = np.float32(1 / (1 + damping * setting.step))
@@ -180,7 +182,19 @@ def _declare(order: float, name: str, solver: str, summary: str, parameters: dic
     )(session)
 
 
-_declare(150, "newton-vbd", "VBD", "implicit steps by vertex block descent, one particle after the other", VBD)
-_declare(151, "newton-xpbd", "XPBD", "springs alone, all at once in an iteration", {"ke": SPRING}, laws=())
-_declare(152, "newton-semi-implicit", "SemiImplicit", "explicit steps", SEMI_IMPLICIT, iterates=False)
-_declare(153, "newton-style3d", "Style3D", "implicit steps by projective dynamics", STYLE3D, springs=False)
+IMPLICIT = {"implicit": True, "dampers": {"kd": DASHPOT}}
+
+_declare(150, "newton-vbd", "VBD", "implicit steps by vertex block descent", VBD, **IMPLICIT)
+_declare(151, "newton-xpbd", "XPBD", "springs alone, all at once in an iteration", {"ke": SPRING}, laws=(), **IMPLICIT)
+_declare(
+    152,
+    "newton-semi-implicit",
+    "SemiImplicit",
+    "explicit steps",
+    SEMI_IMPLICIT,
+    iterates=False,
+    dampers={"kd": DASHPOT},
+)
+_declare(
+    153, "newton-style3d", "Style3D", "implicit steps by projective dynamics", STYLE3D, springs=False, implicit=True
+)

@@ -8,10 +8,12 @@ Tried in 3.2.7, whose wheel computes in double precision; an OBJ file has positi
   `springBendingStiffness` is 0.1 N/m where none is given, and must be 0.
 - Springs are explicit, so steps must be below the stable one; dampers `springDampingStiffness` are implicit. Solver
   iterations change nothing at rest.
-- All nodes have the same mass. An anchor to nothing (-1) holds a node in all directions.
+- All nodes have the same mass. An anchor to the world (-1) holds a node in all directions, one to a prismatic joint in
+  one.
 - `applyExternalForce` does not act on a deformable body. So a loaded node is anchored to a rigid body of a node's mass,
-  which is pushed and damped over mass. Dampers do not act on anchored nodes: those of the other nodes have
-  4 / damping times the stiffness, which damps the loaded mode as much.
+  which is pushed and damped over mass; dampers do not act on anchored nodes. Dampers between the others have the
+  stiffness over the damping over mass. Their solver leaves up to a thousandth of the load, the more the stronger they
+  are, and does nothing about swings of micrometres.
 - The laws of triangles (`useNeoHookean`) act on tetrahedra alone.
 - Bodies that are slow fall asleep, and their forces vanish, unless `changeDynamics` forbids it.
 """
@@ -41,7 +43,7 @@ def typed(net: SpringNet) -> dict[str, Any]:
     if np.ptp(stiffness) > LARGEST_SPREAD * abs(stiffness.mean()):
         raise EngineError(
             f"definition '{net.header['definition']}': has springs of {stiffness.min():.4g} to {stiffness.max():.4g} "
-            "N/m, and PyBullet has one stiffness for all springs of a body; take 'paper', or 'uniform' with a stiffness"
+            "N/m, and PyBullet has one stiffness for all springs of a body; take 'uniform', or 'paper' with a stiffness"
         )
     return {"springElasticStiffness": float(stiffness.mean()), "springBendingStiffness": 0.0}
 
@@ -63,7 +65,7 @@ class _Session:
         assert net.masses is not None  # of a scene that moves
         numbers = typed(net) | {"springDampingStiffness": 0.0, "springDampingAllDirections": 0}
         if damping:
-            numbers["springDampingStiffness"] = 4 / damping * numbers["springElasticStiffness"]
+            numbers["springDampingStiffness"] = numbers["springElasticStiffness"] / damping
         self.program, self.net, self.substeps = pybullet, net, setting.substeps
         self.here = {"physicsClientId": pybullet.connect(pybullet.DIRECT)}
         weakref.finalize(self, pybullet.disconnect, **self.here)
@@ -98,10 +100,10 @@ class _Session:
         mass, place = float(self.net.masses.mean()), [*self.rest[node].tolist(), 0.0]
         rail: dict[str, Any] = {}
         if held.any():
-            one = {"Masses": mass, "CollisionShapeIndices": -1, "VisualShapeIndices": -1, "ParentIndices": 0}
-            one |= {"Positions": [0, 0, 0], "InertialFramePositions": [0, 0, 0], "JointTypes": program.JOINT_PRISMATIC}
-            one |= {"Orientations": [0, 0, 0, 1], "InertialFrameOrientations": [0, 0, 0, 1]}
-            one |= {"JointAxis": [*np.where(held, 0, 1).tolist(), 0]}
+            one: dict[str, Any] = {"Masses": mass, "ParentIndices": 0, "JointTypes": program.JOINT_PRISMATIC}
+            one |= {"JointAxis": [*np.where(held, 0, 1).tolist(), 0], "Positions": [0, 0, 0]}
+            one |= {"CollisionShapeIndices": -1, "VisualShapeIndices": -1, "Orientations": [0, 0, 0, 1]}
+            one |= {"InertialFramePositions": [0, 0, 0], "InertialFrameOrientations": [0, 0, 0, 1]}
             rail = {f"link{name}": [value] for name, value in one.items()}
         body = program.createMultiBody(0 if rail else mass, -1, -1, place, **rail, **self.here)
         link = 0 if rail else -1
@@ -141,6 +143,7 @@ class _Session:
         "springBendingStiffness": Parameter("N/m", "0; it is 0.1 where it is not given"),
     },
     iterates=False,
+    dampers={"springDampingStiffness": Parameter("N s/m", "beta k, one for all springs")},
     typed=typed,
     source="Bullet's source, btDeformableMassSpringForce.h",
 )

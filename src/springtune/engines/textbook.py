@@ -1,4 +1,9 @@
-"""What the textbook solvers share: a step from the inertial position, and the velocity that it leaves."""
+"""What the textbook solvers share: a step from the inertial position, and the velocity that it leaves.
+
+A step minimizes ``|x - y|^2 / (2 h^2) + W(x)``, the first term weighted by masses, about ``y = x + h v + h^2 f / m``. A
+solver that begins at y and stops early ends between y and the minimum. So it rests where each step falls back by
+``h^2 f / m``: too far along the load, as if springs were softer.
+"""
 
 from collections.abc import Callable
 from typing import Any
@@ -7,7 +12,9 @@ import numpy as np
 from numba import njit
 
 from ..handover.net import SpringNet
-from .base import Setting
+from ..handover.simulation import WORDS
+from ..handover.terms import VALUES
+from .base import SPRING, EngineError, Parameter, Setting
 
 
 def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -34,22 +41,42 @@ class Textbook:
         self.points = net.points.astype(kind)
         self.weights = np.where(net.held, 0, 1 / net.masses[:, None]).astype(kind)
         self.push = (setting.step**2 * np.where(net.held, 0, net.forces / net.masses[:, None])).astype(kind)
+        self.inertia = (net.masses / setting.step**2).astype(kind)
         self.x, self.v = self.points.copy(), np.zeros_like(self.points)
         there = net.stiffness != 0
         self.springs = net.springs[there]
         self.lengths, self.stiffness = net.rest_lengths[there].astype(kind), net.stiffness[there].astype(kind)
 
     def solve(self, before: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return the positions at the end of a step from those before it and the inertial ones."""
+        """Return the positions at the end of a step from those before it and the inertial ones, which it may change."""
         raise NotImplementedError
 
     def advance(self, frames: int) -> None:
         """Take a number of frames."""
-        for _ in range(frames * self.substeps):
-            before = self.x
-            self.x = self.solve(before, before + self.h * self.v + self.push)
-            self.v = self.kept / self.h * (self.x - before)
+        with np.errstate(over="ignore", invalid="ignore"):
+            for _ in range(frames * self.substeps):
+                before = self.x
+                self.x = self.solve(before, before + self.h * self.v + self.push)
+                self.v = self.kept / self.h * (self.x - before)
 
     def displacements(self) -> np.ndarray:
         """Displacement of each particle [m]."""
         return (self.x - self.points).astype(float)
+
+
+def pulling(net: SpringNet, why: str) -> None:
+    """Refuse springs of negative stiffness."""
+    if np.any(net.stiffness < 0):
+        raise EngineError(
+            f"definition '{net.header['definition']}': has springs of negative stiffness, and {why}; take 'patch' or "
+            "'lattice', whose springs all pull, or engine 'implicit-cg'"
+        )
+
+
+def as_they_are(*kinds: str) -> dict[str, Parameter]:
+    """Parameters of a solver that takes stiffnesses and values of kinds of energies as a net has them."""
+    return {"stiffness": SPRING} | {
+        f"{kind} {name}": Parameter(unit, f"{name} of {WORDS[kind]}, as of the net")
+        for kind in kinds
+        for name, unit in VALUES[kind].items()
+    }

@@ -179,6 +179,7 @@ class _Session(Textbook):
         ),
         "rubber compliance": Parameter("1/(N m)", "1 / (G h A0), G = E / (2 (1 + nu))"),
     },
+    implicit=True,
     source="Macklin 2016",
 )
 def session(net: SpringNet, setting: Setting, damping: float) -> Session:

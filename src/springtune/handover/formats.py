@@ -16,6 +16,7 @@ import numpy as np
 from ..mesh.formats import LONGEST_SAID, library
 from ..safe_io.atomic import check_folder, replacing, write_text
 from ..safe_io.inputs import DataElsewhere, check_alone
+from .lammps import lammps
 from .mujoco import mjcf
 from .newton import newton_script, newton_usd
 from .paraview import comment_of, write_vtu
@@ -72,7 +73,7 @@ def write(path: str | Path, net: Net, mujoco: int | None = None) -> list[Path]:
             raise ValueError(
                 f"mujoco: {mujoco!r} is of no use to {path.name}; leave it out, or give a name ending in .xml or .mjcf"
             )
-        form = _for_simulator("MuJoCo", partial(mjcf, version=mujoco))
+        form = _for_simulator("MuJoCo", _as_text(partial(mjcf, version=mujoco)))
     return form.write(path, replace(net, header=net.header | {"thickness": float(net.thickness)})) or [path]
 
 
@@ -206,12 +207,17 @@ def _write_csv(path: Path, net: Net) -> list[Path]:
     said += [f"# {line}" for line in json.dumps(net.header, indent=1, ensure_ascii=False).splitlines()]
     texts = {other: _csv_text(table) for other, table in tables.items()}
     texts[path] = "\n".join([*said, ""]) + _csv_text(_table(arrays, SPRING_COLUMNS))
-    with ExitStack() as unfinished:  # the last one gets its name first: if that fails, none gets one
-        for one, text in texts.items():
-            unfinished.enter_context(replacing(one)).write_text(text, encoding="utf-8")
+    _write_all(texts)
     for other in set(others.values()) - set(tables):
         other.unlink(missing_ok=True)  # left by another net
     return [path, *tables]
+
+
+def _write_all(texts: Mapping[Path, str]) -> None:
+    """Write files whole, or none of them."""
+    with ExitStack() as unfinished:  # the last one gets its name first: if that fails, none gets one
+        for one, text in texts.items():
+            unfinished.enter_context(replacing(one)).write_text(text, encoding="utf-8")
 
 
 def _titled(titles: Iterable[str], unit: str, values: np.ndarray) -> dict[str, np.ndarray]:
@@ -457,13 +463,25 @@ def _read_h5(path: Path) -> Read:
 # -- simulators ----------------------------------------------------------------------------------------------------
 
 
-def _for_simulator(program: str, text: Callable[[Net], str]) -> "_Format":
+def _for_simulator(program: str, write: Callable[[Path, Net], list[Path] | None]) -> "_Format":
     """Format of a simulator, which is not read."""
 
     def refuse(path: Path) -> Read:
         raise ValueError(f"it is for {program}; read the springs from .json, .h5, .csv or .vtu")
 
-    return _Format(lambda path, net: write_text(path, text(net)), refuse)
+    return _Format(write, refuse)
+
+
+def _as_text(text: Callable[[Net], str]) -> Callable[[Path, Net], None]:
+    """How a net is written that is one text."""
+    return lambda path, net: write_text(path, text(net))
+
+
+def _write_lammps(path: Path, net: Net) -> list[Path]:
+    data = path.with_suffix(".data")
+    script, particles = lammps(net, data.name)
+    _write_all({data: particles, path: script})
+    return [path, data]
 
 
 class _Format(NamedTuple):
@@ -483,16 +501,17 @@ _FORMATS = {
 ENDINGS = tuple(_FORMATS)
 """Endings of the names of files of nets."""
 
-_MUJOCO = _for_simulator("MuJoCo", mjcf)
+_MUJOCO = _for_simulator("MuJoCo", _as_text(mjcf))
 
 _SIMULATORS = {
     ".xml": _MUJOCO,
     ".mjcf": _MUJOCO,
-    ".scn": _for_simulator("SOFA", sofa_xml),
-    ".py": _for_simulator("SOFA", sofa_python),
-    ".xpbd.json": _for_simulator("XPBD", xpbd),
-    ".newton.py": _for_simulator("Newton", newton_script),
-    ".usda": _for_simulator("Newton", newton_usd),
+    ".scn": _for_simulator("SOFA", _as_text(sofa_xml)),
+    ".py": _for_simulator("SOFA", _as_text(sofa_python)),
+    ".lmp": _for_simulator("LAMMPS", _write_lammps),
+    ".xpbd.json": _for_simulator("XPBD", _as_text(xpbd)),
+    ".newton.py": _for_simulator("Newton", _as_text(newton_script)),
+    ".usda": _for_simulator("Newton", _as_text(newton_usd)),
 }
 
 

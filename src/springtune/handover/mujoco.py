@@ -78,10 +78,12 @@ def model(net: Net, simulation: Simulation, version: int, integrator: str = "Eul
     load = net.header.get("load")
     title = net.header["definition"] + (f", {load_in_words(load)}" if load else "")
     flex = [_flex(net, terms, size, version) for terms in net.energies]
+    # MuJoCo 3 has no other solver for a flex under it.
+    solver = ' solver="CG"' if flex and version == 3 and integrator == "discrete" else ""
     lines = [
         f"<mujoco model={quoteattr(title)}>",
         *commented([*about(net, simulation, said), f"Written {for_versions(net.energies, version)}."], "  "),
-        f'  <option timestep="{simulation.step!r}" integrator="{integrator}" gravity="0 0 0">',
+        f'  <option timestep="{simulation.step!r}" integrator="{integrator}"{solver} gravity="0 0 0">',
         f'    <flag contact="disable"{keep}/>',
         "  </option>",
         f'  <statistic center="{centre} 0" extent="{0.6 * float(np.hypot(*(high - low))):.6g}" meansize="{size:.6g}"/>',

@@ -32,6 +32,7 @@ from ..problem.geometry import Beam
 from ..problem.loads import LOADS
 from ..problem.materials import AnyMaterial, Material
 from ..problem.quantities import positive
+from ..registry import hook
 from ..safe_io.tables import Tabled
 from ..scene.meshes import A_BEAM, A_MATERIAL, A_MESH, check_filled, is_a
 from ..scene.motion import stable_steps
@@ -39,7 +40,6 @@ from ..scene.sheet import AnyDefinition, Sheet, check_stiffness, definition_of, 
 from ..scene.single import Scene
 from ..scene.statements import BeamStatement, ShapeStatement
 from ..springs import Definition, DefinitionError, Springs
-from .formats import read, write
 from .terms import Net, Terms
 
 if TYPE_CHECKING:
@@ -278,7 +278,9 @@ class SpringNet(Tabled, Net):
             ``.csv`` has the springs as a table, with the header ahead as comments, and particles and cells in tables
             beside it, such as ``net.particles.csv``; ``.json`` and ``.h5`` (HDF5) have the arrays by their names here;
             ``.vtu`` has springs as lines, for ParaView and meshio. Models that run, and are not read again: ``.xml`` or
-            ``.mjcf`` for MuJoCo, ``.scn`` or ``.py`` for SOFA, ``.xpbd.json`` for XPBD.
+            ``.mjcf`` for MuJoCo, ``.scn`` or ``.py`` for SOFA, ``.newton.py`` or, of `delingette` alone, ``.usda``
+            for Newton, ``.xpbd.json`` for XPBD, ``.lmp`` for LAMMPS, with
+            particles and bonds beside it, such as ``net.data``.
         mujoco : int, optional
             Version of MuJoCo that its file is for, 3 or 4; 4 without. Springs alone are the same in both; squared
             lengths (`delingette`) are not, and each version refuses the file for the other.
@@ -300,7 +302,8 @@ class SpringNet(Tabled, Net):
                 f"load {load['name']!r}: prescribes displacements, and a file of springs has forces and directions "
                 "that are held; take a load of forces, or give SpringNet.from_mesh the mesh and the scene's springs"
             )
-        return write(path, self, mujoco)
+        written: list[Path] = hook("files").write(path, self, mujoco)
+        return written
 
     @classmethod
     def read(cls, path: str | Path) -> "SpringNet":
@@ -320,7 +323,7 @@ class SpringNet(Tabled, Net):
         ValueError
             If there is no such file, or it is not as `write` writes it.
         """
-        return cls(**vars(read(path)))
+        return cls(**vars(hook("files").read(path)))
 
 
 def terms(energy: Energy, reference: float) -> Terms:

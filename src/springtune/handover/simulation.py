@@ -10,7 +10,7 @@ from scipy.sparse import diags_array
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from ..mechanics.dynamics import Motion
-from ..mechanics.energies import AreaEnergy, BiquadraticEnergy, Energy, NeoHookeEnergy, YeohEnergy
+from ..mechanics.energies import AngleEnergy, AreaEnergy, BiquadraticEnergy, Energy, NeoHookeEnergy, YeohEnergy
 from ..mechanics.network import Network
 from ..mechanics.statics import SingularError, StaticProblem
 from ..mesh import Mesh, corner_angles, signed_areas
@@ -80,7 +80,7 @@ def simulate(
     load = net.header.get("load")
     # Of a shape, whose load case is of several forces, the factor on it.
     force = float(load.get("force", 1.0)) if load else 0.0
-    network = _network(net, reference, energies or _energies)
+    network = network_of(net, reference, energies)
     motion = Motion(network, net.masses / reference, net.forces / reference)
     largest = motion.step_limit("symplectic-euler")
     displacements, lowest, loaded, why = None, 0.0, 0.0, "there is no load"
@@ -177,16 +177,17 @@ def _check(net: Net, program: str, laws: Iterable[str]) -> None:
         )
 
 
-def _network(net: Net, reference: float, energies: Callable[[Net, float], list[Energy]]) -> Network:
+def network_of(net: Net, reference: float, energies: Callable[[Net, float], list[Energy]] | None = None) -> Network:
     """The network that a net was written from; everything over the reference stiffness."""
     mesh = Mesh(net.points, net.triangles, net.quads)
     if not np.array_equal(mesh.edges, net.springs):
         raise ValueError("springs: are not the edges of the cells in their order; write the springs of a scene anew")
-    return Network(mesh, net.held, net.stiffness / reference, energies(net, reference))
+    return Network(mesh, net.held, net.stiffness / reference, (energies or _energies)(net, reference))
 
 
 ENERGIES: dict[str, tuple[type[Energy], tuple[str, ...]]] = {
     "area": (AreaEnergy, ("modulus",)),
+    "angle": (AngleEnergy, ("modulus",)),
     "biquadratic": (BiquadraticEnergy, ("tensile", "coupling")),
     "compressible": (NeoHookeEnergy, ("shear", "bulk")),
     "incompressible": (YeohEnergy, ("c1", "c2", "c3")),

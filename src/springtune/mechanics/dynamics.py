@@ -135,11 +135,17 @@ class Motion(Moving):
                 break
         return float(step)
 
-    @cached_property
+    @property
     def loaded_frequency(self) -> float:
-        """Return the frequency [rad/s] of the lowest mode that the load excites, by share in the static answer.
+        """Frequency of `loaded_mode` [rad/s]."""
+        return self.loaded_mode[0]
 
-        By Lanczos' method from the static answer, which keeps to the load's symmetry; one factorization.
+    @cached_property
+    def loaded_mode(self) -> tuple[float, np.ndarray]:
+        """Frequency [rad/s] and shape of the mode that has the largest share in the static answer to the load.
+
+        By Lanczos' method from the static answer, which keeps to the load's symmetry; one factorization. The shape
+        (unknowns,) has an inertia of 1.
         """
         factor, load = self.network.rest_factor, self.network.reduce(self.load)
         if not load.any():
@@ -158,7 +164,8 @@ class Motion(Moving):
         basis = np.array(found)
         squares, shapes = np.linalg.eigh(basis @ (self.stiffness_matrix @ basis.T))
         shares = (shapes.T @ (basis @ load)) ** 2 / squares
-        return float(np.sqrt(squares[int(np.argmax(shares))]))
+        most = int(np.argmax(shares))
+        return float(np.sqrt(squares[most])), shapes[:, most] @ basis
 
     @property
     def critical_damping(self) -> float:

@@ -104,7 +104,8 @@ def make_stepper(
         return _ExplicitSteps(motion, integrator, step, precision, threads)
     if integrator == "implicit-midpoint":
         return _MidpointSteps(motion, step)
-    return _BackwardEulerSteps(motion, step, integrator if isinstance(integrator, BackwardEuler) else BackwardEuler())
+    options = integrator if isinstance(integrator, BackwardEuler) else BackwardEuler()
+    return _BackwardEulerSteps(motion, step, options, precision)
 
 
 class Stepper(ABC):
@@ -327,10 +328,12 @@ class _BackwardEulerSteps(Stepper):
     r"""One linear solve a step, as SOFA's EulerImplicitSolver does; `step` h in s.
 
     .. math:: (M (1 + h \alpha) + h C + h (h + \beta) K) \Delta v = h (f - (h + \beta) K v - C v - \alpha M v)
+
+    The state, the matrix and conjugate gradients are of the precision; forces are computed in double.
     """
 
-    def __init__(self, motion: Moving, step: float, options: BackwardEuler) -> None:
-        self.motion, self.step, self.options = motion, step, options
+    def __init__(self, motion: Moving, step: float, options: BackwardEuler, precision: str) -> None:
+        self.motion, self.step, self.options, self.kind = motion, step, options, np.dtype(precision)
         self.solve: Callable[[np.ndarray], np.ndarray] | None = None
 
     def advance(self, steps: int) -> None:
@@ -343,15 +346,15 @@ class _BackwardEulerSteps(Stepper):
                 matrix = mass + h * h * self.stiffness
                 if self.damping is not None:
                     matrix = matrix + h * self.damping
-                self.solve = self._solver(csc_array(matrix))
+                self.solve = self._solver(csc_array(matrix, dtype=self.kind))
             v = network.reduce(self.v)
             right = motion.missing(self.u) - h * (self.stiffness @ v)
             right -= motion.mass_damping * motion.mass * v
             if self.damping is not None:
                 right -= self.damping @ v
-            v = v + self.solve(h * right)
-            self.v = network.expand(v)
-            self.u = self.u + h * self.v
+            v = v + self.solve((h * right).astype(self.kind))
+            self.v = network.expand(v).astype(self.kind)
+            self.u = (self.u + h * self.v).astype(self.kind)
 
     def _solver(self, matrix: csc_array) -> Callable[[np.ndarray], np.ndarray]:
         if self.options.iterations is None:

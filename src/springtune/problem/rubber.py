@@ -1,13 +1,12 @@
 """Rubber tests in CSV files, and Yeoh's law fitted to one: see `fit_rubber`."""
 
-import csv
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from ..safe_io.inputs import LARGEST_CSV, read
+from ..safe_io.inputs import csv_rows, two_numbers
 from .materials import MOST_TERMS, RUBBER_TESTS, Rubber
 from .quantities import Number, positive, put
 
@@ -68,15 +67,7 @@ class TensileTest:
     @classmethod
     def read(cls, path: str | Path) -> "TensileTest":
         """Read a CSV file of stretch or engineering strain and of nominal stress, with units in the columns' heads."""
-        try:
-            lines = read(path, LARGEST_CSV).decode("utf-8-sig").splitlines()
-        except ValueError as error:
-            why = "not UTF-8 text" if isinstance(error, UnicodeDecodeError) else error
-            raise TestDataError(f"'{path}' cannot be read: {why}; {TWO_COLUMNS}") from None
-        rows = [(number, row) for number, line in enumerate(lines, 1) if line.strip() and not line.startswith("#")
-                for row in csv.reader([line])]  # fmt: skip
-        if not rows:
-            raise TestDataError(f"'{path}' is empty; {TWO_COLUMNS}")
+        rows = csv_rows(path, TestDataError, TWO_COLUMNS)
         head = rows[0][1]
         where, column = f"'{path}', line {rows[0][0]}: ", head[0].lower()
         kinds = [kind for kind in ("stretch", "strain") if kind in column]
@@ -89,15 +80,7 @@ class TensileTest:
             scale = positive(f"1 {unit}", "stress", "nominal stress")
         except ValueError as error:
             raise TestDataError(f"{where}{error}") from None
-        found = []
-        for number, row in rows[1:]:
-            try:
-                stretch, stress = map(float, row)
-            except ValueError:
-                raise TestDataError(
-                    f"'{path}', line {number}: {','.join(row)!r} is not two numbers; correct it"
-                ) from None
-            found.append((stretch, scale * stress))
+        found = [(one, scale * other) for one, other in two_numbers(path, rows[1:], TestDataError)]
         stretches, stresses = np.array(found).reshape(-1, 2).T
         if kinds == ["strain"]:
             strains = stretches / (100 if percent else 1)

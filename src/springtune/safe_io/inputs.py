@@ -1,5 +1,6 @@
 """Bounded reading of foreign files: regular ones, of limited size, with limited memory."""
 
+import csv
 import errno
 import mmap
 import os
@@ -65,6 +66,36 @@ def read(path: str | Path, most: int) -> bytes:
                 raise BeyondSize(f"larger than {most / 1e6:g} MB")
     if why:
         raise ValueError(why)
+    return found
+
+
+Rows = list[tuple[int, list[str]]]
+"""Rows of a CSV file with their line numbers."""
+
+
+def csv_rows(path: str | Path, refuse: Callable[[str], ValueError], remedy: str) -> Rows:
+    """Rows of a CSV file, the head first, without comments after #."""
+    try:
+        lines = read(path, LARGEST_CSV).decode("utf-8-sig").splitlines()
+    except ValueError as error:
+        why = "not UTF-8 text" if isinstance(error, UnicodeDecodeError) else error
+        raise refuse(f"'{path}' cannot be read: {why}; {remedy}") from None
+    rows = [(number, row) for number, line in enumerate(lines, 1) if line.strip() and not line.startswith("#")
+            for row in csv.reader([line])]  # fmt: skip
+    if not rows:
+        raise refuse(f"'{path}' is empty; {remedy}")
+    return rows
+
+
+def two_numbers(path: str | Path, rows: Rows, refuse: Callable[[str], ValueError]) -> list[tuple[float, float]]:
+    """Numbers of rows of two columns."""
+    found = []
+    for number, row in rows:
+        try:
+            first, second = map(float, row)
+        except ValueError:
+            raise refuse(f"'{path}', line {number}: {','.join(row)!r} is not two numbers; correct it") from None
+        found.append((first, second))
     return found
 
 

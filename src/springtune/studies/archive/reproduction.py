@@ -33,8 +33,8 @@ if TYPE_CHECKING:
 MADE_BY = "https://w3id.org/ro/wfrun/provenance/0.5"
 """Profile that identifies an archive."""
 
-OF_MACHINE = "/benchmark"
-"""Group whose cases depend on the machine: `most_seconds`, CalculiX, CHOLMOD."""
+OF_MACHINE = {"/benchmark", "/engines", "/engine_curves"}
+"""Groups whose cases depend on the machine: `most_seconds`, CalculiX, CHOLMOD; engines that are installed."""
 
 UNZIPPED = 2**20
 
@@ -218,7 +218,7 @@ class Reproduced:
     """Outcome of a reproduction.
 
     `exact` and `near` list differences in bits and beyond the tolerance. `others` are changed versions and processor,
-    before and after. With any benchmark cases that `ended_otherwise`, that group is not compared.
+    before and after. Groups of `OF_MACHINE` with cases that `ended_otherwise` are not compared.
     """
 
     exact: "Comparison"
@@ -305,10 +305,13 @@ def compared(kept: Path, made: Path, machine: dict[str, str]) -> Reproduced:
     with reading.open(kept) as before, reading.open(made) as after:
         exact = compare(before, after, Tolerance(0.0, 0.0))
         groups: list[str] = []
-        flags = [one for group in exact.groups if group.name == OF_MACHINE for one in group.flags]
-        ended_otherwise = sum(one.changed for one in flags)
+        changed = {
+            group.name: sum(one.changed for one in group.flags) for group in exact.groups if group.name in OF_MACHINE
+        }
+        ended_otherwise = sum(changed.values())
         if ended_otherwise:
-            groups = sorted({node.path for tree in (before, after) for node in tree.subtree} - {OF_MACHINE})
+            elsewise = {name for name, count in changed.items() if count}
+            groups = sorted({node.path for tree in (before, after) for node in tree.subtree} - elsewise)
             exact = compare(before, after, Tolerance(0.0, 0.0), groups)
         near = compare(before, after, groups=groups) if exact.different else exact
         versions = [json.loads(tree.attrs["software"]) for tree in (before, after)]

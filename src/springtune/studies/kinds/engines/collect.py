@@ -6,13 +6,13 @@ import numpy as np
 
 from ...output.dataset import Filler, Group
 from ...runs.stages import results
-from . import ENDS, SETTING
+from . import RUN_ENDS, SETTING
 from .kind import STAGE
 from .outputs import divided
 
 NETWORK = ("scene", "definition")
-RUN = (*NETWORK, "engine", *SETTING)
-CURVE = (*RUN, "stiffness_factor")
+OF_A_RUN = (*NETWORK, "engine", *SETTING)
+OF_A_CURVE = (*OF_A_RUN, "stiffness_factor")
 
 OF_NETWORK = {
     "network_displacement": (NETWORK, "m", "displacement of the network in equilibrium", np.nan),
@@ -40,13 +40,27 @@ def _of_runs(cell):
     }  # fmt: skip
 
 
-OF_ENGINE = {
-    "engine_version": (("engine",), "1", "versions of what the engine needs, as it was run", ""),
+SCENE_AND_PROGRAM = {
+    "scene_beam": (("scene",), "1", "beam", ""),
+    "scene_mesh_type": (("scene",), "1", "mesh type", ""),
+    "scene_mesh_size": (("scene",), "m", "asked length of an edge", np.nan),
+    "scene_material": (("scene",), "1", "material", ""),
+    "scene_load": (("scene",), "1", "load", ""),
+    "scene_force": (("scene",), "N", "magnitude of the force", np.nan),
+    "program": (("engine",), "1", "program that the engine is of", ""),
 }
 
-FURTHER = {"engine_status": {"flag_values": np.arange(len(ENDS), dtype="int8"), "flag_meanings": " ".join(ENDS)}}
+IN_BOTH = (
+    OF_NETWORK
+    | {"engine_version": (("engine",), "1", "versions of what the engine needs, as it was run", "")}
+    | SCENE_AND_PROGRAM
+)
+"""Variables of both groups."""
 
-WORDS = {
+_FLAGS = {"flag_values": np.arange(len(RUN_ENDS), dtype="int8"), "flag_meanings": " ".join(RUN_ENDS)}
+END_FLAGS = {"engine_status": _FLAGS}
+
+ENGINE_DIMENSIONS: dict[str, str | tuple[str, str]] = {
     "scene": "scene in engines",
     "engine": "program and solver",
     "precision": "floating-point numbers",
@@ -57,80 +71,42 @@ WORDS = {
 }
 """Own dimensions."""
 
-RUNS = Group("/engines", _of_runs(RUN) | OF_NETWORK | OF_ENGINE, WORDS, further=FURTHER)
-
-CURVES = Group(
-    "/engine_curves",
-    _of_runs(CURVE)
-    | {
-        "best_factor": (RUN, "1", "factor at which the displacement is the reference's", np.nan),
-        "best_factor_message": (RUN, "1", "why no factor is the best", ""),
-    }
-    | OF_NETWORK
-    | OF_ENGINE,
-    WORDS,
-    further=FURTHER,
-)
-
-OF_SCENE = {
-    "scene_beam": ("beam", "beam"),
-    "scene_mesh_type": ("mesh_type", "mesh type"),
-    "scene_material": ("material", "material"),
-    "scene_load": ("load", "load"),
-    "scene_mesh_size": ("mesh_size", "asked length of an edge"),
-    "scene_force": ("force", "magnitude of the force"),
+BEST = {
+    "best_factor": (OF_A_RUN, "1", "factor at which the displacement is the reference's", np.nan),
+    "best_factor_message": (OF_A_RUN, "1", "why no factor is the best", ""),
 }
-"""Coordinates of scenes: attribute of a run, and long name."""
 
-UNITS = {"scene_mesh_size": "m", "scene_force": "N"}
+ENGINE_RUNS = Group("/engines", _of_runs(OF_A_RUN) | IN_BOTH, ENGINE_DIMENSIONS, further=END_FLAGS)
+ENGINE_CURVES = Group("/engine_curves", _of_runs(OF_A_CURVE) | BEST | IN_BOTH, ENGINE_DIMENSIONS, further=END_FLAGS)
 
 
 def groups(study, folder):
     """Groups of a dataset, see `springtune.studies.kinds.scenes.collect.groups`."""
     found = {task.of: (task.labels, result) for task, result in results(STAGE, study, folder)}
     made = {}
-    for group, runs in zip((RUNS, CURVES), divided(found)):
+    for group, runs in zip((ENGINE_RUNS, ENGINE_CURVES), divided(found)):
         if runs:
             made[group.name] = _gathered(group, study, [(run, *found[run]) for run in runs])
     return made
 
 
 def _gathered(group, study, found):
-    axes = {name: tuple(dict.fromkeys(labels[name] for _, labels, _ in found)) for name in WORDS}
-    numbers = {name: tuple(sorted(axes[name])) for name in ("dt", "substeps", "iterations", "stiffness_factor")}
-    filler, curves = Filler(group.empty(study.axes | axes | numbers)), defaultdict(list)
-    for _, labels, result in found:
-        filler.put({name: result[name] for name in group.variables if name in result}, **labels)
-        curves[tuple(labels[name] for name in RUN)].append((labels["stiffness_factor"], result))
-    if group is CURVES:
-        for setting, points in curves.items():
-            filler.put(_best(points), **dict(zip(RUN, setting)))
-    scenes = {run.scene: run for run, _, _ in found}
-    coordinates = {name: [_named(getattr(run, attribute)) for run in scenes.values()]
-                   for name, (attribute, _) in OF_SCENE.items()}  # fmt: skip
-    coordinates = {
-        name: ("scene", np.array(values, dtype=None if name in UNITS else object),
-               {"long_name": OF_SCENE[name][1], "units": UNITS.get(name, "1")})
-        for name, values in coordinates.items()
-    }  # fmt: skip
-    programs = np.array([_programs()[name] for name in axes["engine"]], dtype=object)
-    coordinates["program"] = "engine", programs, {"long_name": "program that the engine is of", "units": "1"}
-    return filler.data.assign_coords(coordinates)
-
-
-def _named(value):
-    return getattr(value, "name", value)
-
-
-def _programs():
-    from springtune.engines.base import ENGINES
-
-    return {name: one.program for name, one in ENGINES.items()}
+    axes = {name: tuple(dict.fromkeys(labels[name] for _, labels, _ in found)) for name in ENGINE_DIMENSIONS}
+    axes |= {name: tuple(sorted(axes[name])) for name in ("dt", "substeps", "iterations", "stiffness_factor")}
+    filler, curves = Filler(group.empty(study.axes | axes)), defaultdict(list)
+    for run, labels, result in found:
+        about = {"scene_beam": run.beam.name, "scene_material": run.material.name, "program": run.program}
+        about |= {f"scene_{name}": getattr(run, name) for name in ("mesh_type", "mesh_size", "load", "force")}
+        filler.put({name: value for name, value in (result | about).items() if name in group.variables}, **labels)
+        curves[tuple(labels[name] for name in OF_A_RUN)].append((labels["stiffness_factor"], result))
+    for setting, points in curves.items() if group is ENGINE_CURVES else ():
+        filler.put(_best(points), **dict(zip(OF_A_RUN, setting)))
+    return filler.data.set_coords([*SCENE_AND_PROGRAM])
 
 
 def _best(points):
     """Factor at which the displacement is the reference's: between two, displacements are linear in 1 / factor."""
-    known = sorted((factor, float(result["error"])) for factor, result in points if np.isfinite(result.get("error", np.nan)))
+    known = sorted((factor, result["error"]) for factor, result in points if np.isfinite(result.get("error", np.nan)))
     found = []
     for (below, high), (above, low) in zip(known, known[1:]):
         if high * low <= 0 and high != low:

@@ -10,7 +10,7 @@ from springtune.problem.compare import unbeaten
 from ...output import labels, style
 from ...output.drawing import NOT_ASKED, error_text, heat_map
 from ...output.selection import choose, group, labels_of, records
-from . import ENDS, SETTING, WITHOUT_RUN
+from . import RUN_ENDS, SETTING, WITHOUT_RUN
 from .outputs import figures
 
 FRAME = 1 / 60
@@ -19,10 +19,15 @@ FRAME = 1 / 60
 END_COLOURS = {"swings": "#b5cfe3", "moving": "#dcdcdc", "diverged": "#4a0d1a", "no run": "#8a8a8a"}
 """Of runs without an error, on the map of settings."""
 
-COLUMNS = 3
+PANELS_IN_ROW = 3
 """Panels in a row."""
 
-LARGEST_PERCENT = 1000
+NARROW = 5
+"""Largest over smallest best factor up to which their axis is not logarithmic."""
+
+MAP_NUMBERS = "numbers: error [%]; ×: displacement over the reference's"
+
+LARGEST_PERCENT = 100
 """Error from which a map shows the displacement as a multiple of the reference's [%]."""
 
 
@@ -54,14 +59,17 @@ def _runs(data, name, scene):
 
 def _lost(runs):
     """How many runs have no error and why, with the names of what was not run at all; empty where all have one."""
-    ends = Counter(ENDS[row["engine_status"]] for rows in runs.values() for row in rows if not np.isfinite(row["error"]))
-    names = {end: [name for name, rows in runs.items() if {ENDS[row["engine_status"]] for row in rows} == {end}]
-             for end in WITHOUT_RUN}  # fmt: skip
-    return ", ".join(
-        f"{count} {end if end != 'rest' else 'without a reference'}"
-        + (f" ({'; '.join(names[end])})" if names.get(end) else "")
-        for end, count in sorted(ends.items(), key=lambda one: ENDS.index(one[0]))
-    )
+    counts, alone = Counter(), defaultdict(list)
+    for name, rows in runs.items():
+        ends = [row["engine_status"] for row in rows if not np.isfinite(row["error"])]
+        counts.update(ends)
+        if len(set(ends)) == 1 and RUN_ENDS[ends[0]] in WITHOUT_RUN:
+            alone[ends[0]].append(name)
+    said = []
+    for end, count in sorted(counts.items()):
+        names = f" ({'; '.join(alone[end])})" if end in alone else ""
+        said.append(f"{count} {RUN_ENDS[end] if RUN_ENDS[end] != 'rest' else 'without a reference'}{names}")
+    return ", ".join(said)
 
 
 def _frame(dt):
@@ -145,9 +153,16 @@ def _definition_lines(panel, case):
     known = {name: 100 * abs(float(case.definition_error.sel(definition=name))) for name in case.definition.values}
     known = {name: error for name, error in known.items() if error > 0}  # NaN is not
     for error in known.values():
-        panel.axhline(error, color="0.45", linewidth=0.9, linestyle=(0, (1, 1.5)), zorder=0)
+        _across(panel, error, linestyle=(0, (1, 1.5)))
     said = ", ".join(f"{name} {error:.2g} %" for name, error in known.items())
     return [f"dotted: error of the definition in equilibrium, {said}"] if known else []
+
+
+def _across(panel, value, **look):
+    """Draw a line at a value, as far as the panel goes by now: names of lines stand right of it."""
+    limits = panel.get_xlim()
+    panel.hlines(value, *limits, color="0.45", linewidth=0.8, zorder=0, **look)
+    panel.set_xlim(limits)
 
 
 def _real_time(panel):
@@ -187,60 +202,73 @@ def plot_engine_maps(data, ax=None, *, scene=None):
     >>> import springtune as st  # tree = st.open("results/mine")
     >>> axes = st.plot_engine_maps(tree, scene="sheet")
     >>> [panel.get_title(loc="left") for panel in axes]
-    ['xpbd', 'vbd']
+    ['xpbd, paper', 'vbd, paper', 'xpbd, area', 'vbd, area']
     """
     case, runs = _runs(data, "engines", scene)
     shown = {name: rows for name, rows in runs.items()
-             if any(ENDS[row["engine_status"]] not in WITHOUT_RUN for row in rows)}  # fmt: skip
-    every = [row for rows in shown.values() for row in rows]
-    steps = {tuple(row[name] for name in SETTING[:3]) for row in every}
-    steps = sorted(steps, key=lambda one: (one[0], one[1] / one[2], one[2]))
-    counts = sorted({row["iterations"] for row in every})
-    height, lost = 0.62 + 0.19 * max(len(steps), 3), _lost({k: rows for k, rows in runs.items() if k not in shown})
-    columns = min(COLUMNS, max(len(shown), 1))
-    note = labels.wrapped(f"not drawn: {lost}" if lost else "", (style.PAGE if columns > 1 else style.COLUMN) - 0.2)
-    under = 0.3 + labels.LINE * labels.lines_of(note)
-    figure, axes, flat, size = style.multiples(ax, max(len(shown), 1), columns, height, further=0.25 + under)
-    place = {"left": 0.5, "right": 0.08, "bottom": 0.36 + under, "top": 0.5, "down": 0.62}
+             if any(RUN_ENDS[row["engine_status"]] not in WITHOUT_RUN for row in rows)}  # fmt: skip
+    lost = _lost({name: rows for name, rows in runs.items() if name not in shown})
+    columns = min(PANELS_IN_ROW, max(len(shown), 1))
+    said = "; ".join(filter(None, (MAP_NUMBERS if shown else "", f"not drawn: {lost}" if lost and shown else "")))
+    said = labels.wrapped(said, (style.PAGE if columns > 1 else style.COLUMN) - 0.2)
+    under = 0.24 + labels.LINE * labels.lines_of(said)
+    most = max((len(_steps(rows)) for rows in shown.values()), default=3)
+    height = 0.8 + 0.19 * max(most, 3)
+    figure, axes, flat, _ = style.multiples(ax, max(len(shown), 1), columns, height, further=under)
+    place = {"left": 0.5, "right": 0.08, "bottom": 0.36 + under, "top": 0.42, "down": 0.62}
     style.arrange(figure, axes, across=0.15, **place, title=case.scene.item())
-    several = len({step[0] for step in steps}) > 1
-    texts = [f"{precision + ', ' if several else ''}{_frame(dt)} / {substeps}" for precision, dt, substeps in steps]
+    ends = set()
     for number, (panel, (name, rows)) in enumerate(zip(flat, shown.items())):
-        _map(panel, rows, steps, counts)
+        ends |= _map(panel, rows)
         panel.set(title=name, xlabel="Iterations")
-        panel.set_xticks(range(len(counts)), map(str, counts))
-        first = number % axes.shape[1] == 0
-        panel.set_yticks(range(len(steps)), texts if first else [""] * len(texts))
-        panel.set_ylabel("Frame / substeps" if first else "")
+        panel.set_ylabel("Frame / substeps" if number % axes.shape[1] == 0 else "")
     labels.settle(figure, axes, place | {"across": 0.12})
     if not shown:
         labels.say(flat[0], f"Nothing was run: {lost}.")
-        return flat
-    keys = labels.swatches({"error [%], ×: displacement over the reference's": "#fec44f"} | END_COLOURS)
-    if figure is not None:
-        wide, high = style.size(figure)
-        figure.legend(handles=keys, loc="lower left", ncols=len(keys) if columns > 1 else 2, borderaxespad=0.2,
-                      bbox_to_anchor=(0.0, labels.LINE * labels.lines_of(note) / high), columnspacing=1.2)  # fmt: skip
-        figure.text(0.08 / wide, 0.03 / high, note, fontsize=style.SMALL, color="0.25", va="bottom")
+    elif figure is not None:
+        keys = labels.swatches({name: colour for name, colour in END_COLOURS.items() if name in ends})
+        figure.legend(handles=keys, loc="lower left", ncols=len(END_COLOURS), borderaxespad=0.2,
+                      bbox_to_anchor=(0.0, (under - 0.24) / style.size(figure)[1]), columnspacing=1.2)  # fmt: skip
+        _below(figure, said)
     return flat
 
 
-def _map(panel, rows, steps, counts):
-    """Draw errors of runs at rest with their numbers, and how the others ended."""
+def _below(figure, text):
+    """Write a note at the lower left of a figure."""
+    wide, high = style.size(figure)
+    figure.text(0.08 / wide, 0.04 / high, text, fontsize=style.SMALL, color="0.25", va="bottom")
+
+
+def _steps(rows):
+    """Precision, frame and substeps of runs, the smallest step first."""
+    steps = {tuple(row[name] for name in SETTING[:3]) for row in rows}
+    return sorted(steps, key=lambda one: (one[0], one[1] / one[2], one[2]))
+
+
+def _map(panel, rows):
+    """Draw errors of runs at rest with their numbers, and how the others ended, which it returns."""
+    steps, counts = _steps(rows), sorted({row["iterations"] for row in rows})
     errors = np.full((len(steps), len(counts)), np.nan)
     ends, texts = np.full(errors.shape, np.nan), np.full(errors.shape, NOT_ASKED, dtype=object)
     names = list(END_COLOURS)
     for row in rows:
         place = steps.index(tuple(row[name] for name in SETTING[:3])), counts.index(row["iterations"])
-        end, error = ENDS[row["engine_status"]], 100 * row["error"]
+        end, error = RUN_ENDS[row["engine_status"]], 100 * row["error"]
         texts[place] = ""
         if np.isfinite(error):
-            errors[place] = error
-            texts[place] = error_text(error) if error < LARGEST_PERCENT else f"×{1 + error / 100:.0f}"
+            errors[place], times = error, 1 + error / 100
+            texts[place] = error_text(error) if error < LARGEST_PERCENT else f"×{times:.{1 if times < 9.95 else 0}f}"
         elif end != "rest":
             ends[place] = names.index(end if end in names else "no run")
     heat_map(panel, errors, texts)
     panel.imshow(ends, cmap=ListedColormap([*END_COLOURS.values()]), vmin=-0.5, vmax=len(names) - 0.5, aspect="auto")
+    several = len({precision for precision, *_ in steps}) > 1
+    panel.set_yticks(
+        range(len(steps)),
+        [f"{precision + ', ' if several else ''}{_frame(dt)} / {substeps}" for precision, dt, substeps in steps],
+    )
+    panel.set_xticks(range(len(counts)), map(str, counts))
+    return {names[int(end)] for end in ends[np.isfinite(ends)]}
 
 
 @style.styled
@@ -272,31 +300,35 @@ def plot_engine_curves(data, ax=None, *, scene=None):
     >>> import springtune as st  # tree = st.open("results/mine")
     >>> axes = st.plot_engine_curves(tree, scene="sheet")
     >>> [panel.get_title(loc="left") for panel in axes]
-    ['xpbd', 'vbd']
+    ['xpbd, paper', 'vbd, paper', 'xpbd, area', 'vbd, area']
     """
     case, runs = _runs(data, "engine_curves", scene)
     shown = {name: rows for name, rows in runs.items() if any(np.isfinite(row["error"]) for row in rows)}
-    columns = min(COLUMNS, max(len(shown), 1))
-    figure, axes, flat, height = style.multiples(ax, max(len(shown), 1), columns, 2.0, sharey=True, further=0.2)
-    place = {"left": 0.5, "right": 0.08, "bottom": 0.4, "top": 0.5, "down": 0.72, "title": case.scene.item()}
-    style.arrange(figure, axes, across=0.15, **place)
-    drawn = {}
+    columns = min(PANELS_IN_ROW, max(len(shown), 1))
+    lost = _lost(runs)
+    said = f"+: the network in equilibrium{'; not drawn: ' + lost if lost else ''}" if shown else ""
+    said = labels.wrapped(said, (style.PAGE if columns > 1 else style.COLUMN) - 0.2)
+    under = labels.LINE * labels.lines_of(said)
+    figure, axes, flat, _ = style.multiples(ax, max(len(shown), 1), columns, 2.0, sharey=True, further=0.1 + under)
+    place = {"left": 0.5, "right": 0.08, "bottom": 0.42 + under, "top": 0.42, "down": 0.62}
+    style.arrange(figure, axes, across=0.15, **place, title=case.scene.item())
+    ends = []
     for number, (panel, (name, rows)) in enumerate(zip(flat, shown.items())):
-        drawn[panel] = _curves(panel, rows, float(case.definition_error.sel(definition=rows[0]["definition"]))), "", ""
-        panel.set(title=name, xlabel="Factor on what is typed", **style.LOGARITHMIC)
+        ends.append(_curves(panel, rows, float(case.definition_error.sel(definition=rows[0]["definition"]))))
+        panel.set(title=name, xlabel="Factor on what is typed")
         panel.set_ylabel("Displacement / reference" if number % axes.shape[1] == 0 else "")
-        style.plain(panel, "x", "y")
-    lost, why = _lost(runs), "no run of a curve is at rest beside a reference"
-    said = labels.wrapped(f"+: the network in equilibrium{'; not drawn: ' + lost if lost else ''}", 2.0)
-    last = flat[len(shown) - 1] if shown else flat[0]
-    drawn[last] = (drawn[last][0], said, "") if shown else ([], "", f"Nothing to draw, {why}: {lost}.")
-    labels.finish(figure, axes, place | {"across": 0.1}, drawn, height if ax is None else 0.0)
+    labels.settle(figure, axes, place | {"across": 0.1})
+    for panel, found in zip(flat, ends):
+        labels.name_lines(panel, found)
+    if not shown:
+        labels.say(flat[0], f"No run of a curve is at rest beside a reference: {lost}.")
+    elif figure is not None:
+        _below(figure, said)
     return flat
 
 
 def _curves(panel, rows, definition_error):
     """Draw a line a setting: ends of the lines, named by what tells them apart."""
-    panel.axhline(1, color="0.45", linewidth=0.8)
     lines, names, ends = defaultdict(list), _varying(rows, SETTING), []
     for row in rows:
         lines[_setting(row, names)].append((row["stiffness_factor"], 1 + row["error"]))
@@ -305,6 +337,9 @@ def _curves(panel, rows, definition_error):
         ends += labels.line(panel, factors, np.where(ratios > 0, ratios, np.nan), style.line(number), name)
     if np.isfinite(definition_error):
         panel.plot([1], [1 + definition_error], "+", color="black", markersize=7, zorder=4)
+    panel.set(**style.LOGARITHMIC)
+    style.plain(panel, "x", "y")
+    _across(panel, 1)
     return ends
 
 
@@ -346,12 +381,15 @@ def plot_engine_factors(data, ax=None, *, scene=None):
                 lines[", ".join(filter(None, (name, _setting(row, names))))][row["iterations"]] = row["best_factor"]
     figure, axes = style.panels(ax, figsize=(style.COLUMN, 2.6))
     panel, ends, place = axes[0, 0], [], {"left": 0.5, "right": 0.08, "bottom": 0.4, "top": 0.3}
-    panel.axhline(1, color="0.45", linewidth=0.8)
     for number, (name, points) in enumerate(lines.items()):
         counts, factors = np.array(sorted(points.items())).T
         ends += labels.line(panel, counts, factors, style.line(number), name)
-    panel.set(**style.LOGARITHMIC, xlabel="Iterations", ylabel="Best factor on what is typed", title=case.scene.item())
-    style.plain(panel, "x", "y")
+    shown = [1.0, *(factor for points in lines.values() for factor in points.values())]
+    scale = "log" if max(shown) > NARROW * min(shown) else "linear"
+    panel.set(xscale="log", yscale=scale, xlabel="Iterations", ylabel="Best factor on what is typed")
+    panel.set_title(case.scene.item())
+    style.plain(panel, "x", *(["y"] if scale == "log" else []))
+    _across(panel, 1)
     curves = {tuple(row[name] for name in ("engine", "definition", *SETTING)): row["best_factor"] for row in every}
     lost = sum(np.isnan(list(curves.values())))
     why = "" if ends else f"None of {len(curves)} curves has a factor at which the displacement is right."

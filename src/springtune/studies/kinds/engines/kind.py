@@ -63,8 +63,8 @@ def _read_frame(value: str) -> float:
     return found
 
 
-_COUNT = number("a whole number from 1 to 100000, such as 10", 1, 100_000, whole=True)
-Count = Annotated[int, _COUNT]
+_WHOLE = number("a whole number from 1 to 100000, such as 10", 1, 100_000, whole=True)
+Count = Annotated[int, _WHOLE]
 EngineName = Annotated[str, Scalar(str, {"type": "string", "examples": ["xpbd"]}, "an engine such as 'xpbd'")]
 FrameTime = Annotated[
     float, Scalar(_read_frame, {"type": "string", "examples": ["1/60 s"]}, "a time such as '1/60 s' or '5 ms'")
@@ -106,8 +106,8 @@ class EngineRunsConfig(Section):
     )
     stiffness_factor: Ratios = default(
         "1",
-        description="Factors on all stiffnesses that are typed. Several give a sensitivity curve in the engine, and the "
-        "factor at which its displacement is right.",
+        description="Factors on all stiffnesses that are typed; several give a sensitivity curve in the engine, and "
+        "the factor at which its displacement is right.",
     )
 
 
@@ -123,7 +123,10 @@ class EnginesConfig(Section):
 
 @dataclass(frozen=True)
 class EngineRun:
-    """A scene in an engine at a setting; the force is a magnitude [N], `dt` the time of a frame [s]."""
+    """A scene in an engine at a setting; the force is a magnitude [N], `dt` the time of a frame [s].
+
+    Runs `of_curve` have factors on what is typed.
+    """
 
     scene: str
     beam: Beam
@@ -134,17 +137,14 @@ class EngineRun:
     force: float
     definition: str
     engine: str
+    program: str
     precision: str
     dt: float
     substeps: int
     iterations: int
     stiffness_factor: float
     frames: int | None
-
-    @property
-    def setting(self):
-        """The same for all runs of a curve."""
-        return self.scene, self.definition, self.engine, *(getattr(self, name) for name in SETTING)
+    of_curve: bool
 
 
 def _engines():
@@ -206,17 +206,19 @@ def _expand(config, declared):
         names = runs.scene or section.scenes
         for name, definition, engine, setting in product(names, runs.definition, runs.engine, product(*values)):
             precision, dt, substeps, iterations, factor = setting
-            precision = engines[engine].precisions[0] if precision == OWN_PRECISION else precision
-            iterations = iterations if engines[engine].iterates else 1
-            scene = section.scenes[name]
+            scene, solver = section.scenes[name], engines[engine]
+            precision = solver.precisions[0] if precision == OWN_PRECISION else precision
             body = declared.beams[scene.beam], scene.mesh_type, scene.mesh_size, declared.materials[scene.material]
-            how = definition, engine, precision, dt, substeps, iterations, factor, section.frames
-            found[EngineRun(name, *body, scene.load, scene.force, *how)] = None
+            how = definition, engine, solver.program, precision, dt, substeps, iterations if solver.iterates else 1
+            of_curve = runs.stiffness_factor != [1.0]
+            run = EngineRun(name, *body, scene.load, scene.force, *how, factor, section.frames, of_curve)
+            found[run] = None
     ranks = [list(one) for one in (section.scenes, DEFINITIONS, engines)]
 
     def order(run):
         names = (run.scene, run.definition, run.engine)
-        return [rank.index(name) for rank, name in zip(ranks, names)], run.setting[3:], run.stiffness_factor
+        numbers = [getattr(run, name) for name in (*SETTING, "stiffness_factor", "of_curve")]
+        return [rank.index(name) for rank, name in zip(ranks, names)], numbers
 
     return tuple(sorted(found, key=order))
 
@@ -230,23 +232,24 @@ def _summary(runs):
 
 def _version(engine):
     """Versions of what an engine needs, "none" of what is absent: a new one runs it again."""
-    return ", ".join(f"{name} {installed(name)}" for name in map(distribution, engine.needs))
+    names = (distribution(need.partition(">=")[0]) for need in engine.needs)
+    return ", ".join(f"{name} {installed(name)}" for name in names)
 
 
 def _tasks(study):
     """Runs of an engine follow each other in one job, since their seconds are measured."""
-    engines = _engines()
+    of_cell = ("scene", "definition", "engine", *SETTING, "stiffness_factor")
     for run in study.parts["engines"]:
-        same = ("mesh_type", "mesh_size", "load", "force", "definition", "engine", *SETTING, "stiffness_factor")
-        values = {name: getattr(run, name) for name in (*same, "frames")}
+        engine = _engines()[run.engine]
+        of_task = (*of_cell[1:], "mesh_type", "mesh_size", "load", "force", "frames")
+        values = {name: getattr(run, name) for name in of_task}
         values |= {"beam": beam_key(run.beam), "material": material_key(run.material, density=True)}
-        engine = engines[run.engine]
         values["engine_version"] = _version(engine)
         also = mesh_type_key(run.mesh_type), definition_key(run.definition), declared_key(engine)
         particles = run.beam.length * run.beam.height / (COEFFICIENT * run.mesh_size**2)
-        cost = _cost_of(engine.program), run.substeps * run.iterations * particles
-        labels = {name: getattr(run, name) for name in ("scene", "definition", "engine", *SETTING, "stiffness_factor")}
-        yield Task(values, also, labels, run, [cost], run.engine)
+        name = f"engines {run.program.lower()}"
+        cost = name if name in COSTS else "engines", run.substeps * run.iterations * particles
+        yield Task(values, also, {name: getattr(run, name) for name in of_cell}, run, [cost], run.engine)
 
 
 COSTS = {
@@ -257,11 +260,6 @@ COSTS = {
     "engines pybullet": (0.2, 5e-6),
 }
 """Seconds of a run by program, and by particles, substeps and iterations."""
-
-
-def _cost_of(program):
-    name = f"engines {program}"
-    return name if name in COSTS else "engines"
 
 
 STAGE = stage("engines", "studies.kinds.engines.solve", "Running scenes in engines", _tasks, alone=True)

@@ -13,16 +13,13 @@ if TYPE_CHECKING:
 def figures(scenes: Iterable[object], curves: Iterable[object]) -> dict[str, dict[str, object]]:
     """Figures by stem: of scenes that were run, and of those with curves."""
     shown = {"errors": scenes, "maps": scenes, "curves": curves, "factors": curves}
-    return {
-        f"engines_{name}_{scene}": {"scene": scene} for name, own in shown.items() for scene in dict.fromkeys(own)
-    }
+    return {f"engines_{name}_{scene}": {"scene": scene} for name, own in shown.items() for scene in dict.fromkeys(own)}
 
 
 def divided(runs: Iterable[Any]) -> tuple[list[Any], list[Any]]:
-    """Runs with what is typed as it is, and those of settings that have other factors, too."""
+    """Runs with what is typed as it is, and those of curves."""
     runs = list(runs)
-    swept = {run.setting for run in runs if run.stiffness_factor != 1}
-    return [run for run in runs if run.stiffness_factor == 1], [run for run in runs if run.setting in swept]
+    return [run for run in runs if not run.of_curve], [run for run in runs if run.of_curve]
 
 
 OUTPUTS = (
@@ -61,7 +58,7 @@ VIEWS = (
     ),
 )
 
-COLUMNS = {
+ENGINE_COLUMNS = {
     "dt_ms": ("dt", 1e3),
     "displacement_mm": ("displacement", 1e3),
     "reference_mm": ("reference_displacement", 1e3),
@@ -76,16 +73,16 @@ COLUMNS = {
 def tables(tree: "xr.DataTree") -> list[dict[str, Any]]:
     """Tables of the page, see `springtune.studies.kinds.scenes.tables.tables`."""
     from ...output.selection import records  # here, since a plan does without xarray
-    from . import ENDS
+    from . import RUN_ENDS
 
     if "engines" not in tree:
         return []
     data = tree["engines"].to_dataset()
-    names = [name for name, _ in COLUMNS.values() if name in data.data_vars]
+    names = [name for name, _ in ENGINE_COLUMNS.values() if name in data.data_vars]
     rows = [
         {name: one[name] for name in ("scene", "definition", "engine", "precision", "substeps", "iterations")}
-        | {column: factor * one[name] for column, (name, factor) in COLUMNS.items()}
-        | {"end": ENDS[int(one["engine_status"])], "why": one["message"]}
+        | {column: factor * one[name] for column, (name, factor) in ENGINE_COLUMNS.items()}
+        | {"end": RUN_ENDS[int(one["engine_status"])], "why": one["message"]}
         for one in records(data, data.status != 0, (*names, "engine_status", "message"))
     ]
     note = (

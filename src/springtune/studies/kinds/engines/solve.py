@@ -12,9 +12,9 @@ from springtune.reference.small_strain import ReferenceNotConvergedError
 from springtune.scene.meshes import make_mesh
 from springtune.scene.single import Scene
 
-from . import ENDS
+from . import RUN_ENDS
 
-OURS = "springtune"
+OUR_PROGRAM = "springtune"
 """Program of the engines whose errors are errors of this package."""
 
 OF_THE_SCENE = ("mesh_type", "mesh_size", "load", "force", "definition")
@@ -23,7 +23,7 @@ OF_THE_SCENE = ("mesh_type", "mesh_size", "load", "force", "definition")
 
 def failed(task, why, end="failed"):
     """Result of a run that did not begin, or did not end by itself."""
-    return {"status": Status.FAILED, "engine_status": ENDS.index(end), "message": why}
+    return {"status": Status.FAILED, "engine_status": RUN_ENDS.index(end), "message": why}
 
 
 def solve(task):
@@ -32,22 +32,20 @@ def solve(task):
     scene, known, objection = _scene(*body, *(task[name] for name in OF_THE_SCENE))
     engine, setting = ENGINES[task["engine"]], (task["dt"], task["substeps"], task["iterations"], task["precision"])
     try:
-        found = in_engine(
-            scene, engine.name, Setting(*setting), factor=task["stiffness_factor"], frames=task["frames"]
-        )
+        found = in_engine(scene, engine.name, Setting(*setting), factor=task["stiffness_factor"], frames=task["frames"])
     except EngineError as error:
         end = "absent" if isinstance(error, EngineAbsentError) else "refused"
         return known | failed(task, str(error), end)
     except MemoryError:
         raise
     except Exception as error:  # a program of others may raise anything, and other runs go on
-        if engine.program == OURS:
+        if engine.program == OUR_PROGRAM:
             raise
         return known | failed(task, f"{engine.name}: {type(error).__name__}: {error}")
     at_rest = found.status == "rest"
     result = {
         "status": Status.SOLVED if at_rest else Status.NOT_CONVERGED,
-        "engine_status": ENDS.index(found.status),
+        "engine_status": RUN_ENDS.index(found.status),
         "message": "; ".join(filter(None, (found.message, objection))),
         "displacement" if at_rest else "last_displacement": found.displacement,
         "swing": found.swing,

@@ -1,0 +1,81 @@
+"""Position-based dynamics: Mueller, Heidelberger, Hennix and Ratcliff, J. Vis. Commun. Image R. 18, 2007.
+
+A warning rather than a tool: its stiffness s is no stiffness, but the share of a spring's stretch that an iteration
+takes away, between 0 and 1. One spring that holds a force, with w the sum of its ends' inverse masses, n iterations and
+steps of h, rests as if it had
+
+    k = ((1 - s)^-n - 1) / (w h^2)    [N/m].
+
+The same s is stiffer with more iterations, with shorter steps and with lighter particles. With any s above 0, springs
+tend to rods as n grows or h shrinks. So s must follow the setting, one for each spring:
+
+    s = 1 - (1 + k w h^2)^(-1/n).
+
+With one iteration that is the first iteration of XPBD. A net of springs then tends to our equilibrium as h shrinks:
+the error falls as h^2, at any n. It does not as n grows, since iterations know of no load. They tend to the flow of x
+along ``-M^-1 dV/dx`` for a unit of time, V the energy of springs of ``ln(1 + k w h^2) / w`` in the place of k. Linear,
+with A = M^-1 times the tangent of V, the net rests where ``(exp(A) - 1) u = h^2 M^-1 f``; ``A u = h^2 M^-1 f`` would be
+our equilibrium at small h.
+"""
+
+import numpy as np
+
+from ..handover.net import SpringNet
+from .base import Parameter, Session, Setting, engine
+from .textbook import Textbook, compiled, pulling
+
+
+@compiled
+def _project(x, weights, springs, lengths, shares, iterations):  # type: ignore[no-untyped-def]
+    """Take away a share of each spring's stretch, in iterations over all springs."""
+    for _ in range(iterations):
+        for e in range(len(lengths)):
+            i, j = springs[e]
+            dx, dy = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1]
+            length = np.sqrt(dx * dx + dy * dy)
+            dx, dy = dx / length, dy / length
+            total = (weights[i, 0] + weights[j, 0]) * dx * dx + (weights[i, 1] + weights[j, 1]) * dy * dy
+            if total == 0:
+                continue
+            change = shares[e] * (lengths[e] - length) / total
+            x[i, 0] -= weights[i, 0] * change * dx
+            x[i, 1] -= weights[i, 1] * change * dy
+            x[j, 0] += weights[j, 0] * change * dx
+            x[j, 1] += weights[j, 1] * change * dy
+    return x
+
+
+def shares(net: SpringNet, setting: Setting) -> np.ndarray:
+    """Stiffness of position-based dynamics for each spring of a net [1]; 0 where both ends are held."""
+    assert net.masses is not None  # of a scene that moves
+    weights = np.where(net.held, 0, 1 / net.masses[:, None])[net.springs].sum(axis=1)
+    along = (net.points[net.springs[:, 1]] - net.points[net.springs[:, 0]]) / net.rest_lengths[:, None]
+    grown = net.stiffness * setting.step**2 * np.einsum("ij,ij->i", weights, along**2)
+    found: np.ndarray = -np.expm1(-np.log1p(grown) / setting.iterations)
+    return found
+
+
+class _Session(Textbook):
+    def __init__(self, net: SpringNet, setting: Setting, damping: float) -> None:
+        pulling(net, "no share of a stretch is negative")
+        super().__init__(net, setting, damping)
+        self.shares = shares(net, setting)[net.stiffness != 0].astype(self.kind)
+
+    def solve(self, before: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """Project the inertial positions."""
+        found: np.ndarray = _project(y, self.weights, self.springs, self.lengths, self.shares, self.iterations)
+        return found
+
+
+@engine(
+    "pbd",
+    order=10,
+    parameters={"stiffness": Parameter("1", "1 - (1 + k w h^2)^(-1/n), w = 1/m_i + 1/m_j; h the step, n iterations")},
+    implicit=True,
+    typed=lambda net, setting: {"stiffness": shares(net, setting)},
+    of_setting=True,
+    source="Mueller 2007",
+)
+def session(net: SpringNet, setting: Setting, damping: float) -> Session:
+    """Position-based dynamics: shares of stretches, which mean another stiffness at each setting; a warning."""
+    return _Session(net, setting, damping)

@@ -1,0 +1,367 @@
+"""Measured decays: dampers that give them, verified by released beams, and fits of measured swings."""
+
+import re
+from functools import cache
+
+import mujoco
+import numpy as np
+import pytest
+
+import springtune as st
+from springtune.mechanics.dynamics import Motion
+
+BEAM, RUBBER = st.Beam("100 mm", "10 mm"), st.Material("1 MPa", 0.45, density="1100 kg/m^3")
+DECREMENT = 0.3
+
+
+@cache
+def scene(definition="patch", load="bending", size="5 mm", kinematics="linear", mesh_type="structured", force="0.1 mN"):
+    """A soft beam, moved so little that the length law is linear, too."""
+    mesh = st.make_mesh(BEAM, mesh_type, size)
+    return st.Scene(BEAM, mesh, RUBBER, load, force, definition=definition, kinematics=kinematics)
+
+
+@cache
+def bent(one):
+    return one.solve().displacements
+
+
+def share(one, displacements):
+    """Amplitude of the loaded mode."""
+    motion = one.motion()
+    return (motion.mass * motion.loaded_mode[1]) @ motion.network.reduce(displacements)
+
+
+def swing(one, integrator, step, periods=3, **options):
+    """Decay of the loaded mode of a beam that is let go of."""
+    motion, seen = one.motion(released=True, **options), []
+    steps = round(periods * 2 * np.pi / one.motion().loaded_frequency / step)
+    motion.run(
+        integrator, step, steps, bent(one), sample=1, watch=lambda time, u, v: seen.append((time, share(one, u)))
+    )
+    return st.fit_decay(*np.array(seen).T)
+
+
+# -- our integrators ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("over", ["mass", "springs", "both"])
+@pytest.mark.parametrize("definition, load", [("patch", "bending"), ("lattice", "traction"), ("patch", "shear")])
+def test_a_released_beam_decays_as_was_measured(definition, load, over):
+    """The mode is alone where dampers are proportional. With x = omega h the midpoint rule has periods that are longer
+    by x^2 / 12, and decrements that are smaller by x^2 / 6.
+    """
+    one = scene(definition, load)
+    damping = st.damping_of(one, decrement=DECREMENT)
+    found = swing(one, "implicit-midpoint", damping.period / 100, **damping.options(over))
+    square = (2 * np.pi / 100) ** 2
+    assert found.period == pytest.approx(damping.period * (1 + square / 12), rel=2e-5)
+    assert found.decrement == pytest.approx(DECREMENT * (1 - square / 6), rel=2e-5)
+
+
+def pushing(mesh, material, thickness):
+    """Springs of `lattice`, a few of which push a little."""
+    springs = st.DEFINITIONS["lattice"].springs(mesh, material, thickness)
+    relative = springs.relative.copy()
+    relative[::9] = -0.02
+    return st.Springs(springs.reference, relative)
+
+
+@pytest.mark.parametrize("definition", ["delingette", pushing])
+def test_dashpots_where_stiffness_has_no_proportional_ones(definition):
+    """Of energies alone, or of springs that push: dashpots are scaled for the mode, and couple it to others a little.
+
+    The decrement of the loaded mode is then off by terms of the ratio.
+    """
+    one = scene(definition)
+    assert one.springs.relative.min() <= 0
+    damping = st.damping_of(one, decrement=DECREMENT)
+    assert damping.dashpots.min() >= 0
+    found = swing(one, "implicit-midpoint", damping.period / 100, **damping.options("springs"))
+    assert found.decrement == pytest.approx(DECREMENT, rel=damping.ratio)
+
+
+def test_dashpots_are_beta_times_stiffness():
+    damping = st.damping_of(scene(), ratio=0.05)
+    stiffness = st.SpringNet.from_scene(scene(), errors=False).stiffness
+    assert damping.dashpots == pytest.approx(damping.stiffness_damping * stiffness, rel=1e-9)
+    assert damping.mass_damping == pytest.approx(2 * 0.05 * damping.frequency)
+    assert damping.stiffness_damping == pytest.approx(2 * 0.05 / damping.frequency)
+
+
+def test_the_loaded_mode_is_a_mode():
+    motion = scene().motion()
+    frequency, shape = motion.loaded_mode
+    assert shape @ (motion.mass * shape) == pytest.approx(1)
+    away = motion.stiffness_matrix @ shape - frequency**2 * motion.mass * shape
+    assert np.linalg.norm(away) < 1e-6 * np.linalg.norm(frequency**2 * motion.mass * shape)
+
+
+@pytest.mark.parametrize("count", [20, 100])
+def test_implicit_euler_damps_as_a_stiffness_damping_of_its_step(count):
+    """Without dampers the ratio is x / 2, x = omega h; the decrement is exactly pi ln(1 + x^2) / atan(x)."""
+    one = scene(size="10 mm")
+    step = 2 * np.pi / one.motion().loaded_frequency / count
+    found = swing(one, "backward-euler", step)
+    x = 2 * np.pi / count
+    assert found.decrement == pytest.approx(np.pi * np.log1p(x * x) / np.arctan(x), rel=1e-6)
+    assert found.decrement == pytest.approx(2 * np.pi * x / 2, rel=x)
+
+
+@pytest.mark.parametrize("over", ["mass", "springs", "both"])
+def test_what_implicit_euler_damps_is_taken_off(over):
+    """What is left to type gives the decrement that was measured, but for terms of the ratio times omega h."""
+    one = scene(size="10 mm")
+    measured = st.damping_of(one, decrement=DECREMENT)
+    step = measured.stiffness_damping / 3
+    left = measured.implicit_euler(step)
+    assert left.stiffness_damping == pytest.approx(measured.stiffness_damping - step)
+    found = swing(one, "backward-euler", step, 1.5, **left.options(over))
+    x = one.motion().loaded_frequency * step
+    assert found.decrement == pytest.approx(DECREMENT, rel=measured.ratio * x + x**2)
+    assert swing(one, "backward-euler", step, 1.5, **measured.options(over)).decrement > 1.3 * DECREMENT
+
+
+def test_a_step_that_damps_more_than_was_measured_is_refused():
+    damping = st.damping_of(scene(), decrement=DECREMENT)
+    with pytest.raises(ValueError, match=r"step: 16.7 ms of implicit Euler alone damp .* take 7 substeps or more"):
+        damping.implicit_euler("16.6667 ms")
+    assert damping.implicit_euler(1 / 60 / 7).ratio > 0
+    assert damping.implicit_euler(1 / 60 / 7).options("both")["mass_damping"] > 0
+
+
+def test_two_modes_get_their_ratios():
+    one = scene()
+    own = one.motion().loaded_frequency
+    periods = [2 * np.pi / own / np.sqrt(1 - 0.05**2), 2 * np.pi / (6 * own) / np.sqrt(1 - 0.08**2)]
+    damping = st.damping_of(one, ratio=(0.05, 0.08), period=periods)
+    alpha, beta = damping.rayleigh
+    assert [alpha / own + beta * own, alpha / (6 * own) + 6 * beta * own] == pytest.approx([0.1, 0.16])
+    assert damping.stiffness_factor == pytest.approx(1) and damping.ratio == pytest.approx(0.05)
+    found = swing(one, "implicit-midpoint", damping.period / 100, **damping.options("both"))
+    assert found.decrement == pytest.approx(damping.decrement, rel=1e-3)
+    # Of a body whose modes are all slower, the same ratios and another stiffness.
+    slower = st.damping_of(one, ratio=(0.05, 0.08), period=2 * np.array(periods))
+    assert slower.rayleigh == pytest.approx((alpha, beta)) and slower.stiffness_factor == pytest.approx(0.25)
+
+
+def test_a_measured_period_corrects_the_stiffness():
+    """With the material that the factor gives, the scene has the measured period, by a run."""
+    first = st.damping_of(scene(), decrement=DECREMENT, period="0.2 s")
+    assert "longer than the scene's; multiply stiffnesses by 0.70" in first.notes[0]
+    assert first.notes[0] in str(first)
+    material = st.Material(1e6 * first.stiffness_factor, 0.45, density="1100 kg/m^3")
+    one = st.Scene(BEAM, scene().mesh, material, "bending", "0.1 mN", definition="patch", kinematics="linear")
+    second = st.damping_of(one, decrement=DECREMENT, period="0.2 s")
+    assert second.notes == () and second.stiffness_factor == pytest.approx(1)
+    found = swing(one, "implicit-midpoint", 2e-3, **second.options("springs"))
+    assert (found.period, found.decrement) == pytest.approx((0.2, DECREMENT), rel=1e-3)
+
+
+def test_a_loss_factor_is_twice_the_ratio():
+    one = scene()
+    hertz = one.motion().loaded_frequency / (2 * np.pi)
+    damping = st.damping_of(one, loss_factor=0.1, at=hertz)
+    assert damping.ratio == 0.05 and damping.notes == ()
+    assert st.damping_of(one, loss_factor=0.1).ratio == 0.05
+    assert "is of 50 Hz" in st.damping_of(one, loss_factor=0.1, at="50 Hz").notes[0]
+    pair = st.damping_of(one, loss_factor=(0.1, 0.2), at=(hertz / 2, "20 Hz"))
+    alpha, beta = pair.rayleigh
+    for frequency, factor in ((hertz / 2, 0.1), (20, 0.2)):
+        omega = 2 * np.pi * frequency
+        assert alpha / omega + beta * omega == pytest.approx(factor)
+    assert 2 * pair.ratio == pytest.approx(alpha / pair.frequency + beta * pair.frequency)
+
+
+def test_a_load_that_turns_has_a_mode_too():
+    """A follower load cannot be moved under, but let go of."""
+    one = scene(load="follower-pressure", kinematics="nonlinear", force="1 mN")
+    damping = st.damping_of(one, ratio=0.05)
+    assert damping.frequency > 0
+    assert one.motion(released=True, **damping.options("mass")).mass_damping == damping.mass_damping
+
+
+@pytest.mark.parametrize(
+    "given, says",
+    [
+        ({}, "decrement, ratio, loss_factor: nothing was measured; give one of them"),
+        ({"ratio": 0.1, "decrement": 0.3}, "decrement=0.3 and ratio=0.1; give one of them"),
+        ({"ratio": 1.0}, "ratio: 1.0 is not a number above zero and below 1; give one"),
+        ({"decrement": -0.1}, "decrement: -0.1 is not a number above zero"),
+        ({"decrement": "0.3"}, "decrement: '0.3' is not a number above zero"),
+        ({"loss_factor": 2.5}, "loss_factor: 2.5 is not a number above zero and below 2"),
+        ({"ratio": (0.1, 0.2, 0.3)}, "ratio: .* is neither one value nor two"),
+        ({"ratio": 0.1, "at": "5 Hz"}, "at: '5 Hz' does not go with ratio; give period"),
+        ({"loss_factor": 0.1, "period": 1}, "period: 1 does not go with loss_factor; give at"),
+        ({"loss_factor": 0.1, "at": "5 rad/s"}, "at: '5 rad/s' is .*; give a frequency such as '10 Hz'"),
+        ({"decrement": 0.3, "period": "5 mm"}, "period: '5 mm' is a length; give a time"),
+        ({"ratio": (0.1, 0.2)}, "period: None and ratio are not as many; give one for each mode"),
+        ({"ratio": 0.1, "period": (1, 2)}, r"period: \(1, 2\) and ratio are not as many"),
+        ({"ratio": (0.1, 0.5), "period": (1, 0.5)}, "the second ratio is 0.0435 to 0.23; give one mode"),
+        ({"ratio": (0.1, 0.2), "period": (1, 1)}, "as 1 to 1.0.*; give one mode"),
+    ],
+)
+def test_measures_that_say_nothing_are_refused(given, says):
+    with pytest.raises(ValueError, match=says):
+        st.damping_of(scene(), **given)
+
+
+def falling_apart(mesh, material, thickness):
+    """Springs that push so much that the beam is unstable without any load."""
+    springs = st.DEFINITIONS["lattice"].springs(mesh, material, thickness)
+    return st.Springs(springs.reference, np.where(np.arange(len(mesh.edges)) % 3, springs.relative, -1.0))
+
+
+def test_what_is_unstable_at_rest_does_not_swing():
+    with pytest.raises(ValueError, match="definition 'falling_apart': is unstable at rest"):
+        st.damping_of(scene(falling_apart), ratio=0.1)
+
+
+def test_unknown_choices_and_bodies_without_masses_are_refused():
+    with pytest.raises(ValueError, match="over: 'time' is unknown; give one of mass, springs, both"):
+        st.damping_of(scene(), ratio=0.1).options("time")
+    light = st.Scene(BEAM, scene().mesh, st.Material("1 MPa", 0.45), "bending", "1 mN")
+    with pytest.raises(ValueError, match="density: material .* has none"):
+        st.damping_of(light, ratio=0.1)
+
+
+# -- engines -----------------------------------------------------------------------------------------------------------
+
+
+def with_dampers(one, typed, tendons):
+    """Model of MuJoCo of a scene, its load let go of, with dampers in joints or tendons in place of its own."""
+    [path] = one.springs.write("net.xml", errors=False, mujoco=int(mujoco.__version__[0]))
+    text = re.sub(r'biasprm="[^"]*"', 'biasprm="0 0 0"', path.read_text())
+    text = re.sub(r' damping="[^"]*"', "", text)
+    if tendons:
+        dampers = iter(typed[st.SpringNet.from_scene(one, errors=False).stiffness != 0])
+        text = re.sub("<spatial ", lambda found: f'<spatial damping="{float(next(dampers))!r}" ', text)
+    else:
+        text = re.sub(
+            r'name="([xy])(\d+)"/>', lambda found: f'{found[0][:-2]} damping="{typed[int(found[2])]!r}"/>', text
+        )
+    return mujoco.MjModel.from_xml_string(text)
+
+
+@pytest.mark.parametrize("tendons", [False, True])
+def test_mujoco_decays_as_was_measured(tendons, tmp_path, monkeypatch):
+    """Joints take alpha m, tendons beta k, both in N s/m; Euler's scheme does not damp by itself."""
+    monkeypatch.chdir(tmp_path)
+    one = scene(size="10 mm", kinematics="nonlinear")
+    damping = st.damping_of(one, decrement=0.03 if tendons else DECREMENT)
+    masses = one.statement.masses()
+    model = with_dampers(one, damping.dashpots if tendons else (damping.mass_damping * masses).tolist(), tendons)
+    free, data, seen = ~one.held, mujoco.MjData(model), []
+    model.opt.timestep = 0.5 * one.motion(**damping.options("springs" if tendons else "mass")).step_limit(
+        "symplectic-euler"
+    )
+    data.qpos[:] = bent(one)[free]
+    moved = np.zeros(free.shape)
+    while data.time < 2 * damping.period:
+        moved[free] = data.qpos
+        seen.append((data.time, share(one, moved)))
+        mujoco.mj_step(model, data, 20)
+    found = st.fit_decay(*np.array(seen).T)
+    assert found.period == pytest.approx(damping.period, rel=1e-3)
+    assert found.decrement == pytest.approx(damping.decrement, rel=2e-3)
+
+
+@pytest.mark.parametrize("name", ["xpbd", "projective", "vbd", "vbd-inertia", "implicit-cg"])
+def test_an_implicit_engine_is_given_what_its_steps_lack(name):
+    """Iterated to the end it is implicit Euler: it swings with the measured decay about its loaded place."""
+    one = scene(size="10 mm", kinematics="nonlinear")
+    damping = st.damping_of(one, decrement=DECREMENT)
+    setting = st.Setting(damping.period / 250, iterations=40)
+    engine = st.ENGINES[name]
+    typed = engine.typed_dampers(damping, setting)["damping"]
+    session, place, seen = engine.start(st.SpringNet.from_scene(one, errors=False), setting, typed), bent(one), []
+    for number in range(300):
+        seen.append((number * setting.step, share(one, session.displacements() - place)))
+        session.advance(1)
+    found = st.fit_decay(*np.array(seen).T)
+    assert found.period == pytest.approx(damping.period, rel=1e-3)
+    assert found.decrement == pytest.approx(DECREMENT, rel=2e-3)
+    with pytest.raises(ValueError, match="take 9 substeps or more"):
+        engine.typed_dampers(damping, st.Setting("1/60"))
+
+
+# -- fits --------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("size", [1e-9, 1.0, 1e6])
+@pytest.mark.parametrize("decrement", [0.01, 0.3, 3.0])
+def test_a_fit_finds_what_made_the_points(decrement, size):
+    times = np.linspace(2.0, 3.0, 150)
+    moved = size * (5 + np.exp(-decrement * (times - 2) / 0.2) * np.cos(2 * np.pi * times / 0.2 + 1))
+    found = st.fit_decay(times, moved)
+    assert (found.period, found.decrement) == pytest.approx((0.2, decrement), rel=1e-5)
+
+
+def test_errors_of_a_fit_are_those_of_noise():
+    """Over many noises the spread is the standard error, and the mean is right."""
+    rng, times = np.random.default_rng(3), np.sort(np.random.default_rng(4).uniform(0, 1, 80))
+    clean = np.exp(-1.5 * times) * np.cos(30 * times)
+    found = [st.fit_decay(times, clean + rng.normal(0, 0.05, 80)) for _ in range(60)]
+    for name, exact in (("period", 2 * np.pi / 30), ("decrement", np.pi / 10)):
+        values = np.array([getattr(one, name) for one in found])
+        told = np.mean([getattr(one, f"{name}_error") for one in found])
+        assert values.std() == pytest.approx(told, rel=0.3)
+        assert abs(values.mean() - exact) < 4 * told / np.sqrt(60)
+
+
+def test_a_swing_is_read_from_a_file(tmp_path):
+    times = np.linspace(0, 1, 100)
+    moved = 3 * np.exp(-times) * np.cos(20 * times)
+    path = tmp_path / "swing.csv"
+    rows = "".join(f"{1e3 * t},{x}\n" for t, x in zip(times, moved))
+    path.write_text("# let go at 0\ntime [ms],displacement [mm]\n" + rows)
+    found, exact = st.fit_decay(path), st.fit_decay(times, moved)
+    assert (found.period, found.decrement) == pytest.approx((exact.period, exact.decrement), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    "text, says",
+    [
+        (None, "cannot be read: No such file or directory; give two columns"),
+        ("", "is empty; give two columns"),
+        ("time,displacement\n0,1\n", "line 1: 'time,displacement' is no head of a decay; give two columns"),
+        ("time [s],displacement [N]\n0,1\n", "head: '1 N' is a force; give a length"),
+        ("time [s],displacement [mm]\n0,zero\n", "line 2: '0,zero' is not two numbers; correct it"),
+        ("time [s],displacement [mm]\n", "times: have the shape .*; give 12 points or more"),
+    ],
+)
+def test_files_that_are_no_swing_are_refused(text, says, tmp_path):
+    path = tmp_path / "swing.csv"
+    if text is not None:
+        path.write_text(text)
+    with pytest.raises(ValueError, match=says):
+        st.fit_decay(path)
+
+
+TIMES = np.linspace(0, 1, 50)
+
+
+@pytest.mark.parametrize(
+    "times, moved, says",
+    [
+        (TIMES, TIMES[:-1], "times: have the shape"),
+        (TIMES[::-1], np.cos(20 * TIMES), "times: are not ascending"),
+        (TIMES, np.where(TIMES > 0.5, np.nan, TIMES), "no finite number"),
+        (TIMES, 0 * TIMES + 2, "displacements: are all 2"),
+        (TIMES, np.exp(TIMES) * np.cos(20 * TIMES), "no swing that decays"),
+        (TIMES, np.exp(-5 * TIMES), "no swing that decays"),
+        (TIMES, np.random.default_rng(0).normal(size=50), "no swing that decays"),
+    ],
+)
+def test_points_that_are_no_swing_are_refused(times, moved, says):
+    with pytest.raises(ValueError, match=says):
+        st.fit_decay(times, moved)
+
+
+def test_a_motion_can_be_damped_by_a_fit():
+    """From a measured swing to dampers, and by a run back to the swing."""
+    one = scene()
+    made = swing(one, "implicit-midpoint", 1e-3, mass_damping=2.0)
+    damping = st.damping_of(one, decrement=made.decrement, period=made.period)
+    assert damping.notes == () and damping.mass_damping == pytest.approx(2.0, rel=1e-3)
+    assert isinstance(one.motion(**damping.options("mass")), Motion)

@@ -1,0 +1,102 @@
+"""Numbers of docs/which-numbers.md that its blocks do not print: measured again, and closed forms."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import springtune as st
+
+PAGE = " ".join((Path(__file__).parents[2] / "docs/which-numbers.md").read_text().split())
+SHEET = st.Beam("300 mm", "200 mm")
+
+
+def shown(pattern):
+    """Numbers of the page's sentence that a pattern finds."""
+    return [float(number) for number in re.search(pattern, PAGE).groups()]
+
+
+def off(size="20 mm", force="10 N", young="5 MPa", density="1000 kg/m^3", substeps=20, factor=1.0):
+    """Error of the page's sheet in XPBD, in percent."""
+    mesh, material = st.make_mesh(SHEET, "structured", size), st.Material(young, 0.3, density=density)
+    scene = st.Scene(SHEET, mesh, material, "traction", force, definition="patch")
+    return 100 * st.in_engine(scene, "xpbd", dt="1/60", substeps=substeps, factor=factor).error
+
+
+@pytest.mark.parametrize(
+    ("pattern", "changes"),
+    [
+        (r"([\d.]+) % at 1 N, ([\d.]+) % at 20 N", [{"force": "1 N"}, {"force": "20 N"}]),
+        (r"(\d+) % at cells of 40 mm, (\d+) % at 20 mm, (\d+) % at 10 mm",
+         [{"size": "40 mm"}, {}, {"size": "10 mm"}]),
+        (r"with E of 50 MPa it is (\d+) %, with a quarter of the density (\d+) %",
+         [{"young": "50 MPa"}, {"density": "250 kg/m^3"}]),
+        (r"within (\d+) % at 1.5 cells, (\d+) % off at 3", [{"substeps": 40}, {}]),
+        (r"too far by (\d+) %, and by (\d+) % with a hundred times the stiffness",
+         [{"substeps": 10}, {"substeps": 10, "factor": 100.0}]),
+    ],
+)  # fmt: skip
+def test_errors_at_other_settings_are_those_of_the_page(pattern, changes):
+    assert [off(**one) for one in changes] == pytest.approx(shown(pattern), abs=0.55)
+
+
+def test_cells_that_sound_crosses_are_those_of_the_page():
+    speed = (5e6 / 1000) ** 0.5
+    assert shown(r"Here √\(E/ρ\) is (\d+) m/s") == [round(speed)]
+    assert [speed / 60 / substeps / 0.02 for substeps in (40, 20)] == pytest.approx([1.5, 3], rel=0.02)
+    mesh, rubber = st.make_mesh(SHEET, "structured", "20 mm"), st.Material("5 MPa", 0.3, density="1000 kg/m^3")
+    limit = st.Scene(SHEET, mesh, rubber, "traction", "10 N", definition="patch").motion()
+    assert shown(r"Explicit engines explode above ([\d.]+)\.") == [
+        round(speed * limit.step_limit("symplectic-euler") / 0.02, 2)
+    ]
+
+
+def test_a_bent_strip_is_too_stiff_as_the_page_says():
+    rows = [list(map(float, row)) for row in re.findall(r"\| (\d+) \| (\d+) % \| (\d+) % \|", PAGE)]
+    assert [cells for cells, *_ in rows] == [2, 4, 8, 16]
+    strip, rubber = st.Beam("200 mm", "40 mm"), st.Material("5 MPa", 0.3)
+    for cells, *errors in rows:
+        for mesh_type, error in zip(("right", "structured"), errors):
+            mesh = st.make_mesh(strip, mesh_type, 0.04 / cells)
+            scene = st.Scene(strip, mesh, rubber, "bending", "5 mN", definition="delingette")
+            assert -100 * scene.solve().error == pytest.approx(error, abs=0.55)
+
+
+def test_springs_of_a_mesh_are_those_of_the_page():
+    rubber = st.Material("5 MPa", 1 / 3)
+    for mesh_type, row in {"structured": r"equilateral triangles", "braced": r"diagonals: sides"}.items():
+        mesh = st.make_mesh(SHEET, mesh_type, "20 mm")
+        found = st.DEFINITIONS["lattice"].springs(mesh, rubber, 1e-3)
+        inside, outline = shown(row + r" \| ([\d.]+) E h \| ([\d.]+) E h")
+        assert set(np.round(found.reference * found.relative / 5e3, 3)) == {inside, outline}
+    assert shown(r"both diagonals: diagonals \| ([\d.]+) E h") == [outline]
+
+
+def test_plane_stress_is_what_the_page_says():
+    def young(shear, area):
+        """Of a sheet, from the two that engines want."""
+        return 4 * shear * (area + shear) / (area + 2 * shear)
+
+    def of_a_sheet(ratio, area):
+        return young(1 / (2 * (1 + ratio)), area(ratio))
+
+    plane, solid = (lambda ratio: ratio / (1 - ratio**2)), (lambda ratio: ratio / ((1 + ratio) * (1 - 2 * ratio)))
+    for ratio in (0.0, 0.3, 0.45, 0.5):
+        assert of_a_sheet(ratio, plane) == pytest.approx(1)
+        assert plane(ratio) == pytest.approx(2 / (2 * (1 + ratio)) * ratio / (1 - ratio))
+    too_stiff = [100 * (of_a_sheet(ratio, solid) - 1) for ratio in (0.3, 0.45)]
+    assert too_stiff == pytest.approx(shown(r"by (\d+) % at ν = 0.3, by (\d+) % at 0.45"), abs=0.5)
+    assert shown(r"the sheet has (\d+) % of E at ν = 0.3") == [round(100 * of_a_sheet(0.3, lambda ratio: 0.0))]
+    assert plane(0.5) == pytest.approx(2 / (2 * 1.5))  # tri_ka = 2 tri_ke
+
+
+def test_everything_that_is_typed_into_an_engine_stands_on_the_page_with_its_unit():
+    typed = {
+        (name, parameter.unit)
+        for engine in st.ENGINES.values()
+        if engine.program != "springtune" and engine.name not in st.ENGINES.packages
+        for name, parameter in engine.parameters.items()
+    }
+    lacking = [name for name, unit in typed if name not in PAGE or unit not in ("1", "") and f"[{unit}]" not in PAGE]
+    assert not lacking
