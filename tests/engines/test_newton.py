@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-from engine_scenes import TEN, scene
 
 import springtune as st
 from springtune.handover.newton import LAWS, membrane_energies
 from springtune.handover.simulation import simulate
+
+from engine_scenes import TEN, scene
 
 pytest.importorskip("newton")
 
