@@ -94,3 +94,12 @@ def test_an_integrator_that_came_later_is_absent_by_name(monkeypatch):
     with pytest.raises(EngineAbsentError, match="needs mujoco>=3.13"):
         st.in_engine(scene(*STRIP, "patch"), "mujoco-discrete")
     assert not st.ENGINES["mujoco-euler"].absent
+
+
+def test_where_mujoco_is_not_installed_the_constants_are_those_of_its_last_version(monkeypatch):
+    def absent(name):
+        raise metadata.PackageNotFoundError(name)
+
+    monkeypatch.setattr(metadata, "version", absent)
+    net = st.SpringNet.from_scene(scene("strip", "free", "traction", "rubber", "delingette"), errors=False)
+    assert st.ENGINES["mujoco-euler"].typed(net) == pytest.approx({"young": 1e6, "poisson": 0.45, "thickness": 1e-3})
