@@ -167,6 +167,17 @@ class _Session(Textbook):
         return y
 
 
+TYPED = {"area": "area", "biquadratic": "squared-length", "incompressible": "rubber", "compressible": "rubber"}
+"""Words for kinds of blocks in the names of parameters."""
+
+
+def typed(net: SpringNet) -> dict[str, Any]:
+    """Compliances; infinite where a definition gives an edge no spring."""
+    with np.errstate(divide="ignore"):
+        springs = {"compliance": 1 / net.stiffness} if np.any(net.stiffness) else {}
+    return springs | {f"{TYPED[one.kind]} compliance": one.compliance for one in blocks(net)}
+
+
 @engine(
     "xpbd",
     order=20,
@@ -180,6 +191,7 @@ class _Session(Textbook):
         "rubber compliance": Parameter("1/(N m)", "1 / (G h A0), G = E / (2 (1 + nu))"),
     },
     implicit=True,
+    typed=typed,
     source="Macklin 2016",
 )
 def session(net: SpringNet, setting: Setting, damping: float) -> Session:
