@@ -221,6 +221,17 @@ def test_a_scene_that_no_engine_runs_is_refused():
         st.fit_engine(BASE, "xpdb")
 
 
+def test_an_absent_engine_is_refused_with_the_command_that_installs_it(engine):
+    st.ENGINES.discard("late")
+    st.engine("late", needs=("no_such_program",), extra="newton")(engine)
+    for fit in (
+        lambda: st.fit_engine(BASE, "late"),
+        lambda: st.fit_budget(BASE.beam, BASE.material, "traction", 0.2, engine="late", budget=1.0),
+    ):
+        with pytest.raises(st.EngineError, match="engine 'late' needs no_such_program; .*newton"):
+            fit()
+
+
 class TestBudget:
     """Searches within a frame's time, at costs that are given."""
 

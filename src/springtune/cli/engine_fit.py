@@ -246,16 +246,23 @@ def _meaning(fit: "EngineFit") -> list[str]:
 
 def budget_text(search: "BudgetSearch") -> str:
     """Text of a search within a budget."""
+    head = (
+        f"engine {search.engine}, at most {1e3 * search.budget:.3g} ms a frame: {len(search.tried)} choices were tried"
+    )
+    if search.best is None:
+        nearest = min(search.tried, key=lambda one: one.worst)
+        least = error_text(nearest.worst).lstrip("+")
+        return f"{head}\n\nNo stiffness makes any of them right; the nearest is off by {least}. Take a larger budget."
     lines = [
-        f"engine {search.engine}, at most {1e3 * search.budget:.3g} ms a frame: {len(search.tried)} calibrated choices",
+        head,
         "",
         "none is both cheaper and less off than one of these:",
         aligned(search.unbeaten.table(), left=2),
         "",
+        "chosen, the least error at worst:",
+        fit_text(search.best.fit, search.best.mesh),
     ]
-    if search.best is None:
-        return "\n".join([*lines, "None has a factor: no stiffness makes a setting within the budget right."])
-    return "\n".join([*lines, "chosen, the least error at worst:", fit_text(search.best.fit, search.best.mesh)])
+    return "\n".join(lines)
 
 
 def fit_json(fit: "EngineFit") -> dict[str, Any]:

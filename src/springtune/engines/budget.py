@@ -26,7 +26,7 @@ from .base import ENGINES, Engine, EngineAbsentError, EngineError, Setting
 from .calibration import WITHIN, EngineFit, fit_engine
 from .run import in_engine, net_of
 
-CELLS_ACROSS = (2, 3, 4, 6, 8, 12, 16)
+CELLS_ACROSS = (1, 2, 3, 4, 6, 8, 12, 16)
 """Cells across the smaller side of a body, of the meshes that are tried."""
 
 BUDGET_MESHES = ("structured", "right")
@@ -136,8 +136,8 @@ class BudgetSearch(Tabled):
 
     @property
     def unbeaten(self) -> TabledList[BudgetChoice]:
-        """Those that no other one beats in both error and time."""
-        worst = np.array([one.worst for one in self.tried])
+        """Those with a factor that no other one beats in both error and time."""
+        worst = np.array([one.worst if one.fit.factor == one.fit.factor else np.nan for one in self.tried])
         kept = unbeaten(worst, np.array([one.frame_seconds for one in self.tried]))
         return TabledList(one for one, there in zip(self.tried, kept) if there)
 
@@ -198,7 +198,7 @@ def fit_budget(
     mesh_types : sequence of str, optional
         Keys of `springtune.MESH_TYPES`, for a beam.
     meshes : mapping of str to Mesh or GroupedMesh, optional
-        Meshes by name, from coarse to fine, in the place of those with 2 to 16 cells across.
+        Meshes by name, from coarse to fine, in the place of those with 1 to 16 cells across.
     springs_alone : bool, optional
         Whether definitions with energies besides springs are left out.
     within : float or str, optional
