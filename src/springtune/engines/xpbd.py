@@ -167,7 +167,7 @@ class _Session(Textbook):
         return y
 
 
-TYPED = {"area": "area", "biquadratic": "squared-length", "incompressible": "rubber", "compressible": "rubber"}
+BLOCK_WORDS = {"area": "area", "biquadratic": "squared-length", "incompressible": "rubber", "compressible": "rubber"}
 """Words for kinds of blocks in the names of parameters."""
 
 
@@ -175,7 +175,7 @@ def typed(net: SpringNet) -> dict[str, Any]:
     """Compliances; infinite where a definition gives an edge no spring."""
     with np.errstate(divide="ignore"):
         springs = {"compliance": 1 / net.stiffness} if np.any(net.stiffness) else {}
-    return springs | {f"{TYPED[one.kind]} compliance": one.compliance for one in blocks(net)}
+    return springs | {f"{BLOCK_WORDS[one.kind]} compliance": one.compliance for one in blocks(net)}
 
 
 @engine(
