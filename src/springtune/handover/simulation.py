@@ -177,9 +177,7 @@ def _check(net: Net, program: str, laws: Iterable[str]) -> None:
         )
 
 
-def network_of(
-    net: Net, reference: float, energies: Callable[[Net, float], list[Energy]] | None = None
-) -> Network:
+def network_of(net: Net, reference: float, energies: Callable[[Net, float], list[Energy]] | None = None) -> Network:
     """The network that a net was written from; everything over the reference stiffness."""
     mesh = Mesh(net.points, net.triangles, net.quads)
     if not np.array_equal(mesh.edges, net.springs):

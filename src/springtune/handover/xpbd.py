@@ -92,6 +92,13 @@ def blocks(net: Net) -> list[Blocks]:
     return [_blocks(net, terms) for terms in net.energies]
 
 
+def compliances(net: Net) -> dict[str, Any]:
+    """Compliances of springs and of blocks, by name."""
+    there = net.stiffness[net.stiffness != 0]
+    found: dict[str, Any] = {"compliance": 1 / there} if there.size else {}
+    return found | {f"{one.kind} compliance": one.compliance for one in blocks(net)}
+
+
 def _check_positive(net: Net, values: np.ndarray, which: str, count: int) -> None:
     negative = int((values < 0).sum())
     if negative:
