@@ -1,5 +1,7 @@
 """Dampers that are typed into Newton, MuJoCo and PyBullet give a beam the decay that was measured."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -83,23 +85,25 @@ SHORT = st.Setting(1e-3, 25)
         ("mujoco-euler", "flex damping"),
     ],
 )
-def test_mujoco(name, damper, monkeypatch):
+def test_mujoco(name, damper, tmp_path):
     """Also of what steps of `discrete` damp by themselves, as implicit Euler does."""
-    pytest.importorskip("mujoco")
-    from springtune.engines import mujoco
-
+    mujoco = pytest.importorskip("mujoco")
     one = scene("delingette" if damper == "flex damping" else "patch", "0.1 mN")
     decrement, setting = (0.3, st.Setting(1e-3, 20)) if "joint" in damper or "discrete" in name else (0.03, SHORT)
     measured = st.damping_of(one, decrement=decrement)
     typed = st.ENGINES[name].typed_dampers(measured, setting)[damper]
-    if damper == "flex damping":  # it is compiled into the model
-        plain, read = mujoco.model, f'<elasticity damping="{float(typed)!r}" '
-        monkeypatch.setattr(mujoco, "model", lambda *given: plain(*given).replace("<elasticity ", read))
     session = started(one, name, setting)
     if damper == "joint damping":
         session.model.dof_damping[:] = np.repeat(typed[:, None], 2, axis=1)[~one.held]
     if damper == "tendon damping":
         session.model.tendon_damping[: len(typed)] = typed
+    if damper == "flex damping":  # it is compiled into a model
+        [path] = one.springs.write(tmp_path / "net.xml", errors=False)
+        text = re.sub(' damping="[^"]*"', "", path.read_text())
+        options = session.model.opt
+        session.model = mujoco.MjModel.from_xml_string(text.replace("<elasticity ", f'<elasticity damping="{typed}" '))
+        session.model.opt.timestep, session.model.opt.integrator = options.timestep, options.integrator
+        session.data = mujoco.MjData(session.model)
     assert swing(one, session, setting, 1.5).decrement == pytest.approx(decrement, rel=3e-3)
 
 
@@ -118,8 +122,6 @@ def test_tendons_of_implicitfast_slow_a_beam():
 def test_pybullet(step, tmp_path):
     """`springDampingStiffness` is a dashpot [N s/m]; steps do not damp by themselves. Nodes weigh the same there."""
     program = pytest.importorskip("pybullet")
-    from springtune.engines.pybullet import NO_CONTACT, _obj
-
     one = scene("paper", stiffness="800 N/m")
     net = st.SpringNet.from_scene(one, errors=False)
     equal = np.full(len(net.points), net.masses.mean() / one.springs.reference)
@@ -129,17 +131,17 @@ def test_pybullet(step, tmp_path):
     typed = st.ENGINES["pybullet"].typed_dampers(measured, st.Setting(step))["springDampingStiffness"]
     assert typed == pytest.approx(measured.stiffness_damping * 800)
     path = tmp_path / "net.obj"
-    path.write_text(_obj(net))
+    rows = [f"v {x!r} {y!r} 0\n" for x, y in net.points.tolist()]
+    path.write_text("".join(rows + [f"f {a} {b} {c}\n" for a, b, c in (net.triangles + 1).tolist()]))
     client = {"physicsClientId": program.connect(program.DIRECT)}
     program.resetSimulation(program.RESET_USE_DEFORMABLE_WORLD, **client)
     program.setTimeStep(step, **client)
     program.setPhysicsEngineParameter(numSubSteps=1, **client)
     program.setGravity(0, -0.2, 0, **client)
-    springs = {"springElasticStiffness": 800, "springBendingStiffness": 0, "springDampingAllDirections": 0}
-    springs["springDampingStiffness"] = typed
-    body = program.loadSoftBody(
-        str(path), mass=float(net.masses.sum()), useMassSpring=1, **springs, **NO_CONTACT, **client
-    )
+    springs = {"springElasticStiffness": 800, "springBendingStiffness": 0, "springDampingStiffness": typed}
+    apart = {"springDampingAllDirections": 0, "useSelfCollision": 0, "useFaceContact": 0, "collisionMargin": 1e-6}
+    mass = float(net.masses.sum())
+    body = program.loadSoftBody(str(path), mass=mass, useMassSpring=1, **springs, **apart, **client)
     program.changeDynamics(body, -1, activationState=program.ACTIVATION_STATE_DISABLE_SLEEPING, **client)
     for node in np.flatnonzero(net.held.all(axis=1)).tolist():
         program.createSoftBodyAnchor(body, node, -1, -1, **client)

@@ -131,7 +131,9 @@ SPRING = Parameter("N/m", "k of the definition, one for each spring")
 
 DAMPERS: dict[str, Callable[[Damping], Any]] = {
     "alpha": lambda damping: damping.mass_damping,
-    "alpha m, one for each particle": lambda damping: damping.mass_damping * damping.scene.statement.masses(),
+    "alpha m, one for each particle": lambda damping: (
+        damping.mass_damping * np.asarray(damping.scene.statement.masses())
+    ),
     "beta": lambda damping: damping.stiffness_damping,
     "beta k, one for each spring": lambda damping: damping.dashpots,
     "beta k, one for all springs": lambda damping: damping.dashpots.mean(),

@@ -17,7 +17,8 @@ from ..handover.terms import FORMULAS
 from ..mechanics.dynamics import Motion
 from ..mechanics.integrators import BackwardEuler
 from ..mechanics.stepping import make_stepper
-from .base import SPRING, Parameter, Session, Setting, engine
+from .base import Session, Setting, engine
+from .textbook import as_they_are
 
 TOLERANCE = 1e-5
 """Relative residual that ends conjugate gradients: SOFA's default."""
@@ -49,7 +50,7 @@ class _Session:
     "implicit-cg",
     order=50,
     laws=tuple(FORMULAS),
-    parameters={"stiffness": SPRING, "moduli": Parameter("as of the net", "those of the energies")},
+    parameters=as_they_are(*FORMULAS),
     implicit=True,
     source="Baraff 1998",
 )

@@ -6,8 +6,8 @@ since MuJoCo 3.13, is implicit in springs, too, by one linear system a step: `it
 gradients, of which MuJoCo allows 100 where nothing is said; they stop at a ten-thousandth of the load. The others do
 not iterate without contacts. MuJoCo computes in double precision.
 
-Velocities are scaled after each step, so joints have no damping. MuJoCo's own way is `damping` = mass times the damping
-over mass in each joint, which `RK4` takes explicitly and the others implicitly. A state that diverges is put back to
+Velocities are scaled after each step, so joints have no damping. MuJoCo's own way is `damping` in joints and tendons,
+which `RK4` takes explicitly, `Euler` those of tendons, and the others implicitly. A state that diverges is put back to
 the beginning by default; that is turned off here, so that it is seen.
 """
 

@@ -13,6 +13,9 @@ What is set besides, since Newton's defaults are others: gravity 0, no ground; r
 not touch; damping and drag of triangles and springs 0; no largest velocity; VBD's colours by springs, too, which
 `ModelBuilder.color` does not see; contacts of Style3D off. Left as they are: Style3D multiplies velocities by 0.998 in
 each step, and takes 10 iterations of conjugate gradients in each of its iterations.
+
+Newton holds particles as a whole. A direction held singly is put back after each step, and the force that would have
+kept it there is added to the next one: at rest it is the support's reaction.
 """
 
 from collections.abc import Iterator
@@ -23,7 +26,7 @@ import numpy as np
 
 from ..handover.net import SpringNet
 from ..handover.simulation import lame
-from .base import SPRING, EngineError, Parameter, Session, Setting, engine
+from .base import DASHPOT, SPRING, EngineError, Parameter, Session, Setting, engine
 
 FASTEST = 1e30
 """Largest velocity [m/s]: none. By default Newton has 1e5."""
@@ -82,11 +85,6 @@ class _Session:
     """A model of Newton, damped over mass."""
 
     def __init__(self, net: SpringNet, setting: Setting, damping: float, solver: str) -> None:
-        if np.any(net.held.any(axis=1) != net.held.all(axis=1)):
-            raise EngineError(
-                "supports: a particle is held in one direction alone, and Newton holds particles as a whole; hold both "
-                "directions, or take another engine, such as xpbd"
-            )
         with _quiet():
             import newton
 
@@ -96,12 +94,16 @@ class _Session:
                 self.solver = made(self.model, config=made.Config(iterations=setting.iterations))
                 self.solver.collision = None
             else:
-                self.solver = made(self.model, **({} if solver == "SemiImplicit" else {"iterations": setting.iterations}))
+                self.solver = made(
+                    self.model, **({} if solver == "SemiImplicit" else {"iterations": setting.iterations})
+                )
             self.now, self.next, self.control = self.model.state(), self.model.state(), self.model.control()
         self.step, self.substeps = setting.step, setting.substeps
         self.kept = np.float32(1 / (1 + damping * setting.step))
-        self.forces = np.column_stack([np.where(net.held, 0, net.forces), np.zeros(len(net.points))])
+        self.forces = np.column_stack([net.forces, np.zeros(len(net.points))])
         self.rest = self.now.particle_q.numpy().copy()
+        self.guided = np.column_stack([net.held & ~net.held.all(axis=1)[:, None], np.zeros(len(net.points), bool)])
+        self.reacting = self.model.particle_mass.numpy()[np.nonzero(self.guided)[0]] / setting.step**2
 
     def advance(self, frames: int) -> None:
         """Take a number of frames."""
@@ -110,7 +112,10 @@ class _Session:
                 self.now.particle_f.numpy()[:] = self.forces  # a view; the semi-implicit solver adds its own to them
                 self.solver.step(self.now, self.next, self.control, None, self.step)
                 self.now, self.next = self.next, self.now
-                self.now.particle_qd.numpy()[:] *= self.kept
+                places, velocities = self.now.particle_q.numpy(), self.now.particle_qd.numpy()
+                velocities *= self.kept
+                self.forces[self.guided] -= self.reacting * (places - self.rest)[self.guided]
+                places[self.guided], velocities[self.guided] = self.rest[self.guided], 0
 
     def displacements(self) -> np.ndarray:
         """Displacement of each particle [m]."""
@@ -120,15 +125,16 @@ class _Session:
 def _model(net: SpringNet, solver: str) -> Any:
     """Model of a net; particles without mass are held."""
     import newton
+    from warp import vec3
 
     assert net.masses is not None  # of a scene that moves
     count = len(net.points)
     builder = newton.ModelBuilder(gravity=(0.0, 0.0, 0.0))
     if solver == "Style3D":
         newton.solvers.SolverStyle3D.register_custom_attributes(builder)
-    places = np.column_stack([net.points, np.zeros(count)])
     masses = np.where(net.held.all(axis=1), 0, net.masses)
-    builder.add_particles(places.tolist(), [(0.0, 0.0, 0.0)] * count, masses.tolist(), radius=[0.0] * count)
+    places = [vec3(x, y, 0.0) for x, y in net.points.tolist()]
+    builder.add_particles(places, [vec3(0.0)] * count, masses.tolist(), radius=[0.0] * count)
     there = net.stiffness != 0
     for (first, second), stiffness in zip(net.springs[there].tolist(), net.stiffness[there].tolist()):
         builder.add_spring(first, second, ke=stiffness, kd=0.0, control=0.0)
@@ -139,6 +145,10 @@ def _model(net: SpringNet, solver: str) -> Any:
         numbers |= triangle_numbers(net, solver)
         each = {name: [value] * len(cells) for name, value in numbers.items()}
         own = {f"style3d:{name}": each.pop(name) for name in STYLE3D if name in each}
+        if own:  # its collision, though off, wants an edge: one without bending
+            first, second = map(int, cells[0, :2])
+            free = {"style3d:edge_rest_area": 1.0}
+            builder.add_edge(-1, -1, first, second, rest=0.0, edge_ke=0.0, edge_kd=0.0, custom_attributes=free)
         builder.add_triangles(*cells.T.tolist(), custom_attributes=own, **each)
     builder.set_coloring(colours(net))
     builder.particle_max_velocity = FASTEST
@@ -169,7 +179,19 @@ def _declare(order: float, name: str, solver: str, summary: str, parameters: dic
     )(session)
 
 
-_declare(150, "newton-vbd", "VBD", "implicit steps by vertex block descent, one particle after the other", VBD)
-_declare(151, "newton-xpbd", "XPBD", "springs alone, all at once in an iteration", {"ke": SPRING}, laws=())
-_declare(152, "newton-semi-implicit", "SemiImplicit", "explicit steps", SEMI_IMPLICIT, iterates=False)
-_declare(153, "newton-style3d", "Style3D", "implicit steps by projective dynamics", STYLE3D, springs=False)
+IMPLICIT = {"implicit": True, "dampers": {"kd": DASHPOT}}
+
+_declare(150, "newton-vbd", "VBD", "implicit steps by vertex block descent", VBD, **IMPLICIT)
+_declare(151, "newton-xpbd", "XPBD", "springs alone, all at once in an iteration", {"ke": SPRING}, laws=(), **IMPLICIT)
+_declare(
+    152,
+    "newton-semi-implicit",
+    "SemiImplicit",
+    "explicit steps",
+    SEMI_IMPLICIT,
+    iterates=False,
+    dampers={"kd": DASHPOT},
+)
+_declare(
+    153, "newton-style3d", "Style3D", "implicit steps by projective dynamics", STYLE3D, springs=False, implicit=True
+)

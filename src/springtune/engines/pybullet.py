@@ -13,7 +13,7 @@ Tried in 3.2.7, whose wheel computes in double precision; an OBJ file has positi
 - `applyExternalForce` does not act on a deformable body. So a loaded node is anchored to a rigid body of a node's mass,
   which is pushed and damped over mass; dampers do not act on anchored nodes. Dampers between the others have the
   stiffness over the damping over mass. Their solver leaves up to a thousandth of the load, the more the stronger they
-  are.
+  are, and does nothing about swings of micrometres.
 - The laws of triangles (`useNeoHookean`) act on tetrahedra alone.
 - Bodies that are slow fall asleep, and their forces vanish, unless `changeDynamics` forbids it.
 """

@@ -30,8 +30,18 @@ REST = {"float64": 1e-7, "float32": 1e-4}
 BLOWN = 1e2
 """Displacement over the body's extent beyond which a run has diverged."""
 
-RECALLED = 16
-"""Looks at a run that tell whether it swings."""
+RECALLED = 32
+"""Last displacements that tell whether a run swings."""
+
+STEADY = 0.8
+"""Amplitude of the later half of these over that of the earlier one, above which a swing is not on its way to rest."""
+
+CALM = 4
+"""Windows in a row that a run has to be near rest."""
+
+SLOWEST = 0.99
+"""Largest ratio of changes that a run is judged by: a creep by less than 1 - `SLOWEST` of the tolerance in a window is
+taken for rest, since it might as well be rounding."""
 
 
 @dataclass(frozen=True)
@@ -114,7 +124,8 @@ class EngineResult(Tabled):
     @cached_property
     def reference(self) -> float:
         """Displacement of the load by finite elements [m]."""
-        return next(iter(self.scene.reference_values().values()))
+        known, quantities = self.scene.reference_values(), self.scene.statement.case.quantities
+        return next((known[one.name] for one in quantities if one.kind == "displacement"), np.nan)
 
     @property
     def error(self) -> float:
@@ -209,7 +220,7 @@ def in_engine(
     16.5 mm in place of 1.0
     """
     chosen = ENGINES[engine]
-    setting = _complete(chosen, setting or Setting(**parts))
+    setting = complete(chosen, setting or Setting(**parts))
     net = net_of(scene, factor)
     chosen.check(setting, net)
     frequency = scene.motion().loaded_frequency * factor**0.5
@@ -221,7 +232,7 @@ def in_engine(
     return EngineResult(scene, engine, setting, factor, **vars(ended))
 
 
-def _complete(engine: Engine, setting: Setting) -> Setting:
+def complete(engine: Engine, setting: Setting) -> Setting:
     """Return a setting with the engine's own precision where it has none."""
     return setting if setting.precision else replace(setting, precision=engine.precisions[0])
 
@@ -244,38 +255,66 @@ def net_of(scene: Scene, factor: float = 1.0) -> SpringNet:
 def follow(session: Session, window: int, most: int, tolerance: float, extent: float) -> Ended:
     """Advance a session until it rests.
 
-    Looks are `window` frames apart. Where the changes between them shrink by a ratio r, the rest of the way is the last
-    change times r / (1 - r). A run rests where that is below `tolerance` of the displacement in two looks.
+    Where the changes in windows of frames shrink by a ratio r, the rest of the way is the last change times r / (1 -
+    r). A rising r tells of a slower motion below, so r is taken as if it rose on. A run rests where the rest of the way
+    stays below `tolerance` of the displacement in `CALM` windows, or where it trembles by less, as rounding does.
+    Within a window there is a second look, since a swing may repeat itself in each.
     """
     seen: list[np.ndarray] = [session.displacements()]
     seconds: list[float] = []
-    done, change, calm = 0, np.nan, 0
+    last, before, gap, done, calm = seen[0], np.inf, 1.0, 0, 0
     while done < most:
-        count = min(window, most - done)
-        begin = time.perf_counter()
-        session.advance(count)
-        seconds.append((time.perf_counter() - begin) / count)
-        done += count
-        now = session.displacements()
-        size = float(np.abs(now).max())
-        if not size <= BLOWN * extent:
-            return Ended(np.full(now.shape, np.nan), "diverged", _why(done), done, _frame(seconds), np.nan)
-        before, change = change, float(np.abs(now - seen[-1]).max())
-        ratio = change / before if before else 0.0
-        left = change * max(1.0, ratio / (1 - ratio)) if ratio < 1 else np.inf
-        calm = calm + 1 if left <= tolerance * size or change == 0 else 0
-        seen = [*seen[1 - RECALLED :], now]
-        if calm == 2:
+        for count in _pieces(min(window, most - done)):
+            begin = time.perf_counter()
+            session.advance(count)
+            seconds.append((time.perf_counter() - begin) / count)
+            done += count
+            now = session.displacements()
+            size = float(np.abs(now).max())
+            if not size <= BLOWN * extent:
+                return Ended(np.full(now.shape, np.nan), "diverged", _why(done), done, _frame(seconds), np.nan)
+            aside = float(np.abs(now - seen[-1]).max())
+            seen = [*seen[1 - RECALLED :], now]
+        change, wider = float(np.abs(now - last).max()), gap
+        ratio = change / before if before else float(change > 0)
+        gap = 1 - min(ratio, SLOWEST)
+        ahead = max(1 - SLOWEST, min(gap, gap * gap / wider))
+        left = max(change, aside) * max(1.0, (1 - ahead) / ahead)
+        calm = calm + 1 if left <= tolerance * size else 0
+        last, before = now, change
+        trembles = len(seen) == RECALLED and _swing(seen) <= tolerance * size and _trembles(seen)
+        if calm == CALM or trembles:
             return Ended(now, "rest", "", done, _frame(seconds), 0.0)
-    recalled = np.array(seen[-(len(seen) // 2 * 2) :])
-    earlier, later = np.split(recalled, 2)
-    drift = float(np.abs(later.mean(axis=0) - earlier.mean(axis=0)).max())
-    swing = float(np.ptp(later, axis=0).max() / 2)
-    if swing > 2 * drift:
+    swing = _swing(seen[len(seen) // 2 :])
+    if _trembles(seen) and swing > STEADY * _swing(seen[: len(seen) // 2]):
         said = f"swings by {swing:.3g} m about its mean after {done} frames; take more substeps or damping"
-        return Ended(recalled.mean(axis=0), "swings", said, done, _frame(seconds), swing)
+        return Ended(_mean(seen), "swings", said, done, _frame(seconds), swing)
     said = f"not at rest after {done} frames, still moving by {change:.3g} m in {window}; give more frames"
     return Ended(seen[-1], "moving", said, done, _frame(seconds), swing)
+
+
+def _pieces(window: int) -> tuple[int, ...]:
+    """Frames up to the second look within a window, and from there on; not halves, which a swing may share."""
+    first = ceil(0.6 * window)
+    return (first, window - first) if first < window else (window,)
+
+
+def _mean(seen: list[np.ndarray]) -> np.ndarray:
+    """Mean displacement, the first and last ones with less weight: no swing has whole periods in it."""
+    found: np.ndarray = np.average(seen, axis=0, weights=np.hanning(len(seen) + 2)[1:-1])
+    return found
+
+
+def _swing(seen: list[np.ndarray]) -> float:
+    """Largest amplitude about a mean [m]."""
+    return float(np.ptp(seen, axis=0).max() / 2)
+
+
+def _trembles(seen: list[np.ndarray]) -> bool:
+    """Whether displacements go to and fro about one place rather than somewhere."""
+    middle = len(seen) // 2
+    drift = float(np.abs(_mean(seen[middle:]) - _mean(seen[:middle])).max())
+    return _swing(seen[middle:]) > 2 * drift
 
 
 def _why(done: int) -> str:

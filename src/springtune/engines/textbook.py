@@ -12,7 +12,9 @@ import numpy as np
 from numba import njit
 
 from ..handover.net import SpringNet
-from .base import EngineError, Setting
+from ..handover.simulation import WORDS
+from ..handover.terms import VALUES
+from .base import SPRING, EngineError, Parameter, Setting
 
 
 def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -69,3 +71,12 @@ def pulling(net: SpringNet, why: str) -> None:
             f"definition '{net.header['definition']}': has springs of negative stiffness, and {why}; take 'patch' or "
             "'lattice', whose springs all pull, or engine 'implicit-cg'"
         )
+
+
+def as_they_are(*kinds: str) -> dict[str, Parameter]:
+    """Parameters of a solver that takes stiffnesses and values of kinds of energies as a net has them."""
+    return {"stiffness": SPRING} | {
+        f"{kind} {name}": Parameter(unit, f"{name} of {WORDS[kind]}, as of the net")
+        for kind in kinds
+        for name, unit in VALUES[kind].items()
+    }

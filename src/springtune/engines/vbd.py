@@ -18,9 +18,8 @@ from typing import Any
 import numpy as np
 
 from ..handover.net import SpringNet
-from ..mesh import signed_areas
-from .base import SPRING, Parameter, Session, Setting, engine
-from .textbook import Textbook, compiled, pulling
+from .base import Session, Setting, engine
+from .textbook import Textbook, as_they_are, compiled, pulling
 
 
 @compiled
@@ -143,25 +142,17 @@ class _Session(Textbook):
         return found
 
 
-PARAMETERS = {
-    "stiffness": SPRING,
-    "area modulus": Parameter("N/m", "modulus of areas, of W = modulus (A - A0)^2 / (2 A0)"),
-    "biquadratic tensile": Parameter("N/m3", "k of squared lengths, of W = k (l^2 - L^2)^2 / 4"),
-    "biquadratic coupling": Parameter("N/m3", "g of two sides, of W = g (l^2 - L^2) (l'^2 - L'^2) / 2"),
-}
-"""Numbers that are typed: those of the energies themselves."""
-
 LAWS = ("area", "biquadratic")
 """Energies besides springs."""
 
 
-@engine("vbd", order=40, laws=LAWS, parameters=PARAMETERS, implicit=True, source="Chen 2024")
+@engine("vbd", order=40, laws=LAWS, parameters=as_they_are(*LAWS), implicit=True, source="Chen 2024")
 def adaptive(net: SpringNet, setting: Setting, damping: float) -> Session:
     """Vertex block descent from its paper's adaptive guess: at rest exact with any number of iterations."""
     return _Session(net, setting, damping, True)
 
 
-@engine("vbd-inertia", order=41, laws=LAWS, parameters=PARAMETERS, implicit=True, source="Chen 2024")
+@engine("vbd-inertia", order=41, laws=LAWS, parameters=as_they_are(*LAWS), implicit=True, source="Chen 2024")
 def inertial(net: SpringNet, setting: Setting, damping: float) -> Session:
     """Vertex block descent from the inertial position."""
     return _Session(net, setting, damping, False)

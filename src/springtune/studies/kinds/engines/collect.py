@@ -60,7 +60,7 @@ IN_BOTH = (
 _FLAGS = {"flag_values": np.arange(len(RUN_ENDS), dtype="int8"), "flag_meanings": " ".join(RUN_ENDS)}
 END_FLAGS = {"engine_status": _FLAGS}
 
-ENGINE_DIMENSIONS = {
+ENGINE_DIMENSIONS: dict[str, str | tuple[str, str]] = {
     "scene": "scene in engines",
     "engine": "program and solver",
     "precision": "floating-point numbers",

@@ -232,7 +232,8 @@ def _summary(runs):
 
 def _version(engine):
     """Versions of what an engine needs, "none" of what is absent: a new one runs it again."""
-    return ", ".join(f"{name} {installed(name)}" for name in map(distribution, engine.needs))
+    names = (distribution(need.partition(">=")[0]) for need in engine.needs)
+    return ", ".join(f"{name} {installed(name)}" for name in names)
 
 
 def _tasks(study):
