@@ -18,7 +18,7 @@ from ..handover.xpbd import COMPLIANCE_UNITS, Blocks, blocks, compliances
 from .base import EngineError, Parameter, Session, Setting, engine
 from .textbook import Textbook, compiled
 
-KINDS = tuple(COMPLIANCE_UNITS)
+BLOCK_KINDS = tuple(COMPLIANCE_UNITS)
 """Kinds of blocks, by their numbers here."""
 
 FLATTEST = 0.05
@@ -148,7 +148,7 @@ class _Session(Textbook):
         if one.kind == "compressible":
             law = np.column_stack([values["shear"], values["bulk"]]) / values["bulk"][:, None]
         parts = rest, values.get("rest_slope", np.zeros((0, 3, 2))), law, one.compliance / float(self.h) ** 2
-        return KINDS.index(one.kind), one.cells, *(part.astype(self.kind) for part in parts)
+        return BLOCK_KINDS.index(one.kind), one.cells, *(part.astype(self.kind) for part in parts)
 
     def solve(self, before: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Project the inertial positions."""
@@ -166,7 +166,7 @@ class _Session(Textbook):
 @engine(
     "xpbd",
     order=20,
-    laws=KINDS,
+    laws=BLOCK_KINDS,
     parameters={
         "compliance": Parameter("m/N", "1 / k of a spring"),
         "area compliance": Parameter("m3/N", "A0 / modulus, of C = A - A0"),
