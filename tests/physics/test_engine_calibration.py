@@ -1,12 +1,8 @@
 """Calibration to an engine's setting: what is typed is right, and what is said of other loads holds."""
 
-from dataclasses import replace
-
 import numpy as np
-import pytest
 
 import springtune as st
-from springtune.engines.calibration import SIZES, _range
 
 import engine_scenes
 

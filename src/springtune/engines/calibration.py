@@ -14,13 +14,13 @@ import numpy as np
 
 from ..handover.net import NOT_COMPUTED, SpringNet
 from ..prediction.choices import check_loads, check_names, predicted
+from ..prediction.search import asked_error
 from ..problem.compare import error_text
-from ..problem.loads import LOADS
 from ..reference.small_strain import ReferenceNotConvergedError
 from ..safe_io.tables import Tabled, TabledList, number_text
 from ..scene.single import Scene
 from ..scene.statements import ShapeStatement
-from .base import ENGINES, EngineError, Setting
+from .base import ENGINES, Engine, EngineError, Parameter, Setting
 from .run import EngineResult, complete, in_engine, net_of
 
 SIZES = (0.25, 0.5, 1.0, 2.0)
@@ -90,11 +90,15 @@ class LoadBand(Tabled):
     --------
     >>> import springtune as st
     >>> beam, rubber = st.Beam("200 mm", "40 mm"), st.Material("1 MPa", 0.3, density="1000 kg/m^3")
-    >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "20 mm"), rubber, "traction", "0.2 N")
-    >>> fit = st.fit_engine(scene, "xpbd", substeps=20, loads=["traction", "bending"], needed=False)
+    >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "13 mm"), rubber, "traction", "0.2 N")
+    >>> fit = st.fit_engine(scene, "xpbd", substeps=16, loads=["bending", "shear"], needed=False)
     >>> for band in fit.bands:
     ...     there = f"{band.least:.3g} to {band.most:.3g} N" if band.least == band.least else "nowhere"
-    ...     print(f"{band.load}: {100 * band.error:+.0f} %, within {100 * band.within:g} % {there}")
+    ...     print(f"{band.load} {100 * band.error:+.0f} %, within {100 * band.within:g} % {there}; "
+    ...           f"converged {100 * band.definition_error:+.0f} %")
+    traction -0 %, within 5 % 0.05 to 0.4 N; converged +0 %
+    bending -8 %, within 5 % nowhere; converged -12 %
+    shear -14 %, within 5 % nowhere; converged +5 %
     """
 
     load: str
@@ -145,9 +149,11 @@ class NeededSetting(Tabled):
     --------
     >>> import springtune as st
     >>> beam, rubber = st.Beam("200 mm", "40 mm"), st.Material("1 MPa", 0.3, density="1000 kg/m^3")
-    >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "20 mm"), rubber, "traction", "0.2 N")
-    >>> for one in st.fit_engine(scene, "xpbd", substeps=20, loads=["traction"]).needed:
+    >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "13 mm"), rubber, "traction", "0.2 N")
+    >>> for one in st.fit_engine(scene, "xpbd", substeps=16, loads=["traction"]).needed:
     ...     print(f"{one.raised}: {one.setting}, {one.found}, {100 * one.solver_error:+.1f} %")
+    substeps: dt 1/60 s, 32 substeps, 10 iterations, float64, True, +0.5 %
+    iterations: dt 1/60 s, 16 substeps, 40 iterations, float64, True, +0.0 %
     """
 
     purpose: str
@@ -191,9 +197,10 @@ class EngineFit(Tabled):
     --------
     >>> import springtune as st
     >>> beam, rubber = st.Beam("200 mm", "40 mm"), st.Material("1 MPa", 0.3, density="1000 kg/m^3")
-    >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "20 mm"), rubber, "traction", "0.2 N")
-    >>> fit = st.fit_engine(scene, "xpbd", substeps=20, loads=["traction"], needed=False)
+    >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "13 mm"), rubber, "traction", "0.2 N")
+    >>> fit = st.fit_engine(scene, "xpbd", substeps=16, loads=["traction"], needed=False)
     >>> print(f"{fit.factor:.2f} times, {fit.typed['compliance'].max():.4g} m/N; error {100 * fit.error:+.1f} %")
+    1.41 times, 0.001862 m/N; error -0.0 %
     >>> fit.net().write("tuned.csv")[0].name
     'tuned.csv'
     """
@@ -240,21 +247,27 @@ class EngineFit(Tabled):
         }
         return replace(net, header=header)
 
+    def typed_values(self) -> Iterator[tuple[str, np.ndarray, Parameter]]:
+        """Name, values and parameter of each number to type; edges without a spring are left out.
+
+        Returns
+        -------
+        iterator of tuple
+        """
+        for name, value in self.typed.items():
+            values = np.ravel(value)
+            yield name, values[np.isfinite(values)], ENGINES[self.result.engine].parameters[name]
+
     def typed_rows(self) -> Iterator[tuple[str, str, str, str]]:
-        """Name, value or range, unit and formula of each number to type.
+        """Name, value or range, unit and formula of each number to type, as texts.
 
         Returns
         -------
         iterator of tuple of str
         """
-        known = ENGINES[self.result.engine].parameters
-        for name, value in self.typed.items():
-            values = np.ravel(value)[np.isfinite(np.ravel(value))]
-            low, high = f"{values.min(initial=np.inf):.5g}", f"{values.max(initial=-np.inf):.5g}"
-            about = known.get(name)
-            yield name, low if low == high else f"{low} to {high}", about.unit if about else "", (
-                about.formula if about else ""
-            )
+        for name, values, known in self.typed_values():
+            low, high = f"{values.min():.5g}", f"{values.max():.5g}"
+            yield name, low if low == high else f"{low} to {high}", known.unit, known.formula
 
     def _rows(self) -> Iterator[tuple[str, str]]:
         yield "engine", f"{self.result.engine}, {self.result.setting}"
@@ -312,7 +325,7 @@ def fit_engine(
     engine: str,
     setting: Setting | None = None,
     *,
-    within: float = WITHIN,
+    within: float | str = WITHIN,
     loads: Iterable[str] | None = None,
     needed: bool = True,
     frames: int | None = None,
@@ -327,8 +340,8 @@ def fit_engine(
     engine : str
         Key of `springtune.ENGINES`.
     setting : Setting, optional
-    within : float, optional
-        Error that bands keep [1].
+    within : float or str, optional
+        Error that bands keep, a fraction or a text such as ``"5 %"``.
     loads : iterable of str, optional
         Loads besides the scene's that get a band; by default all of a beam but those that turn, or all of a shape.
     needed : bool, optional
@@ -363,18 +376,25 @@ def fit_engine(
 
     >>> import springtune as st
     >>> beam, rubber = st.Beam("200 mm", "40 mm"), st.Material("1 MPa", 0.3, density="1000 kg/m^3")
-    >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "20 mm"), rubber, "traction", "0.2 N")
-    >>> fit = st.fit_engine(scene, "xpbd", dt="1/60", substeps=20, loads=["bending", "shear"])
+    >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "13 mm"), rubber, "traction", "0.2 N")
+    >>> fit = st.fit_engine(scene, "xpbd", dt="1/60", substeps=16, loads=["bending", "shear"])
     >>> print(f"{fit.factor:.2f}: {100 * fit.untuned.error:+.1f} % becomes {100 * fit.error:+.1f} %")
-    >>> print(*(f"{band.load} {100 * band.error:+.0f} %" for band in fit.bands))
+    1.41: +22.8 % becomes -0.0 %
+    >>> print(*(f"{band.load} {100 * band.error:+.0f} %, converged {100 * band.definition_error:+.0f} %;"
+    ...         for band in fit.bands))
+    traction -0 %, converged +0 %; bending -8 %, converged -12 %; shear -14 %, converged +5 %;
 
     With fewer substeps there is none:
 
-    >>> print(st.fit_engine(scene, "xpbd", dt="1/60", substeps=4, loads=["traction"]).message)
+    >>> none = st.fit_engine(scene, "xpbd", dt="1/60", substeps=4, needed=False)
+    >>> print(none.factor, f"{1e3 * none.result.displacement:.2f} mm in place of {1e3 * none.result.reference:.2f}")
+    nan 8.00 mm in place of 1.00
     """
     chosen = ENGINES[engine]
-    if not 0 < within < 1:
-        raise EngineError(f"within: {within!r} is no error above 0 and below 1; give one such as 0.05")
+    try:
+        within = asked_error(within)
+    except ValueError as error:
+        raise EngineError(f"within{str(error).removeprefix('error')}") from None
     setting = complete(chosen, setting or Setting(**parts))
     net_of(scene)  # refuses what no engine runs, by its own message
     names = _loads(scene, loads)
@@ -399,11 +419,16 @@ def fit_engine(
         factor,
         runs(factor) if found else min(runs.known.values(), key=lambda one: _distance(one, setting)),
         runs(1.0),
-        chosen.typed(net_of(scene, factor)) if found else {},
+        _typed(chosen, net_of(scene, factor), setting) if found else {},
         bands,
         needs,
         "; ".join(filter(None, (why, scene.objection))),
     )
+
+
+def _typed(engine: Engine, net: SpringNet, setting: Setting) -> dict[str, Any]:
+    """Numbers to type; what an engine takes from the mesh is none."""
+    return {name: value for name, value in engine.numbers(net, setting).items() if name in engine.parameters}
 
 
 def _rests(one: EngineResult) -> bool:
@@ -434,8 +459,9 @@ def _factor(runs: _Runs) -> tuple[float, str]:
         return 0.0 if abs(off) <= CLOSE else float(np.nan_to_num(off, nan=1.0))
 
     moved = f"{number_text(runs.target, 'm')} by finite elements"
+    at = str(runs.setting)
     if not np.isfinite(runs.ratio(1.0)):
-        return np.nan, f"{runs.engine} diverges at {runs.setting} with the numbers of the definition"
+        return np.nan, f"{runs.engine} diverges at {at} with the numbers of the definition"
     stiffen = runs.ratio(1.0) > 1
     last = 1.0
     for _ in range(MOST_STEPS):
@@ -445,7 +471,10 @@ def _factor(runs: _Runs) -> tuple[float, str]:
         if np.isfinite(ratio) and (ratio > 1) != stiffen:
             break
         if not np.isfinite(ratio):
-            return np.nan, f"{runs.engine} diverges at {runs.setting} at {factor:.3g} times, {there} at {last:.3g} times"
+            return (
+                np.nan,
+                f"{runs.engine} diverges at {runs.setting} at {factor:.3g} times, {there} at {last:.3g} times",
+            )
         last = factor
         if stiffen and abs(ratio - before) < FLAT * abs(ratio):
             break
@@ -454,9 +483,11 @@ def _factor(runs: _Runs) -> tuple[float, str]:
     if not np.isfinite(ratio) or (ratio > 1) == stiffen:
         word = "stiffness" if stiffen else "softness"
         there = number_text(runs(last).displacement, "m")
-        return np.nan, f"no {word} reaches {moved}: at {runs.setting} {last:.3g} times the stiffness leaves {there}"
+        return np.nan, f"no {word} reaches {moved}: {last:.3g} times the stiffness leaves {there} at {at}"
     softness = brentq(error, *sorted((1 / last, 1 / factor)), xtol=1e-5 / max(last, factor), maxiter=60)
-    best = min((one for one, at in runs.known if at == runs.setting), key=lambda one: abs(runs.ratio(one) - 1))
+    best = min(
+        (one for one, setting in runs.known if setting == runs.setting), key=lambda one: abs(runs.ratio(one) - 1)
+    )
     if not abs(runs.ratio(best) - 1) <= ALLOWED:
         return np.nan, f"the displacement jumps over {moved} at {1 / softness:.4g} times the stiffness"
     return best, ""

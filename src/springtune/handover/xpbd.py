@@ -93,9 +93,9 @@ def blocks(net: Net) -> list[Blocks]:
 
 
 def compliances(net: Net) -> dict[str, Any]:
-    """Compliances of springs and of blocks, by name."""
-    there = net.stiffness[net.stiffness != 0]
-    found: dict[str, Any] = {"compliance": 1 / there} if there.size else {}
+    """Compliances of springs and of blocks, by name; infinite where a definition gives an edge no spring."""
+    with np.errstate(divide="ignore"):
+        found: dict[str, Any] = {"compliance": 1 / net.stiffness} if np.any(net.stiffness) else {}
     return found | {f"{one.kind} compliance": one.compliance for one in blocks(net)}
 
 

@@ -13,6 +13,7 @@ from springtune.problem.geometry import Beam
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import Material
 from springtune.problem.quantities import nearest
+from springtune.registry import imported
 from springtune.springs import DEFINITIONS
 from springtune.springs.lattice import COEFFICIENT
 
@@ -148,10 +149,8 @@ class EngineRun:
 
 
 def _engines():
-    # Here, since a study without engines needs none of their modules.
-    from springtune.engines.base import ENGINES
-
-    return ENGINES
+    # By name, since no dataset of other studies is to depend on the modules of engines.
+    return imported("engines.base:ENGINES")
 
 
 def _check(config, problems):
