@@ -180,7 +180,8 @@ class Engine(Declared):
     implicit : bool
         Whether its steps, iterated to the end, are of implicit Euler, which damps by itself.
     typed : callable
-        (net) -> dict of the numbers to type by the names of `parameters`: arrays, or one number for all. Call `numbers`.
+        (net) -> dict of the numbers to type by the names of `parameters`: arrays, or one number for all. `numbers`
+        calls it.
     of_setting : bool
         Whether these numbers follow the setting: `typed` takes (net, setting).
     source : str

@@ -51,9 +51,8 @@ class _Session(Textbook):
         rows, columns = np.concatenate([first, second]), np.concatenate([second, first])
         links = coo_array((np.tile(self.stiffness, 2), (rows, columns)), shape=(len(held), len(held)))
         free = diags_array((~held).astype(self.kind))
-        matrix = free @ (diags_array(self.inertia + links.sum(axis=1)) - links) @ free + diags_array(
-            1 - free.diagonal()
-        )
+        whole = diags_array(self.inertia + links.sum(axis=1)) - links
+        matrix = free @ whole @ free + diags_array(1 - free.diagonal())
         return splu(
             csc_array(matrix, dtype=self.kind),
             permc_spec="MMD_AT_PLUS_A",

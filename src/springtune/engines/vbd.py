@@ -61,7 +61,7 @@ def _squares(x, cell, corner, squares, tensile, coupling, block):  # type: ignor
 
 @compiled
 def _area(x, cell, corner, double, modulus, block):  # type: ignore[no-untyped-def]
-    """As `_spring`, of a corner of a cell of area, by twice its area at rest; `modulus` is over four times that area."""
+    """As `_spring`, of a corner of a cell of area; `double` is twice its area at rest, `modulus` is over twice that."""
     corners, twice = len(cell), -double
     for c in range(corners):
         i, j = cell[c], cell[(c + 1) % corners]
