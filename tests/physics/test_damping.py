@@ -100,7 +100,7 @@ def test_the_loaded_mode_is_a_mode():
 @pytest.mark.parametrize("count", [20, 100])
 def test_implicit_euler_damps_as_a_stiffness_damping_of_its_step(count):
     """Without dampers the ratio is x / 2, x = omega h; the decrement is exactly pi ln(1 + x^2) / atan(x)."""
-    one = scene()
+    one = scene(size="10 mm")
     step = 2 * np.pi / one.motion().loaded_frequency / count
     found = swing(one, "backward-euler", step)
     x = 2 * np.pi / count
@@ -111,15 +111,15 @@ def test_implicit_euler_damps_as_a_stiffness_damping_of_its_step(count):
 @pytest.mark.parametrize("over", ["mass", "springs", "both"])
 def test_what_implicit_euler_damps_is_taken_off(over):
     """What is left to type gives the decrement that was measured, but for terms of the ratio times omega h."""
-    one = scene()
+    one = scene(size="10 mm")
     measured = st.damping_of(one, decrement=DECREMENT)
     step = measured.stiffness_damping / 3
     left = measured.implicit_euler(step)
     assert left.stiffness_damping == pytest.approx(measured.stiffness_damping - step)
-    found = swing(one, "backward-euler", step, **left.options(over))
+    found = swing(one, "backward-euler", step, 1.5, **left.options(over))
     x = one.motion().loaded_frequency * step
     assert found.decrement == pytest.approx(DECREMENT, rel=measured.ratio * x + x**2)
-    assert swing(one, "backward-euler", step, **measured.options(over)).decrement > 1.3 * DECREMENT
+    assert swing(one, "backward-euler", step, 1.5, **measured.options(over)).decrement > 1.3 * DECREMENT
 
 
 def test_a_step_that_damps_more_than_was_measured_is_refused():
@@ -195,7 +195,7 @@ def test_a_load_that_turns_has_a_mode_too():
         ({"loss_factor": 0.1, "period": 1}, "period: 1 does not go with loss_factor; give at"),
         ({"loss_factor": 0.1, "at": "5 rad/s"}, "at: '5 rad/s' is .*; give a frequency such as '10 Hz'"),
         ({"decrement": 0.3, "period": "5 mm"}, "period: '5 mm' is a length; give a time"),
-        ({"ratio": (0.1, 0.2)}, "ratio: two modes, and no period; give the period of each"),
+        ({"ratio": (0.1, 0.2)}, "period: None and ratio are not as many; give one for each mode"),
         ({"ratio": 0.1, "period": (1, 2)}, r"period: \(1, 2\) and ratio are not as many"),
         ({"ratio": (0.1, 0.5), "period": (1, 0.5)}, "the second ratio is 0.0435 to 0.23; give one mode"),
         ({"ratio": (0.1, 0.2), "period": (1, 1)}, "as 1 to 1.0.*; give one mode"),
@@ -204,6 +204,17 @@ def test_a_load_that_turns_has_a_mode_too():
 def test_measures_that_say_nothing_are_refused(given, says):
     with pytest.raises(ValueError, match=says):
         st.damping_of(scene(), **given)
+
+
+def falling_apart(mesh, material, thickness):
+    """Springs that push so much that the beam is unstable without any load."""
+    springs = st.DEFINITIONS["lattice"].springs(mesh, material, thickness)
+    return st.Springs(springs.reference, np.where(np.arange(len(mesh.edges)) % 3, springs.relative, -1.0))
+
+
+def test_what_is_unstable_at_rest_does_not_swing():
+    with pytest.raises(ValueError, match="definition 'falling_apart': is unstable at rest"):
+        st.damping_of(scene(falling_apart), ratio=0.1)
 
 
 def test_unknown_choices_and_bodies_without_masses_are_refused():
@@ -255,20 +266,21 @@ def test_mujoco_decays_as_was_measured(tendons, tmp_path, monkeypatch):
     assert found.decrement == pytest.approx(damping.decrement, rel=2e-3)
 
 
-def test_an_implicit_engine_is_given_what_its_steps_lack():
-    """XPBD, iterated to the end, is implicit Euler: it swings with the measured decay about its loaded place."""
+@pytest.mark.parametrize("name", ["xpbd", "projective", "vbd", "vbd-inertia", "implicit-cg"])
+def test_an_implicit_engine_is_given_what_its_steps_lack(name):
+    """Iterated to the end it is implicit Euler: it swings with the measured decay about its loaded place."""
     one = scene(size="10 mm", kinematics="nonlinear")
     damping = st.damping_of(one, decrement=DECREMENT)
-    setting = st.Setting(damping.period / 250, iterations=60)
-    engine = st.ENGINES["xpbd"]
+    setting = st.Setting(damping.period / 250, iterations=40)
+    engine = st.ENGINES[name]
     typed = engine.typed_dampers(damping, setting)["damping"]
     session, place, seen = engine.start(st.SpringNet.from_scene(one, errors=False), setting, typed), bent(one), []
-    for number in range(500):
+    for number in range(300):
         seen.append((number * setting.step, share(one, session.displacements() - place)))
         session.advance(1)
     found = st.fit_decay(*np.array(seen).T)
-    assert found.period == pytest.approx(damping.period, rel=5e-3)
-    assert found.decrement == pytest.approx(DECREMENT, rel=0.02)
+    assert found.period == pytest.approx(damping.period, rel=1e-3)
+    assert found.decrement == pytest.approx(DECREMENT, rel=2e-3)
     with pytest.raises(ValueError, match="take 9 substeps or more"):
         engine.typed_dampers(damping, st.Setting("1/60"))
 

@@ -34,7 +34,16 @@ ASKED = "--beam 60x20 --size '5 mm' --material steel --density '7850 kg/m^3' --l
 SPRINGS = shlex.split(ASKED)
 """Of `springtune springs`."""
 
-PROGRAMS = {".xml": "MuJoCo", ".mjcf": "MuJoCo", ".scn": "SOFA", ".py": "SOFA", ".xpbd.json": "XPBD", ".lmp": "LAMMPS"}
+PROGRAMS = {
+    ".xml": "MuJoCo",
+    ".mjcf": "MuJoCo",
+    ".scn": "SOFA",
+    ".py": "SOFA",
+    ".newton.py": "Newton",
+    ".usda": "Newton",
+    ".xpbd.json": "XPBD",
+    ".lmp": "LAMMPS",
+}
 
 
 @pytest.fixture(autouse=True)
@@ -303,7 +312,8 @@ def test_accelerations_beyond_those_of_mujoco_start_nothing_anew(tmp_path):
 def test_springs_without_a_load_are_free_and_at_rest(tmp_path):
     net = SpringNet.from_mesh(st.make_mesh(BEAM, "free", "5 mm"), STEEL, "lattice", errors=False)
     for ending in PROGRAMS:
-        net.write(tmp_path / f"net{ending}")
+        if ending != ".usda":  # which has no springs
+            net.write(tmp_path / f"net{ending}")
     model = mujoco.MjModel.from_xml_path(str(tmp_path / "net.mjcf"))
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
@@ -410,7 +420,7 @@ def test_the_command_writes_for_a_version_and_says_so(tmp_path):
 @pytest.mark.parametrize("ending", PROGRAMS)
 def test_a_file_of_springs_is_enough_for_a_simulator(ending, tmp_path):
     """What is read from a file of arrays is written as the scene itself is."""
-    one = scene("free", "shear", "patch")
+    one = scene("free", "shear", "delingette" if ending == ".usda" else "patch")
     direct = written(one, tmp_path, ending)
     [path] = one.springs.write(tmp_path / "arrays.h5", errors=False)
     version = {"mujoco": VERSION} if PROGRAMS[ending] == "MuJoCo" else {}
@@ -588,6 +598,25 @@ def test_xpbd_comes_to_rest_in_our_equilibrium(load, definition, tmp_path):
     assert np.abs(found - result.displacements).max() < 1e-3 * np.abs(result.displacements).max()
 
 
+def test_every_stiffness_is_a_type_of_bonds_of_lammps(tmp_path):
+    """The file as it is read: k without a half, both ends of each spring, masses, load and supports of particles."""
+    one = scene("free", "shear", "patch")
+    script, data = (path.read_text() for path in one.springs.write(tmp_path / "net.lmp", errors=False))
+    typed = {int(row.split()[1]): float(row.split()[2]) for row in script.splitlines() if row.startswith("bond_coeff")}
+    rows = {title: data.partition(f"\n{title}\n\n")[2].partition("\n\n")[0].split("\n") for title in LAMMPS_SECTIONS}
+    points, bonds, particles = (np.array([row.split() for row in rows[title] if row], float) for title in rows)
+    net = SpringNet.from_scene(one, errors=False)
+    assert np.array_equal(points[:, 3:5], net.points) and np.array_equal(bonds[:, 2:] - 1, net.springs)
+    assert np.array_equal([typed[kind] for kind in bonds[:, 1]], net.stiffness)
+    assert np.array_equal(particles[:, 1], net.masses) and np.array_equal(particles[:, 6:].astype(bool), net.held)
+    assert np.array_equal(particles[:, 2:4], np.where(net.held, 0, net.forces))
+    expected = net.points + one.solve().displacements
+    assert np.allclose(particles[:, 4:6], expected, rtol=0, atol=1e-9 * np.abs(net.points).max())
+
+
+LAMMPS_SECTIONS = ("Atoms # bond", "Bonds", "Particles")
+
+
 def test_the_package_itself_imports_no_simulator():
     """Engines import one when they start, the rest of it never."""
     imports = re.compile(r"^(\s*)(import|from) (mujoco|Sofa|newton|warp|pybullet|lammps)\b", re.MULTILINE)
@@ -658,6 +687,8 @@ def test_a_load_without_equilibrium_is_written_and_says_so(tmp_path):
         assert json.loads(written(one, tmp_path, ".xpbd.json"))["displacements"] is None
     with pytest.warns(EquilibriumWarning):
         assert 'name="predicted"' not in written(one, tmp_path, ".scn")
+    with pytest.warns(EquilibriumWarning):
+        assert "predicted equilibrium" not in written(one, tmp_path, ".lmp")
 
 
 def test_the_command_says_of_an_equilibrium_that_there_is_none_or_that_it_is_far(tmp_path):

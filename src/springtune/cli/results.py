@@ -369,7 +369,7 @@ def _compared(made: "Reproduced") -> bool:
 
     if made.ended_otherwise:
         click.echo(
-            f"  {made.ended_otherwise} cases of the benchmark or of engines ended otherwise, by this machine's speed or "
+            f"  {made.ended_otherwise} cases of the benchmark or engines ended otherwise, by this machine's speed or "
             "programs: these groups are not compared"
         )
     exact, near = made.exact, made.near

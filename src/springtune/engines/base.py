@@ -8,7 +8,7 @@ does not move an equilibrium. Forces of the load are dead, and on from the first
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from importlib.metadata import PackageNotFoundError, version
+from importlib import metadata
 from importlib.util import find_spec
 from typing import Any, Protocol, TypeVar
 
@@ -131,11 +131,17 @@ SPRING = Parameter("N/m", "k of the definition, one for each spring")
 
 DAMPERS: dict[str, Callable[[Damping], Any]] = {
     "alpha": lambda damping: damping.mass_damping,
-    "alpha m, one for each particle": lambda damping: damping.mass_damping * damping.scene.statement.masses(),
+    "alpha m, one for each particle": lambda damping: (
+        damping.mass_damping * np.asarray(damping.scene.statement.masses())
+    ),
     "beta": lambda damping: damping.stiffness_damping,
     "beta k, one for each spring": lambda damping: damping.dashpots,
+    "beta k, one for all springs": lambda damping: damping.dashpots.mean(),
 }
 """Dampers that are typed into engines, by the formula of their parameter; each alone has the damping ratio."""
+
+DASHPOT = Parameter("N s/m", "beta k, one for each spring")
+"""Damper of a spring."""
 
 VELOCITIES = Parameter("1/s", "alpha")
 """Damping over mass by `springtune.in_engine`, which every engine has."""
@@ -339,8 +345,8 @@ def _there(need: str) -> bool:
     if find_spec(name) is None:
         return False
     try:
-        return not least or release(version(name)) >= release(least)
-    except PackageNotFoundError:  # installed under another name
+        return not least or release(metadata.version(name)) >= release(least)
+    except metadata.PackageNotFoundError:  # installed under another name
         return True
 
 

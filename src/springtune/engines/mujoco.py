@@ -6,14 +6,14 @@ since MuJoCo 3.13, is implicit in springs, too, by one linear system a step: `it
 gradients, of which MuJoCo allows 100 where nothing is said; they stop at a ten-thousandth of the load. The others do
 not iterate without contacts. MuJoCo computes in double precision.
 
-Velocities are scaled after each step, so joints have no damping. MuJoCo's own way is `damping` = mass times the damping
-over mass in each joint, which `RK4` takes explicitly and the others implicitly. A state that diverges is put back to
+Velocities are scaled after each step, so joints have no damping. MuJoCo's own way is `damping` in joints and tendons,
+which `RK4` takes explicitly, `Euler` those of tendons, and the others implicitly. A state that diverges is put back to
 the beginning by default; that is turned off here, so that it is seen.
 """
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib.metadata import version
+from importlib import metadata
 from typing import Any
 
 import numpy as np
@@ -21,12 +21,12 @@ import numpy as np
 from ..handover.mujoco import VERSIONS, elasticity, model
 from ..handover.net import SpringNet
 from ..handover.simulation import Simulation, lame
-from .base import SPRING, EngineError, Parameter, Session, Setting, engine, release
+from .base import DASHPOT, SPRING, EngineError, Parameter, Session, Setting, engine, release
 
 FLEX_SINCE = (3, 3, 7)
 """Version of MuJoCo that first has the law of a flex."""
 
-PARAMETERS = {
+TYPED = {
     "stiffness": SPRING,
     "young": Parameter("Pa", "E; for MuJoCo 3 it is 2 E (2 + nu) / (1 + nu)"),
     "poisson": Parameter("1", "nu; for MuJoCo 3 it is nu / 2"),
@@ -35,7 +35,7 @@ PARAMETERS = {
 """Stiffness of a tendon; or what an ``elastic2d="stretch"`` flex has."""
 
 JOINTS = {"joint damping": Parameter("N s/m", "alpha m, one for each particle")}
-STIFF = {"tendon damping": Parameter("N s/m", "beta k, one for each spring"), "flex damping": Parameter("s", "beta")}
+STIFF = {"tendon damping": DASHPOT, "flex damping": Parameter("s", "beta")}
 """Dampers over stiffness. `implicit` and `implicitfast` leave out what a tendon between two bodies does to the other
 one, so that it slows them as a mass does: there, joints alone damp as they should."""
 
@@ -44,7 +44,7 @@ def typed(net: SpringNet) -> dict[str, Any]:
     """Stiffness of each tendon, or the constants of the flex."""
     if not net.energies:
         return {"stiffness": net.stiffness}
-    young, poisson = elasticity(*lame(net, net.energies[0], "MuJoCo's flex"), release(version("mujoco"))[0])
+    young, poisson = elasticity(*lame(net, net.energies[0], "MuJoCo's flex"), release(metadata.version("mujoco"))[0])
     return {"young": young / net.thickness, "poisson": poisson, "thickness": net.thickness}
 
 
@@ -109,7 +109,7 @@ def _declare(order: float, integrator: str, summary: str, **declared: Any) -> No
         program="MuJoCo",
         extra="mujoco",
         precisions=("float64",),
-        parameters=PARAMETERS,
+        parameters=TYPED,
         typed=typed,
         source="MuJoCo's documentation, Computation",
         **common | declared,

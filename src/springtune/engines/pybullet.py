@@ -13,7 +13,7 @@ Tried in 3.2.7, whose wheel computes in double precision; an OBJ file has positi
 - `applyExternalForce` does not act on a deformable body. So a loaded node is anchored to a rigid body of a node's mass,
   which is pushed and damped over mass; dampers do not act on anchored nodes. Dampers between the others have the
   stiffness over the damping over mass. Their solver leaves up to a thousandth of the load, the more the stronger they
-  are.
+  are, and does nothing about swings of micrometres.
 - The laws of triangles (`useNeoHookean`) act on tetrahedra alone.
 - Bodies that are slow fall asleep, and their forces vanish, unless `changeDynamics` forbids it.
 """
@@ -43,7 +43,7 @@ def typed(net: SpringNet) -> dict[str, Any]:
     if np.ptp(stiffness) > LARGEST_SPREAD * abs(stiffness.mean()):
         raise EngineError(
             f"definition '{net.header['definition']}': has springs of {stiffness.min():.4g} to {stiffness.max():.4g} "
-            "N/m, and PyBullet has one stiffness for all springs of a body; take 'paper', or 'uniform' with a stiffness"
+            "N/m, and PyBullet has one stiffness for all springs of a body; take 'uniform', or 'paper' with a stiffness"
         )
     return {"springElasticStiffness": float(stiffness.mean()), "springBendingStiffness": 0.0}
 
@@ -143,6 +143,7 @@ class _Session:
         "springBendingStiffness": Parameter("N/m", "0; it is 0.1 where it is not given"),
     },
     iterates=False,
+    dampers={"springDampingStiffness": Parameter("N s/m", "beta k, one for all springs")},
     typed=typed,
     source="Bullet's source, btDeformableMassSpringForce.h",
 )

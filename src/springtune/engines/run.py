@@ -127,7 +127,8 @@ class EngineResult(Tabled):
     @cached_property
     def reference(self) -> float:
         """Displacement of the load by finite elements [m]."""
-        return next(iter(self.scene.reference_values().values()))
+        known, quantities = self.scene.reference_values(), self.scene.statement.case.quantities
+        return next((known[one.name] for one in quantities if one.kind == "displacement"), np.nan)
 
     @property
     def error(self) -> float:
@@ -222,7 +223,7 @@ def in_engine(
     16.5 mm in place of 1.0
     """
     chosen = ENGINES[engine]
-    setting = _complete(chosen, setting or Setting(**parts))
+    setting = complete(chosen, setting or Setting(**parts))
     net = net_of(scene, factor)
     chosen.check(setting, net)
     frequency = scene.motion().loaded_frequency * factor**0.5
@@ -234,7 +235,7 @@ def in_engine(
     return EngineResult(scene, engine, setting, factor, **vars(ended))
 
 
-def _complete(engine: Engine, setting: Setting) -> Setting:
+def complete(engine: Engine, setting: Setting) -> Setting:
     """Return a setting with the engine's own precision where it has none."""
     return setting if setting.precision else replace(setting, precision=engine.precisions[0])
 

@@ -21,10 +21,8 @@ from .terms import Net
 LAWS = ("biquadratic",)
 """Energies that triangles of Newton stand for."""
 
-STEPS = 4
-"""Step of a script over the largest stable one of explicit schemes: VBD then converges in `ITERATIONS`."""
-
 ITERATIONS = 10
+"""Iterations in which VBD converges in a step that is stable in explicit schemes."""
 
 DECAYS = 12
 """Times in which the slowest mode comes down to 1/e that a script runs for."""
@@ -45,18 +43,36 @@ def membrane_energies(net: Net, reference: float) -> list[Energy]:
     return [StableNeoHookeEnergy(net.points, net.triangles, shear * ones, first * ones)] if net.energies else []
 
 
+def colours(net: Net) -> list[np.ndarray]:
+    """Return groups of particles that neither a spring nor a triangle joins: VBD moves a group at once."""
+    joined: list[set[int]] = [set() for _ in net.points]
+    for cell in [*net.springs.tolist(), *net.triangles.tolist()]:
+        for corner in cell:
+            joined[corner].update(cell)
+    chosen = np.full(len(net.points), -1)
+    for corner, others in enumerate(joined):
+        taken = {chosen[other] for other in others}
+        chosen[corner] = next(colour for colour in range(len(joined)) if colour not in taken)
+    return [np.flatnonzero(chosen == colour) for colour in range(chosen.max() + 1)]
+
+
 SCRIPT = '''
+REST = np.pad(POINTS, ((0, 0), (0, 1)))
+WHOLE = np.all(HELD, axis=1)
+SLIDES = np.pad(HELD & ~WHOLE[:, None], ((0, 0), (0, 1)))
+
+
 def build():
     """The sheet as a model; particles without mass are held."""
     builder = newton.ModelBuilder(gravity=(0.0, 0.0, 0.0))
-    for (x, y), mass, held in zip(POINTS, MASSES, HELD):
-        builder.add_particle(wp.vec3(x, y, 0.0), wp.vec3(0.0), 0.0 if held else mass)
+    for place, mass, held in zip(REST, MASSES, WHOLE):
+        builder.add_particle(wp.vec3(*place), wp.vec3(0.0), 0.0 if held else mass)
     for (first, second), stiffness, length in zip(SPRINGS, STIFFNESS, REST_LENGTHS):
         builder.add_spring(first, second, ke=stiffness, kd=0.0, control=0.0)
         builder.spring_rest_length[-1] = length
     for corners in TRIANGLES:
         builder.add_triangle(*corners, tri_ke=TRI_KE, tri_ka=TRI_KA, tri_kd=0.0, tri_drag=0.0, tri_lift=0.0)
-    builder.color()
+    builder.set_coloring([np.array(group) for group in COLOURS])  # builder.color() does not see springs
     return builder.finalize()
 
 
@@ -64,19 +80,25 @@ def run(model, step=STEP, iterations=ITERATIONS, seconds=SECONDS):
     """Displacements [m] after a damped motion from rest."""
     solver = newton.solvers.SolverVBD(model, iterations=iterations)
     state, after, control = model.state(), model.state(), model.control()
-    rest = state.particle_q.numpy().copy()
-    forces = np.column_stack([FORCES, np.zeros(len(FORCES))]).astype(np.float32)
+    forces = np.pad(FORCES, ((0, 0), (0, 1)))
     for _ in range(round(seconds / step)):
-        state.particle_f.assign(forces)
+        state.particle_f.assign(forces.astype(np.float32))
         solver.step(state, after, control, None, step)
-        after.particle_qd.assign(after.particle_qd.numpy() / np.float32(1 + MASS_DAMPING * step))
+        places, velocities = after.particle_q.numpy(), after.particle_qd.numpy()
+        if SLIDES.any():
+            # Newton holds particles as a whole: where one direction is held, a reaction grows until nothing slips.
+            slip = np.where(SLIDES, places - REST, 0.0)
+            forces = forces - np.array(MASSES)[:, None] / step**2 * slip
+            places, velocities = places - slip, np.where(SLIDES, 0.0, velocities)
+            after.particle_q.assign(places.astype(np.float32))
+        after.particle_qd.assign((velocities / (1 + MASS_DAMPING * step)).astype(np.float32))
         state, after = after, state
-    return (state.particle_q.numpy() - rest)[:, :2]
+    return (state.particle_q.numpy() - REST)[:, :2]
 
 
 def along(displacements):
     """Mean displacement along the forces [m]."""
-    return np.sum(FORCES * displacements) / np.abs(FORCES).sum()
+    return np.sum(FORCES * displacements) / max(np.abs(FORCES).sum(), 1e-300)
 
 
 def main():
@@ -100,35 +122,32 @@ def newton_script(net: Net) -> str:
     >>> beam, rubber = st.Beam("40 mm", "20 mm"), st.Material("1 MPa", 0.3, density="1000 kg/m^3")
     >>> scene = st.Scene(beam, st.make_mesh(beam, "right", "20 mm"), rubber, "traction", "1 N", definition="delingette")
     >>> [path] = scene.springs.write("net.newton.py")
-    >>> [line for line in path.read_text().splitlines() if line.startswith("TRI_K")]
-    ['TRI_KE = 384.61538461538464', 'TRI_KA = 329.6703296703297']
+    >>> [line[:14] for line in path.read_text().splitlines() if line.startswith("TRI_K")]
+    ['TRI_KE = 384.6', 'TRI_KA = 329.6']
     """
     simulation = _simulated(net)
     shear, first = membrane(net)
     there = net.stiffness != 0
-    step = STEPS * simulation.step
     expected = simulation.displacements
     values = {
         "POINTS": net.points.tolist(),
         "MASSES": simulation.masses.tolist(),
-        "HELD": net.held.all(axis=1).tolist(),
         "SPRINGS": net.springs[there].tolist(),
         "STIFFNESS": net.stiffness[there].tolist(),
         "REST_LENGTHS": net.rest_lengths[there].tolist(),
         "TRIANGLES": net.triangles.tolist() if net.energies else [],
+        "COLOURS": [group.tolist() for group in colours(net)],
         "TRI_KE": shear,
         "TRI_KA": first,
-        "STEP": step,
+        "STEP": simulation.step,
         "ITERATIONS": ITERATIONS,
         "SECONDS": _seconds(simulation),
         "MASS_DAMPING": simulation.mass_damping,
     }
-    said = (
-        f"the one here is {STEPS * simulation.step / simulation.largest_step:.2g} times as long, which VBD converges in"
-    )
-    lines = [f"# {line}" for line in [*about(net, simulation, said), *_law(net)]]
+    lines = [f"# {line}" for line in [*about(net, simulation, _step(simulation)), *_law(net)]]
     lines += ["", *(f"{verb} {name}" for verb, name in IMPORTS), ""]
     lines += [f"{name} = {value!r}" for name, value in values.items()]
+    lines += [f"HELD = np.array({net.held.tolist()!r})"]
     lines += [f"FORCES = np.array({net.forces.tolist()!r})"]
     lines += [f"EXPECTED = {None if expected is None else f'np.array({expected.tolist()!r})'}", ""]
     return "\n".join(lines) + SCRIPT
@@ -139,14 +158,13 @@ IMPORTS = (("import", "newton"), ("import", "numpy as np"), ("import", "warp as 
 
 def _simulated(net: Net) -> Simulation:
     """Simulation by Newton's law; ValueError for what Newton lacks."""
-    simulation = simulate(net, "Newton", LAWS, membrane_energies)
-    partly = int((net.held.any(axis=1) & ~net.held.all(axis=1)).sum())
-    if partly:
-        raise ValueError(
-            f"supports: {partly} particles are held in one direction alone, and Newton holds particles as a whole; "
-            "hold both directions, or take another format such as .xml for MuJoCo"
-        )
-    return simulation
+    return simulate(net, "Newton", LAWS, membrane_energies)
+
+
+def _step(simulation: Simulation) -> str:
+    """What the step of a file is, for its comments."""
+    share = simulation.step / simulation.largest_step
+    return f"the one here is {share:.2g} of it, in which {ITERATIONS} iterations of VBD converge"
 
 
 def _seconds(simulation: Simulation) -> float:
@@ -175,26 +193,22 @@ USD = '''#usda 1.0
 
 def Xform "sheet" (prepend apiSchemas = ["PhysicsDeformableBodyAPI"])
 {{
-    bool physics:bodyEnabled = 1
-
-    def Mesh "cloth" (prepend apiSchemas = ["PhysicsSurfaceDeformableSimAPI", "MaterialBindingAPI"])
+    def Mesh "cloth" (
+        prepend apiSchemas = ["PhysicsSurfaceDeformableSimAPI", "PhysicsCollisionAPI", "MaterialBindingAPI"]
+    )
     {{
         int[] faceVertexCounts = {counts}
         int[] faceVertexIndices = {indices}
         point3f[] points = {points}
-        point3f[] physics:restShapePoints = {points}
         float[] physics:thicknesses = [{thickness}]
         uniform token physics:thicknesses:elementType = "constant"
         uniform token subdivisionScheme = "none"
         rel material:binding:physics = </sheet/material>
-        custom int[] springtune:held = {held}
+        custom int2[] springtune:held = {held}
         custom vector3f[] springtune:forces = {forces}
         custom vector3f[] springtune:expectedDisplacements = {expected}
         custom float springtune:triKe = {tri_ke}
         custom float springtune:triKa = {tri_ka}
-        custom float springtune:massDamping = {damping}
-        custom float springtune:step = {step}
-        custom float springtune:seconds = {seconds}
     }}
 
     def Material "material" (prepend apiSchemas = ["PhysicsMaterialAPI", "PhysicsSurfaceDeformableMaterialAPI"])
@@ -208,9 +222,10 @@ def Xform "sheet" (prepend apiSchemas = ["PhysicsDeformableBodyAPI"])
 
 LEFT = (
     "Newton's importer reads particles, masses and triangles. It takes tri_ke = E h / (1 - nu^2) and tri_ka = 0, which",
-    "is another material. A script sets, before builder.color() and builder.finalize():",
-    "  builder.tri_materials[t] = (triKe, triKa, 0, 0, 0) for each triangle t, builder.particle_mass[i] = 0 for each i",
-    "  of held; and state.particle_f = forces ahead of each step. These are attributes springtune:... of the mesh.",
+    "is another material: a script sets builder.tri_materials[t] = (triKe, triKa, 0, 0, 0) of all triangles. It also",
+    "sets builder.particle_mass[i] = 0 where held has particle i with both its axes, 0 and 1, and ahead of each step",
+    "state.particle_f = forces. These are the attributes springtune:... of the mesh; a name ending in .newton.py gives",
+    "such a script, whose run(model) takes a model of this file, too.",
 )
 """What a user's script has to do with a file in USD."""
 
@@ -226,21 +241,18 @@ def newton_usd(net: Net) -> str:
         )
     shear, first = membrane(net)
     moved = np.zeros((0, 2)) if simulation.displacements is None else simulation.displacements
-    said = f"a solver such as VBD may take {STEPS} times as long ones"
+    said = "\n".join([*about(net, simulation, _step(simulation)), *_law(net), *LEFT])
     return USD.format(
-        about="\n".join([*about(net, simulation, said), *_law(net), *LEFT]).replace("\\", "/").replace('"', "'"),
+        about=said.replace("\\", "/").replace('"', "'"),
         counts=[3] * len(net.triangles),
         indices=net.triangles.ravel().tolist(),
         points=_vectors(net.points),
         thickness=net.thickness,
-        held=np.flatnonzero(net.held.all(axis=1)).tolist(),
+        held=list(map(tuple, np.argwhere(net.held).tolist())),
         forces=_vectors(net.forces),
         expected=_vectors(moved),
         tri_ke=shear,
         tri_ka=first,
-        damping=simulation.mass_damping,
-        step=STEPS * simulation.step,
-        seconds=_seconds(simulation),
         density=material["density"],
         young=material["young_modulus"],
         poisson=material["poisson_ratio"],

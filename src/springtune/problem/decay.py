@@ -16,7 +16,7 @@ LEAST_POINTS = 12
 MOST_MISFIT = 0.5
 """Misfit from which points are no damped swing [1]."""
 
-TWO_COLUMNS = "give two columns with a head such as 'time [s],displacement [mm]'"
+COLUMNS_OF_DECAY = "give two columns with a head such as 'time [s],displacement [mm]'"
 
 
 @dataclass(frozen=True, repr=False)
@@ -121,20 +121,16 @@ def fit_decay(times: np.ndarray | str | Path, displacements: np.ndarray | None =
                key=lambda found: found.cost)  # fmt: skip
     decay, frequency = best.x
     misfit = np.sqrt(2 * best.cost / len(x))
-    if not decay > 0 or frequency * span < 2 * np.pi or misfit > MOST_MISFIT:
+    if not decay > 0 or misfit > MOST_MISFIT or frequency * span < 2 * np.pi:
         raise ValueError(
-            f"displacements: are no swing that decays, a damped cosine leaves {100 * misfit:.0f} %; give a whole "
-            "period or more of one mode that swings freely, from after it is let go"
+            "displacements: are no swing that decays over a period or more; give those of one mode that swings freely, "
+            "from after it is let go"
         )
+    period, decrement = 2 * np.pi / frequency, 2 * np.pi * decay / frequency
     covariance = 2 * best.cost / (len(t) - 5) * np.linalg.inv(best.jac.T @ best.jac)
-    slope = 2 * np.pi / frequency * np.array([1, -decay / frequency])
-    return Decay(
-        float(2 * np.pi / frequency),
-        float(2 * np.pi * decay / frequency),
-        float(2 * np.pi / frequency**2 * np.sqrt(covariance[1, 1])),
-        float(np.sqrt(slope @ covariance @ slope)),
-        float(misfit),
-    )
+    slopes = np.array([[0, -period / frequency], [period, -decrement / frequency]])
+    errors = np.sqrt(np.diag(slopes @ covariance @ slopes.T))
+    return Decay(*map(float, (period, decrement, *errors, misfit)))
 
 
 def _check(t: np.ndarray, x: np.ndarray) -> None:
@@ -151,11 +147,11 @@ def _check(t: np.ndarray, x: np.ndarray) -> None:
 
 def _read(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
     """Times [s] and displacements [m] of a CSV file."""
-    rows = csv_rows(path, ValueError, TWO_COLUMNS)
+    rows = csv_rows(path, ValueError, COLUMNS_OF_DECAY)
     head = rows[0][1]
     units = [column.partition("[")[2].partition("]")[0] for column in head]
     if len(head) != 2 or not all(units):
-        raise ValueError(f"'{path}', line {rows[0][0]}: {','.join(head)!r} is no head of a decay; {TWO_COLUMNS}")
+        raise ValueError(f"'{path}', line {rows[0][0]}: {','.join(head)!r} is no head of a decay; {COLUMNS_OF_DECAY}")
     scales = [positive(f"1 {unit}", kind, f"'{path}', head") for unit, kind in zip(units, ("time", "length"))]
     times, moved = np.array(two_numbers(path, rows[1:], ValueError)).reshape(-1, 2).T
     return scales[0] * times, scales[1] * moved

@@ -1,6 +1,6 @@
 """Dampers of a scene that give its loaded mode a measured decay, over mass, over stiffness and along springs."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -15,8 +15,12 @@ from .single import Scene
 Numbers = float | str | Sequence[float | str] | np.ndarray
 """A number of one measured mode, or two of two."""
 
-CHOICES = ("mass", "springs", "both")
-"""What dampers of a motion are over."""
+RATIOS: dict[str, tuple[float, Callable[[float], float]]] = {
+    "decrement": (np.inf, lambda value: value / np.hypot(2 * np.pi, value)),
+    "ratio": (1.0, lambda value: value),
+    "loss_factor": (2.0, lambda value: value / 2),
+}
+"""Measures of a decay: what they are below, and the damping ratio that they mean."""
 
 CLOSE = 0.01
 """Relative difference of frequencies that no note is made of."""
@@ -65,10 +69,12 @@ class Damping(Tabled):
     >>> print(f"{damping.mass_damping:.2f} 1/s or {1e3 * damping.stiffness_damping:.2f} ms")
     3.57 1/s or 2.55 ms
 
-    One dashpot for each spring, in proportion to its stiffness:
+    One dashpot for each spring, in proportion to its stiffness, or one damper for each particle:
 
     >>> bool(abs(damping.dashpots - damping.stiffness_damping * st.SpringNet.from_scene(scene).stiffness).max() < 1e-12)
     True
+    >>> f"{1e6 * damping.particle_dampers.max():.0f} uN s/m"
+    '98 uN s/m'
     """
 
     scene: Scene = field(repr=False)
@@ -102,6 +108,11 @@ class Damping(Tabled):
         '0.3146'
         """
         return float(2 * np.pi * self.ratio / np.sqrt(1 - self.ratio**2))
+
+    @property
+    def particle_dampers(self) -> np.ndarray:
+        """Damper of each particle over mass, ``alpha m`` [N s/m], shape (n_points,)."""
+        return self.mass_damping * np.asarray(self.scene.statement.masses())
 
     @cached_property
     def dashpots(self) -> np.ndarray:
@@ -152,11 +163,10 @@ class Damping(Tabled):
         >>> f"{share:.2f}, exp(-0.9) = {np.exp(-0.9):.2f}"
         '0.39, exp(-0.9) = 0.41'
         """
-        if over not in CHOICES:
-            raise ValueError(f"over: {over!r} is unknown; give one of {', '.join(CHOICES)}")
-        alpha, beta = self.rayleigh
-        if over != "both":
-            alpha, beta = (self.mass_damping, 0.0) if over == "mass" else (0.0, self.stiffness_damping)
+        known = {"mass": (self.mass_damping, 0.0), "springs": (0.0, self.stiffness_damping), "both": self.rayleigh}
+        if over not in known:
+            raise ValueError(f"over: {over!r} is unknown; give one of {', '.join(known)}")
+        alpha, beta = known[over]
         dampers = beta / self.stiffness_damping * self.dashpots / self.scene.springs.reference
         return {"mass_damping": alpha} | ({"dampers": dampers} if beta else {})
 
@@ -264,7 +274,7 @@ def damping_of(
     ------
     ValueError
         If none or several of the measures are given, a number is out of its range, or no Rayleigh damping has the
-        ratios of two modes; the message says what to give.
+        ratios of two modes; or if the scene has no masses, or is unstable at rest. The message says what to give.
 
     See Also
     --------
@@ -302,31 +312,30 @@ def damping_of(
     period: '0.21 s' and ratio are not as many; give one for each mode, or two of two
     """
     name, ratios = _ratios({"decrement": decrement, "ratio": ratio, "loss_factor": loss_factor})
-    timed, given, wrong, other = ("period", period, "at", at)
-    if name == "loss_factor":
-        timed, given, wrong, other = ("at", at, "period", period)
+    timed, given, wrong, other = ("at", at, "period", period) if name == "loss_factor" else ("period", period, "at", at)
     if other is not None:
         raise ValueError(f"{wrong}: {other!r} does not go with {name}; give {timed} in its place")
-    if given is None and len(ratios) == 2:
-        raise ValueError(f"{name}: two modes, and no {timed}; give the {timed} of each")
     values = [] if given is None else _values(timed, given)
-    if values and len(values) != len(ratios):
+    if len(values) != len(ratios) and (values or len(ratios) == 2):
         raise ValueError(f"{timed}: {given!r} and {name} are not as many; give one for each mode, or two of two")
+    if scene.network.rest_factor.negative_pivots:
+        raise ValueError(
+            f"definition '{scene.definition.name}': is unstable at rest, so that nothing swings; take another "
+            "definition or mesh"
+        )
     own = _loaded(scene).loaded_frequency
     alpha, beta, factor = ratios[0] * own, ratios[0] / own, 1.0
     if timed == "at":
         measured = [2 * np.pi * positive(one, "frequency", timed) for one in values]
-        notes = _other_frequency(measured, own)
     else:
         measured = [2 * np.pi / positive(one, "time", timed) / np.sqrt(1 - x**2) for one, x in zip(values, ratios)]
         factor = (measured[0] / own) ** 2 if measured else 1.0
         measured = [one / np.sqrt(factor) for one in measured]  # as damping goes with the scene's own mode
-        notes = _other_period(factor)
     first = ratios[0]
     if len(ratios) == 2:
         alpha, beta = _rayleigh(name, ratios, measured)
         first = (alpha / own + beta * own) / 2
-    return Damping(scene, first, 2 * first * own, 2 * first / own, (alpha, beta), factor, notes)
+    return Damping(scene, first, 2 * first * own, 2 * first / own, (alpha, beta), factor, _notes(factor, measured, own))
 
 
 def _loaded(scene: Scene) -> Motion:
@@ -349,14 +358,11 @@ def _ratios(given: dict[str, Numbers | None]) -> tuple[str, list[float]]:
         said = " and ".join(f"{name}={value!r}" for name, value in known.items()) or "nothing was measured"
         raise ValueError(f"{', '.join(given)}: {said}; give one of them, such as decrement=0.3")
     [(name, value)] = known.items()
-    most = {"decrement": np.inf, "ratio": 1.0, "loss_factor": 2.0}[name]
-    ratios = []
-    for one in _values(name, value):
-        number = np.nan if isinstance(one, str | bool) else float(one)
-        if not 0 < number < most:
-            raise ValueError(f"{name}: {one!r} is not a number above zero and below {most:g}; give one")
-        ratios.append({"decrement": number / np.hypot(2 * np.pi, number), "loss_factor": number / 2}.get(name, number))
-    return name, ratios
+    most, ratio = RATIOS[name]
+    numbers = [np.nan if isinstance(one, str | bool) else float(one) for one in _values(name, value)]
+    if not all(0 < one < most for one in numbers):
+        raise ValueError(f"{name}: {value!r} is not a number above zero and below {most:g}; give one")
+    return name, [ratio(one) for one in numbers]
 
 
 def _rayleigh(name: str, ratios: list[float], frequencies: list[float]) -> tuple[float, float]:
@@ -374,23 +380,15 @@ def _rayleigh(name: str, ratios: list[float], frequencies: list[float]) -> tuple
     )
 
 
-def _other_period(factor: float) -> tuple[str, ...]:
-    """What a measured period says of the stiffness."""
-    change = 1 / np.sqrt(factor) - 1
-    if abs(change) <= CLOSE:
-        return ()
-    return (
-        f"the measured period is {100 * abs(change):.2g} % {'longer' if change > 0 else 'shorter'} than the scene's; "
-        f"multiply stiffnesses by {factor:.3g} or the density by {1 / factor:.3g}, and ask again",
-    )
-
-
-def _other_frequency(measured: list[float], own: float) -> tuple[str, ...]:
-    """What the frequency of a loss factor says."""
-    if len(measured) != 1 or abs(measured[0] / own - 1) <= CLOSE:
-        return ()
-    hertz, loaded = measured[0] / (2 * np.pi), own / (2 * np.pi)
-    return (
-        f"the loss factor is of {hertz:.3g} Hz, and is taken for that of the loaded mode, at {loaded:.3g} Hz; give the "
-        "one measured there",
-    )
+def _notes(factor: float, measured: list[float], own: float) -> tuple[str, ...]:
+    """What a measured period says of the stiffness, and the frequency of a loss factor of what it is for."""
+    longer = 1 / np.sqrt(factor) - 1
+    if abs(longer) > CLOSE:
+        return (
+            f"the measured period is {100 * abs(longer):.2g} % {'longer' if longer > 0 else 'shorter'} than the "
+            f"scene's; multiply stiffnesses by {factor:.3g} or the density by {1 / factor:.3g}, and ask again",
+        )
+    if len(measured) == 1 and abs(measured[0] / own - 1) > CLOSE:
+        hertz, loaded = measured[0] / (2 * np.pi), own / (2 * np.pi)
+        return (f"the loss factor is of {hertz:.3g} Hz, and the loaded mode at {loaded:.3g} Hz; give the one of there",)
+    return ()

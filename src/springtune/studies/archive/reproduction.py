@@ -310,8 +310,8 @@ def compared(kept: Path, made: Path, machine: dict[str, str]) -> Reproduced:
         }
         ended_otherwise = sum(changed.values())
         if ended_otherwise:
-            others = {name for name, count in changed.items() if count}
-            groups = sorted({node.path for tree in (before, after) for node in tree.subtree} - others)
+            elsewise = {name for name, count in changed.items() if count}
+            groups = sorted({node.path for tree in (before, after) for node in tree.subtree} - elsewise)
             exact = compare(before, after, Tolerance(0.0, 0.0), groups)
         near = compare(before, after, groups=groups) if exact.different else exact
         versions = [json.loads(tree.attrs["software"]) for tree in (before, after)]

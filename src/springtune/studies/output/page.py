@@ -20,7 +20,7 @@ ANSWERED = ("solved", "unstable", "linear_only")
 MOST_ROWS = 1000
 """Most rows on the page; CSV files have all."""
 
-COLUMN_UNITS = {"mm2": "mm²", "mm": "mm", "percent": "%", "points": "points", "N": "N", "MPa": "MPa"}
+COLUMN_UNITS = {"mm2": "mm²", "mm": "mm", "percent": "%", "points": "points", "N": "N", "MPa": "MPa", "ms": "ms"}
 
 
 def write(tree: xr.DataTree, folder: str | Path) -> list[str]:

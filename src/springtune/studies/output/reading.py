@@ -66,8 +66,8 @@ def open(path: str | os.PathLike[str]) -> "xarray.DataTree":
     >>> with st.open("results/mine") as tree:
     ...     sorted(tree.children), dict(tree.sizes)
     (['benchmark', 'block', 'effects', 'engine_curves', 'engines', 'fields', 'laying', 'moduli', 'refinement',
-    'samples', 'sensitivity', 'shape_fields', 'shapes', 'sobol', 'stability'], {'beam': 2, 'mesh_type': 2, 'mesh_size': 3, 'material': 2,
-    'load': 3, 'definition': 2, 'kinematics': 2})
+    'samples', 'sensitivity', 'shape_fields', 'shapes', 'sobol', 'stability'], {'beam': 2, 'mesh_type': 2,
+    'mesh_size': 3, 'material': 2, 'load': 3, 'definition': 2, 'kinematics': 2})
     >>> st.open("results/nothing")
     Traceback (most recent call last):
     FileNotFoundError: results/nothing: there is no such dataset; run the study, or give its results/<study>/dataset.nc

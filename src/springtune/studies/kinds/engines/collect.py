@@ -57,11 +57,10 @@ IN_BOTH = (
 )
 """Variables of both groups."""
 
-END_FLAGS = {
-    "engine_status": {"flag_values": np.arange(len(RUN_ENDS), dtype="int8"), "flag_meanings": " ".join(RUN_ENDS)}
-}
+_FLAGS = {"flag_values": np.arange(len(RUN_ENDS), dtype="int8"), "flag_meanings": " ".join(RUN_ENDS)}
+END_FLAGS = {"engine_status": _FLAGS}
 
-ENGINE_DIMENSIONS = {
+ENGINE_DIMENSIONS: dict[str, str | tuple[str, str]] = {
     "scene": "scene in engines",
     "engine": "program and solver",
     "precision": "floating-point numbers",

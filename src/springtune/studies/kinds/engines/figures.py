@@ -207,29 +207,21 @@ def plot_engine_maps(data, ax=None, *, scene=None):
     case, runs = _runs(data, "engines", scene)
     shown = {name: rows for name, rows in runs.items()
              if any(RUN_ENDS[row["engine_status"]] not in WITHOUT_RUN for row in rows)}  # fmt: skip
-    every = [row for rows in shown.values() for row in rows]
-    steps = {tuple(row[name] for name in SETTING[:3]) for row in every}
-    steps = sorted(steps, key=lambda one: (one[0], one[1] / one[2], one[2]))
-    counts = sorted({row["iterations"] for row in every})
     lost = _lost({name: rows for name, rows in runs.items() if name not in shown})
     columns = min(PANELS_IN_ROW, max(len(shown), 1))
     said = "; ".join(filter(None, (MAP_NUMBERS if shown else "", f"not drawn: {lost}" if lost and shown else "")))
     said = labels.wrapped(said, (style.PAGE if columns > 1 else style.COLUMN) - 0.2)
     under = 0.24 + labels.LINE * labels.lines_of(said)
-    height = 0.8 + 0.19 * max(len(steps), 3)
+    most = max((len(_steps(rows)) for rows in shown.values()), default=3)
+    height = 0.8 + 0.19 * max(most, 3)
     figure, axes, flat, _ = style.multiples(ax, max(len(shown), 1), columns, height, further=under)
     place = {"left": 0.5, "right": 0.08, "bottom": 0.36 + under, "top": 0.42, "down": 0.62}
     style.arrange(figure, axes, across=0.15, **place, title=case.scene.item())
-    several = len({step[0] for step in steps}) > 1
-    texts = [f"{precision + ', ' if several else ''}{_frame(dt)} / {substeps}" for precision, dt, substeps in steps]
     ends = set()
     for number, (panel, (name, rows)) in enumerate(zip(flat, shown.items())):
-        ends |= _map(panel, rows, steps, counts)
+        ends |= _map(panel, rows)
         panel.set(title=name, xlabel="Iterations")
-        panel.set_xticks(range(len(counts)), map(str, counts))
-        first = number % axes.shape[1] == 0
-        panel.set_yticks(range(len(steps)), texts if first else [""] * len(texts))
-        panel.set_ylabel("Frame / substeps" if first else "")
+        panel.set_ylabel("Frame / substeps" if number % axes.shape[1] == 0 else "")
     labels.settle(figure, axes, place | {"across": 0.12})
     if not shown:
         labels.say(flat[0], f"Nothing was run: {lost}.")
@@ -247,8 +239,15 @@ def _below(figure, text):
     figure.text(0.08 / wide, 0.04 / high, text, fontsize=style.SMALL, color="0.25", va="bottom")
 
 
-def _map(panel, rows, steps, counts):
+def _steps(rows):
+    """Precision, frame and substeps of runs, the smallest step first."""
+    steps = {tuple(row[name] for name in SETTING[:3]) for row in rows}
+    return sorted(steps, key=lambda one: (one[0], one[1] / one[2], one[2]))
+
+
+def _map(panel, rows):
     """Draw errors of runs at rest with their numbers, and how the others ended, which it returns."""
+    steps, counts = _steps(rows), sorted({row["iterations"] for row in rows})
     errors = np.full((len(steps), len(counts)), np.nan)
     ends, texts = np.full(errors.shape, np.nan), np.full(errors.shape, NOT_ASKED, dtype=object)
     names = list(END_COLOURS)
@@ -263,6 +262,12 @@ def _map(panel, rows, steps, counts):
             ends[place] = names.index(end if end in names else "no run")
     heat_map(panel, errors, texts)
     panel.imshow(ends, cmap=ListedColormap([*END_COLOURS.values()]), vmin=-0.5, vmax=len(names) - 0.5, aspect="auto")
+    several = len({precision for precision, *_ in steps}) > 1
+    panel.set_yticks(
+        range(len(steps)),
+        [f"{precision + ', ' if several else ''}{_frame(dt)} / {substeps}" for precision, dt, substeps in steps],
+    )
+    panel.set_xticks(range(len(counts)), map(str, counts))
     return {names[int(end)] for end in ends[np.isfinite(ends)]}
 
 

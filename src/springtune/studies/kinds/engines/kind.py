@@ -63,8 +63,8 @@ def _read_frame(value: str) -> float:
     return found
 
 
-_COUNT = number("a whole number from 1 to 100000, such as 10", 1, 100_000, whole=True)
-Count = Annotated[int, _COUNT]
+_WHOLE = number("a whole number from 1 to 100000, such as 10", 1, 100_000, whole=True)
+Count = Annotated[int, _WHOLE]
 EngineName = Annotated[str, Scalar(str, {"type": "string", "examples": ["xpbd"]}, "an engine such as 'xpbd'")]
 FrameTime = Annotated[
     float, Scalar(_read_frame, {"type": "string", "examples": ["1/60 s"]}, "a time such as '1/60 s' or '5 ms'")
@@ -232,7 +232,8 @@ def _summary(runs):
 
 def _version(engine):
     """Versions of what an engine needs, "none" of what is absent: a new one runs it again."""
-    return ", ".join(f"{name} {installed(name)}" for name in map(distribution, engine.needs))
+    names = (distribution(need.partition(">=")[0]) for need in engine.needs)
+    return ", ".join(f"{name} {installed(name)}" for name in names)
 
 
 def _tasks(study):

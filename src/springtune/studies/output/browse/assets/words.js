@@ -105,7 +105,7 @@ function labelWithUnit(dim, place) {
 // "18,432 samples", "1 shape", "5 approaches".
 function counted(count, name) {
   const many = /(s|x|ch)$/.test(name) ? `${name}es` : name.replace(/y$/, "ie") + "s";
-  return `${count.toLocaleString("en")} ${count === 1 || name === "kinematics" ? name : many}`;
+  return `${count.toLocaleString("en")} ${count === 1 || ["kinematics", "iterations", "substeps"].includes(name) ? name : many}`;
 }
 
 // Elements: texts are always set as text, so that what a dataset says is never markup.

@@ -1,0 +1,550 @@
+"""Calibration of a scene to an engine's setting: the numbers to type so that it moves as the material does.
+
+An engine that does not converge adds to the displacement of springs. In most solvers the displacement is nearly
+``a / s + b`` with a factor ``s`` on all that is typed. ``b`` is what iterations and substeps leave, however stiff the
+springs are: a factor hides it for one load and not for the others, and where ``b`` exceeds the material's displacement
+no factor does.
+"""
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from ..handover.net import NOT_COMPUTED, SpringNet
+from ..prediction.choices import check_loads, check_names, predicted
+from ..problem.compare import error_text
+from ..problem.loads import LOADS
+from ..reference.small_strain import ReferenceNotConvergedError
+from ..safe_io.tables import Tabled, TabledList, number_text
+from ..scene.single import Scene
+from ..scene.statements import ShapeStatement
+from .base import ENGINES, EngineError, Setting
+from .run import EngineResult, complete, in_engine, net_of
+
+SIZES = (0.25, 0.5, 1.0, 2.0)
+"""Sizes of a load that a calibration is tried on, over its own."""
+
+WITHIN = 0.05
+"""Error that a band keeps."""
+
+CLOSE = 1e-3
+"""Error at which a factor is taken."""
+
+ALLOWED = 0.02
+"""Error above which a factor is refused where nothing comes closer."""
+
+STEP, MOST_STEPS = 8.0, 7
+"""Ratio of the factors that look for a bracket, and how many there are."""
+
+REST = {"float64": 1e-4, "float32": 1e-3}
+"""Distance from rest that ends a run, over the displacement, by precision."""
+
+SHAKE = 5e-3
+"""Amplitude over the displacement up to which a run that does not rest counts, as those of single precision do."""
+
+FLAT = 1e-3
+"""Change of the displacement over a `STEP` below which stiffness no longer decides."""
+
+CONVERGED = 0.01
+"""Solver error of a converged setting; or the definition's error, if that is larger."""
+
+MOST_DOUBLINGS = 8
+"""Doublings of substeps or iterations that are tried."""
+
+SETTLED, TUNABLE = "converged", "a factor"
+"""Purposes of settings: the solver error is small without a factor; there is a factor."""
+
+STALLED = 0.9
+"""Share of the solver error that two doublings leave where more of them are hopeless."""
+
+FINE = 200
+"""Sizes between two tested ones at which a band is looked at."""
+
+
+@dataclass(frozen=True, repr=False)
+class LoadBand(Tabled):
+    """How a calibrated factor fares under a load of several sizes.
+
+    Attributes
+    ----------
+    load : str
+    sizes : tuple of float
+        Tested forces on a beam [N], or factors on a load case of a shape [1].
+    errors : tuple of float
+        In the engine at each size [1]; NaN where it does not come to rest.
+    definition_error : float
+        Of the network's equilibrium without a factor, at the third size [1]: what a converged setting would have.
+    within : float
+        Error that the range keeps [1].
+    least, most : float
+        Range of sizes over which the error stays within it; NaN where there is none. It lies between tested sizes, and
+        has a margin for what is between them.
+    message : str
+        Why there is no error.
+    unit : str
+        Of the sizes; empty for factors.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> beam, rubber = st.Beam("200 mm", "40 mm"), st.Material("1 MPa", 0.3, density="1000 kg/m^3")
+    >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "20 mm"), rubber, "traction", "0.2 N")
+    >>> fit = st.fit_engine(scene, "xpbd", substeps=20, loads=["traction", "bending"], needed=False)
+    >>> for band in fit.bands:
+    ...     there = f"{band.least:.3g} to {band.most:.3g} N" if band.least == band.least else "nowhere"
+    ...     print(f"{band.load}: {100 * band.error:+.0f} %, within {100 * band.within:g} % {there}")
+    """
+
+    load: str
+    sizes: tuple[float, ...]
+    errors: tuple[float, ...]
+    definition_error: float
+    within: float
+    least: float
+    most: float
+    message: str = ""
+    unit: str = "N"
+
+    @property
+    def error(self) -> float:
+        """Error at the third size [1]: that of the scene, or one that moves the reference as far."""
+        return self.errors[SIZES.index(1.0)]
+
+    def _rows(self) -> Iterator[tuple[str, str]]:
+        yield "load", self.load
+        for share, error in zip(SIZES, self.errors):
+            yield f"x {share:g}", error_text(error) if error == error else "no rest"
+        yield "converged", error_text(self.definition_error) if self.definition_error == self.definition_error else ""
+        there = f"{number_text(self.least, self.unit)} to {number_text(self.most, self.unit)}"
+        yield f"within {100 * self.within:g} %", there if self.least == self.least else "nowhere"
+        yield "reason", self.message
+
+
+@dataclass(frozen=True, repr=False)
+class NeededSetting(Tabled):
+    """Setting that some purpose needs, found by doubling its substeps or its iterations.
+
+    Attributes
+    ----------
+    purpose : str
+        ``"converged"``: the solver error is small without a factor; ``"a factor"``: there is one for the reference.
+    raised : str
+        ``"substeps"`` or ``"iterations"``.
+    setting : Setting
+        The first one that serves, or the last one that was tried.
+    found : bool
+        Whether it serves.
+    solver_error : float
+        There, without a factor [1].
+    frame_seconds : float
+        Time that a frame took there [s].
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> beam, rubber = st.Beam("200 mm", "40 mm"), st.Material("1 MPa", 0.3, density="1000 kg/m^3")
+    >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "20 mm"), rubber, "traction", "0.2 N")
+    >>> for one in st.fit_engine(scene, "xpbd", substeps=20, loads=["traction"]).needed:
+    ...     print(f"{one.raised}: {one.setting}, {one.found}, {100 * one.solver_error:+.1f} %")
+    """
+
+    purpose: str
+    raised: str
+    setting: Setting
+    found: bool
+    solver_error: float
+    frame_seconds: float
+
+    def _rows(self) -> Iterator[tuple[str, str]]:
+        yield "for", self.purpose
+        yield "more", self.raised
+        yield "setting", str(self.setting) if self.found else f"none up to {self.setting}"
+        yield "solver error", error_text(self.solver_error) if self.solver_error == self.solver_error else "diverges"
+        yield "a frame", number_text(self.frame_seconds, "s")
+
+
+@dataclass(frozen=True, repr=False)
+class EngineFit(Tabled):
+    """What to type into an engine so that a scene is right at a setting, and how far that goes.
+
+    Attributes
+    ----------
+    scene : Scene
+    factor : float
+        On all stiffnesses and moduli that are typed [1]; NaN where there is none, for the reason in `message`.
+    result : EngineResult
+        With the factor; where there is none, with the one that came nearest.
+    untuned : EngineResult
+        Without a factor.
+    typed : dict of str to float or ndarray
+        The numbers to type by the names of the engine's `parameters`, with the factor in them.
+    bands : TabledList of LoadBand
+        The load of the scene first.
+    needed : TabledList of NeededSetting
+        What a converged setting needs, and where there is no factor, what a factor needs.
+    message : str
+        Why there is no factor, or what else is to be known.
+
+    Examples
+    --------
+    >>> import springtune as st
+    >>> beam, rubber = st.Beam("200 mm", "40 mm"), st.Material("1 MPa", 0.3, density="1000 kg/m^3")
+    >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "20 mm"), rubber, "traction", "0.2 N")
+    >>> fit = st.fit_engine(scene, "xpbd", substeps=20, loads=["traction"], needed=False)
+    >>> print(f"{fit.factor:.2f} times, {fit.typed['compliance'].max():.4g} m/N; error {100 * fit.error:+.1f} %")
+    >>> fit.net().write("tuned.csv")[0].name
+    'tuned.csv'
+    """
+
+    scene: Scene = field(repr=False)
+    factor: float
+    result: EngineResult = field(repr=False)
+    untuned: EngineResult = field(repr=False)
+    typed: dict[str, Any] = field(repr=False)
+    bands: TabledList[LoadBand] = field(repr=False)
+    needed: TabledList[NeededSetting] = field(repr=False)
+    message: str
+
+    @property
+    def error(self) -> float:
+        """Error in the engine with the factor, under the load of the scene [1]."""
+        return self.result.error
+
+    def net(self) -> SpringNet:
+        """Springs with the factor in them.
+
+        Returns
+        -------
+        SpringNet
+            Its header says the engine and the setting.
+
+        Raises
+        ------
+        EngineError
+            If there is no factor.
+        """
+        if self.factor != self.factor:
+            raise EngineError(self.message)
+        net, result = net_of(self.scene, self.factor), self.result
+        why = f"{NOT_COMPUTED}: the stiffness is that for engine '{result.engine}' at {result.setting}, which has not"
+        steps = net.header["largest_stable_step"]
+        if isinstance(steps, dict):
+            steps = {name: one if isinstance(one, str) else one / self.factor**0.5 for name, one in steps.items()}
+        header = net.header | {
+            "reference_stiffness": self.factor * net.header["reference_stiffness"],
+            "calibrated": {"engine": result.engine, "setting": str(result.setting), "factor": self.factor},
+            "expected_error": f"{why} converged",
+            "largest_stable_step": steps,
+        }
+        return replace(net, header=header)
+
+    def typed_rows(self) -> Iterator[tuple[str, str, str, str]]:
+        """Name, value or range, unit and formula of each number to type.
+
+        Returns
+        -------
+        iterator of tuple of str
+        """
+        known = ENGINES[self.result.engine].parameters
+        for name, value in self.typed.items():
+            values = np.ravel(value)[np.isfinite(np.ravel(value))]
+            low, high = f"{values.min(initial=np.inf):.5g}", f"{values.max(initial=-np.inf):.5g}"
+            about = known.get(name)
+            yield name, low if low == high else f"{low} to {high}", about.unit if about else "", (
+                about.formula if about else ""
+            )
+
+    def _rows(self) -> Iterator[tuple[str, str]]:
+        yield "engine", f"{self.result.engine}, {self.result.setting}"
+        yield "factor", f"{self.factor:.5g}" if self.factor == self.factor else "none"
+        for name, value, unit, _ in self.typed_rows():
+            yield f"type {name}", f"{value} {unit}"
+        yield "displacement", number_text(self.result.displacement, "m")
+        yield "error", error_text(self.error)
+        yield "without a factor", error_text(self.untuned.error)
+        yield "note", self.message
+
+    def _computed_rows(self) -> Iterator[tuple[str, str]]:
+        for band in self.bands:
+            yield f"under {band.load}", "; ".join(f"{label} {text}" for label, text in band._table()[1:])
+        for one in self.needed:
+            yield f"{one.purpose}, {one.raised}", "; ".join(text for _, text in one._table()[2:])
+
+
+class _Runs:
+    """Runs of a scene in an engine, each factor and setting once.
+
+    All are damped critically for the loaded mode of the material: where the displacement is right, so is the damping.
+    """
+
+    def __init__(self, scene: Scene, engine: str, setting: Setting, frames: int | None) -> None:
+        self.scene, self.engine, self.setting, self.frames = scene, engine, setting, frames
+        self.known: dict[tuple[float, Setting], EngineResult] = {}
+        self.target = self(1.0).reference
+        if not abs(self.target) > 0:
+            raise EngineError(
+                f"load: {scene.load!r} has no displacement by finite elements to calibrate to; take a load case with a "
+                "quantity of kind 'displacement' that is not zero"
+            )
+
+    def __call__(self, factor: float, setting: Setting | None = None) -> EngineResult:
+        key = factor, setting or self.setting
+        if key not in self.known:
+            self.known[key] = self.under(self.scene, *key)
+        return self.known[key]
+
+    def under(self, scene: Scene, factor: float, setting: Setting | None = None) -> EngineResult:
+        """Run of a scene of the same springs."""
+        damping = 2 * scene.motion().loaded_frequency
+        setting = setting or self.setting
+        options = {"factor": factor, "frames": self.frames, "tolerance": REST[setting.precision], "damping": damping}
+        return in_engine(scene, self.engine, setting, **options)
+
+    def ratio(self, factor: float, setting: Setting | None = None) -> float:
+        """Displacement over the reference's; NaN where it diverged."""
+        return self(factor, setting).displacement / self.target
+
+
+def fit_engine(
+    scene: Scene,
+    engine: str,
+    setting: Setting | None = None,
+    *,
+    within: float = WITHIN,
+    loads: Iterable[str] | None = None,
+    needed: bool = True,
+    frames: int | None = None,
+    **parts: Any,
+) -> EngineFit:
+    """Find what to type into an engine so that a scene's displacement is that of finite elements.
+
+    Parameters
+    ----------
+    scene : Scene
+        As of `in_engine`, with the load to calibrate on.
+    engine : str
+        Key of `springtune.ENGINES`.
+    setting : Setting, optional
+    within : float, optional
+        Error that bands keep [1].
+    loads : iterable of str, optional
+        Loads besides the scene's that get a band; by default all of a beam but those that turn, or all of a shape.
+    needed : bool, optional
+        Whether settings that converge are looked for, which takes the longest.
+    frames : int, optional
+        At most, of each run, as of `in_engine`.
+    **parts
+        In the place of a setting its parts: ``dt``, ``substeps``, ``iterations``, ``precision``.
+
+    Returns
+    -------
+    EngineFit
+
+    Raises
+    ------
+    KeyError
+        If no engine has the name.
+    EngineError
+        If the engine is not installed or lacks what the scene has, the load has no displacement, or `within` is out of
+        its range.
+
+    Notes
+    -----
+    One factor is on all stiffnesses and moduli. It is found by Brent's method in the softness, 1 over the factor, in
+    which displacements are nearly straight, between factors that are 8 times apart. Other loads of a beam have the
+    force that moves the reference as far as the scene's does. Errors between tested sizes are interpolated; a band has
+    a margin of twice what a parabola through neighbours differs from the line.
+
+    Examples
+    --------
+    A factor hides too few substeps from the load that it is found for, and from that load alone:
+
+    >>> import springtune as st
+    >>> beam, rubber = st.Beam("200 mm", "40 mm"), st.Material("1 MPa", 0.3, density="1000 kg/m^3")
+    >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "20 mm"), rubber, "traction", "0.2 N")
+    >>> fit = st.fit_engine(scene, "xpbd", dt="1/60", substeps=20, loads=["bending", "shear"])
+    >>> print(f"{fit.factor:.2f}: {100 * fit.untuned.error:+.1f} % becomes {100 * fit.error:+.1f} %")
+    >>> print(*(f"{band.load} {100 * band.error:+.0f} %" for band in fit.bands))
+
+    With fewer substeps there is none:
+
+    >>> print(st.fit_engine(scene, "xpbd", dt="1/60", substeps=4, loads=["traction"]).message)
+    """
+    chosen = ENGINES[engine]
+    if not 0 < within < 1:
+        raise EngineError(f"within: {within!r} is no error above 0 and below 1; give one such as 0.05")
+    setting = complete(chosen, setting or Setting(**parts))
+    net_of(scene)  # refuses what no engine runs, by its own message
+    names = _loads(scene, loads)
+    runs = _Runs(scene, engine, setting, frames)
+    factor, why = _factor(runs)
+    found = factor == factor
+    needs: TabledList[NeededSetting] = TabledList()
+    for raised in ("substeps", "iterations") if chosen.iterates else ("substeps",):
+        if needed and not found:
+            needs.append(_needed(runs, TUNABLE, raised, _reachable))
+        if needed:
+            needs.append(_needed(runs, SETTLED, raised, _converged))
+    if not found:
+        enough = [one for one in needs if one.found and one.purpose == TUNABLE]
+        remedies = [f"{getattr(one.setting, one.raised)} {one.raised}" for one in enough]
+        why += f"; take {' or '.join(remedies) or 'more substeps or iterations'}"
+    elif not _rests(runs(factor)):
+        why = runs(factor).message
+    bands = TabledList(_band(runs, name, factor, within) for name in names if found)
+    return EngineFit(
+        scene,
+        factor,
+        runs(factor) if found else min(runs.known.values(), key=lambda one: _distance(one, setting)),
+        runs(1.0),
+        chosen.typed(net_of(scene, factor)) if found else {},
+        bands,
+        needs,
+        "; ".join(filter(None, (why, scene.objection))),
+    )
+
+
+def _rests(one: EngineResult) -> bool:
+    """Whether a run rests, or does but for its rounding."""
+    return one.status == "rest" or one.swing <= SHAKE * abs(one.displacement)
+
+
+def _distance(one: EngineResult, setting: Setting) -> float:
+    return abs(one.error) if one.setting == setting and np.isfinite(one.error) else np.inf
+
+
+def _loads(scene: Scene, loads: Iterable[str] | None) -> tuple[str, ...]:
+    """Loads that get a band, the scene's first."""
+    if isinstance(scene.statement, ShapeStatement):
+        known = scene.shape.loads
+        others = check_names("loads", known if loads is None else loads, known, tuple(known), "is unknown")
+    else:
+        others = check_loads(predicted() if loads is None else loads)
+    return tuple(dict.fromkeys((scene.load, *others)))
+
+
+def _factor(runs: _Runs) -> tuple[float, str]:
+    """Find the factor at which the displacement is the reference's; NaN, and why, where there is none."""
+    from scipy.optimize import brentq
+
+    def error(softness: float) -> float:
+        off = runs.ratio(1 / softness) - 1
+        return 0.0 if abs(off) <= CLOSE else float(np.nan_to_num(off, nan=1.0))
+
+    moved = f"{number_text(runs.target, 'm')} by finite elements"
+    if not np.isfinite(runs.ratio(1.0)):
+        return np.nan, f"{runs.engine} diverges at {runs.setting} with the numbers of the definition"
+    stiffen = runs.ratio(1.0) > 1
+    last = 1.0
+    for _ in range(MOST_STEPS):
+        factor = last * (STEP if stiffen else 1 / STEP)
+        ratio, before = runs.ratio(factor), runs.ratio(last)
+        there = number_text(runs(last).displacement, "m")
+        if np.isfinite(ratio) and (ratio > 1) != stiffen:
+            break
+        if not np.isfinite(ratio):
+            return np.nan, f"{runs.engine} diverges at {runs.setting} at {factor:.3g} times, {there} at {last:.3g} times"
+        last = factor
+        if stiffen and abs(ratio - before) < FLAT * abs(ratio):
+            break
+    else:
+        ratio = np.nan
+    if not np.isfinite(ratio) or (ratio > 1) == stiffen:
+        word = "stiffness" if stiffen else "softness"
+        there = number_text(runs(last).displacement, "m")
+        return np.nan, f"no {word} reaches {moved}: at {runs.setting} {last:.3g} times the stiffness leaves {there}"
+    softness = brentq(error, *sorted((1 / last, 1 / factor)), xtol=1e-5 / max(last, factor), maxiter=60)
+    best = min((one for one, at in runs.known if at == runs.setting), key=lambda one: abs(runs.ratio(one) - 1))
+    if not abs(runs.ratio(best) - 1) <= ALLOWED:
+        return np.nan, f"the displacement jumps over {moved} at {1 / softness:.4g} times the stiffness"
+    return best, ""
+
+
+def _reachable(runs: _Runs, setting: Setting) -> bool:
+    """Whether a large factor makes a setting stiff enough, or a small one soft enough."""
+    untuned = runs.ratio(1.0, setting)
+    other = runs.ratio(STEP**MOST_STEPS if untuned > 1 else STEP**-MOST_STEPS, setting)
+    return bool((untuned > 1) != (other > 1)) and bool(np.isfinite(untuned + other))
+
+
+def _converged(runs: _Runs, setting: Setting) -> bool:
+    found = runs(1.0, setting)
+    return _rests(found) and abs(found.solver_error) <= max(CONVERGED, abs(found.definition_error))
+
+
+def _needed(runs: _Runs, purpose: str, raised: str, serves: Callable[[_Runs, Setting], bool]) -> NeededSetting:
+    """Double substeps or iterations until a setting serves, or its error stalls."""
+    errors: list[float] = []
+    for power in range(MOST_DOUBLINGS + 1):
+        setting = replace(runs.setting, **{raised: getattr(runs.setting, raised) * 2**power})
+        found = serves(runs, setting)
+        untuned = runs(1.0, setting)
+        errors.append(abs(untuned.solver_error))
+        if found or (power > 1 and errors[-1] > STALLED * errors[-3]):
+            break
+    return NeededSetting(purpose, raised, setting, found, untuned.solver_error, untuned.frame_seconds)
+
+
+def _loaded(scene: Scene, load: str, size: float, kinematics: str = "nonlinear") -> Scene:
+    """Scene of the same springs under a load of a size."""
+    shared: dict[str, Any] = {
+        "definition": scene.definition,
+        "stiffness": scene.uniform_stiffness,
+        "kinematics": kinematics,
+        "sheet": scene.sheet,
+    }
+    if scene.definition.needs == "cases" and load != scene.load:
+        raise EngineError(f"definition '{scene.definition.name}' is fitted to load '{scene.load}' alone")
+    if isinstance(scene.statement, ShapeStatement):
+        return Scene(scene.shape, scene.grouped, scene.by_part, load, scale=size, **shared)
+    return Scene(scene.beam, scene.mesh, scene.material, load, size, **shared)
+
+
+def _band(runs: _Runs, load: str, factor: float, within: float) -> LoadBand:
+    """Band of a load: the engine at each size, with the factor."""
+    scene = runs.scene
+    unit, base, nothing = "N", scene.statement.size, (np.nan,) * len(SIZES)
+    try:
+        if isinstance(scene.statement, ShapeStatement):
+            unit = ""
+        elif load != scene.load:
+            known = _loaded(scene, load, 1.0, "linear").reference_values()
+            base = abs(runs.target / next(iter(known.values())))
+        sizes = tuple(float(share * base) for share in SIZES)
+        found = [runs.under(_loaded(scene, load, size), factor) for size in sizes]
+    except (ValueError, ReferenceNotConvergedError) as error:
+        return LoadBand(load, nothing, nothing, np.nan, within, np.nan, np.nan, str(error), unit)
+    errors = tuple(one.error if _rests(one) else np.nan for one in found)
+    why = next((one.message for one in found if not _rests(one)), "")
+    definition_error = found[SIZES.index(1.0)].definition_error
+    least, most = _range(np.array(sizes), np.array(errors), within)
+    return LoadBand(load, sizes, errors, definition_error, within, least, most, why, unit)
+
+
+def _range(sizes: np.ndarray, errors: np.ndarray, within: float) -> tuple[float, float]:
+    """Return the range of sizes, about the least error, whose interpolated error and its margin are within."""
+    bends = [
+        abs(np.polyfit(sizes[place : place + 3], errors[place : place + 3], 2)[0])
+        if np.isfinite(errors[place : place + 3]).all()
+        else np.nan
+        for place in range(len(sizes) - 2)
+    ]
+    fine, bounds = [], []
+    for place, width in enumerate(np.diff(sizes)):
+        bend = max((one for one in bends[max(place - 1, 0) : place + 1] if one == one), default=np.nan)
+        share = np.linspace(0, 1, FINE)
+        between = errors[place] * (1 - share) + errors[place + 1] * share
+        fine.append(sizes[place] + share * width)
+        bounds.append(np.abs(between) + 2 * bend * width**2 * share * (1 - share) + SHAKE)
+    size, kept = np.concatenate(fine), np.nan_to_num(np.concatenate(bounds), nan=np.inf) <= within
+    if not kept.any():
+        return np.nan, np.nan
+    start = int(np.argmin(np.where(kept, np.concatenate(bounds), np.inf)))
+    low, high = start, start
+    while low > 0 and kept[low - 1]:
+        low -= 1
+    while high < len(kept) - 1 and kept[high + 1]:
+        high += 1
+    return float(size[low]), float(size[high])

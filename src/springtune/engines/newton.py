@@ -1,0 +1,197 @@
+"""Newton (newton-physics) on the processor: springs, and triangles of a material, in four of its solvers.
+
+Numbers were read in the kernels of Newton 1.8; mu and lambda are Lame's constants of plane stress, h the thickness.
+Springs have our law in all solvers that have any. Triangles of VBD and of the semi-implicit solver have one law,
+
+    W = A_0 [mu h/2 (tr C - 2 J) + (lambda + mu) h/2 (J - 1)^2]
+
+but it is typed in two ways: ``tri_ke = mu h`` in both, ``tri_ka = lambda h`` in VBD and ``(lambda + mu) h`` in the
+other. At small strain it is St. Venant-Kirchhoff's, which `delingette` has; at a strain e displacements differ by
+some 2 e. Style3D has a stiffness of each direction and of shear, and no contraction across: a material of nu = 0.
+
+What is set besides, since Newton's defaults are others: gravity 0, no ground; radius of particles 0, so that they do
+not touch; damping and drag of triangles and springs 0; no largest velocity; VBD's colours by springs, too, which
+`ModelBuilder.color` does not see; contacts of Style3D off. Left as they are: Style3D multiplies velocities by 0.998 in
+each step, and takes 10 iterations of conjugate gradients in each of its iterations.
+
+Newton holds particles as a whole. A direction held singly is put back after each step, and the force that would have
+kept it there is added to the next one: at rest it is the support's reaction.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+from ..handover.net import SpringNet
+from ..handover.simulation import lame
+from .base import DASHPOT, SPRING, EngineError, Parameter, Session, Setting, engine
+
+FASTEST = 1e30
+"""Largest velocity [m/s]: none. By default Newton has 1e5."""
+
+SHEAR = Parameter("N/m", "mu h = E h / (2 (1 + nu))")
+VBD = {"ke": SPRING, "tri_ke": SHEAR, "tri_ka": Parameter("N/m", "lambda h = E h nu / (1 - nu^2)")}
+SEMI_IMPLICIT = {"ke": SPRING, "tri_ke": SHEAR, "tri_ka": Parameter("N/m", "(lambda + mu) h = E h / (2 (1 - nu))")}
+STYLE3D = {"tri_aniso_ke": Parameter("N/m", "(E h, E h, E h / 2) along, across, in shear; for nu = 0 alone")}
+
+
+def triangle_numbers(net: SpringNet, solver: str) -> dict[str, Any]:
+    """Return numbers to type for the triangles of a net; empty where it has springs alone."""
+    if not net.energies:
+        return {}
+    first, shear = lame(net, net.energies[0], "Newton")
+    if solver == "VBD":
+        return {"tri_ke": shear, "tri_ka": first}
+    if solver == "SemiImplicit":
+        return {"tri_ke": shear, "tri_ka": first + shear}
+    if first > 1e-6 * shear:
+        raise EngineError(
+            f"material: Poisson's ratio is {first / (first + 2 * shear):.3g}, and triangles of Newton's Style3D have "
+            "none; take a material of nu = 0, or engine newton-vbd"
+        )
+    return {"tri_aniso_ke": (2 * shear, 2 * shear, shear)}
+
+
+def colours(net: SpringNet) -> list[np.ndarray]:
+    """Return groups of particles that neither a spring nor a triangle joins."""
+    joined: list[set[int]] = [set() for _ in net.points]
+    for cells in (net.springs, *(one.cells for one in net.energies)):
+        for cell in cells.tolist():
+            for corner in cell:
+                joined[corner].update(cell)
+    chosen = np.full(len(net.points), -1)
+    for corner, others in enumerate(joined):
+        taken = {chosen[other] for other in others}
+        chosen[corner] = next(colour for colour in range(len(joined)) if colour not in taken)
+    return [np.flatnonzero(chosen == colour) for colour in range(chosen.max() + 1)]
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep Warp from printing its banner, compiled modules and times."""
+    import warp
+
+    before = warp.config.log_level, warp.ScopedTimer.enabled
+    warp.config.log_level, warp.ScopedTimer.enabled = warp.LOG_ERROR, False
+    try:
+        yield
+    finally:
+        warp.config.log_level, warp.ScopedTimer.enabled = before
+
+
+class _Session:
+    """A model of Newton, damped over mass."""
+
+    def __init__(self, net: SpringNet, setting: Setting, damping: float, solver: str) -> None:
+        with _quiet():
+            import newton
+
+            self.model = _model(net, solver)
+            made = getattr(newton.solvers, f"Solver{solver}")
+            if solver == "Style3D":
+                self.solver = made(self.model, config=made.Config(iterations=setting.iterations))
+                self.solver.collision = None
+            else:
+                self.solver = made(
+                    self.model, **({} if solver == "SemiImplicit" else {"iterations": setting.iterations})
+                )
+            self.now, self.next, self.control = self.model.state(), self.model.state(), self.model.control()
+        self.step, self.substeps = setting.step, setting.substeps
+        self.kept = np.float32(1 / (1 + damping * setting.step))
+        self.forces = np.column_stack([net.forces, np.zeros(len(net.points))])
+        self.rest = self.now.particle_q.numpy().copy()
+        self.guided = np.column_stack([net.held & ~net.held.all(axis=1)[:, None], np.zeros(len(net.points), bool)])
+        self.reacting = self.model.particle_mass.numpy()[np.nonzero(self.guided)[0]] / setting.step**2
+
+    def advance(self, frames: int) -> None:
+        """Take a number of frames."""
+        with _quiet():
+            for _ in range(frames * self.substeps):
+                self.now.particle_f.numpy()[:] = self.forces  # a view; the semi-implicit solver adds its own to them
+                self.solver.step(self.now, self.next, self.control, None, self.step)
+                self.now, self.next = self.next, self.now
+                places, velocities = self.now.particle_q.numpy(), self.now.particle_qd.numpy()
+                velocities *= self.kept
+                self.forces[self.guided] -= self.reacting * (places - self.rest)[self.guided]
+                places[self.guided], velocities[self.guided] = self.rest[self.guided], 0
+
+    def displacements(self) -> np.ndarray:
+        """Displacement of each particle [m]."""
+        return (self.now.particle_q.numpy() - self.rest)[:, :2].astype(float)
+
+
+def _model(net: SpringNet, solver: str) -> Any:
+    """Model of a net; particles without mass are held."""
+    import newton
+    from warp import vec3
+
+    assert net.masses is not None  # of a scene that moves
+    count = len(net.points)
+    builder = newton.ModelBuilder(gravity=(0.0, 0.0, 0.0))
+    if solver == "Style3D":
+        newton.solvers.SolverStyle3D.register_custom_attributes(builder)
+    masses = np.where(net.held.all(axis=1), 0, net.masses)
+    places = [vec3(x, y, 0.0) for x, y in net.points.tolist()]
+    builder.add_particles(places, [vec3(0.0)] * count, masses.tolist(), radius=[0.0] * count)
+    there = net.stiffness != 0
+    for (first, second), stiffness in zip(net.springs[there].tolist(), net.stiffness[there].tolist()):
+        builder.add_spring(first, second, ke=stiffness, kd=0.0, control=0.0)
+    builder.spring_rest_length = net.rest_lengths[there].tolist()
+    if net.energies:
+        cells = net.energies[0].cells
+        numbers = dict.fromkeys(("tri_ke", "tri_ka", "tri_kd", "tri_drag", "tri_lift"), 0.0)
+        numbers |= triangle_numbers(net, solver)
+        each = {name: [value] * len(cells) for name, value in numbers.items()}
+        own = {f"style3d:{name}": each.pop(name) for name in STYLE3D if name in each}
+        if own:  # its collision, though off, wants an edge: one without bending
+            first, second = map(int, cells[0, :2])
+            free = {"style3d:edge_rest_area": 1.0}
+            builder.add_edge(-1, -1, first, second, rest=0.0, edge_ke=0.0, edge_kd=0.0, custom_attributes=free)
+        builder.add_triangles(*cells.T.tolist(), custom_attributes=own, **each)
+    builder.set_coloring(colours(net))
+    builder.particle_max_velocity = FASTEST
+    model = builder.finalize(device="cpu")
+    model.particle_grid = None
+    return model
+
+
+def _declare(order: float, name: str, solver: str, summary: str, parameters: dict[str, Parameter], **own: Any) -> None:
+    def session(net: SpringNet, setting: Setting, damping: float) -> Session:
+        return _Session(net, setting, damping, solver)
+
+    def typed(net: SpringNet) -> dict[str, Any]:
+        return ({"ke": net.stiffness} if np.any(net.stiffness) else {}) | triangle_numbers(net, solver)
+
+    session.__doc__ = f"Newton's solver {solver}: {summary}"
+    declared = {"laws": ("biquadratic",), "source": "Newton 1.8, newton.solvers"} | own
+    engine(
+        name,
+        order=order,
+        program="Newton",
+        needs=("newton", "warp"),
+        extra="newton",
+        precisions=("float32",),
+        parameters=parameters,
+        typed=typed,
+        **declared,
+    )(session)
+
+
+IMPLICIT = {"implicit": True, "dampers": {"kd": DASHPOT}}
+
+_declare(150, "newton-vbd", "VBD", "implicit steps by vertex block descent", VBD, **IMPLICIT)
+_declare(151, "newton-xpbd", "XPBD", "springs alone, all at once in an iteration", {"ke": SPRING}, laws=(), **IMPLICIT)
+_declare(
+    152,
+    "newton-semi-implicit",
+    "SemiImplicit",
+    "explicit steps",
+    SEMI_IMPLICIT,
+    iterates=False,
+    dampers={"kd": DASHPOT},
+)
+_declare(
+    153, "newton-style3d", "Style3D", "implicit steps by projective dynamics", STYLE3D, springs=False, implicit=True
+)

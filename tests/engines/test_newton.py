@@ -1,0 +1,91 @@
+"""Newton's solvers: what is typed into each gives the equilibrium of its own law, at settings that converge."""
+
+import numpy as np
+import pytest
+from engine_scenes import TEN, scene
+
+import springtune as st
+from springtune.handover.newton import LAWS, membrane_energies
+from springtune.handover.simulation import simulate
+
+pytest.importorskip("newton")
+
+SETTINGS = {"newton-semi-implicit": (0.7, 1), "newton-style3d": (4, 5), "newton-vbd": (1, 10), "newton-xpbd": (0.7, 10)}
+"""Step over the largest one of explicit schemes, and iterations, that converge to 1e-3 at the least cost."""
+
+MAPPINGS = [(name, "delingette") for name in SETTINGS if name != "newton-xpbd"]
+MAPPINGS += [(name, "patch") for name in SETTINGS if name != "newton-style3d"]
+QUICK = ("sheet", "structured", "traction", "foam")
+PERIODS = 8
+"""Periods of the loaded mode in which critical damping brings it to rest."""
+
+
+def style3d_forces(net, moved):
+    """Forces on particles by Style3D's law: along, across and in shear."""
+    (terms,) = net.energies
+    along, across, shear = st.ENGINES["newton-style3d"].typed(net)["tri_aniso_ke"]
+    edges = np.diff(net.points[terms.cells], axis=1)
+    rest = np.stack([edges[:, 0], edges.sum(axis=1)], axis=2)
+    now = (net.points + moved)[terms.cells]
+    f = np.stack([now[:, 1] - now[:, 0], now[:, 2] - now[:, 0]], axis=2) @ np.linalg.inv(rest)
+    length = np.linalg.norm(f, axis=1, keepdims=True)
+    unit = f / length
+    cosine = np.sum(unit[..., 0] * unit[..., 1], axis=1)[:, None, None]
+    stress = unit * (length - 1) * [along, across] + shear * cosine * unit[..., ::-1]
+    areas = 0.5 * np.linalg.det(rest)[:, None, None]
+    pulls = -areas * stress @ np.swapaxes(np.linalg.inv(rest), 1, 2)
+    forces = np.zeros_like(net.points)
+    for corner, pull in ((1, pulls[..., 0]), (2, pulls[..., 1]), (0, -pulls.sum(axis=2))):
+        np.add.at(forces, terms.cells[:, corner], pull)
+    return forces
+
+
+def style3d_equilibrium(net, guess):
+    """Displacements in which forces of Style3D's law balance the load."""
+    free, size = ~net.held, np.abs(guess).max()
+    moved = guess.copy()
+
+    def unbalanced(values):
+        moved[free] = values
+        return (style3d_forces(net, moved) + net.forces)[free]
+
+    values, steps = guess[free], 1e-3 * size * np.eye(int(free.sum()))
+    for _ in range(10):
+        slopes = [(unbalanced(values + step) - unbalanced(values - step)) / (2e-3 * size) for step in steps]
+        change = np.linalg.solve(np.transpose(slopes), unbalanced(values))
+        values = values - change
+    assert np.abs(change).max() < 1e-8 * size
+    unbalanced(values)
+    return moved
+
+
+def equilibrium(one, engine):
+    """Displacements at rest by the law that an engine has for a scene."""
+    net = st.SpringNet.from_scene(one, errors=False)
+    if engine == "newton-style3d":
+        return style3d_equilibrium(net, one.solve().displacements)
+    return simulate(net, "Newton", LAWS, membrane_energies).displacements
+
+
+def off(engine, definition, case):
+    """Largest error of a displacement in an engine, over the largest displacement by its law."""
+    *parts, material = case
+    one = scene(*parts, "felt" if engine == "newton-style3d" else material, definition)
+    share, iterations = SETTINGS[engine]
+    motion = one.motion()
+    dt, period = share * motion.step_limit("symplectic-euler"), 2 * np.pi / motion.loaded_frequency
+    found = st.in_engine(one, engine, dt=dt, iterations=iterations, frames=round(PERIODS * period / dt))
+    exact = equilibrium(one, engine)
+    return np.abs(found.displacements - exact).max() / np.abs(exact).max()
+
+
+@pytest.mark.parametrize(("engine", "definition"), MAPPINGS)
+def test_typed_numbers_give_the_equilibrium_of_the_law(engine, definition):
+    assert off(engine, definition, QUICK) < 1e-3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", TEN, ids=" ".join)
+@pytest.mark.parametrize(("engine", "definition"), MAPPINGS)
+def test_typed_numbers_on_ten_scenes(engine, definition, case):
+    assert off(engine, definition, case) < 1e-3
