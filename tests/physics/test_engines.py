@@ -43,7 +43,7 @@ def relative(found):
 @pytest.mark.parametrize("case", some(CASES))
 @pytest.mark.parametrize(
     ("engine", "share", "iterations"),
-    [("projective", 1.0, 250), ("vbd", 10.0, 10), ("vbd-inertia", 1.0, 40), ("implicit-cg", 30.0, 25)],
+    [("projective", 0.1, 30), ("vbd", 10.0, 10), ("vbd-inertia", 1.0, 40), ("implicit-cg", 30.0, 25)],
 )
 def test_many_iterations_end_in_our_equilibrium(engine, share, iterations, case):
     """Relative error below 1e-6; the stiffest spring has `share` times the inertia of a step."""
@@ -217,7 +217,8 @@ def test_one_spring_is_exact_at_any_setting(engine, h, iterations):
 def test_stiffness_that_a_share_means(share, iterations):
     """((1 - s)^-n - 1) / (w h^2): the same share is any stiffness, and a rod in the end."""
     net, h = one_spring(), 0.01
-    session = ENGINES["pbd"].start(net, st.Setting(h, iterations=iterations), damping=30.0)
+    setting = st.Setting(h, iterations=iterations)
+    session = ENGINES["pbd"].start(net, setting, damping=30.0)
     session.shares[:] = share
     session.advance(5000)
     meant = ((1 - share) ** -iterations - 1) * net.masses[1] / h**2
