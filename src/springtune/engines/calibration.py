@@ -399,7 +399,7 @@ def fit_engine(
         factor,
         runs(factor) if found else min(runs.known.values(), key=lambda one: _distance(one, setting)),
         runs(1.0),
-        chosen.typed(net_of(scene, factor)) if found else {},
+        chosen.numbers(net_of(scene, factor), setting) if found else {},
         bands,
         needs,
         "; ".join(filter(None, (why, scene.objection))),

@@ -142,17 +142,19 @@ class _Session(Textbook):
         return found
 
 
-LAWS = ("area", "biquadratic")
+VERTEX_LAWS = ("area", "biquadratic")
 """Energies besides springs."""
 
 
-@engine("vbd", order=40, laws=LAWS, parameters=as_they_are(*LAWS), implicit=True, source="Chen 2024")
+@engine("vbd", order=40, laws=VERTEX_LAWS, parameters=as_they_are(*VERTEX_LAWS), implicit=True, source="Chen 2024")
 def adaptive(net: SpringNet, setting: Setting, damping: float) -> Session:
     """Vertex block descent from its paper's adaptive guess: at rest exact with any number of iterations."""
     return _Session(net, setting, damping, True)
 
 
-@engine("vbd-inertia", order=41, laws=LAWS, parameters=as_they_are(*LAWS), implicit=True, source="Chen 2024")
+@engine(
+    "vbd-inertia", order=41, laws=VERTEX_LAWS, parameters=as_they_are(*VERTEX_LAWS), implicit=True, source="Chen 2024"
+)
 def inertial(net: SpringNet, setting: Setting, damping: float) -> Session:
     """Vertex block descent from the inertial position."""
     return _Session(net, setting, damping, False)
