@@ -415,11 +415,7 @@ def fit_engine(
         factor,
         runs(factor) if found else min(runs.known.values(), key=lambda one: _distance(one, setting)),
         runs(1.0),
-<<<<<<< HEAD
         _typed(chosen, net_of(scene, factor), setting) if found else {},
-=======
-        chosen.numbers(net_of(scene, factor), setting) if found else {},
->>>>>>> h-txt
         bands,
         needs,
         "; ".join(filter(None, (why, scene.objection))),
