@@ -27,6 +27,9 @@ TABLES = {
 IN_ENGINES = "which-numbers.md"
 """Page that shows runs in engines, from the dataset of config/engines.yaml."""
 
+SETTING = ["substeps", "iterations"]
+"""Dimensions of a table of engines."""
+
 USUAL, GOOD = 10, 0.02
 """Iterations of a step in the tables of engines, and solver error that counts as converged."""
 
@@ -65,29 +68,34 @@ def in_engines(data: xr.Dataset) -> str:
 
 
 def _of_scene(data: xr.Dataset) -> str:
-    data = data.squeeze(["precision", "dt"]).dropna("substeps", subset=["solver_error"], how="all")
+    data = data.isel(substeps=(data.engine_status != 0).any([one for one in data.dims if one != "substeps"]).values)
     head = ["engine", "definition", *(f"{n} substep{'s' if n > 1 else ''}" for n in data.substeps.values)]
     head += ["converged from", "ms a frame"]
     rows = [head, ["---"] * 2 + ["---:"] * (len(head) - 2)]
+    without = [words(data).index(word) for word in ("not_requested", "absent", "refused", "failed")]
     for engine in data.engine.values:
         for definition in data.definition.values:
-            runs = data.sel(engine=engine, definition=definition)
-            if (runs.engine_status != 0).any() and set(np.unique(runs.engine_status)) - {0, _status(data, "refused")}:
-                rows.append([engine, f"`{definition}`", *_of_engine(runs)])
+            runs = data.sel(engine=engine, definition=definition).isel(dt=0)
+            run = ~runs.engine_status.isin(without)
+            if run.any():
+                rows.append(
+                    [engine, f"`{definition}`", *_of_engine(runs.isel(precision=int(np.argmax(run.any(SETTING).values))))]
+                )
     return "".join(f"| {' | '.join(row)} |\n" for row in rows)
 
 
-def _status(data: xr.Dataset, word: str) -> int:
-    return data.engine_status.attrs["flag_meanings"].split().index(word)
+def words(data: xr.Dataset) -> list[str]:
+    """How runs end, in order of the flags."""
+    found: list[str] = data.engine_status.attrs["flag_meanings"].split()
+    return found
 
 
 def _of_engine(runs: xr.Dataset) -> list[str]:
     """Cells of an engine: errors at `USUAL` iterations or its only ones, and the fastest that is converged."""
     tried = runs.iterations.values[(runs.engine_status != 0).any("substeps")]
     usual = runs.sel(iterations=USUAL if USUAL in tried else tried[0])
-    words = runs.engine_status.attrs["flag_meanings"].split()
     ends = zip(usual.solver_error.values, usual.engine_status.values)
-    cells = [_off(error) if np.isfinite(error) else words[status] for error, status in ends]
+    cells = [_off(error) if np.isfinite(error) else words(runs)[status] if status else "" for error, status in ends]
     good = runs.frame_seconds.where(abs(runs.solver_error) <= GOOD)
     if not good.notnull().any():
         return [*cells, "none tried", ""]
