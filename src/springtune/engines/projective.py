@@ -1,11 +1,11 @@
 """Projective dynamics: Liu, Bargteil, O'Brien and Kavan, Fast simulation of mass-spring systems, ACM TOG 32(6), 2013.
 
 An iteration has a local step, which turns each spring of rest length into its direction, and a global one, a linear
-system ``M / h^2 + L`` that is factorized once. L is the Laplacian of the stiffnesses: it resists as much across a spring
-as along it. Both steps together are ``x - (M / h^2 + L)^-1 g`` with g the gradient of the step's energy (Liu, Bouaziz
-and Kavan, Quasi-Newton methods for real-time simulation of hyperelastic materials, ACM TOG 36(3), 2017), which is how
-they are taken here. They begin at the inertial position. The energy falls in each iteration, fast where springs are
-stretched and slowly where they turn, as in bending.
+system ``M / h^2 + L`` that is factorized once. L is the Laplacian of the stiffnesses: it resists as much across a
+spring as along it. Both steps together are ``x - (M / h^2 + L)^-1 g`` with g the gradient of the step's energy (Liu,
+Bouaziz and Kavan, Quasi-Newton methods for real-time simulation of hyperelastic materials, ACM TOG 36(3), 2017), which
+is how they are taken here. They begin at the inertial position. The energy falls in each iteration, fast where springs
+are stretched and slowly where they turn, as in bending.
 """
 
 import numpy as np
@@ -51,9 +51,8 @@ class _Session(Textbook):
         rows, columns = np.concatenate([first, second]), np.concatenate([second, first])
         links = coo_array((np.tile(self.stiffness, 2), (rows, columns)), shape=(len(held), len(held)))
         free = diags_array((~held).astype(self.kind))
-        matrix = free @ (diags_array(self.inertia + links.sum(axis=1)) - links) @ free + diags_array(
-            1 - free.diagonal()
-        )
+        whole = diags_array(self.inertia + links.sum(axis=1)) - links
+        matrix = free @ whole @ free + diags_array(1 - free.diagonal())
         return splu(
             csc_array(matrix, dtype=self.kind),
             permc_spec="MMD_AT_PLUS_A",
