@@ -101,12 +101,17 @@ def _of_engine(runs: xr.Dataset) -> list[str]:
         return [*cells, "none tried", ""]
     best = good.isel(good.argmin(...))
     setting = f"{best.substeps.item()} x {best.iterations.item()}" if len(tried) > 1 else f"{best.substeps.item()}"
-    return [*cells, setting, f"{1e3 * best.item():.2g}"]
+    return [*cells, setting, _short(1e3 * best.item())]
+
+
+def _short(number: float) -> str:
+    """Two digits, and no exponent."""
+    return f"{float(f'{number:.2g}'):g}"
 
 
 def _off(error: float) -> str:
     """Error of a displacement, or how many times it is too large."""
-    return f"x {1 + error:.2g}" if error >= 1 else f"{100 * error:+.1f} %".replace("-", "−")
+    return f"x {_short(1 + error)}" if error >= 1 else f"{100 * error:+.1f} %".replace("-", "−")
 
 
 def benchmark(path: Path) -> xr.Dataset:
