@@ -63,7 +63,7 @@ def shorten(tables: str, file: str) -> str:
 
 
 def in_engines(data: xr.Dataset) -> str:
-    """Table of each scene: solver error over substeps, and the cheapest setting that is converged."""
+    """Table of each scene: solver error over substeps, and the setting of least work that is converged."""
     return "\n".join(f"**{scene.item()}**\n\n{_of_scene(data.sel(scene=scene))}" for scene in data.scene)
 
 
@@ -78,9 +78,8 @@ def _of_scene(data: xr.Dataset) -> str:
             runs = data.sel(engine=engine, definition=definition).isel(dt=0)
             run = ~runs.engine_status.isin(without)
             if run.any():
-                rows.append(
-                    [engine, f"`{definition}`", *_of_engine(runs.isel(precision=int(np.argmax(run.any(SETTING).values))))]
-                )
+                own = runs.isel(precision=int(np.argmax(run.any(SETTING).values)))
+                rows.append([engine, f"`{definition}`", *_of_engine(own)])
     return "".join(f"| {' | '.join(row)} |\n" for row in rows)
 
 
@@ -91,15 +90,16 @@ def words(data: xr.Dataset) -> list[str]:
 
 
 def _of_engine(runs: xr.Dataset) -> list[str]:
-    """Cells of an engine: errors at `USUAL` iterations or its only ones, and the fastest that is converged."""
+    """Cells of an engine: errors at `USUAL` iterations or its only ones, and the setting of least work that is converged."""
     tried = runs.iterations.values[(runs.engine_status != 0).any("substeps")]
     usual = runs.sel(iterations=USUAL if USUAL in tried else tried[0])
     ends = zip(usual.solver_error.values, usual.engine_status.values)
     cells = [_off(error) if np.isfinite(error) else words(runs)[status] if status else "" for error, status in ends]
-    good = runs.frame_seconds.where(abs(runs.solver_error) <= GOOD)
+    work = (runs.substeps * runs.iterations).transpose(*SETTING)
+    good = work.where(abs(runs.solver_error.transpose(*SETTING)) <= GOOD)
     if not good.notnull().any():
         return [*cells, "none tried", ""]
-    best = good.isel(good.argmin(...))
+    best = runs.frame_seconds.transpose(*SETTING).isel(good.argmin(...))
     setting = f"{best.substeps.item()} x {best.iterations.item()}" if len(tried) > 1 else f"{best.substeps.item()}"
     return [*cells, setting, _short(1e3 * best.item())]
 
