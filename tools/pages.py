@@ -90,7 +90,7 @@ def words(data: xr.Dataset) -> list[str]:
 
 
 def _of_engine(runs: xr.Dataset) -> list[str]:
-    """Cells of an engine: errors at `USUAL` iterations or its only ones, and the setting of least work that is converged."""
+    """Cells of an engine: errors at `USUAL` iterations or its only ones, and the least setting that is converged."""
     tried = runs.iterations.values[(runs.engine_status != 0).any("substeps")]
     usual = runs.sel(iterations=USUAL if USUAL in tried else tried[0])
     ends = zip(usual.solver_error.values, usual.engine_status.values)
@@ -111,7 +111,7 @@ def _short(number: float) -> str:
 
 def _off(error: float) -> str:
     """Error of a displacement, or how many times it is too large."""
-    return f"x {_short(1 + error)}" if error >= 1 else f"{100 * error:+.1f} %".replace("-", "−")
+    return f"x {_short(1 + error)}" if error >= 1 else f"{round(100 * error, 1) + 0.0:+.1f} %".replace("-", "−")
 
 
 def benchmark(path: Path) -> xr.Dataset:
