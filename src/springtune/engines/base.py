@@ -191,7 +191,7 @@ class Engine(Declared):
     of_setting : bool
         Whether these numbers follow the setting: `typed` takes (net, setting).
     measured : str
-        Largest difference from the equilibrium of its own law, over the displacement, at converged settings.
+        Bound of the difference from the equilibrium of its own law, over the displacement, at converged settings.
     source : str
         Where it is described.
 

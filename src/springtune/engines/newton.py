@@ -164,7 +164,8 @@ def _declare(order: float, name: str, solver: str, summary: str, parameters: dic
         return ({"ke": net.stiffness} if np.any(net.stiffness) else {}) | triangle_numbers(net, solver)
 
     session.__doc__ = f"Newton's solver {solver}: {summary}"
-    declared = {"laws": ("biquadratic",), "source": "Newton 1.8, newton.solvers"} | own
+    measured = "1e-3, ten scenes, by the law that it has"
+    declared = {"laws": ("biquadratic",), "measured": measured, "source": "Newton 1.8, newton.solvers"} | own
     engine(
         name,
         order=order,

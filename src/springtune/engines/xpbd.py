@@ -178,7 +178,7 @@ class _Session(Textbook):
     },
     typed=compliances,
     implicit=True,
-    measured="1e-6 springs, 1e-4 energies, at 9600 steps a second; it falls as the step squared",
+    measured="1e-6, twenty scenes; it falls as the step squared",
     source="Macklin 2016",
 )
 def session(net: SpringNet, setting: Setting, damping: float) -> Session:

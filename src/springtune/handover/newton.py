@@ -18,7 +18,7 @@ from ..mechanics.energies import Energy, StableNeoHookeEnergy
 from .simulation import Simulation, about, lame, simulate
 from .terms import Net
 
-OF_TRIANGLES = ("biquadratic",)
+LAWS = ("biquadratic",)
 """Energies that triangles of Newton stand for."""
 
 ITERATIONS = 10
@@ -158,7 +158,7 @@ IMPORTS = (("import", "newton"), ("import", "numpy as np"), ("import", "warp as 
 
 def _simulated(net: Net) -> Simulation:
     """Simulation by Newton's law; ValueError for what Newton lacks."""
-    return simulate(net, "Newton", OF_TRIANGLES, membrane_energies)
+    return simulate(net, "Newton", LAWS, membrane_energies)
 
 
 def _step(simulation: Simulation) -> str:
