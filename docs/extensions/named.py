@@ -19,10 +19,20 @@ def _loads() -> list[tuple[str, ...]]:
     return rows
 
 
+def _engines() -> list[tuple[str, ...]]:
+    rows = []
+    for name, one in st.ENGINES.items():
+        for place, (number, typed) in enumerate(one.parameters.items()):
+            measured = one.measured or "not yet" if place == 0 else ""
+            rows.append((name, f"``{number}``", typed.unit, f"``{typed.formula}``", measured))
+    return rows
+
+
 TABLES: dict[str, tuple[tuple[str, ...], Callable[[], list[tuple[str, ...]]]]] = {
     "DEFINITIONS": (("definition", "springs"), lambda: [(one.name, one.summary) for one in st.DEFINITIONS.values()]),
     "MESH_TYPES": (("mesh type", "mesh"), lambda: [(one.name, one.summary) for one in st.MESH_TYPES.values()]),
     "LOADS": (("load", "kind", "force"), _loads),
+    "ENGINES": (("engine", "you type", "unit", "formula", "measured"), _engines),
 }
 """Headings and rows by mapping."""
 

@@ -5,7 +5,11 @@ import springtune as st
 BODIES = {"strip": ("200 mm", "40 mm"), "sheet": ("300 mm", "200 mm"), "slender": ("120 mm", "12 mm")}
 SIZES = {"strip": "13 mm", "sheet": "50 mm", "slender": "6 mm"}
 LOADS = ("traction", "bending", "shear", "compression")
-MATERIALS = {"rubber": ("1 MPa", 0.45, "1100 kg/m^3"), "foam": ("0.2 MPa", 0.1, "80 kg/m^3"), "felt": ("0.2 MPa", 0.0, "80 kg/m^3")}
+MATERIALS = {
+    "rubber": ("1 MPa", 0.45, "1100 kg/m^3"),
+    "foam": ("0.2 MPa", 0.1, "80 kg/m^3"),
+    "felt": ("0.2 MPa", 0.0, "80 kg/m^3"),
+}
 SHARE = {"traction": 0.01, "compression": -0.002, "shear": 0.005, "bending": 0.02}
 """Displacement of the loaded side over the length of the body."""
 
@@ -23,7 +27,9 @@ def scene(body, mesh_type, load, material, definition):
 CASES = [
     (body, mesh_type, load, material)
     for number, (body, load) in enumerate((body, load) for body in BODIES for load in LOADS)
-    for mesh_type, material in zip(("structured", "free"), ("rubber", "foam") if number % 2 else ("foam", "rubber"))
+    for mesh_type, material in zip(
+        ("structured", "free"), ("rubber", "foam") if number // 2 % 2 else ("foam", "rubber")
+    )
 ][:20]
 """Twenty cases: body, mesh type, load, material."""
 

@@ -21,6 +21,7 @@ import springtune
 from counting import counted
 from springtune.cli import COMMANDS, Commands, Shown, main
 from springtune.cli.recommendation import beam_subject, prediction_json, prediction_text
+from springtune.engines import budget
 from springtune.handover.formats import ENDINGS
 from springtune.mesh import MESH_TYPES, Mesh, braced, write_mesh
 from springtune.mesh.types import MeshType
@@ -532,6 +533,62 @@ class TestPredictAMesh:
         result = run("predict", *self.STEEL, *arguments)
         assert result.exit_code == 2 and message in result.stderr and len(result.stderr.splitlines()) == 1
         assert [path.name for path in tmp_path.iterdir()] == ["own.msh"]
+
+    @pytest.mark.parametrize(("arguments", "message"), refused_calls("predict, an engine"))
+    def test_wrong_options_of_engines_are_refused_in_a_line(self, arguments, message):
+        result = run("predict", "--beam", "200x40", "--material", "rubber", *arguments)
+        assert result.exit_code == 2 and message in result.stderr and len(result.stderr.splitlines()) == 1
+
+    def test_an_engine_is_calibrated_to(self, tmp_path):
+        """Text, JSON and the springs that are written say the same."""
+        asked = [
+            *("--engine", "xpbd", "--dt", "1/60", "--substeps", "20", "--beam", "200x40", "--size", "20 mm"),
+            *("--material", "rubber", "--density", "1000 kg/m^3", "--load", "traction", "--force", "0.2 N"),
+            *("--loads", "shear", "--definition", "patch"),
+        ]
+        text, target = run("predict", *asked), tmp_path / "net.json"
+        assert text.exit_code == 0, text.output
+        found = json.loads(run("predict", *asked, "--json", "--write", target).stdout)
+        lines = words(text.stdout)
+        assert lines[1] == "engine xpbd: dt 1/60 s, 20 substeps, 10 iterations, float64"
+        assert lines[3] == f"{found['factor']:.5g} times the stiffness of the definition:"
+        assert lines[5] == f"compliance {found['typed']['compliance']['value']} m/N 1 / k of a spring"
+        assert [one["load"] for one in found["loads"]] == ["traction", "shear"] and abs(found["error"]) < 2e-3
+        assert len(found["loads"][0]["sizes"]) == 4 and found["loads"][1]["least"] is None
+        written = json.loads(target.read_text())
+        least, most = map(float, found["typed"]["compliance"]["value"].split(" to "))
+        assert written["header"]["calibrated"]["factor"] == pytest.approx(found["factor"])
+        assert 1 / max(written["stiffness"]) == pytest.approx(least, rel=1e-4)
+        assert 1 / min(written["stiffness"]) == pytest.approx(most, rel=1e-4)
+
+    def test_a_setting_without_a_factor_writes_nothing(self, tmp_path):
+        asked = [
+            *("--engine", "xpbd", "--beam", "200x40", "--size", "20 mm", "--material", "rubber", "--force", "0.2 N"),
+            *("--density", "1000 kg/m^3", "--load", "traction", "--definition", "lattice"),
+        ]
+        result = run("predict", *asked, "--write", tmp_path / "net.csv")
+        assert "There is no factor: no stiffness reaches 0.993572 mm by finite elements: " in result.stdout
+        assert result.exit_code == 1 and not [*tmp_path.iterdir()]
+        assert result.stderr.startswith("--write: there is no factor, so nothing is written: no stiffness reaches")
+
+    def test_a_budget_is_searched(self, monkeypatch, tmp_path):
+        """In a frame's time by a clock that stands still."""
+
+        def measured(engine, net, start):
+            return lambda net, setting: 1e-7 * setting.substeps * setting.iterations * len(net.springs)
+
+        monkeypatch.setattr(budget, "_measured", measured)
+        asked = [
+            *("--engine", "xpbd", "--budget", "0.2 ms", "--beam", "200x40", "--mesh", "right", "--material", "rubber"),
+            *("--density", "1000 kg/m^3", "--load", "traction", "--force", "0.2 N", "--loads", "traction"),
+        ]
+        lines = words(run("predict", *asked, "--write", tmp_path / "net.csv").stdout)
+        found = json.loads(run("predict", *asked, "--json").stdout)
+        assert lines[0] == f"engine xpbd, at most 0.2 ms a frame: {len(found['tried'])} choices were tried"
+        assert all(one["frame_seconds"] <= 2e-4 for one in found["tried"])
+        chosen = found["tried"][found["chosen"]]
+        assert lines[lines.index("chosen, the least error at worst:") + 1].startswith(f"200x40 mm, {chosen['mesh']}: ")
+        assert chosen["worst"] < 2e-3 and found["unbeaten"] and (tmp_path / "net.csv").exists()
 
     @pytest.mark.parametrize("command", ["predict", "springs"])
     def test_help_has_the_ending_of_every_format(self, command):

@@ -190,6 +190,8 @@ class Engine(Declared):
         calls it.
     of_setting : bool
         Whether these numbers follow the setting: `typed` takes (net, setting).
+    measured : str
+        Largest difference from the equilibrium of its own law, over the displacement, at converged settings.
     source : str
         Where it is described.
 
@@ -225,6 +227,7 @@ class Engine(Declared):
     implicit: bool = False
     typed: Callable[..., dict[str, Any]] = field(default_factory=lambda: typed_springs)
     of_setting: bool = False
+    measured: str = ""
     source: str = ""
 
     @property

@@ -1,21 +1,26 @@
 """Newton (newton-physics) on the processor: springs, and triangles of a material, in four of its solvers.
 
-Numbers were read in the kernels of Newton 1.8; mu and lambda are Lame's constants of plane stress, h the thickness.
-Springs have our law in all solvers that have any. Triangles of VBD and of the semi-implicit solver have one law,
+All formulas are from the kernels of Newton 1.8. mu and lambda are Lame's constants of plane stress, h is the thickness.
+
+Springs follow Hooke's law in VBD, XPBD and the semi-implicit solver. XPBD corrects all springs at once, so that it
+diverges above the largest step of explicit schemes, at any number of iterations; it resets its multipliers in each
+step. It has no triangles, and ignores springs of negative stiffness.
+
+Triangles of VBD and of the semi-implicit solver have one law, which is typed in two ways:
 
     W = A_0 [mu h/2 (tr C - 2 J) + (lambda + mu) h/2 (J - 1)^2]
 
-but it is typed in two ways: ``tri_ke = mu h`` in both, ``tri_ka = lambda h`` in VBD and ``(lambda + mu) h`` in the
-other. At small strain it is St. Venant-Kirchhoff's, which `delingette` has; at a strain e displacements differ by
-some 2 e. Style3D has a stiffness of each direction and of shear, and no contraction across: a material of nu = 0.
+``tri_ke = mu h`` in both, but ``tri_ka = lambda h`` in VBD and ``(lambda + mu) h`` in the semi-implicit one. At small
+strain it is St. Venant-Kirchhoff's law, which `delingette` has; at a strain e displacements differ by some 2 e. Style3D
+has stiffnesses along, across and in shear, and no contraction across: a material of nu = 0. It has no springs.
 
-What is set besides, since Newton's defaults are others: gravity 0, no ground; radius of particles 0, so that they do
-not touch; damping and drag of triangles and springs 0; no largest velocity; VBD's colours by springs, too, which
-`ModelBuilder.color` does not see; contacts of Style3D off. Left as they are: Style3D multiplies velocities by 0.998 in
-each step, and takes 10 iterations of conjugate gradients in each of its iterations.
+What is set besides, because Newton's defaults differ: gravity 0 and no ground; radius of particles 0, so that they do
+not touch; ``tri_kd`` (10 by default) and ``kd`` 0; no limit of velocities (1e5 m/s); contacts of Style3D off; VBD's
+colours by springs, too, which `ModelBuilder.color` does not see. Left as they are: Style3D scales velocities by 0.998
+in each step, and takes 10 iterations of conjugate gradients in each of its iterations.
 
-Newton holds particles as a whole. A direction held singly is put back after each step, and the force that would have
-kept it there is added to the next one: at rest it is the support's reaction.
+Newton holds particles as a whole. A direction held singly is put back after each step. The force that would have kept
+it there is added to the next step: at rest it is the support's reaction.
 """
 
 from collections.abc import Iterator
@@ -25,7 +30,7 @@ from typing import Any
 import numpy as np
 
 from ..handover.net import SpringNet
-from ..handover.simulation import lame
+from ..handover.newton import colours, membrane
 from .base import DASHPOT, SPRING, EngineError, Parameter, Session, Setting, engine
 
 FASTEST = 1e30
@@ -41,7 +46,7 @@ def triangle_numbers(net: SpringNet, solver: str) -> dict[str, Any]:
     """Return numbers to type for the triangles of a net; empty where it has springs alone."""
     if not net.energies:
         return {}
-    first, shear = lame(net, net.energies[0], "Newton")
+    shear, first = membrane(net)
     if solver == "VBD":
         return {"tri_ke": shear, "tri_ka": first}
     if solver == "SemiImplicit":
@@ -52,20 +57,6 @@ def triangle_numbers(net: SpringNet, solver: str) -> dict[str, Any]:
             "none; take a material of nu = 0, or engine newton-vbd"
         )
     return {"tri_aniso_ke": (2 * shear, 2 * shear, shear)}
-
-
-def colours(net: SpringNet) -> list[np.ndarray]:
-    """Return groups of particles that neither a spring nor a triangle joins."""
-    joined: list[set[int]] = [set() for _ in net.points]
-    for cells in (net.springs, *(one.cells for one in net.energies)):
-        for cell in cells.tolist():
-            for corner in cell:
-                joined[corner].update(cell)
-    chosen = np.full(len(net.points), -1)
-    for corner, others in enumerate(joined):
-        taken = {chosen[other] for other in others}
-        chosen[corner] = next(colour for colour in range(len(joined)) if colour not in taken)
-    return [np.flatnonzero(chosen == colour) for colour in range(chosen.max() + 1)]
 
 
 @contextmanager
@@ -85,6 +76,11 @@ class _Session:
     """A model of Newton, damped over mass."""
 
     def __init__(self, net: SpringNet, setting: Setting, damping: float, solver: str) -> None:
+        if solver == "XPBD" and np.any(net.stiffness < 0):
+            raise EngineError(
+                f"definition '{net.header['definition']}': has springs of negative stiffness, which Newton's XPBD "
+                "leaves out; take 'patch' or 'lattice', whose springs all pull, or engine newton-vbd"
+            )
         with _quiet():
             import newton
 
@@ -145,11 +141,14 @@ def _model(net: SpringNet, solver: str) -> Any:
         numbers |= triangle_numbers(net, solver)
         each = {name: [value] * len(cells) for name, value in numbers.items()}
         own = {f"style3d:{name}": each.pop(name) for name in STYLE3D if name in each}
-        if own:  # its collision, though off, wants an edge: one without bending
+        builder.add_triangles(*cells.T.tolist(), custom_attributes=own, **each)
+        if own:
+            edges = net.points[cells[:, 1:]] - net.points[cells[:, :1]]
+            builder.tri_poses = np.linalg.inv(np.swapaxes(edges, 1, 2)).tolist()  # along and across are x and y
+            # The collision of Style3D, though off, wants an edge: one without bending.
             first, second = map(int, cells[0, :2])
             free = {"style3d:edge_rest_area": 1.0}
             builder.add_edge(-1, -1, first, second, rest=0.0, edge_ke=0.0, edge_kd=0.0, custom_attributes=free)
-        builder.add_triangles(*cells.T.tolist(), custom_attributes=own, **each)
     builder.set_coloring(colours(net))
     builder.particle_max_velocity = FASTEST
     model = builder.finalize(device="cpu")
@@ -179,10 +178,18 @@ def _declare(order: float, name: str, solver: str, summary: str, parameters: dic
     )(session)
 
 
-IMPLICIT = {"implicit": True, "dampers": {"kd": DASHPOT}}
+IMPLICIT_WITH_KD = {"implicit": True, "dampers": {"kd": DASHPOT}}
 
-_declare(150, "newton-vbd", "VBD", "implicit steps by vertex block descent", VBD, **IMPLICIT)
-_declare(151, "newton-xpbd", "XPBD", "springs alone, all at once in an iteration", {"ke": SPRING}, laws=(), **IMPLICIT)
+_declare(150, "newton-vbd", "VBD", "implicit steps by vertex block descent", VBD, **IMPLICIT_WITH_KD)
+_declare(
+    151,
+    "newton-xpbd",
+    "XPBD",
+    "springs alone, all at once in an iteration",
+    {"ke": SPRING},
+    laws=(),
+    **IMPLICIT_WITH_KD,
+)
 _declare(
     152,
     "newton-semi-implicit",

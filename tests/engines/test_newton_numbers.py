@@ -1,0 +1,79 @@
+"""What is typed into Newton, and what it refuses; none of it needs Newton."""
+
+import numpy as np
+import pytest
+
+import springtune as st
+from springtune.engines import base
+
+from engine_scenes import scene
+
+BEAM = st.Beam("80 mm", "40 mm", thickness="2 mm")
+E, NU, H = 1e6, 0.3, 2e-3
+SOLVERS = ("newton-vbd", "newton-xpbd", "newton-semi-implicit", "newton-style3d")
+
+
+def net(definition="delingette", nu=NU):
+    rubber = st.Material(E, nu, density=1000.0)
+    one = st.Scene(BEAM, st.make_mesh(BEAM, "right", "20 mm"), rubber, "traction", "0.2 N", definition=definition)
+    return st.SpringNet.from_scene(one, errors=False)
+
+
+def test_triangles_of_vbd_and_of_the_semi_implicit_solver_have_one_law_but_other_numbers():
+    shear, first = E * H / (2 * (1 + NU)), E * H * NU / (1 - NU**2)
+    assert st.ENGINES["newton-vbd"].typed(net()) == pytest.approx({"tri_ke": shear, "tri_ka": first})
+    typed = st.ENGINES["newton-semi-implicit"].typed(net())
+    assert typed == pytest.approx({"tri_ke": shear, "tri_ka": first + shear})
+    assert typed["tri_ka"] == pytest.approx(E * H / (2 * (1 - NU)))  # as `parameters` says
+
+
+def test_style3d_is_a_material_without_contraction():
+    typed = st.ENGINES["newton-style3d"].typed(net(nu=0.0))
+    assert typed["tri_aniso_ke"] == pytest.approx((E * H, E * H, E * H / 2))
+    with pytest.raises(
+        st.EngineError, match=r"Poisson's ratio is 0\.3, .*Style3D have none; take a material of nu = 0"
+    ):
+        st.ENGINES["newton-style3d"].typed(net())
+
+
+@pytest.mark.parametrize(
+    "engine, definition, lacks",
+    [("newton-xpbd", "delingette", "squared lengths"), ("newton-style3d", "patch", "springs")],
+)
+def test_a_solver_says_what_it_lacks(engine, definition, lacks):
+    with pytest.raises(st.EngineError, match=rf"engine '{engine}' has no .*{lacks}.*newton-vbd"):
+        st.ENGINES[engine].check(st.Setting(), net(definition))
+
+
+def test_xpbd_refuses_springs_that_it_leaves_out():
+    given = net("patch")
+    given.stiffness[0] *= -1
+    with pytest.raises(st.EngineError, match="negative stiffness, which Newton's XPBD leaves out"):
+        st.ENGINES["newton-xpbd"].function(given, st.Setting(), 0.0)
+
+
+@pytest.mark.parametrize("engine", SOLVERS)
+def test_an_absent_newton_is_refused_by_name_with_its_command(engine, monkeypatch):
+    monkeypatch.setattr(base, "find_spec", lambda name: None)
+    definition = "delingette" if engine == "newton-style3d" else "patch"
+    with pytest.raises(
+        base.EngineAbsentError, match=rf"engine '{engine}' needs newton and warp; .*pip install .*\[newton\]"
+    ):
+        st.in_engine(scene("sheet", "free", "traction", "felt", definition), engine)
+
+
+@pytest.mark.parametrize("engine", SOLVERS)
+def test_double_precision_is_refused(engine):
+    with pytest.raises(st.EngineError, match=f"'float64' is unknown to engine '{engine}'; give one of float32"):
+        st.ENGINES[engine].check(st.Setting(precision="float64"))
+
+
+def test_a_mixed_sheet_is_no_material_of_newton():
+    """Triangles of one law in Newton have one material."""
+    given = net()
+    values = {name: one.copy() for name, one in given.energies[0].values.items()}
+    values["tensile"][0] *= 2
+    given.energies[0].values.update(values)
+    with pytest.raises(ValueError, match="those of no material, and Newton has the law of a material alone"):
+        st.ENGINES["newton-vbd"].typed(given)
+    assert np.all(values["tensile"] > 0)
