@@ -24,7 +24,7 @@ LAWS = ("biquadratic",)
 ITERATIONS = 10
 """Iterations in which VBD converges in a step that is stable in explicit schemes."""
 
-LONG, LONGER = 300, (3.0, 60)
+SLOW, PATIENT = 300, (3.0, 60)
 """Loaded period over the largest explicit step above which a step is three times that one, with more iterations.
 
 In single precision, what is left of h^2 f / m below the last place of a position is lost in each step.
@@ -171,8 +171,8 @@ def _simulated(net: Net) -> Simulation:
 def _pace(simulation: Simulation) -> tuple[float, int]:
     """Step of a file [s], and iterations in which VBD converges in it."""
     loaded, largest = simulation.loaded_frequency, simulation.largest_step
-    if loaded and 2 * np.pi / loaded > LONG * largest:
-        return LONGER[0] * largest, LONGER[1]
+    if loaded and 2 * np.pi / loaded > SLOW * largest:
+        return PATIENT[0] * largest, PATIENT[1]
     return simulation.step, ITERATIONS
 
 
