@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import springtune as st
-from springtune.engines.calibration import SIZES, _range
+from springtune.engines.calibration import SIZES, range_within
 from springtune.handover.simulation import simulate
 
 import engine_scenes
@@ -164,15 +164,15 @@ def test_a_band_holds_between_its_sizes():
     for number in range(200):
         random = np.random.default_rng(number)
         bend = np.polynomial.Polynomial(random.normal(0, (0.03, 0.03, 0.02)))
-        low, high = _range(sizes, bend(sizes), 0.05)
+        low, high = range_within(sizes, bend(sizes), 0.05)
         if low == low:
             assert np.abs(bend(np.linspace(low, high, 100))).max() <= 0.05
 
 
 def test_nothing_is_said_beside_what_does_not_rest():
-    assert _range(np.array(SIZES), np.array([0.0, 0.0, 0.0, np.nan]), 0.05) == (0.25, 1.0)
-    assert np.isnan(_range(np.array(SIZES), np.array([0.0, np.nan, 0.0, 0.0]), 0.05)).all()
-    assert np.isnan(_range(np.array(SIZES), np.array([0.2, 0.2, 0.2, 0.2]), 0.05)).all()
+    assert range_within(np.array(SIZES), np.array([0.0, 0.0, 0.0, np.nan]), 0.05) == (0.25, 1.0)
+    assert np.isnan(range_within(np.array(SIZES), np.array([0.0, np.nan, 0.0, 0.0]), 0.05)).all()
+    assert np.isnan(range_within(np.array(SIZES), np.array([0.2, 0.2, 0.2, 0.2]), 0.05)).all()
 
 
 def test_a_shape_is_calibrated_under_its_load_cases():

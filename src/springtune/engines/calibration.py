@@ -550,11 +550,11 @@ def _band(runs: _Runs, load: str, factor: float, within: float) -> LoadBand:
     errors = tuple(one.error if _rests(one) else np.nan for one in found)
     why = next((one.message for one in found if not _rests(one)), "")
     definition_error = found[SIZES.index(1.0)].definition_error
-    least, most = _range(np.array(sizes), np.array(errors), within)
+    least, most = range_within(np.array(sizes), np.array(errors), within)
     return LoadBand(load, sizes, errors, definition_error, within, least, most, why, unit)
 
 
-def _range(sizes: np.ndarray, errors: np.ndarray, within: float) -> tuple[float, float]:
+def range_within(sizes: np.ndarray, errors: np.ndarray, within: float) -> tuple[float, float]:
     """Return the range of sizes, about the least error, whose interpolated error and its margin are within."""
     bends = [
         abs(np.polyfit(sizes[place : place + 3], errors[place : place + 3], 2)[0])

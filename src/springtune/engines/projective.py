@@ -42,11 +42,15 @@ class _Session(Textbook):
     def __init__(self, net: SpringNet, setting: Setting, damping: float) -> None:
         pulling(net, "the global step needs a positive one")
         super().__init__(net, setting, damping)
-        self.factors = [self._factor(net.held[:, axis]) for axis in range(2)]
-        self.descent = np.empty_like(self.x)
+        alike = np.array_equal(net.held[:, 0], net.held[:, 1])
+        self.systems = [
+            (self._factor(net.held[:, axes.start]), axes)
+            for axes in ([np.s_[0:2]] if alike else [np.s_[0:1], np.s_[1:2]])
+        ]
+        self.descent = np.empty_like(self.x, order="F")  # as the factors take it
 
     def _factor(self, held: np.ndarray) -> SuperLU:
-        """Factorized system of one direction, a unit matrix where particles are held."""
+        """Factorized system of a direction, a unit matrix where particles are held."""
         first, second = self.springs.T
         rows, columns = np.concatenate([first, second]), np.concatenate([second, first])
         links = coo_array((np.tile(self.stiffness, 2), (rows, columns)), shape=(len(held), len(held)))
@@ -66,8 +70,8 @@ class _Session(Textbook):
         of_springs = self.springs, self.lengths, self.stiffness
         for _ in range(self.iterations):
             _descent(x, y, self.inertia, self.weights, *of_springs, self.descent)
-            for axis, factor in enumerate(self.factors):
-                x[:, axis] += factor.solve(self.descent[:, axis])
+            for factor, axes in self.systems:
+                x[:, axes] += factor.solve(self.descent[:, axes])
         return x
 
 

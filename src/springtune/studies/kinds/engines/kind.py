@@ -66,7 +66,7 @@ def _read_frame(value: str) -> float:
 
 _WHOLE = number("a whole number from 1 to 100000, such as 10", 1, 100_000, whole=True)
 Count = Annotated[int, _WHOLE]
-Distance = Annotated[float, number("a number up to 0.01, such as 1e-4", 0, 0.01, above=True)]
+Distance = Annotated[float, number("a number up to 0.01, such as 0.0001", 0, 0.01, above=True)]
 EngineName = Annotated[str, Scalar(str, {"type": "string", "examples": ["xpbd"]}, "an engine such as 'xpbd'")]
 FrameTime = Annotated[
     float, Scalar(_read_frame, {"type": "string", "examples": ["1/60 s"]}, "a time such as '1/60 s' or '5 ms'")
