@@ -207,3 +207,18 @@ def test_a_solver_written_from_the_file_alone_comes_to_our_equilibrium(case, tmp
     found = run(net, steps=200, sweeps=4, share=0.5)
     # Directions turn within a step, which XPBD takes as they come: at most 4e-3 here, a quarter of it in half the step.
     assert np.abs(found - exact).max() < 5e-3 * np.abs(exact).max()
+
+
+@pytest.mark.parametrize("case", QUICK)
+def test_what_is_typed_is_what_the_file_has(case, tmp_path):
+    one = scene(case)
+    [path] = one.springs.write(tmp_path / "net.xpbd.json", errors=False)
+    net = json.loads(path.read_text())
+    typed = st.ENGINES["xpbd"].numbers(st.SpringNet.from_scene(one, errors=False), st.Setting())
+    assert set(typed) <= set(st.ENGINES["xpbd"].parameters)
+    if net["constraints"]["compliance"]:
+        compliance = typed.pop("compliance")
+        assert np.array_equal(compliance[np.isfinite(compliance)], net["constraints"]["compliance"])
+    [block] = net["cell_constraints"]
+    assert np.array_equal(typed.pop(f"{block['kind']} compliance"), block["compliance"])
+    assert not typed

@@ -220,7 +220,7 @@ def Xform "sheet" (prepend apiSchemas = ["PhysicsDeformableBodyAPI"])
 }}
 '''
 
-LEFT = (
+TO_SET = (
     "Newton's importer reads particles, masses and triangles. It takes tri_ke = E h / (1 - nu^2) and tri_ka = 0, which",
     "is another material: a script sets builder.tri_materials[t] = (triKe, triKa, 0, 0, 0) of all triangles. It also",
     "sets builder.particle_mass[i] = 0 where held has particle i with both its axes, 0 and 1, and ahead of each step",
@@ -241,7 +241,7 @@ def newton_usd(net: Net) -> str:
         )
     shear, first = membrane(net)
     moved = np.zeros((0, 2)) if simulation.displacements is None else simulation.displacements
-    said = "\n".join([*about(net, simulation, _step(simulation)), *_law(net), *LEFT])
+    said = "\n".join([*about(net, simulation, _step(simulation)), *_law(net), *TO_SET])
     return USD.format(
         about=said.replace("\\", "/").replace('"', "'"),
         counts=[3] * len(net.triangles),
