@@ -223,7 +223,10 @@ def fit_text(fit: "EngineFit", mesh_name: str) -> str:
     if fit.bands:
         lines += ["", "errors at shares of a load:", aligned(fit.bands.table(), left=2), "", *_meaning(fit)]
     if fit.needed:
-        lines += ["", "settings without a factor, or that have one:", aligned(fit.needed.table(), left=2)]
+        what = (
+            f"under {fit.scene.load}: settings whose solver error is below 1 % without a factor, or that have a factor"
+        )
+        lines += ["", f"{what}:", aligned(fit.needed.table(), left=2)]
     return "\n".join(lines)
 
 
