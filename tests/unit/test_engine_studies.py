@@ -198,6 +198,19 @@ def test_a_wrong_scene_is_refused_with_a_remedy(refusal, key, value, said):
     assert said in refusal(yaml.safe_dump(content))
 
 
+def test_a_tolerance_ends_a_run_sooner(collected, refusal):
+    text = STUDY.replace("[1, 100], substeps: [1, 4], dt: [1/60 s, 5 ms]", "20")
+    exact, near = (
+        collected("xpbd", text=text.replace("  runs:", f"  tolerance: {tolerance}\n  runs:"))["engines"].to_dataset()
+        for tolerance in ("1e-9", "1e-3")
+    )
+    assert near.frames.item() < exact.frames.item()
+    assert abs(near.displacement.item() / exact.displacement.item() - 1) < 1e-3
+    assert "'0.5' is out of range; give a number up to 0.01" in refusal(
+        text.replace("ENGINES", "xpbd").replace("  runs:", "  tolerance: 0.5\n  runs:")
+    )
+
+
 def test_too_many_runs_and_cells_are_refused(refusal):
     many = f"[{', '.join(map(str, range(1, 2001)))}]"
     text = STUDY.replace("ENGINES", "xpbd")

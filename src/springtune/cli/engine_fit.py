@@ -69,7 +69,7 @@ class EngineOptions:
             raise ValueError(f"--engine: '{self.engine}' is unknown; {nearest(str(self.engine), ENGINES)}")
         given = {name: getattr(self, name) for name in ("dt", "substeps", "iterations", "precision")}
         setting = Setting(**{name: value for name, value in given.items() if value is not None})
-        ENGINES[self.engine].check(setting)
+        ENGINES[str(self.engine)].check(setting)
         return setting
 
 
@@ -115,7 +115,7 @@ class Case(NamedTuple):
     load: str
     force: str | None
     scale: float
-    mesh: "Mesh | GroupedMesh | None"
+    mesh: "Mesh | GroupedMesh | Any"
     mesh_name: str
     further: dict[str, Any]
 
@@ -186,7 +186,7 @@ def _scene(case: Case, asked: EngineOptions, setting: "Setting", springs_alone: 
     if asked.definition is not None:
         return make(definition=asked.definition)
     about: dict[str, Any] = {"load": case.load} if case.force is None else {}
-    choices = predict(case.body, case.mesh, case.material, **about)  # type: ignore[arg-type]  # never without a mesh
+    choices = predict(case.body, case.mesh, case.material, **about)
     kept = [one for one in choices if not (springs_alone and one.energies)]
     scenes, refused = runnable(make, kept, ENGINES[str(asked.engine)], setting, 1)
     if not scenes:
@@ -223,7 +223,10 @@ def fit_text(fit: "EngineFit", mesh_name: str) -> str:
     if fit.bands:
         lines += ["", "errors at shares of a load:", aligned(fit.bands.table(), left=2), "", *_meaning(fit)]
     if fit.needed:
-        lines += ["", "settings without a factor, or that have one:", aligned(fit.needed.table(), left=2)]
+        what = (
+            f"under {fit.scene.load}: settings whose solver error is below 1 % without a factor, or that have a factor"
+        )
+        lines += ["", f"{what}:", aligned(fit.needed.table(), left=2)]
     return "\n".join(lines)
 
 
@@ -246,25 +249,30 @@ def _meaning(fit: "EngineFit") -> list[str]:
 
 def budget_text(search: "BudgetSearch") -> str:
     """Text of a search within a budget."""
+    head = (
+        f"engine {search.engine}, at most {1e3 * search.budget:.3g} ms a frame: {len(search.tried)} choices were tried"
+    )
+    if search.best is None:
+        nearest = min(search.tried, key=lambda one: one.worst)
+        least = error_text(nearest.worst).lstrip("+")
+        return f"{head}\n\nNo stiffness makes any of them right; the nearest is off by {least}. Take a larger budget."
     lines = [
-        f"engine {search.engine}, at most {1e3 * search.budget:.3g} ms a frame: {len(search.tried)} calibrated choices",
+        head,
         "",
         "none is both cheaper and less off than one of these:",
         aligned(search.unbeaten.table(), left=2),
         "",
+        "chosen, the least error at worst:",
+        fit_text(search.best.fit, search.best.mesh),
     ]
-    if search.best is None:
-        return "\n".join([*lines, "None has a factor: no stiffness makes a setting within the budget right."])
-    return "\n".join([*lines, "chosen, the least error at worst:", fit_text(search.best.fit, search.best.mesh)])
+    return "\n".join(lines)
 
 
 def fit_json(fit: "EngineFit") -> dict[str, Any]:
     """Content of a calibration in SI units."""
     found = fit.result
-    typed = {
-        name: {"least": float(value.min()), "most": float(value.max()), "unit": one.unit, "formula": one.formula}
-        for name, value, one in fit.typed_values()
-    }
+    keys = "value", "unit", "formula"
+    typed = {name: dict(zip(keys, about, strict=True)) for name, *about in fit.typed_rows()}
     return {
         "springtune": __version__,
         "body": fit.scene.statement.body,

@@ -26,19 +26,19 @@ from .base import ENGINES, Engine, EngineAbsentError, EngineError, Setting
 from .calibration import WITHIN, EngineFit, fit_engine
 from .run import in_engine, net_of
 
-CELLS = (2, 3, 4, 6, 8, 12, 16)
+CELLS_ACROSS = (1, 2, 3, 4, 6, 8, 12, 16)
 """Cells across the smaller side of a body, of the meshes that are tried."""
 
 BUDGET_MESHES = ("structured", "right")
 """Mesh types of a beam that are tried where none are named."""
 
-DEFINITIONS_TRIED = 2
+BEST_DEFINITIONS = 2
 """Definitions on a mesh that are tried."""
 
 SHARES = (0.25, 0.5, 1.0)
 """Shares of the budget that settings are sought for, so that the table has cheaper ones, too."""
 
-MOST_ITERATIONS, MOST_SUBSTEPS = 400, 256
+ITERATIONS_AT_MOST, SUBSTEPS_AT_MOST = 400, 256
 """Limits of a setting."""
 
 PROBED = 16
@@ -136,8 +136,8 @@ class BudgetSearch(Tabled):
 
     @property
     def unbeaten(self) -> TabledList[BudgetChoice]:
-        """Those that no other one beats in both error and time."""
-        worst = np.array([one.worst for one in self.tried])
+        """Those with a factor that no other one beats in both error and time."""
+        worst = np.array([one.worst if one.fit.factor == one.fit.factor else np.nan for one in self.tried])
         kept = unbeaten(worst, np.array([one.frame_seconds for one in self.tried]))
         return TabledList(one for one, there in zip(self.tried, kept) if there)
 
@@ -198,7 +198,7 @@ def fit_budget(
     mesh_types : sequence of str, optional
         Keys of `springtune.MESH_TYPES`, for a beam.
     meshes : mapping of str to Mesh or GroupedMesh, optional
-        Meshes by name, from coarse to fine, in the place of those with 2 to 16 cells across.
+        Meshes by name, from coarse to fine, in the place of those with 1 to 16 cells across.
     springs_alone : bool, optional
         Whether definitions with energies besides springs are left out.
     within : float or str, optional
@@ -254,13 +254,14 @@ def fit_budget(
         families = [meshes] if meshes else [_beam_meshes(beam, name) for name in mesh_types]
     about: dict[str, Any] = {"load": load} if isinstance(beam, Shape) else {"loads": names}
     tried: list[BudgetChoice] = []
-    refused = ""
+    refused, taken = "", False
     for family in families:
         least, worse = np.inf, 0
         for name, mesh in family.items():
             make = partial(Scene, beam, mesh, material, load, force, scale=scale)
             choices = [one for one in predict(beam, mesh, material, **about) if not (springs_alone and one.energies)]
-            scenes, refused = runnable(make, choices, chosen, start, DEFINITIONS_TRIED)
+            scenes, refused = runnable(make, choices, chosen, start, BEST_DEFINITIONS)
+            taken = taken or bool(scenes)
             found: list[BudgetChoice] = []
             for scene in scenes:
                 net = net_of(scene)
@@ -273,8 +274,8 @@ def fit_budget(
             least = min(least, best)
             if worse == WORSE:
                 break
-    if not tried and refused:
-        raise EngineError(refused)
+    if not taken:
+        raise EngineError(refused or "no definition has a stable network on these meshes; give others")
     if not tried:
         raise EngineError(
             f"budget: {budget!r} is less than a frame of the coarsest mesh takes in engine '{engine}'; give more"
@@ -285,7 +286,7 @@ def fit_budget(
 def _beam_meshes(beam: Beam, name: str) -> Mapping[str, Mesh]:
     """Meshes of a type, from coarse to fine."""
     side, found = min(beam.length, beam.height), {}
-    for cells in CELLS:
+    for cells in CELLS_ACROSS:
         size = side / cells
         if not MESH_TYPES[name].refusal(beam.length, beam.height, size, beam.name):
             found[f"{name} {number_text(size, 'm')}"] = MESH_TYPES[name](beam.length, beam.height, size)
@@ -295,7 +296,7 @@ def _beam_meshes(beam: Beam, name: str) -> Mapping[str, Mesh]:
 def shape_meshes(shape: Shape, make: Callable[[float], GroupedMesh]) -> Mapping[str, GroupedMesh]:
     """Meshes of an outline, from coarse to fine; sizes at which it cannot be meshed are left out."""
     side, found = float(np.ptp(shape.extent, axis=0).min()), {}
-    for cells in CELLS:
+    for cells in CELLS_ACROSS:
         with suppress(ValueError):
             found[f"free {number_text(side / cells, 'm')}"] = make(side / cells)
     return found
@@ -337,7 +338,7 @@ def _fits(
     known: dict[Setting, EngineFit] = {}
     for limit in limits:
         best: Setting | None = None
-        least, worse, substeps = np.inf, 0, MOST_SUBSTEPS
+        least, worse, substeps = np.inf, 0, SUBSTEPS_AT_MOST
         while substeps >= 1 and worse < WORSE:
             setting = _filled(replace(start, substeps=substeps), partial(cost, net), limit, ENGINES[engine].iterates)
             substeps //= 2
@@ -354,7 +355,7 @@ def _fits(
 
 def _filled(setting: Setting, cost: Callable[[Setting], float], limit: float, iterates: bool) -> Setting | None:
     """Setting with as many iterations as there is time for; None where there is not enough for one."""
-    most = MOST_ITERATIONS if iterates else 1
+    most = ITERATIONS_AT_MOST if iterates else 1
     count = bisect_right(range(1, most + 1), limit, key=lambda number: cost(replace(setting, iterations=number)))
     return replace(setting, iterations=count) if count else None
 

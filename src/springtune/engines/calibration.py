@@ -20,7 +20,7 @@ from ..reference.small_strain import ReferenceNotConvergedError
 from ..safe_io.tables import Tabled, TabledList, number_text
 from ..scene.single import Scene
 from ..scene.statements import ShapeStatement
-from .base import ENGINES, Engine, EngineError, Parameter, Setting
+from .base import ENGINES, Engine, EngineError, Setting
 from .run import EngineResult, complete, in_engine, net_of
 
 SIZES = (0.25, 0.5, 1.0, 2.0)
@@ -29,31 +29,31 @@ SIZES = (0.25, 0.5, 1.0, 2.0)
 WITHIN = 0.05
 """Error that a band keeps."""
 
-CLOSE = 1e-3
+TUNED = 1e-3
 """Error at which a factor is taken."""
 
 ALLOWED = 0.02
 """Error above which a factor is refused where nothing comes closer."""
 
-STEP, MOST_STEPS = 8.0, 7
+BRACKET, BRACKETS = 8.0, 7
 """Ratio of the factors that look for a bracket, and how many there are."""
 
-REST = {"float64": 1e-4, "float32": 1e-3}
+RESTING = {"float64": 1e-4, "float32": 1e-3}
 """Distance from rest that ends a run, over the displacement, by precision."""
 
 SHAKE = 5e-3
 """Amplitude over the displacement up to which a run that does not rest counts, as those of single precision do."""
 
-FLAT = 1e-3
-"""Change of the displacement over a `STEP` below which stiffness no longer decides."""
+SATURATED = 1e-3
+"""Change of the displacement over a `BRACKET` below which stiffness no longer decides."""
 
 CONVERGED = 0.01
-"""Solver error of a converged setting; or the definition's error, if that is larger."""
+"""Solver error of a converged setting."""
 
 MOST_DOUBLINGS = 8
 """Doublings of substeps or iterations that are tried."""
 
-SETTLED, TUNABLE = "converged", "a factor"
+CONVERGES, TUNABLE = "converged", "a factor"
 """Purposes of settings: the solver error is small without a factor; there is a factor."""
 
 STALLED = 0.9
@@ -199,8 +199,11 @@ class EngineFit(Tabled):
     >>> beam, rubber = st.Beam("200 mm", "40 mm"), st.Material("1 MPa", 0.3, density="1000 kg/m^3")
     >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "13 mm"), rubber, "traction", "0.2 N")
     >>> fit = st.fit_engine(scene, "xpbd", substeps=16, loads=["traction"], needed=False)
-    >>> print(f"{fit.factor:.2f} times, {fit.typed['compliance'].max():.4g} m/N; error {100 * fit.error:+.1f} %")
-    1.41 times, 0.001862 m/N; error -0.0 %
+    >>> print(f"{fit.factor:.2f} times, {len(fit.typed['compliance'])} springs; error {100 * fit.error:+.1f} %")
+    1.41 times, 205 springs; error -0.0 %
+    1.41 times, 205 springs; error -0.0 %
+    >>> print(*fit.typed_rows())
+    ('compliance', '0.00093108 to 0.0018622', 'm/N', '1 / k of a spring')
     >>> fit.net().write("tuned.csv")[0].name
     'tuned.csv'
     """
@@ -247,25 +250,16 @@ class EngineFit(Tabled):
         }
         return replace(net, header=header)
 
-    def typed_values(self) -> Iterator[tuple[str, np.ndarray, Parameter]]:
-        """Name, values and parameter of each number to type; edges without a spring are left out.
-
-        Returns
-        -------
-        iterator of tuple
-        """
-        for name, value in self.typed.items():
-            values = np.ravel(value)
-            yield name, values[np.isfinite(values)], ENGINES[self.result.engine].parameters[name]
-
     def typed_rows(self) -> Iterator[tuple[str, str, str, str]]:
-        """Name, value or range, unit and formula of each number to type, as texts.
+        """Name, value or range, unit and formula of each number to type, as texts; edges without springs left out.
 
         Returns
         -------
         iterator of tuple of str
         """
-        for name, values, known in self.typed_values():
+        for name, value in self.typed.items():
+            known, values = ENGINES[self.result.engine].parameters[name], np.ravel(value)
+            values = values[np.isfinite(values)]
             low, high = f"{values.min():.5g}", f"{values.max():.5g}"
             yield name, low if low == high else f"{low} to {high}", known.unit, known.formula
 
@@ -312,8 +306,10 @@ class _Runs:
         """Run of a scene of the same springs."""
         damping = 2 * scene.motion().loaded_frequency
         setting = setting or self.setting
-        options = {"factor": factor, "frames": self.frames, "tolerance": REST[setting.precision], "damping": damping}
-        return in_engine(scene, self.engine, setting, **options)
+        tolerance = RESTING[setting.precision]
+        return in_engine(
+            scene, self.engine, setting, factor=factor, frames=self.frames, tolerance=tolerance, damping=damping
+        )
 
     def ratio(self, factor: float, setting: Setting | None = None) -> float:
         """Displacement over the reference's; NaN where it diverged."""
@@ -396,7 +392,7 @@ def fit_engine(
     except ValueError as error:
         raise EngineError(f"within{str(error).removeprefix('error')}") from None
     setting = complete(chosen, setting or Setting(**parts))
-    net_of(scene)  # refuses what no engine runs, by its own message
+    chosen.check(setting, net_of(scene))
     names = _loads(scene, loads)
     runs = _Runs(scene, engine, setting, frames)
     factor, why = _factor(runs)
@@ -406,7 +402,7 @@ def fit_engine(
         if needed and not found:
             needs.append(_needed(runs, TUNABLE, raised, _reachable))
         if needed:
-            needs.append(_needed(runs, SETTLED, raised, _converged))
+            needs.append(_needed(runs, CONVERGES, raised, _converged))
     if not found:
         enough = [one for one in needs if one.found and one.purpose == TUNABLE]
         remedies = [f"{getattr(one.setting, one.raised)} {one.raised}" for one in enough]
@@ -456,53 +452,57 @@ def _factor(runs: _Runs) -> tuple[float, str]:
 
     def error(softness: float) -> float:
         off = runs.ratio(1 / softness) - 1
-        return 0.0 if abs(off) <= CLOSE else float(np.nan_to_num(off, nan=1.0))
+        return 0.0 if abs(off) <= TUNED else float(np.nan_to_num(off, nan=1.0))
 
     moved = f"{number_text(runs.target, 'm')} by finite elements"
-    at = str(runs.setting)
     if not np.isfinite(runs.ratio(1.0)):
-        return np.nan, f"{runs.engine} diverges at {at} with the numbers of the definition"
-    stiffen = runs.ratio(1.0) > 1
-    last = 1.0
-    for _ in range(MOST_STEPS):
-        factor = last * (STEP if stiffen else 1 / STEP)
-        ratio, before = runs.ratio(factor), runs.ratio(last)
-        there = number_text(runs(last).displacement, "m")
-        if np.isfinite(ratio) and (ratio > 1) != stiffen:
-            break
-        if not np.isfinite(ratio):
-            return (
-                np.nan,
-                f"{runs.engine} diverges at {runs.setting} at {factor:.3g} times, {there} at {last:.3g} times",
-            )
-        last = factor
-        if stiffen and abs(ratio - before) < FLAT * abs(ratio):
-            break
-    else:
-        ratio = np.nan
-    if not np.isfinite(ratio) or (ratio > 1) == stiffen:
-        word = "stiffness" if stiffen else "softness"
-        there = number_text(runs(last).displacement, "m")
-        return np.nan, f"no {word} reaches {moved}: {last:.3g} times the stiffness leaves {there} at {at}"
-    softness = brentq(error, *sorted((1 / last, 1 / factor)), xtol=1e-5 / max(last, factor), maxiter=60)
-    best = min(
-        (one for one, setting in runs.known if setting == runs.setting), key=lambda one: abs(runs.ratio(one) - 1)
-    )
+        return np.nan, f"{runs.engine} diverges at {runs.setting} with the numbers of the definition"
+    first, last, diverged = _bracket(runs)
+    if last != last:
+        why = f", and {diverged:.3g} times diverges" if diverged == diverged else ""
+        there = f"{first:.3g} times the stiffness leaves {number_text(runs(first).displacement, 'm')} at {runs.setting}"
+        return np.nan, f"no {'stiffness' if first >= 1 else 'softness'} reaches {moved}: {there}{why}"
+    softness = brentq(error, *sorted((1 / first, 1 / last)), xtol=1e-5 / max(first, last), maxiter=60)
+    tried = [one for one, setting in runs.known if setting == runs.setting and np.isfinite(runs.ratio(one))]
+    best = min(tried, key=lambda one: abs(runs.ratio(one) - 1))
     if not abs(runs.ratio(best) - 1) <= ALLOWED:
         return np.nan, f"the displacement jumps over {moved} at {1 / softness:.4g} times the stiffness"
     return best, ""
 
 
+def _bracket(runs: _Runs) -> tuple[float, float, float]:
+    """Two factors with the right one between them; NaN for the second where there is none, and one that diverged.
+
+    What diverges in search of a softer one is too soft. What diverges in search of a stiffer one, as explicit steps do,
+    is retried nearer.
+    """
+    stiffen = runs.ratio(1.0) > 1
+    first, diverged, step = 1.0, np.nan, BRACKET if stiffen else 1 / BRACKET
+    for _ in range(BRACKETS):
+        factor = first * step
+        ratio = runs.ratio(factor)
+        if stiffen and not np.isfinite(ratio):
+            diverged, step = factor, step**0.5
+        elif not np.isfinite(ratio) or (ratio > 1) != stiffen:
+            return first, factor, diverged
+        else:
+            still = abs(ratio - runs.ratio(first)) < SATURATED * abs(ratio)
+            first = factor
+            if stiffen and still and diverged != diverged:
+                break
+    return first, np.nan, diverged
+
+
 def _reachable(runs: _Runs, setting: Setting) -> bool:
     """Whether a large factor makes a setting stiff enough, or a small one soft enough."""
     untuned = runs.ratio(1.0, setting)
-    other = runs.ratio(STEP**MOST_STEPS if untuned > 1 else STEP**-MOST_STEPS, setting)
+    other = runs.ratio(BRACKET**BRACKETS if untuned > 1 else BRACKET**-BRACKETS, setting)
     return bool((untuned > 1) != (other > 1)) and bool(np.isfinite(untuned + other))
 
 
 def _converged(runs: _Runs, setting: Setting) -> bool:
     found = runs(1.0, setting)
-    return _rests(found) and abs(found.solver_error) <= max(CONVERGED, abs(found.definition_error))
+    return _rests(found) and abs(found.solver_error) <= CONVERGED
 
 
 def _needed(runs: _Runs, purpose: str, raised: str, serves: Callable[[_Runs, Setting], bool]) -> NeededSetting:
@@ -550,11 +550,11 @@ def _band(runs: _Runs, load: str, factor: float, within: float) -> LoadBand:
     errors = tuple(one.error if _rests(one) else np.nan for one in found)
     why = next((one.message for one in found if not _rests(one)), "")
     definition_error = found[SIZES.index(1.0)].definition_error
-    least, most = _range(np.array(sizes), np.array(errors), within)
+    least, most = range_within(np.array(sizes), np.array(errors), within)
     return LoadBand(load, sizes, errors, definition_error, within, least, most, why, unit)
 
 
-def _range(sizes: np.ndarray, errors: np.ndarray, within: float) -> tuple[float, float]:
+def range_within(sizes: np.ndarray, errors: np.ndarray, within: float) -> tuple[float, float]:
     """Return the range of sizes, about the least error, whose interpolated error and its margin are within."""
     bends = [
         abs(np.polyfit(sizes[place : place + 3], errors[place : place + 3], 2)[0])
