@@ -7,6 +7,9 @@ import pytest
 
 import springtune as st
 
+from engine_scenes import TEN
+from engine_scenes import scene as scene_of_engines
+
 CASE = st.LoadCase(
     "push",
     (st.Support("left", 0, 0),),
@@ -69,6 +72,17 @@ def test_energies_come_to_our_equilibrium_with_the_second_order_in_the_step(case
     coarse, fine = (off(one, substeps, tolerance=1e-7) for substeps in (100, 200))
     assert fine < 1e-3
     assert 3 < coarse / fine < 5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", TEN, ids="-".join)
+@pytest.mark.parametrize("definition", ["delingette", "neo-hooke"])
+def test_ten_scenes_in_half_the_largest_explicit_step(case, definition):
+    one = scene_of_engines(*case, definition)
+    substeps = int(np.ceil(2 / 60 / one.motion().step_limit("symplectic-euler")))
+    found = st.in_engine(one, "xpbd", dt="1/60", substeps=substeps, iterations=4, tolerance=1e-6)
+    assert found.status == "rest"
+    assert found.displacement == pytest.approx(found.exact, rel=2e-3)
 
 
 @pytest.mark.slow
