@@ -26,7 +26,7 @@ MAPPINGS = [(name, "delingette") for name in SETTINGS if name != "newton-xpbd"]
 MAPPINGS += [(name, "patch") for name in SETTINGS if name != "newton-style3d"]
 QUICK = ("sheet", "structured", "traction", "foam")
 LONG = 300
-"""Period over the largest step of explicit schemes above which VBD takes three times as long steps, and more iterations.
+"""Period over the largest step of explicit schemes above which VBD takes longer steps, and more iterations.
 
 Newton's positions are of single precision. What is left of h^2 f / m below half a unit in the last place is lost.
 """
