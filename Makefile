@@ -42,8 +42,10 @@ test-browser: $(VENV)/.test
 ENGINES := build/engines
 ENGINES_STUDY ?= config/engines.yaml
 WITH_ENGINES = PYTHONPATH="$(CURDIR)/src:$(CURDIR)/$(ENGINES)"
+# Those of Newton first, since it compiles: at the end no core waits for the other.
+ENGINE_TESTS = $(wildcard tests/engines/test_newton*.py) $(filter-out tests/engines/test_newton%,$(wildcard tests/engines/test_*.py))
 test-engines: $(VENV)/.test $(ENGINES)/.done
-	$(WITH_ENGINES) pytest -n 2 --dist loadfile -rs -m "not slow" tests/engines
+	$(WITH_ENGINES) pytest -n 2 --dist loadfile --no-loadscope-reorder -rs -m "not slow" $(ENGINE_TESTS)
 	$(if $(ENGINES_STUDY),$(WITH_ENGINES) springtune run $(ENGINES_STUDY))
 
 $(ENGINES)/.done: requirements/engines.txt | $(VENV)/.test

@@ -41,6 +41,7 @@ OWN = {
     "nest-asyncio2": "BSD-2-Clause",
     "netgen-occt": "LGPL-2.1-only WITH OCCT-exception-1.0",
     "newton": "Apache-2.0",
+    "newton-usd-schemas": "Apache-2.0",
     "numba": "BSD-2-Clause",
     "packaging": "Apache-2.0 OR BSD-2-Clause",
     "pexpect": "ISC",

@@ -27,6 +27,9 @@ TABLES = {
 IN_ENGINES = "which-numbers.md"
 """Page that shows runs in engines, from the dataset of config/engines.yaml."""
 
+SETTING = ["substeps", "iterations"]
+"""Dimensions of a table of engines."""
+
 USUAL, GOOD = 10, 0.02
 """Iterations of a step in the tables of engines, and solver error that counts as converged."""
 
@@ -60,45 +63,55 @@ def shorten(tables: str, file: str) -> str:
 
 
 def in_engines(data: xr.Dataset) -> str:
-    """Table of each scene: solver error over substeps, and the cheapest setting that is converged."""
+    """Table of each scene: solver error over substeps, and the setting of least work that is converged."""
     return "\n".join(f"**{scene.item()}**\n\n{_of_scene(data.sel(scene=scene))}" for scene in data.scene)
 
 
 def _of_scene(data: xr.Dataset) -> str:
-    data = data.squeeze(["precision", "dt"]).dropna("substeps", subset=["solver_error"], how="all")
+    data = data.isel(substeps=(data.engine_status != 0).any([one for one in data.dims if one != "substeps"]).values)
     head = ["engine", "definition", *(f"{n} substep{'s' if n > 1 else ''}" for n in data.substeps.values)]
     head += ["converged from", "ms a frame"]
     rows = [head, ["---"] * 2 + ["---:"] * (len(head) - 2)]
+    without = [words(data).index(word) for word in ("not_requested", "absent", "refused", "failed")]
     for engine in data.engine.values:
         for definition in data.definition.values:
-            runs = data.sel(engine=engine, definition=definition)
-            if (runs.engine_status != 0).any() and set(np.unique(runs.engine_status)) - {0, _status(data, "refused")}:
-                rows.append([engine, f"`{definition}`", *_of_engine(runs)])
+            runs = data.sel(engine=engine, definition=definition).isel(dt=0)
+            run = ~runs.engine_status.isin(without)
+            if run.any():
+                own = runs.isel(precision=int(np.argmax(run.any(SETTING).values)))
+                rows.append([engine, f"`{definition}`", *_of_engine(own)])
     return "".join(f"| {' | '.join(row)} |\n" for row in rows)
 
 
-def _status(data: xr.Dataset, word: str) -> int:
-    return data.engine_status.attrs["flag_meanings"].split().index(word)
+def words(data: xr.Dataset) -> list[str]:
+    """How runs end, in order of the flags."""
+    found: list[str] = data.engine_status.attrs["flag_meanings"].split()
+    return found
 
 
 def _of_engine(runs: xr.Dataset) -> list[str]:
-    """Cells of an engine: errors at `USUAL` iterations or its only ones, and the fastest that is converged."""
+    """Cells of an engine: errors at `USUAL` iterations or its only ones, and the least setting that is converged."""
     tried = runs.iterations.values[(runs.engine_status != 0).any("substeps")]
     usual = runs.sel(iterations=USUAL if USUAL in tried else tried[0])
-    words = runs.engine_status.attrs["flag_meanings"].split()
     ends = zip(usual.solver_error.values, usual.engine_status.values)
-    cells = [_off(error) if np.isfinite(error) else words[status] for error, status in ends]
-    good = runs.frame_seconds.where(abs(runs.solver_error) <= GOOD)
+    cells = [_off(error) if np.isfinite(error) else words(runs)[status] if status else "" for error, status in ends]
+    work = (runs.substeps * runs.iterations).transpose(*SETTING)
+    good = work.where(abs(runs.solver_error.transpose(*SETTING)) <= GOOD)
     if not good.notnull().any():
         return [*cells, "none tried", ""]
-    best = good.isel(good.argmin(...))
+    best = runs.frame_seconds.transpose(*SETTING).isel(good.argmin(...))
     setting = f"{best.substeps.item()} x {best.iterations.item()}" if len(tried) > 1 else f"{best.substeps.item()}"
-    return [*cells, setting, f"{1e3 * best.item():.2g}"]
+    return [*cells, setting, _short(1e3 * best.item())]
+
+
+def _short(number: float) -> str:
+    """Two digits, and no exponent."""
+    return f"{float(f'{number:.2g}'):g}"
 
 
 def _off(error: float) -> str:
     """Error of a displacement, or how many times it is too large."""
-    return f"x {1 + error:.2g}" if error >= 1 else f"{100 * error:+.1f} %".replace("-", "−")
+    return f"x {_short(1 + error)}" if error >= 1 else f"{round(100 * error, 1) + 0.0:+.1f} %".replace("-", "−")
 
 
 def benchmark(path: Path) -> xr.Dataset:

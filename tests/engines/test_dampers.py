@@ -43,7 +43,14 @@ NEWTON = {
 """Decrement, setting and tolerance."""
 
 
-@pytest.mark.parametrize("name", [*list(NEWTON)[:2], pytest.param("newton-vbd", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "newton-semi-implicit",
+        pytest.param("newton-xpbd", marks=pytest.mark.slow),  # compiles for 20 s, which test_newton.py does meanwhile
+        pytest.param("newton-vbd", marks=pytest.mark.slow),
+    ],
+)
 def test_springs_of_newton(name):
     """`kd` is a dashpot [N s/m]."""
     pytest.importorskip("newton")

@@ -88,27 +88,18 @@ def test_constants_of_a_flex_are_those_of_the_material(nu):
     assert set(typed) <= set(st.ENGINES["mujoco-euler"].parameters)
 
 
-@discrete
-def test_discrete_damps_by_its_steps_as_implicit_euler_does():
-    """A flex that is loaded at once swings about its equilibrium, with a decrement of pi ln(1 + x^2) / atan(x)."""
-    beam, rubber = st.Beam("100 mm", "10 mm"), st.Material("1 MPa", 0.45, density="1100 kg/m^3")
-    mesh = st.make_mesh(beam, "structured", "5 mm")
-    one = st.Scene(beam, mesh, rubber, "bending", "0.1 mN", definition="delingette")
-    frequency, net = one.motion().loaded_frequency, st.SpringNet.from_scene(one, errors=False)
-    setting = st.Setting(2 * np.pi / frequency / 200, iterations=100)
-    session, seen = st.ENGINES["mujoco-discrete"].start(net, setting, 0.0), []
-    for _ in range(150):
-        seen.append(session.displacements()[np.argmax(net.points[:, 0]), 1])
-        session.advance(4)
-    found, x = st.fit_decay(4 * setting.step * np.arange(150), np.array(seen)), frequency * setting.step
-    assert found.decrement == pytest.approx(np.pi * np.log1p(x**2) / np.arctan(x), rel=0.05)
-    assert found.period == pytest.approx(2 * np.pi / frequency, rel=0.01)
-    assert st.ENGINES["mujoco-discrete"].implicit and not st.ENGINES["mujoco-euler"].implicit
-
-
 def test_an_integrator_that_came_later_is_absent_by_name(monkeypatch):
     monkeypatch.setattr(metadata, "version", lambda name: "3.12.0")
     assert st.ENGINES["mujoco-discrete"].absent.startswith("engine 'mujoco-discrete' needs mujoco>=3.13; install the")
     with pytest.raises(EngineAbsentError, match="needs mujoco>=3.13"):
         st.in_engine(scene(*STRIP, "patch"), "mujoco-discrete")
     assert not st.ENGINES["mujoco-euler"].absent
+
+
+def test_where_mujoco_is_not_installed_the_constants_are_those_of_its_last_version(monkeypatch):
+    def absent(name):
+        raise metadata.PackageNotFoundError(name)
+
+    monkeypatch.setattr(metadata, "version", absent)
+    net = st.SpringNet.from_scene(scene("strip", "free", "traction", "rubber", "delingette"), errors=False)
+    assert st.ENGINES["mujoco-euler"].typed(net) == pytest.approx({"young": 1e6, "poisson": 0.45, "thickness": 1e-3})

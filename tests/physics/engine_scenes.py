@@ -27,7 +27,9 @@ def scene(body, mesh_type, load, material, definition):
 CASES = [
     (body, mesh_type, load, material)
     for number, (body, load) in enumerate((body, load) for body in BODIES for load in LOADS)
-    for mesh_type, material in zip(("structured", "free"), ("rubber", "foam") if number % 2 else ("foam", "rubber"))
+    for mesh_type, material in zip(
+        ("structured", "free"), ("rubber", "foam") if number // 2 % 2 else ("foam", "rubber")
+    )
 ][:20]
 """Twenty cases: body, mesh type, load, material."""
 

@@ -148,7 +148,7 @@ def test_two_modes_get_their_ratios():
 def test_a_measured_period_corrects_the_stiffness():
     """With the material that the factor gives, the scene has the measured period, by a run."""
     first = st.damping_of(scene(), decrement=DECREMENT, period="0.2 s")
-    assert "longer than the scene's; multiply stiffnesses by 0.70" in first.notes[0]
+    assert "times the scene's; multiply stiffnesses by 0.70" in first.notes[0]
     assert first.notes[0] in str(first)
     material = st.Material(1e6 * first.stiffness_factor, 0.45, density="1100 kg/m^3")
     one = st.Scene(BEAM, scene().mesh, material, "bending", "0.1 mN", definition="patch", kinematics="linear")

@@ -9,7 +9,14 @@ from hypothesis import strategies as st
 from scipy.sparse import csc_array
 
 from springtune.linalg.factors import SingularError, SuperLUFactor
-from springtune.mechanics.energies import AngleEnergy, AreaEnergy, BiquadraticEnergy, NeoHookeEnergy, YeohEnergy
+from springtune.mechanics.energies import (
+    AngleEnergy,
+    AreaEnergy,
+    BiquadraticEnergy,
+    NeoHookeEnergy,
+    StableNeoHookeEnergy,
+    YeohEnergy,
+)
 from springtune.mesh import MESH_TYPES
 from springtune.problem.materials import Material
 from springtune.springs import DEFINITIONS
@@ -17,7 +24,7 @@ from springtune.springs import DEFINITIONS
 from problems import beam_problem, free_network
 
 RATIOS = {"neo-Hooke": 0.3, "neo-Hooke, nearly incompressible": 0.4999}
-KINDS = ("area of triangles", "area of quads", "angles", "tensile", "coupled", "Yeoh", *RATIOS)
+KINDS = ("area of triangles", "area of quads", "angles", "tensile", "coupled", "Yeoh", "stable neo-Hooke", *RATIOS)
 
 
 def energy_of(kind, seed):
@@ -29,6 +36,8 @@ def energy_of(kind, seed):
     if kind == "Yeoh":
         coefficients = generator.uniform([0.1, -0.01, 0.0], [1, 0.05, 0.01], (len(corners), 3))
         return mesh, YeohEnergy(mesh.points, corners, coefficients)
+    if kind == "stable neo-Hooke":
+        return mesh, StableNeoHookeEnergy(mesh.points, corners, 1.0 + modulus, 0.5 + modulus**2)
     if kind in RATIOS:
         shear, nu = 1.0 + modulus, RATIOS[kind]
         return mesh, NeoHookeEnergy(mesh.points, corners, shear, shear * 2 * (1 + nu) / (3 * (1 - 2 * nu)))
@@ -137,6 +146,7 @@ ENERGIES = {
     BiquadraticEnergy: {"tensile": (16, 3), "coupling": (16, 3)},
     YeohEnergy: {"coefficients": (16, 2), "largest": (16,)},
     NeoHookeEnergy: {"shear": (16,), "bulk": (16,)},
+    StableNeoHookeEnergy: {"shear": (16,), "first": (16,)},
 }
 
 

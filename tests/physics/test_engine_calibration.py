@@ -1,12 +1,11 @@
 """Calibration to an engine's setting: what is typed is right, and what is said of other loads holds."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 import springtune as st
-from springtune.engines.calibration import SIZES, _range
+from springtune.engines.calibration import SIZES, range_within
+from springtune.handover.simulation import simulate
 
 import engine_scenes
 
@@ -61,3 +60,249 @@ def answered(number):
             found = run(other, fit.factor)
             assert abs(found.error) <= band.within, (number, band, force, found)
     return True
+
+
+class Saturated:
+    """An engine of the closed form u = (1 / s + softest) u0 with a factor s on stiffness."""
+
+    softest, explodes = 0.3, np.inf
+
+    def __init__(self, net, setting, damping):
+        self.factor = net.stiffness.max() / BASE.springs.reference / BASE.springs.relative.max()
+        size = net.forces.sum() / BASE.forces.sum()
+        left = self.softest * (10 / setting.iterations) * (1 / setting.substeps) ** 2
+        share = size * (1 / self.factor + left * (1 + self.bent * size))
+        self.moved = share * MOVED if self.factor < self.explodes else np.full(MOVED.shape, 1e9)
+
+    bent = 0.0
+
+    def advance(self, frames):
+        pass
+
+    def displacements(self):
+        return self.moved
+
+
+BASE = strip(size="20 mm", definition="lattice")
+MOVED = BASE.solve().displacements
+
+
+@pytest.fixture
+def engine(monkeypatch):
+    """Declare the closed form as engine ``late`` for a test."""
+    kind = type("Late", (Saturated,), {})
+    st.engine("late", precisions=("float64",))(kind)
+    yield kind
+    st.ENGINES.discard("late")
+
+
+class TestClosedForm:
+    """A factor on an engine whose displacement is known."""
+
+    def test_the_factor_is_exact(self, engine):
+        fit = st.fit_engine(BASE, "late", loads=["traction"], needed=False)
+        exact = BASE.solve().displacement / fit.result.reference
+        assert fit.factor == pytest.approx(1 / (1 / exact - 0.3), rel=5e-3) and abs(fit.error) < 1e-3
+        assert fit.untuned.error == pytest.approx(1.3 * exact - 1, rel=1e-3)
+        assert fit.net().stiffness == pytest.approx(fit.factor * st.SpringNet.from_scene(BASE).stiffness)
+        assert fit.typed["stiffness"] == pytest.approx(fit.net().stiffness) and fit.message == ""
+        assert fit.net().header["reference_stiffness"] == pytest.approx(fit.factor * BASE.springs.reference)
+        assert fit.net().header["expected_error"].startswith("not computed: the stiffness is that for engine 'late'")
+
+    def test_too_stiff_takes_a_softer_one(self, engine):
+        engine.softest = -0.4
+        fit = st.fit_engine(BASE, "late", loads=["traction"], needed=False)
+        assert fit.factor < 1 and abs(fit.error) < 1e-3
+
+    def test_saturation_is_said_with_numbers(self, engine):
+        engine.softest = 1.5
+        fit = st.fit_engine(BASE, "late", loads=["traction"])
+        assert fit.factor != fit.factor and not fit.bands and not fit.typed
+        assert fit.result.displacement == pytest.approx(1.5 * BASE.solve().displacement, rel=0.01)
+        assert fit.message.startswith("no stiffness reaches 0.997555 mm by finite elements: ")
+        assert fit.message.endswith("; take 2 substeps or 20 iterations")
+        with pytest.raises(st.EngineError, match="no stiffness reaches"):
+            fit.net()
+
+    def test_settings_that_converge(self, engine):
+        needed = {(one.purpose, one.raised): one for one in st.fit_engine(BASE, "late", loads=["traction"]).needed}
+        substeps, iterations = needed["converged", "substeps"], needed["converged", "iterations"]
+        for one, left in (
+            (substeps, 1 / substeps.setting.substeps**2),
+            (iterations, 10 / iterations.setting.iterations),
+        ):
+            exact = 0.3 * left * BASE.solve().displacement / BASE.reference().displacement
+            assert one.found and one.solver_error == pytest.approx(exact, rel=1e-3)
+            assert one.solver_error <= 0.01
+        assert (substeps.setting.substeps, iterations.setting.iterations) == (8, 640)
+
+    def test_a_stall_ends_the_doubling(self, engine):
+        engine.softest = 1.5
+        engine.__init__ = lambda self, net, setting, damping: Saturated.__init__(self, net, st.Setting(), damping)
+        needed = st.fit_engine(BASE, "late", loads=["traction"]).needed
+        assert not any(one.found for one in needed) and all(one.setting.substeps <= 4 for one in needed)
+
+    def test_divergence_of_stiff_ones_is_said(self, engine):
+        engine.softest, engine.explodes = 0.9, 2.0
+        fit = st.fit_engine(BASE, "late", loads=["traction"], needed=False)
+        assert fit.factor != fit.factor and " times diverges" in fit.message
+        engine.softest = 0.3
+        fit = st.fit_engine(BASE, "late", loads=["traction"], needed=False)
+        assert 1.8 < fit.factor < engine.explodes and abs(fit.error) < 1e-3
+
+    def test_a_band_is_cut_where_the_error_grows(self, engine):
+        engine.bent = 0.4
+        (band,) = st.fit_engine(BASE, "late", loads=["traction"], needed=False, within="5 %").bands
+        assert band.sizes == pytest.approx([share * 0.2 for share in SIZES]) and band.unit == "N"
+        slope = 0.3 * 0.4 * BASE.solve().displacement / BASE.reference().displacement  # of the error, over the load
+        assert 0.8 * 0.05 / slope < 1 - band.least / 0.2 < 0.05 / slope
+        assert 0.8 * 0.05 / slope < band.most / 0.2 - 1 < 0.05 / slope
+
+
+def test_a_band_holds_between_its_sizes():
+    sizes = np.array(SIZES)
+    for number in range(200):
+        random = np.random.default_rng(number)
+        bend = np.polynomial.Polynomial(random.normal(0, (0.03, 0.03, 0.02)))
+        low, high = range_within(sizes, bend(sizes), 0.05)
+        if low == low:
+            assert np.abs(bend(np.linspace(low, high, 100))).max() <= 0.05
+
+
+def test_nothing_is_said_beside_what_does_not_rest():
+    assert range_within(np.array(SIZES), np.array([0.0, 0.0, 0.0, np.nan]), 0.05) == (0.25, 1.0)
+    assert np.isnan(range_within(np.array(SIZES), np.array([0.0, np.nan, 0.0, 0.0]), 0.05)).all()
+    assert np.isnan(range_within(np.array(SIZES), np.array([0.2, 0.2, 0.2, 0.2]), 0.05)).all()
+
+
+def test_a_shape_is_calibrated_under_its_load_cases():
+    side = st.Quantity("end", "displacement", "right", "x")
+    pulls = {
+        name: st.LoadCase(
+            name,
+            [st.Support("left", x=0, y=0)],
+            [st.Traction("right", force)],
+            quantities=[st.Quantity("work", "energy"), st.Quantity("end", "displacement", "right", axis)],
+        )
+        for name, force, axis in (("pull", ("0.2 N", 0), "x"), ("lift", (0, "1 mN"), "y"))
+    }
+    pulls["move"] = st.LoadCase("move", [st.Support("left", x=0, y=0), st.Support("right", x=1e-3)], quantities=[side])
+    plate = st.Shape.rectangle("200 mm", "40 mm", loads=pulls)
+    foam = st.Material("1 MPa", 0.3, density="1000 kg/m^3")
+    scene = st.Scene(plate, st.mesh_shape(plate, "20 mm"), foam, "pull", definition="lattice")
+    fit = st.fit_engine(scene, "xpbd", substeps=20, needed=False)
+    assert abs(fit.error) < 1e-3 and fit.result.reference == pytest.approx(1e-3, rel=0.02)
+    pull, lift, move = fit.bands
+    assert (pull.least, pull.most, pull.unit) == (0.25, 2.0, "") and np.isfinite(lift.errors).all()
+    assert "prescribes displacements" in move.message and np.isnan(move.least)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"within": 2}, "within: 2 is no error above 0 and below 100 %; give one such as '1 %'"),
+        ({"loads": ["pull"]}, "loads: 'pull' cannot be predicted"),
+        ({"precision": "float16"}, "precision: 'float16' is unknown to engine 'xpbd'; give one of float64, float32"),
+        ({"substeps": 0}, "substeps: 0 is not a whole number above zero; give one"),
+    ],
+)
+def test_a_wrong_call_is_refused(options, said):
+    with pytest.raises(ValueError, match=said):
+        st.fit_engine(BASE, "xpbd", **options)
+
+
+def test_a_scene_that_no_engine_runs_is_refused():
+    with pytest.raises(st.EngineError, match="kinematics: 'linear', and engines keep the length law"):
+        st.fit_engine(strip(kinematics="linear"), "xpbd")
+    light = st.Scene(BASE.beam, BASE.mesh, st.Material("1 MPa", 0.3), "traction", "0.2 N")
+    with pytest.raises(ValueError, match="density: material 'material' has none; give a density"):
+        st.fit_engine(light, "xpbd")
+    with pytest.raises(KeyError, match="unknown engine 'xpdb'"):
+        st.fit_engine(BASE, "xpdb")
+
+
+def test_an_absent_engine_is_refused_with_the_command_that_installs_it(engine):
+    st.ENGINES.discard("late")
+    st.engine("late", needs=("no_such_program",), extra="newton")(engine)
+    for fit in (
+        lambda: st.fit_engine(BASE, "late"),
+        lambda: st.fit_budget(BASE.beam, BASE.material, "traction", 0.2, engine="late", budget=1.0),
+    ):
+        with pytest.raises(st.EngineError, match="engine 'late' needs no_such_program; .*newton"):
+            fit()
+
+
+class TestBudget:
+    """Searches within a frame's time, at costs that are given."""
+
+    MESHES = {name: st.make_mesh(BASE.beam, "right", name) for name in ("40 mm", "20 mm")}
+
+    def search(self, budget, **options):
+        def cost(net, setting):
+            return 1e-6 * setting.substeps * (1 + setting.iterations) * len(net.springs)
+
+        case = BASE.beam, BASE.material, "traction", "0.2 N"
+        given = {"engine": "late", "loads": ["traction"], "meshes": self.MESHES, "cost": cost} | options
+        return st.fit_budget(*case, budget=budget, **given)
+
+    @pytest.fixture(autouse=True)
+    def _late(self):
+        class Late:
+            """The equilibrium, and what is left of it: 3 / (substeps^2 iterations) of an even strain."""
+
+            def __init__(self, net, setting, damping):
+                strain = 3 / setting.substeps**2 / setting.iterations * net.forces.sum() / (1e6 * 0.04 * 1e-3)
+                self.moved = simulate(net, "late").displacements + strain * net.points * [1, -0.3]
+
+            def advance(self, frames):
+                pass
+
+            def displacements(self):
+                return self.moved
+
+        st.engine("late", precisions=("float64",))(Late)
+        yield
+        st.ENGINES.discard("late")
+
+    def test_each_choice_is_within_the_budget(self):
+        search = self.search("5 ms")
+        assert search.tried and max(one.frame_seconds for one in search.tried) <= 5e-3
+        assert search.tried == sorted(search.tried, key=lambda one: (one.frame_seconds, one.worst))
+        best, *_ = sorted(search.tried, key=lambda one: (one.worst, one.frame_seconds))
+        assert search.best is best and best in search.unbeaten
+
+    def test_the_best_split_of_the_time_is_taken(self):
+        ((name, mesh), *_), budget = self.MESHES.items(), 5e-3
+        search = self.search(budget, meshes={name: mesh})
+        for share in (0.25, 0.5, 1.0):
+            steps = 2 ** np.arange(9)
+            iterations = np.minimum(400, np.floor(share * budget / (1e-6 * steps * len(mesh.edges)) - 1))
+            least = min(1 / steps[iterations > 0] ** 2 / iterations[iterations > 0])
+            settings = [one.fit.result.setting for one in search.tried if one.frame_seconds <= share * budget]
+            assert min(1 / one.substeps**2 / one.iterations for one in settings) == pytest.approx(least)
+
+    def test_too_little_time_is_refused(self):
+        with pytest.raises(st.EngineError, match="budget: '1 us' is less than a frame of the coarsest mesh"):
+            self.search("1 us")
+
+    @pytest.mark.parametrize(
+        ("options", "said"),
+        [
+            ({"budget": "2 mm"}, "budget: '2 mm' is a length; give a time"),
+            ({"meshes": None, "mesh_types": ["squares"]}, "mesh types: 'squares' is unknown"),
+            ({"loads": ["pull"]}, "loads: 'pull' cannot be predicted"),
+        ],
+    )
+    def test_a_wrong_call_is_refused(self, options, said):
+        with pytest.raises(ValueError, match=said):
+            self.search(**({"budget": "1 ms"} | options))
+
+
+@pytest.mark.parametrize("number", [1, 6, 7, 14, 37])
+def test_what_is_said_of_a_random_question_holds(number):
+    assert answered(number) is (number != 6)
+
+
+@pytest.mark.slow
+def test_what_is_said_of_random_questions_holds():
+    assert sum(answered(number) for number in range(QUESTIONS)) > QUESTIONS / 2

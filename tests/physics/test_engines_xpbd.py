@@ -7,6 +7,9 @@ import pytest
 
 import springtune as st
 
+from engine_scenes import TEN
+from engine_scenes import scene as scene_of_engines
+
 CASE = st.LoadCase(
     "push",
     (st.Support("left", 0, 0),),
@@ -69,6 +72,17 @@ def test_energies_come_to_our_equilibrium_with_the_second_order_in_the_step(case
     coarse, fine = (off(one, substeps, tolerance=1e-7) for substeps in (100, 200))
     assert fine < 1e-3
     assert 3 < coarse / fine < 5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", TEN, ids="-".join)
+@pytest.mark.parametrize("definition", ["delingette", "neo-hooke"])
+def test_ten_scenes_in_half_the_largest_explicit_step(case, definition):
+    one = scene_of_engines(*case, definition)
+    substeps = int(np.ceil(2 / 60 / one.motion().step_limit("symplectic-euler")))
+    found = st.in_engine(one, "xpbd", dt="1/60", substeps=substeps, iterations=4, tolerance=1e-6)
+    assert found.status == "rest"
+    assert found.displacement == pytest.approx(found.exact, rel=2e-3)
 
 
 @pytest.mark.slow
@@ -207,3 +221,18 @@ def test_a_solver_written_from_the_file_alone_comes_to_our_equilibrium(case, tmp
     found = run(net, steps=200, sweeps=4, share=0.5)
     # Directions turn within a step, which XPBD takes as they come: at most 4e-3 here, a quarter of it in half the step.
     assert np.abs(found - exact).max() < 5e-3 * np.abs(exact).max()
+
+
+@pytest.mark.parametrize("case", QUICK)
+def test_what_is_typed_is_what_the_file_has(case, tmp_path):
+    one = scene(case)
+    [path] = one.springs.write(tmp_path / "net.xpbd.json", errors=False)
+    net = json.loads(path.read_text())
+    typed = st.ENGINES["xpbd"].numbers(st.SpringNet.from_scene(one, errors=False), st.Setting())
+    assert set(typed) <= set(st.ENGINES["xpbd"].parameters)
+    if net["constraints"]["compliance"]:
+        compliance = typed.pop("compliance")
+        assert np.array_equal(compliance[np.isfinite(compliance)], net["constraints"]["compliance"])
+    [block] = net["cell_constraints"]
+    assert np.array_equal(typed.pop(f"{block['kind']} compliance"), block["compliance"])
+    assert not typed

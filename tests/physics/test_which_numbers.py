@@ -88,6 +88,8 @@ def test_plane_stress_is_what_the_page_says():
     too_stiff = [100 * (of_a_sheet(ratio, solid) - 1) for ratio in (0.3, 0.45)]
     assert too_stiff == pytest.approx(shown(r"by (\d+) % at ν = 0.3, by (\d+) % at 0.45"), abs=0.5)
     assert shown(r"the sheet has (\d+) % of E at ν = 0.3") == [round(100 * of_a_sheet(0.3, lambda ratio: 0.0))]
+    of_usd = young(1 / (1 - 0.3**2), 0.0)
+    assert shown(r"([\d.]+) times too stiff at ν = 0.3") == [round(of_usd, 1)]
     assert plane(0.5) == pytest.approx(2 / (2 * 1.5))  # tri_ka = 2 tri_ke
 
 

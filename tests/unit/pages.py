@@ -59,7 +59,8 @@ def check_command(words, folder):
         for study in options.configfile or []:
             load_study(folder / study)
     elif name == "python":
-        assert (REPOSITORY / arguments[0]).is_file() or arguments[0] == "-m", words
+        written = arguments[0].endswith(".newton.py")  # by the command before it
+        assert written or (REPOSITORY / arguments[0]).is_file() or arguments[0] == "-m", words
     elif name == "springtune":
         command = main.get_command(None, arguments[0])
         assert command is not None, words

@@ -22,6 +22,7 @@ from counting import counted
 from springtune.cli import COMMANDS, Commands, Shown, main
 from springtune.cli.recommendation import beam_subject, prediction_json, prediction_text
 from springtune.handover.formats import ENDINGS
+from springtune.handover.simulation import simulate
 from springtune.mesh import MESH_TYPES, Mesh, braced, write_mesh
 from springtune.mesh.types import MeshType
 from springtune.prediction import bands
@@ -532,6 +533,72 @@ class TestPredictAMesh:
         result = run("predict", *self.STEEL, *arguments)
         assert result.exit_code == 2 and message in result.stderr and len(result.stderr.splitlines()) == 1
         assert [path.name for path in tmp_path.iterdir()] == ["own.msh"]
+
+    @pytest.mark.parametrize(("arguments", "message"), refused_calls("predict, an engine"))
+    def test_wrong_options_of_engines_are_refused_in_a_line(self, arguments, message):
+        result = run("predict", "--beam", "200x40", "--material", "rubber", *arguments)
+        assert result.exit_code == 2 and message in result.stderr and len(result.stderr.splitlines()) == 1
+
+    def test_an_engine_is_calibrated_to(self, tmp_path):
+        """Text, JSON and the springs that are written say the same."""
+        asked = [
+            *("--engine", "xpbd", "--dt", "1/60", "--substeps", "20", "--beam", "200x40", "--size", "20 mm"),
+            *("--material", "rubber", "--density", "1000 kg/m^3", "--load", "traction", "--force", "0.2 N"),
+            *("--loads", "shear", "--definition", "patch"),
+        ]
+        text, target = run("predict", *asked), tmp_path / "net.json"
+        assert text.exit_code == 0, text.output
+        found = json.loads(run("predict", *asked, "--json", "--write", target).stdout)
+        lines = words(text.stdout)
+        assert lines[1] == "engine xpbd: dt 1/60 s, 20 substeps, 10 iterations, float64"
+        assert lines[3] == f"{found['factor']:.5g} times the stiffness of the definition:"
+        assert lines[5] == f"compliance {found['typed']['compliance']['value']} m/N 1 / k of a spring"
+        assert [one["load"] for one in found["loads"]] == ["traction", "shear"] and abs(found["error"]) < 2e-3
+        assert len(found["loads"][0]["sizes"]) == 4 and found["loads"][1]["least"] is None
+        written = json.loads(target.read_text())
+        least, most = map(float, found["typed"]["compliance"]["value"].split(" to "))
+        assert written["header"]["calibrated"]["factor"] == pytest.approx(found["factor"])
+        assert 1 / max(written["stiffness"]) == pytest.approx(least, rel=1e-4)
+        assert 1 / min(written["stiffness"]) == pytest.approx(most, rel=1e-4)
+
+    def test_a_setting_without_a_factor_writes_nothing(self, tmp_path):
+        asked = [
+            *("--engine", "xpbd", "--beam", "200x40", "--size", "20 mm", "--material", "rubber", "--force", "0.2 N"),
+            *("--density", "1000 kg/m^3", "--load", "traction", "--definition", "lattice"),
+        ]
+        result = run("predict", *asked, "--write", tmp_path / "net.csv")
+        assert "There is no factor: no stiffness reaches 0.993572 mm by finite elements: " in result.stdout
+        assert result.exit_code == 1 and not [*tmp_path.iterdir()]
+        assert result.stderr.startswith("--write: there is no factor, so nothing is written: no stiffness reaches")
+
+    def test_a_budget_is_searched(self, tmp_path):
+        """In so long a frame that any machine has time for all settings."""
+
+        @springtune.engine("at-once", precisions=("float64",), iterates=False)
+        class AtOnce:
+            """The equilibrium."""
+
+            def __init__(self, net, setting, damping):
+                self.moved = simulate(net, "at-once").displacements
+
+            def advance(self, frames):
+                pass
+
+            def displacements(self):
+                return self.moved
+
+        asked = [
+            *("--engine", "at-once", "--budget", "10 s", "--beam", "200x40", "--mesh", "right", "--material", "rubber"),
+            *("--density", "1000 kg/m^3", "--load", "traction", "--force", "0.2 N", "--loads", "traction"),
+        ]
+        try:
+            result = run("predict", *asked, "--json", "--write", tmp_path / "net.csv")
+        finally:
+            springtune.ENGINES.discard("at-once")
+        found = json.loads(result.stdout)
+        assert all(one["frame_seconds"] <= 10 for one in found["tried"]) and found["unbeaten"]
+        chosen = found["tried"][found["chosen"]]
+        assert chosen["worst"] < 2e-3 and (tmp_path / "net.csv").exists() and result.stderr.startswith(f"{tmp_path}")
 
     @pytest.mark.parametrize("command", ["predict", "springs"])
     def test_help_has_the_ending_of_every_format(self, command):

@@ -5,6 +5,7 @@ import faulthandler
 import importlib
 import os
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ import yaml
 import springtune as st
 from springtune.studies.kinds.engines import RUN_ENDS
 from springtune.studies.kinds.engines.collect import ENGINE_CURVES, ENGINE_RUNS
+from springtune.studies.kinds.engines.kind import KIND
 from springtune.studies.output.comparison import compare
 from springtune.studies.runs import keys
 
@@ -152,6 +154,11 @@ def test_an_engine_without_iterations_has_one(load):
     assert len(runs) == 4 and {run.iterations for run in runs} == {1}
 
 
+def test_what_is_not_installed_is_said_before_a_run(load):
+    ((what, count, said),) = KIND.summary(load(STUDY.replace("ENGINES", "toy, missing")).parts["engines"])
+    assert (what, count) == ("engines", 16) and said == "runs in missing, toy; not installed: missing"
+
+
 REFUSED_STUDIES = {
     "engine: [xpdb]": "engines.runs.map.engine: unknown engine 'xpdb'; did you mean 'xpbd'?",
     "engine: []": "an empty list",
@@ -189,6 +196,19 @@ def test_a_wrong_scene_is_refused_with_a_remedy(refusal, key, value, said):
     content["materials"]["heavy"] = {"young_modulus": "1 MPa", "poisson_ratio": "0.3"}
     content["engines"]["scenes"]["pull"][key] = value
     assert said in refusal(yaml.safe_dump(content))
+
+
+def test_a_tolerance_ends_a_run_sooner(collected, refusal):
+    text = STUDY.replace("[1, 100], substeps: [1, 4], dt: [1/60 s, 5 ms]", "20")
+    exact, near = (
+        collected("xpbd", text=text.replace("  runs:", f"  tolerance: {tolerance}\n  runs:"))["engines"].to_dataset()
+        for tolerance in ("1e-9", "1e-3")
+    )
+    assert near.frames.item() < exact.frames.item()
+    assert abs(near.displacement.item() / exact.displacement.item() - 1) < 1e-3
+    assert "'0.5' is out of range; give a number up to 0.01" in refusal(
+        text.replace("ENGINES", "xpbd").replace("  runs:", "  tolerance: 0.5\n  runs:")
+    )
 
 
 def test_too_many_runs_and_cells_are_refused(refusal):
@@ -272,6 +292,15 @@ def test_the_best_factor_gives_the_references_displacement(collected):
 def forget():
     for one in (keys.stage_key, keys.code_key, keys.installed, keys.distribution):
         one.cache_clear()
+
+
+def test_runs_depend_on_the_module_of_their_own_engine_alone():
+    """And on no writer of files for others."""
+    shared = {Path(file).parent.name + "/" + Path(file).name for file in keys.modules("studies.kinds.engines.solve")}
+    assert "engines/run.py" in shared and not {"engines/xpbd.py", "engines/vbd.py", "handover/formats.py"} & shared
+    own = {path.name for path in keys.OURS.closure(st.ENGINES["xpbd"].file).files}
+    assert {"xpbd.py", "textbook.py"} <= own and "vbd.py" not in own
+    assert keys.declared_key(st.ENGINES["xpbd"]) != keys.declared_key(st.ENGINES["vbd"])
 
 
 def test_an_absent_engine_is_run_when_it_is_there_and_again_when_it_is_new(collected, tmp_path, monkeypatch):

@@ -246,7 +246,8 @@ def test_every_python_agrees_with_the_newest_packages(version, study, usual, tmp
 def test_files_for_mujoco_3_hold_in_it(version, tmp_path):
     """The first that has a flex's elasticity, the last with wrong forces on its rollers, and the last of version 3."""
     python = environment(tmp_path / "venv", sys.executable, [*NEEDED, f"mujoco=={version}"])
-    physics(python, "tests/physics/test_simulators.py")
+    for tests in ("tests/physics/test_simulators.py", "tests/engines/test_mujoco_engine.py"):
+        physics(python, tests)
 
 
 def share_a_file(python, folder):

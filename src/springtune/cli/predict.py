@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import click
 
 from . import examples
+from .engine_fit import EngineOptions, engine_options, fitted
 from .options import (
     SPRING_FILES,
     SheetOptions,
@@ -35,7 +36,10 @@ if TYPE_CHECKING:
     from .recommendation import Subject
 
 
-ASKED = re.compile("^(?=(beam |error:|load |loads:))")
+ASKED = re.compile(
+    "^(?=(beam |error:|load |load:|loads:|force:|scale:|density:|definition:|dt:|substeps:|iterations:|precision:|"
+    "within:|budget:))|^mesh types?(?=:)"
+)
 """Begin of messages with the name of an argument, which is an option of `predict`."""
 
 
@@ -49,6 +53,10 @@ ASKED = re.compile("^(?=(beam |error:|load |loads:))")
         'springtune predict --beam 80x10 --mesh graded.msh --unit "1 mm" --material rubber',
         'springtune predict --shape config/shapes.yaml:cook --load shear --size "2 mm" --material third',
         'springtune predict --shape config/shapes.yaml:cook --material third --error "2 %"',
+        'springtune predict --engine xpbd --dt 1/60 --substeps 20 --iterations 10 --beam 200x40 --size "13 mm" '
+        '--material rubber --density "1000 kg/m^3" --load traction --force "0.2 N"',
+        'springtune predict --engine xpbd --budget "0.2 ms" --beam 200x40 --material rubber --density "1000 kg/m^3" '
+        '--load traction --force "0.2 N"',
     )
 )
 @sheet_options(
@@ -57,13 +65,14 @@ ASKED = re.compile("^(?=(beam |error:|load |loads:))")
     "for the largest stable time steps",
 )
 @click.option("--error", help="Find the coarsest mesh that keeps this error, such as '1 %'.")
-@click.option("--load", help="Load case of a shape.  [default: its only one]")
+@click.option("--load", help="Load case of a shape, by default its only one; with --engine of a beam, too.")
 @click.option(
     "--loads",
     help="Loads that count: some of traction, compression, bending, shear and pressure, such as traction,bending.  "
-    "[default: traction,bending,shear]",
+    "[default: traction,bending,shear; with --engine all]",
 )
 @click.option("--springs-alone", is_flag=True, help="Recommend what needs springs alone, no energies besides them.")
+@engine_options
 @click.option("--json", "as_json", is_flag=True, help="Print everything as JSON, in SI units.")
 @click.option(
     "--write",
@@ -73,6 +82,7 @@ ASKED = re.compile("^(?=(beam |error:|load |loads:))")
 )
 def predict(
     sheet: SheetOptions,
+    engine: EngineOptions,
     error: str | None,
     load: str | None,
     loads: str | None,
@@ -86,12 +96,19 @@ def predict(
     strain; a mesh too large for that has bands from coarser ones. With --error, meshes from coarse to fine are solved
     so, until the error is kept on one and on the finer ones tried, up to one with twice as many cells across.
     A shape of a study has errors in the quantities that its load case asks for.
+
+    With --engine: what to type into an engine at a setting, so that the displacement under --load is that of finite
+    elements; over which loads that holds; and which settings converge. With --budget the setting is found, too.
     """
-    with refusals("--write", target, partial(ASKED.sub, "--")):
-        check_kind(sheet.shape, sheet.beam, ("load",))
+    with refusals("--write", target, _in_options):
+        check_kind(sheet.shape, sheet.beam, ("load",) if engine.engine is None else ("scale",))
+        engine.check(sheet, error)
         if target is not None:
             check_target("--write", target)
-        if sheet.shape is not None:
+        if engine.engine is not None:
+            text, json, net_of = fitted(sheet, engine, load, loads, springs_alone)
+            answer = _Answer(text, json, "", net_of)
+        elif sheet.shape is not None:
             asked = sheet.asked_shape(load, sized=error is None)
             answer = _on_shape(asked, springs_alone) if error is None else _find_on_shape(asked, error, springs_alone)
         elif error is None:
@@ -109,6 +126,11 @@ def predict(
         net = answer.net(answer.definition)
         written = written_text(net, net.write(target))
         click.echo(written if as_json else f"\n{written}", err=as_json)
+
+
+def _in_options(message: str) -> str:
+    """Message with options in the place of arguments."""
+    return ASKED.sub(lambda found: "--mesh" if found[0] else "--", message)
 
 
 class _Answer(NamedTuple):

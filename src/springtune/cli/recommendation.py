@@ -201,7 +201,7 @@ def prediction_json(
 ) -> str:
     """A prediction as JSON; numbers that are missing are null, and those of a band are lists of two."""
     first, plain = recommended(choices)
-    return _json(
+    return json_text(
         {"springtune": __version__}
         | subject.about
         | {"mesh": mesh}
@@ -230,7 +230,7 @@ def search_json(subject: Subject, search: "MeshSearch", springs_alone: bool = Fa
         found["by_type"] = {name: one_json(one) for name, one in search.by_type.items()}
     found["recommended_springs_alone"] = one_json(search.best_springs)
     found["springs_by_type"] = {name: one_json(one) for name, one in search.springs_by_type.items()}
-    return _json(found | {"tried": [asdict(one) for one in search.tried]})
+    return json_text(found | {"tried": [asdict(one) for one in search.tried]})
 
 
 def recommended(choices: "Sequence[Choice]") -> tuple[str | None, str | None]:
@@ -290,7 +290,9 @@ def _choice_json(choice: "Choice") -> dict[str, Any]:
     return asdict(choice) | {"worst": choice.worst}
 
 
-def _json(content: dict[str, Any]) -> str:
+def json_text(content: dict[str, Any]) -> str:
+    """Content as JSON; numbers that are missing are null."""
+
     def plain(value: Any) -> Any:
         if isinstance(value, dict):
             return {name: plain(one) for name, one in value.items()}

@@ -3,6 +3,7 @@
 import time
 from bisect import bisect_right
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
@@ -10,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from ..handover.net import SpringNet
-from ..mesh import MESH_TYPES, Mesh, MeshError
+from ..mesh import MESH_TYPES, Mesh
 from ..mesh.groups import GroupedMesh
 from ..mesh.outlines import mesh_shape
-from ..prediction.choices import CASES, check_loads, check_names, predict
+from ..prediction.choices import CASES, Choice, check_loads, check_names, predict
 from ..problem.compare import error_text, unbeaten
 from ..problem.geometry import Beam
 from ..problem.materials import AnyMaterial
@@ -21,20 +22,23 @@ from ..problem.quantities import positive
 from ..problem.shapes import Shape
 from ..safe_io.tables import Tabled, TabledList, number_text
 from ..scene.single import Scene
-from .base import ENGINES, Engine, EngineError, Setting
+from .base import ENGINES, Engine, EngineAbsentError, EngineError, Setting
 from .calibration import WITHIN, EngineFit, fit_engine
 from .run import in_engine, net_of
 
-CELLS = (2, 3, 4, 6, 8, 12, 16)
+CELLS_ACROSS = (1, 2, 3, 4, 6, 8, 12, 16)
 """Cells across the smaller side of a body, of the meshes that are tried."""
 
 BUDGET_MESHES = ("structured", "right")
 """Mesh types of a beam that are tried where none are named."""
 
+BEST_DEFINITIONS = 2
+"""Definitions on a mesh that are tried."""
+
 SHARES = (0.25, 0.5, 1.0)
 """Shares of the budget that settings are sought for, so that the table has cheaper ones, too."""
 
-MOST_ITERATIONS, MOST_SUBSTEPS = 400, 256
+ITERATIONS_AT_MOST, SUBSTEPS_AT_MOST = 400, 256
 """Limits of a setting."""
 
 PROBED = 16
@@ -66,10 +70,13 @@ class BudgetChoice(Tabled):
     >>> beam, rubber = st.Beam("200 mm", "40 mm"), st.Material("1 MPa", 0.3, density="1000 kg/m^3")
     >>> meshes = {"fine": st.make_mesh(beam, "right", "20 mm")}
     >>> search = st.fit_budget(beam, rubber, "traction", "0.2 N", engine="xpbd", budget="1 ms", meshes=meshes,
-    ...                        cost=lambda net, setting: 2e-7 * setting.substeps * (20 + setting.iterations * 40))
+    ...                        loads=["traction", "shear"],
+    ...                        cost=lambda net, setting: 1e-5 * setting.substeps * setting.iterations)
     >>> best = search.best
     >>> print(best.mesh, best.fit.scene.definition.name, best.fit.result.setting)
+    fine delingette dt 1/60 s, 32 substeps, 3 iterations, float64
     >>> print(f"{1e3 * best.frame_seconds:.2f} ms, {100 * best.worst:.1f} % at worst")
+    0.96 ms, 6.6 % at worst
     """
 
     mesh: str
@@ -115,9 +122,12 @@ class BudgetSearch(Tabled):
     >>> import springtune as st
     >>> beam, rubber = st.Beam("200 mm", "40 mm"), st.Material("1 MPa", 0.3, density="1000 kg/m^3")
     >>> meshes = {name: st.make_mesh(beam, "right", name) for name in ("40 mm", "20 mm")}
+    >>> def cost(net, setting):
+    ...     return 1e-7 * setting.substeps * setting.iterations * len(net.springs)
     >>> search = st.fit_budget(beam, rubber, "traction", "0.2 N", engine="xpbd", budget="1 ms", meshes=meshes,
-    ...                        cost=lambda net, setting: 1e-7 * setting.substeps * setting.iterations * len(net.springs))
+    ...                        loads=["traction", "shear"], cost=cost)
     >>> print(search.best.mesh, len(search.tried), [one.mesh for one in search.unbeaten])
+    20 mm 12 ['40 mm', '40 mm', '20 mm']
     """
 
     engine: str
@@ -126,8 +136,8 @@ class BudgetSearch(Tabled):
 
     @property
     def unbeaten(self) -> TabledList[BudgetChoice]:
-        """Those that no other one beats in both error and time."""
-        worst = np.array([one.worst for one in self.tried])
+        """Those with a factor that no other one beats in both error and time."""
+        worst = np.array([one.worst if one.fit.factor == one.fit.factor else np.nan for one in self.tried])
         kept = unbeaten(worst, np.array([one.frame_seconds for one in self.tried]))
         return TabledList(one for one, there in zip(self.tried, kept) if there)
 
@@ -141,8 +151,7 @@ class BudgetSearch(Tabled):
         yield "engine", self.engine
         yield "budget", number_text(self.budget, "s")
         yield "tried", str(len(self.tried))
-        for label, text in self.best._rows() if self.best else ():
-            yield label, text
+        yield from self.best._rows() if self.best else ()
 
 
 def fit_budget(
@@ -159,7 +168,8 @@ def fit_budget(
     loads: Iterable[str] | None = None,
     mesh_types: Sequence[str] = BUDGET_MESHES,
     meshes: Mapping[str, Mesh | GroupedMesh] | None = None,
-    within: float = WITHIN,
+    springs_alone: bool = False,
+    within: float | str = WITHIN,
     cost: Cost | None = None,
 ) -> BudgetSearch:
     """Find the mesh, definition, substeps and iterations that are least off within a frame's time.
@@ -188,9 +198,11 @@ def fit_budget(
     mesh_types : sequence of str, optional
         Keys of `springtune.MESH_TYPES`, for a beam.
     meshes : mapping of str to Mesh or GroupedMesh, optional
-        Meshes by name, from coarse to fine, in the place of those with 2 to 16 cells across.
-    within : float, optional
-        Error that bands keep [1].
+        Meshes by name, from coarse to fine, in the place of those with 1 to 16 cells across.
+    springs_alone : bool, optional
+        Whether definitions with energies besides springs are left out.
+    within : float or str, optional
+        Error that bands keep, a fraction or a text such as ``"5 %"``.
     cost : callable, optional
         (net, setting) -> seconds of a frame; by default measured by short runs.
 
@@ -219,9 +231,15 @@ def fit_budget(
     >>> import springtune as st
     >>> beam, rubber = st.Beam("200 mm", "40 mm"), st.Material("1 MPa", 0.3, density="1000 kg/m^3")
     >>> meshes = {name: st.make_mesh(beam, "right", name) for name in ("40 mm", "20 mm")}
+    >>> def cost(net, setting):
+    ...     return 1e-7 * setting.substeps * setting.iterations * len(net.springs)
     >>> search = st.fit_budget(beam, rubber, "traction", "0.2 N", engine="xpbd", budget="1 ms", meshes=meshes,
-    ...                        cost=lambda net, setting: 1e-7 * setting.substeps * setting.iterations * len(net.springs))
+    ...                        loads=["traction", "shear"], cost=cost)
     >>> print(search.unbeaten)
+     a frame   at worst  mesh   particles  definition  substeps  iterations  factor  traction  shear
+     0.202 ms  5.92 %    40 mm  12         delingette  32        3           0.9852  +0.07 %   -5.92 %
+     0.403 ms  5.86 %    40 mm  12         delingette  64        3           0.9843  +0.07 %   -5.86 %
+     0.922 ms  4.45 %    20 mm  33         delingette  32        4           0.9986  +0.00 %   -4.45 %
     """
     chosen = ENGINES[engine]
     limit = positive(budget, "time", "budget")
@@ -229,25 +247,24 @@ def fit_budget(
     chosen.check(start)
     if isinstance(beam, Shape):
         names: tuple[str, ...] = tuple(loads or (load,))
-        families = [meshes or _shape_meshes(beam)]
+        families = [meshes or shape_meshes(beam, partial(mesh_shape, beam))]
     else:
         names = check_loads(CASES if loads is None else loads)
         check_names("mesh types", mesh_types, MESH_TYPES, BUDGET_MESHES, "is unknown")
         families = [meshes] if meshes else [_beam_meshes(beam, name) for name in mesh_types]
-    make = partial(Scene, beam, material=material, load=load, force=force, scale=scale)
+    about: dict[str, Any] = {"load": load} if isinstance(beam, Shape) else {"loads": names}
     tried: list[BudgetChoice] = []
-    refused = ""
+    refused, taken = "", False
     for family in families:
         least, worse = np.inf, 0
         for name, mesh in family.items():
+            make = partial(Scene, beam, mesh, material, load, force, scale=scale)
+            choices = [one for one in predict(beam, mesh, material, **about) if not (springs_alone and one.energies)]
+            scenes, refused = runnable(make, choices, chosen, start, BEST_DEFINITIONS)
+            taken = taken or bool(scenes)
             found: list[BudgetChoice] = []
-            for scene in _scenes(make, mesh, beam, material, load, names):
-                try:
-                    net = net_of(scene)
-                    chosen.start(net, start, 1.0)
-                except EngineError as error:
-                    refused = str(error)
-                    continue
+            for scene in scenes:
+                net = net_of(scene)
                 timed = cost or _measured(chosen, net, start)
                 fits = _fits(scene, engine, net, [share * limit for share in SHARES], start, timed, names, within)
                 found += [BudgetChoice(name, fit, timed(net, fit.result.setting)) for fit in fits]
@@ -257,8 +274,8 @@ def fit_budget(
             least = min(least, best)
             if worse == WORSE:
                 break
-    if not tried and refused:
-        raise EngineError(refused)
+    if not taken:
+        raise EngineError(refused or "no definition has a stable network on these meshes; give others")
     if not tried:
         raise EngineError(
             f"budget: {budget!r} is less than a frame of the coarsest mesh takes in engine '{engine}'; give more"
@@ -269,37 +286,41 @@ def fit_budget(
 def _beam_meshes(beam: Beam, name: str) -> Mapping[str, Mesh]:
     """Meshes of a type, from coarse to fine."""
     side, found = min(beam.length, beam.height), {}
-    for cells in CELLS:
+    for cells in CELLS_ACROSS:
         size = side / cells
         if not MESH_TYPES[name].refusal(beam.length, beam.height, size, beam.name):
             found[f"{name} {number_text(size, 'm')}"] = MESH_TYPES[name](beam.length, beam.height, size)
     return found
 
 
-def _shape_meshes(shape: Shape) -> Mapping[str, GroupedMesh]:
-    """Meshes of an outline, from coarse to fine; sizes that leave details out are left out."""
+def shape_meshes(shape: Shape, make: Callable[[float], GroupedMesh]) -> Mapping[str, GroupedMesh]:
+    """Meshes of an outline, from coarse to fine; sizes at which it cannot be meshed are left out."""
     side, found = float(np.ptp(shape.extent, axis=0).min()), {}
-    for cells in CELLS:
-        try:
-            found[f"free {number_text(side / cells, 'm')}"] = mesh_shape(shape, side / cells)
-        except MeshError:
-            continue
+    for cells in CELLS_ACROSS:
+        with suppress(ValueError):
+            found[f"free {number_text(side / cells, 'm')}"] = make(side / cells)
     return found
 
 
-def _scenes(
-    make: Callable[..., Scene],
-    mesh: Mesh | GroupedMesh,
-    beam: Beam | Shape,
-    material: AnyMaterial | Mapping[str, AnyMaterial],
-    load: str,
-    names: Sequence[str],
-) -> Iterator[Scene]:
-    """Scenes of the definitions that are worth a choice, the best at equilibrium first."""
-    about: dict[str, Any] = {"load": load} if isinstance(beam, Shape) else {"loads": names}
-    for choice in predict(beam, mesh, material, **about):
-        if choice.worst < np.inf:
-            yield make(mesh=mesh, definition=choice.definition)
+def runnable(
+    make: Callable[..., Scene], choices: Iterable[Choice], engine: Engine, setting: Setting, most: int
+) -> tuple[list[Scene], str]:
+    """Scenes of the best definitions that an engine takes, at most some; and why it refuses the last other one."""
+    found: list[Scene] = []
+    refused = ""
+    for choice in choices:
+        if len(found) == most or not choice.worst < np.inf:
+            break
+        scene = make(definition=choice.definition)
+        try:
+            engine.start(net_of(scene), setting, 1.0)
+        except EngineAbsentError:
+            raise
+        except EngineError as error:
+            refused = str(error)
+        else:
+            found.append(scene)
+    return found, refused
 
 
 def _fits(
@@ -310,14 +331,14 @@ def _fits(
     start: Setting,
     cost: Cost,
     names: Sequence[str],
-    within: float,
+    within: float | str,
 ) -> Iterator[EngineFit]:
     """Calibrate the best split of each limit into substeps and iterations."""
     damping = 2 * scene.motion().loaded_frequency
     known: dict[Setting, EngineFit] = {}
     for limit in limits:
         best: Setting | None = None
-        least, worse, substeps = np.inf, 0, MOST_SUBSTEPS
+        least, worse, substeps = np.inf, 0, SUBSTEPS_AT_MOST
         while substeps >= 1 and worse < WORSE:
             setting = _filled(replace(start, substeps=substeps), partial(cost, net), limit, ENGINES[engine].iterates)
             substeps //= 2
@@ -334,7 +355,7 @@ def _fits(
 
 def _filled(setting: Setting, cost: Callable[[Setting], float], limit: float, iterates: bool) -> Setting | None:
     """Setting with as many iterations as there is time for; None where there is not enough for one."""
-    most = MOST_ITERATIONS if iterates else 1
+    most = ITERATIONS_AT_MOST if iterates else 1
     count = bisect_right(range(1, most + 1), limit, key=lambda number: cost(replace(setting, iterations=number)))
     return replace(setting, iterations=count) if count else None
 

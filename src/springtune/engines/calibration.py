@@ -14,13 +14,13 @@ import numpy as np
 
 from ..handover.net import NOT_COMPUTED, SpringNet
 from ..prediction.choices import check_loads, check_names, predicted
+from ..prediction.search import asked_error
 from ..problem.compare import error_text
-from ..problem.loads import LOADS
 from ..reference.small_strain import ReferenceNotConvergedError
 from ..safe_io.tables import Tabled, TabledList, number_text
 from ..scene.single import Scene
 from ..scene.statements import ShapeStatement
-from .base import ENGINES, EngineError, Setting
+from .base import ENGINES, Engine, EngineError, Setting
 from .run import EngineResult, complete, in_engine, net_of
 
 SIZES = (0.25, 0.5, 1.0, 2.0)
@@ -29,31 +29,31 @@ SIZES = (0.25, 0.5, 1.0, 2.0)
 WITHIN = 0.05
 """Error that a band keeps."""
 
-CLOSE = 1e-3
+TUNED = 1e-3
 """Error at which a factor is taken."""
 
 ALLOWED = 0.02
 """Error above which a factor is refused where nothing comes closer."""
 
-STEP, MOST_STEPS = 8.0, 7
+BRACKET, BRACKETS = 8.0, 7
 """Ratio of the factors that look for a bracket, and how many there are."""
 
-REST = {"float64": 1e-4, "float32": 1e-3}
+RESTING = {"float64": 1e-4, "float32": 1e-3}
 """Distance from rest that ends a run, over the displacement, by precision."""
 
 SHAKE = 5e-3
 """Amplitude over the displacement up to which a run that does not rest counts, as those of single precision do."""
 
-FLAT = 1e-3
-"""Change of the displacement over a `STEP` below which stiffness no longer decides."""
+SATURATED = 1e-3
+"""Change of the displacement over a `BRACKET` below which stiffness no longer decides."""
 
 CONVERGED = 0.01
-"""Solver error of a converged setting; or the definition's error, if that is larger."""
+"""Solver error of a converged setting."""
 
 MOST_DOUBLINGS = 8
 """Doublings of substeps or iterations that are tried."""
 
-SETTLED, TUNABLE = "converged", "a factor"
+CONVERGES, TUNABLE = "converged", "a factor"
 """Purposes of settings: the solver error is small without a factor; there is a factor."""
 
 STALLED = 0.9
@@ -90,11 +90,15 @@ class LoadBand(Tabled):
     --------
     >>> import springtune as st
     >>> beam, rubber = st.Beam("200 mm", "40 mm"), st.Material("1 MPa", 0.3, density="1000 kg/m^3")
-    >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "20 mm"), rubber, "traction", "0.2 N")
-    >>> fit = st.fit_engine(scene, "xpbd", substeps=20, loads=["traction", "bending"], needed=False)
+    >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "13 mm"), rubber, "traction", "0.2 N")
+    >>> fit = st.fit_engine(scene, "xpbd", substeps=16, loads=["bending", "shear"], needed=False)
     >>> for band in fit.bands:
     ...     there = f"{band.least:.3g} to {band.most:.3g} N" if band.least == band.least else "nowhere"
-    ...     print(f"{band.load}: {100 * band.error:+.0f} %, within {100 * band.within:g} % {there}")
+    ...     print(f"{band.load} {100 * band.error:+.0f} %, within {100 * band.within:g} % {there}; "
+    ...           f"converged {100 * band.definition_error:+.0f} %")
+    traction -0 %, within 5 % 0.05 to 0.4 N; converged +0 %
+    bending -8 %, within 5 % nowhere; converged -12 %
+    shear -14 %, within 5 % nowhere; converged +5 %
     """
 
     load: str
@@ -145,9 +149,11 @@ class NeededSetting(Tabled):
     --------
     >>> import springtune as st
     >>> beam, rubber = st.Beam("200 mm", "40 mm"), st.Material("1 MPa", 0.3, density="1000 kg/m^3")
-    >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "20 mm"), rubber, "traction", "0.2 N")
-    >>> for one in st.fit_engine(scene, "xpbd", substeps=20, loads=["traction"]).needed:
+    >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "13 mm"), rubber, "traction", "0.2 N")
+    >>> for one in st.fit_engine(scene, "xpbd", substeps=16, loads=["traction"]).needed:
     ...     print(f"{one.raised}: {one.setting}, {one.found}, {100 * one.solver_error:+.1f} %")
+    substeps: dt 1/60 s, 32 substeps, 10 iterations, float64, True, +0.5 %
+    iterations: dt 1/60 s, 16 substeps, 40 iterations, float64, True, +0.0 %
     """
 
     purpose: str
@@ -191,9 +197,13 @@ class EngineFit(Tabled):
     --------
     >>> import springtune as st
     >>> beam, rubber = st.Beam("200 mm", "40 mm"), st.Material("1 MPa", 0.3, density="1000 kg/m^3")
-    >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "20 mm"), rubber, "traction", "0.2 N")
-    >>> fit = st.fit_engine(scene, "xpbd", substeps=20, loads=["traction"], needed=False)
-    >>> print(f"{fit.factor:.2f} times, {fit.typed['compliance'].max():.4g} m/N; error {100 * fit.error:+.1f} %")
+    >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "13 mm"), rubber, "traction", "0.2 N")
+    >>> fit = st.fit_engine(scene, "xpbd", substeps=16, loads=["traction"], needed=False)
+    >>> print(f"{fit.factor:.2f} times, {len(fit.typed['compliance'])} springs; error {100 * fit.error:+.1f} %")
+    1.41 times, 205 springs; error -0.0 %
+    1.41 times, 205 springs; error -0.0 %
+    >>> print(*fit.typed_rows())
+    ('compliance', '0.00093108 to 0.0018622', 'm/N', '1 / k of a spring')
     >>> fit.net().write("tuned.csv")[0].name
     'tuned.csv'
     """
@@ -241,20 +251,17 @@ class EngineFit(Tabled):
         return replace(net, header=header)
 
     def typed_rows(self) -> Iterator[tuple[str, str, str, str]]:
-        """Name, value or range, unit and formula of each number to type.
+        """Name, value or range, unit and formula of each number to type, as texts; edges without springs left out.
 
         Returns
         -------
         iterator of tuple of str
         """
-        known = ENGINES[self.result.engine].parameters
         for name, value in self.typed.items():
-            values = np.ravel(value)[np.isfinite(np.ravel(value))]
-            low, high = f"{values.min(initial=np.inf):.5g}", f"{values.max(initial=-np.inf):.5g}"
-            about = known.get(name)
-            yield name, low if low == high else f"{low} to {high}", about.unit if about else "", (
-                about.formula if about else ""
-            )
+            known, values = ENGINES[self.result.engine].parameters[name], np.ravel(value)
+            values = values[np.isfinite(values)]
+            low, high = f"{values.min():.5g}", f"{values.max():.5g}"
+            yield name, low if low == high else f"{low} to {high}", known.unit, known.formula
 
     def _rows(self) -> Iterator[tuple[str, str]]:
         yield "engine", f"{self.result.engine}, {self.result.setting}"
@@ -299,8 +306,10 @@ class _Runs:
         """Run of a scene of the same springs."""
         damping = 2 * scene.motion().loaded_frequency
         setting = setting or self.setting
-        options = {"factor": factor, "frames": self.frames, "tolerance": REST[setting.precision], "damping": damping}
-        return in_engine(scene, self.engine, setting, **options)
+        tolerance = RESTING[setting.precision]
+        return in_engine(
+            scene, self.engine, setting, factor=factor, frames=self.frames, tolerance=tolerance, damping=damping
+        )
 
     def ratio(self, factor: float, setting: Setting | None = None) -> float:
         """Displacement over the reference's; NaN where it diverged."""
@@ -312,7 +321,7 @@ def fit_engine(
     engine: str,
     setting: Setting | None = None,
     *,
-    within: float = WITHIN,
+    within: float | str = WITHIN,
     loads: Iterable[str] | None = None,
     needed: bool = True,
     frames: int | None = None,
@@ -327,8 +336,8 @@ def fit_engine(
     engine : str
         Key of `springtune.ENGINES`.
     setting : Setting, optional
-    within : float, optional
-        Error that bands keep [1].
+    within : float or str, optional
+        Error that bands keep, a fraction or a text such as ``"5 %"``.
     loads : iterable of str, optional
         Loads besides the scene's that get a band; by default all of a beam but those that turn, or all of a shape.
     needed : bool, optional
@@ -363,20 +372,27 @@ def fit_engine(
 
     >>> import springtune as st
     >>> beam, rubber = st.Beam("200 mm", "40 mm"), st.Material("1 MPa", 0.3, density="1000 kg/m^3")
-    >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "20 mm"), rubber, "traction", "0.2 N")
-    >>> fit = st.fit_engine(scene, "xpbd", dt="1/60", substeps=20, loads=["bending", "shear"])
+    >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "13 mm"), rubber, "traction", "0.2 N")
+    >>> fit = st.fit_engine(scene, "xpbd", dt="1/60", substeps=16, loads=["bending", "shear"])
     >>> print(f"{fit.factor:.2f}: {100 * fit.untuned.error:+.1f} % becomes {100 * fit.error:+.1f} %")
-    >>> print(*(f"{band.load} {100 * band.error:+.0f} %" for band in fit.bands))
+    1.41: +22.8 % becomes -0.0 %
+    >>> print(*(f"{band.load} {100 * band.error:+.0f} %, converged {100 * band.definition_error:+.0f} %;"
+    ...         for band in fit.bands))
+    traction -0 %, converged +0 %; bending -8 %, converged -12 %; shear -14 %, converged +5 %;
 
     With fewer substeps there is none:
 
-    >>> print(st.fit_engine(scene, "xpbd", dt="1/60", substeps=4, loads=["traction"]).message)
+    >>> none = st.fit_engine(scene, "xpbd", dt="1/60", substeps=4, needed=False)
+    >>> print(none.factor, f"{1e3 * none.result.displacement:.2f} mm in place of {1e3 * none.result.reference:.2f}")
+    nan 8.00 mm in place of 1.00
     """
     chosen = ENGINES[engine]
-    if not 0 < within < 1:
-        raise EngineError(f"within: {within!r} is no error above 0 and below 1; give one such as 0.05")
+    try:
+        within = asked_error(within)
+    except ValueError as error:
+        raise EngineError(f"within{str(error).removeprefix('error')}") from None
     setting = complete(chosen, setting or Setting(**parts))
-    net_of(scene)  # refuses what no engine runs, by its own message
+    chosen.check(setting, net_of(scene))
     names = _loads(scene, loads)
     runs = _Runs(scene, engine, setting, frames)
     factor, why = _factor(runs)
@@ -386,7 +402,7 @@ def fit_engine(
         if needed and not found:
             needs.append(_needed(runs, TUNABLE, raised, _reachable))
         if needed:
-            needs.append(_needed(runs, SETTLED, raised, _converged))
+            needs.append(_needed(runs, CONVERGES, raised, _converged))
     if not found:
         enough = [one for one in needs if one.found and one.purpose == TUNABLE]
         remedies = [f"{getattr(one.setting, one.raised)} {one.raised}" for one in enough]
@@ -399,11 +415,16 @@ def fit_engine(
         factor,
         runs(factor) if found else min(runs.known.values(), key=lambda one: _distance(one, setting)),
         runs(1.0),
-        chosen.typed(net_of(scene, factor)) if found else {},
+        _typed(chosen, net_of(scene, factor), setting) if found else {},
         bands,
         needs,
         "; ".join(filter(None, (why, scene.objection))),
     )
+
+
+def _typed(engine: Engine, net: SpringNet, setting: Setting) -> dict[str, Any]:
+    """Numbers to type; what an engine takes from the mesh is none."""
+    return {name: value for name, value in engine.numbers(net, setting).items() if name in engine.parameters}
 
 
 def _rests(one: EngineResult) -> bool:
@@ -431,47 +452,57 @@ def _factor(runs: _Runs) -> tuple[float, str]:
 
     def error(softness: float) -> float:
         off = runs.ratio(1 / softness) - 1
-        return 0.0 if abs(off) <= CLOSE else float(np.nan_to_num(off, nan=1.0))
+        return 0.0 if abs(off) <= TUNED else float(np.nan_to_num(off, nan=1.0))
 
     moved = f"{number_text(runs.target, 'm')} by finite elements"
     if not np.isfinite(runs.ratio(1.0)):
         return np.nan, f"{runs.engine} diverges at {runs.setting} with the numbers of the definition"
-    stiffen = runs.ratio(1.0) > 1
-    last = 1.0
-    for _ in range(MOST_STEPS):
-        factor = last * (STEP if stiffen else 1 / STEP)
-        ratio, before = runs.ratio(factor), runs.ratio(last)
-        there = number_text(runs(last).displacement, "m")
-        if np.isfinite(ratio) and (ratio > 1) != stiffen:
-            break
-        if not np.isfinite(ratio):
-            return np.nan, f"{runs.engine} diverges at {runs.setting} at {factor:.3g} times, {there} at {last:.3g} times"
-        last = factor
-        if stiffen and abs(ratio - before) < FLAT * abs(ratio):
-            break
-    else:
-        ratio = np.nan
-    if not np.isfinite(ratio) or (ratio > 1) == stiffen:
-        word = "stiffness" if stiffen else "softness"
-        there = number_text(runs(last).displacement, "m")
-        return np.nan, f"no {word} reaches {moved}: at {runs.setting} {last:.3g} times the stiffness leaves {there}"
-    softness = brentq(error, *sorted((1 / last, 1 / factor)), xtol=1e-5 / max(last, factor), maxiter=60)
-    best = min((one for one, at in runs.known if at == runs.setting), key=lambda one: abs(runs.ratio(one) - 1))
+    first, last, diverged = _bracket(runs)
+    if last != last:
+        why = f", and {diverged:.3g} times diverges" if diverged == diverged else ""
+        there = f"{first:.3g} times the stiffness leaves {number_text(runs(first).displacement, 'm')} at {runs.setting}"
+        return np.nan, f"no {'stiffness' if first >= 1 else 'softness'} reaches {moved}: {there}{why}"
+    softness = brentq(error, *sorted((1 / first, 1 / last)), xtol=1e-5 / max(first, last), maxiter=60)
+    tried = [one for one, setting in runs.known if setting == runs.setting and np.isfinite(runs.ratio(one))]
+    best = min(tried, key=lambda one: abs(runs.ratio(one) - 1))
     if not abs(runs.ratio(best) - 1) <= ALLOWED:
         return np.nan, f"the displacement jumps over {moved} at {1 / softness:.4g} times the stiffness"
     return best, ""
 
 
+def _bracket(runs: _Runs) -> tuple[float, float, float]:
+    """Two factors with the right one between them; NaN for the second where there is none, and one that diverged.
+
+    What diverges in search of a softer one is too soft. What diverges in search of a stiffer one, as explicit steps do,
+    is retried nearer.
+    """
+    stiffen = runs.ratio(1.0) > 1
+    first, diverged, step = 1.0, np.nan, BRACKET if stiffen else 1 / BRACKET
+    for _ in range(BRACKETS):
+        factor = first * step
+        ratio = runs.ratio(factor)
+        if stiffen and not np.isfinite(ratio):
+            diverged, step = factor, step**0.5
+        elif not np.isfinite(ratio) or (ratio > 1) != stiffen:
+            return first, factor, diverged
+        else:
+            still = abs(ratio - runs.ratio(first)) < SATURATED * abs(ratio)
+            first = factor
+            if stiffen and still and diverged != diverged:
+                break
+    return first, np.nan, diverged
+
+
 def _reachable(runs: _Runs, setting: Setting) -> bool:
     """Whether a large factor makes a setting stiff enough, or a small one soft enough."""
     untuned = runs.ratio(1.0, setting)
-    other = runs.ratio(STEP**MOST_STEPS if untuned > 1 else STEP**-MOST_STEPS, setting)
+    other = runs.ratio(BRACKET**BRACKETS if untuned > 1 else BRACKET**-BRACKETS, setting)
     return bool((untuned > 1) != (other > 1)) and bool(np.isfinite(untuned + other))
 
 
 def _converged(runs: _Runs, setting: Setting) -> bool:
     found = runs(1.0, setting)
-    return _rests(found) and abs(found.solver_error) <= max(CONVERGED, abs(found.definition_error))
+    return _rests(found) and abs(found.solver_error) <= CONVERGED
 
 
 def _needed(runs: _Runs, purpose: str, raised: str, serves: Callable[[_Runs, Setting], bool]) -> NeededSetting:
@@ -519,11 +550,11 @@ def _band(runs: _Runs, load: str, factor: float, within: float) -> LoadBand:
     errors = tuple(one.error if _rests(one) else np.nan for one in found)
     why = next((one.message for one in found if not _rests(one)), "")
     definition_error = found[SIZES.index(1.0)].definition_error
-    least, most = _range(np.array(sizes), np.array(errors), within)
+    least, most = range_within(np.array(sizes), np.array(errors), within)
     return LoadBand(load, sizes, errors, definition_error, within, least, most, why, unit)
 
 
-def _range(sizes: np.ndarray, errors: np.ndarray, within: float) -> tuple[float, float]:
+def range_within(sizes: np.ndarray, errors: np.ndarray, within: float) -> tuple[float, float]:
     """Return the range of sizes, about the least error, whose interpolated error and its margin are within."""
     bends = [
         abs(np.polyfit(sizes[place : place + 3], errors[place : place + 3], 2)[0])

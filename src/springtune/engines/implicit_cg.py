@@ -52,6 +52,7 @@ class _Session:
     laws=tuple(FORMULAS),
     parameters=as_they_are(*FORMULAS),
     implicit=True,
+    measured="1e-6, twenty scenes",
     source="Baraff 1998",
 )
 def session(net: SpringNet, setting: Setting, damping: float) -> Session:

@@ -10,14 +10,14 @@ Triangles of VBD and of the semi-implicit solver have one law, which is typed in
 
     W = A_0 [mu h/2 (tr C - 2 J) + (lambda + mu) h/2 (J - 1)^2]
 
-``tri_ke = mu h`` in both, but ``tri_ka = lambda h`` in VBD and ``(lambda + mu) h`` in the semi-implicit solver. At
-small strain it is St. Venant-Kirchhoff's law, which `delingette` has; at a strain e displacements differ by some 2 e.
-Style3D has stiffnesses along, across and in shear, and no contraction across: a material of nu = 0. It has no springs.
+``tri_ke = mu h`` in both, but ``tri_ka = lambda h`` in VBD and ``(lambda + mu) h`` in the semi-implicit one. At small
+strain it is St. Venant-Kirchhoff's law, which `delingette` has; at a strain e displacements differ by some 2 e. Style3D
+has stiffnesses along, across and in shear, and no contraction across: a material of nu = 0. It has no springs.
 
 What is set besides, because Newton's defaults differ: gravity 0 and no ground; radius of particles 0, so that they do
 not touch; ``tri_kd`` (10 by default) and ``kd`` 0; no limit of velocities (1e5 m/s); contacts of Style3D off; VBD's
-colours by springs, too, which `ModelBuilder.color` does not see. Left as they are: Style3D multiplies velocities by
-0.998 in each step, and takes 10 iterations of conjugate gradients in each of its iterations.
+colours by springs, too, which `ModelBuilder.color` does not see. Left as they are: Style3D scales velocities by 0.998
+in each step, and takes 10 iterations of conjugate gradients in each of its iterations.
 
 Newton holds particles as a whole. A direction held singly is put back after each step. The force that would have kept
 it there is added to the next step: at rest it is the support's reaction.
@@ -164,7 +164,8 @@ def _declare(order: float, name: str, solver: str, summary: str, parameters: dic
         return ({"ke": net.stiffness} if np.any(net.stiffness) else {}) | triangle_numbers(net, solver)
 
     session.__doc__ = f"Newton's solver {solver}: {summary}"
-    declared = {"laws": ("biquadratic",), "source": "Newton 1.8, newton.solvers"} | own
+    measured = "1e-3, ten scenes, by the law that it has"
+    declared = {"laws": ("biquadratic",), "measured": measured, "source": "Newton 1.8, newton.solvers"} | own
     engine(
         name,
         order=order,
@@ -178,10 +179,18 @@ def _declare(order: float, name: str, solver: str, summary: str, parameters: dic
     )(session)
 
 
-IMPLICIT = {"implicit": True, "dampers": {"kd": DASHPOT}}
+IMPLICIT_WITH_KD = {"implicit": True, "dampers": {"kd": DASHPOT}}
 
-_declare(150, "newton-vbd", "VBD", "implicit steps by vertex block descent", VBD, **IMPLICIT)
-_declare(151, "newton-xpbd", "XPBD", "springs alone, all at once in an iteration", {"ke": SPRING}, laws=(), **IMPLICIT)
+_declare(150, "newton-vbd", "VBD", "implicit steps by vertex block descent", VBD, **IMPLICIT_WITH_KD)
+_declare(
+    151,
+    "newton-xpbd",
+    "XPBD",
+    "springs alone, all at once in an iteration",
+    {"ke": SPRING},
+    laws=(),
+    **IMPLICIT_WITH_KD,
+)
 _declare(
     152,
     "newton-semi-implicit",

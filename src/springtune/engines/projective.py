@@ -1,11 +1,11 @@
 """Projective dynamics: Liu, Bargteil, O'Brien and Kavan, Fast simulation of mass-spring systems, ACM TOG 32(6), 2013.
 
 An iteration has a local step, which turns each spring of rest length into its direction, and a global one, a linear
-system ``M / h^2 + L`` that is factorized once. L is the Laplacian of the stiffnesses: it resists as much across a spring
-as along it. Both steps together are ``x - (M / h^2 + L)^-1 g`` with g the gradient of the step's energy (Liu, Bouaziz
-and Kavan, Quasi-Newton methods for real-time simulation of hyperelastic materials, ACM TOG 36(3), 2017), which is how
-they are taken here. They begin at the inertial position. The energy falls in each iteration, fast where springs are
-stretched and slowly where they turn, as in bending.
+system ``M / h^2 + L`` that is factorized once. L is the Laplacian of the stiffnesses: it resists as much across a
+spring as along it. Both steps together are ``x - (M / h^2 + L)^-1 g`` with g the gradient of the step's energy (Liu,
+Bouaziz and Kavan, Quasi-Newton methods for real-time simulation of hyperelastic materials, ACM TOG 36(3), 2017), which
+is how they are taken here. They begin at the inertial position. The energy falls in each iteration, fast where springs
+are stretched and slowly where they turn, as in bending.
 """
 
 import numpy as np
@@ -42,18 +42,21 @@ class _Session(Textbook):
     def __init__(self, net: SpringNet, setting: Setting, damping: float) -> None:
         pulling(net, "the global step needs a positive one")
         super().__init__(net, setting, damping)
-        self.factors = [self._factor(net.held[:, axis]) for axis in range(2)]
-        self.descent = np.empty_like(self.x)
+        alike = np.array_equal(net.held[:, 0], net.held[:, 1])
+        self.systems = [
+            (self._factor(net.held[:, axes.start]), axes)
+            for axes in ([np.s_[0:2]] if alike else [np.s_[0:1], np.s_[1:2]])
+        ]
+        self.descent = np.empty_like(self.x, order="F")  # as the factors take it
 
     def _factor(self, held: np.ndarray) -> SuperLU:
-        """Factorized system of one direction, a unit matrix where particles are held."""
+        """Factorized system of a direction, a unit matrix where particles are held."""
         first, second = self.springs.T
         rows, columns = np.concatenate([first, second]), np.concatenate([second, first])
         links = coo_array((np.tile(self.stiffness, 2), (rows, columns)), shape=(len(held), len(held)))
         free = diags_array((~held).astype(self.kind))
-        matrix = free @ (diags_array(self.inertia + links.sum(axis=1)) - links) @ free + diags_array(
-            1 - free.diagonal()
-        )
+        whole = diags_array(self.inertia + links.sum(axis=1)) - links
+        matrix = free @ whole @ free + diags_array(1 - free.diagonal())
         return splu(
             csc_array(matrix, dtype=self.kind),
             permc_spec="MMD_AT_PLUS_A",
@@ -67,12 +70,12 @@ class _Session(Textbook):
         of_springs = self.springs, self.lengths, self.stiffness
         for _ in range(self.iterations):
             _descent(x, y, self.inertia, self.weights, *of_springs, self.descent)
-            for axis, factor in enumerate(self.factors):
-                x[:, axis] += factor.solve(self.descent[:, axis])
+            for factor, axes in self.systems:
+                x[:, axes] += factor.solve(self.descent[:, axes])
         return x
 
 
-@engine("projective", order=30, implicit=True, source="Liu 2013")
+@engine("projective", order=30, implicit=True, measured="1e-6, twenty scenes", source="Liu 2013")
 def session(net: SpringNet, setting: Setting, damping: float) -> Session:
     """Projective dynamics: local directions of springs, and a global linear system that is factorized once."""
     return _Session(net, setting, damping)

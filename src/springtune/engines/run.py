@@ -30,8 +30,11 @@ REST = {"float64": 1e-7, "float32": 1e-4}
 BLOWN = 1e2
 """Displacement over the body's extent beyond which a run has diverged."""
 
-RECALLED = 32
-"""Last displacements that tell whether a run swings."""
+RECALLED = 16
+"""Windows of a run that tell whether it swings."""
+
+LOOKS = 8
+"""Looks at a window at most, since a swing may repeat itself in each."""
 
 STEADY = 0.8
 """Amplitude of the later half of these over that of the earlier one, above which a swing is not on its way to rest."""
@@ -258,12 +261,12 @@ def follow(session: Session, window: int, most: int, tolerance: float, extent: f
     Where the changes in windows of frames shrink by a ratio r, the rest of the way is the last change times r / (1 -
     r). A rising r tells of a slower motion below, so r is taken as if it rose on. A run rests where the rest of the way
     stays below `tolerance` of the displacement in `CALM` windows, or where it trembles by less, as rounding does.
-    Within a window there is a second look, since a swing may repeat itself in each.
     """
-    seen: list[np.ndarray] = [session.displacements()]
+    seen: list[np.ndarray] = []
     seconds: list[float] = []
-    last, before, gap, done, calm = seen[0], np.inf, 1.0, 0, 0
+    last, before, gap, done, calm = session.displacements(), np.inf, 1.0, 0, 0
     while done < most:
+        looks = []
         for count in _pieces(min(window, most - done)):
             begin = time.perf_counter()
             session.advance(count)
@@ -273,8 +276,9 @@ def follow(session: Session, window: int, most: int, tolerance: float, extent: f
             size = float(np.abs(now).max())
             if not size <= BLOWN * extent:
                 return Ended(np.full(now.shape, np.nan), "diverged", _why(done), done, _frame(seconds), np.nan)
-            aside = float(np.abs(now - seen[-1]).max())
-            seen = [*seen[1 - RECALLED :], now]
+            looks.append(now)
+        seen = [*seen[1 - RECALLED :], np.stack([np.mean(looks, axis=0), np.min(looks, axis=0), np.max(looks, axis=0)])]
+        aside = float(np.abs(now - np.array(looks)).max())
         change, wider = float(np.abs(now - last).max()), gap
         ratio = change / before if before else float(change > 0)
         gap = 1 - min(ratio, SLOWEST)
@@ -290,24 +294,25 @@ def follow(session: Session, window: int, most: int, tolerance: float, extent: f
         said = f"swings by {swing:.3g} m about its mean after {done} frames; take more substeps or damping"
         return Ended(_mean(seen), "swings", said, done, _frame(seconds), swing)
     said = f"not at rest after {done} frames, still moving by {change:.3g} m in {window}; give more frames"
-    return Ended(seen[-1], "moving", said, done, _frame(seconds), swing)
+    return Ended(now, "moving", said, done, _frame(seconds), swing)
 
 
-def _pieces(window: int) -> tuple[int, ...]:
-    """Frames up to the second look within a window, and from there on; not halves, which a swing may share."""
-    first = ceil(0.6 * window)
-    return (first, window - first) if first < window else (window,)
+def _pieces(window: int) -> list[int]:
+    """Frames between looks at a window."""
+    each = ceil(window / LOOKS)
+    return [min(each, window - done) for done in range(0, window, each)]
 
 
 def _mean(seen: list[np.ndarray]) -> np.ndarray:
-    """Mean displacement, the first and last ones with less weight: no swing has whole periods in it."""
-    found: np.ndarray = np.average(seen, axis=0, weights=np.hanning(len(seen) + 2)[1:-1])
+    """Mean displacement, of the first and last windows with less weight: no swing has whole periods in them."""
+    found: np.ndarray = np.average([mean for mean, _, _ in seen], axis=0, weights=np.hanning(len(seen) + 2)[1:-1])
     return found
 
 
 def _swing(seen: list[np.ndarray]) -> float:
     """Largest amplitude about a mean [m]."""
-    return float(np.ptp(seen, axis=0).max() / 2)
+    low, high = np.min([low for _, low, _ in seen], axis=0), np.max([high for _, _, high in seen], axis=0)
+    return float((high - low).max() / 2)
 
 
 def _trembles(seen: list[np.ndarray]) -> bool:

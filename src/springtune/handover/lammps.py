@@ -20,10 +20,10 @@ from .terms import Net
 BOND_STYLE = "bpm/spring break no smooth no"
 """Style of all bonds; its coefficients are stiffness [N/m], strain at break, which means nothing here, and damping."""
 
-SETTLED = 1e-10
+BALANCED = 1e-10
 """Force out of balance that ends the minimization, over the load [1]."""
 
-MOST_STEPS = 1_000_000
+LONGEST_MINIMIZATION = 1_000_000
 """Steps of the minimization at most."""
 
 
@@ -85,7 +85,7 @@ def _script(net: Net, simulation: Simulation, data: str, stiffness: list[float])
         "thermo 1000",
         "min_style fire",
         "min_modify tmax 1.0",
-        *([f"minimize 0.0 {SETTLED * load!r} {MOST_STEPS} {MOST_STEPS}"] if load else []),
+        *([f"minimize 0.0 {BALANCED * load!r} {LONGEST_MINIMIZATION} {LONGEST_MINIMIZATION}"] if load else []),
         "# A motion in the place of the minimization, critically damped:",
         f'# variable fx atom "d_fx{damping}x"',
         f'# variable fy atom "d_fy{damping}y"',

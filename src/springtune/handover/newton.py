@@ -24,6 +24,12 @@ LAWS = ("biquadratic",)
 ITERATIONS = 10
 """Iterations in which VBD converges in a step that is stable in explicit schemes."""
 
+SLOW, PATIENT = 300, (3.0, 60)
+"""Loaded period over the largest explicit step above which a step is three times that one, with more iterations.
+
+In single precision, what is left of h^2 f / m below the last place of a position is lost in each step.
+"""
+
 DECAYS = 12
 """Times in which the slowest mode comes down to 1/e that a script runs for."""
 
@@ -126,6 +132,7 @@ def newton_script(net: Net) -> str:
     ['TRI_KE = 384.6', 'TRI_KA = 329.6']
     """
     simulation = _simulated(net)
+    step, iterations = _pace(simulation)
     shear, first = membrane(net)
     there = net.stiffness != 0
     expected = simulation.displacements
@@ -139,8 +146,8 @@ def newton_script(net: Net) -> str:
         "COLOURS": [group.tolist() for group in colours(net)],
         "TRI_KE": shear,
         "TRI_KA": first,
-        "STEP": simulation.step,
-        "ITERATIONS": ITERATIONS,
+        "STEP": step,
+        "ITERATIONS": iterations,
         "SECONDS": _seconds(simulation),
         "MASS_DAMPING": simulation.mass_damping,
     }
@@ -161,10 +168,18 @@ def _simulated(net: Net) -> Simulation:
     return simulate(net, "Newton", LAWS, membrane_energies)
 
 
+def _pace(simulation: Simulation) -> tuple[float, int]:
+    """Step of a file [s], and iterations in which VBD converges in it."""
+    loaded, largest = simulation.loaded_frequency, simulation.largest_step
+    if loaded and 2 * np.pi / loaded > SLOW * largest:
+        return PATIENT[0] * largest, PATIENT[1]
+    return simulation.step, ITERATIONS
+
+
 def _step(simulation: Simulation) -> str:
     """What the step of a file is, for its comments."""
-    share = simulation.step / simulation.largest_step
-    return f"the one here is {share:.2g} of it, in which {ITERATIONS} iterations of VBD converge"
+    step, iterations = _pace(simulation)
+    return f"the one here is {step / simulation.largest_step:.2g} times that, in which {iterations} iterations converge"
 
 
 def _seconds(simulation: Simulation) -> float:
@@ -220,7 +235,7 @@ def Xform "sheet" (prepend apiSchemas = ["PhysicsDeformableBodyAPI"])
 }}
 '''
 
-LEFT = (
+TO_SET = (
     "Newton's importer reads particles, masses and triangles. It takes tri_ke = E h / (1 - nu^2) and tri_ka = 0, which",
     "is another material: a script sets builder.tri_materials[t] = (triKe, triKa, 0, 0, 0) of all triangles. It also",
     "sets builder.particle_mass[i] = 0 where held has particle i with both its axes, 0 and 1, and ahead of each step",
@@ -241,7 +256,7 @@ def newton_usd(net: Net) -> str:
         )
     shear, first = membrane(net)
     moved = np.zeros((0, 2)) if simulation.displacements is None else simulation.displacements
-    said = "\n".join([*about(net, simulation, _step(simulation)), *_law(net), *LEFT])
+    said = "\n".join([*about(net, simulation, _step(simulation)), *_law(net), *TO_SET])
     return USD.format(
         about=said.replace("\\", "/").replace('"', "'"),
         counts=[3] * len(net.triangles),

@@ -185,7 +185,7 @@ def network_of(net: Net, reference: float, energies: Callable[[Net, float], list
     return Network(mesh, net.held, net.stiffness / reference, (energies or _energies)(net, reference))
 
 
-ENERGIES: dict[str, tuple[type[Energy], tuple[str, ...]]] = {
+MADE_OF: dict[str, tuple[type[Energy], tuple[str, ...]]] = {
     "area": (AreaEnergy, ("modulus",)),
     "angle": (AngleEnergy, ("modulus",)),
     "biquadratic": (BiquadraticEnergy, ("tensile", "coupling")),
@@ -199,7 +199,7 @@ def _energies(net: Net, reference: float) -> list[Energy]:
     """Energies that the terms of a net were written from."""
     found = []
     for terms in net.energies:
-        made, names = ENERGIES[terms.kind]
+        made, names = MADE_OF[terms.kind]
         moduli = [terms.values[name] / reference for name in names]
         there = np.any([one.reshape(len(one), -1).any(axis=1) for one in moduli], axis=0)  # others have no such energy
         moduli = [one[there] for one in moduli]

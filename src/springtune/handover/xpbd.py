@@ -51,7 +51,7 @@ _GRADIENT = {
 
 _DILATION = "(r - 1) sqrt(2 r + 1) / r"
 
-FORMULAS: dict[str, dict[str, str]] = {
+CONSTRAINTS: dict[str, dict[str, str]] = {
     "area": {"C": "(A - rest_area), A the area of the cell"},
     "biquadratic": {"C": "(l_i^2 - rest_length_i^2) for i = 0, 1, 2, l_i the side opposite particle i"},
     "incompressible": _GRADIENT
@@ -70,7 +70,7 @@ FORMULAS: dict[str, dict[str, str]] = {
 }
 """Constraints of a cell by kind of its energy."""
 
-UNITS = {"rest_slope": "1/m", "stiffening": "1"}
+OWN_UNITS = {"rest_slope": "1/m", "stiffening": "1"}
 """Units of what the terms of an energy do not have."""
 
 COMPLIANCE_UNITS = {"area": "m3/N", "biquadratic": "m3/N", "incompressible": "1/(N m)", "compressible": "1/(N m)"}
@@ -90,6 +90,13 @@ def blocks(net: Net) -> list[Blocks]:
     """Constraints of the energies besides springs; ValueError if a spring or an energy has no positive compliance."""
     _check_positive(net, net.stiffness, "springs have a negative stiffness", len(net.springs))
     return [_blocks(net, terms) for terms in net.energies]
+
+
+def compliances(net: Net) -> dict[str, Any]:
+    """Compliances of springs and of blocks, by name; infinite where a definition gives an edge no spring."""
+    with np.errstate(divide="ignore"):
+        found: dict[str, Any] = {"compliance": 1 / net.stiffness} if np.any(net.stiffness) else {}
+    return found | {f"{one.kind} compliance": one.compliance for one in blocks(net)}
 
 
 def _check_positive(net: Net, values: np.ndarray, which: str, count: int) -> None:
@@ -148,7 +155,7 @@ def xpbd(net: Net) -> str:
     >>> found["inverse_masses"][0], f"{found['constraints']['compliance'][0]:.3g} m/N"
     (0.0, '1.1e-08 m/N')
     """
-    simulation = simulate(net, "XPBD", FORMULAS)
+    simulation = simulate(net, "XPBD", CONSTRAINTS)
     of_cells = blocks(net)
     there = net.stiffness > 0
     whole = np.asarray(net.held.all(axis=1))
@@ -176,10 +183,10 @@ def xpbd(net: Net) -> str:
 
 
 def _as_json(one: Blocks) -> dict[str, Any]:
-    units = {name: VALUES[one.kind].get(name) or UNITS[name] for name in one.values}
+    units = {name: VALUES[one.kind].get(name) or OWN_UNITS[name] for name in one.values}
     return {
         "kind": one.kind,
-        "formulas": FORMULAS[one.kind],
+        "formulas": CONSTRAINTS[one.kind],
         "units": units | {"compliance": COMPLIANCE_UNITS[one.kind]},
         "particles": one.cells.tolist(),
         **{name: values.tolist() for name, values in one.values.items()},

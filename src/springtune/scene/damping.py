@@ -15,14 +15,14 @@ from .single import Scene
 Numbers = float | str | Sequence[float | str] | np.ndarray
 """A number of one measured mode, or two of two."""
 
-RATIOS: dict[str, tuple[float, Callable[[float], float]]] = {
+MEASURES: dict[str, tuple[float, Callable[[float], float]]] = {
     "decrement": (np.inf, lambda value: value / np.hypot(2 * np.pi, value)),
     "ratio": (1.0, lambda value: value),
     "loss_factor": (2.0, lambda value: value / 2),
 }
 """Measures of a decay: what they are below, and the damping ratio that they mean."""
 
-CLOSE = 0.01
+SAME_MODE = 0.01
 """Relative difference of frequencies that no note is made of."""
 
 
@@ -85,10 +85,14 @@ class Damping(Tabled):
     stiffness_factor: float = 1.0
     notes: tuple[str, ...] = ()
 
+    @cached_property
+    def _motion(self) -> Motion:
+        return _loaded(self.scene)
+
     @property
     def frequency(self) -> float:
         """Frequency of the loaded mode of the scene, without damping [rad/s]."""
-        return _loaded(self.scene).loaded_frequency
+        return self._motion.loaded_frequency
 
     @property
     def period(self) -> float:
@@ -125,9 +129,8 @@ class Damping(Tabled):
         shares = np.maximum(network.stiffness, 0.0)
         if not shares.any():
             shares = np.ones_like(shares)
-        motion = _loaded(self.scene)
-        frequency, shape = motion.loaded_mode
-        matrix = Motion(network, motion.inertia[:, 0], dampers=shares).damper_matrix
+        frequency, shape = self._motion.loaded_mode
+        matrix = Motion(network, self._motion.inertia[:, 0], dampers=shares).damper_matrix
         return self.scene.springs.reference * 2 * self.ratio * frequency / (shape @ (matrix @ shape)) * shares
 
     def options(self, over: str) -> dict[str, Any]:
@@ -297,7 +300,7 @@ def damping_of(
     >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "5 mm"), rubber, "bending", "1 mN")
     >>> damping = st.damping_of(scene, decrement=0.3, period="0.19 s")
     >>> print(*damping.notes[0].split("; "), sep="\n")
-    the measured period is 13 % longer than the scene's
+    the measured period is 1.13 times the scene's
     multiply stiffnesses by 0.784 or the density by 1.28, and ask again
 
     Two modes, and one number too few:
@@ -358,7 +361,7 @@ def _ratios(given: dict[str, Numbers | None]) -> tuple[str, list[float]]:
         said = " and ".join(f"{name}={value!r}" for name, value in known.items()) or "nothing was measured"
         raise ValueError(f"{', '.join(given)}: {said}; give one of them, such as decrement=0.3")
     [(name, value)] = known.items()
-    most, ratio = RATIOS[name]
+    most, ratio = MEASURES[name]
     numbers = [np.nan if isinstance(one, str | bool) else float(one) for one in _values(name, value)]
     if not all(0 < one < most for one in numbers):
         raise ValueError(f"{name}: {value!r} is not a number above zero and below {most:g}; give one")
@@ -368,7 +371,7 @@ def _ratios(given: dict[str, Numbers | None]) -> tuple[str, list[float]]:
 def _rayleigh(name: str, ratios: list[float], frequencies: list[float]) -> tuple[float, float]:
     """Alpha [1/s] and beta [s] that give two modes their ratios."""
     share = frequencies[1] / frequencies[0]
-    if abs(share - 1) > CLOSE:
+    if abs(share - 1) > SAME_MODE:
         matrix = [[0.5 / frequency, 0.5 * frequency] for frequency in frequencies]
         alpha, beta = np.linalg.solve(matrix, ratios).tolist()
         if alpha >= 0 and beta >= 0:
@@ -382,13 +385,13 @@ def _rayleigh(name: str, ratios: list[float], frequencies: list[float]) -> tuple
 
 def _notes(factor: float, measured: list[float], own: float) -> tuple[str, ...]:
     """What a measured period says of the stiffness, and the frequency of a loss factor of what it is for."""
-    longer = 1 / np.sqrt(factor) - 1
-    if abs(longer) > CLOSE:
+    longer = 1 / np.sqrt(factor)
+    if abs(longer - 1) > SAME_MODE:
+        remedy = f"multiply stiffnesses by {factor:.3g} or the density by {1 / factor:.3g}, and ask again"
+        return (f"the measured period is {longer:.3g} times the scene's; {remedy}",)
+    if len(measured) == 1 and abs(measured[0] / own - 1) > SAME_MODE:
+        there, here = measured[0] / (2 * np.pi), own / (2 * np.pi)
         return (
-            f"the measured period is {100 * abs(longer):.2g} % {'longer' if longer > 0 else 'shorter'} than the "
-            f"scene's; multiply stiffnesses by {factor:.3g} or the density by {1 / factor:.3g}, and ask again",
+            f"the loss factor is of {there:.3g} Hz, and the loaded mode at {here:.3g} Hz; give the one of {here:.3g}",
         )
-    if len(measured) == 1 and abs(measured[0] / own - 1) > CLOSE:
-        hertz, loaded = measured[0] / (2 * np.pi), own / (2 * np.pi)
-        return (f"the loss factor is of {hertz:.3g} Hz, and the loaded mode at {loaded:.3g} Hz; give the one of there",)
     return ()

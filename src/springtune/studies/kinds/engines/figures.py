@@ -389,10 +389,13 @@ def plot_engine_factors(data, ax=None, *, scene=None):
     panel.set(xscale="log", yscale=scale, xlabel="Iterations", ylabel="Best factor on what is typed")
     panel.set_title(case.scene.item())
     style.plain(panel, "x", *(["y"] if scale == "log" else []))
-    _across(panel, 1)
+    if ends:
+        _across(panel, 1)
     curves = {tuple(row[name] for name in ("engine", "definition", *SETTING)): row["best_factor"] for row in every}
     lost = sum(np.isnan(list(curves.values())))
-    why = "" if ends else f"None of {len(curves)} curves has a factor at which the displacement is right."
+    without = _lost(runs)
+    why = f"None of {len(curves)} curves has a factor at which the displacement is right"
+    why = "" if ends else f"{why}; {without}." if without else f"{why}."
     said = f"{lost} of {len(curves)} curves have no such factor" if lost else ""
     labels.finish(figure, axes, place, {panel: (ends, said, why)}, 2.6 if ax is None else 0.0)
     return panel

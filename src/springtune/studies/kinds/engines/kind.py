@@ -13,6 +13,7 @@ from springtune.problem.geometry import Beam
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import Material
 from springtune.problem.quantities import nearest
+from springtune.registry import imported
 from springtune.springs import DEFINITIONS
 from springtune.springs.lattice import COEFFICIENT
 
@@ -65,6 +66,7 @@ def _read_frame(value: str) -> float:
 
 _WHOLE = number("a whole number from 1 to 100000, such as 10", 1, 100_000, whole=True)
 Count = Annotated[int, _WHOLE]
+Distance = Annotated[float, number("a number up to 0.01, such as 0.0001", 0, 0.01, above=True)]
 EngineName = Annotated[str, Scalar(str, {"type": "string", "examples": ["xpbd"]}, "an engine such as 'xpbd'")]
 FrameTime = Annotated[
     float, Scalar(_read_frame, {"type": "string", "examples": ["1/60 s"]}, "a time such as '1/60 s' or '5 ms'")
@@ -119,6 +121,11 @@ class EnginesConfig(Section):
         description="Sets of runs."
     )
     frames: Count | None = Field(None, description="Most frames of a run; by default as many as its motion needs.")
+    tolerance: Distance | None = Field(
+        None,
+        description="Distance from rest at which a run ends, over its displacement; by default 1e-7, and 1e-4 in "
+        "single precision.",
+    )
 
 
 @dataclass(frozen=True)
@@ -144,14 +151,13 @@ class EngineRun:
     iterations: int
     stiffness_factor: float
     frames: int | None
+    tolerance: float | None
     of_curve: bool
 
 
 def _engines():
-    # Here, since a study without engines needs none of their modules.
-    from springtune.engines.base import ENGINES
-
-    return ENGINES
+    # By name, since no dataset of other studies is to depend on the modules of engines.
+    return imported("engines.base:ENGINES")
 
 
 def _check(config, problems):
@@ -211,8 +217,8 @@ def _expand(config, declared):
             body = declared.beams[scene.beam], scene.mesh_type, scene.mesh_size, declared.materials[scene.material]
             how = definition, engine, solver.program, precision, dt, substeps, iterations if solver.iterates else 1
             of_curve = runs.stiffness_factor != [1.0]
-            run = EngineRun(name, *body, scene.load, scene.force, *how, factor, section.frames, of_curve)
-            found[run] = None
+            ending = section.frames, section.tolerance
+            found[EngineRun(name, *body, scene.load, scene.force, *how, factor, *ending, of_curve)] = None
     ranks = [list(one) for one in (section.scenes, DEFINITIONS, engines)]
 
     def order(run):
@@ -241,7 +247,7 @@ def _tasks(study):
     of_cell = ("scene", "definition", "engine", *SETTING, "stiffness_factor")
     for run in study.parts["engines"]:
         engine = _engines()[run.engine]
-        of_task = (*of_cell[1:], "mesh_type", "mesh_size", "load", "force", "frames")
+        of_task = (*of_cell[1:], "mesh_type", "mesh_size", "load", "force", "frames", "tolerance")
         values = {name: getattr(run, name) for name in of_task}
         values |= {"beam": beam_key(run.beam), "material": material_key(run.material, density=True)}
         values["engine_version"] = _version(engine)

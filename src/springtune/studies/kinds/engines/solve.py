@@ -32,7 +32,8 @@ def solve(task):
     scene, known, objection = _scene(*body, *(task[name] for name in OF_THE_SCENE))
     engine, setting = ENGINES[task["engine"]], (task["dt"], task["substeps"], task["iterations"], task["precision"])
     try:
-        found = in_engine(scene, engine.name, Setting(*setting), factor=task["stiffness_factor"], frames=task["frames"])
+        how = {"factor": task["stiffness_factor"], "frames": task["frames"], "tolerance": task["tolerance"]}
+        found = in_engine(scene, engine.name, Setting(*setting), **how)
     except EngineError as error:
         end = "absent" if isinstance(error, EngineAbsentError) else "refused"
         return known | failed(task, str(error), end)
