@@ -131,9 +131,7 @@ SPRING = Parameter("N/m", "k of the definition, one for each spring")
 
 DAMPERS: dict[str, Callable[[Damping], Any]] = {
     "alpha": lambda damping: damping.mass_damping,
-    "alpha m, one for each particle": lambda damping: (
-        damping.mass_damping * np.asarray(damping.scene.statement.masses())
-    ),
+    "alpha m, one for each particle": lambda damping: damping.particle_dampers,
     "beta": lambda damping: damping.stiffness_damping,
     "beta k, one for each spring": lambda damping: damping.dashpots,
     "beta k, one for all springs": lambda damping: damping.dashpots.mean(),
@@ -142,9 +140,6 @@ DAMPERS: dict[str, Callable[[Damping], Any]] = {
 
 DASHPOT = Parameter("N s/m", "beta k, one for each spring")
 """Damper of a spring."""
-
-VELOCITIES = Parameter("1/s", "alpha")
-"""Damping over mass by `springtune.in_engine`, which every engine has."""
 
 
 def typed_springs(net: SpringNet) -> dict[str, Any]:
@@ -182,7 +177,8 @@ class Engine(Declared):
     iterates : bool
         Whether iterations mean something to it.
     dampers : dict of str to Parameter
-        Dampers that are typed into it; their formulas are keys of `DAMPERS`.
+        Dampers that are typed into it; their formulas are keys of `DAMPERS`. Damping over mass by
+        `springtune.in_engine` is the default.
     implicit : bool
         Whether its steps, iterated to the end, are of implicit Euler, which damps by itself.
     typed : callable
@@ -209,6 +205,8 @@ class Engine(Declared):
     >>> scene = st.Scene(beam, st.make_mesh(beam, "right", "20 mm"), rubber, "traction", "0.2 N", definition="lattice")
     >>> net, setting = st.SpringNet.from_scene(scene), st.Setting("1 ms", iterations=100)
     >>> st.ENGINES["xpbd"].check(setting, net)
+    >>> list(st.ENGINES["xpbd"].numbers(net, setting))
+    ['compliance']
     >>> session = st.ENGINES["xpbd"].start(net, setting, damping=100.0)
     >>> session.advance(200)
     >>> session.displacements().shape == net.points.shape
@@ -223,7 +221,7 @@ class Engine(Declared):
     precisions: tuple[str, ...] = PRECISIONS
     parameters: Mapping[str, Parameter] = field(default_factory=lambda: {"stiffness": SPRING})
     iterates: bool = True
-    dampers: Mapping[str, Parameter] = field(default_factory=lambda: {"damping": VELOCITIES})
+    dampers: Mapping[str, Parameter] = field(default_factory=lambda: {"damping": Parameter("1/s", "alpha")})
     implicit: bool = False
     typed: Callable[..., dict[str, Any]] = field(default_factory=lambda: typed_springs)
     of_setting: bool = False

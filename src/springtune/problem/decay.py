@@ -1,5 +1,6 @@
 """Period and decrement of a measured swing, see `fit_decay`."""
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -95,37 +96,29 @@ def fit_decay(times: np.ndarray | str | Path, displacements: np.ndarray | None =
     """
     from scipy.optimize import least_squares
 
-    if displacements is None:
-        t, x = _read(times)  # type: ignore[arg-type]
-    else:
-        t, x = np.asarray(times, dtype=float), np.asarray(displacements, dtype=float)
-    _check(t, x)
-    begin, span = t[0], t[-1] - t[0]
-    x = (x - x.mean()) / np.std(x)  # the search ends at a gradient that is small beside 1
-
-    def columns(decay: float, frequency: float) -> np.ndarray:
-        phase = frequency * (t - begin)
-        shrunk = np.exp(-decay * (t - begin))
-        return np.stack([shrunk * np.cos(phase), shrunk * np.sin(phase), np.ones_like(t)], axis=1)
+    t, x = _read(times) if displacements is None else (np.asarray(times, float), np.asarray(displacements, float))
+    if t.ndim != 1 or t.shape != x.shape or len(t) < LEAST_POINTS:
+        raise ValueError(
+            f"times: have the shape {t.shape}, and displacements {x.shape}; give {LEAST_POINTS} points or more"
+        )
+    if not (np.isfinite([t, x]).all() and (np.diff(t) > 0).all()):
+        raise ValueError("times: are not ascending, or a value is no finite number; sort the points and leave gaps out")
+    t, x = t - t[0], (x - x.mean()) / (np.std(x) or 1.0)  # the search ends at a gradient that is small beside 1
 
     def left(guess: np.ndarray) -> np.ndarray:
-        basis = columns(*guess)
+        """What a wave of this decay and frequency leaves of the points, its amplitudes fitted."""
+        wave = np.exp((1j * guess[1] - guess[0]) * t)
+        basis = np.stack([wave.real, wave.imag, np.ones_like(t)], axis=1)
         return x - basis @ np.linalg.lstsq(basis, x, rcond=None)[0]
 
-    even = np.interp(np.linspace(t[0], t[-1], len(t)), t, x)
-    spectrum = np.abs(np.fft.rfft(even, 8 * len(even)))
-    start = 2 * np.pi * max(1, int(spectrum.argmax())) / (8 * span)
-    guesses = [(share * start, start) for share in (0.01, 0.05, 0.2)]
-    bounds = [(-5 / span, 0), (np.inf, np.inf)]
-    best = min((least_squares(left, one, bounds=bounds, x_scale=start, xtol=1e-12) for one in guesses),
-               key=lambda found: found.cost)  # fmt: skip
+    even = np.interp(np.linspace(0, t[-1], len(t)), t, x)
+    peak = max(1, np.abs(np.fft.rfft(even, 8 * len(t))).argmax())
+    start = 2 * np.pi * peak / (8 * t[-1])
+    best = least_squares(left, (0.05 * start, start), bounds=([-5 / t[-1], 0], np.inf), x_scale=start, xtol=1e-12)
     decay, frequency = best.x
     misfit = np.sqrt(2 * best.cost / len(x))
-    if not decay > 0 or misfit > MOST_MISFIT or frequency * span < 2 * np.pi:
-        raise ValueError(
-            "displacements: are no swing that decays over a period or more; give those of one mode that swings freely, "
-            "from after it is let go"
-        )
+    if not decay > 0 or misfit > MOST_MISFIT or frequency * t[-1] < 2 * np.pi:
+        raise ValueError("displacements: are no swing that decays, over a period or more; give those of one free mode")
     period, decrement = 2 * np.pi / frequency, 2 * np.pi * decay / frequency
     covariance = 2 * best.cost / (len(t) - 5) * np.linalg.inv(best.jac.T @ best.jac)
     slopes = np.array([[0, -period / frequency], [period, -decrement / frequency]])
@@ -133,25 +126,12 @@ def fit_decay(times: np.ndarray | str | Path, displacements: np.ndarray | None =
     return Decay(*map(float, (period, decrement, *errors, misfit)))
 
 
-def _check(t: np.ndarray, x: np.ndarray) -> None:
-    """Refuse points that are no measurement of a swing."""
-    if t.ndim != 1 or t.shape != x.shape or len(t) < LEAST_POINTS:
-        raise ValueError(
-            f"times: have the shape {t.shape}, and displacements {x.shape}; give {LEAST_POINTS} points or more of both"
-        )
-    if not (np.isfinite(t).all() and np.isfinite(x).all() and (np.diff(t) > 0).all()):
-        raise ValueError("times: are not ascending, or a value is no finite number; sort the points and leave gaps out")
-    if not np.ptp(x):
-        raise ValueError(f"displacements: are all {x[0]:g}; give points of a swing")
-
-
 def _read(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
     """Times [s] and displacements [m] of a CSV file."""
-    rows = csv_rows(path, ValueError, COLUMNS_OF_DECAY)
-    head = rows[0][1]
-    units = [column.partition("[")[2].partition("]")[0] for column in head]
-    if len(head) != 2 or not all(units):
-        raise ValueError(f"'{path}', line {rows[0][0]}: {','.join(head)!r} is no head of a decay; {COLUMNS_OF_DECAY}")
+    (line, head), *rows = csv_rows(path, ValueError, COLUMNS_OF_DECAY)
+    units = re.findall(r"\[(.+?)\]", ",".join(head))
+    if len(units) != 2:
+        raise ValueError(f"'{path}', line {line}: {','.join(head)!r} is no head of a decay; {COLUMNS_OF_DECAY}")
     scales = [positive(f"1 {unit}", kind, f"'{path}', head") for unit, kind in zip(units, ("time", "length"))]
-    times, moved = np.array(two_numbers(path, rows[1:], ValueError)).reshape(-1, 2).T
+    times, moved = np.array(two_numbers(path, rows, ValueError)).reshape(-1, 2).T
     return scales[0] * times, scales[1] * moved

@@ -1,7 +1,7 @@
 """Dampers of a scene that give its loaded mode a measured decay, over mass, over stiffness and along springs."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -15,12 +15,12 @@ from .single import Scene
 Numbers = float | str | Sequence[float | str] | np.ndarray
 """A number of one measured mode, or two of two."""
 
-MEASURES: dict[str, tuple[float, Callable[[float], float]]] = {
-    "decrement": (np.inf, lambda value: value / np.hypot(2 * np.pi, value)),
-    "ratio": (1.0, lambda value: value),
-    "loss_factor": (2.0, lambda value: value / 2),
+MEASURES: dict[str, Callable[[np.ndarray], np.ndarray]] = {
+    "decrement": lambda value: value / np.hypot(2 * np.pi, value),
+    "ratio": lambda value: value,
+    "loss_factor": lambda value: value / 2,
 }
-"""Measures of a decay: what they are below, and the damping ratio that they mean."""
+"""Damping ratios that measures of a decay mean."""
 
 SAME_MODE = 0.01
 """Relative difference of frequencies that no note is made of."""
@@ -33,14 +33,10 @@ class Damping(Tabled):
     Attributes
     ----------
     scene : Scene
+    motion : Motion
+        Of the scene about rest, without damping.
     ratio : float
         Damping ratio of the loaded mode [1].
-    mass_damping : float
-        Alpha, over mass [1/s]: alone it gives that ratio. A mode of n times the frequency gets the ratio over n.
-        Rigid motion is damped, too.
-    stiffness_damping : float
-        Beta, over stiffness [s]: alone it gives that ratio. A mode of n times the frequency gets n times the ratio.
-        Rigid motion is free.
     rayleigh : tuple of float
         Alpha [1/s] and beta [s] that act together: of two measured modes; of one, half of each.
     stiffness_factor : float
@@ -77,22 +73,33 @@ class Damping(Tabled):
     '98 uN s/m'
     """
 
-    scene: Scene = field(repr=False)
+    scene: Scene
+    motion: Motion
     ratio: float
-    mass_damping: float
-    stiffness_damping: float
     rayleigh: tuple[float, float]
     stiffness_factor: float = 1.0
     notes: tuple[str, ...] = ()
 
-    @cached_property
-    def _motion(self) -> Motion:
-        return _loaded(self.scene)
-
     @property
     def frequency(self) -> float:
         """Frequency of the loaded mode of the scene, without damping [rad/s]."""
-        return self._motion.loaded_frequency
+        return self.motion.loaded_frequency
+
+    @property
+    def mass_damping(self) -> float:
+        """Alpha, over mass [1/s]: alone it gives the ratio.
+
+        A mode of n times the frequency gets the ratio over n. Rigid motion is damped, too.
+        """
+        return 2 * self.ratio * self.frequency
+
+    @property
+    def stiffness_damping(self) -> float:
+        """Beta, over stiffness [s]: alone it gives the ratio.
+
+        A mode of n times the frequency gets n times the ratio. Rigid motion is free.
+        """
+        return 2 * self.ratio / self.frequency
 
     @property
     def period(self) -> float:
@@ -125,13 +132,11 @@ class Damping(Tabled):
         They are in proportion to stiffness, ``beta k``. Springs that push get none, and the others more. All have the
         same where the definition has energies alone.
         """
-        network = self.scene.network
-        shares = np.maximum(network.stiffness, 0.0)
-        if not shares.any():
-            shares = np.ones_like(shares)
-        frequency, shape = self._motion.loaded_mode
-        matrix = Motion(network, self._motion.inertia[:, 0], dampers=shares).damper_matrix
-        return self.scene.springs.reference * 2 * self.ratio * frequency / (shape @ (matrix @ shape)) * shares
+        stiffness = self.scene.network.stiffness
+        shares = np.maximum(stiffness, 0.0) if (stiffness > 0).any() else np.ones_like(stiffness)
+        shape = self.motion.loaded_mode[1]
+        matrix = self.scene.motion(released=True, dampers=shares).damper_matrix
+        return self.scene.springs.reference * 2 * self.ratio * self.frequency / (shape @ (matrix @ shape)) * shares
 
     def options(self, over: str) -> dict[str, Any]:
         """Options of `Scene.motion` that damp it.
@@ -208,37 +213,28 @@ class Damping(Tabled):
         ...     damping.implicit_euler(1 / 60)
         ... except ValueError as error:
         ...     print(error)
-        step: 16.7 ms of implicit Euler alone damp by a ratio of 0.312, not 0.0477; take 7 substeps or more of it
+        step: implicit Euler alone has a ratio of 0.312, not 0.0477; take 7 substeps or more
         >>> f"{1e3 * damping.implicit_euler('1 ms').stiffness_damping:.2f} ms"
         '1.55 ms'
         """
-        length = positive(step, "time", "step")
-        left = 1 - length / self.stiffness_damping
-        if left <= 0:
-            substeps = int(np.ceil(length / self.stiffness_damping))
-            raise ValueError(
-                f"step: {1e3 * length:.3g} ms of implicit Euler alone damp by a ratio of "
-                f"{self.frequency * length / 2:.3g}, not {self.ratio:.3g}; take {substeps} substeps or more of it"
-            )
+        share = positive(step, "time", "step") / self.stiffness_damping
+        if share >= 1:
+            ratios, count = f"{share * self.ratio:.3g}, not {self.ratio:.3g}", int(share) + 1
+            raise ValueError(f"step: implicit Euler alone has a ratio of {ratios}; take {count} substeps or more")
         alpha, beta = self.rayleigh
-        return replace(
-            self,
-            ratio=left * self.ratio,
-            mass_damping=left * self.mass_damping,
-            stiffness_damping=left * self.stiffness_damping,
-            rayleigh=(alpha, beta - length) if beta > length else (left * self.mass_damping, 0.0),
-        )
+        beta -= share * self.stiffness_damping
+        rayleigh = (alpha, beta) if beta > 0 else ((1 - share) * self.mass_damping, 0.0)
+        return replace(self, ratio=(1 - share) * self.ratio, rayleigh=rayleigh)
 
     def _rows(self) -> Iterator[tuple[str, str]]:
         alpha, beta = self.rayleigh
         yield "damping ratio", f"{self.ratio:.4g}, logarithmic decrement {self.decrement:.4g}"
         yield "loaded mode", f"{self.frequency / (2 * np.pi):.4g} Hz, period {number_text(self.period, 's')}"
         yield "over mass", f"{self.mass_damping:.4g} 1/s; damps slow modes and rigid motion most"
-        yield "over stiffness", f"{1e3 * self.stiffness_damping:.4g} ms; damps fast modes most, rigid motion not"
+        steps = f"{1e3 * self.stiffness_damping:.4g} ms, or steps of implicit Euler of that length"
+        yield "over stiffness", f"{steps}; damps fast modes most, rigid motion not"
         yield "together", f"{alpha:.4g} 1/s and {1e3 * beta:.4g} ms"
-        least, most = self.dashpots.min(), self.dashpots.max()
-        yield "dashpots", f"{least:.4g} to {most:.4g} N s/m, in place of over stiffness"
-        yield "implicit Euler", f"damps as much by itself in steps of {1e3 * self.stiffness_damping:.4g} ms"
+        yield "dashpots", f"{self.dashpots.min():.4g} to {self.dashpots.max():.4g} N s/m, in place of over stiffness"
         yield "notes", "; ".join(self.notes)
 
 
@@ -300,7 +296,7 @@ def damping_of(
     >>> scene = st.Scene(beam, st.make_mesh(beam, "structured", "5 mm"), rubber, "bending", "1 mN")
     >>> damping = st.damping_of(scene, decrement=0.3, period="0.19 s")
     >>> print(*damping.notes[0].split("; "), sep="\n")
-    the measured period is 1.13 times the scene's
+    measured at 0.885 times the frequency of the loaded mode
     multiply stiffnesses by 0.784 or the density by 1.28, and ask again
 
     Two modes, and one number too few:
@@ -312,86 +308,40 @@ def damping_of(
     ...     st.damping_of(scene, ratio=(0.05, 0.08), period="0.21 s")
     ... except ValueError as error:
     ...     print(error)
-    period: '0.21 s' and ratio are not as many; give one for each mode, or two of two
+    ratio: (0.05, 0.08) does not go with period='0.21 s', at=None; give period of each mode
     """
-    name, ratios = _ratios({"decrement": decrement, "ratio": ratio, "loss_factor": loss_factor})
-    timed, given, wrong, other = ("at", at, "period", period) if name == "loss_factor" else ("period", period, "at", at)
-    if other is not None:
-        raise ValueError(f"{wrong}: {other!r} does not go with {name}; give {timed} in its place")
-    values = [] if given is None else _values(timed, given)
-    if len(values) != len(ratios) and (values or len(ratios) == 2):
-        raise ValueError(f"{timed}: {given!r} and {name} are not as many; give one for each mode, or two of two")
-    if scene.network.rest_factor.negative_pivots:
-        raise ValueError(
-            f"definition '{scene.definition.name}': is unstable at rest, so that nothing swings; take another "
-            "definition or mesh"
-        )
-    own = _loaded(scene).loaded_frequency
-    alpha, beta, factor = ratios[0] * own, ratios[0] / own, 1.0
-    if timed == "at":
-        measured = [2 * np.pi * positive(one, "frequency", timed) for one in values]
-    else:
-        measured = [2 * np.pi / positive(one, "time", timed) / np.sqrt(1 - x**2) for one, x in zip(values, ratios)]
-        factor = (measured[0] / own) ** 2 if measured else 1.0
-        measured = [one / np.sqrt(factor) for one in measured]  # as damping goes with the scene's own mode
-    first = ratios[0]
-    if len(ratios) == 2:
-        alpha, beta = _rayleigh(name, ratios, measured)
-        first = (alpha / own + beta * own) / 2
-    return Damping(scene, first, 2 * first * own, 2 * first / own, (alpha, beta), factor, _notes(factor, measured, own))
-
-
-def _loaded(scene: Scene) -> Motion:
-    """Motion of a scene under its load at rest, also of one that turns."""
-    return scene.motion(released=True, load=scene.forces / scene.springs.reference)
-
-
-def _values(name: str, given: Numbers) -> list[Any]:
-    """One or two values."""
-    values = list(given) if isinstance(given, list | tuple | np.ndarray) else [given]
-    if len(values) not in (1, 2):
-        raise ValueError(f"{name}: {given!r} is neither one value nor two; give one for each measured mode")
-    return values
-
-
-def _ratios(given: dict[str, Numbers | None]) -> tuple[str, list[float]]:
-    """Name of the measure that is given, and the damping ratios that it means."""
+    given = {"decrement": decrement, "ratio": ratio, "loss_factor": loss_factor}
     known = {name: value for name, value in given.items() if value is not None}
     if len(known) != 1:
-        said = " and ".join(f"{name}={value!r}" for name, value in known.items()) or "nothing was measured"
-        raise ValueError(f"{', '.join(given)}: {said}; give one of them, such as decrement=0.3")
+        raise ValueError(f"{', '.join(given)}: {len(known)} are given; give one of them, such as decrement=0.3")
     [(name, value)] = known.items()
-    most, ratio = MEASURES[name]
-    numbers = [np.nan if isinstance(one, str | bool) else float(one) for one in _values(name, value)]
-    if not all(0 < one < most for one in numbers):
-        raise ValueError(f"{name}: {value!r} is not a number above zero and below {most:g}; give one")
-    return name, [ratio(one) for one in numbers]
-
-
-def _rayleigh(name: str, ratios: list[float], frequencies: list[float]) -> tuple[float, float]:
-    """Alpha [1/s] and beta [s] that give two modes their ratios."""
-    share = frequencies[1] / frequencies[0]
-    if abs(share - 1) > SAME_MODE:
-        matrix = [[0.5 / frequency, 0.5 * frequency] for frequency in frequencies]
-        alpha, beta = np.linalg.solve(matrix, ratios).tolist()
-        if alpha >= 0 and beta >= 0:
-            return alpha, beta
-    low, high = sorted((ratios[0] / share, ratios[0] * share))
-    raise ValueError(
-        f"{name}: damping ratios of {ratios[0]:.3g} and {ratios[1]:.3g}, of frequencies that are as 1 to {share:.3g}, "
-        f"and with damping over mass and stiffness the second ratio is {low:.3g} to {high:.3g}; give one mode"
-    )
-
-
-def _notes(factor: float, measured: list[float], own: float) -> tuple[str, ...]:
-    """What a measured period says of the stiffness, and the frequency of a loss factor of what it is for."""
-    longer = 1 / np.sqrt(factor)
-    if abs(longer - 1) > SAME_MODE:
+    values = np.atleast_1d(np.asarray(value))
+    ratios = MEASURES[name](values) if values.dtype.kind in "fiu" else np.zeros(0)
+    if ratios.shape not in ((1,), (2,)) or not ((0 < ratios) & (ratios < 1)).all():
+        raise ValueError(f"{name}: {value!r} does not mean a damping ratio above 0 and below 1; give a number, or two")
+    timed, told, other = ("at", at, period) if name == "loss_factor" else ("period", period, at)
+    times = [] if told is None else np.atleast_1d(np.array(told, dtype=object)).tolist()
+    if other is not None or len(times or ratios[:1]) != len(ratios):
+        raise ValueError(f"{name}: {value!r} does not go with period={period!r}, at={at!r}; give {timed} of each mode")
+    if scene.network.rest_factor.negative_pivots:
+        raise ValueError(f"definition '{scene.definition.name}': is unstable at rest; take another definition or mesh")
+    motion = scene.motion(released=True, load=scene.forces / scene.springs.reference)  # also of a load that turns
+    own = motion.loaded_frequency
+    if timed == "at":
+        measured = 2 * np.pi * np.array([positive(one, "frequency", timed) for one in times])
+        apart = measured[0] / own if len(times) == 1 else 1.0
+        factor, remedy = 1.0, f"give the loss factor at {own / (2 * np.pi):.3g} Hz"
+    else:
+        measured = 2 * np.pi / np.array([positive(one, "time", timed) for one in times]) / np.sqrt(1 - ratios**2)
+        apart = measured[0] / own if times else 1.0
+        factor = apart**2
         remedy = f"multiply stiffnesses by {factor:.3g} or the density by {1 / factor:.3g}, and ask again"
-        return (f"the measured period is {longer:.3g} times the scene's; {remedy}",)
-    if len(measured) == 1 and abs(measured[0] / own - 1) > SAME_MODE:
-        there, here = measured[0] / (2 * np.pi), own / (2 * np.pi)
-        return (
-            f"the loss factor is of {there:.3g} Hz, and the loaded mode at {here:.3g} Hz; give the one of {here:.3g}",
-        )
-    return ()
+    note = f"measured at {apart:.3g} times the frequency of the loaded mode; {remedy}"
+    relative = measured / (apart * own) if times else np.ones(1)
+    rows = np.stack([1 / relative, relative], axis=1) / 2
+    shares = np.linalg.lstsq(rows, ratios, rcond=None)[0].clip(0)  # of one mode both are the same
+    if not np.allclose(rows @ shares, ratios):
+        low, high = sorted(ratios[0] * relative[::-1] / relative)
+        raise ValueError(f"{name}: dampers give the second mode a ratio from {low:.3g} to {high:.3g}; give one mode")
+    notes = (note,) if abs(apart - 1) > SAME_MODE else ()
+    return Damping(scene, motion, shares.mean(), (shares[0] * own, shares[1] / own), factor, notes)
