@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import springtune as st
+from springtune.engines import base
 
 BEAM = st.Beam("80 mm", "40 mm", thickness="2 mm")
 E, NU, H = 1e6, 0.3, 2e-3
@@ -53,10 +54,10 @@ def test_xpbd_refuses_springs_that_it_leaves_out():
 
 @pytest.mark.parametrize("engine", SOLVERS)
 def test_an_absent_newton_is_refused_by_name_with_its_command(engine):
-    one = st.ENGINES[engine]
-    assert one.needs == ("newton", "warp")
-    with pytest.raises(st.EngineError, match=rf"engine '{engine}' needs no_newton; .*pip install .*\[newton\]"):
-        replace(one, needs=("no_newton",)).check(st.Setting())
+    absent = replace(st.ENGINES[engine], needs=("newton_of_nobody",))
+    given = net("delingette" if engine == "newton-style3d" else "patch")
+    with pytest.raises(base.EngineAbsentError, match=rf"engine '{engine}' needs newton_of_.*pip install .*\[newton\]"):
+        absent.check(st.Setting(), given)
 
 
 @pytest.mark.parametrize("engine", SOLVERS)

@@ -36,13 +36,9 @@ from .base import DASHPOT, SPRING, EngineError, Parameter, Session, Setting, eng
 FASTEST = 1e30
 """Largest velocity [m/s]: none. By default Newton has 1e5."""
 
-SHEAR_PARAMETER = Parameter("N/m", "mu h = E h / (2 (1 + nu))")
-VBD = {"ke": SPRING, "tri_ke": SHEAR_PARAMETER, "tri_ka": Parameter("N/m", "lambda h = E h nu / (1 - nu^2)")}
-SEMI_IMPLICIT = {
-    "ke": SPRING,
-    "tri_ke": SHEAR_PARAMETER,
-    "tri_ka": Parameter("N/m", "(lambda + mu) h = E h / (2 (1 - nu))"),
-}
+TRI_KE = Parameter("N/m", "mu h = E h / (2 (1 + nu))")
+VBD = {"ke": SPRING, "tri_ke": TRI_KE, "tri_ka": Parameter("N/m", "lambda h = E h nu / (1 - nu^2)")}
+SEMI_IMPLICIT = {"ke": SPRING, "tri_ke": TRI_KE, "tri_ka": Parameter("N/m", "(lambda + mu) h = E h / (2 (1 - nu))")}
 STYLE3D = {"tri_aniso_ke": Parameter("N/m", "(E h, E h, E h / 2) along, across, in shear; for nu = 0 alone")}
 
 
