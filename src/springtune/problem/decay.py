@@ -4,6 +4,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -96,7 +97,7 @@ def fit_decay(times: np.ndarray | str | Path, displacements: np.ndarray | None =
     """
     from scipy.optimize import least_squares
 
-    t, x = _read(times) if displacements is None else (np.asarray(times, float), np.asarray(displacements, float))
+    t, x = (np.asarray(one, float) for one in (_read(times) if displacements is None else (times, displacements)))
     if t.ndim != 1 or t.shape != x.shape or len(t) < LEAST_POINTS:
         raise ValueError(
             f"times: have the shape {t.shape}, and displacements {x.shape}; give {LEAST_POINTS} points or more"
@@ -112,7 +113,7 @@ def fit_decay(times: np.ndarray | str | Path, displacements: np.ndarray | None =
         return x - basis @ np.linalg.lstsq(basis, x, rcond=None)[0]
 
     even = np.interp(np.linspace(0, t[-1], len(t)), t, x)
-    peak = max(1, np.abs(np.fft.rfft(even, 8 * len(t))).argmax())
+    peak = max(1, int(np.abs(np.fft.rfft(even, 8 * len(t))).argmax()))
     start = 2 * np.pi * peak / (8 * t[-1])
     best = least_squares(left, (0.05 * start, start), bounds=([-5 / t[-1], 0], np.inf), x_scale=start, xtol=1e-12)
     decay, frequency = best.x
@@ -126,7 +127,7 @@ def fit_decay(times: np.ndarray | str | Path, displacements: np.ndarray | None =
     return Decay(*map(float, (period, decrement, *errors, misfit)))
 
 
-def _read(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
+def _read(path: Any) -> tuple[np.ndarray, np.ndarray]:
     """Times [s] and displacements [m] of a CSV file."""
     (line, head), *rows = csv_rows(path, ValueError, COLUMNS_OF_DECAY)
     units = re.findall(r"\[(.+?)\]", ",".join(head))
