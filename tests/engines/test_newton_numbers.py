@@ -1,12 +1,11 @@
 """What is typed into Newton, and what it refuses; none of it needs Newton."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import springtune as st
-from springtune.engines import base
-
-from engine_scenes import scene
 
 BEAM = st.Beam("80 mm", "40 mm", thickness="2 mm")
 E, NU, H = 1e6, 0.3, 2e-3
@@ -53,13 +52,11 @@ def test_xpbd_refuses_springs_that_it_leaves_out():
 
 
 @pytest.mark.parametrize("engine", SOLVERS)
-def test_an_absent_newton_is_refused_by_name_with_its_command(engine, monkeypatch):
-    monkeypatch.setattr(base, "find_spec", lambda name: None)
-    definition = "delingette" if engine == "newton-style3d" else "patch"
-    with pytest.raises(
-        base.EngineAbsentError, match=rf"engine '{engine}' needs newton and warp; .*pip install .*\[newton\]"
-    ):
-        st.in_engine(scene("sheet", "free", "traction", "felt", definition), engine)
+def test_an_absent_newton_is_refused_by_name_with_its_command(engine):
+    one = st.ENGINES[engine]
+    assert one.needs == ("newton", "warp")
+    with pytest.raises(st.EngineError, match=rf"engine '{engine}' needs no_newton; .*pip install .*\[newton\]"):
+        replace(one, needs=("no_newton",)).check(st.Setting())
 
 
 @pytest.mark.parametrize("engine", SOLVERS)

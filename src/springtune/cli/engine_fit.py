@@ -273,27 +273,13 @@ def fit_json(fit: "EngineFit") -> dict[str, Any]:
     found = fit.result
     keys = "value", "unit", "formula"
     typed = {name: dict(zip(keys, about, strict=True)) for name, *about in fit.typed_rows()}
-    return {
-        "springtune": __version__,
-        "body": fit.scene.statement.body,
-        "load": fit.scene.load,
-        "size": fit.scene.statement.size,
-        "definition": fit.scene.definition.name,
-        "particles": len(fit.scene.mesh.points),
-        "engine": found.engine,
-        "setting": asdict(found.setting),
-        "factor": fit.factor,
-        "typed": typed,
-        "displacement": found.displacement,
-        "reference": found.reference,
-        "error": fit.error,
-        "error_without_factor": fit.untuned.error,
-        "status": found.status,
-        "frame_seconds": found.frame_seconds,
-        "message": fit.message,
-        "loads": [asdict(one) | {"sizes": [*one.sizes], "errors": [*one.errors]} for one in fit.bands],
-        "needed": [asdict(one) for one in fit.needed],
-    }
+    result = "engine", "displacement", "reference", "error", "status", "frame_seconds"
+    about: dict[str, Any] = {"springtune": __version__, "body": fit.scene.statement.body, "load": fit.scene.load}
+    about |= {"size": fit.scene.statement.size, "definition": fit.scene.definition.name}
+    about |= {name: getattr(found, name) for name in result} | {"setting": asdict(found.setting)}
+    about |= {"factor": fit.factor, "typed": typed, "error_without_factor": fit.untuned.error, "message": fit.message}
+    about["loads"] = [asdict(one) | {"sizes": [*one.sizes], "errors": [*one.errors]} for one in fit.bands]
+    return about | {"needed": [asdict(one) for one in fit.needed]}
 
 
 def budget_json(search: "BudgetSearch") -> dict[str, Any]:

@@ -10,14 +10,14 @@ Triangles of VBD and of the semi-implicit solver have one law, which is typed in
 
     W = A_0 [mu h/2 (tr C - 2 J) + (lambda + mu) h/2 (J - 1)^2]
 
-``tri_ke = mu h`` in both, but ``tri_ka = lambda h`` in VBD and ``(lambda + mu) h`` in the semi-implicit one. At small
-strain it is St. Venant-Kirchhoff's law, which `delingette` has; at a strain e displacements differ by some 2 e. Style3D
-has stiffnesses along, across and in shear, and no contraction across: a material of nu = 0. It has no springs.
+``tri_ke = mu h`` in both, but ``tri_ka = lambda h`` in VBD and ``(lambda + mu) h`` in the semi-implicit solver. At
+small strain it is St. Venant-Kirchhoff's law, which `delingette` has; at a strain e displacements differ by some 2 e.
+Style3D has stiffnesses along, across and in shear, and no contraction across: a material of nu = 0. It has no springs.
 
 What is set besides, because Newton's defaults differ: gravity 0 and no ground; radius of particles 0, so that they do
 not touch; ``tri_kd`` (10 by default) and ``kd`` 0; no limit of velocities (1e5 m/s); contacts of Style3D off; VBD's
-colours by springs, too, which `ModelBuilder.color` does not see. Left as they are: Style3D scales velocities by 0.998
-in each step, and takes 10 iterations of conjugate gradients in each of its iterations.
+colours by springs, too, which `ModelBuilder.color` does not see. Left as they are: Style3D multiplies velocities by
+0.998 in each step, and takes 10 iterations of conjugate gradients in each of its iterations.
 
 Newton holds particles as a whole. A direction held singly is put back after each step. The force that would have kept
 it there is added to the next step: at rest it is the support's reaction.
@@ -36,9 +36,13 @@ from .base import DASHPOT, SPRING, EngineError, Parameter, Session, Setting, eng
 FASTEST = 1e30
 """Largest velocity [m/s]: none. By default Newton has 1e5."""
 
-SHEAR = Parameter("N/m", "mu h = E h / (2 (1 + nu))")
-VBD = {"ke": SPRING, "tri_ke": SHEAR, "tri_ka": Parameter("N/m", "lambda h = E h nu / (1 - nu^2)")}
-SEMI_IMPLICIT = {"ke": SPRING, "tri_ke": SHEAR, "tri_ka": Parameter("N/m", "(lambda + mu) h = E h / (2 (1 - nu))")}
+SHEAR_PARAMETER = Parameter("N/m", "mu h = E h / (2 (1 + nu))")
+VBD = {"ke": SPRING, "tri_ke": SHEAR_PARAMETER, "tri_ka": Parameter("N/m", "lambda h = E h nu / (1 - nu^2)")}
+SEMI_IMPLICIT = {
+    "ke": SPRING,
+    "tri_ke": SHEAR_PARAMETER,
+    "tri_ka": Parameter("N/m", "(lambda + mu) h = E h / (2 (1 - nu))"),
+}
 STYLE3D = {"tri_aniso_ke": Parameter("N/m", "(E h, E h, E h / 2) along, across, in shear; for nu = 0 alone")}
 
 
@@ -96,14 +100,14 @@ class _Session:
             self.now, self.next, self.control = self.model.state(), self.model.state(), self.model.control()
         self.step, self.substeps = setting.step, setting.substeps
         self.kept = np.float32(1 / (1 + damping * setting.step))
-        self.forces = np.column_stack([net.forces, np.zeros(len(net.points))])
+        singly = net.held & ~net.held.all(axis=1, keepdims=True)
+        self.forces, self.guided = (np.pad(plane, ((0, 0), (0, 1))) for plane in (net.forces, singly))
         self.rest = self.now.particle_q.numpy().copy()
-        self.guided = np.column_stack([net.held & ~net.held.all(axis=1)[:, None], np.zeros(len(net.points), bool)])
         self.reacting = self.model.particle_mass.numpy()[np.nonzero(self.guided)[0]] / setting.step**2
 
     def advance(self, frames: int) -> None:
         """Take a number of frames."""
-        with _quiet():
+        with _quiet(), np.errstate(over="ignore", invalid="ignore"):
             for _ in range(frames * self.substeps):
                 self.now.particle_f.numpy()[:] = self.forces  # a view; the semi-implicit solver adds its own to them
                 self.solver.step(self.now, self.next, self.control, None, self.step)

@@ -4,7 +4,6 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -97,7 +96,10 @@ def fit_decay(times: np.ndarray | str | Path, displacements: np.ndarray | None =
     """
     from scipy.optimize import least_squares
 
-    t, x = (np.asarray(one, float) for one in (_read(times) if displacements is None else (times, displacements)))
+    if isinstance(times, str | Path):
+        t, x = _read(times)
+    else:
+        t, x = np.asarray(times, dtype=float), np.asarray(displacements, dtype=float)
     if t.ndim != 1 or t.shape != x.shape or len(t) < LEAST_POINTS:
         raise ValueError(
             f"times: have the shape {t.shape}, and displacements {x.shape}; give {LEAST_POINTS} points or more"
@@ -127,7 +129,7 @@ def fit_decay(times: np.ndarray | str | Path, displacements: np.ndarray | None =
     return Decay(*map(float, (period, decrement, *errors, misfit)))
 
 
-def _read(path: Any) -> tuple[np.ndarray, np.ndarray]:
+def _read(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
     """Times [s] and displacements [m] of a CSV file."""
     (line, head), *rows = csv_rows(path, ValueError, COLUMNS_OF_DECAY)
     units = re.findall(r"\[(.+?)\]", ",".join(head))
