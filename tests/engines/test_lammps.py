@@ -1,4 +1,4 @@
-"""Springs in LAMMPS: what is written is read, minimized, and rests in our equilibrium."""
+"""Springs in LAMMPS: what is written is read, minimised, and rests in our equilibrium."""
 
 import ctypes
 import sys

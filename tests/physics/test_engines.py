@@ -260,7 +260,7 @@ def test_some_rest_in_our_equilibrium_with_few_iterations(engine, iterations):
 
 @pytest.mark.parametrize("engine", ["projective", "vbd-inertia"])
 def test_each_iteration_lowers_the_energy_of_a_step(engine):
-    """By minimization over directions and places in turn, or over a particle's place; the error at rest falls, too."""
+    """By minimisation over directions and places in turn, or over a particle's place; the error at rest falls, too."""
     one = scene(*BENT, "patch")
     net = run.net_of(one)
     network, h = network_of(net, 1.0), 1 / 60

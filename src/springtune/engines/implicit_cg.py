@@ -1,4 +1,4 @@
-"""Implicit Euler, linearized once a step: Baraff and Witkin, Large steps in cloth simulation, SIGGRAPH 1998.
+"""Implicit Euler, linearised once a step: Baraff and Witkin, Large steps in cloth simulation, SIGGRAPH 1998.
 
 A step solves ``(M + h^2 K) dv = h (f - h K v)`` with the tangent K of where it begins, by some iterations of conjugate
 gradients from ``dv = 0``: SOFA's EulerImplicitSolver with its CGLinearSolver, whose default is 25 iterations. It is our
@@ -56,5 +56,5 @@ class _Session:
     source="Baraff 1998",
 )
 def session(net: SpringNet, setting: Setting, damping: float) -> Session:
-    """Implicit Euler, linearized once a step, with iterations of conjugate gradients; SOFA takes 25."""
+    """Implicit Euler, linearised once a step, with iterations of conjugate gradients; SOFA takes 25."""
     return _Session(net, setting, damping)

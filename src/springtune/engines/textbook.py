@@ -1,6 +1,6 @@
 """What the textbook solvers share: a step from the inertial position, and the velocity that it leaves.
 
-A step minimizes ``|x - y|^2 / (2 h^2) + W(x)``, the first term weighted by masses, about ``y = x + h v + h^2 f / m``. A
+A step minimises ``|x - y|^2 / (2 h^2) + W(x)``, the first term weighted by masses, about ``y = x + h v + h^2 f / m``. A
 solver that begins at y and stops early ends between y and the minimum. So it rests where each step falls back by
 ``h^2 f / m``: too far along the load, as if springs were softer.
 """

@@ -6,7 +6,7 @@ break (``break no``), and no factor smooths their end (``smooth no``). ``bond_st
 ``K (r - r0)^2``, so K = k / 2 there. Tried with the release of 22 July 2025.
 
 Masses, loads and supports are per particle (`fix property/atom`). A support is `fix setforce`, the load `fix addforce`.
-The script minimizes by FIRE, which needs forces alone, in steps no longer than the stable one: energies are too coarse,
+The script minimises by FIRE, which needs forces alone, in steps no longer than the stable one: energies are too coarse,
 `min_style cg` and `hftn` stop at the begin. Lines for a damped motion stand below as comments.
 """
 
@@ -21,10 +21,10 @@ BOND_STYLE = "bpm/spring break no smooth no"
 """Style of all bonds; its coefficients are stiffness [N/m], strain at break, which means nothing here, and damping."""
 
 BALANCED = 1e-10
-"""Force out of balance that ends the minimization, over the load [1]."""
+"""Force out of balance that ends the minimisation, over the load [1]."""
 
-LONGEST_MINIMIZATION = 1_000_000
-"""Steps of the minimization at most."""
+LONGEST_MINIMISATION = 1_000_000
+"""Steps of the minimisation at most."""
 
 
 def lammps(net: Net, data: str) -> tuple[str, str]:
@@ -73,7 +73,7 @@ def _script(net: Net, simulation: Simulation, data: str, stiffness: list[float])
     for axis in "xy":
         lines += [f"variable held{axis} atom i_held{axis}", f"group held{axis} variable held{axis}"]
     lines += [
-        "# The load, whose energy the minimization has no use for.",
+        "# The load, whose energy the minimisation has no use for.",
         "variable fx atom d_fx",
         "variable fy atom d_fy",
         "variable none atom 0.0",
@@ -85,8 +85,8 @@ def _script(net: Net, simulation: Simulation, data: str, stiffness: list[float])
         "thermo 1000",
         "min_style fire",
         "min_modify tmax 1.0",
-        *([f"minimize 0.0 {BALANCED * load!r} {LONGEST_MINIMIZATION} {LONGEST_MINIMIZATION}"] if load else []),
-        "# A motion in the place of the minimization, critically damped:",
+        *([f"minimize 0.0 {BALANCED * load!r} {LONGEST_MINIMISATION} {LONGEST_MINIMISATION}"] if load else []),
+        "# A motion in the place of the minimisation, critically damped:",
         f'# variable fx atom "d_fx{damping}x"',
         f'# variable fy atom "d_fy{damping}y"',
         "# fix motion all nve",
