@@ -344,4 +344,5 @@ def damping_of(
         low, high = sorted(ratios[0] * relative[::-1] / relative)
         raise ValueError(f"{name}: dampers give the second mode a ratio from {low:.3g} to {high:.3g}; give one mode")
     notes = (note,) if abs(apart - 1) > SAME_MODE else ()
-    return Damping(scene, motion, shares.mean(), (shares[0] * own, shares[1] / own), factor, notes)
+    alpha, beta = float(shares[0] * own), float(shares[1] / own)
+    return Damping(scene, motion, float(shares.mean()), (alpha, beta), float(factor), notes)
