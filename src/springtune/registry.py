@@ -237,7 +237,7 @@ def how_to_install(extra: str) -> str:
     >>> print(how_to_install("export"))
     install the extra, in a clone `pip install '.[export]'`, of a wheel `pip install 'springtune-...whl[export]'`
     """
-    from . import __version__
+    from importlib.metadata import version
 
-    wheel = f"springtune-{__version__}-py3-none-any.whl[{extra}]"
+    wheel = f"springtune-{version('springtune')}-py3-none-any.whl[{extra}]"
     return f"install the extra, in a clone `pip install '.[{extra}]'`, of a wheel `pip install '{wheel}'`"

@@ -450,3 +450,24 @@ def test_a_scene_that_swings_in_an_engine():
     """Without damping, in short steps of an implicit scheme that hardly damps."""
     found = st.in_engine(scene(*SHEET, "patch"), "vbd", dt="1 ms", substeps=20, iterations=3, damping=0.0, frames=300)
     assert found.status in ("swings", "moving") and found.swing > 0.05 * abs(found.exact)
+
+
+def test_cells_turned_inside_out_are_no_rest():
+    @st.engine("folds")
+    class Folds:
+        """Everything is mirrored, and stays so."""
+
+        def __init__(self, net, setting, damping):
+            self.moved = net.points * [-2.0, 0.0]
+
+        def advance(self, frames):
+            pass
+
+        def displacements(self):
+            return self.moved
+
+    try:
+        found = st.in_engine(scene(*CASES[0], "patch"), "folds")
+    finally:
+        st.ENGINES.discard("folds")
+    assert found.status == "inverted" and "turned inside out" in found.message

@@ -6,7 +6,7 @@ What stages store is no output that Snakemake knows of, so a stage is one pack; 
 from importlib.util import find_spec
 
 from springtune.studies.archive.parts import ENDING
-from springtune.studies.output.text import how_to_install
+from springtune.registry import how_to_install
 
 PLUGIN = "snakemake_storage_plugin_s3"
 STORAGE = str(config.get("storage", "")).rstrip("/")

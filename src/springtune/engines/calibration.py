@@ -201,7 +201,6 @@ class EngineFit(Tabled):
     >>> fit = st.fit_engine(scene, "xpbd", substeps=16, loads=["traction"], needed=False)
     >>> print(f"{fit.factor:.2f} times, {len(fit.typed['compliance'])} springs; error {100 * fit.error:+.1f} %")
     1.41 times, 205 springs; error -0.0 %
-    1.41 times, 205 springs; error -0.0 %
     >>> print(*fit.typed_rows())
     ('compliance', '0.00093108 to 0.0018622', 'm/N', '1 / k of a spring')
     >>> fit.net().write("tuned.csv")[0].name
@@ -429,7 +428,7 @@ def _typed(engine: Engine, net: SpringNet, setting: Setting) -> dict[str, Any]:
 
 def _rests(one: EngineResult) -> bool:
     """Whether a run rests, or does but for its rounding."""
-    return one.status == "rest" or one.swing <= SHAKE * abs(one.displacement)
+    return one.status == "rest" or one.status != "inverted" and one.swing <= SHAKE * abs(one.displacement)
 
 
 def _distance(one: EngineResult, setting: Setting) -> float:

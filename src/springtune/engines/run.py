@@ -73,8 +73,8 @@ class EngineResult(Tabled):
     displacements : ndarray of float, shape (n_points, 2)
         Of the particles [m]; mean ones where it swings, NaN where it diverged.
     status : str
-        ``"rest"``; ``"swings"``: it ends in a periodic state; ``"moving"``: it still creeps after the last frame; or
-        ``"diverged"``.
+        ``"rest"``; ``"swings"``: it ends in a periodic state; ``"moving"``: it still creeps after the last frame;
+        ``"inverted"``: it rests with cells turned inside out; or ``"diverged"``.
     message : str
         Why it is not at rest; empty where it is.
     frames : int
@@ -232,6 +232,9 @@ def in_engine(
     most = frames or max(MOST_FRAMES, ceil(PERIODS / WINDOW) * window)
     extent = float(np.ptp(net.points, axis=0).max())
     ended = follow(session, window, most, REST[setting.precision] if tolerance is None else tolerance, extent)
+    if ended.status == "rest" and scene.network.inverted(ended.displacements):
+        said = "at rest with cells turned inside out; take shorter steps, or less load"
+        ended = replace(ended, status="inverted", message=said)
     return EngineResult(scene, engine, setting, factor, **vars(ended))
 
 

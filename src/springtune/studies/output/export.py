@@ -65,9 +65,9 @@ def table(
     ['beam', 'mesh_type', 'mesh_size', 'material']
     >>> len(columns[0].values)
     48
-    >>> table(tree, "curves")
+    >>> table(tree, "unknown")
     Traceback (most recent call last):
-    springtune.studies.output.export.RequestError: group 'curves': there is none; known: /, benchmark, block, ...
+    springtune.studies.output.export.RequestError: group 'unknown': there is none; known: /, benchmark, block, ...
     """
     data = _group(tree, group)
     if not data.data_vars:

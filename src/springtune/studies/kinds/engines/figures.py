@@ -16,7 +16,13 @@ from .outputs import figures
 FRAME = 1 / 60
 """Time of motion that costs are given for [s]."""
 
-END_COLOURS = {"swings": "#b5cfe3", "moving": "#dcdcdc", "diverged": "#4a0d1a", "no run": "#8a8a8a"}
+END_COLOURS = {
+    "swings": "#b5cfe3",
+    "moving": "#dcdcdc",
+    "diverged": "#4a0d1a",
+    "inverted": "#a05a2c",
+    "no run": "#8a8a8a",
+}
 """Of runs without an error, on the map of settings."""
 
 PANELS_IN_ROW = 3
@@ -261,6 +267,16 @@ def _map(panel, rows):
         elif end != "rest":
             ends[place] = names.index(end if end in names else "no run")
     heat_map(panel, errors, texts)
+    if not np.isfinite(errors).any():
+        panel.text(
+            0.5,
+            0.5,
+            "none at rest",
+            transform=panel.transAxes,
+            ha="center",
+            va="center",
+            bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.5},
+        )
     panel.imshow(ends, cmap=ListedColormap([*END_COLOURS.values()]), vmin=-0.5, vmax=len(names) - 0.5, aspect="auto")
     several = len({precision for precision, *_ in steps}) > 1
     panel.set_yticks(
@@ -338,7 +354,11 @@ def _curves(panel, rows, definition_error):
     if np.isfinite(definition_error):
         panel.plot([1], [1 + definition_error], "+", color="black", markersize=7, zorder=4)
     panel.set(**style.LOGARITHMIC)
-    style.plain(panel, "x", "y")
+    style.plain(panel, "y")
+    every = [row["stiffness_factor"] for row in rows]
+    ticks = sorted({min(every), 1.0, max(every)})
+    panel.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+    panel.set_xticks([], minor=True)
     _across(panel, 1)
     return ends
 
