@@ -28,6 +28,9 @@ END_COLOURS = {
 PANELS_IN_ROW = 3
 """Panels in a row."""
 
+KEY = 0.24
+"""Height of the key of a map [inch]."""
+
 NARROW = 5
 """Largest over smallest best factor up to which their axis is not logarithmic."""
 
@@ -214,35 +217,40 @@ def plot_engine_maps(data, ax=None, *, scene=None):
     shown = {name: rows for name, rows in runs.items()
              if any(RUN_ENDS[row["engine_status"]] not in WITHOUT_RUN for row in rows)}  # fmt: skip
     lost = _lost({name: rows for name, rows in runs.items() if name not in shown})
-    columns = min(PANELS_IN_ROW, max(len(shown), 1))
-    said = "; ".join(filter(None, (MAP_NUMBERS if shown else "", f"not drawn: {lost}" if lost and shown else "")))
-    said = labels.wrapped(said, (style.PAGE if columns > 1 else style.COLUMN) - 0.2)
-    under = 0.24 + labels.LINE * labels.lines_of(said)
-    most = max((len(_steps(rows)) for rows in shown.values()), default=3)
-    height = 0.8 + 0.19 * max(most, 3)
-    figure, axes, flat, _ = style.multiples(ax, max(len(shown), 1), columns, height, further=under)
-    place = {"left": 0.5, "right": 0.08, "bottom": 0.36 + under, "top": 0.42, "down": 0.62}
-    style.arrange(figure, axes, across=0.15, **place, title=case.scene.item())
     ends = set()
-    for number, (panel, (name, rows)) in enumerate(zip(flat, shown.items())):
-        ends |= _map(panel, rows)
-        panel.set(title=name, xlabel="Iterations")
-        panel.set_ylabel("Frame / substeps" if number % axes.shape[1] == 0 else "")
-    labels.settle(figure, axes, place | {"across": 0.12})
-    if not shown:
-        labels.say(flat[0], f"Nothing was run: {lost}.")
-    elif figure is not None:
+
+    def draw(panel, rows):
+        ends.update(_map(panel, rows))
+
+    said = f"{MAP_NUMBERS}; not drawn: {lost}" if lost else MAP_NUMBERS
+    most = max((len(_steps(rows)) for rows in shown.values()), default=3)
+    texts = {"xlabel": "Iterations", "ylabel": "Frame / substeps", "note": said, "why": f"Nothing was run: {lost}."}
+    figure, flat, under = _multiples(ax, case, shown, draw, 0.8 + 0.19 * max(most, 3), 0.36, KEY, **texts)
+    if shown and figure is not None:
         keys = labels.swatches({name: colour for name, colour in END_COLOURS.items() if name in ends})
         figure.legend(handles=keys, loc="lower left", ncols=len(END_COLOURS), borderaxespad=0.2,
-                      bbox_to_anchor=(0.0, (under - 0.24) / style.size(figure)[1]), columnspacing=1.2)  # fmt: skip
-        _below(figure, said)
+                      bbox_to_anchor=(0.0, (under - KEY) / style.size(figure)[1]), columnspacing=1.2)  # fmt: skip
     return flat
 
 
-def _below(figure, text):
-    """Write a note at the lower left of a figure."""
-    wide, high = style.size(figure)
-    figure.text(0.08 / wide, 0.04 / high, text, fontsize=style.SMALL, color="0.25", va="bottom")
+def _multiples(ax, case, shown, draw, height, bottom, key=0.0, *, xlabel, ylabel, note, why, sharey=False):
+    """Draw a panel an engine, its note below or why there is none: figure, panels, height of key and note [inch]."""
+    columns = min(PANELS_IN_ROW, max(len(shown), 1))
+    note = labels.wrapped(note, (style.PAGE if columns > 1 else style.COLUMN) - 0.2) if shown else ""
+    under = key + labels.LINE * labels.lines_of(note)
+    figure, axes, flat, _ = style.multiples(ax, max(len(shown), 1), columns, height, sharey=sharey, further=under)
+    place = {"left": 0.5, "right": 0.08, "bottom": bottom + under, "top": 0.42, "down": 0.62, "across": 0.12}
+    style.arrange(figure, axes, **place, title=case.scene.item())
+    for number, (panel, (name, rows)) in enumerate(zip(flat, shown.items())):
+        draw(panel, rows)
+        panel.set(title=name, xlabel=xlabel, ylabel="" if number % axes.shape[1] else ylabel)
+    labels.settle(figure, axes, place)
+    if not shown:
+        labels.say(flat[0], why)
+    elif figure is not None:
+        wide, high = style.size(figure)
+        figure.text(0.08 / wide, 0.04 / high, note, fontsize=style.SMALL, color="0.25", va="bottom")
+    return figure, flat, under
 
 
 def _steps(rows):
@@ -320,26 +328,20 @@ def plot_engine_curves(data, ax=None, *, scene=None):
     """
     case, runs = _runs(data, "engine_curves", scene)
     shown = {name: rows for name, rows in runs.items() if any(np.isfinite(row["error"]) for row in rows)}
-    columns = min(PANELS_IN_ROW, max(len(shown), 1))
-    lost = _lost(runs)
-    said = f"+: the network in equilibrium{'; not drawn: ' + lost if lost else ''}" if shown else ""
-    said = labels.wrapped(said, (style.PAGE if columns > 1 else style.COLUMN) - 0.2)
-    under = labels.LINE * labels.lines_of(said)
-    figure, axes, flat, _ = style.multiples(ax, max(len(shown), 1), columns, 2.0, sharey=True, further=0.1 + under)
-    place = {"left": 0.5, "right": 0.08, "bottom": 0.42 + under, "top": 0.42, "down": 0.62}
-    style.arrange(figure, axes, across=0.15, **place, title=case.scene.item())
-    ends = []
-    for number, (panel, (name, rows)) in enumerate(zip(flat, shown.items())):
-        ends.append(_curves(panel, rows, float(case.definition_error.sel(definition=rows[0]["definition"]))))
-        panel.set(title=name, xlabel="Factor on what is typed")
-        panel.set_ylabel("Displacement / reference" if number % axes.shape[1] == 0 else "")
-    labels.settle(figure, axes, place | {"across": 0.1})
-    for panel, found in zip(flat, ends):
+    lost, ends = _lost(runs), {}
+
+    def draw(panel, rows):
+        ends[panel] = _curves(panel, rows, float(case.definition_error.sel(definition=rows[0]["definition"])))
+
+    texts = {
+        "xlabel": "Factor on what is typed",
+        "ylabel": "Displacement / reference",
+        "note": f"+: the network in equilibrium{'; not drawn: ' + lost if lost else ''}",
+        "why": f"No run of a curve is at rest beside a reference: {lost}.",
+    }
+    _, flat, _ = _multiples(ax, case, shown, draw, 2.1, 0.42, **texts, sharey=True)
+    for panel, found in ends.items():
         labels.name_lines(panel, found)
-    if not shown:
-        labels.say(flat[0], f"No run of a curve is at rest beside a reference: {lost}.")
-    elif figure is not None:
-        _below(figure, said)
     return flat
 
 

@@ -52,6 +52,9 @@ from .outputs import OUTPUTS
 MOST_ENGINE_RUNS = 10_000
 """Most combinations of one set of runs; each takes a tenth of a second and more."""
 
+VARIED = ("definition", "engine", *SETTING, "stiffness_factor")
+"""What a set of runs lists values of, besides scenes."""
+
 OWN_PRECISION = "own"
 """The first precision of each engine."""
 
@@ -172,10 +175,12 @@ def _check(config, problems):
         for one in runs.scene or section.scenes:
             check_known(problems, (*place, "scene"), "scene", one, section.scenes, "engines.scenes")
             if one in section.scenes:
-                _check_definitions(runs, section.scenes[one], one, (*place, "definition"), problems)
-        labels = ("definition", "engine", *SETTING, "stiffness_factor")
-        check_product(problems, runs, place, labels, MOST_ENGINE_RUNS)
-    lists = [{value for runs in section.runs.values() for value in getattr(runs, name)} for name in labels]
+                scene = section.scenes[one]
+                corners, uniaxial = MESH_TYPES[scene.mesh_type].corners, LOADS[scene.load].kind.uniaxial
+                why = f"needs a reference or a stated stiffness, or other cells or loads than scene '{one}' has;"
+                check_able(problems, (*place, "definition"), runs.definition, why, corners, uniaxial)
+        check_product(problems, runs, place, VARIED, MOST_ENGINE_RUNS)
+    lists = [{value for runs in section.runs.values() for value in getattr(runs, name)} for name in VARIED]
     cells = len(section.scenes) * prod(map(len, lists))
     if cells > MOST_CELLS:
         message = f"{cells:.3g} cells of all labels together; a dataset has at most {MOST_CELLS}: {FEWER}"
@@ -197,12 +202,6 @@ def _check_scene(scene, place, config, problems):
             problems.add((*place, "mesh_size"), f"{1e3 * scene.mesh_size:g} mm {refusal}")
         else:
             check_particles(problems, (*place, "mesh_size"), [scene.mesh_size], *extent)
-
-
-def _check_definitions(runs, scene, name, place, problems):
-    mesh_type, kind = MESH_TYPES[scene.mesh_type], LOADS[scene.load].kind
-    why = f"needs a reference or a stated stiffness, or other cells or loads than scene '{name}' has;"
-    check_able(problems, place, runs.definition, why, mesh_type.corners, kind.uniaxial)
 
 
 def _expand(config, declared):
@@ -244,10 +243,9 @@ def _version(engine):
 
 def _tasks(study):
     """Runs of an engine follow each other in one job, since their seconds are measured."""
-    of_cell = ("scene", "definition", "engine", *SETTING, "stiffness_factor")
     for run in study.parts["engines"]:
         engine = _engines()[run.engine]
-        of_task = (*of_cell[1:], "mesh_type", "mesh_size", "load", "force", "frames", "tolerance")
+        of_task = (*VARIED, "mesh_type", "mesh_size", "load", "force", "frames", "tolerance")
         values = {name: getattr(run, name) for name in of_task}
         values |= {"beam": beam_key(run.beam), "material": material_key(run.material, density=True)}
         values["engine_version"] = _version(engine)
@@ -255,7 +253,7 @@ def _tasks(study):
         particles = run.beam.length * run.beam.height / (COEFFICIENT * run.mesh_size**2)
         name = f"engines {run.program.lower()}"
         cost = name if name in COSTS else "engines", run.substeps * run.iterations * particles
-        yield Task(values, also, {name: getattr(run, name) for name in of_cell}, run, [cost], run.engine)
+        yield Task(values, also, {name: getattr(run, name) for name in ("scene", *VARIED)}, run, [cost], run.engine)
 
 
 COSTS = {
