@@ -223,10 +223,8 @@ def fit_text(fit: "EngineFit", mesh_name: str) -> str:
     if fit.bands:
         lines += ["", "errors at shares of a load:", aligned(fit.bands.table(), left=2), "", *_meaning(fit)]
     if fit.needed:
-        what = (
-            f"under {fit.scene.load}: settings whose solver error is below 1 % without a factor, or that have a factor"
-        )
-        lines += ["", f"{what}:", aligned(fit.needed.table(), left=2)]
+        what = "settings whose solver error is below 1 % without a factor, or that have a factor"
+        lines += ["", f"under {fit.scene.load}: {what}:", aligned(fit.needed.table(), left=2)]
     return "\n".join(lines)
 
 
@@ -256,16 +254,11 @@ def budget_text(search: "BudgetSearch") -> str:
         nearest = min(search.tried, key=lambda one: one.worst)
         least = error_text(nearest.worst).lstrip("+")
         return f"{head}\n\nNo stiffness makes any of them right; the nearest is off by {least}. Take a larger budget."
-    lines = [
-        head,
-        "",
-        "none is both cheaper and less off than one of these:",
-        aligned(search.unbeaten.table(), left=2),
-        "",
-        "chosen, the least error at worst:",
-        fit_text(search.best.fit, search.best.mesh),
-    ]
-    return "\n".join(lines)
+    table, chosen = aligned(search.unbeaten.table(), left=2), fit_text(search.best.fit, search.best.mesh)
+    return (
+        f"{head}\n\nnone is both cheaper and less off than one of these:\n{table}\n\n"
+        f"chosen, the least error at worst:\n{chosen}"
+    )
 
 
 def fit_json(fit: "EngineFit") -> dict[str, Any]:

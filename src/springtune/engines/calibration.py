@@ -555,26 +555,19 @@ def _band(runs: _Runs, load: str, factor: float, within: float) -> LoadBand:
 
 def range_within(sizes: np.ndarray, errors: np.ndarray, within: float) -> tuple[float, float]:
     """Return the range of sizes, about the least error, whose interpolated error and its margin are within."""
-    bends = [
-        abs(np.polyfit(sizes[place : place + 3], errors[place : place + 3], 2)[0])
-        if np.isfinite(errors[place : place + 3]).all()
-        else np.nan
-        for place in range(len(sizes) - 2)
-    ]
-    fine, bounds = [], []
-    for place, width in enumerate(np.diff(sizes)):
-        bend = max((one for one in bends[max(place - 1, 0) : place + 1] if one == one), default=np.nan)
-        share = np.linspace(0, 1, FINE)
-        between = errors[place] * (1 - share) + errors[place + 1] * share
-        fine.append(sizes[place] + share * width)
-        bounds.append(np.abs(between) + 2 * bend * width**2 * share * (1 - share) + SHAKE)
-    size, kept = np.concatenate(fine), np.nan_to_num(np.concatenate(bounds), nan=np.inf) <= within
-    if not kept.any():
+    widths = np.diff(sizes)[:, np.newaxis]
+    slopes = np.diff(errors) / np.diff(sizes)
+    bends = np.pad(np.abs(np.diff(slopes) / (sizes[2:] - sizes[:-2])), 1, constant_values=np.nan)
+    bend = np.fmax(bends[:-1], bends[1:])[:, np.newaxis]
+    share = np.linspace(0, 1, FINE)
+    between = errors[:-1, np.newaxis] * (1 - share) + errors[1:, np.newaxis] * share
+    bounds = np.abs(between) + 2 * bend * widths**2 * share * (1 - share) + SHAKE
+    bounds = np.nan_to_num(bounds.ravel(), nan=np.inf)
+    start = int(np.argmin(bounds))
+    if bounds[start] > within:
         return np.nan, np.nan
-    start = int(np.argmin(np.where(kept, np.concatenate(bounds), np.inf)))
-    low, high = start, start
-    while low > 0 and kept[low - 1]:
-        low -= 1
-    while high < len(kept) - 1 and kept[high + 1]:
-        high += 1
+    outside = np.flatnonzero(bounds > within)
+    low = max(outside[outside < start], default=-1) + 1
+    high = min(outside[outside > start], default=len(bounds)) - 1
+    size = (sizes[:-1, np.newaxis] + share * widths).ravel()
     return float(size[low]), float(size[high])
