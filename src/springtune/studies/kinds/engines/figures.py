@@ -28,7 +28,7 @@ END_COLOURS = {
 PANELS_IN_ROW = 3
 """Panels in a row."""
 
-KEY = 0.24
+MAP_KEY = 0.24
 """Height of the key of a map [inch]."""
 
 NARROW = 5
@@ -225,11 +225,11 @@ def plot_engine_maps(data, ax=None, *, scene=None):
     said = f"{MAP_NUMBERS}; not drawn: {lost}" if lost else MAP_NUMBERS
     most = max((len(_steps(rows)) for rows in shown.values()), default=3)
     texts = {"xlabel": "Iterations", "ylabel": "Frame / substeps", "note": said, "why": f"Nothing was run: {lost}."}
-    figure, flat, under = _multiples(ax, case, shown, draw, 0.8 + 0.19 * max(most, 3), 0.36, KEY, **texts)
+    figure, flat, under = _multiples(ax, case, shown, draw, 0.8 + 0.19 * max(most, 3), 0.36, MAP_KEY, **texts)
     if shown and figure is not None:
         keys = labels.swatches({name: colour for name, colour in END_COLOURS.items() if name in ends})
         figure.legend(handles=keys, loc="lower left", ncols=len(END_COLOURS), borderaxespad=0.2,
-                      bbox_to_anchor=(0.0, (under - KEY) / style.size(figure)[1]), columnspacing=1.2)  # fmt: skip
+                      bbox_to_anchor=(0.0, (under - MAP_KEY) / style.size(figure)[1]), columnspacing=1.2)  # fmt: skip
     return flat
 
 

@@ -52,7 +52,7 @@ from .outputs import OUTPUTS
 MOST_ENGINE_RUNS = 10_000
 """Most combinations of one set of runs; each takes a tenth of a second and more."""
 
-VARIED = ("definition", "engine", *SETTING, "stiffness_factor")
+OF_RUNS = ("definition", "engine", *SETTING, "stiffness_factor")
 """What a set of runs lists values of, besides scenes."""
 
 OWN_PRECISION = "own"
@@ -179,8 +179,8 @@ def _check(config, problems):
                 corners, uniaxial = MESH_TYPES[scene.mesh_type].corners, LOADS[scene.load].kind.uniaxial
                 why = f"needs a reference or a stated stiffness, or other cells or loads than scene '{one}' has;"
                 check_able(problems, (*place, "definition"), runs.definition, why, corners, uniaxial)
-        check_product(problems, runs, place, VARIED, MOST_ENGINE_RUNS)
-    lists = [{value for runs in section.runs.values() for value in getattr(runs, name)} for name in VARIED]
+        check_product(problems, runs, place, OF_RUNS, MOST_ENGINE_RUNS)
+    lists = [{value for runs in section.runs.values() for value in getattr(runs, name)} for name in OF_RUNS]
     cells = len(section.scenes) * prod(map(len, lists))
     if cells > MOST_CELLS:
         message = f"{cells:.3g} cells of all labels together; a dataset has at most {MOST_CELLS}: {FEWER}"
@@ -245,7 +245,7 @@ def _tasks(study):
     """Runs of an engine follow each other in one job, since their seconds are measured."""
     for run in study.parts["engines"]:
         engine = _engines()[run.engine]
-        of_task = (*VARIED, "mesh_type", "mesh_size", "load", "force", "frames", "tolerance")
+        of_task = (*OF_RUNS, "mesh_type", "mesh_size", "load", "force", "frames", "tolerance")
         values = {name: getattr(run, name) for name in of_task}
         values |= {"beam": beam_key(run.beam), "material": material_key(run.material, density=True)}
         values["engine_version"] = _version(engine)
@@ -253,7 +253,7 @@ def _tasks(study):
         particles = run.beam.length * run.beam.height / (COEFFICIENT * run.mesh_size**2)
         name = f"engines {run.program.lower()}"
         cost = name if name in COSTS else "engines", run.substeps * run.iterations * particles
-        yield Task(values, also, {name: getattr(run, name) for name in ("scene", *VARIED)}, run, [cost], run.engine)
+        yield Task(values, also, {name: getattr(run, name) for name in ("scene", *OF_RUNS)}, run, [cost], run.engine)
 
 
 COSTS = {
