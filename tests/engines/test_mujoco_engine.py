@@ -58,9 +58,10 @@ def test_steps_beyond_the_stable_one_diverge_and_are_not_put_back(engine, tmp_pa
 
 @discrete
 def test_few_iterations_of_discrete_leave_it_on_its_way():
-    found = [st.in_engine(scene(*STRIP, "patch"), "mujoco-discrete", substeps=8, iterations=n) for n in (2, 50)]
+    options = {"substeps": 8, "frames": 150}
+    found = [st.in_engine(scene(*STRIP, "patch"), "mujoco-discrete", iterations=n, **options) for n in (2, 50)]
     assert found[0].status == "moving" and found[1].status == "rest"
-    assert abs(found[0].solver_error) > 1e-3 > 10 * abs(found[1].solver_error)
+    assert abs(found[0].solver_error) > 1e-2 > 100 * abs(found[1].solver_error)
 
 
 @pytest.mark.parametrize("engine", ["mujoco-implicit", "mujoco-implicitfast"])

@@ -41,7 +41,7 @@ CASES = {
 }
 
 
-QUICK = ("patch-area", "delingette", "woven, rectangles", "neo-hooke", "yeoh")
+QUICK = ("patch-area", "delingette", "woven, rectangles", "yeoh")
 """One of each kind of constraints; the others are slow tests."""
 
 ALL = [pytest.param(case, marks=() if case in QUICK else pytest.mark.slow) for case in CASES]
@@ -91,7 +91,7 @@ def test_energies_are_exact_at_large_strain(case):
     assert off(scene(case, share=0.5), 200, tolerance=1e-6) < 2e-3
 
 
-@pytest.mark.parametrize("case", ["patch-area", "delingette", "neo-hooke"])
+@pytest.mark.parametrize("case", ["delingette", "neo-hooke"])
 def test_energies_in_single_precision(case):
     one = scene(case)
     single, double = (
