@@ -257,12 +257,9 @@ class Engine(Declared):
                 f"precision: '{setting.precision}' is unknown to engine '{self.name}'; give one of {known}"
             )
         if net is not None:
-            name = net.header["definition"]
-            lacking = [WORDS[one.kind] for one in net.energies if one.kind not in self.laws]
-            if not self.springs and np.any(net.stiffness):
-                lacking.append("springs")
+            name, lacking = net.header["definition"], _lacking(self, net)
             if lacking:
-                others = [one.name for one in ENGINES.values() if not _lacks(one, net)]
+                others = [one.name for one in ENGINES.values() if not _lacking(one, net)]
                 raise EngineError(
                     f"engine '{self.name}' has no {' and no '.join(lacking)}, and definition '{name}' has; take "
                     f"another definition, or engine {' or '.join(others) or 'none of these'}"
@@ -365,10 +362,10 @@ def _there(need: str) -> bool:
         return True
 
 
-def _lacks(engine: Engine, net: SpringNet) -> bool:
-    return (
-        any(one.kind not in engine.laws for one in net.energies) or not engine.springs and bool(np.any(net.stiffness))
-    )
+def _lacking(engine: Engine, net: SpringNet) -> list[str]:
+    """Words for what a net has and an engine has not."""
+    energies = [WORDS[one.kind] for one in net.energies if one.kind not in engine.laws]
+    return energies if engine.springs or not np.any(net.stiffness) else [*energies, "springs"]
 
 
 ENGINES: Registry[Engine] = Registry(__package__, "engine", "engines")

@@ -21,8 +21,9 @@ our equilibrium at small h.
 import numpy as np
 
 from ..handover.net import SpringNet
+from ..mechanics.kernels import compiled
 from .base import Parameter, Session, Setting, engine
-from .textbook import Textbook, compiled, pulling
+from .textbook import Textbook, pulling, spring_between, stretch_spring
 
 
 @compiled
@@ -31,17 +32,11 @@ def _project(x, weights, springs, lengths, shares, iterations):  # type: ignore[
     for _ in range(iterations):
         for e in range(len(lengths)):
             i, j = springs[e]
-            dx, dy = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1]
-            length = np.sqrt(dx * dx + dy * dy)
-            dx, dy = dx / length, dy / length
-            total = (weights[i, 0] + weights[j, 0]) * dx * dx + (weights[i, 1] + weights[j, 1]) * dy * dy
+            dx, dy, length, total = spring_between(x, weights, i, j)
             if total == 0:
                 continue
             change = shares[e] * (lengths[e] - length) / total
-            x[i, 0] -= weights[i, 0] * change * dx
-            x[i, 1] -= weights[i, 1] * change * dy
-            x[j, 0] += weights[j, 0] * change * dx
-            x[j, 1] += weights[j, 1] * change * dy
+            stretch_spring(x, weights, i, j, dx, dy, change)
     return x
 
 

@@ -13,8 +13,9 @@ from scipy.sparse import coo_array, csc_array, diags_array
 from scipy.sparse.linalg import SuperLU, splu
 
 from ..handover.net import SpringNet
+from ..mechanics.kernels import compiled
 from .base import Session, Setting, engine
-from .textbook import Textbook, compiled, pulling
+from .textbook import Textbook, pulling
 
 
 @compiled

@@ -5,24 +5,32 @@ solver that begins at y and stops early ends between y and the minimum. So it re
 ``h^2 f / m``: too far along the load, as if springs were softer.
 """
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
-from numba import njit
 
 from ..handover.net import SpringNet
 from ..handover.simulation import WORDS
 from ..handover.terms import VALUES
+from ..mechanics.kernels import compiled
 from .base import SPRING, EngineError, Parameter, Setting
 
 
-def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile on the first call, and cache on disk if possible."""
-    try:
-        return njit(cache=True, error_model="numpy", nogil=True)(function)
-    except RuntimeError:  # no folder to keep it in
-        return njit(error_model="numpy", nogil=True)(function)
+@compiled
+def spring_between(x, weights, i, j):  # type: ignore[no-untyped-def]
+    """Direction of a spring from i to j, its length, and the sum of its ends' inverse masses along it."""
+    dx, dy = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1]
+    length = np.sqrt(dx * dx + dy * dy)
+    dx, dy = dx / length, dy / length
+    total = (weights[i, 0] + weights[j, 0]) * dx * dx + (weights[i, 1] + weights[j, 1]) * dy * dy
+    return dx, dy, length, total
+
+
+@compiled
+def stretch_spring(x, weights, i, j, dx, dy, change):  # type: ignore[no-untyped-def]
+    """Move the ends of a spring apart along its direction, by a change times their inverse masses."""
+    x[i, 0] -= weights[i, 0] * change * dx
+    x[i, 1] -= weights[i, 1] * change * dy
+    x[j, 0] += weights[j, 0] * change * dx
+    x[j, 1] += weights[j, 1] * change * dy
 
 
 class Textbook:

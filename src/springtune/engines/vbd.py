@@ -18,8 +18,9 @@ from typing import Any
 import numpy as np
 
 from ..handover.net import SpringNet
+from ..mechanics.kernels import compiled
 from .base import Session, Setting, engine
-from .textbook import Textbook, as_they_are, compiled, pulling
+from .textbook import Textbook, as_they_are, pulling
 
 
 @compiled
@@ -145,30 +146,22 @@ class _Session(Textbook):
 VERTEX_LAWS = ("area", "biquadratic")
 """Energies besides springs."""
 
+IN_COMMON: dict[str, Any] = {
+    "laws": VERTEX_LAWS,
+    "parameters": as_they_are(*VERTEX_LAWS),
+    "implicit": True,
+    "measured": "1e-6, twenty scenes",
+    "source": "Chen 2024",
+}
 
-@engine(
-    "vbd",
-    order=40,
-    laws=VERTEX_LAWS,
-    parameters=as_they_are(*VERTEX_LAWS),
-    implicit=True,
-    measured="1e-6, twenty scenes",
-    source="Chen 2024",
-)
+
+@engine("vbd", order=40, **IN_COMMON)
 def adaptive(net: SpringNet, setting: Setting, damping: float) -> Session:
     """Vertex block descent from its paper's adaptive guess: at rest exact with any number of iterations."""
     return _Session(net, setting, damping, True)
 
 
-@engine(
-    "vbd-inertia",
-    order=41,
-    laws=VERTEX_LAWS,
-    parameters=as_they_are(*VERTEX_LAWS),
-    implicit=True,
-    measured="1e-6, twenty scenes",
-    source="Chen 2024",
-)
+@engine("vbd-inertia", order=41, **IN_COMMON)
 def inertial(net: SpringNet, setting: Setting, damping: float) -> Session:
     """Vertex block descent from the inertial position."""
     return _Session(net, setting, damping, False)

@@ -15,8 +15,9 @@ import numpy as np
 
 from ..handover.net import SpringNet
 from ..handover.xpbd import COMPLIANCE_UNITS, Blocks, blocks, compliances
+from ..mechanics.kernels import compiled
 from .base import EngineError, Parameter, Session, Setting, engine
-from .textbook import Textbook, compiled
+from .textbook import Textbook, spring_between, stretch_spring
 
 BLOCK_KINDS = tuple(COMPLIANCE_UNITS)
 """Kinds of blocks, by their numbers here."""
@@ -31,16 +32,10 @@ def _project_springs(x, weights, springs, lengths, compliance, multipliers, iter
     for _ in range(iterations):
         for e in range(len(lengths)):
             i, j = springs[e]
-            dx, dy = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1]
-            length = np.sqrt(dx * dx + dy * dy)
-            dx, dy = dx / length, dy / length
-            total = (weights[i, 0] + weights[j, 0]) * dx * dx + (weights[i, 1] + weights[j, 1]) * dy * dy
+            dx, dy, length, total = spring_between(x, weights, i, j)
             change = (lengths[e] - length - compliance[e] * multipliers[e]) / (total + compliance[e])
             multipliers[e] += change
-            x[i, 0] -= weights[i, 0] * change * dx
-            x[i, 1] -= weights[i, 1] * change * dy
-            x[j, 0] += weights[j, 0] * change * dx
-            x[j, 1] += weights[j, 1] * change * dy
+            stretch_spring(x, weights, i, j, dx, dy, change)
 
 
 @compiled

@@ -152,15 +152,12 @@ def newton_script(net: Net) -> str:
         "MASS_DAMPING": simulation.mass_damping,
     }
     lines = [f"# {line}" for line in [*about(net, simulation, _step(simulation)), *_law(net)]]
-    lines += ["", *(f"{verb} {name}" for verb, name in IMPORTS), ""]
+    lines += ["", "import newton", "import numpy as np", "import warp as wp", ""]
     lines += [f"{name} = {value!r}" for name, value in values.items()]
     lines += [f"HELD = np.array({net.held.tolist()!r})"]
     lines += [f"FORCES = np.array({net.forces.tolist()!r})"]
     lines += [f"EXPECTED = {None if expected is None else f'np.array({expected.tolist()!r})'}", ""]
     return "\n".join(lines) + SCRIPT
-
-
-IMPORTS = (("import", "newton"), ("import", "numpy as np"), ("import", "warp as wp"))
 
 
 def _simulated(net: Net) -> Simulation:

@@ -28,7 +28,7 @@ STRIDE = 8
 """Array entries between progress counters of threads: a cache line, against false sharing."""
 
 
-def _compiled(function: Callable[..., Any]) -> Callable[..., Any]:
+def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile on the first call, and cache on disk if possible."""
     try:
         return njit(cache=True, error_model="numpy", nogil=True)(function)
@@ -75,7 +75,7 @@ _told: Any = intrinsic(_acquire)
 """Load the first number of an array before all later reads (acquire)."""
 
 
-@_compiled
+@compiled
 def _follow(progress: np.ndarray, thread: int, number: int, block: int, blocks: int, distance: int) -> bool:
     """Wait until the pass before is so many blocks ahead; False if it never will be."""
     threads = len(progress) - 1
@@ -93,20 +93,20 @@ def _follow(progress: np.ndarray, thread: int, number: int, block: int, blocks: 
     return True
 
 
-@_compiled
+@compiled
 def _passes(count: int, size: int, depth: int, bandwidth: int) -> tuple[int, int]:
     """Blocks of a pass over so many rows, and those that the next pass stays behind."""
     return (count + (depth - 1) * bandwidth + size - 1) // size, (depth * bandwidth + size - 1) // size
 
 
-@_compiled
+@compiled
 def _part(block: int, size: int, behind: int, count: int) -> tuple[int, int]:
     """Rows of a block, from one to before another, at a distance behind the first step."""
     first = block * size - behind
     return min(max(first, 0), count), min(max(first + size, 0), count)
 
 
-@_compiled
+@compiled
 def _pull(
     rx: float, ry: float, lx: float, ly: float, length: float, stiffness: float
 ) -> tuple[float, float, float, float]:
@@ -118,7 +118,7 @@ def _pull(
     return x, y, now, stiffness * square / ((now + length) * now)
 
 
-@_compiled
+@compiled
 def advance_springs(
     thread: int,
     pointers: np.ndarray,
@@ -196,7 +196,7 @@ def advance_springs(
             _tell(progress[thread], number // threads * blocks + block + 1)
 
 
-@_compiled
+@compiled
 def advance_matrix(
     thread: int,
     pointers: np.ndarray,
