@@ -27,10 +27,12 @@ def _installed():
     return {one.metadata["Name"] for one in metadata.distributions(path=sys.path)}
 
 
-@pytest.mark.parametrize("case", TEN, ids="-".join)
-def test_it_rests_in_our_equilibrium(case, tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    ("case", "definition"), [*((case, "patch") for case in TEN), *((case, "ielsm") for case in TEN), (TEN[0], "angular")]
+)
+def test_it_rests_in_our_equilibrium(case, definition, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    one = scene(*case, "patch")
+    one = scene(*case, definition)
     assert [path.name for path in one.springs.write("net.lmp", errors=False)] == ["net.lmp", "net.data"]
     lammps = started()
     try:
