@@ -30,7 +30,7 @@ def _installed():
 CASES = [*((case, name) for name in ("patch", "ielsm") for case in TEN), (TEN[0], "angular")]
 
 
-@pytest.mark.parametrize(("case", "definition"), CASES, ids=lambda one: "-".join(one) if isinstance(one, tuple) else one)
+@pytest.mark.parametrize(("case", "definition"), CASES, ids=["-".join((*case, name)) for case, name in CASES])
 def test_it_rests_in_our_equilibrium(case, definition, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     one = scene(*case, definition)
@@ -48,8 +48,7 @@ def test_it_rests_in_our_equilibrium(case, definition, tmp_path, monkeypatch):
     assert away < 1e-6 * np.abs(expected).max() and furthest < 2e-6 * np.abs(expected).max()
 
 
-@pytest.mark.parametrize("nu", [-0.5, 0.0, 1 / 3, 0.45])
-@pytest.mark.parametrize("edge", [1.0, 0.5])
+@pytest.mark.parametrize(("edge", "nu"), [(1.0, 0.0), (0.5, 0.0), (0.5, -0.5), (0.5, 0.45)])
 def test_its_volume_factor_has_the_moduli_of_the_page(edge, nu):
     """A lattice that repeats, E t = 1: stresses under even strains of a millionth along x and along y."""
     k, factor = 1 / (3**0.5 * (1 - nu)), edge * (1 - 3 * nu) / (3**0.5 * (1 - nu**2))

@@ -173,8 +173,7 @@ def test_lammps_volume_factor_has_the_moduli_that_it_is_given(nu, edge):
     size = 1e-6
     strains = size * np.array([[[1, 0], [0, 0]], [[0, 0], [0, 1]], [[0, 0.5], [0.5, 0]]])
     stresses = [
-        lammps_stress(ends[once], vectors[once], len(points), mesh.area, k, factor, strain) / size
-        for strain in strains
+        lammps_stress(ends[once], vectors[once], len(points), mesh.area, k, factor, strain) / size for strain in strains
     ]
     stiffness = np.array([[one[0, 0], one[1, 1], one[0, 1]] for one in stresses])
     np.testing.assert_allclose(stiffness, Material(1.0, nu).plane_stress, atol=2e-5)  # of second order in the strain

@@ -48,9 +48,7 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     reference = material.young_modulus * thickness / (math.sqrt(3) * (1 - nu))
     relative = mesh.sum_to_edges({3: bulk / np.tan(corner_angles(mesh.points, mesh.triangles))})
     relative[np.abs(relative) <= NO_STIFFNESS] = 0.0  # opposite right angles
-    return Springs(
-        reference, relative, (AngleEnergy(mesh.points, mesh.triangles, angle_moduli(mesh, bulk, shear)),)
-    )
+    return Springs(reference, relative, (AngleEnergy(mesh.points, mesh.triangles, angle_moduli(mesh, bulk, shear)),))
 
 
 def angle_moduli(mesh: Mesh, bulk: float, shear: float, slip: float = 0.0) -> np.ndarray:
