@@ -18,6 +18,10 @@ if TYPE_CHECKING:
     from ..engines.budget import BudgetSearch
     from ..engines.calibration import EngineFit
     from ..handover.net import SpringNet
+    from ..mesh import Mesh
+    from ..mesh.groups import GroupedMesh
+    from ..problem.geometry import Beam
+    from ..problem.shapes import Shape
 
 FOUND = ("substeps", "iterations", "size", "definition")
 """Options of what a budget finds."""
@@ -116,6 +120,9 @@ def fitted(
     names = None if loads is None else [name.strip() for name in loads.split(",") if name.strip()]
     searched, scale = asked.budget is not None, 1.0 if asked.scale is None else asked.scale
     further: dict[str, Any] = {}
+    body: Beam | Shape
+    material: Any
+    make_mesh: Callable[[], Mesh | GroupedMesh]
     if sheet.shape is not None:
         of = sheet.asked_shape(load, sized=not searched)
         body, material, load, mesh_name = of.shape, of.materials, of.load, of.mesh_name
@@ -125,7 +132,7 @@ def fitted(
             further["meshes"] = graded_meshes(of.shape, "free", lambda size: replace(of, size=size).mesh())
         make_mesh = of.mesh
     else:
-        body, material = sheet.asked_beam()
+        body, material = beam, _ = sheet.asked_beam()
         needs = {"load": (load, "traction"), "force": (asked.force, "0.2 N"), "density": (sheet.density, "1000 kg/m^3")}
         for name, (value, example) in needs.items():
             if value is None:
@@ -134,8 +141,8 @@ def fitted(
                 )
         if sheet.mesh_type is not None:
             further["mesh_types"] = sheet.mesh_type.split(",")
-        edge = None if searched else sheet.edge(body)
-        make_mesh, mesh_name = partial(sheet.mesh, body, edge), sheet.mesh_name(edge)
+        edge = None if searched else sheet.edge(beam)
+        make_mesh, mesh_name = partial(sheet.mesh, beam, edge), sheet.mesh_name(edge)
     if searched:
         limit = asked_quantity("--budget", str(asked.budget), "time")
         given = {"engine": engine, "budget": limit, "dt": setting.dt, "precision": setting.precision}
@@ -148,7 +155,7 @@ def fitted(
             return json_text({"budget": limit, "chosen": 0 if search.best else None, "tried": tried})
 
         return partial(budget_text, search), content, partial(_net, search.best.fit if search.best else None)
-    make = partial(Scene, body, make_mesh(), material, load, asked.force, scale=scale)
+    make = partial(Scene, body, make_mesh(), material, str(load), asked.force, scale=scale)
     if asked.definition is not None:
         scenes, refused = [make(definition=asked.definition)], ""
     else:

@@ -46,7 +46,8 @@ PROBED = 16
 WORSE = 2
 """Settings or meshes in a row that are worse than the best one before a search ends."""
 
-One, AnyMesh = TypeVar("One"), TypeVar("AnyMesh", bound=Mesh | GroupedMesh)
+One = TypeVar("One")
+AnyMesh = TypeVar("AnyMesh", bound=Mesh | GroupedMesh)
 
 Cost = Callable[[SpringNet, Setting], float]
 """Seconds of a frame of a net at a setting."""
