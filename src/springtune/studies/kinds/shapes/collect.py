@@ -58,7 +58,7 @@ SHAPES = declared(
     further=dict.fromkeys(("value", "reference_value", "expected_value"), MIXED),
 )
 
-FINITE_STRAIN = declared(
+AT_FINITE_STRAIN = declared(
     "/shapes_finite_strain",
     {
         (*CASE_AXES, "law", "quantity"): {
@@ -70,7 +70,8 @@ FINITE_STRAIN = declared(
             "error": ("1", "signed error against finite strain, (network - reference) / |reference|"),
         },
     },
-    dimensions={"law": "law at finite strain: that of the material, or of St. Venant and Kirchhoff"},
+    dimensions=SHAPES.dimensions
+    | {"law": "law at finite strain: that of the material, or of St. Venant and Kirchhoff"},
     further={"reference_value": MIXED},
 )
 
@@ -110,7 +111,7 @@ def groups(study, folder):
         for one, key in keys.items():
             _scene(part, one, results[key], references, found)
     drawn = DRAWING in study.outputs and not study.part
-    finite = {FINITE_STRAIN.name: _finite_strain(study, part, folder, found.data.value)} if part.finite else {}
+    finite = {AT_FINITE_STRAIN.name: _finite_strain(study, part, folder, found.data.value)} if part.finite else {}
     return {SHAPES.name: found.data} | finite | (_fields(study, folder) if drawn else {})
 
 
@@ -161,7 +162,7 @@ def _references(study, part, folder, found):
 def _finite_strain(study, part, folder, values):
     """Group of references at finite strain, and the errors of the networks with their law."""
     laws = tuple(dict.fromkeys(law for *_, law in part.finite))
-    found = Filler(FINITE_STRAIN.empty(study.axes | {"law": laws}))
+    found = Filler(AT_FINITE_STRAIN.empty(study.axes | {"law": laws}))
     references = {}
     for shape, material, load, law in part.finite:
         result = store.read_one(

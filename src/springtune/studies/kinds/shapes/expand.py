@@ -120,8 +120,13 @@ def _scenes(config):
                     one = ShapeScene(name, *mesh, material, load, definition, kinematics)
                     found[one] = None
                     if grid.finite_strain and law_of(one):
-                        finite[name, material, load, law_of(one)] = None
+                        finite[_finite(one)] = None
     return found, referred, finite
+
+
+def _finite(one):
+    """Case of a scene's reference at finite strain."""
+    return one.shape, one.material, one.load, law_of(one)
 
 
 def law_of(one):
@@ -160,7 +165,7 @@ def expand(config, declared):
         parts,
         tuple(scenes),
         tuple(dict.fromkeys(key for one in scenes for key in [(one.shape, one.material, one.load)] if key in referred)),
-        tuple(finite),
+        tuple(dict.fromkeys(key for one in scenes for key in [_finite(one)] if key in finite)),
         {name: dict(one.refined) for name, one in config.shapes.items()},
     )
 
