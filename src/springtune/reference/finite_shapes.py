@@ -79,7 +79,13 @@ class _PartLaws:
 
 
 class _FiniteLevel(Level, Body):
-    """A shape solved at finite strain on one level."""
+    """A shape solved at finite strain on one level.
+
+    One layer at corners: nearer to them strain grows without end, and a law that gives way when pressed has no
+    equilibrium.
+    """
+
+    most_layers = 1
 
     def __init__(self, problem: Problem, degree: int, levels: _Levels) -> None:
         self.levels = levels

@@ -463,9 +463,11 @@ VOIGT = np.array([[0, 2], [2, 1]])
 class Level:
     """A shape solved on one level."""
 
+    most_layers = HIGHEST_DEGREE
+
     def __init__(self, problem: Problem, degree: int) -> None:
         self.problem = problem
-        mesh = problem.graded(degree)
+        mesh = problem.graded(min(degree, self.most_layers))
         self.space = _Space(mesh, degree)
         self.outlines = mesh.part_sides()
         thickness = problem.shape.thickness
