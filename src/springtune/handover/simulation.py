@@ -24,6 +24,7 @@ stretch springs further."""
 WORDS = {
     "area": "areas",
     "angle": "angles",
+    "corner": "angles",
     "biquadratic": "squared lengths",
     "incompressible": "rubber",
     "compressible": "rubber",
@@ -188,6 +189,7 @@ def network_of(net: Net, reference: float, energies: Callable[[Net, float], list
 MADE_OF: dict[str, tuple[type[Energy], tuple[str, ...]]] = {
     "area": (AreaEnergy, ("modulus",)),
     "angle": (AngleEnergy, ("modulus",)),
+    "corner": (AngleEnergy, ("rotational",)),
     "biquadratic": (BiquadraticEnergy, ("tensile", "coupling")),
     "compressible": (NeoHookeEnergy, ("shear", "bulk")),
     "incompressible": (YeohEnergy, ("c1", "c2", "c3")),
