@@ -272,6 +272,20 @@ def about(net: Net, simulation: Simulation, integrator: str) -> list[str]:
     return lines
 
 
+def filled(name: str, **values: Any) -> str:
+    """Fill in a template; floats get the shortest text that is read back exactly."""
+    import jinja2
+
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader(__package__, "templates"),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    return environment.get_template(f"{name}.jinja").render(values)
+
+
 def numbers(values: np.ndarray) -> str:
     """Numbers of an array in a row, each in the shortest text that is read back exactly."""
     return " ".join(map(repr, values.ravel().tolist()))
