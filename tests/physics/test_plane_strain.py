@@ -5,6 +5,10 @@ import pytest
 
 import springtune as st
 from springtune.prediction.choices import references
+from springtune.problem.loads import AXIAL
+from springtune.problem.shapes import LoadCase, Pressure, Quantity, Segment, Shape, Support
+from springtune.reference.finite_strain import solve_finite_strain
+from springtune.reference.shapes import solve_shape
 
 BEAM = st.Beam("200 mm", "40 mm")
 STEEL = st.Material("210 GPa", 0.3, plane="strain", name="steel")
@@ -95,5 +99,34 @@ def test_an_incompressible_material_and_an_unknown_plane_are_refused():
 def test_laws_of_rubber_with_a_free_thickness_are_refused():
     """Also at nu = 1/3, where the constants in the plane are those of an incompressible sheet."""
     mesh = st.make_mesh(BEAM, "structured", "10 mm")
-    with pytest.raises(st.DefinitionError, match="'steel' is in plane strain; choose 'delingette', or plane stress"):
+    with pytest.raises(st.DefinitionError, match="'steel' is in plane strain; choose 'delingette', or plane 'stress'"):
         st.DEFINITIONS["neo-hooke"].springs(mesh, st.Material(1e6, 1 / 3, plane="strain", name="steel"), 1e-3)
+
+
+def test_a_ring_under_pressure_widens_as_lame_says():
+    """A quarter of a thick pipe; the mean of u cos over the bore is 2 / pi of the radial displacement."""
+    inner, outer, pressure = 0.01, 0.03, 1e6
+    corners = [(inner, 0.0), (outer, 0.0), (0.0, outer), (0.0, inner)]
+    centres, names = (None, (0.0, 0.0)) * 2, ("lower", "outer", "left", "bore")
+    sides = [Segment(at, centre=centre, group=name) for at, centre, name in zip(corners, centres, names)]
+    burst = LoadCase(
+        "burst",
+        (Support("lower", y=0.0), Support("left", x=0.0)),
+        pressures=(Pressure("bore", pressure),),
+        quantities=(Quantity("bore", "displacement", "bore", "x"),),
+    )
+    found = solve_shape(Shape("pipe", 1e-3, sides, loads={"burst": burst}), burst, {"": STEEL}).values["bore"]
+    young, nu, square = 210e9, 0.3, inner**2 / (outer**2 - inner**2)
+    widened = (1 + nu) / young * pressure * square * ((1 - 2 * nu) * inner + outer**2 / inner)
+    assert found == pytest.approx(2 / np.pi * widened, rel=1e-6)
+
+
+@pytest.mark.parametrize("force", [0.01, 8.0])
+def test_a_reference_at_finite_strain_takes_the_plane_of_its_material(force):
+    rubber = st.Material("1 MPa", 0.45, plane="strain")
+    ours = solve_finite_strain(BEAM, rubber, force, AXIAL)
+    asked = solve_finite_strain(BEAM, st.Material("1 MPa", 0.45), force, AXIAL, plane="strain")
+    assert ours.displacement == asked.displacement
+    if force < 1:
+        small = st.Scene(BEAM, st.make_mesh(BEAM, "right", "20 mm"), rubber, "traction", force).reference()
+        assert ours.displacement == pytest.approx(small.displacement, rel=1e-3)

@@ -15,6 +15,7 @@ springs, loads nor supports. So scripts have to type them, and files say which.
 import numpy as np
 
 from ..mechanics.energies import Energy, StableNeoHookeEnergy
+from ..problem.materials import Material
 from .simulation import Simulation, about, lame, simulate
 from .terms import Net
 
@@ -252,6 +253,8 @@ def newton_usd(net: Net) -> str:
             "'delingette', or a name ending in .newton.py"
         )
     shear, first = membrane(net)
+    plane = material.get("plane", "stress")
+    sheet = Material(material["young_modulus"], material["poisson_ratio"], plane=plane).in_plane
     moved = np.zeros((0, 2)) if simulation.displacements is None else simulation.displacements
     said = "\n".join([*about(net, simulation, _step(simulation)), *_law(net), *TO_SET])
     return USD.format(
@@ -266,8 +269,8 @@ def newton_usd(net: Net) -> str:
         tri_ke=shear,
         tri_ka=first,
         density=material["density"],
-        young=material["young_modulus"],
-        poisson=material["poisson_ratio"],
+        young=sheet.young_modulus,
+        poisson=sheet.poisson_ratio,
     )
 
 

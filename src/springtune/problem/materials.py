@@ -111,7 +111,7 @@ class Material:
         if self.plane == "stress":
             return self
         nu = self.poisson_ratio
-        return _InPlane(self.young_modulus / (1 - nu**2), nu / (1 - nu), self.density, self.name)
+        return InPlane(self.young_modulus / (1 - nu**2), nu / (1 - nu), self.density, self.name)
 
     @property
     def plane_stress(self) -> np.ndarray:
@@ -130,11 +130,16 @@ class Material:
         return np.array([[diagonal, coupling, 0.0], [coupling, diagonal, 0.0], [0.0, 0.0, shear]])
 
 
-class _InPlane(Material):
+class InPlane(Material):
     """Constants of a sheet in plane strain, as if of one in plane stress; its Poisson's ratio is below 1."""
 
     def __post_init__(self) -> None:
-        pass
+        put(self, plane="strain")
+
+    @property
+    def in_plane(self) -> Material:
+        """The same."""
+        return self
 
 
 RUBBER_TESTS = {"uniaxial": 2, "equibiaxial": 5, "pure shear": 3}

@@ -177,9 +177,10 @@ class Definition(Declared):
         if self.needs == "cases" and not (isinstance(given, list | tuple) and given):
             raise DefinitionError(f"cases: {given!r} is no list of loads; give what identification.patch_cases returns")
         if self.finite_strain and isinstance(material, Material) and material.plane == "strain":
+            named = repr(material.name) if material.name else "this one"
             raise DefinitionError(
-                f"has a law at finite strain whose thickness is free, and {material.name!r} is in plane strain; choose "
-                "'delingette', or plane stress"
+                f"has a law of sheets whose thickness is free, and {named} is in plane strain; choose 'delingette', or "
+                "plane 'stress'"
             )
         arguments = (given,) if self.needs else ()
         found = self.function(mesh, material.in_plane, thickness, *arguments)
