@@ -108,6 +108,10 @@ class BudgetChoice(Tabled):
 class BudgetSearch(TabledList[BudgetChoice]):
     """What a search within a frame's time found: the least error at worst first, then the cheapest.
 
+    Parameters
+    ----------
+    iterable : iterable of BudgetChoice
+
     Examples
     --------
     >>> import springtune as st

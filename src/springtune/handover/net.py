@@ -71,7 +71,7 @@ def meaning() -> str:
     return f"{of}; {signs}; linear kinematics, small strain"
 
 
-CONSTANTS_SAID = ("name", "young_modulus", "poisson_ratio", "density")
+CONSTANTS_SAID = ("name", "young_modulus", "poisson_ratio", "plane", "density")
 """Constants of a material in a header."""
 
 STEP_MEANING = "about rest, undamped; springs that stiffen, and damping that lags, narrow it"

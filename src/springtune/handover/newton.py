@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from ..mechanics.energies import Energy, StableNeoHookeEnergy
+from ..problem.materials import Material
 from .simulation import about, filled, lame, simulate
 from .terms import Net
 
@@ -94,7 +95,10 @@ def newton_usd(net: Net) -> str:
             f"definition '{net.header['definition']}': has springs, and deformable cloth of OpenUSD is triangles of a "
             "material; take 'delingette', or a name ending in .newton.py"
         )
-    return filled("newton.usda", **values, held=np.argwhere(net.held).tolist())
+    material = net.header["material"]
+    plane = material.get("plane", "stress")
+    sheet = Material(material["young_modulus"], material["poisson_ratio"], plane=plane).in_plane
+    return filled("newton.usda", **values, sheet=sheet, held=np.argwhere(net.held).tolist())
 
 
 def _values(net: Net) -> dict[str, Any]:

@@ -239,6 +239,7 @@ def about(net: Net, simulation: Simulation, integrator: str) -> list[str]:
     constants = ""
     if material["young_modulus"] is not None:
         constants = f"Young's modulus {material['young_modulus']:g} Pa, Poisson's ratio {material['poisson_ratio']:g}, "
+        constants += "plane strain, " if material.get("plane") == "strain" else ""
     left_out = int((net.stiffness == 0).sum()) if np.any(net.stiffness) else 0
     lines = [
         f"{header['made_by']}: definition '{header['definition']}'. {header['formula']}.",

@@ -90,10 +90,13 @@ class FiniteStrainSolution:
 
 
 def solve_finite_strain(
-    beam: Beam, material: Material, force: float, kind: LoadKind = FACE, plane: str = "stress", follower: bool = False
+    beam: Beam, material: Material, force: float, kind: LoadKind = FACE, plane: str = "", follower: bool = False
 ) -> FiniteStrainSolution:
-    """Solve for the displacements of a beam of rubber, see `law_of`, under a `force` [N], positive outwards."""
-    law = law_of(material, plane)
+    """Solve for the displacements of a beam of rubber, see `law_of`, under a `force` [N], positive outwards.
+
+    The plane is the material's unless one is given.
+    """
+    law = law_of(material, plane or material.plane)
     stress = force / (kind.side_length(beam) * beam.thickness * material.young_modulus)
     sheets = [_Sheet(beam.length / beam.height, law, count, kind, follower) for count in COUNTS]
     name = f"{beam.name}, {material.name}"

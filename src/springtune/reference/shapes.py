@@ -257,7 +257,8 @@ class Problem:
                 f"{', '.join(repr(name) for name in materials)}"
             )
         absent = np.zeros((3, 3))
-        self.stiffness = np.array([materials[n].plane_stress if n in present else absent for n in self.mesh.names])
+        planes = {name: one.in_plane.plane_stress for name, one in materials.items()}
+        self.stiffness = np.array([planes[n] if n in present else absent for n in self.mesh.names])
         self.density = np.zeros(len(self.mesh.names))
         for name in present if any(load.gravity) else ():
             density = materials[name].density

@@ -191,8 +191,14 @@ class Definition(Declared):
                 raise DefinitionError(f"{name}: {value!r} is not a number above zero; give one in SI units")
         if self.needs == "cases" and not (isinstance(given, list | tuple) and given):
             raise DefinitionError(f"cases: {given!r} is no list of loads; give what identification.patch_cases returns")
+        if self.finite_strain and isinstance(material, Material) and material.plane == "strain":
+            named = repr(material.name) if material.name else "this one"
+            raise DefinitionError(
+                f"has a law of sheets whose thickness is free, and {named} is in plane strain; choose 'delingette', or "
+                "plane 'stress'"
+            )
         arguments = (given,) if self.needs else ()
-        found = self.function(mesh, material, thickness, *arguments)
+        found = self.function(mesh, material.in_plane, thickness, *arguments)
         if not isinstance(found, Springs) or len(found.relative) != len(mesh.edges):
             what = f"{len(found.relative)} springs" if isinstance(found, Springs) else type(found).__name__
             raise DefinitionError(f"returns {what}; return springtune.Springs, one for each of {len(mesh.edges)} edges")

@@ -127,10 +127,12 @@ def tables(tree: "xr.DataTree") -> list[dict[str, Any]]:
         row |= {"expected": one["expected_value"], "units": one["quantity_units"]}
         row |= {f"{error}_percent": 100 * one[error] for error in ERRORS_SHOWN}
         rows.append(row | {"status": STATUS[int(one["status"])], "message": one["message"]})
+    strained = tree.attrs.get("plane_strain")
     note = (
-        "Quantities of interest of the networks, in SI units; the reference is small-strain plane stress by converged "
-        "finite elements on the same shape, and errors are signed: (network − reference) / |reference|, and the same "
-        "against the expected values that others give."
+        "Quantities of interest of the networks, in SI units; the reference is small-strain plane stress "
+        f"{f'(plane strain of {strained}) ' if strained else ''}by converged finite elements on the same shape, and "
+        "errors are signed: (network − reference) / |reference|, and the same against the expected values that others "
+        "give."
     )
     told = "; ".join(sources)
     return [{"stem": "shapes", "title": "Shapes", "note": f"{note} Sources: {told}." if told else note, "rows": rows}]
