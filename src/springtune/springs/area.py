@@ -6,7 +6,8 @@ Central springs obey Cauchy's relation, so isotropic networks have nu = 1/3. Spr
 .. math:: W_A = \tfrac{1}{2} K_A t (A - A_0)^2 / A_0, \quad K_A = \frac{E (3 \nu - 1)}{2 (1 - \nu^2)},
 
 adds the rest of the bulk modulus. K_A is negative for nu < 1/3, but the sum stays positive. E, nu and G are exact on
-equilateral rows and on rectangles with both diagonals, and within 2 or 3 % on free meshes.
+equilateral rows and on rectangles with both diagonals, and within 2 or 3 % on free meshes. In plane strain K_A is
+``lambda - G``, with lambda of three dimensions, and zero at nu = 1/4.
 
 After Golec and others (The Visual Computer 36, 2020, hal-02124471, abstract read): springs keep the Cauchy part, a
 volume energy the rest. The plane form is derived here.
