@@ -65,6 +65,8 @@ _NAMES = {
     "problem.status": ("Status",),
     "scene.curve": ("Curve", "sensitivity"),
     "scene.damping": ("Damping", "damping_of"),
+    "scene.identify": ("Identified", "identify"),
+    "scene.measured": ("MeasuredTest",),
     "scene.meshes": ("make_mesh", "read_mesh"),
     "scene.moduli": ("Moduli", "moduli"),
     "scene.shape_meshes": ("mesh_shape", "read_shape"),

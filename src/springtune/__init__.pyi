@@ -47,6 +47,9 @@ from .scene.curve import Curve as Curve
 from .scene.curve import sensitivity as sensitivity
 from .scene.damping import Damping as Damping
 from .scene.damping import damping_of as damping_of
+from .scene.identify import Identified as Identified
+from .scene.identify import identify as identify
+from .scene.measured import MeasuredTest as MeasuredTest
 from .scene.meshes import make_mesh as make_mesh
 from .scene.meshes import read_mesh as read_mesh
 from .scene.moduli import Moduli as Moduli

@@ -71,6 +71,7 @@ COMMANDS = {
     "split": Row(STUDIES, "study", "split", "Write the parts of a study for several sites."),
     "definitions": Row(STUDIES, "study", "definitions", "List the definitions of spring stiffness."),
     "predict": Row(STUDIES, "predict", "predict", "Recommend a definition for one mesh, or a mesh for one error."),
+    "identify": Row(STUDIES, "identify", "identify", "Find a material's constants from measured tests."),
     "springs": Row(STUDIES, "predict", "springs", "Write the springs of one mesh for another program."),
     "browse": Row(RESULTS, "results", "browse", "Browse the results of a study."),
     "info": Row(RESULTS, "results", "info", "Say what a dataset holds, and where it comes from."),

@@ -214,7 +214,7 @@ class AskedShape:
             raise ValueError(f"--size: '{self.size_text}'{between}{said}") from None
 
 
-def _shape(text: str) -> "tuple[Study, Shapes, Shape]":
+def shape_of_study(text: str) -> "tuple[Study, Shapes, Shape]":
     """Study, its part of shapes, and the shape."""
     from ..problem.quantities import nearest
     from ..studies.kinds import load_study
@@ -308,7 +308,7 @@ class SheetOptions:
 
         Load and material may be None if the study has only one for the shape. `sized`: an outline needs a size.
         """
-        study, part, shape = _shape(self.shape or "")
+        study, part, shape = shape_of_study(self.shape or "")
         if load is None and len(shape.loads) > 1:
             raise ValueError(f"--load: missing; shape '{shape.name}' has {', '.join(shape.loads)}; give one")
         from ..problem.quantities import nearest

@@ -334,8 +334,8 @@ def terms(energy: Energy, reference: float) -> Terms:
         values = {"rest_area": signed_areas(points, corners), "modulus": reference * energy.modulus}
         return Terms("area", corners, values)
     if isinstance(energy, AngleEnergy):
-        values = {"rest_angle": corner_angles(points, corners), "modulus": reference * energy.modulus}
-        return Terms("angle", corners, values)
+        kind, name = ("angle", "modulus") if energy.modulus.ndim == 1 else ("corner", "rotational")
+        return Terms(kind, corners, {"rest_angle": corner_angles(points, corners), name: reference * energy.modulus})
     if isinstance(energy, BiquadraticEnergy):
         sides = np.roll(points[corners], 1, axis=1) - np.roll(points[corners], -1, axis=1)
         coupling = np.zeros(energy.tensile.shape) if energy.coupling is None else energy.coupling

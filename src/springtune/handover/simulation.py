@@ -24,6 +24,7 @@ stretch springs further."""
 WORDS = {
     "area": "areas",
     "angle": "angles",
+    "corner": "angles",
     "biquadratic": "squared lengths",
     "incompressible": "rubber",
     "compressible": "rubber",
@@ -188,6 +189,7 @@ def network_of(net: Net, reference: float, energies: Callable[[Net, float], list
 MADE_OF: dict[str, tuple[type[Energy], tuple[str, ...]]] = {
     "area": (AreaEnergy, ("modulus",)),
     "angle": (AngleEnergy, ("modulus",)),
+    "corner": (AngleEnergy, ("rotational",)),
     "biquadratic": (BiquadraticEnergy, ("tensile", "coupling")),
     "compressible": (NeoHookeEnergy, ("shear", "bulk")),
     "incompressible": (YeohEnergy, ("c1", "c2", "c3")),
@@ -269,6 +271,20 @@ def about(net: Net, simulation: Simulation, integrator: str) -> list[str]:
     if simulation.force and simulation.why:
         lines.append(f"No equilibrium was found: {simulation.why}.")
     return lines
+
+
+def filled(name: str, **values: Any) -> str:
+    """Fill in a template; floats get the shortest text that is read back exactly."""
+    import jinja2
+
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader(__package__, "templates"),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    return environment.get_template(f"{name}.jinja").render(values)
 
 
 def numbers(values: np.ndarray) -> str:

@@ -101,12 +101,23 @@ def told(test: TensileTest | str | Path) -> TensileTest:
 
 def fit(columns: np.ndarray, test: TensileTest) -> tuple[float, ...]:
     """Return coefficients of stress `columns` (n, n_terms) by least squares of relative errors."""
-    size = np.abs(test.stress)
-    weights = 1 / np.maximum(size, LEAST_SHARE * size.max())
+    weights = relative_weights(test)
     scaled = columns * weights[:, None]
     sizes = np.linalg.norm(scaled, axis=0)
     found = np.linalg.lstsq(scaled / sizes, test.stress * weights, rcond=None)[0] / sizes
     return tuple(float(f"{one:.{FIT_DIGITS}g}") for one in found)
+
+
+def relative_weights(test: TensileTest) -> np.ndarray:
+    """Return what makes errors of a test's stresses relative [1/Pa], shape (n,)."""
+    size = np.abs(test.stress)
+    return np.asarray(1 / np.maximum(size, LEAST_SHARE * size.max()))
+
+
+def stress_columns(stretch: np.ndarray, terms: int) -> np.ndarray:
+    """Return uniaxial stresses at stretches (n,) for a coefficient of 1 Pa of each term, shape (n, terms)."""
+    slopes = [n * Rubber.excess("uniaxial", stretch) ** (n - 1) for n in range(1, terms + 1)]
+    return np.stack([2 * (stretch - stretch**-2) * slope for slope in slopes], axis=1)
 
 
 def relative_error(stress: np.ndarray, test: TensileTest) -> float:
@@ -180,13 +191,10 @@ def fit_rubber(
     """
     test = told(uniaxial)
     check_terms(terms, MOST_TERMS)
-    q = test.stretch
-    excess = Rubber.excess("uniaxial", q)
-    columns = np.stack([2 * (q - q**-2) * n * excess ** (n - 1) for n in range(1, terms + 1)], axis=1)
-    found = fit(columns, test)
+    found = fit(stress_columns(test.stretch, terms), test)
     if not found[0] > 0:
         raise TestDataError(f"{test.name}: fits a modulus that is not above zero; give points of small stretches, too")
-    law = Rubber(found, float(f"{excess.max():.{FIT_DIGITS}g}"), (), density, name)
+    law = Rubber(found, float(f"{Rubber.excess('uniaxial', test.stretch).max():.{FIT_DIGITS}g}"), (), density, name)
     _check(law, test.name)
     data = {"uniaxial": test} | {
         kind: told(other)

@@ -110,6 +110,8 @@ class Definition(Declared):
         Whether it supports anisotropic materials.
     finite_strain : bool
         Whether it has the material's law at finite strain; its nonlinear error is then against a reference of that law.
+    st_venant : bool
+        Whether it is linear triangles of St. Venant and Kirchhoff's law in nonlinear kinematics.
 
     Examples
     --------
@@ -127,6 +129,19 @@ class Definition(Declared):
     needs: str
     anisotropic: bool
     finite_strain: bool
+    st_venant: bool = False
+
+    @property
+    def law(self) -> str:
+        """Law at finite strain, ``"rubber"`` (that of the material), ``"st-venant"`` or none.
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> [st.DEFINITIONS[name].law for name in ("neo-hooke", "delingette", "lattice")]
+        ['rubber', 'st-venant', '']
+        """
+        return "rubber" if self.finite_strain else "st-venant" if self.st_venant else ""
 
     def springs(self, mesh: Mesh, material: AnyMaterial, thickness: float, given: object = None) -> Springs:
         """Return the springs of a mesh.
@@ -210,6 +225,7 @@ def definition(
     needs: str = "",
     anisotropic: bool = False,
     finite_strain: bool = False,
+    st_venant: bool = False,
 ) -> Callable[[Function], Function]:
     """Declare a function as a definition, by a decorator that returns it unchanged.
 
@@ -219,7 +235,7 @@ def definition(
         Label in a study and in the dataset.
     order : float, optional
         Place in the order of labels, between its neighbours' numbers; by default last.
-    uniform, cells, uniaxial, needs, anisotropic, finite_strain
+    uniform, cells, uniaxial, needs, anisotropic, finite_strain, st_venant
         As of `Definition`.
 
     Returns
@@ -252,9 +268,8 @@ def definition(
             raise ValueError(f"definition {name!r}: cells {cells!r}; give the corners of cells that it can have: 3, 4")
         if needs not in NEEDS:
             raise ValueError(f"definition {name!r}: needs {needs!r}; give one of {', '.join(map(repr, NEEDS))}")
-        DEFINITIONS.declare(
-            Definition(name, function, order, uniform, tuple(cells), uniaxial, needs, anisotropic, finite_strain)
-        )
+        traits = uniform, tuple(cells), uniaxial, needs, anisotropic, finite_strain, st_venant
+        DEFINITIONS.declare(Definition(name, function, order, *traits))
         return function
 
     return declare

@@ -1,7 +1,7 @@
 """Plots of a single scene and of a single curve in the style of all figures, and what figures of networks share."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -84,6 +84,20 @@ def draw_curve(ax: Axes | None, curve: "Curve") -> Axes:
     elif np.isfinite(error).any():
         said.append(sign_sentence({"": float(np.nansum(curve.displacement))}))
     labels.note(panel, "; ".join(said))
+    return panel
+
+
+@style.styled
+def draw_residuals(ax: Axes | None, residuals: Mapping[str, np.ndarray], places: Mapping[str, np.ndarray]) -> Axes:
+    """Draw residuals over the noise of each column or field, over the largest load or coordinate."""
+    _, ((panel,),) = style.panels(ax, figsize=(style.COLUMN, 2.5), layout="constrained")
+    for number, (label, values) in enumerate(residuals.items()):
+        where = places[label]
+        along = where if where.ndim == 1 else np.repeat(where[:, 0], 2)
+        panel.plot(along / np.abs(along).max(), values, ".", color=style.line(number)["color"], label=label)
+    panel.axhline(0.0, color="0.6", linewidth=0.7)
+    panel.set(xlabel="Load, or x, over its largest [1]", ylabel="Residual over noise [1]")
+    panel.legend(fontsize=style.SMALL)
     return panel
 
 

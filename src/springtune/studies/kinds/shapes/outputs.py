@@ -83,6 +83,16 @@ VIEWS = (
         ),
     ),
     View(
+        "/shapes_finite_strain",
+        "Shapes at finite strain",
+        "Errors of networks that have a law at finite strain, against references of that law.",
+        (
+            Plot("error over mesh size", "error", "mesh_size", "definition", log="xy"),
+            Plot("errors of definitions by quantity", "error", "quantity", "definition", "map"),
+            Plot("quantities of the references", "reference_value", "load", "law"),
+        ),
+    ),
+    View(
         "/shape_fields",
         "Networks of shapes",
         "Positions and displacements of all particles, of each shape and load.",
