@@ -235,3 +235,23 @@ def test_finite_strain(kind, force, length, size):
     # Even elements, too stiff at the corners: 5e-5 to 3e-4 as measured, in shear at five times the length of a clamp.
     assert theirs == pytest.approx(ours.displacement, rel=1e-3 if kind == SHEAR else 5e-4)
     assert abs(theirs) < abs(ours.displacement)
+
+
+@pytest.mark.parametrize("nu", [0.3, 0.49])
+@pytest.mark.parametrize("kind", [AXIAL, BENDING, SHEAR, FACE])
+def test_plane_strain(kind, nu):
+    """By elements CPE8 of even size, too stiff at the corners of the clamp, which are sharper towards nu = 0.5."""
+    material = Material(210e9, nu, name="steel", plane="strain")
+    coarse, fine = (theirs_of(BEAM, material, 400e3, size, kind) for size in (4e-3, 2e-3))
+    if kind == AXIAL and nu == 0.3:
+        assert fine * 1e3 == pytest.approx(8.62447, abs=1e-5)
+    ours = solve_small_strain(BEAM, material, 400e3, kind=kind).displacement
+    assert coarse < fine < ours
+    assert fine == pytest.approx(ours, rel=3e-4 if nu == 0.3 else 4e-3)
+    assert ours - fine < 0.5 * (ours - coarse)
+
+
+def test_plane_strain_at_finite_strain():
+    material = Material(1e6, 0.4, name="rubber", plane="strain")
+    theirs = theirs_of(BEAM, material, 2.0, 2.5e-3, AXIAL, finite=True)
+    assert theirs == pytest.approx(solve_finite_strain(BEAM, material, 2.0, kind=AXIAL).displacement, rel=5e-4)

@@ -2,11 +2,14 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import root
 
 import springtune as st
+from springtune.mechanics.network import Network
 from springtune.prediction.choices import references
 from springtune.problem.loads import AXIAL
-from springtune.problem.shapes import LoadCase, Pressure, Quantity, Segment, Shape, Support
+from springtune.problem.shapes import LoadCase, Pressure, Quantity, Segment, Shape, Support, Traction
+from springtune.reference.finite_shapes import solve_finite_shape
 from springtune.reference.finite_strain import solve_finite_strain
 from springtune.reference.shapes import solve_shape
 
@@ -130,3 +133,63 @@ def test_a_reference_at_finite_strain_takes_the_plane_of_its_material(force):
     if force < 1:
         small = st.Scene(BEAM, st.make_mesh(BEAM, "right", "20 mm"), rubber, "traction", force).reference()
         assert ours.displacement == pytest.approx(small.displacement, rel=1e-3)
+
+
+def test_an_orthotropic_sheet_in_plane_strain_is_the_block_without_strain_across():
+    moduli, ratios, shear = (140e9, 10e9, 9e9), {"xy": 0.3, "xz": 0.28, "yz": 0.4}, 5e9
+    compliance = np.diag([*(1 / one for one in moduli), 1 / shear])
+    for (i, j), name in zip(((0, 1), (0, 2), (1, 2)), ratios):
+        compliance[i, j] = compliance[j, i] = -ratios[name] / moduli[i]
+    block = np.linalg.inv(compliance)[np.ix_([0, 1, 3], [0, 1, 3])]
+    third = (moduli[2], ratios["xz"], ratios["yz"])
+    ply = st.AnisotropicMaterial.orthotropic(*moduli[:2], ratios["xy"], shear, across_the_plane=third)
+    np.testing.assert_allclose(ply.plane_stress, block, rtol=1e-12)
+    steel = st.AnisotropicMaterial.orthotropic(210e9, 210e9, 0.3, 210e9 / 2.6, across_the_plane=(210e9, 0.3, 0.3))
+    np.testing.assert_allclose(steel.plane_stress, by_lame(STEEL), rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("third", "said"), [((9e9, 0.3), "give E_z, nu_xz and nu_yz"), ((140e9, 0.3, 0.9), "some strain takes no work")]
+)
+def test_wrong_constants_across_the_plane_are_refused(third, said):
+    with pytest.raises(ValueError, match=f"across_the_plane.*{said}"):
+        st.AnisotropicMaterial.orthotropic("140 GPa", "10 GPa", 0.3, "5 GPa", across_the_plane=third)
+
+
+def test_coupled_triangles_have_saint_venants_energy_in_three_dimensions():
+    """Of Green's strain without a part across the plane: lambda/2 (tr G)^2 + mu G : G, at any strain."""
+    mesh, clay = st.make_mesh(st.Beam(0.1, 0.02), "free", "5 mm"), st.Material(2e6, 0.45, plane="strain")
+    springs = st.DEFINITIONS["delingette"].springs(mesh, clay, 1e-3)
+    network = Network(mesh, np.zeros(mesh.points.shape, dtype=bool), springs.relative, springs.energies)
+    gradient = np.array([[1.4, 0.3], [-0.2, 0.7]])
+    green = 0.5 * (gradient.T @ gradient - np.eye(2))
+    first, shear = 2e6 * 0.45 / (1.45 * 0.1), 2e6 / 2.9
+    energy = (0.5 * first * np.trace(green) ** 2 + shear * np.sum(green**2)) * 1e-3 * mesh.area
+    found = springs.reference * network.energy(mesh.points @ (gradient - np.eye(2)).T)
+    assert found == pytest.approx(energy, rel=1e-9)
+
+
+def test_a_shape_at_finite_strain_is_in_the_plane_of_its_material():
+    """An even pull between rollers: neo-Hooke's stresses of stretches a along, b across and 1 out of the plane."""
+    rubber, length, height, force = st.Material(1e6, 0.4, plane="strain"), 0.1, 0.04, 20.0
+    shear, bulk = 1e6 / 2.8, 1e6 / 0.6
+
+    def stresses(stretches):
+        volume, total = np.prod(stretches), 1 + np.sum(stretches**2)
+        even = shear * volume ** (-2 / 3) * (stretches - total / (3 * stretches))
+        return even + bulk * (volume - 1) * stretches[::-1] - [force / (height * 1e-3), 0]
+
+    case = LoadCase(
+        "pull",
+        (Support("left", x=0.0), Support("lower", y=0.0)),
+        [Traction("right", (force, 0.0))],
+        quantities=(Quantity("end", "displacement", "right", "x"),),
+    )
+    shape = Shape.rectangle(length, height, loads={"pull": case})
+    found = solve_finite_shape(shape, case, {"": rubber}).values["end"]
+    assert found == pytest.approx((root(stresses, [1.3, 0.8], tol=1e-12).x[0] - 1) * length, rel=1e-9)
+    sheet = solve_finite_shape(shape, case, {"": rubber}, law="st-venant").values["end"]
+    pulled = root(
+        lambda a: a * (a**2 - 1) / 2 * rubber.in_plane.young_modulus - force / (height * 1e-3), 1.3, tol=1e-12
+    )
+    assert sheet == pytest.approx((pulled.x[0] - 1) * length, rel=1e-9)

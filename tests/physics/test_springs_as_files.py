@@ -15,6 +15,7 @@ from mechanics import angle_forces, area_forces, area_of, spring_forces
 from springtune.cli import main
 from springtune.handover import paraview
 from springtune.handover.formats import ENDINGS
+from springtune.handover.newton import membrane
 from springtune.mechanics.energies import AngleEnergy, AreaEnergy
 from springtune.mechanics.integrators import EXPLICIT, IMPLICIT
 from springtune.studies.kinds.scenes.solve import solved
@@ -534,3 +535,29 @@ class TestCommand:
         assert result.stderr.startswith(said) or said in result.stderr
         assert sorted(os.listdir()) == ["file", "folder.csv", "folder.json"]
         assert not os.listdir("folder.json") and not os.listdir("folder.csv")
+
+
+class TestPlaneStrain:
+    """Lame's constants of a sheet in plane strain are those of three dimensions, beyond nu = 1/3 above 2 G."""
+
+    CLAY = st.Material(1e6, 0.45, 1800.0, "clay", "strain")
+
+    def net(self):
+        mesh = st.make_mesh(st.Beam(0.1, 0.02), "structured", 0.01)
+        return st.SpringNet.from_mesh(mesh, self.CLAY, "delingette", thickness=1e-3)
+
+    def test_a_file_has_the_constants_of_the_plane_and_says_which_it_is(self, tmp_path):
+        net = self.net()
+        assert net.header["material"]["plane"] == "strain"
+        shear, first = membrane(net)
+        assert (shear, first) == pytest.approx((1e3 / 2.9, 1e3 * 0.45 / (1.45 * 0.1)))
+        net.write(tmp_path / "net.usda")
+        text = (tmp_path / "net.usda").read_text()
+        assert "Poisson's ratio 0.45, plane strain, density 1800 kg/m3" in text
+        assert f"physics:poissonsRatio = {0.45 / 0.55!r}" in text
+
+    def test_a_flex_of_mujoco_4_is_refused_where_its_ratio_is_above_a_half(self, tmp_path):
+        with pytest.raises(ValueError, match="ratio of 0.818 in its plane, and a flex of MuJoCo 4"):
+            self.net().write(tmp_path / "net.xml")
+        assert not list(tmp_path.iterdir())
+        self.net().write(tmp_path / "net.xml", mujoco=3)

@@ -383,6 +383,11 @@ class TestPredict:
         assert result.exit_code == 0
         assert "recommended: area" in result.stdout and "own.vtu" in result.stdout
         assert "K_A = 658.3 MPa" in result.stdout  # E (3 nu - 1) / (2 (1 - nu^2))
+        strained = run(
+            "predict", "--beam", "100x20", "--young", "3 GPa", "--poisson", "0.45", *mesh, "--plane", "strain"
+        )
+        assert "nu = 0.45, t = 1 mm, plane strain" in strained.stdout
+        assert "K_A = 8276 MPa" in strained.stdout  # lambda - G, of three dimensions
 
     @pytest.mark.parametrize(("arguments", "message"), refused_calls("predict"))
     def test_refusals_are_one_line(self, arguments, message):

@@ -531,7 +531,8 @@ class TestReferences:
         one = data.isel(sample=5)
         kind = LOADS["traction"].kind
         alone = solve_unit(float(one.length / one.height), float(one.poisson_ratio), kind)
-        _, scale = unit_scales(one, one, kind)
+        material = Material(float(one.young_modulus), float(one.poisson_ratio))
+        _, scale = unit_scales(one, material, kind)
         assert float(one.reference_displacement) == pytest.approx(float(one.force * scale) * alone.displacement)
         assert "without a reference" not in summary
 

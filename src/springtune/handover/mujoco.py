@@ -191,6 +191,11 @@ def _refused_before_3_15(net: Net) -> list[str]:
 def elasticity(first: float, second: float, version: int) -> tuple[float, float]:
     """Young [N/m] and poisson [1] of a flex of thickness 1 that has two Lame constants, times the thickness [N/m]."""
     ratio = first / second
+    if version != 3 and ratio > 2 * (1 + 1e-9):
+        raise ValueError(
+            f"the sheet is in plane strain and has a Poisson's ratio of {ratio / (2 + ratio):.3g} in its plane, and a "
+            f"flex of MuJoCo {version} takes less than 0.5; take MuJoCo 3, or springs alone such as 'patch'"
+        )
     # MuJoCo refuses a half, which plane stress allows in MuJoCo 4.
     poisson = ratio / (4 + 2 * ratio) if version == 3 else min(ratio / (2 + ratio), float(np.nextafter(0.5, 0)))
     return (8 if version == 3 else 2) * (1 + poisson) * second, poisson

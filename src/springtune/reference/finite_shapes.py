@@ -46,10 +46,11 @@ class _Levels:
         self.laws: dict[str, tuple[float, Law]] = {}
         for name, one in materials.items():
             if rubber and isinstance(one, Material):
-                self.laws[name] = one.young_modulus, law_of(one)
+                self.laws[name] = one.young_modulus, law_of(one, one.plane)
             else:
-                scale = float(one.plane_stress.max())
-                self.laws[name] = scale, StVenant(one.plane_stress / scale)
+                stiffness = one.in_plane.plane_stress
+                scale = float(stiffness.max())
+                self.laws[name] = scale, StVenant(stiffness / scale)
 
     def __call__(self, problem: Problem, degree: int) -> "_FiniteLevel":
         self.last = _FiniteLevel(problem, degree, self)

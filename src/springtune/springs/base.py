@@ -94,7 +94,8 @@ class Definition(Declared):
     name : str
         Label in a study and in the dataset.
     function : callable
-        Its formula: (mesh, material, thickness), and what it `needs`, -> `Springs`.
+        Its formula: (mesh, material, thickness), and what it `needs`, -> `Springs`. The material has the constants of
+        its plane, see `springtune.Material.in_plane`.
     order : float
         Place in the order of labels.
     uniform : bool

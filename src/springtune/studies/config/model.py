@@ -19,10 +19,13 @@ if TYPE_CHECKING:
 FINITE_STRAIN_REFERENCE = "neo-hooke-plane-stress"
 """Reference of sheets at finite strain for networks with nonlinear kinematics."""
 
+STRAINED_REFERENCE = "neo-hooke-plane-strain"
+"""The same of materials in plane strain; of others to see what the plane changes."""
+
 TESTED_REFERENCE = "yeoh-plane-stress"
 """The same for materials with a uniaxial test, using the fitted law."""
 
-FURTHER_REFERENCES = (FINITE_STRAIN_REFERENCE, "neo-hooke-plane-strain", TESTED_REFERENCE)
+FURTHER_REFERENCES = (FINITE_STRAIN_REFERENCE, STRAINED_REFERENCE, TESTED_REFERENCE)
 
 
 @dataclass(frozen=True)
@@ -185,7 +188,7 @@ class Study:
 
     @property
     def plane_strain(self) -> tuple[str, ...]:
-        """Names of the materials in plane strain."""
+        """Names of the declared materials in plane strain."""
         return tuple(name for name, one in self.materials.items() if getattr(one, "plane", "") == "strain")
 
     def material(self, name: str) -> AnyMaterial:

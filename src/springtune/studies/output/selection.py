@@ -13,7 +13,7 @@ from springtune.problem.geometry import beam_label
 from springtune.problem.parameters import OF_BODIES, SWEPT, shown_order
 from springtune.problem.status import Status
 
-from ..config.model import FINITE_STRAIN_REFERENCE, TESTED_REFERENCE
+from ..config.model import FINITE_STRAIN_REFERENCE, STRAINED_REFERENCE, TESTED_REFERENCE
 
 if TYPE_CHECKING:
     from .dataset import Label
@@ -169,28 +169,36 @@ def labelled_beam(data: xr.Dataset, name: str) -> str:
     return beam_label(str(name), float(found.beam_length), float(found.beam_height))
 
 
-# -- references at finite strain: Yeoh's law of a material with a uniaxial test, else neo-Hooke's ---------------------
+# -- references at finite strain: Yeoh's law of a material with a uniaxial test, else neo-Hooke's in its plane ---------
 
-OWN_LAWS = (TESTED_REFERENCE, FINITE_STRAIN_REFERENCE)
-"""Plane-stress references of own laws, by priority."""
+OWN_LAWS = (TESTED_REFERENCE, FINITE_STRAIN_REFERENCE, STRAINED_REFERENCE)
+"""References of own laws, by priority; the last one of materials in plane strain alone."""
+
+
+def own_laws(data: xr.Dataset) -> tuple[list[str], xr.Dataset]:
+    """References of own laws in a group, and the group without the numbers of those in plane strain of other sheets."""
+    laws = [kind for kind in OWN_LAWS if kind in data.reference.values]
+    if "material_plane" not in data:
+        return [kind for kind in laws if kind != STRAINED_REFERENCE], data
+    own = (data.reference != STRAINED_REFERENCE) | (data.material_plane == "strain")
+    numbers = {name: one for name, one in data.items() if one.dtype.kind == "f" and "reference" in one.dims}
+    return laws, data.assign({name: one.where(own) for name, one in numbers.items()}).drop_vars("material_plane")
 
 
 def of_own_law(finite: xr.Dataset) -> xr.Dataset | None:
-    """Select plane-stress references of each material's own law."""
-    neo_hooke, tested = (
-        finite.sel(reference=kind, drop=True) if kind in finite.reference.values else None
-        for kind in (FINITE_STRAIN_REFERENCE, TESTED_REFERENCE)
-    )
-    if neo_hooke is None or tested is None:
-        return tested if neo_hooke is None else neo_hooke
-    # A material has one of the two; where neither is there, each says why.
-    there = tested.reference_displacement.notnull()
-    if not there.any():
-        return neo_hooke
-    found = neo_hooke.copy()
-    for name, array in tested.items():
-        own = there.broadcast_like(array).transpose(*array.dims) if set(there.dims) <= set(array.dims) else there
-        found[name] = array.where(own, neo_hooke[name])
+    """Select the references of each material's own law and plane."""
+    laws, finite = own_laws(finite)
+    if not laws:
+        return None
+    found = finite.sel(reference=laws[-1], drop=True)
+    # A material has one of them; where none is there, each says why.
+    for law in laws[-2::-1]:
+        other = finite.sel(reference=law, drop=True)
+        there = other.reference_displacement.notnull()
+        found = found.copy()
+        for name, array in other.items() if there.any() else ():
+            own = there.broadcast_like(array).transpose(*array.dims) if set(there.dims) <= set(array.dims) else there
+            found[name] = array.where(own, found[name])
     return found
 
 
@@ -208,7 +216,7 @@ def judged(data: xr.Dataset, finite: xr.Dataset | None = None, name: str = "defo
 
 
 def own_law(cell: xr.Dataset, name: str) -> str | None:
-    """Label of one material's plane-stress reference; an unsolved requested one counts last, None without any."""
-    kinds = [kind for kind in OWN_LAWS if kind in cell.reference.values]
+    """Label of one material's own reference; an unsolved requested one counts last, None without any."""
+    kinds, cell = own_laws(cell)
     there = [kind for kind in kinds if np.isfinite(cell[name].sel(reference=kind).values).any()]
     return next(iter(there or kinds[::-1]), None)

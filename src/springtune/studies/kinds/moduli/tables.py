@@ -118,7 +118,9 @@ def decision(tree: xr.DataTree) -> str:
     for mesh_type in TABLE_MESH_TYPES:
         if mesh_type in root.mesh_type.values and mesh_type in moduli.mesh_type.values:
             parts += _attained(root, moduli, mesh_type, beam, materials)
-    return "\n".join(parts + _paper_cells(root) + _beyond(root))
+    strained = ", ".join(root.material.values[root.material_plane == "strain"]) if "material_plane" in root else ""
+    plane = [f"Of materials in plane strain, E and ν are E / (1 − ν²) and ν / (1 − ν): {strained}.", ""]
+    return "\n".join(parts + _paper_cells(root) + (plane if strained else []) + _beyond(root))
 
 
 def _beyond(root):

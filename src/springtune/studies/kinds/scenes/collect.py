@@ -68,8 +68,6 @@ def _bodies(study, root):
         labels = {name: getattr(material, name) for name in ("young_modulus", "poisson_ratio")}
         values = labels | {"density": np.nan if material.density is None else material.density}
         root.put({f"material_{name}": value for name, value in values.items()}, material=material.name, **labels)
-        if study.plane_strain:
-            root.put({"material_plane": material.plane}, material=material.name)
         if isinstance(material, Rubber):
             fits[material.name] = material
     if fits:
@@ -79,9 +77,16 @@ def _bodies(study, root):
             + ", ".join(f"{100 * error:.2g} % ({test})" for test, error in law.errors.items())
             for name, law in sorted(fits.items())
         )
+    _planes(study, root)
     for beam in {scene.mesh.beam for scene in study.scenes}:
         body = {f"beam_{name}": getattr(beam, name) for name in ("length", "height", "thickness")}
         root.put(body, beam=beam.name, thickness=beam.thickness)
+
+
+def _planes(study, group):
+    """Write the planes of materials, where any is in plane strain."""
+    for material in {one.material for one in study.references} if study.plane_strain else ():
+        group.put({"material_plane": material.plane}, material=material.name)
 
 
 def _reference_of(scene):
@@ -230,6 +235,7 @@ def _block(study, folder, axes):
     """Group of pressed faces with all references and, so far, no scenes."""
     kinds = (small_strain(study), *study.further_references)
     block = Filler(swept(BLOCK, study).empty(axes | {"reference": kinds, "face_position": tuple(FACE_POSITIONS)}))
+    _planes(study, block)
     for one in study.references:
         for kind in kinds if LOADS[one.load].kind.pressed else ():
             block.put(_face_reference(study, folder, one, kind), reference=kind, **study.labels(one))
@@ -239,6 +245,7 @@ def _block(study, folder, axes):
 def _finite_strain(study, folder, axes, displacement):
     """Group of references at finite strain, and the networks' errors against them."""
     finite = Filler(swept(FINITE_STRAIN, study).empty(axes | {"reference": study.further_references}))
+    _planes(study, finite)
     for one in study.references:
         labels = study.labels(one)
         for kind in study.further_references:

@@ -7,7 +7,7 @@ from springtune.problem.loads import LOADS
 from springtune.problem.parameters import SWEPT
 
 from ...output.dataset import STATUS
-from ...output.selection import OWN_LAWS, of_own_law, records
+from ...output.selection import of_own_law, own_laws, records
 from .outputs import SWEPT_SHOWN, TABLE, stem
 
 ROW = ("beam", "mesh_size")
@@ -164,8 +164,9 @@ def _finite_strain(finite, root):
 
 def _block(block, root):
     """Middle of the pressed face, every definition, mesh, material and kinematics, beside its own law."""
+    kinds, block = own_laws(block)
     known, references = block.reference.values.tolist(), block.reference_face_displacement
-    laws = [known.index(kind) for kind in OWN_LAWS if kind in known] or [0]
+    laws = [known.index(kind) for kind in kinds] or [0]
     chosen = xr.full_like(references.isel(reference=0, drop=True), laws[-1], int)
     for law in reversed(laws):
         chosen = chosen.where(references.isel(reference=law, drop=True).isnull(), law)
@@ -177,7 +178,7 @@ def _block(block, root):
     rows = list(_rows(block, block.face_displacement.notnull().transpose(*order, ...), names, *values))
     note = (
         "Displacement of the middle of the pressed face along the load. Networks of nonlinear kinematics are compared "
-        "with the reference at finite strain in plane stress where the study has it, linear ones with that of small "
-        "strain; all pairs are in the dataset."
+        "with the reference at finite strain in their material's plane where the study has it, linear ones with that "
+        "of small strain; all pairs are in the dataset."
     )
     return {"stem": "block", "title": "The pressed face", "note": note, "rows": rows}
