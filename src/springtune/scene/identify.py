@@ -1,8 +1,8 @@
 r"""Constants of a sheet from measured tests, with their uncertainty, and what the tests do not tell.
 
 Least squares of residuals over their noise, with exact derivatives (`springtune.reference.by_constants`). With
-residuals r and derivatives J, both over the noise and without shifts, the covariance of the unknowns is :math:`(J^T J)^{-1}`.
-Along a direction in which J vanishes the tests tell nothing.
+residuals r and derivatives J, both over the noise and without shifts, the covariance of the unknowns is
+:math:`(J^T J)^{-1}`. Along a direction in which J vanishes the tests tell nothing.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -104,7 +104,7 @@ class Model:
                     value, slope = block.rows @ moved, block.rows @ derivatives
                 yield block.unshifted(block.factors * value), block.unshifted(block.factors[:, None] * slope)
 
-    def residuals(self, unknowns: np.ndarray, noise: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
+    def residuals(self, unknowns: np.ndarray, noise: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Residuals over the noise of each block, and their derivatives by the unknowns."""
         if "nu12" in self.names and unknowns[2] ** 2 > np.exp(unknowns[0] - unknowns[1]):  # not positive definite
             size = sum(len(block.values) for block in self.blocks)
@@ -296,6 +296,8 @@ def _start(names: tuple[str, ...], known: Mapping[str, Number]) -> tuple[np.ndar
     for name, value in known.items():
         if name not in names:
             raise ValueError(f"known: {name!r} is no constant of this law; {nearest(str(name), names)}")
+        if len(known) == len(names):
+            raise ValueError(f"known: {', '.join(known)} are all constants of this law; leave out what is to be found")
         if name in RATIOS and not (isinstance(value, int | float) and -1 < value <= 0.5):
             raise ValueError(f"known: {name} is {value!r}; give a number above -1, at most 0.5")
         number = value if name in RATIOS else np.log(positive(value, "stress", f"known: {name}"))
@@ -307,7 +309,8 @@ def _materials(model: Model, unknowns: np.ndarray, parts: list[str], angle: floa
     """Material of each part, turned by an angle [rad]."""
     values = model.values(unknowns).tolist()
     if "nu12" in model.names:
-        return dict.fromkeys(parts, AnisotropicMaterial.orthotropic(*values, angle, name="measured"))
+        along, across, nu, shear = values
+        return {"": AnisotropicMaterial.orthotropic(along, across, nu, shear, angle, name="measured")}
     *moduli, nu = values
     own = moduli if len(moduli) == len(parts) else moduli * len(parts)
     return {part: Material(one, min(nu, 0.5), name=f"measured-{part}".rstrip("-")) for part, one in zip(parts, own)}
@@ -329,8 +332,9 @@ def _scale(model: Model, unknowns: np.ndarray) -> float:
 
 def undetermined(model: Model, unknowns: np.ndarray, free: np.ndarray) -> tuple[str, ...]:
     """Constants without which the derivatives by the others have no direction in which they vanish."""
-    noise = [float(np.linalg.norm(block.values)) or 1.0 for block in model.blocks]
-    slopes, names, lacking = model.residuals(unknowns, noise)[1], np.array(model.names), []
+    sizes = np.array([np.linalg.norm(block.values) or 1.0 for block in model.blocks])
+    slopes, names = model.residuals(unknowns, sizes)[1], np.array(model.names)
+    lacking: list[str] = []
     while (kept := free & ~np.isin(names, lacking)).any():
         _, sizes, ways = np.linalg.svd(slopes[:, kept])
         sizes = np.pad(sizes, (0, len(ways) - len(sizes)))
@@ -344,7 +348,9 @@ def undetermined(model: Model, unknowns: np.ndarray, free: np.ndarray) -> tuple[
     )
 
 
-def fit(model: Model, unknowns: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, ...]:
+def fit(
+    model: Model, unknowns: np.ndarray, free: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, float]:
     """Fit free unknowns; return all, residuals and derivatives over the noise, the noise, and degrees of freedom.
 
     Noise that is not given is estimated from the residuals of each block.
@@ -386,7 +392,7 @@ def fit(model: Model, unknowns: np.ndarray, free: np.ndarray) -> tuple[np.ndarra
     unknowns = unknowns.copy()
     residuals, slopes = evaluated(part)
     unknowns[free] = part
-    return unknowns, residuals, slopes, noise, freedom[estimated].sum() or np.inf
+    return unknowns, residuals, slopes, noise, float(freedom[estimated].sum()) or np.inf
 
 
 def half_intervals(slopes: np.ndarray, freedom: float) -> np.ndarray:
@@ -409,10 +415,14 @@ def _result(
         ordered = one[np.argsort(block.places, kind="stable")] if block.places.ndim == 1 else one[:1]
         if len(ordered) > 9 and ordered[1:] @ ordered[:-1] > MISFIT / 3 * (one @ one):
             notes.append(
-                f"{block.label}: residuals are not random, so the intervals are too narrow; leave out where the law does not hold"
+                f"{block.label}: residuals are not random, so the intervals are too narrow; leave out where the law "
+                "does not hold"
             )
     labels = [block.label for block in found]
-    values, intervals = ({name: three[part] for name, three in ends.items()} for part in (0, slice(1, 3)))
+    values, intervals = (
+        {name: three[0] for name, three in ends.items()},
+        {name: three[1:] for name, three in ends.items()},
+    )
     data = (dict(zip(labels, one)) for one in (noise.tolist(), each, [block.places for block in found]))
     kept, own, places = data
     return Identified(law, values, intervals, lacking, tuple(notes), kept, own, materials, places)

@@ -34,7 +34,7 @@ GAUGES = ("gauge-1", "gauge-2")
 """Points of a beam between which ``transverse`` is measured: the middles of the sides beside the load."""
 
 OUTSIDE = 1e-3
-"""Distance from the body up to which a point counts as on its outline, over the extent of the points."""
+"""Distance from the body, over its extent, up to which a point counts as on its outline."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +123,7 @@ class MeasuredTest:
     def __post_init__(self) -> None:
         is_a(self.body, (Beam, Shape), "body", A_BEAM)
         is_beam = isinstance(self.body, Beam)
-        chosen(LOADS if is_beam else self.body.loads, self.load, "load")
+        chosen(self.body.loads if isinstance(self.body, Shape) else LOADS, self.load, "load")
         put(self, angle=quantity(self.angle, "angle", "angle"))
         columns, lines = _read(self.file)
         put(self, columns=columns, _lines=lines)
@@ -156,28 +156,20 @@ def blocks(test: MeasuredTest, family: Family, load: LoadCase) -> Iterator[Block
     if "u" in columns:
         points = np.stack([columns["x"], columns["y"]], axis=1)
         rows, apart = family.at(points)
-        if apart.max() > OUTSIDE * np.ptp(points):
+        if apart.max() > OUTSIDE:
             worst = int(np.argmax(apart))
-            x, y, away = 1e3 * np.array([*points[worst], apart[worst]])
+            x, y = 1e3 * points[worst]
             raise TestDataError(
-                f"{where}, line {test._lines[worst]}: the point x = {x:.6g} mm, y = {y:.6g} mm is {away:.3g} mm outside "
-                "of the body; remove it, or correct the unit or the origin"
+                f"{where}, line {test._lines[worst]}: the point x = {x:.6g} mm, y = {y:.6g} mm is outside of the body; "
+                "remove it, or correct the unit or the origin"
             )
         rigid = np.zeros((len(points), 2, 3 * test.shift))
         if test.shift:
             rigid[:, :, :2] = np.eye(2)
             rigid[:, :, 2] = (points - points.mean(axis=0))[:, ::-1] * [-1, 1] / (np.ptp(points) or 1.0)
-        moved = np.stack([columns["u"], columns["v"]], axis=1).ravel()
-        noise = _noise(test, "length")
-        yield Block(
-            f"field of {where}",
-            moved,
-            np.full(len(moved), test.scale),
-            rows,
-            rigid.reshape(len(moved), -1),
-            noise,
-            points,
-        )
+        values = np.stack([columns["u"], columns["v"]], axis=1).ravel()
+        noise, factors = _noise(test, "length"), np.full(len(values), test.scale)
+        yield Block(f"field of {where}", values, factors, rows, rigid.reshape(len(values), -1), noise, points)
         return
     pushed = [np.hypot(*one.force) for one in load.tractions]
     moved = [np.hypot(one.x or 0.0, one.y or 0.0) for one in load.supports if one.x or one.y]
