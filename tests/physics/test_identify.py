@@ -182,9 +182,9 @@ BAD = {
     "force [N],displacement [mm]\n1,1\n2\n": "line 3: has 1 values, and the head 2",
     "force [N],displacement [mm]\n": "has no rows of numbers",
     "force [N],displacement [mm]\n5,1\n5,1.1\n5,1.2\n": "column 'force': all 3 values are 5 in SI units",
-    "force [N],displacement [mm]\n5,1\n6,1.1\n": "1 numbers besides the shift, and 1 unknowns",
+    "force [N],displacement [mm]\n5,1\n6,1.1\n": "1 numbers besides the shift, for the unknowns",
     "force [N],displacement [mm],widht [mm]\n5,1,1\n6,1.1,1\n": "column 'widht': ",
-    "x [mm],y [mm],u [um],v [um]\n5,5,1,1\n300,5,2,1\n": "line 3: the point x = 300 mm, y = 5 mm is outside of the body",
+    "x [mm],y [mm],u [um],v [um]\n5,5,1,1\n300,5,2,1\n": "line 3: the point x = 300 mm, y = 5 mm is outside",
     "x [mm],y [mm],u [um]\n5,5,1\n": "line 1: column 'v' is missing",
     "x [mm],y [mm],u [um],v [um]\n5,5,1,1\n": "numbers besides the shift",
 }

@@ -54,7 +54,7 @@ def identify(
     FILES are CSV files of one test, or YAML files with a list of tests, whose keys are the options and 'file'. Columns
     have units in their heads, such as 'force [N],displacement [mm]' or 'x [mm],y [mm],u [um],v [um]'.
     """
-    from ..scene.identify import LAWS
+    from ..scene.identify import SHEET_LAWS
     from ..scene.identify import identify as identified
 
     target = plot or write
@@ -64,7 +64,7 @@ def identify(
     with refusals("--plot" if plot else "--write", target, partial(ARGUMENT.sub, "--")):
         given = {name: _number(value) for name, _, value in (one.partition("=") for one in known)}
         rows = [row for path in files for row in _rows(path, options)]
-        if LAWS.get(law) == ():
+        if SHEET_LAWS.get(law) == ():
             found = identified(files[0] if len(files) == 1 else [], law)
         else:
             found = identified([_test(row) for row in rows], law, known=given)
