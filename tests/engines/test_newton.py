@@ -1,5 +1,7 @@
 """Newton's solvers: what is typed into each gives the equilibrium of its own law, at settings that converge."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -19,17 +21,23 @@ SETTINGS = {
 }
 """Step over the largest one of explicit schemes, and iterations, that converge to 1e-3 at the least cost."""
 
-LIMITS = {"newton-style3d": 1e-2, "newton-vbd": 1e-2, "newton-xpbd": 2e-2}
-"""Errors where single precision leaves more than 1e-3: in slender bending, and near buckling."""
+TURNING = ("strip", "structured", "shear", "rubber")
+"""In XPBD springs turn by the square of a step: it is 1.1e-3 off in double precision, too, at the setting of others."""
+
+BUCKLING = ("strip", "free", "compression", "foam")
+"""At a quarter of its buckling strain: rounding leaves springs of XPBD and VBD trembling there."""
+
+SLENDER = ("slender", "free", "bending", "rubber")
+
+LIMITS = {("newton-xpbd", BUCKLING): 1e-2, ("newton-style3d", SLENDER): 3e-3}
+"""Errors where more than 1e-3 is left.
+
+XPBD: rounding, as `test_what_xpbd_leaves_is_rounding` shows. Style3D: 1.9e-3 at 4 x 20, 8 x 60 and 10 x 40 alike.
+"""
 
 MAPPINGS = [(name, "delingette") for name in SETTINGS if name != "newton-xpbd"]
 MAPPINGS += [(name, "patch") for name in SETTINGS if name != "newton-style3d"]
 QUICK = ("sheet", "structured", "traction", "foam")
-LONG = 300
-"""Period over the largest explicit step above which VBD takes three times as long steps, and more iterations.
-
-Newton's positions are of single precision. What is left of h^2 f / m below half a unit in the last place is lost.
-"""
 
 
 def style3d_forces(net, moved):
@@ -83,19 +91,64 @@ def off(engine, definition, case):
     """Largest error of a displacement in an engine, over the largest displacement by its law."""
     *parts, material = case
     one = scene(*parts, "felt" if engine == "newton-style3d" else material, definition)
-    share, iterations = SETTINGS[engine]
-    rest = simulate(st.SpringNet.from_scene(one, errors=False), "Newton", LAWS)
+    share, iterations = (0.5, 20) if (engine, case) == ("newton-xpbd", TURNING) else SETTINGS[engine]
+    net = st.SpringNet.from_scene(one, errors=False)
+    rest = simulate(net, "Newton", LAWS)
     frequency, periods = rest.frequency, 2.5  # of the slowest mode: its critical damping brings all to rest
-    if engine == "newton-vbd":
-        if rest.loaded_frequency > 4 * rest.frequency and "compression" not in case:
-            frequency, periods = rest.loaded_frequency, 5.0  # slower modes hardly move
-        if 2 * np.pi / frequency > LONG * rest.largest_step:
-            share, iterations = 3, 60
+    ratio, mean = 1.0, 0.0  # damping over the critical one, and the share of frames that a mean is of
+    if (engine, definition, case) == ("newton-vbd", "patch", BUCKLING):
+        share, iterations, periods, ratio, mean = 1.5, 20, 8.0, 0.1, 0.7
+    elif engine == "newton-vbd" and rest.loaded_frequency > 4 * rest.frequency and "compression" not in case:
+        frequency, periods = rest.loaded_frequency, 5.0  # slower modes hardly move
     dt = share * rest.largest_step
     frames = max(200, round(periods * 2 * np.pi / frequency / dt))  # reactions of single directions take steps
-    found = st.in_engine(one, engine, dt=dt, iterations=iterations, frames=frames, tolerance=0.0, damping=2 * frequency)
+    session = st.ENGINES[engine].start(net, st.Setting(dt, iterations=iterations), ratio * 2 * frequency)
+    session.advance(round((1 - mean) * frames))
+    found = [session.displacements()]
+    for _ in range(round(mean * frames)):
+        session.advance(1)
+        found.append(session.displacements())
     exact = equilibrium(one, engine)
-    return np.abs(found.displacements - exact).max() / np.abs(exact).max()
+    return np.abs(np.mean(found, axis=0) - exact).max() / np.abs(exact).max()
+
+
+def xpbd_as_newton_takes_it(net, kind, dt, damping, steps):
+    """Displacements after steps of ten iterations over all springs at once, in a precision."""
+    weights = np.where(net.held, 0, 1 / net.masses[:, None]).astype(kind)
+    start, (first, second) = net.points.astype(kind), net.springs.T
+    lengths, compliance = net.rest_lengths.astype(kind), (1 / (net.stiffness * dt**2)).astype(kind)
+    total, push = (weights[first] + weights[second])[:, 0] + compliance, (net.forces * dt).astype(kind) * weights
+    places, velocities, kept, dt = start, np.zeros_like(start), kind(1 / (1 + damping * dt)), kind(dt)
+    for _ in range(steps):
+        before, multipliers = places, np.zeros_like(lengths)
+        places = places + (velocities + push) * dt
+        for _ in range(10):
+            along = places[first] - places[second]
+            now = np.sqrt((along**2).sum(axis=1))
+            change = (lengths - now - compliance * multipliers) / total
+            multipliers = multipliers + change
+            moved, pulls = np.zeros_like(places), along * (change / now)[:, None]
+            np.add.at(moved, first, pulls)
+            np.add.at(moved, second, -pulls)
+            places = places + weights * moved
+        velocities = (places - before) / dt * kept
+    return (places - start).astype(float)
+
+
+@pytest.mark.slow
+def test_what_xpbd_leaves_is_rounding():
+    """The same steps near buckling, in either precision."""
+    one = scene(*BUCKLING, "patch")
+    net = st.SpringNet.from_scene(one, errors=False)
+    net = dataclasses.replace(net, points=net.points - (net.points.min(axis=0) + net.points.max(axis=0)) / 2)
+    rest, exact = simulate(net, "Newton", LAWS), equilibrium(one, "newton-xpbd")
+    dt, damping = 0.7 * rest.largest_step, 2 * rest.frequency
+    steps = round(2.5 * 2 * np.pi / rest.frequency / dt)
+    double, single = (
+        np.abs(xpbd_as_newton_takes_it(net, kind, dt, damping, steps) - exact).max() / np.abs(exact).max()
+        for kind in (np.float64, np.float32)
+    )
+    assert double < 1e-3 < 4e-3 < single < 1.2e-2  # Newton: 8e-3
 
 
 @pytest.mark.parametrize(("engine", "definition"), MAPPINGS)
@@ -129,4 +182,4 @@ def test_newton_prints_nothing_and_keeps_its_log_level(capfd):
 @pytest.mark.parametrize("case", TEN, ids=" ".join)
 @pytest.mark.parametrize(("engine", "definition"), MAPPINGS)
 def test_typed_numbers_on_ten_scenes(engine, definition, case):
-    assert off(engine, definition, case) < LIMITS.get(engine, 1e-3)
+    assert off(engine, definition, case) < LIMITS.get((engine, case), 1e-3)

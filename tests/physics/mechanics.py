@@ -59,22 +59,30 @@ def angles_of(x):
 
 
 def angle_forces(x, modulus, rest):
-    """Derivative of ``beta/2 sum (theta - theta0)^2``: a side's direction changes by its turn over its square."""
+    """Derivative of ``sum beta/2 (theta - theta0)^2``: a side's direction changes by its turn over its square."""
     angles, a, b = angles_of(x)
-    moment = (modulus[:, None] * (angles - rest))[..., None]
+    moment = (modulus * (angles - rest))[..., None]
     by_next = moment * np.stack([a[..., 1], -a[..., 0]], axis=2) / dot(a, a)[..., None]
     by_last = moment * np.stack([-b[..., 1], b[..., 0]], axis=2) / dot(b, b)[..., None]
     return np.roll(by_next, 1, axis=1) + np.roll(by_last, -1, axis=1) - by_next - by_last
 
 
-def _sides(x):
+def sides_of(x):
+    """Side opposite each corner of triangles."""
     return np.roll(x, 1, axis=1) - np.roll(x, -1, axis=1)
 
 
 def squares_forces(x, k, rest):
     """Derivative of ``sum k_i/4 (l_i^2 - L_i^2)^2``, side i opposite corner i."""
-    sides = _sides(x)
+    sides = sides_of(x)
     pull = (k * (dot(sides, sides) - rest))[..., None] * sides
+    return np.roll(pull, -1, axis=1) - np.roll(pull, 1, axis=1)
+
+
+def factor_forces(x, modulus, rest):
+    """Derivative of ``M/2 ((V - V0) / V0)^2``, V the sum of the squared sides."""
+    sides = sides_of(x)
+    pull = 2 * (modulus * (dot(sides, sides).sum(axis=1) - rest) / rest**2)[:, None, None] * sides
     return np.roll(pull, -1, axis=1) - np.roll(pull, 1, axis=1)
 
 
@@ -94,6 +102,20 @@ def element_forces(x, inverse, area, first, second):
     gradient = _gradient(x, inverse)
     nominal = gradient @ _second(0.5 * (gradient.swapaxes(1, 2) @ gradient - np.eye(2)), first, second)
     columns = area[:, None, None] * nominal @ inverse.swapaxes(1, 2)
+    return np.stack([-columns.sum(axis=2), columns[..., 0], columns[..., 1]], axis=1)
+
+
+def slip_forces(x, inverse, sides, stiffness):
+    """Derivative of ``sum k/2 (L n.E.s)^2`` over the sides of triangles, E Green's strain and s across n."""
+    gradient = _gradient(x, inverse)
+    green = 0.5 * (gradient.swapaxes(1, 2) @ gradient - np.eye(2))
+    second = np.zeros(green.shape, green.dtype)
+    for side in sides.swapaxes(0, 1):
+        across = np.stack([-side[:, 1], side[:, 0]], axis=1) / np.sqrt(dot(side, side))[:, None]
+        both = side[:, :, None] * across[:, None, :]
+        slip = (green * both).sum(axis=(1, 2))
+        second = second + 0.5 * (stiffness * slip)[:, None, None] * (both + both.swapaxes(1, 2))
+    columns = gradient @ second @ inverse.swapaxes(1, 2)
     return np.stack([-columns.sum(axis=2), columns[..., 0], columns[..., 1]], axis=1)
 
 

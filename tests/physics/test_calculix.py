@@ -1,5 +1,7 @@
 """The references of beams and of shapes against CalculiX, a program with which they share nothing."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,10 +9,14 @@ import shapes_of_others as others
 from springtune.problem.geometry import Beam
 from springtune.problem.loads import AXIAL, BENDING, FACE, SHEAR
 from springtune.problem.materials import Material
+from springtune.problem.shapes import Quantity, Traction
 from springtune.reference import calculix
+from springtune.reference.finite_shapes import solve_finite_shape
 from springtune.reference.finite_strain import solve_finite_strain
 from springtune.reference.shapes import solve_shape
 from springtune.reference.small_strain import solve_small_strain
+
+PULLED = (Quantity("end", "displacement", "right", "x"),)
 
 pytestmark = [
     pytest.mark.slow,
@@ -124,6 +130,31 @@ def test_a_plate_with_a_hole():
     s, moved = square[hole, 0] * np.pi / 2, theirs[hole, 0]
     strain = odd_slope(s, moved) / radius
     assert material.young_modulus * strain == pytest.approx(ours.values["top-of-the-hole"], rel=1e-3)
+
+
+def test_rubber_with_a_hole():
+    """Neo-Hooke at some 30 % strain, beside the hole at 80 %."""
+    shape, material = others.holed_plate()[0], Material(1e6, 0.4, name="rubber")
+    radius, size = 0.01, 0.05
+    force = 0.3e6 * size * shape.thickness
+    case = replace(shape.loads["pull"], tractions=(Traction("right", (force, 0.0)),), quantities=PULLED)
+
+    def place(s, t):
+        angle = (1 - s) * np.pi / 2
+        ring = radius * np.stack([np.cos(angle), np.sin(angle)])
+        box = size * np.stack([np.minimum(1, 2 * s), np.minimum(1, 2 - 2 * s)])
+        return (ring + t**1.5 * (box - ring)).T
+
+    points, elements, square = mapped(32, 24, place)
+    held = np.zeros(points.shape, dtype=bool)
+    held[on(square, 0, 1.0), 1] = held[on(square, 0, 0.0), 0] = True
+    right = on(square, 1, 1.0)
+    right = right[len(right) // 2 :]
+    load = pressed(points, right, lambda way: np.array([force / size * np.hypot(*way), 0.0]))
+    theirs = calculix.solve(points, elements, "CPS8", material, shape.thickness, load, held, finite=True)
+    ours = solve_finite_shape(replace(shape, loads={"pull": case}), case, {"": material})
+    assert mean(points, right, theirs[:, 0]) == pytest.approx(ours.values["end"], rel=1e-3)
+    np.testing.assert_allclose(ours.at(points), theirs, rtol=0, atol=2e-3 * np.abs(theirs).max())
 
 
 def theirs_of(beam, material, force, size, kind=AXIAL, finite=False):

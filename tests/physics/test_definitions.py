@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.optimize import nnls
 
 from springtune.mechanics.moduli import PatchTest
-from springtune.mesh import MESH_TYPES, ROW_HEIGHT, Mesh, lattice, signed_areas
+from springtune.mesh import MESH_TYPES, ROW_HEIGHT, Mesh, MeshError, lattice, signed_areas, write_mesh
 from springtune.problem.geometry import Beam
 from springtune.problem.materials import Material, Rubber
 from springtune.springs import DEFINITIONS, DefinitionError, Springs, definition
@@ -55,6 +55,8 @@ ON_LATTICE = {
     "delingette-tensile": lambda nu: (10 - 6 * nu) / (9 * (1 - nu**2)),
     "element-fit": lambda nu: 8 / (9 * (1 - nu**2)),
     "patch": lambda nu: 1.0,
+    "cross-section": lambda nu: 2 / 3,  # bars in three directions, each counted as if alone
+    "force-balance": lambda nu: 1.0,
 }
 
 
@@ -64,6 +66,81 @@ def test_springs_alone_on_the_lattice(name, nu):
     young, ratio, _ = errors(name, patch("structured"), nu)
     assert 1 + young == pytest.approx(ON_LATTICE[name](nu), rel=1e-9)
     assert ratio == pytest.approx(1 / 3, rel=1e-9)  # Cauchy's relation: whatever was asked
+
+
+def even_tension(name, mesh):
+    """Stiffness against even tension over that of a sheet with nu = 1/3, E / (1 - nu)."""
+    springs = DEFINITIONS[name].springs(mesh, Material(1.0, 1 / 3), 1.0)
+    return 0.5 * PatchTest(mesh).stiffness(springs)[:2, :2].sum() * springs.reference * (1 - 1 / 3)
+
+
+@pytest.mark.parametrize("mesh_type", ["structured", "free", "alternating", "right"])
+@pytest.mark.parametrize(("name", "share"), [("force-balance", 1.0), ("cross-section", 2 / 3)])
+def test_even_tension_is_known_on_any_triangles(name, share, mesh_type):
+    """Both stretch all springs alike under it: by construction, and since cotangents reproduce linear fields."""
+    mesh = patch(mesh_type)
+    if (name, mesh_type) == ("force-balance", "right"):  # its springs are no stable network at rest without diagonals
+        return
+    assert even_tension(name, mesh) == pytest.approx(share, rel=1e-9)
+
+
+@pytest.mark.parametrize("mesh_type", ["structured", "free", "braced"])
+@pytest.mark.parametrize("shells", [0, 1, 2, 3])
+def test_bonds_of_peridynamics_have_the_energy_of_a_sheet(mesh_type, shells):
+    """Of even strains the mean over all directions is exact, with any shells and any outline: sum k L^2 = 3 E t A."""
+    mesh = patch(mesh_type)
+    if shells:
+        mesh = mesh.bonded((shells + 0.01) * mesh.edge_lengths.min())
+    springs = DEFINITIONS["peridynamic"].springs(mesh, Material(1.0, 1 / 3), 1.0)
+    total = (springs.relative * springs.reference * mesh.edge_lengths**2).sum()
+    assert total == pytest.approx(3 * mesh.area, rel=1e-12) and (springs.relative > 0).all()
+
+
+def test_peridynamics_inside_a_sheet():
+    """Far from the outline a sheet of two shells has E and nu = 1/3; near it bonds are cut, and E and G miss some."""
+    mesh = lattice(60, 40, 1.0)
+    bonded = mesh.bonded(2.01)
+    springs = DEFINITIONS["peridynamic"].springs(bonded, Material(1.0, 1 / 3), 1.0)
+    middle = np.argmin(((mesh.points - mesh.points.mean(axis=0)) ** 2).sum(axis=1))
+    here = (bonded.edges == middle).any(axis=1)
+    assert here.sum() == 18  # 6 neighbours, 6 at sqrt(3), 6 at 2
+    ways = np.diff(mesh.points[bonded.edges[here]], axis=1)[:, 0]
+    x, y = (ways / np.linalg.norm(ways, axis=1, keepdims=True)).T
+    weight = 0.5 * springs.relative[here] * (ways**2).sum(axis=1) / mesh.particle_areas[middle]
+    assert (weight * x**4).sum() == pytest.approx(9 / 8, rel=1e-9)  # E / (1 - nu^2)
+    assert (weight * x**2 * y**2).sum() == pytest.approx(3 / 8, rel=1e-9)
+    young, ratio = PatchTest(bonded).axial(springs)
+    assert abs(young - 1) < 0.02 and abs(ratio - 1 / 3) < 0.01  # 40 rows: an outline of two shells is a tenth
+
+
+def test_bonds_do_not_cross_what_is_no_body():
+    """Of a sheet with a slot none joins its two lips; a bond between neighbours is no second spring."""
+    points = np.array([[x, y] for y in range(4) for x in range(7)], dtype=float)
+    quads = np.array([[i + 7 * j, i + 1 + 7 * j, i + 8 + 7 * j, i + 7 + 7 * j] for j in range(3) for i in range(6)])
+    slot = (quads[:, 0] // 7 == 1) & (quads[:, 0] % 7 < 5)
+    mesh = Mesh(points, np.zeros((0, 3), dtype=int), quads[~slot]).bonded(2.3)
+    ends = points[mesh.edges]
+    lips = (ends[:, :, 0] < 5).all(axis=1) & (ends[:, :, 1].min(axis=1) <= 1) & (ends[:, :, 1].max(axis=1) >= 2)
+    assert not lips.any() and len(mesh.bonds)
+    assert ((ends[:, :, 1] == 3).all(axis=1) & (np.ptp(ends[:, :, 0], axis=1) == 2)).sum() == 5  # along a side
+    assert len(np.unique(mesh.edges, axis=0)) == len(mesh.edges)
+    assert (mesh.cells_per_edge == 0).sum() == len(mesh.bonds)
+    with pytest.raises(MeshError, match="a mesh file has no place for"):
+        write_mesh("bonds.vtu", mesh)
+    with pytest.raises(MeshError, match="reach: 0 is not above zero"):
+        mesh.bonded(0)
+    with pytest.raises(MeshError, match="bonds: they join points up to 28 of 28; renumber them"):
+        Mesh(points, mesh.triangles, mesh.quads, np.array([[0, 28]]))
+
+
+@pytest.mark.parametrize("nu", [0.0, 0.3, 0.49])
+def test_areas_are_those_of_red_cells(nu):
+    """G = sqrt(3)/4 k, K = sqrt(3)/2 k + k_d and E = 4 K G / (K + G) of bonds and areas (Fedosov 2010)."""
+    springs = DEFINITIONS["area"].springs(patch("structured"), Material(1.0, nu), 1.0)
+    bond, of_area = springs.reference, springs.reference * springs.energies[0].modulus[0]
+    shear, bulk = np.sqrt(3) / 4 * bond, np.sqrt(3) / 2 * bond + of_area
+    assert shear == pytest.approx(1 / (2 * (1 + nu)), rel=1e-12)
+    assert 4 * bulk * shear / (bulk + shear) == pytest.approx(1.0, rel=1e-12)
 
 
 EXACT = [
@@ -109,7 +186,7 @@ def test_stiffnesses_do_not_depend_on_the_size_of_the_sheet(name, factor):
     )
     assert other.reference == pytest.approx(one.reference, rel=1e-12)
     np.testing.assert_allclose(other.relative, one.relative, rtol=1e-9)
-    assert one.evaluations == other.evaluations and (one.evaluations == 0) != name.startswith("patch")
+    assert one.evaluations == other.evaluations and (one.evaluations == 0) != name.startswith(("patch", "force"))
     assert name != "patch" or one.evaluations == 1
 
 

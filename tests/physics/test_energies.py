@@ -24,7 +24,10 @@ from springtune.springs import DEFINITIONS
 from problems import beam_problem, free_network
 
 RATIOS = {"neo-Hooke": 0.3, "neo-Hooke, nearly incompressible": 0.4999}
-KINDS = ("area of triangles", "area of quads", "angles", "tensile", "coupled", "Yeoh", "stable neo-Hooke", *RATIOS)
+KINDS = (
+    *("area of triangles", "area of quads", "angles", "angles of corners", "tensile", "coupled"),
+    *("Yeoh", "stable neo-Hooke", *RATIOS),
+)
 
 
 def energy_of(kind, seed):
@@ -43,8 +46,9 @@ def energy_of(kind, seed):
         return mesh, NeoHookeEnergy(mesh.points, corners, shear, shear * 2 * (1 + nu) / (3 * (1 - 2 * nu)))
     if "area" in kind:
         return mesh, AreaEnergy(mesh.points, corners, modulus)
-    if kind == "angles":
-        return mesh, AngleEnergy(mesh.points, corners, 25e-6 * modulus)
+    if "angles" in kind:
+        shape = (len(corners), 3) if "corners" in kind else len(corners)
+        return mesh, AngleEnergy(mesh.points, corners, 25e-6 * generator.uniform(-0.5, 1.0, shape))
     tensile, coupling = 1e6 * generator.uniform(-0.5, 1.0, (2, len(corners), 3))
     return mesh, BiquadraticEnergy(mesh.points, corners, tensile, coupling if kind == "coupled" else None)
 
@@ -140,6 +144,16 @@ def test_a_place_far_from_the_origin_costs_no_digits(kind):
     assert np.abs(away - here).max() <= 1e-13 * np.abs(here).max()
 
 
+def test_one_modulus_a_triangle_is_that_modulus_at_each_corner():
+    mesh, energy = energy_of("angles", 2)
+    same = replace(energy, modulus=np.repeat(energy.modulus[:, None], 3, axis=1))
+    here = scattered(mesh, 3, 3e-4)
+    assert same.value(here) == pytest.approx(energy.value(here), rel=1e-14)
+    for part in ("forces", "tangent"):
+        mine, theirs = (getattr(one, part)(here) for one in (same, energy))
+        assert np.abs(mine - theirs).max() <= 1e-14 * np.abs(theirs).max()
+
+
 ENERGIES = {
     AreaEnergy: {"modulus": (16,)},
     AngleEnergy: {"modulus": (16,)},
@@ -169,7 +183,13 @@ def test_keys_tell_energies_apart_by_their_cells_and_by_each_modulus(kind, shape
     assert len({known, *(one.key for one in others)}) == 1 + len(others)
 
 
-@pytest.mark.parametrize("name", ["area", "angular", "delingette", "neo-hooke", "patch-area", "flechon"])
+WITH_ENERGIES = [
+    *("area", "angular", "delingette", "neo-hooke", "patch-area", "flechon"),
+    *("normal-shear", "ielsm", "many-body"),
+]
+
+
+@pytest.mark.parametrize("name", WITH_ENERGIES)
 @pytest.mark.parametrize("nu", [0.0, 0.3, 0.5])
 def test_free_networks_have_three_rigid_motions_and_no_other(name, nu):
     definition = DEFINITIONS[name]

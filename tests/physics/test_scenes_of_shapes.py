@@ -510,7 +510,7 @@ class TestAgainstReferences:
         again = st.Scene(self.shape, self.grouped, THIRD, "pull", definition="area", sheet=scene.sheet, scale=2)
         assert again.reference() is scene.reference()
         assert again.objection == ""
-        far = st.Scene(self.shape, self.grouped, RUBBER, "pull", definition="delingette")
+        far = st.Scene(self.shape, self.grouped, RUBBER, "pull", definition="area")
         assert "the linear reference does not apply" in far.objection
 
     def test_predictions_are_scenes(self):

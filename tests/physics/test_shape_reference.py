@@ -31,6 +31,10 @@ class Sheet:
     density: float | None = None
     name: str = "sheet"
 
+    @property
+    def in_plane(self):
+        return self
+
 
 def converge(shape, load, materials, tractions=None, displacements=None, **options):
     """Solve as `solve_shape`, with tractions [Pa] and displacements [m] that vary along groups, those of a solution."""

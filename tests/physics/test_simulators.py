@@ -614,6 +614,36 @@ def test_every_stiffness_is_a_type_of_bonds_of_lammps(tmp_path):
     assert np.allclose(particles[:, 4:6], expected, rtol=0, atol=1e-9 * np.abs(net.points).max())
 
 
+@pytest.mark.parametrize("name", ["angular", "ielsm"])
+def test_every_angle_is_one_of_lammps(name, tmp_path):
+    """Half the modulus, the angle at rest in degrees, and the corner between the two others."""
+    one = scene("free", "traction", name)
+    script, data = (path.read_text() for path in one.springs.write(tmp_path / "net.lmp", errors=False))
+    assert "atom_style angle" in script and "Atoms # angle" in data and "angle_style harmonic" in script
+    rows = [row.split() for row in script.splitlines() if row.startswith("angle_coeff")]
+    typed = {int(row[1]): (float(row[2]), float(row[3])) for row in rows}
+    angles = np.array([row.split() for row in data.partition("\nAngles\n\n")[2].partition("\n\n")[0].split("\n")], int)
+    net = SpringNet.from_scene(one, errors=False)
+    [terms] = net.energies
+    modulus = terms.values["rotational"] if name == "ielsm" else np.repeat(terms.values["modulus"][:, None], 3, axis=1)
+    expected = {
+        (*np.roll(cell, 1 - corner).tolist(), float(modulus[row, corner]) / 2)
+        for row, cell in enumerate(terms.cells)
+        for corner in range(3)
+    }
+    assert {(*(row[2:] - 1).tolist(), typed[row[1]][0]) for row in angles} == expected
+    first, middle, last = (net.points[angles[:, column] - 1] for column in (2, 3, 4))
+    a, b = first - middle, last - middle
+    rest = np.degrees(np.arccos((a * b).sum(axis=1) / np.linalg.norm(a, axis=1) / np.linalg.norm(b, axis=1)))
+    assert np.allclose([typed[kind][1] for kind in angles[:, 1]], rest, rtol=1e-9)
+    assert f"{len(angles)} angles" in data and f"{len(typed)} angle types" in data
+
+
+def test_springs_without_angles_are_written_as_before(tmp_path):
+    script, data = (path.read_text() for path in scene(definition="patch").springs.write(tmp_path / "net.lmp"))
+    assert "angle" not in script + data and "atom_style bond" in script and "Atoms # bond" in data
+
+
 LAMMPS_SECTIONS = ("Atoms # bond", "Bonds", "Particles")
 
 
@@ -638,7 +668,12 @@ def test_what_a_simulator_lacks_is_refused_and_nothing_written(ending, program, 
     )
     for one, message in (
         *(lacking if program != "XPBD" else ()),  # which has them
-        (scene(definition="angular"), f"definition 'angular': has energies of angles.*{program}.*such as 'patch'"),
+        *(
+            (scene(definition=name), f"definition '{name}': has energies of angles.*{program}.*such as 'patch'")
+            for name in ("angular", "ielsm")
+            if program != "LAMMPS"  # which has them
+        ),
+        *((scene(definition=name), f"definition '{name}': .*'patch'") for name in ("normal-shear", "many-body")),
         (scene(material=weightless), f"density: material 'ideal' has none, and {program} moves masses; give a density"),
         (scene(kinematics="linear"), f"kinematics: 'linear', and springs of {program} keep.*; take 'nonlinear'"),
         (scene(load="follower-pressure", force="1 kN"), "load 'follower-pressure': turns.*; take 'pressure'"),

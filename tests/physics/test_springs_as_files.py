@@ -65,7 +65,8 @@ def forces_of(net, x):
         elif terms.kind in ("incompressible", "compressible"):
             part = rubber_forces(terms.kind, corners, value)
         else:
-            part = angle_forces(corners, value["modulus"], value["rest_angle"])
+            one = value["modulus"][:, None] if terms.kind == "angle" else value["rotational"]
+            part = angle_forces(corners, one, value["rest_angle"])
         np.add.at(total, terms.cells, part)
     return total
 
@@ -108,6 +109,9 @@ SCENES = {
     "delingette": ("delingette", "free"),
     "delingette-tensile": ("delingette-tensile", "structured"),
     "angular": ("angular", "structured"),
+    "normal-shear": ("normal-shear", "free"),
+    "ielsm": ("ielsm", "free"),
+    "many-body": ("many-body", "free"),
     "neo-hooke": ("neo-hooke", "free"),
     "yeoh": ("yeoh", "free"),
     "area": ("area", "free"),

@@ -23,6 +23,7 @@ NAME = f"springtune-{springtune.__version__}"
 WITHIN = re.compile(
     r"springtune/.*\.py|springtune/(__init__\.pyi|py\.typed|studies/output/page\.html)"
     r"|springtune/cli/study_of_a_(beam|shape)\.yaml"
+    r"|springtune/handover/templates/[\w.]+\.jinja"
     r"|springtune/studies/output/browse/assets/\w+\.(css|html|js)"
     r"|springtune/workflow/(Snakefile|config/.*|examples/.*|profiles/.*|workflow/.*)"
     r"|snakemake_logger_plugin_springtune/\w+\.py"

@@ -322,7 +322,7 @@ class TestContents:
         for name in ("src/token.txt", "workflow/.env", "src/.own.py"):
             Path(name).write_text("a token")
         result = run("archive", "results/one")
-        assert "no git here" in result.stdout and "src/ .css, .html, .js, .py" in result.stdout, result.output
+        assert "no git here" in result.stdout and "src/ .css, .html, .jinja, .js, .py" in result.stdout, result.output
         assert "src/.own.py, src/token.txt, workflow/.env\n" in result.stdout
         found = archived_files(result)
         assert {"code/Snakefile", "code/profiles/default/config.yaml", "code/src/springtune/units.py"} <= found.keys()

@@ -550,9 +550,9 @@ class TestPredictAMesh:
         assert text.exit_code == 0, text.output
         found = json.loads(run("predict", *asked, "--json", "--write", target).stdout)
         lines = words(text.stdout)
-        assert lines[1] == "engine xpbd: dt 1/60 s, 20 substeps, 10 iterations, float64"
-        assert lines[3] == f"{found['factor']:.5g} times the stiffness of the definition:"
-        assert lines[5] == f"compliance {found['typed']['compliance']['value']} m/N 1 / k of a spring"
+        assert lines[1] == "engine xpbd, dt 1/60 s, 20 substeps, 10 iterations, float64"
+        assert lines[2] == f"factor {found['factor']:.5g}"
+        assert lines[3] == f"type compliance {found['typed']['compliance']['value']} m/N: 1 / k of a spring"
         assert [one["load"] for one in found["loads"]] == ["traction", "shear"] and abs(found["error"]) < 2e-3
         assert len(found["loads"][0]["sizes"]) == 4 and found["loads"][1]["least"] is None
         written = json.loads(target.read_text())
@@ -567,7 +567,7 @@ class TestPredictAMesh:
             *("--density", "1000 kg/m^3", "--load", "traction", "--definition", "lattice"),
         ]
         result = run("predict", *asked, "--write", tmp_path / "net.csv")
-        assert "There is no factor: no stiffness reaches 0.993572 mm by finite elements: " in result.stdout
+        assert "no stiffness reaches 0.993572 mm by finite elements: " in result.stdout
         assert result.exit_code == 1 and not [*tmp_path.iterdir()]
         assert result.stderr.startswith("--write: there is no factor, so nothing is written: no stiffness reaches")
 
@@ -596,7 +596,7 @@ class TestPredictAMesh:
         finally:
             springtune.ENGINES.discard("at-once")
         found = json.loads(result.stdout)
-        assert all(one["frame_seconds"] <= 10 for one in found["tried"]) and found["unbeaten"]
+        assert all(one["frame_seconds"] <= 10 for one in found["tried"])
         chosen = found["tried"][found["chosen"]]
         assert chosen["worst"] < 2e-3 and (tmp_path / "net.csv").exists() and result.stderr.startswith(f"{tmp_path}")
 

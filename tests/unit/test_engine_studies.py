@@ -343,7 +343,7 @@ def test_figures_say_what_they_lack(collected, names):
                 assert any(panel.has_data() for panel in panels)
             else:
                 lost = {"missing": "absent", "exploding": "diverged"}[names[0]]
-                assert lost in re.sub(r"\s+", " ", said) or "None of" in said or plot is st.plot_engine_maps
+                assert lost in re.sub(r"\s+", " ", said) or "curves have no" in said or plot is st.plot_engine_maps
     with pytest.raises(ValueError, match="nothing has scene 'push'"):
         st.plot_engine_maps(tree, scene="push")
 

@@ -151,12 +151,14 @@ def test_keys_of_isotropic_materials_are_what_they_were():
         "name": "",
     }
     assert asdict(Material(210e9, 0.3)) == {
-        "young_modulus": 210e9, "poisson_ratio": 0.3, "density": None, "name": "material"
+        "young_modulus": 210e9, "poisson_ratio": 0.3, "density": None, "name": "material", "plane": "stress"
     }  # fmt: skip
+    assert material_key(Material(210e9, 0.3, plane="strain"))["plane"] == "strain"
 
 
 def test_a_material_is_made_again_of_its_fields():
-    for material in (PLY, PLY.rotated(0.3), Material(210e9, 0.3, 7850.0, "steel")):
+    steels = (Material(210e9, 0.3, 7850.0, "steel", plane) for plane in ("stress", "strain"))
+    for material in (PLY, PLY.rotated(0.3), *steels):
         assert material_of(asdict(material)) == material
         assert material.isotropic == isinstance(material, Material)
 

@@ -373,6 +373,35 @@ def test_anisotropic_materials_are_told_without_their_names(load, tmp_path):
     assert all("needs an isotropic material and this one is anisotropic" in message for message in messages)
 
 
+def test_errors_of_rubber_are_against_its_law_at_finite_strain(load, tmp_path):
+    """Each law has a reference; what has none of its own has no error there, and what fails says why."""
+    config = yaml.safe_load(COOK)
+    loads, grid = config["shapes"]["cook"]["loads"], config["shape_grids"]["all"]
+    loads["shear"]["forces"] = {"right": [0, "0.5 N"]}
+    loads["push"] = loads["shear"] | {"forces": {"right": ["-500 N", 0]}}
+    grid |= {"definition": ["neo-hooke", "delingette", "lattice"], "kinematics": ["nonlinear", "linear"]}
+    grid |= {"mesh_size": "8 mm", "finite_strain": True}
+    study = load(yaml.safe_dump(config, sort_keys=False))
+    assert [law for *_, law in study.parts["shapes"].finite] == [
+        "st-venant",
+        "rubber",
+    ] * 2  # as definitions are ordered
+    tree, _ = done(study, tmp_path / "results/study")
+    finite, data = tree["shapes_finite_strain"].to_dataset(), tree["shapes"].to_dataset()
+    references = finite.reference_value.sel(shape="cook", material="third", quantity="tip")
+    cut = {"shape": "cook", "material": "third", "mesh_size": 8e-3, "mesh_type": "free", "quantity": "tip"}
+    for name, law in (("neo-hooke", "rubber"), ("delingette", "st-venant")):
+        cell = cut | {"load": "shear", "definition": name, "kinematics": "nonlinear"}
+        value, error = float(data.value.sel(cell)), float(finite.error.sel(cell))
+        reference = float(references.sel(load="shear", law=law))
+        assert error == pytest.approx(value / reference - 1, rel=1e-12) and abs(error) < 0.1
+    for without in ({"definition": "lattice"}, {"kinematics": "linear"}, {"load": "push"}):
+        assert np.isnan(finite.error.sel(without)).all()
+    assert np.isnan(references.sel(load="push")).all()
+    why = str(finite.reference_message.sel(load="push", law="rubber").item())
+    assert "shape 'cook', load 'push': no " in why and "% of the load" in why
+
+
 def test_datasets_without_beams_say_where_their_networks_and_tables_are(load, tmp_path):
     study = load(COOK.replace("kinematics: linear", "kinematics: linear, reference: false").replace(", 8 mm]", "]"))
     tree, _ = done(study, tmp_path / "results/study")

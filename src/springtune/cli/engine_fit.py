@@ -3,13 +3,13 @@
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, fields, replace
 from functools import partial, reduce, wraps
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from .. import __version__
 from ..problem.compare import error_text
-from ..safe_io.tables import aligned, number_text
+from ..safe_io.tables import aligned
 from .options import AnyCommand, SheetOptions, Unmet, asked_quantity, names_from
 from .recommendation import json_text
 
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from ..mesh.groups import GroupedMesh
     from ..problem.geometry import Beam
     from ..problem.shapes import Shape
-    from ..scene.single import Scene
 
 FOUND = ("substeps", "iterations", "size", "definition")
 """Options of what a budget finds."""
@@ -107,91 +106,64 @@ def engine_options(command: AnyCommand) -> AnyCommand:
     return reduce(lambda made, option: option(made), reversed(each), call)
 
 
-class Case(NamedTuple):
-    """What is calibrated: body, material and load, its size, and a mesh, or meshes for a search."""
-
-    body: "Beam | Shape"
-    material: Any
-    load: str
-    force: str | None
-    scale: float
-    mesh: "Mesh | GroupedMesh | Any"
-    mesh_name: str
-    further: dict[str, Any]
-
-
-def _case(sheet: SheetOptions, asked: EngineOptions, load: str | None) -> Case:
-    searched = asked.budget is not None
-    scale = 1.0 if asked.scale is None else asked.scale
-    if sheet.shape is not None:
-        of = sheet.asked_shape(load, sized=not searched)
-        further: dict[str, Any] = {}
-        if searched and of.shape.file:
-            further["meshes"] = {of.mesh_name: of.mesh()}
-        elif searched:
-            from ..engines.budget import shape_meshes
-
-            further["meshes"] = shape_meshes(of.shape, lambda size: replace(of, size=size).mesh())
-        mesh = None if searched else of.mesh()
-        return Case(of.shape, of.materials, of.load, None, scale, mesh, "" if searched else of.mesh_name, further)
-    beam, material = sheet.asked_beam()
-    lacking = {"load": (load, "traction"), "force": (asked.force, "0.2 N"), "density": (sheet.density, "1000 kg/m^3")}
-    for name, (value, example) in lacking.items():
-        if value is None:
-            raise ValueError(f"--{name}: missing; an engine is calibrated to a load and moves masses; give '{example}'")
-    if searched:
-        further = {} if sheet.mesh_type is None else {"mesh_types": sheet.mesh_type.split(",")}
-        return Case(beam, material, str(load), asked.force, scale, None, "", further)
-    edge = sheet.edge(beam)
-    return Case(beam, material, str(load), asked.force, scale, sheet.mesh(beam, edge), sheet.mesh_name(edge), {})
-
-
 def fitted(
     sheet: SheetOptions, asked: EngineOptions, load: str | None, loads: str | None, springs_alone: bool
 ) -> "tuple[Callable[[], str], Callable[[], str], Callable[[str], SpringNet]]":
     """Text, JSON and springs of a calibration, or of a search within a budget."""
-    from ..engines.budget import fit_budget
+    from ..engines.base import ENGINES
+    from ..engines.budget import fit_budget, graded_meshes, runnable
     from ..engines.calibration import WITHIN, fit_engine
+    from ..prediction.choices import CASES
+    from ..scene.single import Scene
 
     setting, engine, within = asked.setting(), str(asked.engine), asked.within or WITHIN
     names = None if loads is None else [name.strip() for name in loads.split(",") if name.strip()]
-    case = _case(sheet, asked, load)
-    if asked.budget is None:
-        fit = fit_engine(_scene(case, asked, setting, springs_alone), engine, setting, loads=names, within=within)
-        return partial(fit_text, fit, case.mesh_name), lambda: json_text(fit_json(fit)), partial(_net, fit)
-    search = fit_budget(
-        *case[:4],
-        scale=case.scale,
-        engine=engine,
-        budget=asked_quantity("--budget", asked.budget, "time"),
-        dt=setting.dt,
-        precision=setting.precision,
-        loads=names,
-        within=within,
-        springs_alone=springs_alone,
-        **case.further,
-    )
-    best = search.best.fit if search.best else None
-    return partial(budget_text, search), lambda: json_text(budget_json(search)), partial(_net, best)
+    searched, scale = asked.budget is not None, 1.0 if asked.scale is None else asked.scale
+    further: dict[str, Any] = {}
+    body: Beam | Shape
+    material: Any
+    make_mesh: Callable[[], Mesh | GroupedMesh]
+    if sheet.shape is not None:
+        of = sheet.asked_shape(load, sized=not searched)
+        body, material, load, mesh_name = of.shape, of.materials, of.load, of.mesh_name
+        if searched and of.shape.file:
+            further["meshes"] = {mesh_name: of.mesh()}
+        elif searched:
+            further["meshes"] = graded_meshes(of.shape, "free", lambda size: replace(of, size=size).mesh())
+        make_mesh = of.mesh
+    else:
+        body, material = beam, _ = sheet.asked_beam()
+        needs = {"load": (load, "traction"), "force": (asked.force, "0.2 N"), "density": (sheet.density, "1000 kg/m^3")}
+        for name, (value, example) in needs.items():
+            if value is None:
+                raise ValueError(
+                    f"--{name}: missing; an engine is calibrated to a load and moves masses; give '{example}'"
+                )
+        if sheet.mesh_type is not None:
+            further["mesh_types"] = sheet.mesh_type.split(",")
+        edge = None if searched else sheet.edge(beam)
+        make_mesh, mesh_name = partial(sheet.mesh, beam, edge), sheet.mesh_name(edge)
+    if searched:
+        limit = asked_quantity("--budget", str(asked.budget), "time")
+        given = {"engine": engine, "budget": limit, "dt": setting.dt, "precision": setting.precision}
+        given |= {"loads": names, "within": within, "scale": scale, "springs_alone": springs_alone}
+        search = fit_budget(body, material, str(load), asked.force, **given, **further)
 
+        def content() -> str:
+            keys = "mesh", "frame_seconds", "worst"
+            tried = [fit_json(one.fit) | {key: getattr(one, key) for key in keys} for one in search]
+            return json_text({"budget": limit, "chosen": 0 if search.best else None, "tried": tried})
 
-def _scene(case: Case, asked: EngineOptions, setting: "Setting", springs_alone: bool) -> "Scene":
-    """Scene of the definition that is asked for, or of the best one that the engine takes."""
-    from ..engines.base import ENGINES
-    from ..engines.budget import runnable
-    from ..prediction.choices import predict
-    from ..scene.single import Scene
-
-    make = partial(Scene, case.body, case.mesh, case.material, case.load, case.force, scale=case.scale)
+        return partial(budget_text, search), content, partial(_net, search.best.fit if search.best else None)
+    make = partial(Scene, body, make_mesh(), material, str(load), asked.force, scale=scale)
     if asked.definition is not None:
-        return make(definition=asked.definition)
-    about: dict[str, Any] = {"load": case.load} if case.force is None else {}
-    choices = predict(case.body, case.mesh, case.material, **about)
-    kept = [one for one in choices if not (springs_alone and one.energies)]
-    scenes, refused = runnable(make, kept, ENGINES[str(asked.engine)], setting, 1)
+        scenes, refused = [make(definition=asked.definition)], ""
+    else:
+        scenes, refused = runnable(make, CASES, ENGINES[engine], setting, 1, springs_alone)
     if not scenes:
-        raise Unmet(refused or "no definition has a stable network on this mesh; take another mesh")
-    return scenes[0]
+        raise Unmet(refused)
+    fit = fit_engine(scenes[0], engine, setting, loads=names, within=within)
+    return partial(fit_text, fit, mesh_name), lambda: json_text(fit_json(fit)), partial(_net, fit)
 
 
 def _net(fit: "EngineFit | None", _: str) -> "SpringNet":
@@ -202,90 +174,48 @@ def _net(fit: "EngineFit | None", _: str) -> "SpringNet":
 
 def fit_text(fit: "EngineFit", mesh_name: str) -> str:
     """Text of a calibration."""
-    found, about, name = fit.result, fit.scene.statement, fit.scene.definition.name
+    about, mesh = fit.scene.statement, fit.scene.mesh
     lines = [
-        f"{about.body}, {mesh_name}: {len(fit.scene.mesh.points)} particles, {len(fit.scene.mesh.edges)} springs; "
-        f"{about.named_materials}; {about.label}; definition {name}",
-        f"engine {found.engine}: {found.setting}",
-        "",
-    ]
-    if fit.factor == fit.factor:
-        rows = [("type", "value", "unit", "formula"), *fit.typed_rows()]
-        lines += [f"{fit.factor:.5g} times the stiffness of the definition:", aligned(rows, left=2)]
-    else:
-        lines.append(f"There is no factor: {fit.message}.")
-    lines += [
-        "",
-        f"displacement {number_text(found.displacement, 'm')}, by finite elements {number_text(found.reference, 'm')}: "
-        f"error {error_text(fit.error)}; without a factor {error_text(fit.untuned.error)}",
-        f"{found.status} after {found.frames} frames, each of {1e3 * found.frame_seconds:.3g} ms here",
+        f"{about.body}, {mesh_name}: {len(mesh.points)} particles, {len(mesh.edges)} springs; "
+        f"{about.named_materials}; {about.label}; definition {fit.scene.definition.name}",
+        aligned(fit._table(), left=2),
     ]
     if fit.bands:
-        lines += ["", "errors at shares of a load:", aligned(fit.bands.table(), left=2), "", *_meaning(fit)]
+        converging = "" if len(fit.bands) == 1 else ": of others than the first, at what moves finite elements as far"
+        lines += ["", f"errors at shares of a load{converging}:", aligned(fit.bands.table(), left=2)]
+        off = [one.load for one in fit.bands[1:] if abs(one.error - one.definition_error) > one.within / 2]
+        hides = f"The factor hides from {fit.scene.load} that the solver has not converged, not from {', '.join(off)}."
+        lines += [hides] if off else []
     if fit.needed:
-        what = "settings whose solver error is below 1 % without a factor, or that have a factor"
-        lines += ["", f"under {fit.scene.load}: {what}:", aligned(fit.needed.table(), left=2)]
+        lines += ["", f"under {fit.scene.load}, solver error below 1 % without a factor:"]
+        lines.append(aligned(fit.needed.table(), left=2))
     return "\n".join(lines)
-
-
-def _meaning(fit: "EngineFit") -> list[str]:
-    """What the table of loads means, and what a factor does not mend."""
-    first, *others = fit.bands
-    lines = [
-        f"x 1 of {first.load} is the load that was calibrated on"
-        + ("; of the others, what moves finite elements as far." if others and first.unit else "."),
-        "converged: the error of a converged setting without a factor, at x 1.",
-        f"within {100 * first.within:g} %: sizes of the load over which the error stays within it.",
-    ]
-    off = [one.load for one in others if abs(one.error - one.definition_error) > one.within / 2]
-    if off:
-        lines.append(
-            f"The factor hides from {first.load} that the solver has not converged, not from {', '.join(off)}."
-        )
-    return [*lines, *([f"But {fit.message}."] if fit.message else [])]
 
 
 def budget_text(search: "BudgetSearch") -> str:
     """Text of a search within a budget."""
-    head = (
-        f"engine {search.engine}, at most {1e3 * search.budget:.3g} ms a frame: {len(search.tried)} choices were tried"
-    )
     if search.best is None:
-        nearest = min(search.tried, key=lambda one: one.worst)
-        least = error_text(nearest.worst).lstrip("+")
-        return f"{head}\n\nNo stiffness makes any of them right; the nearest is off by {least}. Take a larger budget."
-    table, chosen = aligned(search.unbeaten.table(), left=2), fit_text(search.best.fit, search.best.mesh)
-    return (
-        f"{head}\n\nnone is both cheaper and less off than one of these:\n{table}\n\n"
-        f"chosen, the least error at worst:\n{chosen}"
-    )
+        least = error_text(search[0].worst).lstrip("+")
+        return f"No stiffness makes any of them right; the nearest is off by {least}. Take a larger budget."
+    return f"{search!r}\n\nchosen, the least error at worst:\n{fit_text(search.best.fit, search.best.mesh)}"
 
 
 def fit_json(fit: "EngineFit") -> dict[str, Any]:
     """Content of a calibration in SI units."""
-    found = fit.result
-    keys = "value", "unit", "formula"
-    typed = {name: dict(zip(keys, about, strict=True)) for name, *about in fit.typed_rows()}
+    found, about = fit.result, fit.scene.statement
     result = "engine", "displacement", "reference", "error", "status", "frame_seconds"
-    about: dict[str, Any] = {"springtune": __version__, "body": fit.scene.statement.body, "load": fit.scene.load}
-    about |= {"size": fit.scene.statement.size, "definition": fit.scene.definition.name}
-    about |= {name: getattr(found, name) for name in result} | {"setting": asdict(found.setting)}
-    about |= {"factor": fit.factor, "typed": typed, "error_without_factor": fit.untuned.error, "message": fit.message}
-    about["loads"] = [asdict(one) | {"sizes": [*one.sizes], "errors": [*one.errors]} for one in fit.bands]
-    return about | {"needed": [asdict(one) for one in fit.needed]}
-
-
-def budget_json(search: "BudgetSearch") -> dict[str, Any]:
-    """Content of a search within a budget in SI units; `unbeaten` are numbers of `tried`."""
-    tried = [
-        {"mesh": one.mesh, "frame_seconds": one.frame_seconds, "worst": one.worst, "fit": fit_json(one.fit)}
-        for one in search.tried
-    ]
+    rows = fit.typed_rows()
     return {
         "springtune": __version__,
-        "engine": search.engine,
-        "budget": search.budget,
-        "chosen": search.tried.index(search.best) if search.best else None,
-        "unbeaten": [search.tried.index(one) for one in search.unbeaten],
-        "tried": tried,
-    }
+        "body": about.body,
+        "load": fit.scene.load,
+        "size": about.size,
+        "definition": fit.scene.definition.name,
+        "setting": asdict(found.setting),
+        "factor": fit.factor,
+        "typed": {name: {"value": value, "unit": unit, "formula": formula} for name, value, unit, formula in rows},
+        "error_without_factor": fit.untuned.error,
+        "message": fit.message,
+        "loads": [asdict(one) | {"sizes": [*one.sizes], "errors": [*one.errors]} for one in fit.bands],
+        "needed": [asdict(one) for one in fit.needed],
+    } | {name: getattr(found, name) for name in result}

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
-from ..problem.parameters import MOST_SCENES, MOST_SCENES_VARIABLE
+from ..problem.parameters import MOST_SCENES, MOST_SCENES_VARIABLE, PLANES
 from ..registry import imported
 from ..studies.runs.source import CONFIG_FOLDER
 from . import FAILED, WRONG, mesh_types
@@ -102,7 +102,9 @@ def asked_beam(text: str, thickness: str) -> "Beam":
         raise ValueError(f"--beam: {error}") from None
 
 
-def asked_material(name: str | None, young: str | None, poisson: str | None, density: str | None = None) -> "Material":
+def asked_material(
+    name: str | None, young: str | None, poisson: str | None, density: str | None = None, plane: str | None = None
+) -> "Material":
     """Material of a name, or of its constants; ValueError names the option."""
     from ..problem.materials import Material
 
@@ -127,7 +129,10 @@ def asked_material(name: str | None, young: str | None, poisson: str | None, den
     if not 0 <= ratio <= 0.5:
         raise ValueError(f"--poisson: '{poisson}' is out of range; give a number from 0 to 0.5")
     heavy = None if density is None else asked_quantity("--density", density, "density")
-    return Material(asked_quantity("--young", young, "stress"), ratio, heavy, name or "material")
+    if plane == "strain" and ratio == 0.5:
+        option, given = ("--poisson", f"'{poisson}'") if name is None else ("--material", f"nu of '{name}'")
+        raise ValueError(f"{option}: {given} is 0.5, and plane strain needs less; give less, or --plane stress")
+    return Material(asked_quantity("--young", young, "stress"), ratio, heavy, name or "material", plane or "stress")
 
 
 NAMED_SHAPE = "config/shapes.yaml:cook"
@@ -143,6 +148,7 @@ OF_BEAMS = {
     "unit": "which has the one of its study; leave it out",
     "young": "whose materials are those of its study; give one of them by --material",
     "poisson": "whose materials are those of its study; give one of them by --material",
+    "plane": "whose materials are those of its study, where 'plane' is a key of each; leave it out",
     "loads": "whose loads are those of its study; give one of them by --load",
     "force": "whose loads have their sizes; give --scale, such as 0.5, or leave it out",
 }
@@ -289,11 +295,12 @@ class SheetOptions:
     material: str | None
     young: str | None
     poisson: str | None
+    plane: str | None
     density: str | None
 
     def asked_beam(self) -> "tuple[Beam, Material]":
         """Beam and its material; ValueError names the option."""
-        material = asked_material(self.material, self.young, self.poisson, self.density)
+        material = asked_material(self.material, self.young, self.poisson, self.density, self.plane)
         return asked_beam(self.beam or "", self.thickness), material
 
     def asked_shape(self, load: str | None, sized: bool = True) -> "AskedShape":
@@ -391,6 +398,11 @@ def sheet_options(
         ),
         click.option("--young", help="Young's modulus, such as '210 GPa'."),
         click.option("--poisson", help="Poisson's ratio, from 0 to 0.5."),
+        click.option(
+            "--plane",
+            type=click.Choice(PLANES),
+            help="Plane stress of a thin sheet, the default, or plane strain of a slice of a long body.",
+        ),
         click.option("--density", help=f"Density, such as '7850 kg/m^3': {density_help}."),
     )
 

@@ -58,6 +58,7 @@ def beam_subject(beam: "Beam", material: "Material", known: "References") -> Sub
     young = material.young_modulus
     modulus = f"{young / 1e9:g} GPa" if young >= 1e9 else f"{young / 1e6:g} MPa"
     made_of = f"{material.name}, E = {modulus}, nu = {material.poisson_ratio:g}, t = {1e3 * beam.thickness:g} mm"
+    made_of += ", plane strain" if material.plane == "strain" else ""
     references = {
         load: {"message": found}
         if isinstance(found, str)

@@ -141,6 +141,9 @@ DAMPERS: dict[str, Callable[[Damping], Any]] = {
 DASHPOT = Parameter("N s/m", "beta k, one for each spring")
 """Damper of a spring."""
 
+MASS_DAMPING = {"damping": Parameter("1/s", "alpha")}
+"""Damping over mass by `springtune.in_engine`."""
+
 
 def typed_springs(net: SpringNet) -> dict[str, Any]:
     """Stiffness of each spring [N/m] and moduli of energies, as they are."""
@@ -221,7 +224,7 @@ class Engine(Declared):
     precisions: tuple[str, ...] = PRECISIONS
     parameters: Mapping[str, Parameter] = field(default_factory=lambda: {"stiffness": SPRING})
     iterates: bool = True
-    dampers: Mapping[str, Parameter] = field(default_factory=lambda: {"damping": Parameter("1/s", "alpha")})
+    dampers: Mapping[str, Parameter] = field(default_factory=lambda: MASS_DAMPING)
     implicit: bool = False
     typed: Callable[..., dict[str, Any]] = field(default_factory=lambda: typed_springs)
     of_setting: bool = False

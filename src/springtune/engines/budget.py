@@ -1,12 +1,13 @@
 """Search for the mesh, definition, substeps and iterations that are least off within a frame's time."""
 
-import time
+import timeit
 from bisect import bisect_right
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from operator import itemgetter
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -14,15 +15,16 @@ from ..handover.net import SpringNet
 from ..mesh import MESH_TYPES, Mesh
 from ..mesh.groups import GroupedMesh
 from ..mesh.outlines import mesh_shape
-from ..prediction.choices import CASES, Choice, check_loads, check_names, predict
-from ..problem.compare import error_text, unbeaten
+from ..prediction.choices import CASES, check_loads, check_names, predict
+from ..problem.compare import error_text
 from ..problem.geometry import Beam
 from ..problem.materials import AnyMaterial
 from ..problem.quantities import positive
 from ..problem.shapes import Shape
 from ..safe_io.tables import Tabled, TabledList, number_text
+from ..scene.meshes import make_mesh
 from ..scene.single import Scene
-from .base import ENGINES, Engine, EngineAbsentError, EngineError, Setting
+from .base import ENGINES, Engine, EngineError, Setting
 from .calibration import WITHIN, EngineFit, fit_engine
 from .run import in_engine, net_of
 
@@ -35,9 +37,6 @@ BUDGET_MESHES = ("structured", "right")
 BEST_DEFINITIONS = 2
 """Definitions on a mesh that are tried."""
 
-SHARES = (0.25, 0.5, 1.0)
-"""Shares of the budget that settings are sought for, so that the table has cheaper ones, too."""
-
 ITERATIONS_AT_MOST, SUBSTEPS_AT_MOST = 400, 256
 """Limits of a setting."""
 
@@ -46,6 +45,9 @@ PROBED = 16
 
 WORSE = 2
 """Settings or meshes in a row that are worse than the best one before a search ends."""
+
+One = TypeVar("One")
+AnyMesh = TypeVar("AnyMesh", bound=Mesh | GroupedMesh)
 
 Cost = Callable[[SpringNet, Setting], float]
 """Seconds of a frame of a net at a setting."""
@@ -86,10 +88,8 @@ class BudgetChoice(Tabled):
     @property
     def worst(self) -> float:
         """Largest size of an error under the loads, with the factor [1]; without one that of the first load."""
-        if not self.fit.bands:
-            return abs(self.fit.error) if np.isfinite(self.fit.error) else np.inf
-        errors = [abs(band.error) for band in self.fit.bands]
-        return float(np.nan_to_num(max(errors, key=lambda one: np.nan_to_num(one, nan=np.inf)), nan=np.inf))
+        errors = [one.error for one in self.fit.bands] or [self.fit.error]
+        return float(np.nan_to_num(np.abs(errors).max(), nan=np.inf))
 
     def _rows(self) -> Iterator[tuple[str, str]]:
         setting = self.fit.result.setting
@@ -105,17 +105,12 @@ class BudgetChoice(Tabled):
             yield band.load, error_text(band.error) if band.error == band.error else "no rest"
 
 
-@dataclass(frozen=True, repr=False)
-class BudgetSearch(Tabled):
-    """What a search within a frame's time found.
+class BudgetSearch(TabledList[BudgetChoice]):
+    """What a search within a frame's time found: the least error at worst first, then the cheapest.
 
-    Attributes
+    Parameters
     ----------
-    engine : str
-    budget : float
-        Time of a frame [s].
-    tried : TabledList of BudgetChoice
-        All that were calibrated, the cheapest first.
+    iterable : iterable of BudgetChoice
 
     Examples
     --------
@@ -124,32 +119,14 @@ class BudgetSearch(Tabled):
     >>> search = st.fit_budget(beam, rubber, "traction", "0.2 N", engine="xpbd", budget="1 ms",
     ...                        meshes={"coarse": st.make_mesh(beam, "right", "40 mm")}, loads=["traction"],
     ...                        cost=lambda net, setting: 1e-5 * setting.substeps * setting.iterations)
-    >>> print(search.best.mesh, len(search.tried), len(search.unbeaten))
-    coarse 6 2
+    >>> print(search.best.mesh, len(search))
+    coarse 2
     """
-
-    engine: str
-    budget: float
-    tried: TabledList[BudgetChoice] = field(repr=False)
-
-    @property
-    def unbeaten(self) -> TabledList[BudgetChoice]:
-        """Those with a factor that no other one beats in both error and time."""
-        worst = np.array([one.worst if one.fit.factor == one.fit.factor else np.nan for one in self.tried])
-        kept = unbeaten(worst, np.array([one.frame_seconds for one in self.tried]))
-        return TabledList(one for one, there in zip(self.tried, kept) if there)
 
     @property
     def best(self) -> BudgetChoice | None:
-        """The least error at worst, then the cheapest; None where nothing has a factor within the budget."""
-        usable = [one for one in self.tried if one.fit.factor == one.fit.factor and one.worst < np.inf]
-        return min(usable, key=lambda one: (one.worst, one.frame_seconds), default=None)
-
-    def _rows(self) -> Iterator[tuple[str, str]]:
-        yield "engine", self.engine
-        yield "budget", number_text(self.budget, "s")
-        yield "tried", str(len(self.tried))
-        yield from self.best._rows() if self.best else ()
+        """The first one; None where nothing has a factor within the budget."""
+        return next((one for one in self[:1] if one.fit.bands and one.worst < np.inf), None)
 
 
 def fit_budget(
@@ -220,9 +197,9 @@ def fit_budget(
     Notes
     -----
     The error of a choice is the largest one of the loads with the factor that makes `load` right. On each mesh, coarse
-    ones first, the two definitions count that are best at equilibrium and that the engine has. For a quarter, a half
-    and all of the budget each number of substeps gets as many iterations as there is time for. One run without a factor
-    shows which of these converges best, and that one is calibrated. Finer meshes are left out after two that are worse.
+    ones first, the two definitions count that are best at equilibrium and that the engine has. Each number of substeps
+    gets as many iterations as there is time for. One run without a factor shows which of these converges best, and that
+    one is calibrated. Finer meshes are left out after two that are worse.
 
     Examples
     --------
@@ -233,11 +210,12 @@ def fit_budget(
     ...     return 1e-7 * setting.substeps * setting.iterations * len(net.springs)
     >>> search = st.fit_budget(beam, rubber, "traction", "0.2 N", engine="xpbd", budget="1 ms", meshes=meshes,
     ...                        loads=["traction", "shear"], cost=cost)
-    >>> print(search.unbeaten)
+    >>> print(search)
      a frame   at worst  mesh   particles  definition  substeps  iterations  factor  traction  shear
-     0.202 ms  5.92 %    40 mm  12         delingette  32        3           0.9852  +0.07 %   -5.92 %
-     0.403 ms  5.86 %    40 mm  12         delingette  64        3           0.9843  +0.07 %   -5.86 %
      0.922 ms  4.45 %    20 mm  33         delingette  32        4           0.9986  +0.00 %   -4.45 %
+     0.806 ms  5.88 %    40 mm  12         delingette  128       3           0.9845  +0.07 %   -5.88 %
+     0.922 ms  19.1 %    20 mm  33         lattice     64        2           1.173   +0.00 %   -19.1 %
+     0.806 ms  21.6 %    40 mm  12         lattice     128       3           1.15    +0.06 %   -21.6 %
     """
     chosen = ENGINES[engine]
     limit = positive(budget, "time", "budget")
@@ -245,117 +223,103 @@ def fit_budget(
     chosen.check(start)
     if isinstance(beam, Shape):
         names: tuple[str, ...] = tuple(loads or (load,))
-        families = [meshes or shape_meshes(beam, partial(mesh_shape, beam))]
+        made: list[Any] = [] if meshes else [graded_meshes(beam, "free", partial(mesh_shape, beam))]
     else:
         names = check_loads(CASES if loads is None else loads)
         check_names("mesh types", mesh_types, MESH_TYPES, BUDGET_MESHES, "is unknown")
-        families = [meshes] if meshes else [_beam_meshes(beam, name) for name in mesh_types]
-    about: dict[str, Any] = {"load": load} if isinstance(beam, Shape) else {"loads": names}
+        made = [] if meshes else [graded_meshes(beam, one, partial(make_mesh, beam, one)) for one in mesh_types]
+    why = ""
+
+    def on_mesh(named: tuple[str, Mesh | GroupedMesh]) -> list[BudgetChoice]:
+        """Choices of the best definitions on a mesh."""
+        nonlocal why
+        make = partial(Scene, beam, named[1], material, load, force, scale=scale)
+        scenes, refused = runnable(make, names, chosen, start, BEST_DEFINITIONS, springs_alone)
+        why = why or refused
+        found = []
+        for scene in scenes:
+            net = net_of(scene)
+            seconds = partial(cost or _measured(chosen, net, start), net)
+            if setting := _split(scene, chosen, start, seconds, limit):
+                fit = fit_engine(scene, engine, setting, loads=names, within=within, needed=False)
+                found.append(BudgetChoice(named[0], fit, seconds(setting)))
+            else:
+                coarsest = f"a frame of the coarsest mesh takes in engine '{engine}'"
+                why = f"budget: {budget!r} is less than {coarsest}; give more"
+        return found
+
+    def least_error(found: list[BudgetChoice]) -> float:
+        return min((one.worst for one in found), default=np.inf)
+
     tried: list[BudgetChoice] = []
-    refused, taken = "", False
-    for family in families:
-        least, worse = np.inf, 0
-        for name, mesh in family.items():
-            make = partial(Scene, beam, mesh, material, load, force, scale=scale)
-            choices = [one for one in predict(beam, mesh, material, **about) if not (springs_alone and one.energies)]
-            scenes, refused = runnable(make, choices, chosen, start, BEST_DEFINITIONS)
-            taken = taken or bool(scenes)
-            found: list[BudgetChoice] = []
-            for scene in scenes:
-                net = net_of(scene)
-                timed = cost or _measured(chosen, net, start)
-                fits = _fits(scene, engine, net, [share * limit for share in SHARES], start, timed, names, within)
-                found += [BudgetChoice(name, fit, timed(net, fit.result.setting)) for fit in fits]
-            tried += found
-            best = min((one.worst for one in found), default=np.inf)
-            worse = 0 if best < least else worse + 1
-            least = min(least, best)
-            if worse == WORSE:
-                break
-    if not taken:
-        raise EngineError(refused or "no definition has a stable network on these meshes; give others")
+    for family in [meshes] if meshes else made:
+        found = _until_worse(map(on_mesh, family.items()), least_error)
+        tried += [one for _, choices in found for one in choices]
     if not tried:
-        raise EngineError(
-            f"budget: {budget!r} is less than a frame of the coarsest mesh takes in engine '{engine}'; give more"
-        )
-    return BudgetSearch(engine, limit, TabledList(sorted(tried, key=lambda one: (one.frame_seconds, one.worst))))
+        raise EngineError(why or "no mesh can be made; give others")
+    return BudgetSearch(sorted(tried, key=lambda one: (not one.fit.bands, one.worst, one.frame_seconds)))
 
 
-def _beam_meshes(beam: Beam, name: str) -> Mapping[str, Mesh]:
-    """Meshes of a type, from coarse to fine."""
-    side, found = min(beam.length, beam.height), {}
-    for cells in CELLS_ACROSS:
-        size = side / cells
-        if not MESH_TYPES[name].refusal(beam.length, beam.height, size, beam.name):
-            found[f"{name} {number_text(size, 'm')}"] = MESH_TYPES[name](beam.length, beam.height, size)
+def _until_worse(those: Iterable[One], error: Callable[[One], float]) -> list[tuple[float, One]]:
+    """Errors and what has them, up to two in a row that are worse than the best one before."""
+    found: list[tuple[float, One]] = []
+    worse = 0
+    for one in those:
+        off = float(np.nan_to_num(error(one), nan=np.inf))
+        worse = 0 if off < min((least for least, _ in found), default=np.inf) else worse + 1
+        found.append((off, one))
+        if worse == WORSE:
+            break
     return found
 
 
-def shape_meshes(shape: Shape, make: Callable[[float], GroupedMesh]) -> Mapping[str, GroupedMesh]:
-    """Meshes of an outline, from coarse to fine; sizes at which it cannot be meshed are left out."""
-    side, found = float(np.ptp(shape.extent, axis=0).min()), {}
+def graded_meshes(body: Beam | Shape, name: str, make: Callable[[float], AnyMesh]) -> dict[str, AnyMesh]:
+    """Meshes by name, from coarse to fine; sizes at which there is none are left out."""
+    found = {}
+    side = min(np.ptp(body.extent, axis=0)) if isinstance(body, Shape) else min(body.length, body.height)
     for cells in CELLS_ACROSS:
         with suppress(ValueError):
-            found[f"free {number_text(side / cells, 'm')}"] = make(side / cells)
+            found[f"{name} {number_text(side / cells, 'm')}"] = make(side / cells)
     return found
 
 
 def runnable(
-    make: Callable[..., Scene], choices: Iterable[Choice], engine: Engine, setting: Setting, most: int
+    make: "partial[Scene]", loads: Iterable[str], engine: Engine, setting: Setting, most: int, springs_alone: bool
 ) -> tuple[list[Scene], str]:
-    """Scenes of the best definitions that an engine takes, at most some; and why it refuses the last other one."""
+    """Scenes of the best definitions that an engine takes, at most some; and why there is no other one."""
+    body, mesh, material, load, *_ = make.args
+    about: dict[str, Any] = {"load": load} if isinstance(body, Shape) else {"loads": loads}
     found: list[Scene] = []
-    refused = ""
-    for choice in choices:
-        if len(found) == most or not choice.worst < np.inf:
-            break
-        scene = make(definition=choice.definition)
-        try:
-            engine.start(net_of(scene), setting, 1.0)
-        except EngineAbsentError:
-            raise
-        except EngineError as error:
-            refused = str(error)
-        else:
-            found.append(scene)
+    refused = "no definition has a stable network on this mesh; take another mesh"
+    for choice in predict(body, mesh, material, **about):
+        if len(found) < most and choice.worst < np.inf and not (springs_alone and choice.energies):
+            scene = make(definition=choice.definition)
+            try:
+                engine.start(net_of(scene), setting, 1.0)
+                found.append(scene)
+            except EngineError as error:
+                refused = str(error)
     return found, refused
 
 
-def _fits(
-    scene: Scene,
-    engine: str,
-    net: SpringNet,
-    limits: Sequence[float],
-    start: Setting,
-    cost: Cost,
-    names: Sequence[str],
-    within: float | str,
-) -> Iterator[EngineFit]:
-    """Calibrate the best split of each limit into substeps and iterations."""
-    damping = 2 * scene.motion().loaded_frequency
-    known: dict[Setting, EngineFit] = {}
-    for limit in limits:
-        best: Setting | None = None
-        least, worse, substeps = np.inf, 0, SUBSTEPS_AT_MOST
-        while substeps >= 1 and worse < WORSE:
-            setting = _filled(replace(start, substeps=substeps), partial(cost, net), limit, ENGINES[engine].iterates)
-            substeps //= 2
-            if setting is None:
-                continue
-            error = abs(in_engine(scene, engine, setting, damping=damping, tolerance=1e-3).solver_error)
-            worse = 0 if error < least else worse + 1
-            if error < least:
-                best, least = setting, error
-        if best is not None and best not in known:
-            known[best] = fit_engine(scene, engine, best, loads=names, within=within, needed=False)
-            yield known[best]
+def _split(
+    scene: Scene, engine: Engine, start: Setting, seconds: Callable[[Setting], float], limit: float
+) -> Setting | None:
+    """Best split of a time into substeps, with as many iterations as it has time for; None if it is too short."""
+    damping, settings = 2 * scene.motion().loaded_frequency, []
+    substeps = SUBSTEPS_AT_MOST
+    iterations = range(1, (ITERATIONS_AT_MOST if engine.iterates else 1) + 1)
+    while substeps >= 1:
+        setting = replace(start, substeps=substeps)
+        if count := bisect_right(iterations, limit, key=lambda number: seconds(replace(setting, iterations=number))):
+            settings.append(replace(setting, iterations=count))
+        substeps //= 2
 
+    def error(setting: Setting) -> float:
+        return abs(in_engine(scene, engine.name, setting, damping=damping, tolerance=1e-3).solver_error)
 
-def _filled(setting: Setting, cost: Callable[[Setting], float], limit: float, iterates: bool) -> Setting | None:
-    """Setting with as many iterations as there is time for; None where there is not enough for one."""
-    most = ITERATIONS_AT_MOST if iterates else 1
-    count = bisect_right(range(1, most + 1), limit, key=lambda number: cost(replace(setting, iterations=number)))
-    return replace(setting, iterations=count) if count else None
+    errors = _until_worse(settings, error)
+    return min(errors, key=itemgetter(0))[1] if errors else None
 
 
 def _measured(engine: Engine, net: SpringNet, start: Setting) -> Cost:
@@ -364,12 +328,7 @@ def _measured(engine: Engine, net: SpringNet, start: Setting) -> Cost:
     def seconds(iterations: int) -> float:
         session = engine.start(net, replace(start, substeps=4, iterations=iterations), 1.0)
         session.advance(1)  # may compile
-        times = []
-        for _ in range(5):
-            begin = time.perf_counter()
-            session.advance(2)
-            times.append((time.perf_counter() - begin) / 8)
-        return min(times)
+        return min(timeit.repeat(lambda: session.advance(2), repeat=5, number=1)) / 8
 
     one, more = seconds(1), seconds(PROBED)
     each = max((more - one) / (PROBED - 1), 0.0)

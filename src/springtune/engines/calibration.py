@@ -6,8 +6,9 @@ springs are: a factor hides it for one load and not for the others, and where ``
 no factor does.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from ..reference.small_strain import ReferenceNotConvergedError
 from ..safe_io.tables import Tabled, TabledList, number_text
 from ..scene.single import Scene
 from ..scene.statements import ShapeStatement
-from .base import ENGINES, Engine, EngineError, Setting
+from .base import ENGINES, EngineError, Setting
 from .run import EngineResult, complete, in_engine, net_of
 
 SIZES = (0.25, 0.5, 1.0, 2.0)
@@ -52,9 +53,6 @@ CONVERGED = 0.01
 
 MOST_DOUBLINGS = 8
 """Doublings of substeps or iterations that are tried."""
-
-CONVERGES, TUNABLE = "converged", "a factor"
-"""Purposes of settings: the solver error is small without a factor; there is a factor."""
 
 STALLED = 0.9
 """Share of the solver error that two doublings leave where more of them are hopeless."""
@@ -128,12 +126,10 @@ class LoadBand(Tabled):
 
 @dataclass(frozen=True, repr=False)
 class NeededSetting(Tabled):
-    """Setting that some purpose needs, found by doubling its substeps or its iterations.
+    """Setting whose solver error is small without a factor, found by doubling its substeps or its iterations.
 
     Attributes
     ----------
-    purpose : str
-        ``"converged"``: the solver error is small without a factor; ``"a factor"``: there is one for the reference.
     raised : str
         ``"substeps"`` or ``"iterations"``.
     setting : Setting
@@ -156,7 +152,6 @@ class NeededSetting(Tabled):
     iterations: dt 1/60 s, 16 substeps, 40 iterations, float64, True, +0.0 %
     """
 
-    purpose: str
     raised: str
     setting: Setting
     found: bool
@@ -164,7 +159,6 @@ class NeededSetting(Tabled):
     frame_seconds: float
 
     def _rows(self) -> Iterator[tuple[str, str]]:
-        yield "for", self.purpose
         yield "more", self.raised
         yield "setting", str(self.setting) if self.found else f"none up to {self.setting}"
         yield "solver error", error_text(self.solver_error) if self.solver_error == self.solver_error else "diverges"
@@ -189,7 +183,7 @@ class EngineFit(Tabled):
     bands : TabledList of LoadBand
         The load of the scene first.
     needed : TabledList of NeededSetting
-        What a converged setting needs, and where there is no factor, what a factor needs.
+        What a converged setting needs.
     message : str
         Why there is no factor, or what else is to be known.
 
@@ -265,54 +259,38 @@ class EngineFit(Tabled):
     def _rows(self) -> Iterator[tuple[str, str]]:
         yield "engine", f"{self.result.engine}, {self.result.setting}"
         yield "factor", f"{self.factor:.5g}" if self.factor == self.factor else "none"
-        for name, value, unit, _ in self.typed_rows():
-            yield f"type {name}", f"{value} {unit}"
+        for name, value, unit, formula in self.typed_rows():
+            yield f"type {name}", f"{value} {unit}: {formula}"
         yield "displacement", number_text(self.result.displacement, "m")
+        yield "by finite elements", number_text(self.result.reference, "m")
         yield "error", error_text(self.error)
         yield "without a factor", error_text(self.untuned.error)
+        yield "run", f"{self.result.status} after {self.result.frames} frames"
+        yield "a frame", f"{1e3 * self.result.frame_seconds:.3g} ms"
         yield "note", self.message
 
-    def _computed_rows(self) -> Iterator[tuple[str, str]]:
-        for band in self.bands:
-            yield f"under {band.load}", "; ".join(f"{label} {text}" for label, text in band._table()[1:])
-        for one in self.needed:
-            yield f"{one.purpose}, {one.raised}", "; ".join(text for _, text in one._table()[2:])
 
+class _Runs(dict[tuple[float, Setting], EngineResult]):
+    """Runs of a scene in an engine by factor and setting, each once."""
 
-class _Runs:
-    """Runs of a scene in an engine, each factor and setting once.
+    def __init__(self, scene: Scene, engine: str, frames: int | None) -> None:
+        self.scene, self.engine, self.frames = scene, engine, frames
 
-    All are damped critically for the loaded mode of the material: where the displacement is right, so is the damping.
-    """
+    def __missing__(self, key: tuple[float, Setting]) -> EngineResult:
+        self[key] = self.under(self.scene, *key)
+        return self[key]
 
-    def __init__(self, scene: Scene, engine: str, setting: Setting, frames: int | None) -> None:
-        self.scene, self.engine, self.setting, self.frames = scene, engine, setting, frames
-        self.known: dict[tuple[float, Setting], EngineResult] = {}
-        self.target = self(1.0).reference
-        if not abs(self.target) > 0:
-            raise EngineError(
-                f"load: {scene.load!r} has no displacement by finite elements to calibrate to; take a load case with a "
-                "quantity of kind 'displacement' that is not zero"
-            )
-
-    def __call__(self, factor: float, setting: Setting | None = None) -> EngineResult:
-        key = factor, setting or self.setting
-        if key not in self.known:
-            self.known[key] = self.under(self.scene, *key)
-        return self.known[key]
-
-    def under(self, scene: Scene, factor: float, setting: Setting | None = None) -> EngineResult:
-        """Run of a scene of the same springs."""
-        damping = 2 * scene.motion().loaded_frequency
-        setting = setting or self.setting
-        tolerance = RESTING[setting.precision]
+    def under(self, scene: Scene, factor: float, setting: Setting) -> EngineResult:
+        """Run of a scene of the same springs, damped critically for the loaded mode of the material."""
+        damping, rest = 2 * scene.motion().loaded_frequency, RESTING[setting.precision]
         return in_engine(
-            scene, self.engine, setting, factor=factor, frames=self.frames, tolerance=tolerance, damping=damping
+            scene, self.engine, setting, factor=factor, frames=self.frames, tolerance=rest, damping=damping
         )
 
-    def ratio(self, factor: float, setting: Setting | None = None) -> float:
+    def ratio(self, factor: float, setting: Setting) -> float:
         """Displacement over the reference's; NaN where it diverged."""
-        return self(factor, setting).displacement / self.target
+        found = self[factor, setting]
+        return found.displacement / found.reference
 
 
 def fit_engine(
@@ -393,37 +371,29 @@ def fit_engine(
     setting = complete(chosen, setting or Setting(**parts))
     chosen.check(setting, net_of(scene))
     names = _loads(scene, loads)
-    runs = _Runs(scene, engine, setting, frames)
-    factor, why = _factor(runs)
+    runs = _Runs(scene, engine, frames)
+    untuned = runs[1.0, setting]
+    if not abs(untuned.reference) > 0:
+        raise EngineError(
+            f"load: {scene.load!r} has no displacement by finite elements to calibrate to; take a load case with a "
+            "quantity of kind 'displacement' that is not zero"
+        )
+    factor, why = _factor(runs, setting)
     found = factor == factor
-    needs: TabledList[NeededSetting] = TabledList()
-    for raised in ("substeps", "iterations") if chosen.iterates else ("substeps",):
-        if needed and not found:
-            needs.append(_needed(runs, TUNABLE, raised, _reachable))
-        if needed:
-            needs.append(_needed(runs, CONVERGES, raised, _converged))
-    if not found:
-        enough = [one for one in needs if one.found and one.purpose == TUNABLE]
-        remedies = [f"{getattr(one.setting, one.raised)} {one.raised}" for one in enough]
-        why += f"; take {' or '.join(remedies) or 'more substeps or iterations'}"
-    elif not _rests(runs(factor)):
-        why = runs(factor).message
-    bands = TabledList(_band(runs, name, factor, within) for name in names if found)
+    tuned = runs[factor, setting] if found else min(runs.values(), key=_distance)
+    why = why or ("" if _rests(tuned) else tuned.message)
+    numbers = chosen.numbers(net_of(scene, factor), setting) if found else {}
+    raised = ("substeps", "iterations") if chosen.iterates else ("substeps",)
     return EngineFit(
         scene,
         factor,
-        runs(factor) if found else min(runs.known.values(), key=lambda one: _distance(one, setting)),
-        runs(1.0),
-        _typed(chosen, net_of(scene, factor), setting) if found else {},
-        bands,
-        needs,
+        tuned,
+        untuned,
+        {name: value for name, value in numbers.items() if name in chosen.parameters},
+        TabledList(_band(runs, name, tuned, within) for name in names if found),
+        TabledList(_needed(runs, name, setting) for name in raised if needed),
         "; ".join(filter(None, (why, scene.objection))),
     )
-
-
-def _typed(engine: Engine, net: SpringNet, setting: Setting) -> dict[str, Any]:
-    """Numbers to type; what an engine takes from the mesh is none."""
-    return {name: value for name, value in engine.numbers(net, setting).items() if name in engine.parameters}
 
 
 def _rests(one: EngineResult) -> bool:
@@ -431,8 +401,8 @@ def _rests(one: EngineResult) -> bool:
     return one.status == "rest" or one.status != "inverted" and one.swing <= SHAKE * abs(one.displacement)
 
 
-def _distance(one: EngineResult, setting: Setting) -> float:
-    return abs(one.error) if one.setting == setting and np.isfinite(one.error) else np.inf
+def _distance(one: EngineResult) -> float:
+    return abs(one.error) if np.isfinite(one.error) else np.inf
 
 
 def _loads(scene: Scene, loads: Iterable[str] | None) -> tuple[str, ...]:
@@ -445,105 +415,93 @@ def _loads(scene: Scene, loads: Iterable[str] | None) -> tuple[str, ...]:
     return tuple(dict.fromkeys((scene.load, *others)))
 
 
-def _factor(runs: _Runs) -> tuple[float, str]:
+def _factor(runs: _Runs, setting: Setting) -> tuple[float, str]:
     """Find the factor at which the displacement is the reference's; NaN, and why, where there is none."""
     from scipy.optimize import brentq
 
     def error(softness: float) -> float:
-        off = runs.ratio(1 / softness) - 1
+        off = runs.ratio(1 / softness, setting) - 1
         return 0.0 if abs(off) <= TUNED else float(np.nan_to_num(off, nan=1.0))
 
-    moved = f"{number_text(runs.target, 'm')} by finite elements"
-    if not np.isfinite(runs.ratio(1.0)):
-        return np.nan, f"{runs.engine} diverges at {runs.setting} with the numbers of the definition"
-    first, last, diverged = _bracket(runs)
+    moved = f"{number_text(runs[1.0, setting].reference, 'm')} by finite elements"
+    if not np.isfinite(runs.ratio(1.0, setting)):
+        return np.nan, f"{runs.engine} diverges at {setting} with the numbers of the definition"
+    first, last, diverged = _bracket(runs, setting)
     if last != last:
+        what, there = "stiffness" if first >= 1 else "softness", number_text(runs[first, setting].displacement, "m")
         why = f", and {diverged:.3g} times diverges" if diverged == diverged else ""
-        there = f"{first:.3g} times the stiffness leaves {number_text(runs(first).displacement, 'm')} at {runs.setting}"
-        return np.nan, f"no {'stiffness' if first >= 1 else 'softness'} reaches {moved}: {there}{why}"
-    softness = brentq(error, *sorted((1 / first, 1 / last)), xtol=1e-5 / max(first, last), maxiter=60)
-    tried = [one for one, setting in runs.known if setting == runs.setting and np.isfinite(runs.ratio(one))]
-    best = min(tried, key=lambda one: abs(runs.ratio(one) - 1))
-    if not abs(runs.ratio(best) - 1) <= ALLOWED:
-        return np.nan, f"the displacement jumps over {moved} at {1 / softness:.4g} times the stiffness"
-    return best, ""
+        why += "; take more substeps or iterations"
+        return np.nan, f"no {what} reaches {moved}: {first:.3g} times the stiffness leaves {there} at {setting}{why}"
+    brentq(error, *sorted((1 / first, 1 / last)), xtol=1e-5 / max(first, last), maxiter=60)
+    factor, best = min(((factor, one) for (factor, _), one in runs.items()), key=lambda pair: _distance(pair[1]))
+    if not abs(best.error) <= ALLOWED:
+        return np.nan, f"the displacement jumps over {moved} at {factor:.4g} times the stiffness"
+    return factor, ""
 
 
-def _bracket(runs: _Runs) -> tuple[float, float, float]:
+def _bracket(runs: _Runs, setting: Setting) -> tuple[float, float, float]:
     """Two factors with the right one between them; NaN for the second where there is none, and one that diverged.
 
     What diverges in search of a softer one is too soft. What diverges in search of a stiffer one, as explicit steps do,
     is retried nearer.
     """
-    stiffen = runs.ratio(1.0) > 1
+    stiffen = runs.ratio(1.0, setting) > 1
     first, diverged, step = 1.0, np.nan, BRACKET if stiffen else 1 / BRACKET
     for _ in range(BRACKETS):
         factor = first * step
-        ratio = runs.ratio(factor)
+        ratio = runs.ratio(factor, setting)
         if stiffen and not np.isfinite(ratio):
             diverged, step = factor, step**0.5
         elif not np.isfinite(ratio) or (ratio > 1) != stiffen:
             return first, factor, diverged
         else:
-            still = abs(ratio - runs.ratio(first)) < SATURATED * abs(ratio)
+            still = abs(ratio - runs.ratio(first, setting)) < SATURATED * abs(ratio)
             first = factor
             if stiffen and still and diverged != diverged:
                 break
     return first, np.nan, diverged
 
 
-def _reachable(runs: _Runs, setting: Setting) -> bool:
-    """Whether a large factor makes a setting stiff enough, or a small one soft enough."""
-    untuned = runs.ratio(1.0, setting)
-    other = runs.ratio(BRACKET**BRACKETS if untuned > 1 else BRACKET**-BRACKETS, setting)
-    return bool((untuned > 1) != (other > 1)) and bool(np.isfinite(untuned + other))
-
-
-def _converged(runs: _Runs, setting: Setting) -> bool:
-    found = runs(1.0, setting)
-    return _rests(found) and abs(found.solver_error) <= CONVERGED
-
-
-def _needed(runs: _Runs, purpose: str, raised: str, serves: Callable[[_Runs, Setting], bool]) -> NeededSetting:
-    """Double substeps or iterations until a setting serves, or its error stalls."""
+def _needed(runs: _Runs, raised: str, setting: Setting) -> NeededSetting:
+    """Double substeps or iterations until the solver error is small without a factor, or stalls."""
     errors: list[float] = []
     for power in range(MOST_DOUBLINGS + 1):
-        setting = replace(runs.setting, **{raised: getattr(runs.setting, raised) * 2**power})
-        found = serves(runs, setting)
-        untuned = runs(1.0, setting)
+        more = replace(setting, **{raised: getattr(setting, raised) * 2**power})
+        untuned = runs[1.0, more]
         errors.append(abs(untuned.solver_error))
+        found = _rests(untuned) and errors[-1] <= CONVERGED
         if found or (power > 1 and errors[-1] > STALLED * errors[-3]):
             break
-    return NeededSetting(purpose, raised, setting, found, untuned.solver_error, untuned.frame_seconds)
+    return NeededSetting(raised, more, found, untuned.solver_error, untuned.frame_seconds)
 
 
 def _loaded(scene: Scene, load: str, size: float, kinematics: str = "nonlinear") -> Scene:
     """Scene of the same springs under a load of a size."""
-    shared: dict[str, Any] = {
-        "definition": scene.definition,
-        "stiffness": scene.uniform_stiffness,
-        "kinematics": kinematics,
-        "sheet": scene.sheet,
-    }
+    make = partial(
+        Scene,
+        definition=scene.definition,
+        stiffness=scene.uniform_stiffness,
+        kinematics=kinematics,
+        sheet=scene.sheet,
+    )
     if scene.definition.needs == "cases" and load != scene.load:
         raise EngineError(f"definition '{scene.definition.name}' is fitted to load '{scene.load}' alone")
     if isinstance(scene.statement, ShapeStatement):
-        return Scene(scene.shape, scene.grouped, scene.by_part, load, scale=size, **shared)
-    return Scene(scene.beam, scene.mesh, scene.material, load, size, **shared)
+        return make(scene.shape, scene.grouped, scene.by_part, load, scale=size)
+    return make(scene.beam, scene.mesh, scene.material, load, size)
 
 
-def _band(runs: _Runs, load: str, factor: float, within: float) -> LoadBand:
+def _band(runs: _Runs, load: str, tuned: EngineResult, within: float) -> LoadBand:
     """Band of a load: the engine at each size, with the factor."""
     scene = runs.scene
-    unit, base, nothing = "N", scene.statement.size, (np.nan,) * len(SIZES)
+    base, nothing = scene.statement.size, (np.nan,) * len(SIZES)
+    unit = "" if isinstance(scene.statement, ShapeStatement) else "N"
     try:
-        if isinstance(scene.statement, ShapeStatement):
-            unit = ""
-        elif load != scene.load:
-            known = _loaded(scene, load, 1.0, "linear").reference_values()
-            base = abs(runs.target / next(iter(known.values())))
+        if unit and load != scene.load:
+            (moved,) = _loaded(scene, load, 1.0, "linear").reference_values().values()
+            base = abs(tuned.reference / moved)
         sizes = tuple(float(share * base) for share in SIZES)
-        found = [runs.under(_loaded(scene, load, size), factor) for size in sizes]
+        found = [runs.under(_loaded(scene, load, size), tuned.factor, tuned.setting) for size in sizes]
     except (ValueError, ReferenceNotConvergedError) as error:
         return LoadBand(load, nothing, nothing, np.nan, within, np.nan, np.nan, str(error), unit)
     errors = tuple(one.error if _rests(one) else np.nan for one in found)

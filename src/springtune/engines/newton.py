@@ -25,13 +25,14 @@ it there is added to the next step: at rest it is the support's reaction.
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from ..handover.net import SpringNet
 from ..handover.newton import colours, membrane
-from .base import DASHPOT, SPRING, EngineError, Parameter, Session, Setting, engine
+from .base import DASHPOT, MASS_DAMPING, SPRING, EngineError, Parameter, Session, Setting, engine
 
 FASTEST = 1e30
 """Largest velocity [m/s]: none. By default Newton has 1e5."""
@@ -81,18 +82,16 @@ class _Session:
                 f"definition '{net.header['definition']}': has springs of negative stiffness, which Newton's XPBD "
                 "leaves out; take 'patch' or 'lattice', whose springs all pull, or engine newton-vbd"
             )
+        middle = (net.points.min(axis=0) + net.points.max(axis=0)) / 2  # small numbers lose least by rounding
         with _quiet():
             import newton
 
-            self.model = _model(net, solver)
+            self.model = _model(replace(net, points=net.points - middle), solver)
             made = getattr(newton.solvers, f"Solver{solver}")
+            taken: dict[str, Any] = {} if solver == "SemiImplicit" else {"iterations": setting.iterations}
+            self.solver = made(self.model, **({"config": made.Config(**taken)} if solver == "Style3D" else taken))
             if solver == "Style3D":
-                self.solver = made(self.model, config=made.Config(iterations=setting.iterations))
                 self.solver.collision = None
-            else:
-                self.solver = made(
-                    self.model, **({} if solver == "SemiImplicit" else {"iterations": setting.iterations})
-                )
             self.now, self.next, self.control = self.model.state(), self.model.state(), self.model.control()
         self.step, self.substeps = setting.step, setting.substeps
         self.kept = np.float32(1 / (1 + damping * setting.step))
@@ -156,50 +155,47 @@ def _model(net: SpringNet, solver: str) -> Any:
     return model
 
 
-def _declare(order: float, name: str, solver: str, summary: str, parameters: dict[str, Parameter], **own: Any) -> None:
-    def session(net: SpringNet, setting: Setting, damping: float) -> Session:
-        return _Session(net, setting, damping, solver)
+def _declared(solver: str, **own: Any) -> dict[str, Any]:
+    """What the declaration of a solver has, besides its name, order and parameters."""
 
     def typed(net: SpringNet) -> dict[str, Any]:
         return ({"ke": net.stiffness} if np.any(net.stiffness) else {}) | triangle_numbers(net, solver)
 
-    session.__doc__ = f"Newton's solver {solver}: {summary}"
-    measured = "1e-3, ten scenes, by the law that it has"
-    declared = {"laws": ("biquadratic",), "measured": measured, "source": "Newton 1.8, newton.solvers"} | own
-    engine(
-        name,
-        order=order,
-        program="Newton",
-        needs=("newton", "warp"),
-        extra="newton",
-        precisions=("float32",),
-        parameters=parameters,
-        typed=typed,
-        **declared,
-    )(session)
+    in_common = {
+        "program": "Newton",
+        "needs": ("newton", "warp"),
+        "extra": "newton",
+        "precisions": ("float32",),
+        "laws": ("biquadratic",),
+        "dampers": {"kd": DASHPOT},
+        "measured": "1e-3, ten scenes, by the law that it has",
+        "source": "Newton 1.8, newton.solvers",
+    }
+    return in_common | {"typed": typed} | own
 
 
-IMPLICIT_WITH_KD = {"implicit": True, "dampers": {"kd": DASHPOT}}
+@engine("newton-vbd", order=150, parameters=VBD, **_declared("VBD", implicit=True))
+def vbd(net: SpringNet, setting: Setting, damping: float) -> Session:
+    """Newton's solver VBD: implicit steps by vertex block descent."""
+    return _Session(net, setting, damping, "VBD")
 
-_declare(150, "newton-vbd", "VBD", "implicit steps by vertex block descent", VBD, **IMPLICIT_WITH_KD)
-_declare(
-    151,
-    "newton-xpbd",
-    "XPBD",
-    "springs alone, all at once in an iteration",
-    {"ke": SPRING},
-    laws=(),
-    **IMPLICIT_WITH_KD,
-)
-_declare(
-    152,
-    "newton-semi-implicit",
-    "SemiImplicit",
-    "explicit steps",
-    SEMI_IMPLICIT,
-    iterates=False,
-    dampers={"kd": DASHPOT},
-)
-_declare(
-    153, "newton-style3d", "Style3D", "implicit steps by projective dynamics", STYLE3D, springs=False, implicit=True
-)
+
+@engine("newton-xpbd", order=151, parameters={"ke": SPRING}, **_declared("XPBD", implicit=True, laws=()))
+def xpbd(net: SpringNet, setting: Setting, damping: float) -> Session:
+    """Newton's solver XPBD: springs alone, all at once in an iteration."""
+    return _Session(net, setting, damping, "XPBD")
+
+
+@engine("newton-semi-implicit", order=152, parameters=SEMI_IMPLICIT, **_declared("SemiImplicit", iterates=False))
+def semi_implicit(net: SpringNet, setting: Setting, damping: float) -> Session:
+    """Newton's solver SemiImplicit: explicit steps."""
+    return _Session(net, setting, damping, "SemiImplicit")
+
+
+STYLE = {"springs": False, "implicit": True, "dampers": MASS_DAMPING}
+
+
+@engine("newton-style3d", order=153, parameters=STYLE3D, **_declared("Style3D", **STYLE))
+def style3d(net: SpringNet, setting: Setting, damping: float) -> Session:
+    """Newton's solver Style3D: implicit steps by projective dynamics."""
+    return _Session(net, setting, damping, "Style3D")

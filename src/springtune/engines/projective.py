@@ -13,64 +13,48 @@ from scipy.sparse import coo_array, csc_array, diags_array
 from scipy.sparse.linalg import SuperLU, splu
 
 from ..handover.net import SpringNet
+from ..linalg.factors import SUPERLU
 from ..mechanics.kernels import compiled
 from .base import Session, Setting, engine
-from .textbook import Textbook, pulling
+from .textbook import Textbook, pulling, spring_between, stretch_spring
 
 
 @compiled
-def _descent(x, y, inertia, weights, springs, lengths, stiffness, descent):  # type: ignore[no-untyped-def]
-    """Negative gradient of a step's energy, 0 where held, into `descent`."""
+def _descent(x, y, inertia, free, springs, lengths, stiffness, descent):  # type: ignore[no-untyped-def]
+    """Negative gradient of a step's energy into `descent`; `free` is 0 where held, and 1 elsewhere."""
     for i in range(len(x)):
         for d in range(2):
-            descent[i, d] = inertia[i] * (y[i, d] - x[i, d])
+            descent[i, d] = free[i, d] * inertia[i] * (y[i, d] - x[i, d])
     for e in range(len(lengths)):
         i, j = springs[e]
-        dx, dy = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1]
-        length = np.sqrt(dx * dx + dy * dy)
-        pull = stiffness[e] * (length - lengths[e]) / length
-        descent[i, 0] += pull * dx
-        descent[i, 1] += pull * dy
-        descent[j, 0] -= pull * dx
-        descent[j, 1] -= pull * dy
-    for i in range(len(x)):
-        for d in range(2):
-            if weights[i, d] == 0:
-                descent[i, d] = 0
+        dx, dy, length, _ = spring_between(x, free, i, j)
+        stretch_spring(descent, free, i, j, dx, dy, stiffness[e] * (lengths[e] - length))
 
 
 class _Session(Textbook):
     def __init__(self, net: SpringNet, setting: Setting, damping: float) -> None:
         pulling(net, "the global step needs a positive one")
         super().__init__(net, setting, damping)
-        alike = np.array_equal(net.held[:, 0], net.held[:, 1])
-        self.systems = [
-            (self._factor(net.held[:, axes.start]), axes)
-            for axes in ([np.s_[0:2]] if alike else [np.s_[0:1], np.s_[1:2]])
-        ]
+        self.free = (~net.held).astype(self.kind)
         self.descent = np.empty_like(self.x, order="F")  # as the factors take it
+        alike = np.array_equal(net.held[:, 0], net.held[:, 1])
+        axes = [slice(0, 2)] if alike else [slice(0, 1), slice(1, 2)]
+        self.systems = [(self._factor(self.free[:, one.start]), one) for one in axes]
 
-    def _factor(self, held: np.ndarray) -> SuperLU:
+    def _factor(self, free: np.ndarray) -> SuperLU:
         """Factorized system of a direction, a unit matrix where particles are held."""
-        first, second = self.springs.T
-        rows, columns = np.concatenate([first, second]), np.concatenate([second, first])
-        links = coo_array((np.tile(self.stiffness, 2), (rows, columns)), shape=(len(held), len(held)))
-        free = diags_array((~held).astype(self.kind))
+        links = coo_array((self.stiffness, self.springs.T), shape=(len(free), len(free)))
+        links = links + links.T
         whole = diags_array(self.inertia + links.sum(axis=1)) - links
-        matrix = free @ whole @ free + diags_array(1 - free.diagonal())
-        return splu(
-            csc_array(matrix, dtype=self.kind),
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        )
+        matrix = diags_array(free) @ whole @ diags_array(free) + diags_array(1 - free)
+        return splu(csc_array(matrix, dtype=self.kind), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, **SUPERLU)
 
     def solve(self, before: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Iterate from the inertial positions."""
         x = y.copy()
         of_springs = self.springs, self.lengths, self.stiffness
         for _ in range(self.iterations):
-            _descent(x, y, self.inertia, self.weights, *of_springs, self.descent)
+            _descent(x, y, self.inertia, self.free, *of_springs, self.descent)
             for factor, axes in self.systems:
                 x[:, axes] += factor.solve(self.descent[:, axes])
         return x

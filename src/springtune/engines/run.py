@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil
 from typing import Any
@@ -49,7 +49,7 @@ taken for rest, since it might as well be rounding."""
 
 @dataclass(frozen=True)
 class Ended:
-    """How a session ended: `displacements` (n_points, 2), mean ones where it swings [m]; `swing`, largest one [m]."""
+    """How a session ended; see `EngineResult`."""
 
     displacements: np.ndarray
     status: str
@@ -60,16 +60,11 @@ class Ended:
 
 
 @dataclass(frozen=True, repr=False)
-class EngineResult(Tabled):
+class EngineResult(Tabled, Ended):
     """What a scene comes to in an engine.
 
     Attributes
     ----------
-    scene : Scene
-    engine : str
-    setting : Setting
-    factor : float
-        On all stiffnesses and moduli that were typed [1].
     displacements : ndarray of float, shape (n_points, 2)
         Of the particles [m]; mean ones where it swings, NaN where it diverged.
     status : str
@@ -82,6 +77,11 @@ class EngineResult(Tabled):
         Time that a frame took, without the first ones [s].
     swing : float
         Largest amplitude about the mean, where it swings [m].
+    scene : Scene
+    engine : str
+    setting : Setting
+    factor : float
+        On all stiffnesses and moduli that were typed [1].
 
     Examples
     --------
@@ -98,16 +98,10 @@ class EngineResult(Tabled):
     (<Status.SOLVED: 1>, '0.998 mm')
     """
 
-    scene: Scene = field(repr=False)
+    scene: Scene
     engine: str
     setting: Setting
     factor: float
-    displacements: np.ndarray = field(repr=False)
-    status: str
-    message: str
-    frames: int
-    frame_seconds: float
-    swing: float
 
     @property
     def displacement(self) -> float:
@@ -235,7 +229,7 @@ def in_engine(
     if ended.status == "rest" and scene.network.inverted(ended.displacements):
         said = "at rest with cells turned inside out; take shorter steps, or less load"
         ended = replace(ended, status="inverted", message=said)
-    return EngineResult(scene, engine, setting, factor, **vars(ended))
+    return EngineResult(**vars(ended), scene=scene, engine=engine, setting=setting, factor=factor)
 
 
 def complete(engine: Engine, setting: Setting) -> Setting:
@@ -269,8 +263,10 @@ def follow(session: Session, window: int, most: int, tolerance: float, extent: f
     seconds: list[float] = []
     last, before, gap, done, calm = session.displacements(), np.inf, 1.0, 0, 0
     while done < most:
-        looks = []
-        for count in _pieces(min(window, most - done)):
+        looks, size_of_window = [], min(window, most - done)
+        each = ceil(size_of_window / LOOKS)
+        for begun in range(0, size_of_window, each):
+            count = min(each, size_of_window - begun)
             begin = time.perf_counter()
             session.advance(count)
             seconds.append((time.perf_counter() - begin) / count)
@@ -278,7 +274,8 @@ def follow(session: Session, window: int, most: int, tolerance: float, extent: f
             now = session.displacements()
             size = float(np.abs(now).max())
             if not size <= BLOWN * extent:
-                return Ended(np.full(now.shape, np.nan), "diverged", _why(done), done, _frame(seconds), np.nan)
+                said = f"diverged within {done} frames; take more substeps, or a smaller stiffness"
+                return Ended(np.full(now.shape, np.nan), "diverged", said, done, _frame(seconds), np.nan)
             looks.append(now)
         seen = [*seen[1 - RECALLED :], np.stack([np.mean(looks, axis=0), np.min(looks, axis=0), np.max(looks, axis=0)])]
         aside = float(np.abs(now - np.array(looks)).max())
@@ -300,12 +297,6 @@ def follow(session: Session, window: int, most: int, tolerance: float, extent: f
     return Ended(now, "moving", said, done, _frame(seconds), swing)
 
 
-def _pieces(window: int) -> list[int]:
-    """Frames between looks at a window."""
-    each = ceil(window / LOOKS)
-    return [min(each, window - done) for done in range(0, window, each)]
-
-
 def _mean(seen: list[np.ndarray]) -> np.ndarray:
     """Mean displacement, of the first and last windows with less weight: no swing has whole periods in them."""
     found: np.ndarray = np.average([mean for mean, _, _ in seen], axis=0, weights=np.hanning(len(seen) + 2)[1:-1])
@@ -323,10 +314,6 @@ def _trembles(seen: list[np.ndarray]) -> bool:
     middle = len(seen) // 2
     drift = float(np.abs(_mean(seen[middle:]) - _mean(seen[:middle])).max())
     return _swing(seen[middle:]) > 2 * drift
-
-
-def _why(done: int) -> str:
-    return f"diverged within {done} frames; take more substeps, or a smaller stiffness"
 
 
 def _frame(seconds: list[float]) -> float:

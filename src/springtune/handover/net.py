@@ -71,7 +71,7 @@ def meaning() -> str:
     return f"{of}; {signs}; linear kinematics, small strain"
 
 
-CONSTANTS_SAID = ("name", "young_modulus", "poisson_ratio", "density")
+CONSTANTS_SAID = ("name", "young_modulus", "poisson_ratio", "plane", "density")
 """Constants of a material in a header."""
 
 STEP_MEANING = "about rest, undamped; springs that stiffen, and damping that lags, narrow it"
@@ -334,8 +334,8 @@ def terms(energy: Energy, reference: float) -> Terms:
         values = {"rest_area": signed_areas(points, corners), "modulus": reference * energy.modulus}
         return Terms("area", corners, values)
     if isinstance(energy, AngleEnergy):
-        values = {"rest_angle": corner_angles(points, corners), "modulus": reference * energy.modulus}
-        return Terms("angle", corners, values)
+        kind, name = ("angle", "modulus") if energy.modulus.ndim == 1 else ("corner", "rotational")
+        return Terms(kind, corners, {"rest_angle": corner_angles(points, corners), name: reference * energy.modulus})
     if isinstance(energy, BiquadraticEnergy):
         sides = np.roll(points[corners], 1, axis=1) - np.roll(points[corners], -1, axis=1)
         coupling = np.zeros(energy.tensile.shape) if energy.coupling is None else energy.coupling

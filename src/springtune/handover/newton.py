@@ -12,14 +12,23 @@ Its importer of USD takes tri_ke = E h / (1 - nu^2), tri_ka = 0, which is no mat
 springs, loads nor supports. So scripts have to type them, and files say which.
 """
 
+from typing import Any
+
 import numpy as np
 
 from ..mechanics.energies import Energy, StableNeoHookeEnergy
-from .simulation import Simulation, about, lame, simulate
+from ..problem.materials import Material
+from .simulation import about, filled, lame, simulate
 from .terms import Net
 
 LAWS = ("biquadratic",)
 """Energies that triangles of Newton stand for."""
+
+LAW = (
+    "Triangles have Newton's law: mu/2 (tr C - 2 J) + (lambda + mu)/2 (J - 1)^2, mu = tri_ke, lambda = tri_ka.",
+    "At small strain it is that of the definition; the displacement expected here is by Newton's law.",
+)
+"""What comments say of that law."""
 
 ITERATIONS = 10
 """Iterations in which VBD converges in a step that is stable in explicit schemes."""
@@ -62,63 +71,6 @@ def colours(net: Net) -> list[np.ndarray]:
     return [np.flatnonzero(chosen == colour) for colour in range(chosen.max() + 1)]
 
 
-SCRIPT = '''
-REST = np.pad(POINTS, ((0, 0), (0, 1)))
-WHOLE = np.all(HELD, axis=1)
-SLIDES = np.pad(HELD & ~WHOLE[:, None], ((0, 0), (0, 1)))
-
-
-def build():
-    """The sheet as a model; particles without mass are held."""
-    builder = newton.ModelBuilder(gravity=(0.0, 0.0, 0.0))
-    for place, mass, held in zip(REST, MASSES, WHOLE):
-        builder.add_particle(wp.vec3(*place), wp.vec3(0.0), 0.0 if held else mass)
-    for (first, second), stiffness, length in zip(SPRINGS, STIFFNESS, REST_LENGTHS):
-        builder.add_spring(first, second, ke=stiffness, kd=0.0, control=0.0)
-        builder.spring_rest_length[-1] = length
-    for corners in TRIANGLES:
-        builder.add_triangle(*corners, tri_ke=TRI_KE, tri_ka=TRI_KA, tri_kd=0.0, tri_drag=0.0, tri_lift=0.0)
-    builder.set_coloring([np.array(group) for group in COLOURS])  # builder.color() does not see springs
-    return builder.finalize()
-
-
-def run(model, step=STEP, iterations=ITERATIONS, seconds=SECONDS):
-    """Displacements [m] after a damped motion from rest."""
-    solver = newton.solvers.SolverVBD(model, iterations=iterations)
-    state, after, control = model.state(), model.state(), model.control()
-    forces = np.pad(FORCES, ((0, 0), (0, 1)))
-    for _ in range(round(seconds / step)):
-        state.particle_f.assign(forces.astype(np.float32))
-        solver.step(state, after, control, None, step)
-        places, velocities = after.particle_q.numpy(), after.particle_qd.numpy()
-        if SLIDES.any():
-            # Newton holds particles as a whole: where one direction is held, a reaction grows until nothing slips.
-            slip = np.where(SLIDES, places - REST, 0.0)
-            forces = forces - np.array(MASSES)[:, None] / step**2 * slip
-            places, velocities = places - slip, np.where(SLIDES, 0.0, velocities)
-            after.particle_q.assign(places.astype(np.float32))
-        after.particle_qd.assign((velocities / (1 + MASS_DAMPING * step)).astype(np.float32))
-        state, after = after, state
-    return (state.particle_q.numpy() - REST)[:, :2]
-
-
-def along(displacements):
-    """Mean displacement along the forces [m]."""
-    return np.sum(FORCES * displacements) / max(np.abs(FORCES).sum(), 1e-300)
-
-
-def main():
-    found = along(run(build()))
-    print(f"displacement along the load: {1e3 * found:.6g} mm")
-    if EXPECTED is not None:
-        print(f"expected at rest:            {1e3 * along(EXPECTED):.6g} mm")
-
-
-if __name__ == "__main__":
-    main()
-'''
-
-
 def newton_script(net: Net) -> str:
     """Script of a net for Newton's `ModelBuilder` and its solver VBD.
 
@@ -131,146 +83,42 @@ def newton_script(net: Net) -> str:
     >>> [line[:14] for line in path.read_text().splitlines() if line.startswith("TRI_K")]
     ['TRI_KE = 384.6', 'TRI_KA = 329.6']
     """
-    simulation = _simulated(net)
-    step, iterations = _pace(simulation)
-    shear, first = membrane(net)
-    there = net.stiffness != 0
-    expected = simulation.displacements
-    values = {
-        "POINTS": net.points.tolist(),
-        "MASSES": simulation.masses.tolist(),
-        "SPRINGS": net.springs[there].tolist(),
-        "STIFFNESS": net.stiffness[there].tolist(),
-        "REST_LENGTHS": net.rest_lengths[there].tolist(),
-        "TRIANGLES": net.triangles.tolist() if net.energies else [],
-        "COLOURS": [group.tolist() for group in colours(net)],
-        "TRI_KE": shear,
-        "TRI_KA": first,
-        "STEP": step,
-        "ITERATIONS": iterations,
-        "SECONDS": _seconds(simulation),
-        "MASS_DAMPING": simulation.mass_damping,
-    }
-    lines = [f"# {line}" for line in [*about(net, simulation, _step(simulation)), *_law(net)]]
-    lines += ["", "import newton", "import numpy as np", "import warp as wp", ""]
-    lines += [f"{name} = {value!r}" for name, value in values.items()]
-    lines += [f"HELD = np.array({net.held.tolist()!r})"]
-    lines += [f"FORCES = np.array({net.forces.tolist()!r})"]
-    lines += [f"EXPECTED = {None if expected is None else f'np.array({expected.tolist()!r})'}", ""]
-    return "\n".join(lines) + SCRIPT
-
-
-def _simulated(net: Net) -> Simulation:
-    """Simulation by Newton's law; ValueError for what Newton lacks."""
-    return simulate(net, "Newton", LAWS, membrane_energies)
-
-
-def _pace(simulation: Simulation) -> tuple[float, int]:
-    """Step of a file [s], and iterations in which VBD converges in it."""
-    loaded, largest = simulation.loaded_frequency, simulation.largest_step
-    if loaded and 2 * np.pi / loaded > SLOW * largest:
-        return PATIENT[0] * largest, PATIENT[1]
-    return simulation.step, ITERATIONS
-
-
-def _step(simulation: Simulation) -> str:
-    """What the step of a file is, for its comments."""
-    step, iterations = _pace(simulation)
-    return f"the one here is {step / simulation.largest_step:.2g} times that, in which {iterations} iterations converge"
-
-
-def _seconds(simulation: Simulation) -> float:
-    """Time in which the slowest mode that the load excites comes to rest [s]."""
-    lowest, damping = simulation.frequency, simulation.mass_damping
-    rate = damping / 2 - max(damping**2 / 4 - lowest**2, 0.0) ** 0.5
-    return DECAYS / rate if rate else 100 * simulation.step
-
-
-def _law(net: Net) -> list[str]:
-    if not net.energies:
-        return []
-    return [
-        "Triangles have Newton's law: mu/2 (tr C - 2 J) + (lambda + mu)/2 (J - 1)^2, mu = tri_ke, lambda = tri_ka.",
-        "At small strain it is that of the definition; the displacement expected here is by Newton's law.",
-    ]
-
-
-USD = '''#usda 1.0
-(
-    defaultPrim = "sheet"
-    doc = """{about}"""
-    metersPerUnit = 1
-    upAxis = "Z"
-)
-
-def Xform "sheet" (prepend apiSchemas = ["PhysicsDeformableBodyAPI"])
-{{
-    def Mesh "cloth" (
-        prepend apiSchemas = ["PhysicsSurfaceDeformableSimAPI", "PhysicsCollisionAPI", "MaterialBindingAPI"]
-    )
-    {{
-        int[] faceVertexCounts = {counts}
-        int[] faceVertexIndices = {indices}
-        point3f[] points = {points}
-        float[] physics:thicknesses = [{thickness}]
-        uniform token physics:thicknesses:elementType = "constant"
-        uniform token subdivisionScheme = "none"
-        rel material:binding:physics = </sheet/material>
-        custom int2[] springtune:held = {held}
-        custom vector3f[] springtune:forces = {forces}
-        custom vector3f[] springtune:expectedDisplacements = {expected}
-        custom float springtune:triKe = {tri_ke}
-        custom float springtune:triKa = {tri_ka}
-    }}
-
-    def Material "material" (prepend apiSchemas = ["PhysicsMaterialAPI", "PhysicsSurfaceDeformableMaterialAPI"])
-    {{
-        float physics:density = {density}
-        float physics:youngsModulus = {young}
-        float physics:poissonsRatio = {poisson}
-    }}
-}}
-'''
-
-TO_SET = (
-    "Newton's importer reads particles, masses and triangles. It takes tri_ke = E h / (1 - nu^2) and tri_ka = 0, which",
-    "is another material: a script sets builder.tri_materials[t] = (triKe, triKa, 0, 0, 0) of all triangles. It also",
-    "sets builder.particle_mass[i] = 0 where held has particle i with both its axes, 0 and 1, and ahead of each step",
-    "state.particle_f = forces. These are the attributes springtune:... of the mesh; a name ending in .newton.py gives",
-    "such a script, whose run(model) takes a model of this file, too.",
-)
-"""What a user's script has to do with a file in USD."""
+    grouped = [group.tolist() for group in colours(net)]
+    return filled("newton.py", **_values(net), there=net.stiffness != 0, colours=grouped)
 
 
 def newton_usd(net: Net) -> str:
     """Sheet of a net of triangles as OpenUSD's deformable cloth, as Newton's importer reads it."""
-    simulation = _simulated(net)
-    name, material = net.header["definition"], net.header["material"]
+    values = _values(net)
     if not net.energies or np.any(net.stiffness):
         raise ValueError(
-            f"definition '{name}': has springs, and deformable cloth of OpenUSD is triangles of a material; take "
-            "'delingette', or a name ending in .newton.py"
+            f"definition '{net.header['definition']}': has springs, and deformable cloth of OpenUSD is triangles of a "
+            "material; take 'delingette', or a name ending in .newton.py"
         )
+    material = net.header["material"]
+    plane = material.get("plane", "stress")
+    sheet = Material(material["young_modulus"], material["poisson_ratio"], plane=plane).in_plane
+    return filled("newton.usda", **values, sheet=sheet, held=np.argwhere(net.held).tolist())
+
+
+def _values(net: Net) -> dict[str, Any]:
+    """Values that both files have; ValueError for what Newton lacks."""
+    simulation = simulate(net, "Newton", LAWS, membrane_energies)
     shear, first = membrane(net)
-    moved = np.zeros((0, 2)) if simulation.displacements is None else simulation.displacements
-    said = "\n".join([*about(net, simulation, _step(simulation)), *_law(net), *TO_SET])
-    return USD.format(
-        about=said.replace("\\", "/").replace('"', "'"),
-        counts=[3] * len(net.triangles),
-        indices=net.triangles.ravel().tolist(),
-        points=_vectors(net.points),
-        thickness=net.thickness,
-        held=list(map(tuple, np.argwhere(net.held).tolist())),
-        forces=_vectors(net.forces),
-        expected=_vectors(moved),
-        tri_ke=shear,
-        tri_ka=first,
-        density=material["density"],
-        young=material["young_modulus"],
-        poisson=material["poisson_ratio"],
-    )
-
-
-def _vectors(points: np.ndarray) -> str:
-    """Vectors of three dimensions as USD has them."""
-    return "[" + ", ".join(f"({x!r}, {y!r}, 0)" for x, y in points.tolist()) + "]"
+    largest, loaded, damping = simulation.largest_step, simulation.loaded_frequency, simulation.mass_damping
+    step, iterations = simulation.step, ITERATIONS
+    if loaded and 2 * np.pi / loaded > SLOW * largest:
+        step, iterations = PATIENT[0] * largest, PATIENT[1]
+    # Of the slowest mode that the load excites.
+    rate = damping / 2 - max(damping**2 / 4 - simulation.frequency**2, 0.0) ** 0.5
+    said = f"the one here is {step / largest:.2g} times that, in which {iterations} iterations converge"
+    return {
+        "net": net,
+        "simulation": simulation,
+        "about": [*about(net, simulation, said), *(LAW if net.energies else ())],
+        "tri_ke": shear,
+        "tri_ka": first,
+        "step": step,
+        "iterations": iterations,
+        "seconds": DECAYS / rate if rate else 100 * simulation.step,
+    }

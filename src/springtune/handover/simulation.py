@@ -24,6 +24,7 @@ stretch springs further."""
 WORDS = {
     "area": "areas",
     "angle": "angles",
+    "corner": "angles",
     "biquadratic": "squared lengths",
     "incompressible": "rubber",
     "compressible": "rubber",
@@ -188,6 +189,7 @@ def network_of(net: Net, reference: float, energies: Callable[[Net, float], list
 MADE_OF: dict[str, tuple[type[Energy], tuple[str, ...]]] = {
     "area": (AreaEnergy, ("modulus",)),
     "angle": (AngleEnergy, ("modulus",)),
+    "corner": (AngleEnergy, ("rotational",)),
     "biquadratic": (BiquadraticEnergy, ("tensile", "coupling")),
     "compressible": (NeoHookeEnergy, ("shear", "bulk")),
     "incompressible": (YeohEnergy, ("c1", "c2", "c3")),
@@ -237,6 +239,7 @@ def about(net: Net, simulation: Simulation, integrator: str) -> list[str]:
     constants = ""
     if material["young_modulus"] is not None:
         constants = f"Young's modulus {material['young_modulus']:g} Pa, Poisson's ratio {material['poisson_ratio']:g}, "
+        constants += "plane strain, " if material.get("plane") == "strain" else ""
     left_out = int((net.stiffness == 0).sum()) if np.any(net.stiffness) else 0
     lines = [
         f"{header['made_by']}: definition '{header['definition']}'. {header['formula']}.",
@@ -268,6 +271,20 @@ def about(net: Net, simulation: Simulation, integrator: str) -> list[str]:
     if simulation.force and simulation.why:
         lines.append(f"No equilibrium was found: {simulation.why}.")
     return lines
+
+
+def filled(name: str, **values: Any) -> str:
+    """Fill in a template; floats get the shortest text that is read back exactly."""
+    import jinja2
+
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader(__package__, "templates"),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    return environment.get_template(f"{name}.jinja").render(values)
 
 
 def numbers(values: np.ndarray) -> str:

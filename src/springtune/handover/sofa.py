@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .simulation import PERIOD, Simulation, about, commented, numbers, simulate
+from .simulation import PERIOD, Simulation, about, filled, numbers, simulate
 from .terms import Net
 
 BACKWARD_EULER = (
@@ -69,80 +69,13 @@ def sofa_xml(net: Net) -> str:
     """
     scene = _scene(net)
     plugin, integrator = BACKWARD_EULER[0]
-    plugins = [Component("RequiredPlugin", {"pluginName": name}) for name in (*PLUGINS, plugin)]
-    lines = [
-        '<?xml version="1.0"?>',
-        f'<Node name="root" dt="{scene.step!r}" gravity="0 0 0">',
-        *commented(scene.about, "  "),
-        *_tags([*plugins, *SCENE_ROOT], "  "),
-        '  <Node name="sheet">',
-        *_tags([Component(integrator, scene.sheet[0].data), *scene.sheet[1:]], "    "),
-        "  </Node>",
-    ]
-    if scene.predicted:
-        lines += ['  <Node name="predicted">', *_tags(scene.predicted, "    "), "  </Node>"]
-    return "\n".join([*lines, "</Node>", ""])
-
-
-def _tags(components: list[Component], indent: str) -> list[str]:
-    lines = []
-    for one in components:
-        data = "".join(f' {key}="{value}"' for key, value in one.data.items())
-        lines.append(f"{indent}<{one.name}{data}/>")
-    return lines
-
-
-PYTHON = '''
-def createScene(root):
-    root.dt.value = {step!r}
-    root.gravity.value = [0.0, 0.0, 0.0]
-    for plugin in PLUGINS:
-        root.addObject("RequiredPlugin", pluginName=plugin)
-    for name, data in ROOT:
-        root.addObject(name, **data)
-    sheet = root.addChild("sheet")
-    add_integrator(root, sheet)
-    for name, data in SHEET:
-        sheet.addObject(name, **data)
-    if PREDICTED:
-        predicted = root.addChild("predicted")
-        for name, data in PREDICTED:
-            predicted.addObject(name, **data)
-    return root
-
-
-def add_integrator(root, sheet):
-    """Backward Euler, whose plugin and component have other names since v26.06."""
-    for plugin, name in BACKWARD_EULER:
-        try:
-            root.addObject("RequiredPlugin", pluginName=plugin)
-            return sheet.addObject(name, **INTEGRATOR)
-        except Exception as error:
-            failed = error
-    raise failed
-'''
+    sheet = [scene.sheet[0]._replace(name=integrator), *scene.sheet[1:]]
+    return filled("sofa.scn", scene=scene._replace(sheet=sheet), plugins=(*PLUGINS, plugin), root=SCENE_ROOT)
 
 
 def sofa_python(net: Net) -> str:
     """Scene of a net for SOFA v24.06 and later with SofaPython3, in Python; errors as of `sofa_xml`."""
-    scene = _scene(net)
-    said = "\n".join(f"# {line}" for line in scene.about)
-    entries = {
-        "PLUGINS": repr(PLUGINS),
-        "BACKWARD_EULER": repr(BACKWARD_EULER),
-        "INTEGRATOR": repr(dict(scene.sheet[0].data)),
-        "ROOT": _rows(SCENE_ROOT),
-        "SHEET": _rows(scene.sheet[1:]),
-        "PREDICTED": _rows(scene.predicted),
-    }
-    values = "\n".join(f"{name} = {value}" for name, value in entries.items())
-    return f"{said}\n\n{values}\n\n{PYTHON.replace('{step!r}', repr(scene.step))}"
-
-
-def _rows(components: list[Component]) -> str:
-    if not components:
-        return "[]"
-    return "[\n" + "".join(f"    ({one.name!r}, {dict(one.data)!r}),\n" for one in components) + "]"
+    return filled("sofa.py", scene=_scene(net), plugins=PLUGINS, backward_euler=BACKWARD_EULER, root=SCENE_ROOT)
 
 
 def _scene(net: Net) -> SofaScene:

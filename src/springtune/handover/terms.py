@@ -10,6 +10,7 @@ from ..mesh.cells import no_cells
 FORMULAS = {
     "area": "W = 1/2 modulus (A - rest_area)^2 / rest_area of each cell, A its area",
     "angle": "W = 1/2 modulus sum_i (angle_i - rest_angle_i)^2 of each triangle, angle_i that at its corner i",
+    "corner": "W = 1/2 sum_i rotational_i (angle_i - rest_angle_i)^2 of each triangle, angle_i that at its corner i",
     "biquadratic": (
         "W = sum_i tensile_i / 4 q_i^2 + sum_i coupling_i / 2 q_j q_k of each triangle, with q_i = l_i^2 - "
         "rest_length_i^2 of the side opposite corner i, and j, k the other two: coupling_i joins the sides that meet "
@@ -31,13 +32,14 @@ FORMULAS = {
 VALUES = {
     "area": {"rest_area": "m2", "modulus": "N/m"},
     "angle": {"rest_angle": "rad", "modulus": "J"},
+    "corner": {"rest_angle": "rad", "rotational": "J"},
     "biquadratic": {"rest_length": "m", "tensile": "N/m3", "coupling": "N/m3"},
     "incompressible": {"rest_area": "m2", "rest_weight": "1", "c1": "N/m", "c2": "N/m", "c3": "N/m"},
     "compressible": {"rest_area": "m2", "rest_weight": "1", "shear": "N/m", "bulk": "N/m"},
 }
 """Names of the values of each kind of terms, and their units."""
 
-OF_CORNERS = ("rest_angle", "rest_length", "tensile", "coupling", "rest_weight")
+OF_CORNERS = ("rest_angle", "rotational", "rest_length", "tensile", "coupling", "rest_weight")
 """Values that each corner of a cell has its own of."""
 
 

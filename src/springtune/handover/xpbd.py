@@ -119,8 +119,9 @@ def _blocks(net: Net, terms: Terms) -> Blocks:
         stiffness[:, corners, corners] = values["tensile"] / 2
         for i, (j, k) in enumerate(((1, 2), (2, 0), (0, 1))):
             stiffness[:, j, k] = stiffness[:, k, j] = values["coupling"][:, i] / 2
-        least = np.linalg.eigvalsh(stiffness)[:, 0]
-        _check_positive(net, least, "triangles have squared lengths that are not stable by themselves", len(cells))
+        least, _, most = np.linalg.eigvalsh(stiffness).T
+        which = "triangles have squared lengths that are not stable by themselves"
+        _check_positive(net, least - 1e-12 * most, which, len(cells))
         return Blocks(kind, cells, np.linalg.inv(stiffness), {"rest_length": values["rest_length"]})
     areas = values["rest_area"]
     if kind == "area":

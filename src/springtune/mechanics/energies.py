@@ -175,12 +175,21 @@ class AreaEnergy(Energy):
 
 @dataclass(frozen=True)
 class AngleEnergy(Energy):
-    r"""Energy of the angles of each triangle; `modulus` (n_cells,) is beta over the reference stiffness [m2].
+    r"""Energy of the angles of each triangle; `modulus` is beta over the reference stiffness [m2].
 
-    .. math:: W = \tfrac{1}{2} \beta \sum_i (\theta_i - \theta_{i,0})^2
+    .. math:: W = \tfrac{1}{2} \sum_i \beta_i (\theta_i - \theta_{i,0})^2
+
+    It is one number a triangle (n_cells,), or one for each of its corners (n_cells, 3).
     """
 
     modulus: np.ndarray
+
+    @cached_property
+    def _factors(self) -> tuple[np.ndarray, np.ndarray]:
+        """A factor for each triangle, and one for each of its corners (3, n_cells): their product is the modulus."""
+        if self.modulus.ndim == 1:
+            return self.modulus, np.ones((3, 1))
+        return np.ones(len(self.modulus)), np.ascontiguousarray(self.modulus.T)
 
     def _change(self, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Change of each angle [rad], and the vectors from each corner to the next and to the one before."""
@@ -195,7 +204,8 @@ class AngleEnergy(Energy):
 
     def _values(self, moved: np.ndarray) -> np.ndarray:
         change, _, _ = self._change(moved)
-        return 0.5 * self.modulus * (change**2).sum(axis=0)
+        of_cell, of_corner = self._factors
+        return 0.5 * of_cell * (of_corner * change**2).sum(axis=0)
 
     @staticmethod
     def _slopes(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -206,19 +216,21 @@ class AngleEnergy(Energy):
 
     def _forces(self, moved: np.ndarray) -> np.ndarray:
         change, a, b = self._change(moved)
-        to_next, to_last = (self.modulus * change * slope for slope in self._slopes(a, b))
+        to_next, to_last = (self.modulus.T * change * slope for slope in self._slopes(a, b))
         return preceding(to_next) + following(to_last) - to_next - to_last
 
     def _couplings(self, moved: np.ndarray) -> np.ndarray:
         change, a, b = self._change(moved)
         to_next, to_last = self._slopes(a, b)
         own = -to_next - to_last
-        pull = self.modulus * change
+        pull = self.modulus.T * change
+        of_cell, of_corner = self._factors
         blocks = np.empty((3, 2, 2, len(self.modulus)))
         # Side (j, k): corners j and k have their own angles there, and that of the corner opposite, i, sees both.
         for i, (j, k) in enumerate(self._pairs):
-            at_ends = _products(own[:, j], to_next[:, j]) + _products(to_last[:, k], own[:, k])
-            blocks[i] = self.modulus * (at_ends + _products(to_next[:, i], to_last[:, i]))
+            at_ends = of_corner[j] * _products(own[:, j], to_next[:, j])
+            at_ends += of_corner[k] * _products(to_last[:, k], own[:, k])
+            blocks[i] = of_cell * (at_ends + of_corner[i] * _products(to_next[:, i], to_last[:, i]))
             x, y = a[:, j]
             bend = (pull[j] - pull[k]) / (x * x + y * y) ** 2
             off, diagonal = bend * (y * y - x * x), bend * (2 * x * y)

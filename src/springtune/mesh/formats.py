@@ -76,6 +76,8 @@ def write_mesh(path: str | Path, mesh: Mesh | GroupedMesh) -> None:
     check_folder(path)
     grouped = mesh if isinstance(mesh, GroupedMesh) else GroupedMesh(mesh)
     mesh = grouped.mesh
+    if len(mesh.bonds):
+        raise MeshError(f"{path}: a mesh file has no place for {len(mesh.bonds)} bonds; write the springs of a scene")
     # A named point that is no particle becomes a point of its own.
     places: list[np.ndarray] = []
     blocks: list[tuple[str, np.ndarray, list[str]]] = []

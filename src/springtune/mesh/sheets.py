@@ -1,6 +1,7 @@
 """Checks of meshes: conforming plane sheets, boxes filled exactly once, and parts held against rigid motions."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -204,7 +205,7 @@ def on_sides(mesh: Mesh, box: np.ndarray) -> Mesh:
         if len(flat):
             first = f"{len(flat)}, the first one at {in_words(points[flat[0]])}"
             raise MeshError(f"cells within rounding of a side of the box: {first}; make them larger or remove them")
-    return Mesh(points, mesh.triangles, mesh.quads)
+    return replace(mesh, points=points)
 
 
 def box_fault(mesh: Mesh) -> str:
@@ -225,7 +226,7 @@ def box_fault(mesh: Mesh) -> str:
     if known is None:
         low = mesh.points.min(axis=0)
         box = mesh.points.max(axis=0) - low
-        moved = Mesh(mesh.points - low, mesh.triangles, mesh.quads) if low.any() else mesh
+        moved = replace(mesh, points=mesh.points - low) if low.any() else mesh
         try:
             known = _misfilled(on_sides(moved, box), box)
         except MeshError as error:

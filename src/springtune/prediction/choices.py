@@ -495,7 +495,7 @@ class Trial:
             if isinstance(moduli, str):
                 failures["patch test"] = moduli
             else:
-                material = cast(Material, self.materials[0])
+                material = cast(Material, self.materials[0]).in_plane
                 young = float(moduli[0] * springs.reference / (material.young_modulus * self.thickness)) - 1
                 poisson = float(moduli[1])
         return Choice(

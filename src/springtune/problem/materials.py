@@ -1,6 +1,7 @@
 r"""Materials: linear elastic, isotropic or anisotropic, and rubber fitted to a test.
 
-Sheets are in plane stress. With stresses and strains in Voigt's order, xx, yy and xy, and the shear angle as strain,
+Sheets are in plane stress, or in plane strain, see `Material.in_plane`. With stresses and strains in Voigt's order, xx,
+yy and xy, and the shear angle as strain,
 
 .. math:: \begin{pmatrix} \sigma_{xx} \\ \sigma_{yy} \\ \sigma_{xy} \end{pmatrix} =
           \begin{pmatrix} C_{11} & C_{12} & C_{16} \\ C_{12} & C_{22} & C_{26} \\ C_{16} & C_{26} & C_{66}
@@ -21,10 +22,18 @@ from dataclasses import dataclass, field
 from numbers import Real
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
+from .parameters import PLANES
 from .quantities import Number, positive, put, quantity
 
 if TYPE_CHECKING:
     import numpy as np
+
+
+INCOMPRESSIBLE = (
+    "0.5: in plane strain an incompressible material has no finite stiffness; give a ratio below 0.5 such as 0.49, or "
+    "plane 'stress'"
+)
+"""Why a Poisson's ratio is refused in plane strain, and the remedy."""
 
 
 @dataclass(frozen=True)
@@ -36,11 +45,14 @@ class Material:
     young_modulus : float or str
         Young's modulus E [Pa], or a text with its unit.
     poisson_ratio : float
-        Poisson's ratio nu [1], above -1 and at most 0.5: plane stress allows 0.5.
+        Poisson's ratio nu [1], above -1 and at most 0.5; below 0.5 in plane strain.
     density : float, str or None
         Density rho [kg/m3], or a text with its unit; not needed in statics.
     name : str
         Label of the material, e.g. ``"steel"``.
+    plane : str
+        ``"stress"`` of a thin sheet whose faces are free, or ``"strain"`` of a slice of a long body, which cannot
+        expand across the plane. E and nu are those of the material in three dimensions in both.
 
     Attributes
     ----------
@@ -50,30 +62,56 @@ class Material:
     Raises
     ------
     ValueError
-        If a quantity is not above zero or has the wrong unit, the name is not a text, or Poisson's ratio is out of
-        range.
+        If a quantity is not above zero or has the wrong unit, the name is not a text, the plane is unknown, or
+        Poisson's ratio is out of range.
 
     Examples
     --------
     >>> import springtune as st
     >>> st.Material("210 GPa", 0.3, density="7850 kg/m^3", name="steel")
-    Material(young_modulus=210000000000.0, poisson_ratio=0.3, density=7850.0, name='steel')
+    Material(young_modulus=210000000000.0, poisson_ratio=0.3, density=7850.0, name='steel', plane='stress')
     """
 
     young_modulus: Number
     poisson_ratio: float
     density: Number | None = None
     name: str = "material"
+    plane: str = "stress"
     isotropic: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         _check_label(self)
+        _check_plane(self.plane)
         put(self, young_modulus=positive(self.young_modulus, "stress", "Young's modulus"))
         if not (isinstance(self.poisson_ratio, Real) and -1 < self.poisson_ratio <= 0.5):
             raise ValueError(
                 f"Poisson's ratio of {self.name!r} is {self.poisson_ratio!r}: isotropic materials have -1 < nu <= 0.5; "
                 "give a number in that range"
             )
+        if self.plane == "strain" and self.poisson_ratio == 0.5:
+            raise ValueError(f"Poisson's ratio of {self.name!r} is {INCOMPRESSIBLE}")
+
+    @property
+    def in_plane(self) -> Material:
+        r"""The material whose plane stress is this sheet's behaviour in its plane; all formulas take their E and nu.
+
+        In plane stress the material itself. In plane strain its E and nu are
+
+        .. math:: E' = \frac{E}{1 - \nu^2}, \quad \nu' = \frac{\nu}{1 - \nu} < 1.
+
+        Central springs have nu' = 1/3, and so nu = 1/4 in plane strain.
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> sheet = st.Material("210 GPa", 0.25, plane="strain").in_plane
+        >>> f"{sheet.young_modulus / 1e9:.0f} GPa, {sheet.poisson_ratio:.4f}"
+        '224 GPa, 0.3333'
+        """
+        if self.plane == "stress":
+            return self
+        nu = self.poisson_ratio
+        return InPlane(self.young_modulus / (1 - nu**2), nu / (1 - nu), self.density, self.name)
 
     @property
     def plane_stress(self) -> np.ndarray:
@@ -90,6 +128,18 @@ class Material:
         modulus, nu = self.young_modulus, self.poisson_ratio
         diagonal, coupling, shear = modulus / (1 - nu**2), modulus * nu / (1 - nu**2), modulus / (2 * (1 + nu))
         return np.array([[diagonal, coupling, 0.0], [coupling, diagonal, 0.0], [0.0, 0.0, shear]])
+
+
+class InPlane(Material):
+    """Constants of a sheet in plane strain, as if of one in plane stress; its Poisson's ratio is below 1."""
+
+    def __post_init__(self) -> None:
+        put(self, plane="strain")
+
+    @property
+    def in_plane(self) -> Material:
+        """The same."""
+        return self
 
 
 RUBBER_TESTS = {"uniaxial": 2, "equibiaxial": 5, "pure shear": 3}
@@ -145,6 +195,7 @@ class Rubber(Material):
 
     young_modulus: float = field(init=False)
     poisson_ratio: float = field(init=False)
+    plane: str = field(init=False, default="stress")
     coefficients: tuple[float, ...] = ()
     largest: float = math.inf
     test_errors: tuple[tuple[str, float], ...] = ()
@@ -463,6 +514,18 @@ class AnisotropicMaterial:
         return cls(c11, c22, c12, c66, c16, c26, density, name)
 
     @property
+    def in_plane(self) -> AnisotropicMaterial:
+        """The material itself: its constants are those in its plane.
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> st.AnisotropicMaterial(3.0, 2.0, 0.5, 1.0).in_plane.C11
+        3.0
+        """
+        return self
+
+    @property
     def plane_stress(self) -> np.ndarray:
         """Stiffness in plane stress [Pa], shape (3, 3): stresses xx, yy, xy of strains xx, yy and the shear angle xy.
 
@@ -604,7 +667,8 @@ def indefinite(c11: float, c22: float, c12: float, c66: float, c16: float = 0.0,
 def material_of(fields: Mapping[str, Any]) -> AnyMaterial:
     """Return the material of its fields, as `dataclasses.asdict` gives them."""
     if "coefficients" in fields:
-        return Rubber(**{key: value for key, value in fields.items() if key not in ("young_modulus", "poisson_ratio")})
+        of_law = ("young_modulus", "poisson_ratio", "plane")
+        return Rubber(**{key: value for key, value in fields.items() if key not in of_law})
     return Material(**fields) if "young_modulus" in fields else AnisotropicMaterial(**fields)
 
 
@@ -630,6 +694,11 @@ def _known_test(test: str) -> str:
     if test not in RUBBER_TESTS:
         raise ValueError(f"test: {test!r} is unknown; known: {', '.join(RUBBER_TESTS)}")
     return test
+
+
+def _check_plane(plane: str) -> None:
+    if plane not in PLANES:
+        raise ValueError(f"plane: {plane!r} is unknown; give {' or '.join(map(repr, PLANES))}")
 
 
 def _check_label(material: AnyMaterial) -> None:

@@ -9,6 +9,9 @@ SWEPT = {
 }
 """Description and unit of each by its name in studies and datasets."""
 
+PLANES = "stress", "strain"
+"""What is zero across a sheet."""
+
 OF_BODIES = {
     "thickness": "beam_thickness",
     "young_modulus": "material_young_modulus",

@@ -142,7 +142,7 @@ def field_error(mesh: "Mesh", displacements: np.ndarray, reference: np.ndarray) 
 
 def unit_problem(beam: Beam, material: Material, kind: LoadKind) -> tuple[float, float, LoadKind]:
     """Aspect ratio [1], Poisson's ratio [1] and kind of load."""
-    return float(f"{beam.length / beam.height:.12g}"), material.poisson_ratio, kind
+    return float(f"{beam.length / beam.height:.12g}"), material.in_plane.poisson_ratio, kind
 
 
 def unit_scales(beam: Beam, material: Material, kind: LoadKind) -> tuple[float, float]:
@@ -151,4 +151,4 @@ def unit_scales(beam: Beam, material: Material, kind: LoadKind) -> tuple[float, 
     Half the height [m]; and for 1 N half the height times the traction over Young's modulus [m].
     """
     side = kind.side_length(beam)
-    return beam.height / 2, beam.height / 2 / (side * beam.thickness * material.young_modulus)
+    return beam.height / 2, beam.height / 2 / (side * beam.thickness * material.in_plane.young_modulus)

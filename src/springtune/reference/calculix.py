@@ -55,8 +55,9 @@ def solve(
     held: np.ndarray,
     finite: bool = False,
 ) -> np.ndarray:
-    """Return displacements [m] by plane stress at small strain, or neo-Hookean ones at finite strain.
+    """Return displacements [m] at small strain, or neo-Hookean ones at finite strain.
 
+    Elements of plane stress, ``CPS3`` or ``CPS8``, are those of plane strain for a material in plane strain.
     `points` (n_points, 2) [m], `elements` (n_elements, 3 or 8), `thickness` [m], `load` (n_points, 2) [N], `held`
     (n_points, 2).
     """
@@ -66,6 +67,8 @@ def solve(
 
     forces = [(n + 1, axis + 1, repr(float(load[n, axis]))) for n, axis in np.argwhere(load != 0)]
     modulus, nu = material.young_modulus, material.poisson_ratio
+    if material.plane == "strain":
+        kind = kind.replace("CPS", "CPE")
     law = f"*ELASTIC\n{modulus!r}, {nu!r}"
     if finite:  # half the shear modulus, and 2 over the bulk modulus, in the 20 columns that a number may have
         law = f"*HYPERELASTIC, NEO HOOKE\n{modulus / (4 * (1 + nu)):.12e}, {6 * (1 - 2 * nu) / modulus:.12e}"

@@ -18,6 +18,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 from scipy.sparse import csc_array, csr_array
@@ -89,10 +90,13 @@ class FiniteStrainSolution:
 
 
 def solve_finite_strain(
-    beam: Beam, material: Material, force: float, kind: LoadKind = FACE, plane: str = "stress", follower: bool = False
+    beam: Beam, material: Material, force: float, kind: LoadKind = FACE, plane: str = "", follower: bool = False
 ) -> FiniteStrainSolution:
-    """Solve for the displacements of a beam of rubber, see `law_of`, under a `force` [N], positive outwards."""
-    law = law_of(material, plane)
+    """Solve for the displacements of a beam of rubber, see `law_of`, under a `force` [N], positive outwards.
+
+    The plane is the material's unless one is given.
+    """
+    law = law_of(material, plane or material.plane)
     stress = force / (kind.side_length(beam) * beam.thickness * material.young_modulus)
     sheets = [_Sheet(beam.length / beam.height, law, count, kind, follower) for count in COUNTS]
     name = f"{beam.name}, {material.name}"
@@ -115,50 +119,41 @@ def _change(coarse: FiniteStrainSolution, fine: FiniteStrainSolution, kind: Load
     return 2 * max(middle, mean) if kind.pressed else middle
 
 
-class _Sheet:
-    """What is solved of a sheet of height 2 with E = 1: half of it where the load keeps it symmetric."""
+class Body:
+    """What is solved at finite strain: elements with a law, supports and a load that grows.
 
-    def __init__(self, aspect_ratio: float, law: "_PlaneLaw", count: int, kind: LoadKind, follower: bool) -> None:
-        self.kind, self.law = kind, law
-        length = 2 * aspect_ratio
-        self.extent = max(length, 2.0)
-        along, across = _element_ends(length, count, kind)
-        mesh = MeshQuad.init_tensor(along, across)
-        basis = Basis(mesh, ElementQuad2(), intorder=4)
-        axis, component, place = kind.normal, kind.axis, kind.loaded.place(along[-1], across[-1])
-        facets = mesh.facets_satisfying(lambda x: np.isclose(x[axis], place), boundaries_only=True)
-        side = FacetBasis(mesh, ElementQuad2(), facets=facets, intorder=4)
-        places = self.nodes_at = basis.doflocs.T
-        # Coordinates of the nodes: ends and middles of elements. Those of one line differ by rounding.
-        self.axes = [
-            np.interp(np.arange(2 * len(ends) - 1) / 2, np.arange(len(ends)), ends) for ends in (along, across)
-        ]
-        self.held = np.zeros(places.shape, dtype=bool)
-        for where, axes in kind.half_held if kind.symmetric else kind.held:
-            there = np.isclose(places[:, where.axis], where.place(along[-1], across[-1]))
-            self.held[np.ix_(there, axes)] = True
+    - `law`: `PlaneLaw` at points of integration.
+    - `nodes_of` (elements, functions): Functions of each element.
+    - `gradients` (elements, points, 2, functions), `weights` (elements, points): Of the functions, at points of
+      integration; weights are times the unit of stress.
+    - `load`, `held`, `given` (functions, 2): Forces, what is held, and displacements prescribed there.
+    - `turning`: What displacements add to the load.
+    - `extent`: Size of the body.
+    """
 
-        # Of each element and its points of integration: gradients of shape functions, (elements, points, 2, shapes).
-        self.nodes_of = basis.element_dofs.T
-        self.gradients = np.stack([one[0].grad for one in basis.basis], axis=-1).transpose(1, 2, 0, 3)
-        self.weights = basis.dx
-        self.load = np.zeros(places.shape)
-        shapes = np.stack([np.asarray(one[0]) * side.dx for one in side.basis])
-        np.add.at(self.load[:, component], side.element_dofs, shapes.sum(axis=2))
-        unknowns = (2 * self.nodes_of[:, :, None] + np.arange(2)).reshape(len(self.nodes_of), -1)
-        self.rows, self.columns = np.repeat(unknowns, 18, axis=1).ravel(), np.tile(unknowns, 18).ravel()
-        self.turning = _turning(side, shapes, kind.along) if follower else csr_array((places.size, places.size))
+    law: "Law"
+    nodes_of: np.ndarray
+    gradients: np.ndarray
+    weights: np.ndarray
+    load: np.ndarray
+    held: np.ndarray
+    given: np.ndarray
+    turning: csr_array
+    extent: float
 
-    def solve(self, stress: float, name: str, watched: bool = True) -> FiniteStrainSolution:
-        """Equilibrium under the whole load, reached in steps, which are watched for snaps.
+    def moved(self, stress: float, name: str, watched: bool = True) -> tuple[np.ndarray, float]:
+        """Return the equilibrium under so many times the load, and what rounding leaves of it, relative.
 
-        Lengths are over half the height; its error estimate is what rounding leaves.
+        It is reached in steps, which are watched for snaps.
         """
         path, step = [(0.0, np.zeros(self.load.shape))], 1.0
         while path[-1][0] < 1:
             done = path[-1][0]
             step = min(step, 1 - done)
-            found = self._newton(_extrapolated(path, done + step), stress * (done + step))
+            guess = _extrapolated(path, done + step)
+            if len(path) == 1 and self.given.any():
+                guess = stress * step * self._slope
+            found = self.equilibrium(guess, stress * (done + step))
             if found is not None and found[2] and (not watched or self._joined(path, done + step, found[0], stress)):
                 moved, uncertain, _ = found
                 path, step = [*path[-2:], (done + step, moved)], 1.5 * step
@@ -167,13 +162,7 @@ class _Sheet:
                 raise FiniteStrainError(f"reference of {name}: no {what} beyond {100 * done:.3g} % of the load")
             else:
                 step /= 2
-        mean = float((self.load * moved).sum() / self.load.sum())
-        kind, (x, y, field) = self.kind, self._field(moved)
-        places = (x, y)[kind.along]
-        positions = places / places[-1]
-        profile = field.take(-1 if kind.loaded.far else 0, axis=kind.normal)[:, kind.axis]
-        displacement = float(np.interp(0.5, positions, profile)) if kind.pressed else mean
-        return FiniteStrainSolution(displacement, mean, uncertain, positions, profile, x, y, field)
+        return moved, uncertain
 
     def _joined(self, path: list[tuple[float, np.ndarray]], share: float, moved: np.ndarray, stress: float) -> bool:
         """Whether no snap lies between a stable equilibrium and the last one: the middle is stable, too."""
@@ -198,7 +187,7 @@ class _Sheet:
         """Whether the symmetric part of the tangent is positive definite: no real eigenvalue is negative then."""
         gradient = self._gradient(moved)
         with np.errstate(all="ignore"):
-            tangent = self._tangent(gradient, self.law.response(_strain(gradient))) - stress * self.turning
+            tangent = self._tangent(gradient, self.law.response(strain_of(gradient))) - stress * self.turning
         free = ~self.held.ravel()
         try:
             return not SuperLUFactor(csc_array((0.5 * (tangent + tangent.T))[free][:, free])).negative_pivots
@@ -210,27 +199,11 @@ class _Sheet:
         """Linear solution for a stress of 1."""
         rest, free = np.zeros(self.load.shape), ~self.held.ravel()
         gradient = self._gradient(rest)
-        tangent = self._tangent(gradient, self.law.response(_strain(gradient)))
+        tangent = self._tangent(gradient, self.law.response(strain_of(gradient)))
         rest[~self.held] = SuperLUFactor(csc_array(tangent[free][:, free])).solve(self.load.ravel()[free])
         return rest
 
-    def _field(self, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Coordinates of a grid over the whole sheet, from 0 on, and displacements there: nodes are those of a grid."""
-        x, y = self.axes
-        field = np.empty((len(x), len(y), 2))
-        columns, rows = (
-            np.searchsorted((axis[1:] + axis[:-1]) / 2, at) for axis, at in zip((x, y), self.nodes_at.T, strict=True)
-        )
-        field[columns, rows] = moved
-        if not self.kind.symmetric:
-            return x, y, field
-        if self.kind.cut == BOTTOM:  # the upper half
-            whole = np.concatenate([field[:, :0:-1] * [1, -1], field], axis=1)
-            return x, 1 + np.concatenate([-y[:0:-1], y]), whole
-        whole = np.concatenate([field, field[-2::-1] * [-1, 1]])
-        return np.concatenate([x, 2 * x[-1] - x[-2::-1]]), y, whole
-
-    def _newton(self, moved: np.ndarray, stress: float) -> tuple[np.ndarray, float, bool] | None:
+    def equilibrium(self, moved: np.ndarray, stress: float) -> tuple[np.ndarray, float, bool] | None:
         """Return the equilibrium, its relative rounding error, and whether it is stable; None if there is none.
 
         Strains at integration points are separate unknowns, which agree with the displacements in the end (Magisano,
@@ -238,9 +211,10 @@ class _Sheet:
         stretch on the way, and steps would have to be small.
         """
         free, strain = ~self.held.ravel(), None
+        moved = np.where(self.held, stress * self.given, moved)
         for _ in range(MAX_ITERATIONS):
             gradient = self._gradient(moved)
-            found = _strain(gradient)
+            found = strain_of(gradient)
             strain = found if strain is None else strain
             turning = stress * self.turning
             external = stress * self.load + (turning @ moved.ravel()).reshape(-1, 2)
@@ -261,8 +235,7 @@ class _Sheet:
             strain = found + _strain_change(gradient, self._gradient(step))
             moved = moved + step
             if np.abs(step).max() <= TOLERANCE * np.abs(moved).max():
-                open_ = float(abs((self.load * step).sum() / (self.load * moved).sum()))
-                return moved, open_, self._judged(factor, moved, stress)
+                return moved, self._open(step, moved), self._judged(factor, moved, stress)
         return None
 
     def _gradient(self, moved: np.ndarray) -> np.ndarray:
@@ -271,7 +244,7 @@ class _Sheet:
 
     def _forces(self, gradient: np.ndarray, stress: np.ndarray) -> np.ndarray:
         """Inner forces of second Piola-Kirchhoff stresses xx, yy, xy."""
-        first = (gradient + np.eye(2)) @ _matrix(stress) * self.weights[..., None, None]
+        first = (gradient + np.eye(2)) @ matrix_of(stress) * self.weights[..., None, None]
         count, points = self.weights.shape
         forces = np.swapaxes(self.gradients, 2, 3).transpose(0, 2, 1, 3).reshape(count, -1, 2 * points)
         forces = forces @ np.swapaxes(first, 2, 3).reshape(count, 2 * points, 2)
@@ -294,11 +267,86 @@ class _Sheet:
         stresses = state.tangent * self.weights[..., None, None] @ by_unknown
         blocks = np.swapaxes(by_unknown.reshape(count, 3 * points, -1), 1, 2) @ stresses.reshape(count, 3 * points, -1)
         held = self.gradients.reshape(count, 2 * points, shapes)
-        turned = _matrix(state.stress) * self.weights[..., None, None] @ self.gradients
+        turned = matrix_of(state.stress) * self.weights[..., None, None] @ self.gradients
         stretched = np.swapaxes(held, 1, 2) @ turned.reshape(count, 2 * points, shapes)
         for axis in range(2):
             blocks[:, axis::2, axis::2] += stretched
-        return csr_array((blocks.ravel(), (self.rows, self.columns)), shape=(self.load.size, self.load.size))
+        rows, columns = self._places
+        return csr_array((blocks.ravel(), (rows, columns)), shape=(self.load.size, self.load.size))
+
+    @cached_property
+    def _places(self) -> tuple[np.ndarray, np.ndarray]:
+        """Rows and columns of the entries of all elements' matrices."""
+        unknowns = (2 * self.nodes_of[:, :, None] + np.arange(2)).reshape(len(self.nodes_of), -1)
+        count = unknowns.shape[1]
+        return np.repeat(unknowns, count, axis=1).ravel(), np.tile(unknowns, count).ravel()
+
+    def _open(self, step: np.ndarray, moved: np.ndarray) -> float:
+        """What the last step changes, relative: of the load's displacement."""
+        return float(abs((self.load * step).sum() / (self.load * moved).sum()))
+
+
+class _Sheet(Body):
+    """What is solved of a sheet of height 2 with E = 1: half of it where the load keeps it symmetric."""
+
+    def __init__(self, aspect_ratio: float, law: "PlaneLaw", count: int, kind: LoadKind, follower: bool) -> None:
+        self.kind, self.law = kind, law
+        length = 2 * aspect_ratio
+        self.extent = max(length, 2.0)
+        along, across = _element_ends(length, count, kind)
+        mesh = MeshQuad.init_tensor(along, across)
+        basis = Basis(mesh, ElementQuad2(), intorder=4)
+        axis, component, place = kind.normal, kind.axis, kind.loaded.place(along[-1], across[-1])
+        facets = mesh.facets_satisfying(lambda x: np.isclose(x[axis], place), boundaries_only=True)
+        side = FacetBasis(mesh, ElementQuad2(), facets=facets, intorder=4)
+        places = self.nodes_at = basis.doflocs.T
+        # Coordinates of the nodes: ends and middles of elements. Those of one line differ by rounding.
+        self.axes = [
+            np.interp(np.arange(2 * len(ends) - 1) / 2, np.arange(len(ends)), ends) for ends in (along, across)
+        ]
+        self.held, self.given = np.zeros(places.shape, dtype=bool), np.zeros(places.shape)
+        for where, axes in kind.half_held if kind.symmetric else kind.held:
+            there = np.isclose(places[:, where.axis], where.place(along[-1], across[-1]))
+            self.held[np.ix_(there, axes)] = True
+
+        # Of each element and its points of integration: gradients of shape functions, (elements, points, 2, shapes).
+        self.nodes_of = basis.element_dofs.T
+        self.gradients = np.stack([one[0].grad for one in basis.basis], axis=-1).transpose(1, 2, 0, 3)
+        self.weights = basis.dx
+        self.load = np.zeros(places.shape)
+        shapes = np.stack([np.asarray(one[0]) * side.dx for one in side.basis])
+        np.add.at(self.load[:, component], side.element_dofs, shapes.sum(axis=2))
+        self.turning = _turning(side, shapes, kind.along) if follower else csr_array((places.size, places.size))
+
+    def solve(self, stress: float, name: str, watched: bool = True) -> FiniteStrainSolution:
+        """Equilibrium under the whole load, reached in steps, which are watched for snaps.
+
+        Lengths are over half the height; its error estimate is what rounding leaves.
+        """
+        moved, uncertain = self.moved(stress, name, watched)
+        mean = float((self.load * moved).sum() / self.load.sum())
+        kind, (x, y, field) = self.kind, self._field(moved)
+        places = (x, y)[kind.along]
+        positions = places / places[-1]
+        profile = field.take(-1 if kind.loaded.far else 0, axis=kind.normal)[:, kind.axis]
+        displacement = float(np.interp(0.5, positions, profile)) if kind.pressed else mean
+        return FiniteStrainSolution(displacement, mean, uncertain, positions, profile, x, y, field)
+
+    def _field(self, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Coordinates of a grid over the whole sheet, from 0 on, and displacements there: nodes are those of a grid."""
+        x, y = self.axes
+        field = np.empty((len(x), len(y), 2))
+        columns, rows = (
+            np.searchsorted((axis[1:] + axis[:-1]) / 2, at) for axis, at in zip((x, y), self.nodes_at.T, strict=True)
+        )
+        field[columns, rows] = moved
+        if not self.kind.symmetric:
+            return x, y, field
+        if self.kind.cut == BOTTOM:  # the upper half
+            whole = np.concatenate([field[:, :0:-1] * [1, -1], field], axis=1)
+            return x, 1 + np.concatenate([-y[:0:-1], y]), whole
+        whole = np.concatenate([field, field[-2::-1] * [-1, 1]])
+        return np.concatenate([x, 2 * x[-1] - x[-2::-1]]), y, whole
 
 
 def _turning(side: FacetBasis, shapes: np.ndarray, along: int) -> csr_array:
@@ -311,7 +359,7 @@ def _turning(side: FacetBasis, shapes: np.ndarray, along: int) -> csr_array:
     return sum(csr_array(entry, shape=(2 * side.N, 2 * side.N)) for entry in entries)
 
 
-def _strain(gradient: np.ndarray) -> np.ndarray:
+def strain_of(gradient: np.ndarray) -> np.ndarray:
     """Green's strains xx, yy and 2 xy."""
     x, y = gradient[..., 0], gradient[..., 1]  # derivatives by x and by y
     parts = [x[..., 0] + (x * x).sum(-1) / 2, y[..., 1] + (y * y).sum(-1) / 2, x[..., 1] + y[..., 0] + (x * y).sum(-1)]
@@ -319,7 +367,7 @@ def _strain(gradient: np.ndarray) -> np.ndarray:
 
 
 def _strain_change(gradient: np.ndarray, change: np.ndarray) -> np.ndarray:
-    """Derivative of `_strain` along a change of the gradient."""
+    """Derivative of `strain_of` along a change of the gradient."""
     x, y, by_x, by_y = gradient[..., 0], gradient[..., 1], change[..., 0], change[..., 1]
     parts = [
         by_x[..., 0] + (x * by_x).sum(-1),
@@ -329,7 +377,7 @@ def _strain_change(gradient: np.ndarray, change: np.ndarray) -> np.ndarray:
     return np.stack(parts, axis=-1)
 
 
-def _matrix(stress: np.ndarray) -> np.ndarray:
+def matrix_of(stress: np.ndarray) -> np.ndarray:
     """Symmetric matrices of xx, yy, xy."""
     return stress[..., [[0, 2], [2, 1]]]
 
@@ -371,12 +419,31 @@ _Derivatives = tuple[Sequence[np.ndarray], Sequence[np.ndarray]]
 """First derivatives of an energy by t and d, and second ones by tt, td, dd."""
 
 
-class _PlaneLaw(ABC):
+class Law(Protocol):
+    """What a body asks of its law: stress and tangent at Green's strains xx, yy and 2 xy, shape (..., 3), over E."""
+
+    def response(self, strain: np.ndarray) -> "Response":
+        """Stress and tangent."""
+
+    def energy(self, strain: np.ndarray) -> np.ndarray:
+        """Energy."""
+
+
+class PlaneLaw(ABC):
     """Energy of a sheet with E = 1, of the trace and the determinant of C in the plane."""
 
     @abstractmethod
     def derivatives(self, trace: np.ndarray, d: np.ndarray) -> _Derivatives:
         """First derivatives by t and d, and second ones by tt, td, dd."""
+
+    @abstractmethod
+    def value(self, trace: np.ndarray, d: np.ndarray) -> np.ndarray:
+        """Energy of t and d."""
+
+    def energy(self, strain: np.ndarray) -> np.ndarray:
+        """Energy at Green's strains xx, yy and 2 xy, shape (..., 3) [1]."""
+        x, y, angle = 1 + 2 * strain[..., 0], 1 + 2 * strain[..., 1], strain[..., 2]
+        return self.value(x + y, x * y - angle**2)
 
     def response(self, strain: np.ndarray) -> "Response":
         """Return stress and tangent at Green's strains xx, yy and 2 xy, shape (..., 3) [1].
@@ -402,14 +469,19 @@ class _PlaneLaw(ABC):
         return Response(stress, tangent)
 
 
-class Yeoh(_PlaneLaw):
+class Yeoh(PlaneLaw):
     """Yeoh's law of an incompressible sheet in plane stress, with E = 1."""
 
     def __init__(self, coefficients: Sequence[float]) -> None:
         self.coefficients = coefficients
 
+    def value(self, trace: np.ndarray, d: np.ndarray) -> np.ndarray:
+        """As of `PlaneLaw`."""
+        excess = trace + 1 / d - 3
+        return np.asarray(sum(c * excess**n for n, c in enumerate(self.coefficients, 1)))
+
     def derivatives(self, trace: np.ndarray, d: np.ndarray) -> _Derivatives:
-        """As of `_PlaneLaw`, of W = sum_n c_n x^n with x = t + 1/d - 3."""
+        """As of `PlaneLaw`, of W = sum_n c_n x^n with x = t + 1/d - 3."""
         excess = trace + 1 / d - 3
         first = sum(n * c * excess ** (n - 1) for n, c in enumerate(self.coefficients, 1)) + np.zeros_like(excess)
         second = np.zeros_like(excess)
@@ -419,7 +491,7 @@ class Yeoh(_PlaneLaw):
         return (first, first * by_d), (second, second * by_d, second * by_d**2 + 2 * first / d**3)
 
 
-class NeoHooke(_PlaneLaw):
+class NeoHooke(PlaneLaw):
     """Compressible neo-Hookean energy of a sheet with E = 1; `nu` < 0.5 is Poisson's ratio at small strain."""
 
     def __init__(self, nu: float, plane: str) -> None:
@@ -428,7 +500,24 @@ class NeoHooke(_PlaneLaw):
         self.plane = plane
 
     def derivatives(self, trace: np.ndarray, d: np.ndarray) -> _Derivatives:
-        """As of `_PlaneLaw`, of the module's energy; in plane stress the stretch z across is eliminated."""
+        """As of `PlaneLaw`, of the module's energy; in plane stress the stretch z across is eliminated."""
+        z = self._across(trace, d)
+        parts = self._parts(trace, d, z)
+        second = [parts["tt"], parts["td"], parts["dd"]]
+        if self.plane == "stress":
+            pairs = ("tz", "tz"), ("tz", "dz"), ("dz", "dz")
+            second = [of - parts[one] * parts[other] / parts["zz"] for of, (one, other) in zip(second, pairs)]
+        return (parts["t"], parts["d"]), second
+
+    def value(self, trace: np.ndarray, d: np.ndarray) -> np.ndarray:
+        """As of `PlaneLaw`."""
+        z = self._across(trace, d)
+        volume = z * np.sqrt(d)
+        isochoric = volume ** (-2 / 3) * (trace + z**2) - 3
+        return np.asarray(0.5 * self.shear * isochoric + 0.5 * self.bulk * (volume - 1) ** 2)
+
+    def _across(self, trace: np.ndarray, d: np.ndarray) -> np.ndarray:
+        """Stretch across the sheet."""
         z = np.ones_like(d)
         if self.plane == "stress":
             z = 1 / np.sqrt(d)
@@ -438,12 +527,7 @@ class NeoHooke(_PlaneLaw):
                 z = np.maximum(z - step, 0.2 * z)
                 if np.nanmax(np.abs(step)) < 1e-14:
                     break
-        parts = self._parts(trace, d, z)
-        second = [parts["tt"], parts["td"], parts["dd"]]
-        if self.plane == "stress":
-            pairs = ("tz", "tz"), ("tz", "dz"), ("dz", "dz")
-            second = [of - parts[one] * parts[other] / parts["zz"] for of, (one, other) in zip(second, pairs)]
-        return (parts["t"], parts["d"]), second
+        return z
 
     def _parts(self, t: np.ndarray, d: np.ndarray, z: np.ndarray) -> dict[str, np.ndarray]:
         """Derivatives of mu/2 (p (t + z^2) - 3) + K/2 (J - 1)^2 with J = z sqrt(d), p = J^(-2/3)."""
@@ -463,7 +547,22 @@ class NeoHooke(_PlaneLaw):
         }
 
 
-def law_of(material: Material, plane: str = "stress") -> _PlaneLaw:
+class StVenant:
+    """St. Venant-Kirchhoff's law of any sheet: stresses are linear in Green's strains, by `stiffness` (3, 3)."""
+
+    def __init__(self, stiffness: np.ndarray) -> None:
+        self.stiffness = stiffness
+
+    def energy(self, strain: np.ndarray) -> np.ndarray:
+        """As of `Law`."""
+        return np.asarray(0.5 * (strain @ self.stiffness * strain).sum(axis=-1))
+
+    def response(self, strain: np.ndarray) -> "Response":
+        """As of `Law`."""
+        return Response(strain @ self.stiffness, np.broadcast_to(self.stiffness, (*strain.shape, 3)))
+
+
+def law_of(material: Material, plane: str = "stress") -> PlaneLaw:
     """Return Yeoh's law of a tested rubber, else the neo-Hookean law: one term of Yeoh's where nu = 1/2."""
     modulus, nu = material.young_modulus, material.poisson_ratio
     if isinstance(material, Rubber):

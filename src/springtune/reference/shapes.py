@@ -104,7 +104,7 @@ def solve_shape(
     materials: AnyMaterial | Mapping[str, AnyMaterial],
     grouped: GroupedMesh | None = None,
     tolerance: float = 1e-4,
-    level_of: "type[Level] | None" = None,
+    level_of: "Callable[[Problem, int], Level] | None" = None,
 ) -> ShapeReference:
     r"""Solve for the displacements of a shape under a load case, at small strain in plane stress.
 
@@ -122,7 +122,7 @@ def solve_shape(
     Curves are polynomials of the level's degree (isoparametric), reactions are the work of the solution on a unit
     displacement of their group, and stresses are not smoothed.
     """
-    problem = _Problem(shape, load, materials if isinstance(materials, Mapping) else {"": materials}, grouped)
+    problem = Problem(shape, load, materials if isinstance(materials, Mapping) else {"": materials}, grouped)
     names = [quantity.name for quantity in load.quantities]
     values: list[dict[str, float]] = []
     estimates: dict[str, float] = {}
@@ -178,20 +178,21 @@ def solve_each(
     load: LoadCase,
     materials: AnyMaterial | Mapping[str, AnyMaterial],
     grouped: GroupedMesh | None = None,
+    solve: Callable[..., ShapeReference] | None = None,
 ) -> tuple[list[ShapeReference], dict[str, str]]:
     """Return references that together have every quantity of interest that converges, and the faults of the others.
 
-    A quantity without a limit, such as the stress at a corner, does not affect the others.
+    A quantity without a limit, such as the stress at a corner, does not affect the others. `solve` is as `solve_shape`.
     """
     try:
-        return [solve_shape(shape, load, materials, grouped)], {}
+        return [(solve or solve_shape)(shape, load, materials, grouped)], {}
     except (ReferenceNotConvergedError, ValueError) as error:
         if len(load.quantities) < 2:
             return [], dict.fromkeys([one.name for one in load.quantities] or [""], str(error))
     found: list[ShapeReference] = []
     lacking: dict[str, str] = {}
     for one in load.quantities:
-        more, why = solve_each(shape, replace(load, quantities=(one,)), materials, grouped)
+        more, why = solve_each(shape, replace(load, quantities=(one,)), materials, grouped, solve)
         found += more
         lacking |= why
     return found, lacking
@@ -219,7 +220,7 @@ def unmet(estimate: float, accepted: float, before: float, last: float) -> str:
     return f"within the tolerance of {accepted:.1e}, but it is no bound: {steps}"
 
 
-class _Problem:
+class Problem:
     """What all levels share: coarse triangles, stiffnesses, supports and loads by group, corners."""
 
     def __init__(
@@ -256,7 +257,8 @@ class _Problem:
                 f"{', '.join(repr(name) for name in materials)}"
             )
         absent = np.zeros((3, 3))
-        self.stiffness = np.array([materials[n].plane_stress if n in present else absent for n in self.mesh.names])
+        planes = {name: one.in_plane.plane_stress for name, one in materials.items()}
+        self.stiffness = np.array([planes[n] if n in present else absent for n in self.mesh.names])
         self.density = np.zeros(len(self.mesh.names))
         for name in present if any(load.gravity) else ():
             density = materials[name].density
@@ -447,7 +449,7 @@ class _Space:
         return values, values @ at, outwards * np.stack([tangents[:, 1], -tangents[:, 0]], axis=1), weights
 
 
-def _inverse(matrices: np.ndarray, determinants: np.ndarray) -> np.ndarray:
+def inverse_of(matrices: np.ndarray, determinants: np.ndarray) -> np.ndarray:
     """Inverses of 2 x 2 matrices, shape (..., 2, 2)."""
     inverse = np.empty_like(matrices)
     inverse[..., 0, 0], inverse[..., 1, 1] = matrices[..., 1, 1], matrices[..., 0, 0]
@@ -462,9 +464,11 @@ VOIGT = np.array([[0, 2], [2, 1]])
 class Level:
     """A shape solved on one level."""
 
-    def __init__(self, problem: _Problem, degree: int) -> None:
+    most_layers = HIGHEST_DEGREE
+
+    def __init__(self, problem: Problem, degree: int) -> None:
         self.problem = problem
-        mesh = problem.graded(degree)
+        mesh = problem.graded(min(degree, self.most_layers))
         self.space = _Space(mesh, degree)
         self.outlines = mesh.part_sides()
         thickness = problem.shape.thickness
@@ -491,7 +495,7 @@ class Level:
         straight = np.flatnonzero(~space.curved)
         _, weights, _, gradients = tabulated(degree, 2 * degree - 2)
         jacobian, determinant = space.jacobians(gradients[:1], straight)
-        inverse = _inverse(jacobian[:, 0], determinant[:, 0])
+        inverse = inverse_of(jacobian[:, 0], determinant[:, 0])
         products = np.einsum("q,qia,qjb->abij", weights, gradients, gradients, optimize=True)
         area = np.abs(determinant[:, 0])
         metric = np.einsum("eua,ecadb,evb,e->ecduv", inverse, tensors[straight], inverse, area, optimize=True)
@@ -501,7 +505,7 @@ class Level:
         _, weights, _, gradients = tabulated(degree, 2 * degree + 4)
         for rows in np.array_split(curved, max(1, len(curved) * gradients.size // 4_000_000)) if len(curved) else ():
             jacobian, determinant = space.jacobians(gradients, rows)
-            inverse = _inverse(jacobian, determinant)
+            inverse = inverse_of(jacobian, determinant)
             slopes = np.einsum("qiu,equa->eaqi", gradients, inverse, optimize=True)
             weighted = slopes * (weights * np.abs(determinant))[:, None, :, None]
             flat = slopes.reshape(len(rows), -1, count)
@@ -703,7 +707,7 @@ class Level:
         _, weights, _, gradients = tabulated(space.degree, 4)
         jacobian, determinant = space.jacobians(gradients)
         slopes = np.einsum("eic,qiu->eqcu", self.field[space.numbers], gradients, optimize=True)
-        slopes = slopes @ _inverse(jacobian, determinant)
+        slopes = slopes @ inverse_of(jacobian, determinant)
         return most_rotation_and_strain(slopes.reshape(-1, 2, 2), (weights * np.abs(determinant)).ravel())
 
     def _located(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -199,7 +199,7 @@ def sensitivity(scene: "Scene", stiffness_ratios: ArrayLike | None = None) -> Cu
     if not len(ratios) or not ((ratios > LEAST_RATIO) & (ratios < 1 / LEAST_RATIO)).all():
         raise ValueError("stiffness_ratios: not all above zero; give stiffnesses over E t such as [0.5, 0.8, 1.1]")
     beam, kind, force = scene.beam, scene.kind, scene.force
-    stiffness = ratios * scene.material.young_modulus * beam.thickness
+    stiffness = ratios * scene.material.in_plane.young_modulus * beam.thickness
     path = follow(scene.sheet, kind, scene.kinematics, force / stiffness)
     displacement, stable = path.values, path.stable
     try:

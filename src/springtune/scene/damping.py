@@ -1,6 +1,6 @@
 """Dampers of a scene that give its loaded mode a measured decay, over mass, over stiffness and along springs."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -12,10 +12,7 @@ from ..problem.quantities import positive
 from ..safe_io.tables import Tabled, number_text
 from .single import Scene
 
-Numbers = float | str | Sequence[float | str] | np.ndarray
-"""A number of one measured mode, or two of two."""
-
-MEASURES: dict[str, Callable[[np.ndarray], np.ndarray]] = {
+MEASURES: dict[str, Callable[[float], float]] = {
     "decrement": lambda value: value / np.hypot(2 * np.pi, value),
     "ratio": lambda value: value,
     "loss_factor": lambda value: value / 2,
@@ -37,8 +34,6 @@ class Damping(Tabled):
         Of the scene about rest, without damping.
     ratio : float
         Damping ratio of the loaded mode [1].
-    rayleigh : tuple of float
-        Alpha [1/s] and beta [s] that act together: of two measured modes; of one, half of each.
     stiffness_factor : float
         What all stiffnesses must be multiplied by, or the density divided by, to have the measured period [1]; 1 where
         no period was given.
@@ -76,7 +71,6 @@ class Damping(Tabled):
     scene: Scene
     motion: Motion
     ratio: float
-    rayleigh: tuple[float, float]
     stiffness_factor: float = 1.0
     notes: tuple[str, ...] = ()
 
@@ -100,6 +94,11 @@ class Damping(Tabled):
         A mode of n times the frequency gets n times the ratio. Rigid motion is free.
         """
         return 2 * self.ratio / self.frequency
+
+    @property
+    def rayleigh(self) -> tuple[float, float]:
+        """Alpha [1/s] and beta [s] that act together: half of each."""
+        return 0.5 * self.mass_damping, 0.5 * self.stiffness_damping
 
     @property
     def period(self) -> float:
@@ -221,10 +220,7 @@ class Damping(Tabled):
         if share >= 1:
             ratios, count = f"{share * self.ratio:.3g}, not {self.ratio:.3g}", int(share) + 1
             raise ValueError(f"step: implicit Euler alone has a ratio of {ratios}; take {count} substeps or more")
-        alpha, beta = self.rayleigh
-        beta -= share * self.stiffness_damping
-        rayleigh = (alpha, beta) if beta > 0 else ((1 - share) * self.mass_damping, 0.0)
-        return replace(self, ratio=(1 - share) * self.ratio, rayleigh=rayleigh)
+        return replace(self, ratio=(1 - share) * self.ratio)
 
     def _rows(self) -> Iterator[tuple[str, str]]:
         alpha, beta = self.rayleigh
@@ -241,11 +237,11 @@ class Damping(Tabled):
 def damping_of(
     scene: Scene,
     *,
-    decrement: Numbers | None = None,
-    ratio: Numbers | None = None,
-    loss_factor: Numbers | None = None,
-    period: Numbers | None = None,
-    at: Numbers | None = None,
+    decrement: float | None = None,
+    ratio: float | None = None,
+    loss_factor: float | None = None,
+    period: float | str | None = None,
+    at: float | str | None = None,
 ) -> Damping:
     r"""Dampers of a scene from a measured decay.
 
@@ -272,8 +268,8 @@ def damping_of(
     Raises
     ------
     ValueError
-        If none or several of the measures are given, a number is out of its range, or no Rayleigh damping has the
-        ratios of two modes; or if the scene has no masses, or is unstable at rest. The message says what to give.
+        If none or several of the measures are given, a number is out of its range, or the scene has no masses or is
+        unstable at rest. The message says what to give.
 
     See Also
     --------
@@ -281,9 +277,6 @@ def damping_of(
 
     Notes
     -----
-    All numbers may be pairs, of two measured modes: then their periods are needed, or the frequencies of two loss
-    factors. The first mode is the loaded one. Alpha and beta solve ``ratio = alpha / (2 w) + beta w / 2`` for both.
-
     At resonance a loss factor is twice the damping ratio. The mode is that of small swings about rest: gravity or a
     load that stays shifts it.
 
@@ -298,51 +291,27 @@ def damping_of(
     >>> print(*damping.notes[0].split("; "), sep="\n")
     measured at 0.885 times the frequency of the loaded mode
     multiply stiffnesses by 0.784 or the density by 1.28, and ask again
-
-    Two modes, and one number too few:
-
-    >>> both = st.damping_of(scene, ratio=(0.05, 0.08), period=("0.21 s", "0.034 s"))
-    >>> f"alpha {both.rayleigh[0]:.2f} 1/s, beta {1e3 * both.rayleigh[1]:.2f} ms"
-    'alpha 2.85 1/s, beta 0.64 ms'
-    >>> try:
-    ...     st.damping_of(scene, ratio=(0.05, 0.08), period="0.21 s")
-    ... except ValueError as error:
-    ...     print(error)
-    ratio: (0.05, 0.08) does not go with period='0.21 s', at=None; give period of each mode
     """
     given = {"decrement": decrement, "ratio": ratio, "loss_factor": loss_factor}
     known = {name: value for name, value in given.items() if value is not None}
     if len(known) != 1:
         raise ValueError(f"{', '.join(given)}: {len(known)} are given; give one of them, such as decrement=0.3")
     [(name, value)] = known.items()
-    values = np.atleast_1d(np.asarray(value))
-    ratios = MEASURES[name](values) if values.dtype.kind in "fiu" else np.zeros(0)
-    if ratios.shape not in ((1,), (2,)) or not ((0 < ratios) & (ratios < 1)).all():
-        raise ValueError(f"{name}: {value!r} does not mean a damping ratio above 0 and below 1; give a number, or two")
-    timed, told, other = ("at", at, period) if name == "loss_factor" else ("period", period, at)
-    times = [] if told is None else np.atleast_1d(np.array(told, dtype=object)).tolist()
-    if other is not None or len(times or ratios[:1]) != len(ratios):
-        raise ValueError(f"{name}: {value!r} does not go with period={period!r}, at={at!r}; give {timed} of each mode")
+    own = MEASURES[name](float(value)) if isinstance(value, int | float | np.number) else np.nan
+    if not 0 < own < 1:
+        raise ValueError(f"{name}: {value!r} does not mean a damping ratio above 0 and below 1; give a number")
+    if (period if name == "loss_factor" else at) is not None:
+        raise ValueError(f"{name}: {value!r} does not go with period={period!r}, at={at!r}; leave that out")
     if scene.network.rest_factor.negative_pivots:
         raise ValueError(f"definition '{scene.definition.name}': is unstable at rest; take another definition or mesh")
     motion = scene.motion(released=True, load=scene.forces / scene.springs.reference)  # also of a load that turns
-    own = motion.loaded_frequency
-    if timed == "at":
-        measured = 2 * np.pi * np.array([positive(one, "frequency", timed) for one in times])
-        apart = measured[0] / own if len(times) == 1 else 1.0
-        factor, remedy = 1.0, f"give the loss factor at {own / (2 * np.pi):.3g} Hz"
-    else:
-        measured = 2 * np.pi / np.array([positive(one, "time", timed) for one in times]) / np.sqrt(1 - ratios**2)
-        apart = measured[0] / own if times else 1.0
+    frequency, apart, factor, remedy = motion.loaded_frequency, 1.0, 1.0, ""
+    if at is not None:
+        apart = 2 * np.pi * positive(at, "frequency", "at") / frequency
+        remedy = f"give the loss factor at {frequency / (2 * np.pi):.3g} Hz"
+    if period is not None:
+        apart = 2 * np.pi / positive(period, "time", "period") / np.sqrt(1 - own**2) / frequency
         factor = apart**2
         remedy = f"multiply stiffnesses by {factor:.3g} or the density by {1 / factor:.3g}, and ask again"
     note = f"measured at {apart:.3g} times the frequency of the loaded mode; {remedy}"
-    relative = measured / (apart * own) if times else np.ones(1)
-    rows = np.stack([1 / relative, relative], axis=1) / 2
-    shares = np.linalg.lstsq(rows, ratios, rcond=None)[0].clip(0)  # of one mode both are the same
-    if not np.allclose(rows @ shares, ratios):
-        low, high = sorted(ratios[0] * relative[::-1] / relative)
-        raise ValueError(f"{name}: dampers give the second mode a ratio from {low:.3g} to {high:.3g}; give one mode")
-    notes = (note,) if abs(apart - 1) > SAME_MODE else ()
-    alpha, beta = float(shares[0] * own), float(shares[1] / own)
-    return Damping(scene, motion, float(shares.mean()), (alpha, beta), float(factor), notes)
+    return Damping(scene, motion, own, float(factor), (note,) if abs(apart - 1) > SAME_MODE else ())

@@ -94,7 +94,7 @@ class Moduli:
         >>> round(st.moduli(mesh, st.AnisotropicMaterial(9.0, 4.0, 1.5, 2.0, C16=0.5), "delingette").stiffness_error, 9)
         0.0
         """
-        wanted = self.material.plane_stress
+        wanted = self.material.in_plane.plane_stress
         # Twice the shear and its couplings: the norm of the tensor, which no turn of the axes changes.
         weights = np.sqrt([1.0, 1.0, 2.0])
         weights = weights[:, None] * weights
@@ -118,11 +118,12 @@ class MeshModuli:
         if name not in self._found:
             self._found[name] = *self._test.axial(springs), self._test.shear(springs)
         young_modulus, poisson_ratio, shear_modulus = self._found[name]
-        scale = material.young_modulus * self.sheet.thickness
+        wanted = material.in_plane
+        scale = wanted.young_modulus * self.sheet.thickness
         return Moduli(
             young_modulus * springs.reference / scale - 1,
             poisson_ratio,
-            shear_modulus * springs.reference / scale * 2 * (1 + material.poisson_ratio) - 1,
+            shear_modulus * springs.reference / scale * 2 * (1 + wanted.poisson_ratio) - 1,
             springs,
             seconds,
             self.sheet.mesh,

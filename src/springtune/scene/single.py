@@ -334,7 +334,10 @@ class Scene(Tabled):
 
     @property
     def finite_strain(self) -> bool:
-        """Whether the network has the material's law at finite strain: a `neo-hooke` or `yeoh` one, not linear.
+        """Whether the reference is one at finite strain, of the network's own law.
+
+        That of a nonlinear `neo-hooke` or `yeoh` network; on a shape also that of `delingette` where small strain does
+        not apply.
 
         Examples
         --------
@@ -346,13 +349,18 @@ class Scene(Tabled):
         >>> [scene.finite_strain for scene in pulls]
         [True, False, False, False]
         """
-        return self.definition.finite_strain and self.kinematics == "nonlinear"
+        return bool(self._law)
+
+    @cached_property
+    def _law(self) -> str:
+        """Law at finite strain of the reference, or none."""
+        return self.statement.law(self.sheet, self.definition)
 
     def reference(self) -> "ReferenceSolution | FiniteStrainSolution | ShapeReference":
         """Converged finite-element solution under the same force or load case.
 
-        In small strain; of a beam whose network has `finite_strain` at finite strain: of a `springtune.Rubber` by its
-        own law, of another material by neo-Hooke's.
+        In small strain, or at finite strain (`finite_strain`): of a `springtune.Rubber` by its own law, of another
+        material by neo-Hooke's, of a `delingette` network by St. Venant and Kirchhoff's.
 
         Returns
         -------
@@ -366,8 +374,9 @@ class Scene(Tabled):
         Notes
         -----
         In small strain by the hp version of finite elements, whose error falls exponentially and is estimated; see
-        `springtune.reference.small_strain`. At finite strain by quadratic elements on two meshes, see
-        `springtune.reference.finite_strain`.
+        `springtune.reference.small_strain`. At finite strain of a beam by quadratic elements on two meshes, see
+        `springtune.reference.finite_strain`; of a shape by levels as in small strain, see
+        `springtune.reference.finite_shapes`.
 
         Examples
         --------
@@ -385,7 +394,7 @@ class Scene(Tabled):
         >>> print(f"{1e3 * scene.reference().displacement:.0f} mm, error {100 * scene.solve().error:+.1f} %")
         64 mm, error -0.1 %
         """
-        return self.statement.reference(self.sheet, self.finite_strain)
+        return self.statement.reference(self.sheet, self._law)
 
     def reference_values(self) -> dict[str, float]:
         """Quantities of interest of the reference by name.
@@ -408,7 +417,7 @@ class Scene(Tabled):
         >>> {name: f"{1e3 * value:.2f} mm" for name, value in scene.reference_values().items()}
         {'displacement': '9.50 mm'}
         """
-        return self.statement.reference_values(self.sheet, self.finite_strain)
+        return self.statement.reference_values(self.sheet, self._law)
 
     @property
     def objection(self) -> str:
@@ -416,7 +425,7 @@ class Scene(Tabled):
 
         Empty where it does, as in linear kinematics, and where the reference is one at finite strain.
         """
-        return "" if self.kinematics == "linear" else self.statement.objection(self.sheet, self.finite_strain)
+        return "" if self.kinematics == "linear" or self.finite_strain else self.statement.objection(self.sheet)
 
     def motion(self, released: bool = False, **options: Any) -> "Motion":
         """The scene in time, its force switched on at rest and kept; free of damping.

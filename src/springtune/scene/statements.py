@@ -87,18 +87,22 @@ class Statement(ABC):
         """Refuse a definition that is not for the body or the load."""
 
     @abstractmethod
-    def reference(self, sheet: Sheet, finite_strain: bool = False) -> "AnyReference":
-        """Converged finite-element solution, in small strain or of the material's law at finite strain."""
+    def reference(self, sheet: Sheet, law: str = "") -> "AnyReference":
+        """Converged finite-element solution, in small strain or of a law at finite strain."""
 
     @abstractmethod
-    def reference_values(self, sheet: Sheet, finite_strain: bool = False) -> dict[str, float]:
-        """Quantities of interest of the reference; NaN of those that it lacks."""
+    def reference_values(self, sheet: Sheet, law: str = "") -> dict[str, float]:
+        """Quantities of interest of the reference."""
+
+    def law(self, sheet: Sheet, definition: Definition) -> str:
+        """Law at finite strain of the reference of a definition's network; none of small strain."""
+        return definition.law if self.kinematics == "nonlinear" else ""
 
     @abstractmethod
     def _unit_field(self, sheet: Sheet) -> np.ndarray:
         """Displacements of the reference at the particles for a factor of 1, shape (n_points, 2)."""
 
-    def objection(self, sheet: Sheet, finite_strain: bool = False) -> str:
+    def objection(self, sheet: Sheet) -> str:
         """Why the small-strain reference does not apply to networks of nonlinear kinematics; empty if it does."""
         found = cast("ReferenceSolution | ShapeReference", self.reference(sheet))
         return beyond_linear(found.rotation, found.strain)
@@ -223,19 +227,19 @@ class BeamStatement(Statement):
         density = self.material.density
         return None if density is None else density * self.thickness * self.mesh.particle_areas
 
-    def reference(self, sheet: Sheet, finite_strain: bool = False) -> "ReferenceSolution | FiniteStrainSolution":
+    def reference(self, sheet: Sheet, law: str = "") -> "ReferenceSolution | FiniteStrainSolution":
         """Converged finite-element solution, in small strain or of the material's law at finite strain."""
-        if finite_strain:
+        if law:
             return _solve_finite(self.beam, self.material, self.force, self.kind, self.follower)
         return unit_reference(self.beam, self.material, self.kind, self.force)
 
-    def reference_values(self, sheet: Sheet, finite_strain: bool = False) -> dict[str, float]:
+    def reference_values(self, sheet: Sheet, law: str = "") -> dict[str, float]:
         """Displacement of the reference [m]."""
-        return {"displacement": self.reference(sheet, finite_strain).displacement}
+        return {"displacement": self.reference(sheet, law).displacement}
 
-    def objection(self, sheet: Sheet, finite_strain: bool = False) -> str:
-        """Why the reference does not apply to networks of nonlinear kinematics; empty if it does."""
-        return "" if finite_strain else super().objection(sheet)
+    def law(self, sheet: Sheet, definition: Definition) -> str:
+        """Law of the reference: of beams that of rubber alone."""
+        return "rubber" if definition.finite_strain and self.kinematics == "nonlinear" else ""
 
     def _unit_field(self, sheet: Sheet) -> np.ndarray:
         return unit_reference(self.beam, self.material, self.kind, 1.0).at(self.mesh.points)
@@ -349,25 +353,36 @@ class ShapeStatement(Statement):
             )
         return springs, seconds
 
-    def reference(self, sheet: Sheet, finite_strain: bool = False) -> "ShapeReference":
-        """Converged finite-element solution, once for all scenes of a sheet; of shapes there is small strain alone."""
-        case = self.shape.loads[self.load]
+    def reference(self, sheet: Sheet, law: str = "") -> "ShapeReference":
+        """Converged finite-element solution, once for all scenes of a sheet."""
+        case = self.case if law else self.shape.loads[self.load]
+        as_read = self.grouped if self.shape.file else None
         # The shape is kept too, so that its id is not used again.
-        key = id(self.shape), self.grouped, case, tuple(self.by_part.items())
+        key = id(self.shape), self.grouped, case, tuple(self.by_part.items()), law
         if (key, 1.0) not in sheet.references:
-            from ..reference.shapes import solve_shape  # here, since finite elements take half a second to import
+            if law:
+                from ..reference.finite_shapes import solve_finite_shape  # here, as below
 
-            as_read = self.grouped if self.shape.file else None
-            sheet.references[key, 1.0] = self.shape, solve_shape(self.shape, case, self.by_part, as_read)
-        if (key, self.scale) not in sheet.references:
-            sheet.references[key, self.scale] = self.shape, sheet.references[key, 1.0][1].scaled(self.scale)
-        found: ShapeReference = sheet.references[key, self.scale][1]
+                solved = solve_finite_shape(self.shape, case, self.by_part, as_read, law)
+            else:
+                from ..reference.shapes import solve_shape  # here, since finite elements take half a second to import
+
+                solved = solve_shape(self.shape, case, self.by_part, as_read)
+            sheet.references[key, 1.0] = self.shape, solved
+        scale = 1.0 if law else self.scale
+        if (key, scale) not in sheet.references:
+            sheet.references[key, scale] = self.shape, sheet.references[key, 1.0][1].scaled(scale)
+        found: ShapeReference = sheet.references[key, scale][1]
         return found
 
-    def reference_values(self, sheet: Sheet, finite_strain: bool = False) -> dict[str, float]:
-        """Quantities of interest of the reference; NaN where the reference does not apply."""
-        values = dict(self.reference(sheet).values)
-        return dict.fromkeys(values, np.nan) if finite_strain and self.objection(sheet) else values
+    def reference_values(self, sheet: Sheet, law: str = "") -> dict[str, float]:
+        """Quantities of interest of the reference."""
+        return dict(self.reference(sheet, law).values)
+
+    def law(self, sheet: Sheet, definition: Definition) -> str:
+        """Law of the reference; St. Venant and Kirchhoff's only where small strain does not apply."""
+        law = super().law(sheet, definition)
+        return "" if law == "st-venant" and not self.objection(sheet) else law
 
     def _unit_field(self, sheet: Sheet) -> np.ndarray:
         return self.reference(sheet).at(self.mesh.points)

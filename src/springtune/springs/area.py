@@ -8,6 +8,10 @@ Central springs obey Cauchy's relation, so isotropic networks have nu = 1/3. Spr
 adds the rest of the bulk modulus. K_A is negative for nu < 1/3, but the sum stays positive. E, nu and G are exact on
 equilateral rows and on rectangles with both diagonals, and within 2 or 3 % on free meshes.
 
+The coarse models of red cells have the same two parts (Fedosov, Caswell and Karniadakis, CMAME 199:1937, 2010, abstract
+read): bonds of stiffness k at rest and areas of stiffness k_d have, on the lattice, ``G t = sqrt(3)/4 k``, ``K t =
+sqrt(3)/2 k + k_d`` and ``E = 4 K G / (K + G)``, which are these springs and ``k_d = K_A t``.
+
 After Golec and others (The Visual Computer 36, 2020, hal-02124471, abstract read): springs keep the Cauchy part, a
 volume energy the rest. The plane form is derived here.
 """

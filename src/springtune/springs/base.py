@@ -109,6 +109,8 @@ class Definition(Declared):
         Whether it supports anisotropic materials.
     finite_strain : bool
         Whether it has the material's law at finite strain; its nonlinear error is then against a reference of that law.
+    st_venant : bool
+        Whether it is linear triangles of St. Venant and Kirchhoff's law in nonlinear kinematics.
 
     Examples
     --------
@@ -126,6 +128,19 @@ class Definition(Declared):
     needs: str
     anisotropic: bool
     finite_strain: bool
+    st_venant: bool = False
+
+    @property
+    def law(self) -> str:
+        """Law at finite strain, ``"rubber"`` (that of the material), ``"st-venant"`` or none.
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> [st.DEFINITIONS[name].law for name in ("neo-hooke", "delingette", "lattice")]
+        ['rubber', 'st-venant', '']
+        """
+        return "rubber" if self.finite_strain else "st-venant" if self.st_venant else ""
 
     def springs(self, mesh: Mesh, material: AnyMaterial, thickness: float, given: object = None) -> Springs:
         """Return the springs of a mesh.
@@ -176,8 +191,14 @@ class Definition(Declared):
                 raise DefinitionError(f"{name}: {value!r} is not a number above zero; give one in SI units")
         if self.needs == "cases" and not (isinstance(given, list | tuple) and given):
             raise DefinitionError(f"cases: {given!r} is no list of loads; give what identification.patch_cases returns")
+        if self.finite_strain and isinstance(material, Material) and material.plane == "strain":
+            named = repr(material.name) if material.name else "this one"
+            raise DefinitionError(
+                f"has a law of sheets whose thickness is free, and {named} is in plane strain; choose 'delingette', or "
+                "plane 'stress'"
+            )
         arguments = (given,) if self.needs else ()
-        found = self.function(mesh, material, thickness, *arguments)
+        found = self.function(mesh, material.in_plane, thickness, *arguments)
         if not isinstance(found, Springs) or len(found.relative) != len(mesh.edges):
             what = f"{len(found.relative)} springs" if isinstance(found, Springs) else type(found).__name__
             raise DefinitionError(f"returns {what}; return springtune.Springs, one for each of {len(mesh.edges)} edges")
@@ -203,6 +224,7 @@ def definition(
     needs: str = "",
     anisotropic: bool = False,
     finite_strain: bool = False,
+    st_venant: bool = False,
 ) -> Callable[[Function], Function]:
     """Declare a function as a definition, by a decorator that returns it unchanged.
 
@@ -212,7 +234,7 @@ def definition(
         Label in a study and in the dataset.
     order : float, optional
         Place in the order of labels, between its neighbours' numbers; by default last.
-    uniform, cells, uniaxial, needs, anisotropic, finite_strain
+    uniform, cells, uniaxial, needs, anisotropic, finite_strain, st_venant
         As of `Definition`.
 
     Returns
@@ -245,9 +267,8 @@ def definition(
             raise ValueError(f"definition {name!r}: cells {cells!r}; give the corners of cells that it can have: 3, 4")
         if needs not in NEEDS:
             raise ValueError(f"definition {name!r}: needs {needs!r}; give one of {', '.join(map(repr, NEEDS))}")
-        DEFINITIONS.declare(
-            Definition(name, function, order, uniform, tuple(cells), uniaxial, needs, anisotropic, finite_strain)
-        )
+        traits = uniform, tuple(cells), uniaxial, needs, anisotropic, finite_strain, st_venant
+        DEFINITIONS.declare(Definition(name, function, order, *traits))
         return function
 
     return declare

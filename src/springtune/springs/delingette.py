@@ -29,7 +29,7 @@ from ..problem.materials import AnyMaterial, Material
 from .base import Springs, definition, membrane_stiffness, triangles_only
 
 
-@definition("delingette", order=230, cells=(3,), anisotropic=True)
+@definition("delingette", order=230, cells=(3,), anisotropic=True, st_venant=True)
 def springs(mesh: Mesh, material: AnyMaterial, thickness: float) -> Springs:
     """Tensile and coupling springs of squared lengths (Delingette 2008): equal to linear triangles of any material.
 

@@ -63,7 +63,7 @@ def patch_cases(mesh: Mesh, material: AnyMaterial, thickness: float) -> list[Cas
         other = _first_least(-np.abs(x - x[corner]))
     held[other, 1] = True
     points = mesh.points - mesh.points[corner]
-    modulus, gradients = _gradients(material)
+    modulus, gradients = _gradients(material.in_plane)
     cases = []
     for stress, given in zip(([[1, 0], [0, 0]], [[0, 0], [0, 1]], [[0, 1], [1, 0]]), gradients):
         forces = modulus * thickness * outline_forces(mesh, np.array(stress, dtype=float))

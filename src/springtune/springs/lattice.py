@@ -60,4 +60,4 @@ def predicted_stiffness(material: Material, beam: Beam, mesh_size: float, load: 
     kind = LOADS[load].kind
     known = kind.clamped and kind.normal == 0
     excess = (1.0 if kind.direct else 3.0) * COEFFICIENT if known else math.nan
-    return COEFFICIENT * material.young_modulus * beam.thickness / (1.0 + excess * mesh_size / beam.height)
+    return COEFFICIENT * material.in_plane.young_modulus * beam.thickness / (1.0 + excess * mesh_size / beam.height)

@@ -55,7 +55,7 @@ CHECKOUT_FILES = (
 """Required files of a checkout."""
 
 FOLDERS = {
-    "src": (".css", ".html", ".js", ".py", ".pyi", ".typed", ".yaml"),
+    "src": (".css", ".html", ".jinja", ".js", ".py", ".pyi", ".typed", ".yaml"),
     "workflow": (".csl", "README.md", "Snakefile", ".rst", ".smk", ".typ", ".yaml", ".yml"),
     "requirements": (".in", ".txt"),
 }

@@ -10,6 +10,7 @@ from typing import Any
 from springtune.mesh import MESH_TYPES
 from springtune.mesh.types import MOST_MESHED
 from springtune.problem.loads import LOADS
+from springtune.problem.materials import INCOMPRESSIBLE
 from springtune.problem.parameters import MOST_SCENES, MOST_SCENES_VARIABLE
 from springtune.problem.quantities import nearest
 from springtune.springs import DEFINITIONS
@@ -52,6 +53,12 @@ def check_beam_material(problems: Problems, path: Sequence[Key], name: str, conf
         )
 
 
+def check_compressible(problems: Problems, path: Sequence[Key], name: str, config: StudyConfig) -> None:
+    """Check that a material, which is asked for with a Poisson's ratio of 0.5, is in plane stress."""
+    if name in config.materials and config.materials[name].plane == "strain":
+        problems.add(path, f"material '{name}' is in plane strain, and this ratio is {INCOMPRESSIBLE}")
+
+
 def check_names(config: StudyConfig, problems: Problems) -> None:
     """Check the names that refer to declared sections, and the sensitivity range."""
     mesh_types = mesh_type_names(config)
@@ -67,6 +74,8 @@ def check_names(config: StudyConfig, problems: Problems) -> None:
             check_known(problems, ("grids", name, "beam"), "beam", beam, config.beams)
         for material in grid.material:
             check_beam_material(problems, ("grids", name, "material"), material, config)
+            if 0.5 in (grid.poisson_ratio or ()):
+                check_compressible(problems, ("grids", name, "poisson_ratio"), material, config)
         for beam in grid.force or ():
             if beam is not None:
                 check_known(problems, ("grids", name, "force", beam), "beam", beam, config.beams)

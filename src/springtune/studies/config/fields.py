@@ -12,6 +12,7 @@ from springtune import units
 from springtune.mesh import MESH_TYPES
 from springtune.problem.loads import KINEMATICS, LOADS
 from springtune.problem.materials import MOST_TERMS
+from springtune.problem.parameters import PLANES
 from springtune.problem.quantities import beyond, nearest
 from springtune.registry import NAME, NAME_RULE
 from springtune.springs import DEFINITIONS
@@ -134,6 +135,7 @@ MeshType = Annotated[
     str, Scalar(str, {"type": "string", "examples": list(MESH_TYPES)}, "a mesh type such as 'structured'")
 ]
 Load = Annotated[str, one_of("load", LOADS)]
+Plane = Annotated[str, one_of("plane", PLANES)]
 FurtherReference = Annotated[str, one_of("reference", FURTHER_REFERENCES)]
 Kinematics = Annotated[str, one_of("kinematics", KINEMATICS)]
 DefinitionName = Annotated[str, one_of("definition", DEFINITIONS)]

@@ -183,6 +183,11 @@ class Study:
     row_files: tuple[Path, ...] = ()
     part: Part | None = None
 
+    @property
+    def plane_strain(self) -> tuple[str, ...]:
+        """Names of the materials in plane strain."""
+        return tuple(name for name, one in self.materials.items() if getattr(one, "plane", "") == "strain")
+
     def material(self, name: str) -> AnyMaterial:
         """A material that the study declares.
 

@@ -11,7 +11,7 @@ from pydantic.fields import FieldInfo
 
 from springtune.mesh import MESH_TYPES
 from springtune.problem.loads import LOADS
-from springtune.problem.materials import MOST_TERMS, AnisotropicMaterial, AnyMaterial, Material
+from springtune.problem.materials import INCOMPRESSIBLE, MOST_TERMS, AnisotropicMaterial, AnyMaterial, Material
 from springtune.problem.quantities import nearest
 from springtune.registry import imported
 
@@ -37,6 +37,7 @@ from .fields import (
     OneOrMore,
     OrthotropicRatio,
     PerBeam,
+    Plane,
     Points,
     PoissonRatio,
     PoissonRatios,
@@ -147,6 +148,9 @@ MATERIAL_FORMS = (
 """Keys of the four forms of a material; a material has the keys of one form."""
 
 
+IN_PLANE = {"stiffness": ", and give the stiffness of plane strain"}
+"""Remedies for forms that cannot have a plane, by their first key."""
+
 OF_A_TEST = ("terms", "equibiaxial_test", "pure_shear_test")
 
 
@@ -166,8 +170,11 @@ class MaterialConfig(Section):
     model_config = ConfigDict(json_schema_extra=_one_form)
 
     young_modulus: Stress | None = Field(None, description="Young's modulus E.")
-    poisson_ratio: PoissonRatio | None = Field(
-        None, description="Poisson's ratio nu; 0.5 is allowed, since sheets are in plane stress."
+    poisson_ratio: PoissonRatio | None = Field(None, description="Poisson's ratio nu; 0.5 is allowed in plane stress.")
+    plane: Plane | None = Field(
+        None,
+        description="'stress' of a thin sheet, the default, or 'strain' of a slice of a long body; E and nu are those "
+        "of the material in three dimensions in both. Isotropic materials alone.",
     )
     young_modulus_x: Stress | None = Field(None, description="Young's modulus along the fibres.")
     young_modulus_y: Stress | None = Field(None, description="Young's modulus across the fibres.")
@@ -208,9 +215,13 @@ class MaterialConfig(Section):
         form = next((form for form, own in zip(MATERIAL_FORMS, given) if own), MATERIAL_FORMS[0])
         if self.angle is not None and form is not MATERIAL_FORMS[1]:
             raise refuse("turns the axes of an orthotropic material, and this is none; remove it", "angle")
+        if self.plane is not None and form is not MATERIAL_FORMS[0]:
+            raise refuse(f"is for isotropic materials; remove it{IN_PLANE.get(form[0], '')}", "plane")
         for key in OF_A_TEST:
             if getattr(self, key) is not None and form is not MATERIAL_FORMS[3]:
                 raise refuse("goes with a 'uniaxial_test', and this material has none; remove it", key)
+        if self.plane == "strain" and self.poisson_ratio == 0.5:
+            raise refuse(f"is {INCOMPRESSIBLE}", "poisson_ratio")
         for key in form:
             if getattr(self, key) is None:
                 raise refuse(f"'{key}' is missing; give {expected_value(type(self).model_fields[key])}", key)
@@ -236,7 +247,7 @@ class MaterialConfig(Section):
                 name=name,
             )
         if self.young_modulus is not None and self.poisson_ratio is not None:
-            return Material(self.young_modulus, self.poisson_ratio, self.density, name)
+            return Material(self.young_modulus, self.poisson_ratio, self.density, name, self.plane or "stress")
         if self.stiffness is not None:
             return AnisotropicMaterial(**self.stiffness.model_dump(), density=self.density, name=name)
         own = {key: getattr(self, key) for key in MATERIAL_FORMS[1]}

@@ -1,7 +1,7 @@
 """Place texts in figures: line names, notes and messages."""
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cache
 from typing import Any
@@ -226,6 +226,29 @@ def finish(
             say(panel, why)
         else:
             note(panel, said)
+
+
+def small_multiples(
+    ax: Figure | SubFigure | Axes | np.ndarray | None,
+    shown: Mapping[str, Any],
+    columns: int,
+    height: float,
+    title: str,
+    draw: Callable[[Axes, Any], Drawn],
+    *,
+    sharey: bool = False,
+) -> np.ndarray:
+    """Draw a panel a name, each of a `height` [inch], below a wrapped title; `draw` gets a panel and its part."""
+    columns = min(columns, max(1, len(shown)))
+    figure, axes, flat, whole = style.multiples(ax, len(shown), columns, height, sharey=sharey)
+    title = wrapped(title, (style.PAGE if columns > 1 else style.COLUMN) - 0.1, 8.5)
+    place = {"left": 0.5, "right": 0.06, "bottom": 0.4, "top": 0.36 + 0.14 * lines_of(title), "down": 0.68}
+    arrange(figure, axes, across=0.5, title=title, **place)
+    drawn = {panel: draw(panel, part) for panel, part in zip(flat, shown.values())}
+    for panel, name in zip(flat, shown):
+        panel.set_title(name)
+    finish(figure, axes, place | {"across": 0.1, "title": title}, drawn, whole if ax is None else 0.0)
+    return flat
 
 
 @contextmanager

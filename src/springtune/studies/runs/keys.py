@@ -495,6 +495,8 @@ def material_key(material: "Material", density: bool = False) -> dict[str, Any]:
     """Properties of a material that results depend on; statics ignore density."""
     known = asdict(material) | {"name": ""}
     known.pop("test_errors", None)
+    if known.get("plane") == "stress":
+        del known["plane"]
     if not density:
         del known["density"]
     return known

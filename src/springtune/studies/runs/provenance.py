@@ -80,6 +80,7 @@ def attributes(
         "software": json.dumps(software, sort_keys=True),
         "host": "" if "host" in untold else platform.node(),
     }
+    found |= {"plane_strain": ", ".join(study.plane_strain)} if study.plane_strain else {}
     return found | ({"study_commit": own} if own else {}) | _references(study)
 
 

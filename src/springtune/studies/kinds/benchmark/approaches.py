@@ -97,8 +97,8 @@ def triangles(scene, size, clock, degree):
     with clock("assembling"):
         element = ElementVector((ElementTriP1, ElementTriP2)[degree - 1]())
         basis = Basis(mesh, element)
-        young, nu = scene.material.young_modulus, scene.material.poisson_ratio
-        lam, mu = young * nu / (1 - nu**2), young / (2 * (1 + nu))  # plane stress
+        young, nu = scene.sheet.young_modulus, scene.sheet.poisson_ratio
+        lam, mu = young * nu / (1 - nu**2), young / (2 * (1 + nu))  # in the plane
         matrix = linear_elasticity(lam, mu).assemble(basis) * scene.beam.thickness
         value, along, axis = scene.side
         side = FacetBasis(mesh, element, facets=mesh.facets_satisfying(lambda x: np.isclose(x[along], value)))
@@ -126,7 +126,7 @@ def tensor_mass(scene, size, clock):
     """
     mesh = _mesh(scene, size, clock)
     with clock("assembling"):
-        young, nu = scene.material.young_modulus, scene.material.poisson_ratio
+        young, nu = scene.sheet.young_modulus, scene.sheet.poisson_ratio
         lam, mu = young * nu / (1 - nu**2), young / (2 * (1 + nu))
         corners = mesh.points[mesh.triangles]
         opposite = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)
@@ -224,8 +224,8 @@ def boundary_elements(scene, size, clock):
         middle = 0.5 * (start + end)
         side = np.repeat(np.arange(4), [columns, rows, columns, rows])  # lower, right, upper, left
     with clock("assembling"):
-        nu = scene.material.poisson_ratio / (1 + scene.material.poisson_ratio)
-        shear = scene.material.young_modulus / (2 * (1 + scene.material.poisson_ratio))
+        nu = scene.sheet.poisson_ratio / (1 + scene.sheet.poisson_ratio)
+        shear = scene.sheet.young_modulus / (2 * (1 + scene.sheet.poisson_ratio))
         count = len(middle)
         u, t = np.zeros((2, count, 2, count, 2))
         places, shares = np.polynomial.legendre.leggauss(8)
@@ -272,7 +272,7 @@ def free_form(scene, size, clock):
 
     T. W. Sederberg, S. R. Parry, Computer Graphics 20(4):151, 1986.
     """
-    beam, young = scene.beam, scene.material.young_modulus
+    beam, young = scene.beam, scene.sheet.young_modulus
     mesh = _mesh(scene, size, clock)
     with clock("solving"):
         across, axis = scene.kind.normal, scene.kind.axis

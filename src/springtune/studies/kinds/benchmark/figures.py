@@ -21,7 +21,8 @@ APPROACH_FAMILIES = {
 }
 """Colour and marker of each family of approaches."""
 
-WITH_ENERGIES = ("area", "angular", "delingette", "delingette-tensile", "neo-hooke", "patch-area")
+WITH_ENERGIES = ("area", "angular", "delingette", "delingette-tensile", "ielsm", "many-body", "neo-hooke",
+                 "normal-shear", "patch-area")  # fmt: skip
 SHOWN = ("delingette/structured", "van-gelder/structured", "area/braced", "linear-triangles", "quadratic-triangles",
          "boundary-elements", "tensor-mass", "relaxation", "calculix-cps3", "calculix-cps8")  # fmt: skip
 """Approaches with names before others."""

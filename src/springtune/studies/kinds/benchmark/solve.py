@@ -106,6 +106,11 @@ class LoadedBeam:
         return LOADS[self.load].kind
 
     @property
+    def sheet(self):
+        """Material with the constants that the beam has in its plane."""
+        return self.material.in_plane
+
+    @property
     def side(self):
         """Coordinate of the loaded side [m], axis of that coordinate, axis of the force."""
         return self.kind.loaded.place(self.beam.length, self.beam.height), self.kind.normal, self.kind.axis
@@ -379,7 +384,7 @@ def curves(scene, size, most_seconds):
 def _curves(alarm, scene, size):
     mesh = MESH_TYPES["structured"](scene.beam.length, scene.beam.height, size)
     pattern = weights(mesh, scene.kind)
-    membrane = scene.material.young_modulus * scene.beam.thickness
+    membrane = scene.sheet.young_modulus * scene.beam.thickness
 
     def problem():
         return Sheet(mesh, scene.beam.thickness).problem(scene.kind, Springs(1.0, uniform(mesh)))

@@ -41,6 +41,7 @@ def _of_runs(cell):
 
 
 SCENE_AND_PROGRAM = {
+    "engine_version": (("engine",), "1", "versions of what the engine needs, as it was run", ""),
     "scene_beam": (("scene",), "1", "beam", ""),
     "scene_mesh_type": (("scene",), "1", "mesh type", ""),
     "scene_mesh_size": (("scene",), "m", "asked length of an edge", np.nan),
@@ -50,15 +51,8 @@ SCENE_AND_PROGRAM = {
     "program": (("engine",), "1", "program that the engine is of", ""),
 }
 
-IN_BOTH = (
-    OF_NETWORK
-    | {"engine_version": (("engine",), "1", "versions of what the engine needs, as it was run", "")}
-    | SCENE_AND_PROGRAM
-)
+IN_BOTH = OF_NETWORK | SCENE_AND_PROGRAM
 """Variables of both groups."""
-
-_FLAGS = {"flag_values": np.arange(len(RUN_ENDS), dtype="int8"), "flag_meanings": " ".join(RUN_ENDS)}
-END_FLAGS = {"engine_status": _FLAGS}
 
 ENGINE_DIMENSIONS: dict[str, str | tuple[str, str]] = {
     "scene": "scene in engines",
@@ -76,8 +70,17 @@ BEST = {
     "best_factor_message": (OF_A_RUN, "1", "why no factor is the best", ""),
 }
 
+END_FLAGS = {
+    "engine_status": {"flag_values": np.arange(len(RUN_ENDS), dtype="int8"), "flag_meanings": " ".join(RUN_ENDS)}
+}
+
 ENGINE_RUNS = Group("/engines", _of_runs(OF_A_RUN) | IN_BOTH, ENGINE_DIMENSIONS, further=END_FLAGS)
-ENGINE_CURVES = Group("/engine_curves", _of_runs(OF_A_CURVE) | BEST | IN_BOTH, ENGINE_DIMENSIONS, further=END_FLAGS)
+ENGINE_CURVES = Group(
+    "/engine_curves",
+    _of_runs(OF_A_CURVE) | BEST | IN_BOTH,
+    ENGINE_DIMENSIONS,
+    further=END_FLAGS,
+)
 
 
 def groups(study, folder):
@@ -101,7 +104,7 @@ def _gathered(group, study, found):
         curves[tuple(labels[name] for name in OF_A_RUN)].append((labels["stiffness_factor"], result))
     for setting, points in curves.items() if group is ENGINE_CURVES else ():
         filler.put(_best(points), **dict(zip(OF_A_RUN, setting)))
-    return filler.data.set_coords([*SCENE_AND_PROGRAM])
+    return filler.data.set_coords([name for name in SCENE_AND_PROGRAM if name != "engine_version"])
 
 
 def _best(points):
@@ -114,8 +117,8 @@ def _best(points):
             found.append(1 / ((1 - share) / below + share / above))
     if found:
         return {"best_factor": min(found, key=lambda factor: abs(np.log(factor)))}
-    if len(known) < 2:
-        return {"best_factor_message": f"{len(known)} of {len(points)} runs are at rest, and two are needed"}
-    factor, error = min(known, key=lambda one: abs(one[1]))
-    said = f"no factor from {known[0][0]:g} to {known[-1][0]:g} is right; {factor:g} is off by {100 * error:+.3g} %"
+    said = f"{len(known)} of {len(points)} runs are at rest, and two are needed"
+    if len(known) > 1:
+        factor, error = min(known, key=lambda one: abs(one[1]))
+        said = f"no factor from {known[0][0]:g} to {known[-1][0]:g} is right; {factor:g} is off by {100 * error:+.3g} %"
     return {"best_factor_message": said}

@@ -17,31 +17,8 @@ from springtune.registry import imported
 from springtune.springs import DEFINITIONS
 from springtune.springs.lattice import COEFFICIENT
 
-from ...config.checks import (
-    FEWER,
-    MOST_CELLS,
-    check_able,
-    check_beam_material,
-    check_density,
-    check_known,
-    check_particles,
-    check_product,
-)
-from ...config.fields import (
-    BeamName,
-    DefinitionName,
-    Force,
-    Length,
-    Load,
-    MaterialName,
-    Named,
-    OneOrMore,
-    Ratios,
-    Scalar,
-    number,
-    one_of,
-    quantity,
-)
+from ...config import checks, fields
+from ...config.fields import OneOrMore, Scalar, number, one_of
 from ...config.kind import Kind
 from ...config.sections import Section, default, optional
 from ...runs.keys import beam_key, declared_key, definition_key, distribution, installed, material_key, mesh_type_key
@@ -55,6 +32,9 @@ MOST_ENGINE_RUNS = 10_000
 OF_RUNS = ("definition", "engine", *SETTING, "stiffness_factor")
 """What a set of runs lists values of, besides scenes."""
 
+OF_STUDY = ("scene", "program", "of_curve")
+"""What a run's result does not depend on."""
+
 OWN_PRECISION = "own"
 """The first precision of each engine."""
 
@@ -63,7 +43,7 @@ def _read_frame(value: str) -> float:
     above, slash, below = value.strip().removesuffix("s").strip().partition("/")
     if slash and above.isdecimal() and below.isdecimal() and int(above) and int(below):
         return int(above) / int(below)
-    found: float = quantity("time").read(value)
+    found: float = fields.quantity("time").read(value)
     return found
 
 
@@ -82,19 +62,19 @@ SceneName = Annotated[str, Scalar(str, {"type": "string"}, "the name of a scene"
 class EngineSceneConfig(Section):
     """A scene that is run in engines."""
 
-    beam: BeamName = Field(description="Beam.")
+    beam: fields.BeamName = Field(description="Beam.")
     mesh_type: MadeType = default("right", description="Generated mesh type.")
-    mesh_size: Length = Field(description="Length of an edge.")
-    material: MaterialName = Field(description="Material, with a density.")
-    load: Load = Field(description="Load whose forces keep their direction.")
-    force: Force = Field(description="Magnitude of the force.")
+    mesh_size: fields.Length = Field(description="Length of an edge.")
+    material: fields.MaterialName = Field(description="Material, with a density.")
+    load: fields.Load = Field(description="Load whose forces keep their direction.")
+    force: fields.Force = Field(description="Magnitude of the force.")
 
 
 class EngineRunsConfig(Section):
     """Runs in engines: every combination of the values listed, as in a grid."""
 
     scene: Annotated[list[SceneName], OneOrMore()] | None = Field(None, description="Scenes; all of them without.")
-    definition: Annotated[list[DefinitionName], OneOrMore()] = Field(
+    definition: Annotated[list[fields.DefinitionName], OneOrMore()] = Field(
         description="Definitions that derive a stiffness and need no reference. An engine that lacks an energy of one "
         "refuses it, in a hole that says so."
     )
@@ -109,7 +89,7 @@ class EngineRunsConfig(Section):
     precision: Annotated[list[Precision], OneOrMore()] = default(
         OWN_PRECISION, description="Floating-point numbers; `own` is what an engine has by itself."
     )
-    stiffness_factor: Ratios = default(
+    stiffness_factor: fields.Ratios = default(
         "1",
         description="Factors on all stiffnesses that are typed; several give a sensitivity curve in the engine, and "
         "the factor at which its displacement is right.",
@@ -119,8 +99,8 @@ class EngineRunsConfig(Section):
 class EnginesConfig(Section):
     """Scenes in the engines that people run, at the settings that they run them at."""
 
-    scenes: Annotated[dict[str, EngineSceneConfig], Named("scene")] = Field(description="Scenes.")
-    runs: Annotated[dict[str, EngineRunsConfig], Named("set of runs", for_files=False)] = Field(
+    scenes: Annotated[dict[str, EngineSceneConfig], fields.Named("scene")] = Field(description="Scenes.")
+    runs: Annotated[dict[str, EngineRunsConfig], fields.Named("set of runs", for_files=False)] = Field(
         description="Sets of runs."
     )
     frames: Count | None = Field(None, description="Most frames of a run; by default as many as its motion needs.")
@@ -173,24 +153,24 @@ def _check(config, problems):
             if engine not in engines:
                 problems.add((*place, "engine"), f"unknown engine '{engine}'; {nearest(engine, engines)}")
         for one in runs.scene or section.scenes:
-            check_known(problems, (*place, "scene"), "scene", one, section.scenes, "engines.scenes")
+            checks.check_known(problems, (*place, "scene"), "scene", one, section.scenes, "engines.scenes")
             if one in section.scenes:
                 scene = section.scenes[one]
                 corners, uniaxial = MESH_TYPES[scene.mesh_type].corners, LOADS[scene.load].kind.uniaxial
                 why = f"needs a reference or a stated stiffness, or other cells or loads than scene '{one}' has;"
-                check_able(problems, (*place, "definition"), runs.definition, why, corners, uniaxial)
-        check_product(problems, runs, place, OF_RUNS, MOST_ENGINE_RUNS)
+                checks.check_able(problems, (*place, "definition"), runs.definition, why, corners, uniaxial)
+        checks.check_product(problems, runs, place, OF_RUNS, MOST_ENGINE_RUNS)
     lists = [{value for runs in section.runs.values() for value in getattr(runs, name)} for name in OF_RUNS]
     cells = len(section.scenes) * prod(map(len, lists))
-    if cells > MOST_CELLS:
-        message = f"{cells:.3g} cells of all labels together; a dataset has at most {MOST_CELLS}: {FEWER}"
+    if cells > checks.MOST_CELLS:
+        message = f"{cells:.3g} cells of all labels together; a dataset has at most {checks.MOST_CELLS}: {checks.FEWER}"
         problems.add(("engines", "runs"), message)
 
 
 def _check_scene(scene, place, config, problems):
-    check_known(problems, (*place, "beam"), "beam", scene.beam, config.beams)
-    check_beam_material(problems, (*place, "material"), scene.material, config)
-    check_density(config, scene.material, (*place, "material"), problems)
+    checks.check_known(problems, (*place, "beam"), "beam", scene.beam, config.beams)
+    checks.check_beam_material(problems, (*place, "material"), scene.material, config)
+    checks.check_density(config, scene.material, (*place, "material"), problems)
     if LOADS[scene.load].follower:
         able = ", ".join(name for name, load in LOADS.items() if not load.follower)
         message = f"'{scene.load}' turns with its side, and forces in engines do not; choose of {able}"
@@ -201,7 +181,7 @@ def _check_scene(scene, place, config, problems):
         if refusal:
             problems.add((*place, "mesh_size"), f"{1e3 * scene.mesh_size:g} mm {refusal}")
         else:
-            check_particles(problems, (*place, "mesh_size"), [scene.mesh_size], *extent)
+            checks.check_particles(problems, (*place, "mesh_size"), [scene.mesh_size], *extent)
 
 
 def _expand(config, declared):
@@ -245,8 +225,7 @@ def _tasks(study):
     """Runs of an engine follow each other in one job, since their seconds are measured."""
     for run in study.parts["engines"]:
         engine = _engines()[run.engine]
-        of_task = (*OF_RUNS, "mesh_type", "mesh_size", "load", "force", "frames", "tolerance")
-        values = {name: getattr(run, name) for name in of_task}
+        values = {name: value for name, value in vars(run).items() if name not in OF_STUDY}
         values |= {"beam": beam_key(run.beam), "material": material_key(run.material, density=True)}
         values["engine_version"] = _version(engine)
         also = mesh_type_key(run.mesh_type), definition_key(run.definition), declared_key(engine)
@@ -257,11 +236,9 @@ def _tasks(study):
 
 
 COSTS = {
-    "engines": (0.2, 1e-5),
+    "engines": (0.2, 5e-6),
     "engines springtune": (0.1, 2e-6),
     "engines newton": (1.0, 2e-5),
-    "engines mujoco": (0.2, 5e-6),
-    "engines pybullet": (0.2, 5e-6),
 }
 """Seconds of a run by program, and by particles, substeps and iterations."""
 

@@ -59,15 +59,15 @@ VIEWS = (
 )
 
 ENGINE_COLUMNS = {
-    "dt_ms": ("dt", 1e3),
-    "displacement_mm": ("displacement", 1e3),
-    "reference_mm": ("reference_displacement", 1e3),
-    "error_percent": ("error", 100),
-    "definition_error_percent": ("definition_error", 100),
-    "solver_error_percent": ("solver_error", 100),
-    "frame_ms": ("frame_seconds", 1e3),
+    "dt": ("dt_ms", 1e3),
+    "displacement": ("displacement_mm", 1e3),
+    "reference_displacement": ("reference_mm", 1e3),
+    "error": ("error_percent", 100),
+    "definition_error": ("definition_error_percent", 100),
+    "solver_error": ("solver_error_percent", 100),
+    "frame_seconds": ("frame_ms", 1e3),
 }
-"""Columns of the table: variable, and factor on it."""
+"""Columns of the table by variable, and the factor on it."""
 
 
 def tables(tree: "xr.DataTree") -> list[dict[str, Any]]:
@@ -78,13 +78,11 @@ def tables(tree: "xr.DataTree") -> list[dict[str, Any]]:
     if "engines" not in tree:
         return []
     data = tree["engines"].to_dataset()
-    names = [name for name, _ in ENGINE_COLUMNS.values() if name in data.data_vars]
-    rows = [
-        {name: one[name] for name in ("scene", "definition", "engine", "precision", "substeps", "iterations")}
-        | {column: factor * one[name] for column, (name, factor) in ENGINE_COLUMNS.items()}
-        | {"end": RUN_ENDS[int(one["engine_status"])], "why": one["message"]}
-        for one in records(data, data.status != 0, (*names, "engine_status", "message"))
-    ]
+    rows = []
+    for one in records(data, data.status != 0, [*{*ENGINE_COLUMNS, "message", "engine_status"} & {*data.data_vars}]):
+        row = {name: one[name] for name in ("scene", "definition", "engine", "precision", "substeps", "iterations")}
+        row |= {column: factor * one[name] for name, (column, factor) in ENGINE_COLUMNS.items() if name in one}
+        rows.append(row | {"end": RUN_ENDS[one["engine_status"]], "why": one["message"]})
     note = (
         "Displacement of the load where it rests in an engine, beside finite elements. The error is that of the "
         "definition, which its network has in equilibrium, and what the engine's solver adds at this setting."

@@ -2,7 +2,7 @@
 
 from functools import lru_cache
 
-from springtune.engines.base import ENGINES, EngineAbsentError, EngineError, Setting
+from springtune.engines.base import ENGINES, EngineAbsentError, EngineError
 from springtune.engines.run import in_engine
 from springtune.problem.compare import deformation_error
 from springtune.problem.geometry import Beam
@@ -12,7 +12,7 @@ from springtune.reference.small_strain import ReferenceNotConvergedError
 from springtune.scene.meshes import make_mesh
 from springtune.scene.single import Scene
 
-from . import RUN_ENDS
+from . import RUN_ENDS, SETTING
 
 OUR_PROGRAM = "springtune"
 """Program of the engines whose errors are errors of this package."""
@@ -30,10 +30,9 @@ def solve(task):
     """Result of a run; what an engine refuses, or fails in, is a hole with a reason."""
     body = Beam(**task["beam"]), material_of(task["material"])
     scene, known, objection = _scene(*body, *(task[name] for name in OF_THE_SCENE))
-    engine, setting = ENGINES[task["engine"]], (task["dt"], task["substeps"], task["iterations"], task["precision"])
+    engine, how = ENGINES[task["engine"]], {name: task[name] for name in (*SETTING, "frames", "tolerance")}
     try:
-        how = {"factor": task["stiffness_factor"], "frames": task["frames"], "tolerance": task["tolerance"]}
-        found = in_engine(scene, engine.name, Setting(*setting), **how)
+        found = in_engine(scene, engine.name, factor=task["stiffness_factor"], **how)
     except EngineError as error:
         end = "absent" if isinstance(error, EngineAbsentError) else "refused"
         return known | failed(task, str(error), end)
@@ -43,25 +42,23 @@ def solve(task):
         if engine.program == OUR_PROGRAM:
             raise
         return known | failed(task, f"{engine.name}: {type(error).__name__}: {error}")
-    at_rest = found.status == "rest"
-    result = {
-        "status": Status.SOLVED if at_rest else Status.NOT_CONVERGED,
+    result = known | {
+        "status": Status.NOT_CONVERGED,
         "engine_status": RUN_ENDS.index(found.status),
         "message": "; ".join(filter(None, (found.message, objection))),
-        "displacement" if at_rest else "last_displacement": found.displacement,
-        "swing": found.swing,
-        "frames": found.frames,
-        "frame_seconds": found.frame_seconds,
         "engine_version": task["engine_version"],
     }
-    if at_rest:
-        reference = known["reference_displacement"]
-        result |= {
-            "residual": found.residual,
-            "error": float(deformation_error(found.displacement, reference)),
-            "solver_error": (found.displacement - known["network_displacement"]) / abs(reference),
-        }
-    return known | result
+    result |= {name: getattr(found, name) for name in ("swing", "frames", "frame_seconds")}
+    if found.status != "rest":
+        return result | {"last_displacement": found.displacement}
+    reference = known["reference_displacement"]
+    return result | {
+        "status": Status.SOLVED,
+        "displacement": found.displacement,
+        "residual": found.residual,
+        "error": float(deformation_error(found.displacement, reference)),
+        "solver_error": (found.displacement - known["network_displacement"]) / abs(reference),
+    }
 
 
 @lru_cache(maxsize=8)

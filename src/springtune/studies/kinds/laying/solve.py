@@ -36,8 +36,8 @@ def solve(task):
     made = {
         "strip": Strip(**task["strip"]),
         "trapezoid": Trapezoid(**task["trapezoid"]),
-        "material": material_of(task["material"]),
-        "support": material_of(task["support"]),
+        "material": material_of(task["material"]).in_plane,
+        "support": material_of(task["support"]).in_plane,
         "size": task["mesh_size"],
     }
     try:

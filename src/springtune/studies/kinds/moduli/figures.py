@@ -46,17 +46,8 @@ def _main(root, names, selection):
 
 def _by_mesh_type(ax, present, title, draw):
     """A panel a mesh type; `draw` returns ends of lines for their names, a note, and what to say without lines."""
-    types = labels_of(present, "mesh_type")
-    columns = min(2, max(1, len(types)))
-    figure, axes, flat, height = style.multiples(ax, len(types), columns, 1.95)
-    title = labels.wrapped(title, (style.PAGE if columns > 1 else style.COLUMN) - 0.1, 8.5)
-    place = {"left": 0.5, "right": 0.06, "bottom": 0.4, "top": 0.36 + 0.14 * labels.lines_of(title), "down": 0.68}
-    style.arrange(figure, axes, across=0.5, title=title, **place)
-    drawn = {panel: draw(panel, name) for panel, name in zip(flat, types)}
-    for panel, name in zip(flat, types):
-        panel.set_title(name)
-    labels.finish(figure, axes, place | {"across": 0.1, "title": title}, drawn, height if ax is None else 0.0)
-    return flat
+    names = {name: name for name in labels_of(present, "mesh_type")}
+    return labels.small_multiples(ax, names, 2, 1.95, title, draw)
 
 
 def _statuses(flags):

@@ -63,7 +63,7 @@ def _expand(config, declared):
     for grid in config.grids.values():
         if grid.moduli:
             derived = [name for name in grid.definition if DEFINITIONS[name].needs != "stiffness"]
-            own = (declared.materials[name].poisson_ratio for name in grid.material)
+            own = (declared.materials[name].in_plane.poisson_ratio for name in grid.material)
             ratios = dict.fromkeys(grid.poisson_ratio or own)
             found |= dict.fromkeys(product(derived, grid.mesh_type, grid.mesh_size, ratios))
     if not found:

@@ -1,6 +1,6 @@
 """Stage `moduli`: effective moduli of definitions on patches, for E = 1 and t = 1."""
 
-from springtune.problem.materials import Material
+from springtune.problem.materials import InPlane, Material
 from springtune.problem.status import Status
 from springtune.scene.moduli import MeshModuli
 from springtune.springs import DefinitionError
@@ -16,7 +16,8 @@ def prepare(patch, content):
 def solve(task, moduli):
     """Errors of E and G [1], effective Poisson's ratio, and what the definition cost; or why there are none."""
     try:
-        found = moduli(Material(1.0, task["poisson_ratio"]), task["definition"])
+        made = Material if task["poisson_ratio"] <= 0.5 else InPlane  # as of materials in plane strain alone
+        found = moduli(made(1.0, task["poisson_ratio"]), task["definition"])
     except DefinitionError as error:
         return {"status": Status.FAILED, "message": f"{task['definition']}: {error}"}
     return {

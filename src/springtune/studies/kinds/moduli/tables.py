@@ -8,7 +8,7 @@ import xarray as xr
 from springtune.safe_io.atomic import write_text
 
 from ...output.dataset import STATUS, most_requested
-from ...output.selection import records, unswept
+from ...output.selection import in_plane_ratio, records, unswept
 from ...output.text import cell_number, csv_text, markdown_section, markdown_table
 from ..scenes.variables import SCENE
 from .outputs import TABLES
@@ -137,7 +137,7 @@ def _beyond(root):
 def _materials(root, beam):
     """Materials by Poisson's ratio: nearest to 0.3, and the largest one, of those with most scenes."""
     requested = (root.status.sel(beam=beam) != 0).any(["mesh_type", "mesh_size", "definition", "kinematics"])
-    counts, ratios = requested.sum("load").values, root.material_poisson_ratio.values
+    counts, ratios = requested.sum("load").values, in_plane_ratio(root).values
     found = np.flatnonzero(counts == counts.max())
     chosen = {found[np.argmin(np.abs(ratios[found] - 0.3))], found[np.argmax(ratios[found])]}
     return {float(ratios[i]): str(root.material.values[i]) for i in sorted(chosen, key=lambda i: ratios[i])}

@@ -14,7 +14,7 @@ from springtune.problem.loads import LOADS
 from springtune.problem.materials import Material
 from springtune.springs import DEFINITIONS
 
-from ...config.checks import check_able, check_beam_material, check_known, check_particles
+from ...config.checks import check_able, check_beam_material, check_compressible, check_known, check_particles
 from ...config.fields import (
     BeamName,
     DefinitionName,
@@ -150,6 +150,8 @@ def _check(config, problems):
             problems.add((*path, "most"), f"{section.most} is below 'points', {section.points}; give at least as many")
         ends = _ends(section, path, problems)
         sizes = {"mesh_size": section.mesh_size} if section.mesh_size else {}
+        if section.parameter == "poisson_ratio" and 0.5 in ends:
+            check_compressible(problems, (*path, "to"), section.material, config)
         if section.parameter == "mesh_size":
             sizes = dict(zip(("from", "to"), ends))
         if section.beam in config.beams:

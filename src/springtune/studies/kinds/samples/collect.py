@@ -142,6 +142,7 @@ def _put_load(load, sample, filler, drawn, results, folder):
     """Put references, networks, their errors, and the uniform stiffness without an error under a load."""
     kind, sign, is_linear = LOADS[load].kind, LOADS[load].sign, sample.kinematics == "linear"
     body, softness = SimpleNamespace(**drawn), COEFFICIENT * (drawn["young_modulus"] * drawn["thickness"])
+    body.in_plane = body  # sheets of samples are in plane stress
     answers, why = _answers(sample, drawn, folder, kind, drawn["length"] / drawn["height"])
     length, scale = unit_scales(body, body, kind)
     force = sign * drawn["force"]

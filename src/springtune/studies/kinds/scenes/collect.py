@@ -23,7 +23,7 @@ from .stored import PACKED, fields_key, unpacked
 from .variables import BLOCK, CELL, FIELDS, FINITE_STRAIN, OF_PRINT, ROOT, SENSITIVITY, fields_of, swept
 
 SMALL_STRAIN = "small-strain-plane-stress"
-"""Name of the reference that all studies have."""
+"""Name of the reference that all studies have, where all materials are in plane stress."""
 
 FACE_VARIABLES = {
     "displacement": "face_displacement",
@@ -68,6 +68,8 @@ def _bodies(study, root):
         labels = {name: getattr(material, name) for name in ("young_modulus", "poisson_ratio")}
         values = labels | {"density": np.nan if material.density is None else material.density}
         root.put({f"material_{name}": value for name, value in values.items()}, material=material.name, **labels)
+        if study.plane_strain:
+            root.put({"material_plane": material.plane}, material=material.name)
         if isinstance(material, Rubber):
             fits[material.name] = material
     if fits:
@@ -216,9 +218,17 @@ def _sensitivity(study, folder, displacements, axes):
     return curves.data
 
 
+def small_strain(study):
+    """Name of the reference of small strain, by the planes of the materials."""
+    planes = {one.material.plane for one in study.references}
+    if planes == {"strain"}:
+        return "small-strain-plane-strain"
+    return "small-strain" if "strain" in planes else SMALL_STRAIN
+
+
 def _block(study, folder, axes):
     """Group of pressed faces with all references and, so far, no scenes."""
-    kinds = (SMALL_STRAIN, *study.further_references)
+    kinds = (small_strain(study), *study.further_references)
     block = Filler(swept(BLOCK, study).empty(axes | {"reference": kinds, "face_position": tuple(FACE_POSITIONS)}))
     for one in study.references:
         for kind in kinds if LOADS[one.load].kind.pressed else ():
@@ -255,7 +265,7 @@ def _face_reference(study, folder, one, kind):
     """Middle, mean and profile of a pressed face of a reference."""
     from scipy.interpolate import CubicSpline  # here: only pressed faces need it
 
-    if kind == SMALL_STRAIN:
+    if kind not in study.further_references:
         result, scale = _reference(study, folder, one, ["x", "displacements"]), one.force
         if "x" in result:
             result |= {"positions": result["x"] / one.beam.length, "profile": result["displacements"][:, -1, 1]}

@@ -8,7 +8,18 @@ from springtune.problem.parameters import with_unit
 from ...config.kind import distinct
 from ...output import labels, style
 from ...output.drawing import BEYOND_SMALL_STRAIN, extent, fitted, in_words, largest, magnification, plane, spring_ends
-from ...output.selection import at, cells, choose, group, labelled_beam, labels_of, last_swept, own_law, shown_swept
+from ...output.selection import (
+    at,
+    cells,
+    choose,
+    group,
+    in_plane_ratio,
+    labelled_beam,
+    labels_of,
+    last_swept,
+    own_law,
+    shown_swept,
+)
 from .outputs import SCENE_LABELS, SENSITIVITY_LABELS
 
 # -- sensitivity curves ------------------------------------------------------------------------------------------------
@@ -490,7 +501,7 @@ def _stiffness(panel, curves, root):
 
 
 def _membrane(curves):
-    """E t of the sheet [N/m]."""
+    """E t of the sheet [N/m], in plane strain E t / (1 - nu^2)."""
     return np.nanmax((curves.stiffness / curves.stiffness_ratio).values, initial=0.0)
 
 
@@ -504,9 +515,10 @@ def _marks(panel, curves, root):
             printed = "paper_stiffness" in root and np.isfinite(root.paper_stiffness.values).any()
             marks[f"{'the paper’s' if printed else 'as stated'}: {stated[0]:.4g}"] = stated[0]
     if str(root.mesh_type.values) == "structured" and middle > 0:
-        marks[f"√3/2 E t: {middle:.4g}"] = middle
+        strained = "material_plane" in root and root.material_plane == "strain"
+        marks[f"√3/2 {'E/(1−ν²)' if strained else 'E'} t: {middle:.4g}"] = middle
         # Held sideways, a sheet's modulus is E / (1 - nu^2), and that of a network, whose nu is 1/3, 9/8 E.
-        held = middle / (1 - float(root.material_poisson_ratio) ** 2) / (9 / 8)
+        held = middle / (1 - float(in_plane_ratio(root)) ** 2) / (9 / 8)
         if abs(held / middle - 1) > 0.02:
             marks[f"of a held block: {held:.4g}"] = held
     low, high = panel.get_xlim()

@@ -102,7 +102,9 @@ def _networks(study: Study) -> int:
     for scene in study.scenes:
         uniform = DEFINITIONS[scene.definition].uniform
         held = LOADS[scene.load].kind.held
-        found.add((scene.mesh, held, "uniform" if uniform else (scene.definition, scene.material.poisson_ratio)))
+        found.add(
+            (scene.mesh, held, "uniform" if uniform else (scene.definition, scene.material.in_plane.poisson_ratio))
+        )
     return len(found)
 
 

@@ -319,7 +319,7 @@ def solved_keys(study, mesh, calibration):
 
 def stiffnesses(study, curve):
     """Stiffnesses of a sensitivity curve [N/m], ascending."""
-    membrane = curve.material.young_modulus * curve.mesh.beam.thickness
+    membrane = curve.material.in_plane.young_modulus * curve.mesh.beam.thickness
     return [ratio * membrane for ratio in study.stiffness_ratios]
 
 

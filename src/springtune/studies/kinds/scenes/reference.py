@@ -16,7 +16,8 @@ from .unit_references import failed, make_interpolant, solve_unit_problem
 
 NOT_TESTED = "has no uniaxial_test, and so no law of Yeoh's: its references are neo-Hookean"
 OF_TESTED = "has a uniaxial_test, and so Yeoh's law: its reference is 'yeoh-plane-stress'"
-"""Why a material has no reference of the other law."""
+OF_PLANE_STRAIN = "is in plane strain: its reference is 'neo-hooke-plane-strain'"
+"""Why a material has no reference of another law or plane."""
 
 
 def run(content, costs):
@@ -56,6 +57,8 @@ def _finite(task):
     from springtune.reference.finite_strain import FiniteStrainError, solve_finite_strain
 
     beam, material, kind = Beam(**task["beam"]), material_of(task["material"]), LOAD_KINDS[task["load"]]
+    if material.plane == "strain" and task["plane"] == "stress":
+        return {"message": f"material {OF_PLANE_STRAIN}"}
     tested = isinstance(material, Rubber)
     if tested != (task["law"] == "yeoh"):
         return {"message": f"material {OF_TESTED if tested else NOT_TESTED}"}

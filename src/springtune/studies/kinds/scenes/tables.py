@@ -154,8 +154,8 @@ def _finite_strain(finite, root):
     note = (
         "Networks of nonlinear kinematics against finite elements of rubber: neo-Hookean ones, or of the law that is "
         "fitted to a uniaxial test. At finite strain an error holds the difference of two material laws, where "
-        "there are two; where a slender beam turns and hardly stretches, it does not. Networks are in plane "
-        "stress: an error against plane strain holds that difference, too."
+        "there are two; where a slender beam turns and hardly stretches, it does not. Networks are in the "
+        "plane of their material, plane stress by default: an error against the other one holds that difference, too."
     )
     lacking = [text for text in np.unique(finite.reference_message.values.astype(str)) if text]
     note += "".join(f" No reference: {text}." for text in lacking)

@@ -171,7 +171,11 @@ def swept(group: Group, study: "Study") -> Group:
             further[name] = [one for one in study.swept if OF_BODIES.get(one) == name]
         elif "load" in dimensions and not name.startswith(OF_PRINT):
             further[name] = [one for one in study.swept if one != "stiffness_scale" or "definition" in dimensions]
-    return group.over(further, without=["force"] if group is ROOT and "force" in study.swept else [])
+    found = group.over(further, without=["force"] if group is ROOT and "force" in study.swept else [])
+    if group is ROOT and study.plane_strain:
+        row = ("material",), "1", "plane of the material, 'stress' or 'strain'; its constants are those in 3-D", ""
+        found = replace(found, variables=found.variables | {"material_plane": row})
+    return found
 
 
 def fields_of(study: "Study") -> Group:

@@ -14,6 +14,7 @@ from ..scenes.collect import fields_on, put_outline, with_objection
 from ..scenes.stored import PACKED, fields_key, unpacked
 from ..scenes.variables import declared, topology
 from . import kind
+from .expand import law_of
 from .outputs import CASE_AXES, DRAWING, MESH_AXES, SCENE_AXES
 from .task_values import named, quantity_key
 
@@ -57,6 +58,23 @@ SHAPES = declared(
     further=dict.fromkeys(("value", "reference_value", "expected_value"), MIXED),
 )
 
+AT_FINITE_STRAIN = declared(
+    "/shapes_finite_strain",
+    {
+        (*CASE_AXES, "law", "quantity"): {
+            "reference_value": ("1", "quantity of interest, reference at finite strain"),
+            **shared.ESTIMATE_ROW,
+        },
+        (*CASE_AXES, "law"): shared.NO_REFERENCE_ROW,
+        (*SCENE_AXES, "quantity"): {
+            "error": ("1", "signed error against finite strain, (network - reference) / |reference|"),
+        },
+    },
+    dimensions=SHAPES.dimensions
+    | {"law": "law at finite strain: that of the material, or of St. Venant and Kirchhoff"},
+    further={"reference_value": MIXED},
+)
+
 SHAPE_FIELDS = declared(
     "/shape_fields",
     topology(("case",), "case")
@@ -93,7 +111,8 @@ def groups(study, folder):
         for one, key in keys.items():
             _scene(part, one, results[key], references, found)
     drawn = DRAWING in study.outputs and not study.part
-    return {SHAPES.name: found.data} | (_fields(study, folder) if drawn else {})
+    finite = {AT_FINITE_STRAIN.name: _finite_strain(study, part, folder, found.data.value)} if part.finite else {}
+    return {SHAPES.name: found.data} | finite | (_fields(study, folder) if drawn else {})
 
 
 def _quantities(part, found):
@@ -138,6 +157,34 @@ def _references(study, part, folder, found):
         found.put(values, **labels)
         answers[shape, material, load] = result, objections
     return answers
+
+
+def _finite_strain(study, part, folder, values):
+    """Group of references at finite strain, and the errors of the networks with their law."""
+    laws = tuple(dict.fromkeys(law for *_, law in part.finite))
+    found = Filler(AT_FINITE_STRAIN.empty(study.axes | {"law": laws}))
+    references = {}
+    for shape, material, load, law in part.finite:
+        result = store.read_one(
+            folder / "shape_references", kind.reference_task(part, shape, material, load, law)["key"]
+        )
+        labels, case = {"shape": shape, "material": material, "load": load}, part.shape[shape].loads[load]
+        references[shape, material, load, law] = result.get("values", {})
+        whys = (result["message"], *result.get("lacking", {}).values())
+        why = "; ".join(named(one, part.shape[shape], case) for one in whys if one)
+        found.put({"reference_message": why}, law=law, **labels)
+        for one in case.quantities:
+            key = quantity_key(one)
+            row = {"reference_value": result.get("values", {}).get(key, np.nan)}
+            row |= {"reference_error_estimate": result.get("error_estimates", {}).get(key, np.nan)}
+            found.put(row, law=law, quantity=one.name, **labels)
+    for one in part.scenes:
+        reference = references.get((one.shape, one.material, one.load, law_of(one)), {})
+        for quantity in part.shape[one.shape].loads[one.load].quantities if reference else ():
+            labels = vars(one) | {"quantity": quantity.name}
+            error = _error(float(values.sel(labels)), reference.get(quantity_key(quantity), np.nan))
+            found.put({"error": error}, **labels)
+    return found.data
 
 
 def _mesh(one, folder, found):

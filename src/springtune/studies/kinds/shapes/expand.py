@@ -49,6 +49,7 @@ class Shapes:
     parts: dict[str, dict[str, str]]
     scenes: tuple[ShapeScene, ...]
     referred: tuple[tuple[str, str, str], ...]
+    finite: tuple[tuple[str, str, str, str], ...]
     refined: dict[str, dict[str, float]]
 
     @cached_property
@@ -104,8 +105,8 @@ def shape_of_config(name, shape, folder):
 
 
 def _scenes(config):
-    """Scenes of all grids, and the cases that have a reference."""
-    found, referred = {}, {}
+    """Scenes of all grids, the cases that have a reference, and those with a law at finite strain that have one."""
+    found, referred, finite = {}, {}, {}
     for grid in config.shape_grids.values():
         for name in grid.shape:
             shape = config.shapes[name]
@@ -116,13 +117,26 @@ def _scenes(config):
                 if grid.reference:
                     referred[name, material, load] = None
                 for definition, kinematics in product(grid.definition, grid.kinematics):
-                    found[ShapeScene(name, *mesh, material, load, definition, kinematics)] = None
-    return found, referred
+                    one = ShapeScene(name, *mesh, material, load, definition, kinematics)
+                    found[one] = None
+                    if grid.finite_strain and law_of(one):
+                        finite[_finite(one)] = None
+    return found, referred, finite
+
+
+def _finite(one):
+    """Case of a scene's reference at finite strain."""
+    return one.shape, one.material, one.load, law_of(one)
+
+
+def law_of(one):
+    """Law at finite strain of a scene's network: a label of the dimension ``law``, or none."""
+    return DEFINITIONS[one.definition].law if one.kinematics == "nonlinear" else ""
 
 
 def expand(config, declared):
     """Shapes of a study that has any, see `springtune.studies.config.kind.Kind`."""
-    found, referred = _scenes(config)
+    found, referred, finite = _scenes(config)
     ranks = {
         name: {label: rank for rank, label in enumerate(labels)}
         for name, labels in (
@@ -151,6 +165,7 @@ def expand(config, declared):
         parts,
         tuple(scenes),
         tuple(dict.fromkeys(key for one in scenes for key in [(one.shape, one.material, one.load)] if key in referred)),
+        tuple(dict.fromkeys(key for one in scenes for key in [_finite(one)] if key in finite)),
         {name: dict(one.refined) for name, one in config.shapes.items()},
     )
 

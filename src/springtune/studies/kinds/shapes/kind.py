@@ -85,10 +85,11 @@ def _case(part, shape, material, name):
     return {"thickness": part.shape[shape].thickness, "load": load(case), "materials": materials}
 
 
-def reference_task(part, shape, material, name):
-    """Task of a reference."""
-    task = {"shape": _source(part.shape[shape])} | _case(part, shape, material, name)
-    code = stage_key("studies.kinds.shapes.reference", driver.DRIVER), _reader(part.shape[shape])
+def reference_task(part, shape, material, name, law=""):
+    """Task of a reference of small strain, or of a law at finite strain."""
+    task = {"shape": _source(part.shape[shape])} | _case(part, shape, material, name) | ({"law": law} if law else {})
+    without = () if law else ("reference.finite_shapes", "reference.finite_strain")
+    code = stage_key("studies.kinds.shapes.reference", driver.DRIVER, without=without), _reader(part.shape[shape])
     key = hash_of(task | {"shape": parameters(task["shape"])}, code)
     return {"key": key} | task
 
@@ -97,8 +98,9 @@ def scene_task(part, one, kept=()):
     """Task of a scene."""
     task = _case(part, one.shape, one.material, one.load)
     task |= {"definition": one.definition, "kinematics": one.kinematics}
-    # Scenes of shapes have no reference at finite strain.
-    code = stage_key("studies.kinds.shapes.solve", without=("reference.finite_strain",)), definition_key(one.definition)
+    # References of shapes have tasks of their own.
+    without = "reference.finite_shapes", "reference.finite_strain"
+    code = stage_key("studies.kinds.shapes.solve", without=without), definition_key(one.definition)
     key = hash_of(mesh_key(part, one), task, code)
     return {"key": key} | task | ({"keep_fields": True} if one in kept else {})
 
@@ -153,7 +155,7 @@ def _meshes(study, folder, members):
 
 def _reference_tasks(study):
     part = study.parts["shapes"]
-    for one in part.referred:
+    for one in (*part.referred, *part.finite):
         task = reference_task(part, *one)
         yield Task(task, costs=[("shape_reference", 0)], name="/".join(one), key=task["key"])
 
@@ -181,7 +183,7 @@ def pieces(study, costs, division):
     found = defaultdict(float)
     for one in part.scenes:
         found[one.shape, one.load] += _seconds(part, one, costs)
-    for shape, _, load in part.referred:
+    for shape, _, load, *_ in (*part.referred, *part.finite):
         found[shape, load] += costs.of("shape_reference")
     return division.of_section(found)
 
@@ -205,6 +207,7 @@ def of_shape_scenes(study: "Study", chosen: "Collection[object]") -> "Study":
         shapes=tuple(shape for shape in part.shapes if shape.name in names),
         scenes=scenes,
         referred=tuple(case for case in part.referred if case in cases),
+        finite=tuple(case for case in part.finite if case[:3] in cases),
     )
     return replace(study, parts=study.parts | {"shapes": found})
 
@@ -251,8 +254,9 @@ def _summary(part):
     quantities = sum(len(part.shape[shape].loads[load].quantities) for shape, load in cases)
     shapes = f"{len(part.shapes)} shape{'s' * (len(part.shapes) > 1)}"
     rows = [["shape scenes", len(part.scenes), f"of {shapes} on {len(meshes)} meshes, {quantities} quantities"]]
-    if part.referred:
-        rows.append(["shape references", len(part.referred), "finite elements on the shapes themselves"])
+    if part.referred or part.finite:
+        count = len(part.referred) + len(part.finite)
+        rows.append(["shape references", count, "finite elements on the shapes themselves"])
     return rows
 
 

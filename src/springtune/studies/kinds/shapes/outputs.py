@@ -83,6 +83,16 @@ VIEWS = (
         ),
     ),
     View(
+        "/shapes_finite_strain",
+        "Shapes at finite strain",
+        "Errors of networks that have a law at finite strain, against references of that law.",
+        (
+            Plot("error over mesh size", "error", "mesh_size", "definition", log="xy"),
+            Plot("errors of definitions by quantity", "error", "quantity", "definition", "map"),
+            Plot("quantities of the references", "reference_value", "load", "law"),
+        ),
+    ),
+    View(
         "/shape_fields",
         "Networks of shapes",
         "Positions and displacements of all particles, of each shape and load.",
@@ -117,10 +127,12 @@ def tables(tree: "xr.DataTree") -> list[dict[str, Any]]:
         row |= {"expected": one["expected_value"], "units": one["quantity_units"]}
         row |= {f"{error}_percent": 100 * one[error] for error in ERRORS_SHOWN}
         rows.append(row | {"status": STATUS[int(one["status"])], "message": one["message"]})
+    strained = tree.attrs.get("plane_strain")
     note = (
-        "Quantities of interest of the networks, in SI units; the reference is small-strain plane stress by converged "
-        "finite elements on the same shape, and errors are signed: (network − reference) / |reference|, and the same "
-        "against the expected values that others give."
+        "Quantities of interest of the networks, in SI units; the reference is small-strain plane stress "
+        f"{f'(plane strain of {strained}) ' if strained else ''}by converged finite elements on the same shape, and "
+        "errors are signed: (network − reference) / |reference|, and the same against the expected values that others "
+        "give."
     )
     told = "; ".join(sources)
     return [{"stem": "shapes", "title": "Shapes", "note": f"{note} Sources: {told}." if told else note, "rows": rows}]

@@ -368,6 +368,12 @@ class ShapeGridConfig(Section):
         "true",
         description="Whether there is a converged reference; else errors are those against `expected` values alone.",
     )
+    finite_strain: Flag = default(
+        "false",
+        description="Whether nonlinear scenes of 'neo-hooke', 'yeoh' and 'delingette' are also compared with a "
+        "reference of their law at finite strain. The group `/shapes_finite_strain` has it and the errors. Each takes "
+        "seconds.",
+    )
 
 
 NAMED_SHAPES = Annotated[dict[str, ShapeConfig], Named("shape")] | None

@@ -1,0 +1,187 @@
+r"""Reference for a shape at finite strain: each material by a law of its own, on the levels of `shapes`.
+
+Unknowns, supports, loads and quantities are those of `springtune.reference.shapes`, laws and Newton's method those of
+`springtune.reference.finite_strain`. Tractions and gravity keep their direction, pressures that follow turn and grow
+with their sides. A stress is a force over the length that it acts on now and the thickness at rest, as that of a
+network. The first level goes from rest in steps that are watched for snaps; each finer one begins at the last.
+"""
+
+from collections.abc import Mapping
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from ..mesh.groups import GroupedMesh
+from ..problem.materials import AnyMaterial, Material
+from ..problem.shapes import LoadCase, Shape
+from .finite_strain import Body, Law, Response, StVenant, law_of, matrix_of, strain_of
+from .shapes import Level, Problem, ShapeReference, inverse_of, solve_shape
+from .triangles import shape_functions, side_fit, side_functions, tabulated
+
+TOLERANCE = 1e-3
+"""Largest accepted relative error estimate."""
+
+
+def solve_finite_shape(
+    shape: Shape,
+    load: LoadCase,
+    materials: Mapping[str, AnyMaterial],
+    grouped: GroupedMesh | None = None,
+    law: str = "rubber",
+) -> ShapeReference:
+    """Solve for the displacements of a shape at finite strain, as `solve_shape`.
+
+    `law` is ``"rubber"``, by which isotropic materials have `law_of`, or ``"st-venant"``; anisotropic ones always have
+    that of St. Venant and Kirchhoff.
+    """
+    return solve_shape(shape, load, materials, grouped, TOLERANCE, _Levels(materials, law == "rubber"))
+
+
+class _Levels:
+    """Makes levels, each of which begins at the last one."""
+
+    def __init__(self, materials: Mapping[str, AnyMaterial], rubber: bool) -> None:
+        self.last: _FiniteLevel | None = None
+        self.laws: dict[str, tuple[float, Law]] = {}
+        for name, one in materials.items():
+            if rubber and isinstance(one, Material):
+                self.laws[name] = one.young_modulus, law_of(one)
+            else:
+                scale = float(one.plane_stress.max())
+                self.laws[name] = scale, StVenant(one.plane_stress / scale)
+
+    def __call__(self, problem: Problem, degree: int) -> "_FiniteLevel":
+        self.last = _FiniteLevel(problem, degree, self)
+        return self.last
+
+
+class _PartLaws:
+    """Laws of elements of several materials, which `parts` (elements,) number."""
+
+    def __init__(self, parts: np.ndarray, laws: Mapping[int, Law]) -> None:
+        self.rows = [(parts == number, law) for number, law in laws.items()]
+
+    def response(self, strain: np.ndarray) -> Response:
+        """As of `Law`."""
+        stress, tangent = np.empty(strain.shape), np.empty((*strain.shape, 3))
+        for rows, law in self.rows:
+            found = law.response(strain[rows])
+            stress[rows], tangent[rows] = found.stress, found.tangent
+        return Response(stress, tangent)
+
+    def energy(self, strain: np.ndarray) -> np.ndarray:
+        """As of `Law`."""
+        total = np.empty(strain.shape[:-1])
+        for rows, law in self.rows:
+            total[rows] = law.energy(strain[rows])
+        return total
+
+
+class _FiniteLevel(Level, Body):
+    """A shape solved at finite strain on one level.
+
+    One layer at corners: nearer to them strain grows without end, and a law that gives way when pressed has no
+    equilibrium.
+    """
+
+    most_layers = 1
+
+    def __init__(self, problem: Problem, degree: int, levels: _Levels) -> None:
+        self.levels = levels
+        super().__init__(problem, degree)
+
+    def _matrices(self) -> np.ndarray:
+        """None: tangents take their place."""
+        return np.empty(0)
+
+    def _solve(
+        self, matrices: np.ndarray, forces: np.ndarray, held: np.ndarray, prescribed: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, float]:
+        """Return coefficients and residual forces, shape (n_functions, 2), and the strain energy."""
+        problem, space = self.problem, self.space
+        _, weights, _, gradients = tabulated(space.degree, 2 * space.degree + (4 if space.curved.any() else 0))
+        jacobian, determinant = space.jacobians(gradients)
+        names = space.mesh.names
+        scales = np.array([self.levels.laws[name][0] if name in self.levels.laws else 0.0 for name in names])
+        parts = np.asarray(space.mesh.parts)
+        self.law = _PartLaws(parts, {one: self.levels.laws[names[one]][1] for one in np.unique(parts).tolist()})
+        self.nodes_of = space.numbers
+        self.gradients = np.einsum("qiu,equa->eqai", gradients, inverse_of(jacobian, determinant), optimize=True)
+        self.weights = weights * np.abs(determinant) * (problem.shape.thickness * scales)[parts][:, None]
+        self.held, self.given, self.turning = held, prescribed, self._turning()
+        self.load, self.extent = forces, float(np.ptp(space.mesh.points, axis=0).max())
+        moved = self._continued()
+        if moved is None:
+            moved, _ = self.moved(1.0, f"shape {problem.shape.name!r}, load {problem.load.name!r}")
+        gradient = self._gradient(moved)
+        strain = strain_of(gradient)
+        external = self.load + (self.turning @ moved.ravel()).reshape(-1, 2)
+        residual = self._forces(gradient, self.law.response(strain).stress) - external
+        return moved, residual, float((self.law.energy(strain) * self.weights).sum())
+
+    def _continued(self) -> np.ndarray | None:
+        """Equilibrium that Newton's method finds from that of the last level, if it is stable."""
+        space, last = self.space, self.levels.last
+        if last is None:
+            return None
+        start, n_points = np.zeros((space.n_functions, 2)), len(space.mesh.points)
+        start[:n_points] = last.displacements(space.mesh.points)
+        along, inverse = side_fit(space.degree)
+        values, _ = side_functions(space.degree, along)
+        inner = n_points + np.arange(len(space.edges) * len(along)).reshape(-1, len(along))
+        places = values @ space.places[np.concatenate([space.edges, inner], axis=1)]
+        there = last.displacements(places.reshape(-1, 2)).reshape(places.shape)
+        start[inner] = inverse @ (there - values[:, :2] @ start[space.edges])
+        found = self.equilibrium(start, 1.0)
+        return found[0] if found is not None and found[2] else None
+
+    @cached_property
+    def _slope(self) -> np.ndarray:
+        """Linear solution under the whole load."""
+        return Level._solve(self, Level._matrices(self), self.load, self.held, self.given)[0]
+
+    def _open(self, step: np.ndarray, moved: np.ndarray) -> float:
+        """What the last step changes, relative."""
+        return float(np.abs(step).max() / np.abs(moved).max())
+
+    def _turning(self) -> csr_array:
+        """Forces of pressures that follow, of displacements: they act across the sides as these are now."""
+        space, size = self.space, 2 * self.space.n_functions
+        total = csr_array((size, size))
+        for pressure in self.problem.load.pressures:
+            for ends, sense in self.group_sides(pressure.group) if pressure.follower else ():
+                along, weights = np.polynomial.legendre.leggauss(space.degree + 1)
+                values, slopes = side_functions(space.degree, along)
+                block = (
+                    values.T @ (weights[:, None] * slopes) * (-pressure.pressure * sense * self.problem.shape.thickness)
+                )
+                rows, columns = np.meshgrid(2 * space.on_side(ends), 2 * space.on_side(ends), indexing="ij")
+                for part, row, column in ((block, 0, 1), (-block, 1, 0)):
+                    places = (rows + row).ravel(), (columns + column).ravel()
+                    total = total + csr_array((part.ravel(), places), shape=(size, size))
+        return total
+
+    def _area_growth(self) -> np.ndarray:
+        """Growth of the areas of quadrature points [m2]."""
+        space = self.space
+        _, weights, _, gradients = tabulated(space.degree, 2 * space.degree)
+        slopes = np.einsum("eic,qiu->eqcu", self.field[space.numbers], gradients, optimize=True)
+        of_map = np.linalg.det(space.jacobians(gradients)[0])
+        return super()._area_growth() + np.linalg.det(slopes) * np.sign(of_map) * weights
+
+    def _stresses(self, found: np.ndarray, local: np.ndarray) -> np.ndarray:
+        """Forces over lengths as they are now and the thickness at rest [Pa], shape (n, 3)."""
+        _, gradients = shape_functions(self.space.degree, local)
+        numbers = self.space.numbers[found]
+        jacobian = np.einsum("pic,pia->pca", self.space.places[numbers], gradients)
+        slopes = np.einsum("pic,pia->pca", self.field[numbers], gradients) @ np.linalg.inv(jacobian)
+        names, parts = self.space.mesh.names, np.asarray(self.space.mesh.parts)[found]
+        total = np.empty((len(found), 3))
+        for part in np.unique(parts):
+            scale, law = self.levels.laws[names[part]]
+            rows = parts == part
+            total[rows] = scale * law.response(strain_of(slopes[rows])).stress
+        deformation = slopes + np.eye(2)
+        cauchy = deformation @ matrix_of(total) @ np.swapaxes(deformation, 1, 2)
+        return (cauchy / np.linalg.det(deformation)[:, None, None])[:, [0, 1, 0], [0, 1, 1]]

@@ -1,0 +1,132 @@
+"""Plane strain: closed forms of patches, lattices, rings and beams, and CalculiX."""
+
+import numpy as np
+import pytest
+
+import springtune as st
+from springtune.prediction.choices import references
+from springtune.problem.loads import AXIAL
+from springtune.problem.shapes import LoadCase, Pressure, Quantity, Segment, Shape, Support
+from springtune.reference.finite_strain import solve_finite_strain
+from springtune.reference.shapes import solve_shape
+
+BEAM = st.Beam("200 mm", "40 mm")
+STEEL = st.Material("210 GPa", 0.3, plane="strain", name="steel")
+LATTICE = st.Material("210 GPa", 0.25, plane="strain", name="lattice")
+
+
+def by_lame(material):
+    """Stiffness of Hooke's law in three dimensions without strain across."""
+    young, nu = material.young_modulus, material.poisson_ratio
+    first, shear = young * nu / ((1 + nu) * (1 - 2 * nu)), young / (2 * (1 + nu))
+    return np.array([[first + 2 * shear, first, 0], [first, first + 2 * shear, 0], [0, 0, shear]])
+
+
+@pytest.mark.parametrize("nu", [0.0, 0.25, 0.3, 0.49])
+def test_constants_in_the_plane_are_hookes_law_without_strain_across(nu):
+    """Saint-Venant and Kirchhoff's law takes the same stiffness, by Green's strains, and so its lambda of 3-D."""
+    material = st.Material(2.0, nu, plane="strain")
+    np.testing.assert_allclose(material.in_plane.plane_stress, by_lame(material), rtol=1e-12)
+    assert material.in_plane.in_plane == material.in_plane
+    assert st.Material(2.0, nu).in_plane == st.Material(2.0, nu)
+
+
+@pytest.mark.parametrize("name", ["delingette", "patch-fit", "energy-fit", "element-fit", "van-gelder"])
+def test_definitions_take_the_constants_of_the_plane(name):
+    mesh, sheet = st.make_mesh(BEAM, "free", "10 mm"), STEEL.in_plane
+    ours, alike = (st.DEFINITIONS[name].springs(mesh, one, 1e-3, given(name, mesh, one)) for one in (STEEL, sheet))
+    np.testing.assert_array_equal(ours.reference * ours.relative, alike.reference * alike.relative)
+
+
+def given(name, mesh, material):
+    from springtune.springs.identification import patch_cases
+
+    return patch_cases(mesh, material, 1e-3) if st.DEFINITIONS[name].needs else None
+
+
+def test_linear_triangles_have_the_moduli_of_plane_strain():
+    found = st.moduli(st.make_mesh(BEAM, "free", "10 mm"), STEEL, "delingette")
+    np.testing.assert_allclose(found.stiffness, by_lame(STEEL), rtol=1e-9, atol=1e-9 * 210e9)
+    assert abs(found.young_modulus_error) < 1e-9
+    assert found.poisson_ratio == pytest.approx(0.3 / 0.7)
+
+
+def equilateral(count, side):
+    """Parallelogram of equilateral triangles."""
+    i, j = np.divmod(np.arange((count + 1) ** 2), count + 1)
+    points = side * np.stack([i + 0.5 * j, np.sqrt(3) / 2 * j], axis=1)
+    low = np.flatnonzero((i < count) & (j < count))
+    right, up = low + count + 1, low + 1
+    return st.Mesh(points, np.concatenate([np.stack([low, right, up], 1), np.stack([right, right + 1, up], 1)]))
+
+
+def test_springs_alone_are_exact_at_a_ratio_of_one_quarter():
+    """On an equilateral lattice, whose area energy vanishes: K_A = lambda - G."""
+    mesh = equilateral(6, 0.005)
+    springs = st.DEFINITIONS["area"].springs(mesh, LATTICE, 1e-3)
+    assert springs.energies == ()
+    np.testing.assert_allclose(springs.reference, np.sqrt(3) / 2 * 224e9 * 1e-3)
+    found = st.moduli(mesh, LATTICE, "lattice")
+    assert abs(found.young_modulus_error) < 1e-9
+    assert abs(found.shear_modulus_error) < 1e-9
+    assert found.poisson_ratio == pytest.approx(1 / 3)
+    stiff = st.DEFINITIONS["area"].springs(mesh, STEEL, 1e-3)
+    lame = by_lame(STEEL)
+    np.testing.assert_allclose(stiff.reference * stiff.energies[0].modulus, (lame[0, 1] - lame[2, 2]) * 1e-3)
+
+
+def test_a_reference_is_that_of_calculix():
+    """8.62447 mm by 200 x 40 elements CPE8, which are too stiff at the corners of the clamp."""
+    scene = st.Scene(BEAM, st.make_mesh(BEAM, "structured", "5 mm"), STEEL, "traction", "400 kN", kinematics="linear")
+    assert 1e3 * scene.reference().displacement == pytest.approx(8.62447, rel=1e-4)
+
+
+def test_a_slender_beam_bends_by_the_modulus_of_the_plane():
+    beam = st.Beam("1000 mm", "10 mm")
+    found, known = (references(beam, one, ["bending"])["bending"].displacement for one in (STEEL, STEEL.in_plane))
+    assert found == known
+    thin = references(beam, st.Material("210 GPa", 0.3), ["bending"])["bending"].displacement
+    assert found / thin == pytest.approx(1 - 0.3**2, rel=2e-4)  # shear bends it, too
+
+
+def test_an_incompressible_material_and_an_unknown_plane_are_refused():
+    with pytest.raises(ValueError, match=r"'rubber' is 0.5: in plane strain .* such as 0.49, or plane 'stress'"):
+        st.Material("1 MPa", 0.5, plane="strain", name="rubber")
+    with pytest.raises(ValueError, match="plane: 'strian' is unknown; give 'stress' or 'strain'"):
+        st.Material("1 MPa", 0.3, plane="strian")
+
+
+def test_laws_of_rubber_with_a_free_thickness_are_refused():
+    """Also at nu = 1/3, where the constants in the plane are those of an incompressible sheet."""
+    mesh = st.make_mesh(BEAM, "structured", "10 mm")
+    with pytest.raises(st.DefinitionError, match="'steel' is in plane strain; choose 'delingette', or plane 'stress'"):
+        st.DEFINITIONS["neo-hooke"].springs(mesh, st.Material(1e6, 1 / 3, plane="strain", name="steel"), 1e-3)
+
+
+def test_a_ring_under_pressure_widens_as_lame_says():
+    """A quarter of a thick pipe; the mean of u cos over the bore is 2 / pi of the radial displacement."""
+    inner, outer, pressure = 0.01, 0.03, 1e6
+    corners = [(inner, 0.0), (outer, 0.0), (0.0, outer), (0.0, inner)]
+    centres, names = (None, (0.0, 0.0)) * 2, ("lower", "outer", "left", "bore")
+    sides = [Segment(at, centre=centre, group=name) for at, centre, name in zip(corners, centres, names)]
+    burst = LoadCase(
+        "burst",
+        (Support("lower", y=0.0), Support("left", x=0.0)),
+        pressures=(Pressure("bore", pressure),),
+        quantities=(Quantity("bore", "displacement", "bore", "x"),),
+    )
+    found = solve_shape(Shape("pipe", 1e-3, sides, loads={"burst": burst}), burst, {"": STEEL}).values["bore"]
+    young, nu, square = 210e9, 0.3, inner**2 / (outer**2 - inner**2)
+    widened = (1 + nu) / young * pressure * square * ((1 - 2 * nu) * inner + outer**2 / inner)
+    assert found == pytest.approx(2 / np.pi * widened, rel=1e-6)
+
+
+@pytest.mark.parametrize("force", [0.01, 8.0])
+def test_a_reference_at_finite_strain_takes_the_plane_of_its_material(force):
+    rubber = st.Material("1 MPa", 0.45, plane="strain")
+    ours = solve_finite_strain(BEAM, rubber, force, AXIAL)
+    asked = solve_finite_strain(BEAM, st.Material("1 MPa", 0.45), force, AXIAL, plane="strain")
+    assert ours.displacement == asked.displacement
+    if force < 1:
+        small = st.Scene(BEAM, st.make_mesh(BEAM, "right", "20 mm"), rubber, "traction", force).reference()
+        assert ours.displacement == pytest.approx(small.displacement, rel=1e-3)
