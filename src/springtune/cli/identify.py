@@ -1,19 +1,24 @@
 """Find a material's constants from measured tests."""
 
 import os
+import re
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from . import examples
+from . import WrongCall, examples
 from .options import asked_beam, refusals, shape_of_study
 
 if TYPE_CHECKING:
     from ..problem.materials import AnyMaterial
     from ..scene.identify import Identified
     from ..scene.measured import MeasuredTest
+
+ARGUMENT = re.compile("^(?=(law|known|load|force|scale|angle|noise):)")
+"""Begin of messages with the name of an argument, which is an option here."""
 
 KEYS = ("beam", "thickness", "shape", "load", "force", "scale", "angle", "noise", "shift", "file")
 """Keys of a test in a list of tests; all but the file are options, too."""
@@ -49,20 +54,27 @@ def identify(
     FILES are CSV files of one test, or YAML files with a list of tests, whose keys are the options and 'file'. Columns
     have units in their heads, such as 'force [N],displacement [mm]' or 'x [mm],y [mm],u [um],v [um]'.
     """
-    from ..scene.identify import LAWS
+    from ..scene.identify import SHEET_LAWS
     from ..scene.identify import identify as identified
 
     target = plot or write
-    with refusals("--plot" if plot else "--write", target):
+    for option, path, endings in (("--plot", plot, (".png", ".svg", ".pdf")), ("--write", write, (".yaml", ".yml"))):
+        if path is not None and path.suffix not in endings:
+            raise WrongCall(f"{option}: '{path}' has another ending than {', '.join(endings)}; give one of these")
+    with refusals("--plot" if plot else "--write", target, partial(ARGUMENT.sub, "--")):
         given = {name: _number(value) for name, _, value in (one.partition("=") for one in known)}
         rows = [row for path in files for row in _rows(path, options)]
-        if LAWS.get(law) == ():
+        if SHEET_LAWS.get(law) == ():
             found = identified(files[0] if len(files) == 1 else [], law)
         else:
             found = identified([_test(row) for row in rows], law, known=given)
         text = _study(found, rows[0], write) if write else ""
         if plot:
-            found.plot().figure.savefig(plot)
+            import matplotlib.pyplot as plt
+
+            found.plot()
+            plt.savefig(plot)
+            plt.close()
         if write:
             write.write_text(text)
     click.echo(found)
@@ -79,12 +91,17 @@ def _rows(path: Path, options: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Options of each test of a file, with paths from here: one of a CSV file, those of the list in a YAML file."""
     from yaml import YAMLError, safe_load
 
+    from ..safe_io.inputs import LARGEST_CSV, read
+
     if path.suffix not in (".yaml", ".yml"):
         return [{**options, "file": path}]
     try:
-        rows = [dict(row) for row in safe_load(path.read_text())["tests"].values()]
-    except (AttributeError, KeyError, TypeError, ValueError, YAMLError):
-        raise ValueError(f"{path}: is no list of tests; give 'tests:' and names, each with keys {KEYS}") from None
+        rows = [dict(row) for row in safe_load(read(path, LARGEST_CSV))["tests"].values()]
+    except (AttributeError, KeyError, TypeError, ValueError, YAMLError) as error:
+        raise ValueError(
+            f"{path}: is no list of tests ({type(error).__name__}: {error}); give 'tests:' and names, each with some "
+            f"of the keys {', '.join(KEYS)}"
+        ) from None
     for row in rows:
         if wrong := [key for key in row if key not in KEYS]:
             raise ValueError(f"{path}: a test has the key {wrong[0]!r}; known: {', '.join(KEYS)}")

@@ -79,7 +79,7 @@ class Family:
         return row.ravel()
 
     def at(self, points: np.ndarray) -> tuple[csr_array, np.ndarray]:
-        """Rows that read u and v at points (n, 2), one after the other, and the points' distances from the body [m]."""
+        """Rows that read u and v at points (n, 2) in turn, and distances from the body over its extent [1]."""
         space = self._level.space
         found, local = self._level._located(points)
         shares = np.column_stack([1 - local.sum(axis=1), local]).clip(0)
@@ -88,4 +88,5 @@ class Family:
         columns = (2 * space.numbers[found][:, None] + np.arange(2)[:, None]).reshape(2 * len(points), -1)
         rows = np.repeat(np.arange(len(columns)), columns.shape[1])
         shape = len(columns), 2 * space.n_functions
-        return csr_array((np.repeat(values, 2, axis=0).ravel(), (rows, columns.ravel())), shape=shape), apart
+        entries = np.repeat(values, 2, axis=0).ravel()
+        return csr_array((entries, (rows, columns.ravel())), shape=shape), apart / np.ptp(space.mesh.points)

@@ -1,8 +1,8 @@
 r"""Constants of a sheet from measured tests, with their uncertainty, and what the tests do not tell.
 
 Least squares of residuals over their noise, with exact derivatives (`springtune.reference.by_constants`). With
-residuals r and derivatives J, both over the noise and without shifts, the covariance of the unknowns is :math:`(J^T J)^{-1}`.
-Along a direction in which J vanishes the tests tell nothing.
+residuals r and derivatives J, both over the noise and without shifts, the covariance of the unknowns is
+:math:`(J^T J)^{-1}`. Along a direction in which J vanishes the tests tell nothing.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -24,7 +24,7 @@ from .measured import Block, MeasuredTest, blocks, stated
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-LAWS = {
+SHEET_LAWS = {
     "isotropic": ("E", "nu"),
     "orthotropic": ("E1", "E2", "nu12", "G12"),
     "regions": ("nu",),
@@ -33,20 +33,20 @@ LAWS = {
 }
 """Laws, and the names of their constants; regions have a modulus each, too, such as ``E core``."""
 
-RATIOS = ("nu", "nu12")
+POISSON_RATIOS = ("nu", "nu12")
 """Constants that are no moduli."""
 
-USUAL = 0.3
+ASSUMED_RATIO = 0.3
 """Poisson's ratio at which a search begins, and which is assumed where tests do not tell."""
 
 REMEDIES = {"G12": "add a test in shear, or of a coupon cut at 45 degrees", "E2": "add a coupon cut across"}
-REMEDIES |= dict.fromkeys(RATIOS, "add a transverse displacement or a field, or give it as known")
+REMEDIES |= dict.fromkeys(POISSON_RATIOS, "add a transverse displacement or a field, or give it as known")
 """What to add where a constant is not determined; for others a force."""
 
 NULL = 1e-7
 """Singular value of the scaled derivatives, over the largest, below which tests tell nothing along its direction."""
 
-WIDE = 0.5
+POOR = 0.5
 """Half of an interval from which on a constant is poorly determined: of a ratio, or relative."""
 
 MISFIT = 1.5
@@ -73,7 +73,7 @@ class Model:
 
     def values(self, unknowns: np.ndarray) -> np.ndarray:
         """Constants in SI units."""
-        ratio = np.isin(self.names, RATIOS)
+        ratio = np.isin(self.names, POISSON_RATIOS)
         return np.where(ratio, unknowns, np.exp(np.where(ratio, 0.0, unknowns)))
 
     def entries(self, unknowns: np.ndarray, angle: float) -> np.ndarray:
@@ -104,7 +104,7 @@ class Model:
                     value, slope = block.rows @ moved, block.rows @ derivatives
                 yield block.unshifted(block.factors * value), block.unshifted(block.factors[:, None] * slope)
 
-    def residuals(self, unknowns: np.ndarray, noise: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
+    def residuals(self, unknowns: np.ndarray, noise: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Residuals over the noise of each block, and their derivatives by the unknowns."""
         if "nu12" in self.names and unknowns[2] ** 2 > np.exp(unknowns[0] - unknowns[1]):  # not positive definite
             size = sum(len(block.values) for block in self.blocks)
@@ -170,14 +170,14 @@ class Identified(Tabled):
 
     def _rows(self) -> Iterator[tuple[str, str]]:
         for name, value in self.values.items():
-            size, unit = (1.0, "") if name in RATIOS else (1e9, " GPa") if value >= 1e9 else (1e6, " MPa")
+            size, unit = (1.0, "") if name in POISSON_RATIOS else (1e9, " GPa") if value >= 1e9 else (1e6, " MPa")
             low, high = (f"{one / size:.5g}" for one in self.intervals[name])
             text = f"{value / size:.5g}{unit}"
             if name in self.undetermined:
-                yield name, f"not determined; {text} is assumed"
+                yield name, f"not determined; {text} is assumed, also for the other intervals"
             else:
                 yield name, f"{text}, given" if low == "nan" else f"{text}, 95 %: {low} to {high}{unit}"
-        yield from ((f"noise of {name}", f"{noise:.3g}") for name, noise in self.noise.items())
+        yield from ((f"noise of {name}", f"{noise:.3g} in SI units") for name, noise in self.noise.items())
         yield from (("note", note) for note in self.notes)
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
@@ -243,9 +243,9 @@ def identify(
     >>> f"{found.values['E'] / 1e9:.0f} GPa", found.undetermined
     ('74 GPa', ('nu',))
     """
-    if law not in LAWS:
-        raise ValueError(f"law: {law!r} is unknown; {nearest(str(law), LAWS)}")
-    if isinstance(tests, str | Path) != (not LAWS[law]):
+    if law not in SHEET_LAWS:
+        raise ValueError(f"law: {law!r} is unknown; {nearest(str(law), SHEET_LAWS)}")
+    if isinstance(tests, str | Path) != (not SHEET_LAWS[law]):
         raise ValueError(f"tests: {tests!r}; give the file of one test for rubber, else springtune.MeasuredTest")
     if isinstance(tests, str | Path):
         return _rubber(tests, law)
@@ -255,7 +255,7 @@ def identify(
         dict.fromkeys(part for shape, _, mesh in bodies for part in ("", *(mesh.parts if mesh else shape.parts)))
     )
     regions = tuple(f"E {part or 'main'}" for part in parts) if law == "regions" else ()
-    names = regions + LAWS[law]
+    names = regions + SHEET_LAWS[law]
     if len(parts) > 1 and not regions:
         raise ValueError(f"law: {law!r} is of one material, and the body has the parts {parts}; take 'regions'")
     unknowns, free = _start(names, known or {})
@@ -270,7 +270,7 @@ def identify(
             ],
         )
         if not settled:
-            unknowns = np.where(free & ~np.isin(names, RATIOS), unknowns + _scale(model, unknowns), unknowns)
+            unknowns = np.where(free & ~np.isin(names, POISSON_RATIOS), unknowns + _scale(model, unknowns), unknowns)
         lacking = undetermined(model, unknowns, free)
         unknowns, residuals, slopes, noise, freedom = fit(model, unknowns, free & ~np.isin(names, lacking))
     found = zip(np.flatnonzero(free & ~np.isin(names, lacking)), half_intervals(slopes, freedom))
@@ -280,7 +280,7 @@ def identify(
     for place, half in found:
         low, high = (model.values(unknowns + step)[place] for step in half * np.eye(len(names))[place] * [[-1], [1]])
         ends[names[place]] = (values[place], float(low), float(high))
-        if half > WIDE:
+        if half > POOR:
             notes.append(f"{names[place]}: poorly determined by these data; {REMEDIES.get(names[place], 'add a test')}")
     for family, own, _ in model.tests:
         factor = max(np.abs(block.factors).max() for block in own)
@@ -292,13 +292,15 @@ def identify(
 
 def _start(names: tuple[str, ...], known: Mapping[str, Number]) -> tuple[np.ndarray, np.ndarray]:
     """Unknowns of a usual material, with those that are known, and which are to be found."""
-    unknowns = np.array([USUAL if name in RATIOS else np.log(1e9) for name in names])
+    unknowns = np.array([ASSUMED_RATIO if name in POISSON_RATIOS else np.log(1e9) for name in names])
     for name, value in known.items():
         if name not in names:
             raise ValueError(f"known: {name!r} is no constant of this law; {nearest(str(name), names)}")
-        if name in RATIOS and not (isinstance(value, int | float) and -1 < value <= 0.5):
+        if len(known) == len(names):
+            raise ValueError(f"known: {', '.join(known)} are all constants of this law; leave out what is to be found")
+        if name in POISSON_RATIOS and not (isinstance(value, int | float) and -1 < value <= 0.5):
             raise ValueError(f"known: {name} is {value!r}; give a number above -1, at most 0.5")
-        number = value if name in RATIOS else np.log(positive(value, "stress", f"known: {name}"))
+        number = value if name in POISSON_RATIOS else np.log(positive(value, "stress", f"known: {name}"))
         unknowns[names.index(name)] = number
     return unknowns, ~np.isin(names, list(known))
 
@@ -307,7 +309,8 @@ def _materials(model: Model, unknowns: np.ndarray, parts: list[str], angle: floa
     """Material of each part, turned by an angle [rad]."""
     values = model.values(unknowns).tolist()
     if "nu12" in model.names:
-        return dict.fromkeys(parts, AnisotropicMaterial.orthotropic(*values, angle, name="measured"))
+        along, across, nu, shear = values
+        return {"": AnisotropicMaterial.orthotropic(along, across, nu, shear, angle, name="measured")}
     *moduli, nu = values
     own = moduli if len(moduli) == len(parts) else moduli * len(parts)
     return {part: Material(one, min(nu, 0.5), name=f"measured-{part}".rstrip("-")) for part, one in zip(parts, own)}
@@ -329,8 +332,9 @@ def _scale(model: Model, unknowns: np.ndarray) -> float:
 
 def undetermined(model: Model, unknowns: np.ndarray, free: np.ndarray) -> tuple[str, ...]:
     """Constants without which the derivatives by the others have no direction in which they vanish."""
-    noise = [float(np.linalg.norm(block.values)) or 1.0 for block in model.blocks]
-    slopes, names, lacking = model.residuals(unknowns, noise)[1], np.array(model.names), []
+    sizes = np.array([np.linalg.norm(block.values) or 1.0 for block in model.blocks])
+    slopes, names = model.residuals(unknowns, sizes)[1], np.array(model.names)
+    lacking: list[str] = []
     while (kept := free & ~np.isin(names, lacking)).any():
         _, sizes, ways = np.linalg.svd(slopes[:, kept])
         sizes = np.pad(sizes, (0, len(ways) - len(sizes)))
@@ -338,28 +342,35 @@ def undetermined(model: Model, unknowns: np.ndarray, free: np.ndarray) -> tuple[
         if told_.all():
             return tuple(lacking)
         empty = np.abs(ways[~told_]).max(axis=0)
-        lacking.append(str(names[kept][np.argmax(empty + np.isin(names[kept], RATIOS) * NULL)]))
+        lacking.append(str(names[kept][np.argmax(empty + np.isin(names[kept], POISSON_RATIOS) * NULL)]))
+    _numbers(model, 1)
     raise TestDataError(
         f"{', '.join(lacking)}: not determined by these data, which have no force; add one, as of a curve or the load"
     )
 
 
-def fit(model: Model, unknowns: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, ...]:
+def _numbers(model: Model, count: int) -> np.ndarray:
+    """Numbers of each block besides the shift; refused if they are too few for a count of unknowns."""
+    numbers = np.array([len(block.values) - block.shifts.shape[1] for block in model.blocks])
+    if numbers.sum() < count + any(block.noise is None for block in model.blocks) or numbers.min() < 1:
+        raise TestDataError(
+            f"{', '.join(block.label for block in model.blocks)}: {max(numbers.sum(), 0)} numbers besides the shift, "
+            f"for the unknowns {', '.join(model.names)} and the noise; give more rows, or known constants and noise"
+        )
+    return numbers
+
+
+def fit(
+    model: Model, unknowns: np.ndarray, free: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, float]:
     """Fit free unknowns; return all, residuals and derivatives over the noise, the noise, and degrees of freedom.
 
     Noise that is not given is estimated from the residuals of each block.
     """
     from scipy.optimize import least_squares
 
-    found = model.blocks
-    numbers = np.array([len(block.values) - block.shifts.shape[1] for block in found])
-    estimated = np.array([block.noise is None for block in found])
-    names = np.array(model.names)[free]
-    if numbers.sum() < len(names) + estimated.any() or numbers.min() < 1:
-        raise TestDataError(
-            f"{', '.join(block.label for block in found)}: {max(numbers.sum(), 0)} numbers besides the shift, and "
-            f"{len(names)} unknowns ({', '.join(names)}) and the noise; give more rows, or known constants and noise"
-        )
+    found, names = model.blocks, np.array(model.names)[free]
+    numbers, estimated = _numbers(model, len(names)), np.array([block.noise is None for block in found])
     sizes = np.array([np.linalg.norm(block.values) / len(block.values) ** 0.5 or 1.0 for block in found])
     noise = np.array([block.noise or size for block, size in zip(found, sizes)])
     freedom = np.maximum(numbers * (1 - len(names) / numbers.sum()), LEAST_NOISE)
@@ -386,7 +397,7 @@ def fit(model: Model, unknowns: np.ndarray, free: np.ndarray) -> tuple[np.ndarra
     unknowns = unknowns.copy()
     residuals, slopes = evaluated(part)
     unknowns[free] = part
-    return unknowns, residuals, slopes, noise, freedom[estimated].sum() or np.inf
+    return unknowns, residuals, slopes, noise, float(freedom[estimated].sum()) or np.inf
 
 
 def half_intervals(slopes: np.ndarray, freedom: float) -> np.ndarray:
@@ -409,10 +420,14 @@ def _result(
         ordered = one[np.argsort(block.places, kind="stable")] if block.places.ndim == 1 else one[:1]
         if len(ordered) > 9 and ordered[1:] @ ordered[:-1] > MISFIT / 3 * (one @ one):
             notes.append(
-                f"{block.label}: residuals are not random, so the intervals are too narrow; leave out where the law does not hold"
+                f"{block.label}: residuals are not random, so the intervals are too narrow; leave out where the law "
+                "does not hold"
             )
     labels = [block.label for block in found]
-    values, intervals = ({name: three[part] for name, three in ends.items()} for part in (0, slice(1, 3)))
+    values, intervals = (
+        {name: three[0] for name, three in ends.items()},
+        {name: three[1:] for name, three in ends.items()},
+    )
     data = (dict(zip(labels, one)) for one in (noise.tolist(), each, [block.places for block in found]))
     kept, own, places = data
     return Identified(law, values, intervals, lacking, tuple(notes), kept, own, materials, places)

@@ -25,7 +25,7 @@ from ..safe_io.inputs import csv_rows
 from .meshes import A_BEAM, is_a
 from .sheet import chosen
 
-FIELD, CURVE = ("x", "y", "u", "v"), ("force", "displacement")
+FIELD_COLUMNS, CURVE_COLUMNS = ("x", "y", "u", "v"), ("force", "displacement")
 """Columns of a field, and those that a curve has at least."""
 
 HEADS = "give columns such as 'force [N],displacement [mm]' or 'x [mm],y [mm],u [um],v [um]'"
@@ -33,8 +33,8 @@ HEADS = "give columns such as 'force [N],displacement [mm]' or 'x [mm],y [mm],u 
 GAUGES = ("gauge-1", "gauge-2")
 """Points of a beam between which ``transverse`` is measured: the middles of the sides beside the load."""
 
-OUTSIDE = 1e-3
-"""Distance from the body up to which a point counts as on its outline, over the extent of the points."""
+OFF_BODY = 1e-3
+"""Distance from the body, over its extent, up to which a point counts as on its outline."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,11 +102,11 @@ class MeasuredTest:
     --------
     >>> from pathlib import Path
     >>> import springtune as st
-    >>> lines = ["force [N],displacement [um]", "0,0.1", "200,13.6", "400,26.9"]
+    >>> lines = ["force [N],displacement [um]", "0,0", "200,13", "400,27"]
     >>> _ = Path("pull.csv").write_text("\n".join(lines))
     >>> test = st.MeasuredTest(st.Beam("100 mm", "20 mm"), "traction", "pull.csv")
-    >>> test.columns["displacement"].tolist()
-    [1e-07, 1.36e-05, 2.69e-05]
+    >>> test.columns["displacement"].round(9).tolist()
+    [0.0, 1.3e-05, 2.7e-05]
     """
 
     body: Beam | Shape
@@ -123,7 +123,7 @@ class MeasuredTest:
     def __post_init__(self) -> None:
         is_a(self.body, (Beam, Shape), "body", A_BEAM)
         is_beam = isinstance(self.body, Beam)
-        chosen(LOADS if is_beam else self.body.loads, self.load, "load")
+        chosen(self.body.loads if isinstance(self.body, Shape) else LOADS, self.load, "load")
         put(self, angle=quantity(self.angle, "angle", "angle"))
         columns, lines = _read(self.file)
         put(self, columns=columns, _lines=lines)
@@ -156,28 +156,20 @@ def blocks(test: MeasuredTest, family: Family, load: LoadCase) -> Iterator[Block
     if "u" in columns:
         points = np.stack([columns["x"], columns["y"]], axis=1)
         rows, apart = family.at(points)
-        if apart.max() > OUTSIDE * np.ptp(points):
+        if apart.max() > OFF_BODY:
             worst = int(np.argmax(apart))
-            x, y, away = 1e3 * np.array([*points[worst], apart[worst]])
+            x, y = 1e3 * points[worst]
             raise TestDataError(
-                f"{where}, line {test._lines[worst]}: the point x = {x:.6g} mm, y = {y:.6g} mm is {away:.3g} mm outside "
-                "of the body; remove it, or correct the unit or the origin"
+                f"{where}, line {test._lines[worst]}: the point x = {x:.6g} mm, y = {y:.6g} mm is outside of the body; "
+                "remove it, or correct the unit or the origin"
             )
         rigid = np.zeros((len(points), 2, 3 * test.shift))
         if test.shift:
             rigid[:, :, :2] = np.eye(2)
             rigid[:, :, 2] = (points - points.mean(axis=0))[:, ::-1] * [-1, 1] / (np.ptp(points) or 1.0)
-        moved = np.stack([columns["u"], columns["v"]], axis=1).ravel()
-        noise = _noise(test, "length")
-        yield Block(
-            f"field of {where}",
-            moved,
-            np.full(len(moved), test.scale),
-            rows,
-            rigid.reshape(len(moved), -1),
-            noise,
-            points,
-        )
+        values = np.stack([columns["u"], columns["v"]], axis=1).ravel()
+        noise, factors = _noise(test, "length"), np.full(len(values), test.scale)
+        yield Block(f"field of {where}", values, factors, rows, rigid.reshape(len(values), -1), noise, points)
         return
     pushed = [np.hypot(*one.force) for one in load.tractions]
     moved = [np.hypot(one.x or 0.0, one.y or 0.0) for one in load.supports if one.x or one.y]
@@ -185,7 +177,7 @@ def blocks(test: MeasuredTest, family: Family, load: LoadCase) -> Iterator[Block
         raise TestDataError(
             f"{where}: load {test.load!r} is not one force or one moved support; give a field of points"
         )
-    driving, measured = CURVE[:: -1 if moved else 1]
+    driving, measured = CURVE_COLUMNS[:: -1 if moved else 1]
     loads = columns[driving]
     if not np.ptp(loads) > 1e-9 * np.abs(loads).max() and (test.shift or not loads.any()):
         raise TestDataError(
@@ -221,7 +213,9 @@ def _row(test: MeasuredTest, name: str, family: Family, load: LoadCase) -> np.nd
         if name == "transverse":
             return family.mean(GAUGES[1], kind.along) - family.mean(GAUGES[0], kind.along)
     if name not in known:
-        raise TestDataError(f"'{test.file}', column {name!r}: {nearest(name, [*CURVE, *known])}; or leave it out")
+        raise TestDataError(
+            f"'{test.file}', column {name!r}: {nearest(name, [*CURVE_COLUMNS, *known])}; or leave it out"
+        )
     return family.mean(name[2:], "xy".index(name[0]))
 
 
@@ -230,14 +224,14 @@ def _read(path: str | Path) -> tuple[dict[str, np.ndarray], list[int]]:
     (line, heads), *rows = csv_rows(path, TestDataError, HEADS)
     parts = [head.rstrip("] ").partition("[") for head in heads]
     names = [name.strip() for name, _, _ in parts]
-    wanted = FIELD if set("uv") & set(names) else CURVE
+    wanted = FIELD_COLUMNS if set("uv") & set(names) else CURVE_COLUMNS
     for name in wanted:
         if names.count(name) != 1:
             why = "is missing" if name not in names else "is there twice"
             raise TestDataError(f"'{path}', line {line}: column {name!r} {why} in {names}; {HEADS}")
     found = {}
     for place, (name, (_, _, unit)) in enumerate(zip(names, parts)):
-        if wanted is FIELD and name not in FIELD:
+        if wanted is FIELD_COLUMNS and name not in FIELD_COLUMNS:
             continue
         try:
             scale = positive(f"1 {unit}", "force" if name == "force" else "length", f"column {name!r}")

@@ -1,0 +1,231 @@
+"""Constants of a sheet from measured tests: synthetic ones with noise, rubber's, and what is refused."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from click.testing import CliRunner
+
+import springtune as st
+from springtune.cli import main
+from springtune.problem.rubber import TestDataError
+from springtune.reference.by_constants import ENTRIES, Family
+from springtune.reference.shapes import solve_shape
+from springtune.scene.identify import Model, fit, half_intervals, undetermined
+from springtune.scene.measured import blocks, stated
+
+BEAM = st.Beam("100 mm", "20 mm")
+PLY = st.AnisotropicMaterial.orthotropic("14 GPa", "5 GPa", 0.3, "2 GPa", name="ply")
+FORCES = np.linspace(0.0, 500.0, 21)
+CORE = st.Shape.rectangle(
+    "60 mm", "30 mm", holes=[st.Hole.circle(("30 mm", "15 mm"), "8 mm", part="core")],
+    loads={"pull": st.LoadCase("pull", (st.Support("left", 0, 0),), (st.Traction("right", (300.0, 0.0)),))},
+)  # fmt: skip
+GRIPPED = st.Shape.rectangle(
+    "100 mm", "20 mm",
+    loads={"grip": st.LoadCase("grip", (st.Support("left", 0, 0), st.Support("right", 1e-4, 0)))},
+)  # fmt: skip
+
+
+def write(path, head, *columns):
+    np.savetxt(path, np.column_stack(columns), delimiter=",", header=head, comments="")
+    return str(path)
+
+
+def curve(path, material, load="traction", noise=0.0, seed=0, angle=0.0):
+    """File of a curve of a beam with its transverse displacement, in um, and a zero that is off by 3 um."""
+    write(path, "force [N],displacement [um]", [0.0, 1.0], [0.0, 1.0])
+    shape, case, _ = stated(st.MeasuredTest(BEAM, load, path))
+    turned = material.rotated(angle) if angle else material
+    family = Family(shape, case, {"": turned}, None)
+    moved = family.solve(np.array([turned.plane_stress[one] for one in ENTRIES]), np.eye(6))[0]
+    across = family.mean("gauge-2", 1) - family.mean("gauge-1", 1)
+    clean = np.stack([np.outer(FORCES, row @ moved) for row in (family.forces[None], across[None])])[:, :, 0]
+    along, width = clean + np.random.default_rng(seed).normal(0.0, noise or 1e-12, clean.shape) + 3e-6
+    return write(path, "force [N],displacement [um],transverse [um]", FORCES, 1e6 * along, 1e6 * width)
+
+
+def field(path, shape, load, materials, noise, seed=0):
+    """File of a field of 300 points of a shape, moved as a camera that shifts and turns."""
+    random = np.random.default_rng(seed)
+    points = random.uniform(*np.array(shape.extent), (300, 2))
+    moved = solve_shape(shape, shape.loads[load], materials).at(points)
+    moved += random.normal(0.0, noise, moved.shape) + [2e-6, -5e-6] + 1e-5 * points[:, ::-1] * [-1, 1]
+    return write(path, "x [mm],y [mm],u [um],v [um],exx [1]", 1e3 * points, 1e6 * moved, 0 * points[:, 0])
+
+
+def within(found, **expected):
+    for name, value in expected.items():
+        low, high = found.intervals[name]
+        assert low < value < high, (name, low, high)
+        assert high - low < 0.2 * abs(value)
+
+
+def test_derivatives_by_constants_are_those_of_differences():
+    case = CORE.loads["pull"]
+    materials = {"": st.Material("2 GPa", 0.3), "core": st.Material("9 GPa", 0.2)}
+    family = Family(CORE, case, materials, None)
+    constants = np.array([one.plane_stress[entry] for one in materials.values() for entry in ENTRIES])
+    directions = np.random.default_rng(0).normal(size=(len(constants), 3)) * 1e9
+    moved, slopes, _ = family.solve(constants, directions)
+    for slope, direction in zip(slopes.T, directions.T):
+        ahead, behind = (family.solve(constants + sign * 1e-5 * direction, directions)[0] for sign in (1, -1))
+        np.testing.assert_allclose((ahead - behind) / 2e-5, slope, rtol=1e-6, atol=1e-6 * np.abs(slope).max())
+    points = np.array([[0.03, 0.015], [0.05, 0.02], [0.02, 0.007]])
+    rows, apart = family.at(points)
+    expected = solve_shape(CORE, case, materials).at(points)
+    np.testing.assert_allclose((rows @ moved).reshape(-1, 2), expected, atol=2e-3 * np.abs(expected).max())
+    assert apart.max() < 1e-12
+
+
+def test_a_curve_with_its_width_tells_both_constants(tmp_path):
+    test = st.MeasuredTest(BEAM, "traction", curve(tmp_path / "c.csv", st.Material("3 GPa", 0.35), noise=2e-6))
+    found = st.identify(test)
+    within(found, E=3e9, nu=0.35)
+    assert not found.notes and not found.undetermined
+    known = st.identify(test, known={"nu": 0.35})
+    assert np.isnan(known.intervals["nu"][0]) and "0.35, given" in str(known)
+
+
+def test_a_curve_alone_does_not_tell_the_ratio(tmp_path):
+    path = tmp_path / "c.csv"
+    curve(path, st.Material("3 GPa", 0.35))
+    rows = [",".join(line.split(",")[:2]) for line in path.read_text().splitlines()]
+    path.write_text("\n".join(rows))
+    found = st.identify(st.MeasuredTest(BEAM, "traction", path))
+    assert found.undetermined == ("nu",)
+    assert found.values["E"] == pytest.approx(3e9, rel=0.01)
+    assert found.notes[0].startswith("nu: not determined by these data; add a transverse displacement")
+    assert "not determined; 0.3 is assumed" in str(found)
+
+
+@pytest.mark.parametrize("load", ["compression", "pressure"])
+def test_columns_are_positive_along_the_load(tmp_path, load):
+    path = tmp_path / "c.csv"
+    write(path, "force [N],displacement [um]", [0.0, 100.0, 200.0, 300.0], [0.0, 1.0, 2.0, 3.1])
+    assert st.identify(st.MeasuredTest(BEAM, load, path), known={"nu": 0.3}).values["E"] > 0
+    write(path, "force [N],displacement [um]", [0.0, 100.0, 200.0, 300.0], [0.0, -1.0, -2.0, -3.1])
+    with pytest.raises(TestDataError, match="displacement of .*c.csv.*: runs against the load"):
+        st.identify(st.MeasuredTest(BEAM, load, path), known={"nu": 0.3})
+
+
+def test_coupons_at_angles_tell_orthotropic_constants(tmp_path):
+    angles = (0.0, np.pi / 4, np.pi / 2)
+    files = [curve(tmp_path / f"{n}.csv", PLY, noise=1e-6, seed=n, angle=angle) for n, angle in enumerate(angles)]
+    tests = [st.MeasuredTest(BEAM, "traction", file, angle=angle) for file, angle in zip(files, angles)]
+    within(st.identify(tests, "orthotropic"), E1=14e9, E2=5e9, nu12=0.3, G12=2e9)
+    assert {"E2", "G12"} <= set(st.identify(tests[0], "orthotropic").undetermined)
+
+
+def test_a_field_tells_regions_and_rigid_motion_does_not_matter(tmp_path):
+    materials = {"": st.Material("2 GPa", 0.3), "core": st.Material("9 GPa", 0.3)}
+    file = field(tmp_path / "f.csv", CORE, "pull", materials, 2e-8)
+    found = st.identify(st.MeasuredTest(CORE, "pull", file), "regions")
+    low, high = found.intervals["E core"]
+    assert low < 9e9 < high and high < 2 * low
+    within(found, **{"E main": 2e9, "nu": 0.3})
+    assert found.materials["core"].young_modulus == found.values["E core"]
+    assert st.identify(st.MeasuredTest(CORE, "pull", file, noise="1 nm"), "regions").notes[-1].endswith("does not fit")
+    with pytest.raises(ValueError, match="take 'regions'"):
+        st.identify(st.MeasuredTest(CORE, "pull", file))
+
+
+def test_a_moved_support_needs_its_force(tmp_path):
+    material = st.Material("3 GPa", 0.35)
+    file = field(tmp_path / "f.csv", GRIPPED, "grip", material, 1e-8)
+    with_field = st.MeasuredTest(GRIPPED, "grip", file)
+    assert st.identify(with_field).undetermined == ("E",)
+    reference = solve_shape(GRIPPED, GRIPPED.loads["grip"], material)
+    force = 2 * reference.energy / 1e-4
+    steps = np.linspace(0.0, 1.0, 11)
+    noise = np.random.default_rng(0).normal(0.0, 0.2, 11)
+    path = write(tmp_path / "c.csv", "displacement [mm],force [N]", 0.1 * steps, force * steps + noise)
+    within(st.identify([with_field, st.MeasuredTest(GRIPPED, "grip", path)]), E=3e9, nu=0.35)
+
+
+@pytest.mark.slow
+def test_estimates_lie_within_their_intervals_as_often_as_they_say(tmp_path):
+    material = st.Material("3 GPa", 0.35)
+    file = curve(tmp_path / "c.csv", material)
+    test = st.MeasuredTest(BEAM, "traction", file)
+    shape, case, _ = stated(test)
+    family = Family(shape, case, {"": material}, None)
+    found = list(blocks(test, family, case))
+    model, random = Model(("E", "nu"), [(family, found, 0.0)]), np.random.default_rng(32)
+    true, clean, inside = np.array([np.log(3e9), 0.35]), [block.values.copy() for block in found], np.zeros(2)
+    for _ in range(200):
+        for block, values in zip(found, clean):
+            block.values[:] = values + random.normal(0.0, 2e-6, values.shape)
+        start, free = np.array([np.log(2e9), 0.3]), np.ones(2, dtype=bool)
+        assert undetermined(model, start, free) == ()
+        unknowns, _, slopes, _, freedom = fit(model, start, free)
+        inside += np.abs(unknowns - true) < half_intervals(slopes, freedom)
+    # A binomial count of 200 with a share of .95 is within these bounds with a probability of 99.9 %.
+    assert (180 <= inside).all() and (inside <= 199).all(), inside
+
+
+def test_rubber_has_intervals_and_is_that_of_fit_rubber():
+    file = "config/treloar/uniaxial.csv"
+    for law, terms in (("neo-hooke", 1), ("yeoh", 3)):
+        found = st.identify(file, law)
+        assert found.materials[""].coefficients == st.fit_rubber(file, terms=terms).coefficients
+        assert all(low < found.values[name] < high for name, (low, high) in found.intervals.items())
+        assert "residuals are not random" in found.notes[0]  # a law of few terms does not follow the test
+
+
+BAD = {
+    "force [N]\n1\n": "line 1: column 'displacement' is missing in",
+    "force [N],displacement [N]\n1,1\n": "line 1: column 'displacement': '1 N' is a force; give a length",
+    "force,displacement [mm]\n1,1\n": "line 1: column 'force': '1 ' has no unit",
+    "force [N],displacement [mm]\n1,nan\n": "line 2, column 'displacement': 'nan' is no finite number",
+    "force [N],displacement [mm]\n1,1\n2\n": "line 3: has 1 values, and the head 2",
+    "force [N],displacement [mm]\n": "has no rows of numbers",
+    "force [N],displacement [mm]\n5,1\n5,1.1\n5,1.2\n": "column 'force': all 3 values are 5 in SI units",
+    "force [N],displacement [mm]\n5,1\n6,1.1\n": "1 numbers besides the shift, for the unknowns",
+    "force [N],displacement [mm],widht [mm]\n5,1,1\n6,1.1,1\n": "column 'widht': ",
+    "x [mm],y [mm],u [um],v [um]\n5,5,1,1\n300,5,2,1\n": "line 3: the point x = 300 mm, y = 5 mm is outside",
+    "x [mm],y [mm],u [um]\n5,5,1\n": "line 1: column 'v' is missing",
+    "x [mm],y [mm],u [um],v [um]\n5,5,1,1\n": "numbers besides the shift",
+}
+
+
+@pytest.mark.parametrize(("text", "message"), BAD.items(), ids=BAD.values())
+def test_a_bad_file_is_refused(tmp_path, text, message):
+    path = tmp_path / "bad.csv"
+    path.write_text(text)
+    with pytest.raises(TestDataError) as error:
+        st.identify(st.MeasuredTest(BEAM, "traction", path, force="5 N" if text[0] == "x" else None))
+    assert message in str(error.value) and "bad.csv" in str(error.value) and ";" in str(error.value)
+
+
+def test_the_command_writes_a_study_that_loads(tmp_path, monkeypatch):
+    curve(tmp_path / "c.csv", st.Material("3 GPa", 0.35), noise=2e-6)
+    monkeypatch.chdir(tmp_path)
+    Path("tests.yaml").write_text("tests: {pull: {beam: 100x20, load: traction, file: c.csv}}")
+    made = CliRunner().invoke(main, ["identify", "tests.yaml", "--write", "mine.yaml", "--plot", "residuals.png"])
+    assert made.exit_code == 0, made.output
+    assert "95 %" in made.output and Path("residuals.png").stat().st_size > 5000
+    material = yaml.safe_load(Path("mine.yaml").read_text())["materials"]["measured"]
+    assert material["poisson_ratio"] == pytest.approx(0.35, abs=0.05)
+    assert len(st.load_study("mine.yaml").scenes) == 2
+
+
+CALLS = {
+    ("c.csv",): (2, "--load: a test needs a body"),
+    ("c.csv", "--beam", "100x20", "--load", "trction"): (2, "--load: 'trction' is unknown"),
+    ("c.csv", "--beam", "100x20", "--load", "traction", "--known", "mu=1"): (2, "--known: 'mu' is no constant"),
+    ("c.csv", "--beam", "100x20", "--load", "traction", "--plot", "r.txt"): (2, "--plot: 'r.txt' has another ending"),
+    ("none.yaml",): (1, "none.yaml: is no list of tests"),
+    ("none.csv", "--beam", "100x20", "--load", "traction"): (1, "'none.csv' cannot be read"),
+}
+
+
+@pytest.mark.parametrize("arguments", CALLS)
+def test_a_wrong_call_says_what_to_give(tmp_path, monkeypatch, arguments):
+    monkeypatch.chdir(tmp_path)
+    Path("c.csv").write_text("force [N],displacement [um]\n0,0\n1,1\n2,2.1\n")
+    code, message = CALLS[arguments]
+    made = CliRunner().invoke(main, ["identify", *arguments, *(() if "--plot" in arguments else ("--write", "m.yaml"))])
+    assert (made.exit_code, Path("m.yaml").exists()) == (code, False), made.output
+    assert message in made.output
