@@ -337,7 +337,14 @@ def derived(name, grouped, main, far):
 
 
 ADDITIVE = [name for name, one in DEFINITIONS.items() if not one.needs and not one.uniaxial]
-NOT_ADDITIVE = {"density", "oriented", "adjoint", *(name for name in DEFINITIONS if name.startswith("patch"))}
+NOT_ADDITIVE = {
+    "density",
+    "oriented",
+    "adjoint",
+    "peridynamic",
+    "force-balance",
+    *(name for name in DEFINITIONS if name.startswith("patch")),
+}
 """Definitions that count or test the springs of each part alone."""
 
 

@@ -8,6 +8,7 @@ from scipy.optimize import nnls
 
 from springtune.mechanics.moduli import PatchTest
 from springtune.mesh import MESH_TYPES, ROW_HEIGHT, Mesh, MeshError, lattice, signed_areas, write_mesh
+from springtune.mesh.bonds import bonded
 from springtune.problem.geometry import Beam
 from springtune.problem.materials import Material, Rubber
 from springtune.springs import DEFINITIONS, DefinitionError, Springs, definition
@@ -90,7 +91,7 @@ def test_bonds_of_peridynamics_have_the_energy_of_a_sheet(mesh_type, shells):
     """Of even strains the mean over all directions is exact, with any shells and any outline: sum k L^2 = 3 E t A."""
     mesh = patch(mesh_type)
     if shells:
-        mesh = mesh.bonded((shells + 0.01) * mesh.edge_lengths.min())
+        mesh = bonded(mesh, (shells + 0.01) * mesh.edge_lengths.min())
     springs = DEFINITIONS["peridynamic"].springs(mesh, Material(1.0, 1 / 3), 1.0)
     total = (springs.relative * springs.reference * mesh.edge_lengths**2).sum()
     assert total == pytest.approx(3 * mesh.area, rel=1e-12) and (springs.relative > 0).all()
@@ -99,17 +100,17 @@ def test_bonds_of_peridynamics_have_the_energy_of_a_sheet(mesh_type, shells):
 def test_peridynamics_inside_a_sheet():
     """Far from the outline a sheet of two shells has E and nu = 1/3; near it bonds are cut, and E and G miss some."""
     mesh = lattice(60, 40, 1.0)
-    bonded = mesh.bonded(2.01)
-    springs = DEFINITIONS["peridynamic"].springs(bonded, Material(1.0, 1 / 3), 1.0)
+    joined = bonded(mesh, 2.01)
+    springs = DEFINITIONS["peridynamic"].springs(joined, Material(1.0, 1 / 3), 1.0)
     middle = np.argmin(((mesh.points - mesh.points.mean(axis=0)) ** 2).sum(axis=1))
-    here = (bonded.edges == middle).any(axis=1)
+    here = (joined.edges == middle).any(axis=1)
     assert here.sum() == 18  # 6 neighbours, 6 at sqrt(3), 6 at 2
-    ways = np.diff(mesh.points[bonded.edges[here]], axis=1)[:, 0]
+    ways = np.diff(mesh.points[joined.edges[here]], axis=1)[:, 0]
     x, y = (ways / np.linalg.norm(ways, axis=1, keepdims=True)).T
     weight = 0.5 * springs.relative[here] * (ways**2).sum(axis=1) / mesh.particle_areas[middle]
     assert (weight * x**4).sum() == pytest.approx(9 / 8, rel=1e-9)  # E / (1 - nu^2)
     assert (weight * x**2 * y**2).sum() == pytest.approx(3 / 8, rel=1e-9)
-    young, ratio = PatchTest(bonded).axial(springs)
+    young, ratio = PatchTest(joined).axial(springs)
     assert abs(young - 1) < 0.02 and abs(ratio - 1 / 3) < 0.01  # 40 rows: an outline of two shells is a tenth
 
 
@@ -118,7 +119,7 @@ def test_bonds_do_not_cross_what_is_no_body():
     points = np.array([[x, y] for y in range(4) for x in range(7)], dtype=float)
     quads = np.array([[i + 7 * j, i + 1 + 7 * j, i + 8 + 7 * j, i + 7 + 7 * j] for j in range(3) for i in range(6)])
     slot = (quads[:, 0] // 7 == 1) & (quads[:, 0] % 7 < 5)
-    mesh = Mesh(points, np.zeros((0, 3), dtype=int), quads[~slot]).bonded(2.3)
+    mesh = bonded(Mesh(points, np.zeros((0, 3), dtype=int), quads[~slot]), 2.3)
     ends = points[mesh.edges]
     lips = (ends[:, :, 0] < 5).all(axis=1) & (ends[:, :, 1].min(axis=1) <= 1) & (ends[:, :, 1].max(axis=1) >= 2)
     assert not lips.any() and len(mesh.bonds)
@@ -128,7 +129,7 @@ def test_bonds_do_not_cross_what_is_no_body():
     with pytest.raises(MeshError, match="a mesh file has no place for"):
         write_mesh("bonds.vtu", mesh)
     with pytest.raises(MeshError, match="reach: 0 is not above zero"):
-        mesh.bonded(0)
+        bonded(mesh, 0)
     with pytest.raises(MeshError, match="bonds: they join points up to 28 of 28; renumber them"):
         Mesh(points, mesh.triangles, mesh.quads, np.array([[0, 28]]))
 

@@ -198,7 +198,7 @@ VERSIONS = {
     "netgen-mesher": {"free", "shapes.mesh", "shapes.reference", "shapes.solve", "engines.solve"},
     "meshio": {"from a file"},
     "numba": {"stability.solve", "benchmark.solve", "shapes.solve", "engines.solve"},
-    "scikit-fem": {"scenes.reference", "benchmark.solve", "shapes.solve", "engines.solve"},
+    "scikit-fem": {"scenes.reference", "benchmark.solve", "shapes.reference", "shapes.solve", "engines.solve"},
     "pyamg": SOLVING,
     "cvxopt": SOLVING | REFERENCE,
     "scipy": SOLVING | REFERENCE | {"scenes.mesh", "shapes.mesh", "from a file"},

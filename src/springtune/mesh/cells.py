@@ -53,7 +53,7 @@ class Mesh:
     quads : ndarray of int, shape (n_quads, 4), optional
         Corner indices, counter-clockwise.
     bonds : ndarray of int, shape (n_bonds, 2), optional
-        Further pairs of points with a spring, which no cell joins; see `bonded`.
+        Further pairs of points with a spring, which no cell joins; see `springtune.mesh.bonds`.
 
     Raises
     ------
@@ -172,48 +172,6 @@ class Mesh:
             self.__dict__.setdefault("on_outline", other.on_outline)
             return True
         return False
-
-    def bonded(self, reach: float) -> "Mesh":
-        """Return the mesh with a bond between all points that are no farther apart, but for those across the outline.
-
-        Parameters
-        ----------
-        reach : float
-            Longest bond [m], the horizon of peridynamics.
-
-        Returns
-        -------
-        Mesh
-
-        Raises
-        ------
-        MeshError
-            If the reach is not above zero.
-
-        Examples
-        --------
-        Second neighbours on rows of triangles:
-
-        >>> import springtune as st
-        >>> beam = st.Beam("100 mm", "20 mm")
-        >>> mesh = st.make_mesh(beam, "structured", "5 mm")
-        >>> bonded = mesh.bonded(2 * mesh.edge_lengths.max())
-        >>> len(mesh.edges), len(bonded.edges), bool(bonded.on_outline.sum() == mesh.on_outline.sum())
-        (333, 900, True)
-        """
-        from scipy.spatial import cKDTree  # here: most meshes have no bonds
-
-        if not reach > 0:
-            raise MeshError(f"reach: {reach!r} is not above zero; give a length in m")
-        pairs = cKDTree(self.points).query_pairs(reach * (1 + 1e-9), output_type="ndarray")
-        known = self.edges @ [len(self.points), 1]
-        pairs = np.sort(pairs, axis=1)
-        pairs = pairs[~np.isin(pairs @ [len(self.points), 1], known)]
-        outline = self.points[self.edges[self.on_outline]]
-        inside = np.concatenate(
-            [_inside(self.points[part], outline) for part in np.array_split(pairs, 1 + len(pairs) // 1000)]
-        )
-        return Mesh(self.points, self.triangles, self.quads, pairs[inside])
 
     @property
     def edges(self) -> np.ndarray:
@@ -380,31 +338,6 @@ def _array(values: object, name: str, columns: int, kind: type) -> np.ndarray:
         numbers = "numbers" if kind is float else "whole numbers"
         raise MeshError(f"{name}: {shape}; give an array of {numbers} of shape (n, {columns})")
     return given.astype(kind, copy=False)
-
-
-def _inside(bonds: np.ndarray, outline: np.ndarray) -> np.ndarray:
-    """Which bonds (n, 2, 2) stay in a body or on its outline (m, 2, 2)."""
-    a, b = bonds[:, None, 0], bonds[:, None, 1]
-    c, d = outline[:, 0], outline[:, 1]
-
-    def turn(start: np.ndarray, end: np.ndarray, at: np.ndarray) -> np.ndarray:
-        """Twice the area of the triangle of three points."""
-        way, there = end - start, at - start
-        return np.asarray(way[..., 0] * there[..., 1] - way[..., 1] * there[..., 0])
-
-    size = np.linalg.norm(d - c, axis=1)
-    rounding = 1e-9 * size * np.linalg.norm(b - a, axis=2)
-    crossed = (turn(c, d, a) * turn(c, d, b) < -(rounding**2)) & (turn(a, b, c) * turn(a, b, d) < -(rounding**2))
-    found: np.ndarray = ~crossed.any(axis=1)
-    for share in (0.125, 0.375, 0.625, 0.875):  # a bond may also leave the body through a corner
-        at = a + share * (b - a)
-        within = np.linalg.norm(at - 0.5 * (c + d), axis=2) <= 0.5 * size * (1 + 1e-9)
-        on_side = (np.abs(turn(c, d, at)) <= rounding) & within
-        # A ray from the point leaves the body through an odd number of sides.
-        rising = (c[:, 1] > at[..., 1]) != (d[:, 1] > at[..., 1])
-        right = (turn(c, d, at) > 0) == (d[:, 1] > c[:, 1])
-        found &= ((rising & right).sum(axis=1) % 2 == 1) | on_side.any(axis=1)
-    return found
 
 
 def rows_of(cells: np.ndarray, chosen: np.ndarray) -> np.ndarray:

@@ -66,6 +66,11 @@ class Damping(Tabled):
     True
     >>> f"{1e6 * damping.particle_dampers.max():.0f} uN s/m"
     '98 uN s/m'
+
+    Half of each of both, together:
+
+    >>> print("{:.2f} 1/s and {:.4f} s".format(*damping.rayleigh))
+    1.78 1/s and 0.0013 s
     """
 
     scene: Scene

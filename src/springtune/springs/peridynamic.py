@@ -11,8 +11,8 @@ horizon. At the outline horizons are cut, and on few shells the sum is not the i
 that by neighbours' volumes (Bobaru and others' handbook; abstract read). nu = 1/3 in plane stress and 1/4 in plane
 strain, as of all central springs.
 
-`Mesh.bonded` joins the particles within a horizon. Without bonds a horizon is one shell, the edges. Assumptions: many
-directions; the outline is still softer in bending.
+`springtune.mesh.bonds.bonded` joins the particles within a horizon. Without bonds a horizon is one
+shell, the edges. Assumptions: many directions; the outline is still softer in bending.
 """
 
 import numpy as np

@@ -170,6 +170,7 @@ NOT_COUNTED = {
     ("studies/output/browse/page.py", "h5py"): "numbers come out of a dataset as they went in, or not at all",
     ("safe_io/inputs.py", "h5py"): "it refuses files, and reads none of their numbers",
     ("safe_io/atomic.py", "psutil"): "it says which processes live",
+    ("handover/simulation.py", "jinja2"): "it fills in files, which no study runs",
     ("studies/runs/store.py", "h5py"): "numbers come out of a file as they went in, or not at all",
     ("studies/output/dataset.py", "h5py"): "texts go into a dataset as they are",
     ("studies/output/reading.py", "h5py"): "it looks at a dataset's links before netCDF opens it",
