@@ -5,7 +5,7 @@ area A gives its side opposite corner i and its corner i
 
 .. math:: k_i = K t \cot a_i, \quad
           \beta_i = \frac{A t}{\sin a_1 \sin a_2 \sin a_3 \sin a_i}
-                    \big( (G - K) \cos a_i + K \cos a_j \cos a_k \big),
+                    ( (G - K) \cos a_i + K \cos a_j \cos a_k ),
 
 .. math:: W = \tfrac{1}{2} \sum k_i (l_i - L_i)^2 + \tfrac{1}{2} \sum \beta_i (\theta_i - a_i)^2 .
 

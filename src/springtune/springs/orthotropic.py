@@ -12,9 +12,9 @@ to C12 as well (Cauchy's relation); the area adds K to C11, C22 and C12. On squa
 C12) t / 2`` and ``k_b = (C22 - C12) t / 2``. All four constants are exact for every even strain. For C12 = C66, K =
 0: springs alone suffice.
 
-Suryawanshi and Gupta (J. Mech. Mater. Struct. 18:143, 2023, abstract read) match the displacements of one square of an
-orthotropic sheet by further springs; their formulas were not found. Four springs' constants cannot, since springs have
-C12 = C66, so the area takes the part of these here.
+Suryawanshi and Gupta (Journal of Mechanics of Materials and Structures 18:143, 2023, abstract read) match the
+displacements of one square of an orthotropic sheet by further springs; their formulas were not found. Four springs'
+constants cannot, since springs have C12 = C66, so the area takes the part of these here.
 
 No spring is negative on squares while C12 <= C11 and C12 <= C22; else on rectangles whose ratio a / b is from
 ``sqrt(C66 / (C22 - K))`` to ``sqrt((C11 - K) / C66)``. Derived here.
