@@ -63,6 +63,7 @@ _NAMES = {
     "problem.rubber": ("fit_rubber",),
     "problem.shapes": ("Hole", "LoadCase", "Pressure", "Quantity", "Segment", "Shape", "Support", "Traction"),
     "problem.status": ("Status",),
+    "scene.best_springs": ("BestSprings", "best_springs"),
     "scene.curve": ("Curve", "sensitivity"),
     "scene.damping": ("Damping", "damping_of"),
     "scene.identify": ("Identified", "identify"),

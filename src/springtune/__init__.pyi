@@ -43,6 +43,8 @@ from .problem.shapes import Shape as Shape
 from .problem.shapes import Support as Support
 from .problem.shapes import Traction as Traction
 from .problem.status import Status as Status
+from .scene.best_springs import BestSprings as BestSprings
+from .scene.best_springs import best_springs as best_springs
 from .scene.curve import Curve as Curve
 from .scene.curve import sensitivity as sensitivity
 from .scene.damping import Damping as Damping

@@ -62,7 +62,7 @@ WAYS = ("moderate", "critical", "large")
 """How far a scene is loaded: within the linear range, next to the loss of stability, or far beyond the linear range."""
 
 
-LATER = ("normal-shear", "ielsm", "many-body", "cross-section", "force-balance", "peridynamic")
+LATER = ("normal-shear", "ielsm", "many-body", "cross-section", "force-balance", "peridynamic", "best-springs")
 """Definitions that came after scenes were found by their number, so that they are drawn by themselves."""
 
 

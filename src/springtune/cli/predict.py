@@ -72,6 +72,7 @@ ASKED = re.compile(
     "[default: traction,bending,shear; with --engine all]",
 )
 @click.option("--springs-alone", is_flag=True, help="Recommend what needs springs alone, no energies besides them.")
+@click.option("--best-springs", is_flag=True, help="Also search for the best springs on the mesh, for some seconds.")
 @engine_options
 @click.option("--json", "as_json", is_flag=True, help="Print everything as JSON, in SI units.")
 @click.option(
@@ -87,6 +88,7 @@ def predict(
     load: str | None,
     loads: str | None,
     springs_alone: bool,
+    best_springs: bool,
     as_json: bool,
     target: Path | None,
 ) -> None:
@@ -103,6 +105,9 @@ def predict(
     with refusals("--write", target, _in_options):
         check_kind(sheet.shape, sheet.beam, ("load",) if engine.engine is None else ("scale",))
         engine.check(sheet, error)
+        if best_springs and (error is not None or engine.engine is not None):
+            raise ValueError("--best-springs: are of one mesh; leave out --error and --engine")
+        also = ("best-springs",) * best_springs
         if target is not None:
             check_target("--write", target)
         if engine.engine is not None:
@@ -110,9 +115,11 @@ def predict(
             answer = _Answer(text, json, "", net_of)
         elif sheet.shape is not None:
             asked = sheet.asked_shape(load, sized=error is None)
-            answer = _on_shape(asked, springs_alone) if error is None else _find_on_shape(asked, error, springs_alone)
+            answer = (
+                _on_shape(asked, springs_alone, also) if error is None else _find_on_shape(asked, error, springs_alone)
+            )
         elif error is None:
-            answer = _on_beam(sheet, loads, springs_alone)
+            answer = _on_beam(sheet, loads, springs_alone, also)
         else:
             answer = _find_on_beam(sheet, loads, error, springs_alone)
         click.echo(answer.json() if as_json else answer.text())
@@ -169,7 +176,7 @@ def _kept(choices: "list[Choice]", springs_alone: bool) -> "list[Choice]":
     return [choice for choice in choices if not (springs_alone and choice.energies)]
 
 
-def _on_beam(sheet: SheetOptions, given: str | None, springs_alone: bool) -> _Answer:
+def _on_beam(sheet: SheetOptions, given: str | None, springs_alone: bool, also: tuple[str, ...]) -> _Answer:
     """Recommend a definition for a mesh of a beam."""
     from ..handover.net import SpringNet
     from ..mesh import MESH_TYPES
@@ -196,11 +203,13 @@ def _on_beam(sheet: SheetOptions, given: str | None, springs_alone: bool) -> _An
     sizes: list[float] = []
     if solved is None:
         assert edge is not None
+        if also:
+            raise ValueError(f"--best-springs: the mesh has more than {SOLVED} particles; give a larger --size")
         about: dict[str, object] = {"particles": float(f"{count:.2g}"), "springs": None}
         found, sizes = extrapolate(mesh_type, edge, beam, material, known, loads=loads)
     else:
         about = {"particles": len(solved.points), "springs": len(solved.edges)}
-        found = predict(beam, solved, material, known, loads=loads)
+        found = predict(beam, solved, material, known, loads=loads, also=also)
     found = _kept(found, springs_alone)
     file = mesh_type if edge is None else None
     mesh_json = {"type": None if file else mesh_type, "file": file, "size": edge} | about
@@ -215,7 +224,7 @@ def _on_beam(sheet: SheetOptions, given: str | None, springs_alone: bool) -> _An
     )
 
 
-def _on_shape(asked: "AskedShape", springs_alone: bool) -> _Answer:
+def _on_shape(asked: "AskedShape", springs_alone: bool, also: tuple[str, ...]) -> _Answer:
     """Recommend a definition for a mesh of a shape."""
     from ..prediction.choices import SOLVED_FROM_FILE, predict, shape_references
     from ..scene.statements import ShapeStatement
@@ -231,7 +240,7 @@ def _on_shape(asked: "AskedShape", springs_alone: bool) -> _Answer:
         )
     statement = ShapeStatement(asked.shape, grouped, asked.materials, asked.load, 1.0, "linear")
     known = shape_references(statement)
-    found = _kept(predict(asked.shape, grouped, asked.materials, known, load=asked.load), springs_alone)
+    found = _kept(predict(asked.shape, grouped, asked.materials, known, load=asked.load, also=also), springs_alone)
     file = asked.shape.file if asked.size is None else None
     mesh_json = {"type": None if file else "free", "file": file, "size": asked.size} | about
     subject = shape_subject(statement, known)

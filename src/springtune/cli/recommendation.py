@@ -124,6 +124,7 @@ def prediction_text(
     for choice in choices:
         notes += [f"{choice.definition}, {part}: {reason}" for part, reason in choice.failures.items()]
     first, plain = (name or "none" for name in recommended(choices))
+    by_rule = recommended([choice for choice in choices if choice.definition != "best-springs"])
     particles, springs = about["particles"], about["springs"]
     counts = f"{particles} particles, {springs} springs" if springs else f"about {particles:.2g} particles"
     how = "solved on this mesh"
@@ -136,7 +137,7 @@ def prediction_text(
         f"{subject.name}, {mesh_name}: {counts}; {subject.made_of}",
         "",
         f"recommended: {first}; with springs alone: {plain}",
-        *_at_worst(subject, choices, (first, plain)),
+        *_at_worst(subject, choices, (first, plain, *map(str, by_rule))),
         "",
         aligned(rows, left=2, right=range(3, 3 + len(columns) + 2 * of_beam)),
         "",

@@ -240,6 +240,7 @@ def predict(
     *,
     loads: Iterable[str] = CASES,
     load: str | None = None,
+    also: Iterable[str] = (),
 ) -> list[Choice]:
     """Choices for a mesh, solved on it, the best one by its worst load first, or quantity of a shape.
 
@@ -257,6 +258,8 @@ def predict(
         Loads of a beam that count: of traction, compression, bending, shear and pressure.
     load : str, optional
         Load case of a shape; its only one without.
+    also : iterable of str, optional
+        Further definitions to try, such as ``["best-springs"]``, a search that takes seconds.
 
     Returns
     -------
@@ -324,7 +327,9 @@ def predict(
             )
         known = references(beam, under_loads[0].material, named) if known is None else known
         wanted = {load: cast(References, known)[load] for load in named}
-    tried = Trial(statements, wanted)
+    able = [name for name, one in DEFINITIONS.items() if not (one.needs or one.uniaxial)]
+    further = check_names("also", also, able, ["best-springs"], "cannot be tried") if also else ()
+    tried = Trial(statements, wanted, also=further)
     if not tried.names and all("springs" in found for found in tried.failures.values()):
         raise DefinitionError("; ".join(f"{name}: {found['springs']}" for name, found in tried.failures.items()))
     return best_first([tried.choice(name) for name in (*tried.names, *tried.failures)], known)
@@ -425,8 +430,10 @@ class Trial:
     """Definitions solved on a mesh, under loads of a beam or a load case of a shape; equal springs once.
 
     `statements` are of one mesh, in linear kinematics; `known` are references by load of a beam or by quantity of a
-    shape; `among` restricts the definitions. `names` are the definitions with springs, equal springs once; `same` has
-    the one of `names` for each definition with springs; `failures` are as of `Choice`, for each definition without.
+    shape; `among` restricts the definitions, `also` adds some.
+
+    `names` are the definitions with springs, equal springs once; `same` has the one of `names` for each definition with
+    springs; `failures` are as of `Choice`, for each definition without.
     """
 
     def __init__(
@@ -434,6 +441,7 @@ class Trial:
         statements: Sequence[Statement],
         known: References | ShapeReferences,
         among: Iterable[str] | None = None,
+        also: Iterable[str] = (),
     ) -> None:
         self.statements, self.known, first = statements, known, statements[0]
         self.mesh, self.materials, self.thickness = first.mesh, first.materials, first.thickness
@@ -448,7 +456,7 @@ class Trial:
         found: dict[tuple[object, ...], str] = {}  # definition by its springs
         quads, isotropic = len(self.mesh.quads) > 0, all(one.isotropic for one in self.materials)
         usual: tuple[str, ...] = ON_QUADS if quads else ON_TRIANGLES
-        for name in usual if isotropic else ANISOTROPIC[4 if quads else 3]:
+        for name in dict.fromkeys((*(usual if isotropic else ANISOTROPIC[4 if quads else 3]), *also)):
             if among is not None and name not in among:
                 continue
             try:

@@ -104,18 +104,29 @@ def outline_tests(mesh: Mesh) -> np.ndarray:
     For E t = 1: times the square root of E t they are forces [N] whose work on their own displacements in the sheet
     is 1 J, and 0 on those of the others.
     """
+    return polynomial_tests(mesh)[0]
+
+
+def polynomial_tests(
+    mesh: Mesh, nu: float = NU, degrees: range = range(1, TEST_DEGREE + 1)
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return forces as `outline_tests` and the displacements of the particles, both of shape (n_tests, n_points, 2).
+
+    Displacements are polynomials of some `degrees`, in a sheet of any Poisson's ratio.
+    """
     x, y = (mesh.points - mesh.points.mean(axis=0)).T
     places = (x + 1j * y) / np.hypot(x, y).max()
     # Sides of triangles run counter-clockwise around them: those of the outline have the sheet on their left.
     sides = np.concatenate([mesh.triangles[:, [1, 2]], mesh.triangles[:, [2, 0]], mesh.triangles[:, [0, 1]]])
     begin, end = sides[mesh.on_outline[mesh.cell_edges[3].T.ravel()]].T
     here, along = places[begin], places[end] - places[begin]
-    at_begin, at_end = np.zeros((2, TESTS, len(here)), dtype=complex)
-    work = np.zeros((TESTS, TESTS))
-    # Four points integrate polynomials of degree 7 exactly: cubic stresses times displacements of degree 4.
-    for position, share in zip(*np.polynomial.legendre.leggauss(4)):
+    inside = np.array([field for field, _ in _solutions(places, places, nu, degrees)])
+    at_begin, at_end = np.zeros((2, len(inside), len(here)), dtype=complex)
+    work = np.zeros((len(inside), len(inside)))
+    # As many points as the degree integrate stresses times displacements exactly.
+    for position, share in zip(*np.polynomial.legendre.leggauss(degrees[-1])):
         part = 0.5 * (1 + position)
-        fields, tractions = np.stack(list(_solutions(here + part * along, -1j * along)), axis=1)
+        fields, tractions = np.stack(list(_solutions(here + part * along, -1j * along, nu, degrees)), axis=1)
         work += 0.5 * share * np.real(tractions @ fields.conj().T)
         at_begin += 0.5 * share * (1 - part) * tractions
         at_end += 0.5 * share * part * tractions
@@ -125,13 +136,17 @@ def outline_tests(mesh: Mesh) -> np.ndarray:
         forces.append(np.stack(axes, axis=1))
     energies, mixtures = np.linalg.eigh(0.5 * (work + work.T))
     told = energies > LEAST_TOLD * energies[-1]
-    return np.einsum("ab,anx->bnx", mixtures[:, told] / np.sqrt(energies[told]), np.array(forces))
+    mixtures = mixtures[:, told] / np.sqrt(energies[told])
+    moved = np.stack([inside.real, inside.imag], axis=2)
+    return np.einsum("ab,anx->bnx", mixtures, np.array(forces)), np.einsum("ab,anx->bnx", mixtures, moved)
 
 
-def _solutions(places: np.ndarray, normals: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+def _solutions(
+    places: np.ndarray, normals: np.ndarray, nu: float, degrees: range
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Displacement and traction along a normal of each polynomial solution for E = 1, as x + i y."""
-    kappa, shear = (3 - NU) / (1 + NU), 1 / (2 * (1 + NU))
-    for power in range(1, TEST_DEGREE + 1):
+    kappa, shear = (3 - nu) / (1 + nu), 1 / (2 * (1 + nu))
+    for power in degrees:
         whole, slope = places**power, power * places ** (power - 1)
         bend = power * (power - 1) * places ** max(power - 2, 0)
         for phi, psi in ((1, 0), (1j, 0), (0, 1), (0, 1j)):

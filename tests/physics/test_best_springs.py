@@ -1,0 +1,185 @@
+"""The best springs on a mesh: exact gradients, a proven bound, what is attainable, and what is refused."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as some
+
+import springtune as st
+from springtune.cli import main
+from springtune.mesh import MESH_TYPES, Mesh, lattice
+from springtune.springs import DEFINITIONS
+from springtune.springs.best_springs import DISPLACEMENT_WEIGHT, STRETCH_WEIGHT, LoadSpace
+
+THIRD = st.Material("1 MPa", 1 / 3, name="third")
+BEAM = st.Beam("60 mm", "20 mm")
+
+
+@cache
+def space(nu=1 / 3, holed=False):
+    if holed:
+        hole = st.Hole.circle(("30 mm", "10 mm"), "5 mm")
+        return LoadSpace(st.mesh_shape(st.Shape.rectangle("60 mm", "20 mm", holes=[hole]), "3 mm").mesh, nu)
+    return LoadSpace(st.make_mesh(BEAM, "free", "5 mm"), nu)
+
+
+@cache
+def found():
+    return st.best_springs(space().mesh, THIRD, "1 mm", starts=["van-gelder", "lattice"])
+
+
+def scattered(count, seed, size=0.5):
+    return np.exp(size * np.random.default_rng(seed).standard_normal(count))
+
+
+# -- gradients and convexity -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("nu", [0.0, 1 / 3, 0.5])
+def test_gradients_are_exact(nu):
+    one = space(nu)
+    stiffness, way = (scattered(len(one.sizes), seed) for seed in (1, 2))
+
+    def value(stiffness):
+        energies, off, apart = one.misses(stiffness)
+        fields = STRETCH_WEIGHT * (off**2).sum() / len(off) + DISPLACEMENT_WEIGHT * (apart**2).sum()
+        return (energies**2).sum() + fields
+
+    step = 1e-5
+    slope = (value(stiffness + step * way) - value(stiffness - step * way)) / (2 * step)
+    assert one.misses(stiffness, slope=True)[3] @ way == pytest.approx(slope, rel=1e-6)
+
+
+@settings(max_examples=10)
+@given(seed=some.integers(0, 1000), share=some.floats(0, 1))
+def test_energies_are_matrix_convex(seed, share):
+    one = space()
+    first, second = (scattered(len(one.sizes), (seed, part), 1.0) for part in (1, 2))
+    between = one.misses(share * first + (1 - share) * second)[0]
+    chord = share * one.misses(first)[0] + (1 - share) * one.misses(second)[0]
+    assert np.linalg.eigvalsh(chord - between).min() > -1e-9
+
+
+# -- what is attained --------------------------------------------------------------------------------------------------
+
+
+def test_equilateral_triangles_are_exact_under_even_stresses():
+    one = LoadSpace(lattice(12, 8))
+    edges = 3**0.5 / 4 * one.mesh.cells_per_edge
+    assert np.linalg.svd(one.misses(edges)[0])[1][-3:] == pytest.approx(0, abs=1e-12)
+    assert one.search(edges)[1] < 0.5 * sum(np.sum(part**2) for part in one.misses(edges)[:1])
+
+
+def test_springs_alone_can_be_within_two_percent_on_a_free_mesh():
+    mesh = st.make_mesh(st.Beam("200 mm", "40 mm"), "free", "5 mm")
+    springs = st.best_springs(mesh, THIRD, "1 mm", starts=["van-gelder"])
+    assert max(map(abs, springs.errors.values())) < 0.02 < springs.lower_bound < springs.stretch_error
+    assert springs.energy_error < 0.02 and springs.springs.relative.min() > 0
+    scene = st.Scene(st.Beam("200 mm", "40 mm"), mesh, THIRD, "pressure", 1.0, definition="patch", kinematics="linear")
+    assert abs(scene.solve().error) > 0.05
+
+
+def test_negative_springs_and_second_neighbours_do_better():
+    any_sign = st.best_springs(space().mesh, THIRD, "1 mm", starts=["van-gelder"], negative=True)
+    farther = st.best_springs(space().mesh, THIRD, "1 mm", starts=["peridynamic"], reach="10.5 mm")
+    assert any_sign.lower_bound is None
+    assert min(any_sign.objectives.values()) < found().objectives["van-gelder"]
+    assert farther.displacement_error < 0.5 * found().displacement_error
+    assert farther.stretch_error < found().stretch_error
+    assert len(farther.springs.relative) == len(farther.mesh.edges) > len(space().mesh.edges)
+
+
+def test_searches_from_several_starts_agree():
+    first, second = found().objectives.values()
+    assert first == pytest.approx(second, rel=0.05)
+    assert found().evaluations > 400
+
+
+# -- the bound ---------------------------------------------------------------------------------------------------------
+
+
+@cache
+def bound(nu, holed):
+    return space(nu, holed).stretch_bound()
+
+
+@settings(max_examples=30)
+@given(
+    seed=some.integers(0, 1000), size=some.floats(0, 3), nu=some.sampled_from([0.0, 1 / 3, 0.5]), holed=some.booleans()
+)
+def test_no_springs_are_below_the_bound(seed, size, nu, holed):
+    one = space(nu, holed)
+    assert one.errors(scattered(len(one.sizes), seed, size))[2] > bound(nu, holed) > 0.02
+
+
+@pytest.mark.parametrize("name", ["lattice", "van-gelder", "energy-fit", "patch-fit", "best-springs"])
+def test_no_definition_is_below_the_bound(name):
+    springs = DEFINITIONS[name].springs(space().mesh, THIRD.in_plane, 1.0)
+    stiffness = springs.relative * springs.reference / THIRD.young_modulus
+    assert space().errors(stiffness)[2] > bound(1 / 3, False)
+
+
+def test_the_bound_is_zero_where_springs_can_be_exact():
+    """Of a particle with two springs and a force along each of them nothing can be said."""
+    from springtune.springs.best_springs import delta_of
+
+    normals, wanted = np.eye(2), np.eye(2)
+    assert delta_of(normals, wanted, np.eye(2)) == pytest.approx(0, abs=1e-6)
+    assert delta_of(normals, wanted, -np.eye(2)) > 0.9
+    assert delta_of(normals, wanted, np.array([[1.0, 1.0], [0.0, 1.0]])) == pytest.approx(0.5**0.5, abs=1e-3)
+
+
+# -- use and refusals --------------------------------------------------------------------------------------------------
+
+
+def test_a_study_can_name_it():
+    springs = DEFINITIONS["best-springs"].springs(space().mesh, THIRD, 1.0)
+    assert springs.evaluations > 10 and springs.relative.min() > 0
+
+
+def test_they_are_of_their_own_mesh():
+    other = st.make_mesh(BEAM, "structured", "5 mm")
+    with pytest.raises(st.DefinitionError, match="of one mesh, material and thickness; search again"):
+        st.Scene(BEAM, other, THIRD, "traction", 1.0, definition=found()).springs  # noqa: B018
+    assert not st.best_springs(space(1 / 3, True).mesh, THIRD, "1 mm", starts=["lattice"], evaluations=5).errors
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"mesh": 3}, "mesh: 3 is not a Mesh"),
+        ({"mesh": MESH_TYPES["braced"](0.06, 0.02, 5e-3)}, "needs triangles and the mesh has quadrilaterals"),
+        ({"mesh": Mesh(np.array([[0, 0], [1, 0], [0, 1], [5, 0], [6, 0], [5, 1.0]]), np.array([[0, 1, 2], [3, 4, 5]]))},
+         "the mesh has 2 parts"),
+        ({"material": st.AnisotropicMaterial(9.0, 4.0, 1.5, 2.0)}, "material: best springs are of isotropic ones"),
+        ({"thickness": "-1 mm"}, "thickness: '-1 mm' is not above zero"),
+        ({"reach": "0 mm"}, "reach: '0 mm' is not above zero"),
+        ({"starts": "lattice"}, "starts: 'lattice' is no list of definitions"),
+        ({"starts": []}, "starts: .* is no list of definitions"),
+        ({"starts": ["latice"]}, "starts: 'latice' is unknown"),
+        ({"starts": ["paper"]}, "definition 'paper': stiffness: None"),
+        ({"evaluations": 0}, "evaluations: 0 is not a whole number above zero"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_named(changes, said):
+    with pytest.raises(ValueError, match=said):
+        st.best_springs(**({"mesh": space().mesh, "material": THIRD, "thickness": "1 mm"} | changes))
+
+
+def test_predict_shows_them_if_asked(capsys):
+    ask = "predict --beam 60x20 --mesh free --size 5mm --young 1MPa --poisson 0.33333"
+    for more, shown in (("", False), (" --best-springs", True)):
+        main((ask + more).split(), standalone_mode=False)
+        assert ("best-springs" in capsys.readouterr().out) == shown
+    with pytest.raises(ValueError, match="also: 'bst-springs' cannot be tried"):
+        st.predict(BEAM, space().mesh, THIRD, also=["bst-springs"])
+
+
+@pytest.mark.parametrize("more", ["--error 1%", "--size 0.1mm"])
+def test_predict_refuses_them_where_no_mesh_is_solved(more, capsys):
+    ask = "predict --beam 200x20 --mesh free --young 1MPa --poisson 0.3 --best-springs " + more
+    with pytest.raises(SystemExit):
+        main(ask.split())
+    assert "--best-springs: " in capsys.readouterr().err
