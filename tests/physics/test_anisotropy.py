@@ -343,6 +343,7 @@ NOT_ADDITIVE = {
     "adjoint",
     "peridynamic",
     "force-balance",
+    "best-springs",
     *(name for name in DEFINITIONS if name.startswith("patch")),
 }
 """Definitions that count or test the springs of each part alone."""
