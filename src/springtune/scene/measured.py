@@ -78,9 +78,7 @@ class MeasuredTest:
         or pressed, the growth of its width at the middle; and mean displacements of sides or points such as
         ``x right``.
     force : float or str, optional
-        Force on a beam [N] at which a field was measured.
-    scale : float, optional
-        Factor on the load case of a shape [1] at which a field was measured.
+        Force on a beam [N] at which a field was measured; the load case of a shape has its own.
     angle : float or str, optional
         Angle of the material's first axis from x [rad], of a coupon that was cut out at an angle.
     noise : float or str, optional
@@ -111,7 +109,6 @@ class MeasuredTest:
     load: str
     file: str | Path
     force: Number | None = None
-    scale: float = 1.0
     angle: Number = 0.0
     noise: Number | None = None
     shift: bool = True
@@ -124,12 +121,12 @@ class MeasuredTest:
         chosen(LOADS if of_beam else self.body.loads, self.load, "load")
         columns, lines = _read(self.file)
         put(self, angle=quantity(self.angle, "angle", "angle"), columns=columns, _lines=lines)
-        if of_beam and "u" in columns:
-            if self.force is None:
-                raise ValueError(f"force: missing; give the force at which '{self.file}' was measured, as '400 N'")
-            put(self, scale=positive(self.force, "force", "force"))
-        elif self.force is not None:
-            raise ValueError(f"force: {self.force!r} is for the field of a beam; leave it out, or give a scale")
+        if (self.force is None) == (of_beam and "u" in columns):
+            raise ValueError(
+                f"force: {self.force!r}; give the force at which '{self.file}' was measured, as '400 N', if it is the "
+                "field of a beam, else none"
+            )
+        put(self, force=None if self.force is None else positive(self.force, "force", "force"))
 
 
 def stated(test: MeasuredTest) -> tuple[Shape, LoadCase, GroupedMesh | None]:
@@ -167,7 +164,7 @@ def _field(test: MeasuredTest, family: Family) -> list[Block]:
         )
     turned = (points - points.mean(axis=0))[:, ::-1] * [-1, 1] / (np.ptp(points) or 1.0)
     rigid = np.column_stack([np.tile(np.eye(2), (len(points), 1)), turned.ravel()])
-    factors, noise = np.full(values.size, test.scale), _noise(test, "length")
+    factors, noise = np.full(values.size, test.force or 1.0), _noise(test, "length")
     label = f"field of '{test.file}'"
     return [Block(label, values.ravel(), factors, rows, rigid[:, : 3 * test.shift], noise, points)]
 
