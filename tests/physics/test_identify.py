@@ -9,6 +9,7 @@ from click.testing import CliRunner
 
 import springtune as st
 from springtune.cli import main
+from springtune.cli.study import template_text
 from springtune.problem.rubber import TestDataError
 from springtune.reference.by_constants import ENTRIES, Family
 from springtune.reference.shapes import solve_shape
@@ -216,6 +217,12 @@ CALLS = {
     ("c.csv", "--beam", "100x20", "--load", "trction"): (2, "--load: 'trction' is unknown"),
     ("c.csv", "--beam", "100x20", "--load", "traction", "--known", "mu=1"): (2, "--known: 'mu' is no constant"),
     ("c.csv", "--beam", "100x20", "--load", "traction", "--plot", "r.txt"): (2, "--plot: 'r.txt' has another ending"),
+    ("c.csv", "--beam", "100x20", "--load", "traction", "--known", "nu=x"): (2, "--known: nu is 'x'; give a number"),
+    ("c.csv", "--shape", "strain.yaml", "--load", "pull"): (
+        2,
+        "--shape: strain.yaml: material 'steel' is in plane str",
+    ),
+    ("c.csv", "--beam", "100x20", "--load", "traction", "--plot", "no/r.png"): (1, "folder no does not exist; make it"),
     ("none.yaml",): (1, "none.yaml: is no list of tests"),
     ("none.csv", "--beam", "100x20", "--load", "traction"): (1, "'none.csv' cannot be read"),
 }
@@ -225,6 +232,9 @@ CALLS = {
 def test_a_wrong_call_says_what_to_give(tmp_path, monkeypatch, arguments):
     monkeypatch.chdir(tmp_path)
     Path("c.csv").write_text("force [N],displacement [um]\n0,0\n1,1\n2,2.1\n")
+    Path("strain.yaml").write_text(
+        template_text(Path("x"), "shape").replace("ratio: 0.3}", "ratio: 0.3, plane: strain}")
+    )
     code, message = CALLS[arguments]
     made = CliRunner().invoke(main, ["identify", *arguments, *(() if "--plot" in arguments else ("--write", "m.yaml"))])
     assert (made.exit_code, Path("m.yaml").exists()) == (code, False), made.output

@@ -19,9 +19,6 @@ if TYPE_CHECKING:
 ARGUMENT = re.compile("^(?=(law|known|load|force|angle|noise):)")
 """Begin of messages with the name of an argument, which is an option here."""
 
-SIDES = ("length", "height", "thickness")
-"""Sides of a beam in a study."""
-
 KEYS = ("beam", "thickness", "shape", "load", "force", "angle", "noise", "shift", "file")
 """Keys of a test in a list of tests; all but the file are options, too."""
 
@@ -70,22 +67,19 @@ def identify(
         if SHEET_LAWS.get(law) == ():
             found = identified(files[0] if len(files) == 1 else [], law)
         else:
-            given = {name: _number(value) for name, _, value in (one.partition("=") for one in known)}
+            given = {name: value for name, _, value in (one.partition("=") for one in known)}
             found = identified([_test(**row) for row in rows], law, known=given)
         text = _study(found, rows[0], write) if write else ""
         if plot:
+            import matplotlib.pyplot as plt
+
+            found.plot()
             with replacing(plot) as unfinished:
-                found.plot().figure.savefig(unfinished, format=plot.suffix[1:])
+                plt.savefig(unfinished, format=plot.suffix[1:])
+            plt.close()
         if write:
             write_text(write, text)
     click.echo(found)
-
-
-def _number(text: str) -> float | str:
-    try:
-        return float(text)
-    except ValueError:
-        return text
 
 
 def _rows(path: Path) -> list[dict[str, Any]]:
@@ -161,5 +155,6 @@ def _study(found: "Identified", row: Mapping[str, Any], target: Path) -> str:
         (places, *_) = found.places.values()
         force = row["force"] or (f"{abs(places).max():g} N" if row["beam"] else "1 N")
         grid |= {"beam": beam.name, "mesh_size": f"{250 * beam.height:g} mm", "force": force}
-        study["beams"] = {beam.name: {side: f"{1e3 * getattr(beam, side):g} mm" for side in SIDES}}
+        (sides,) = study["beams"].values()
+        study["beams"] = {beam.name: {side: f"{1e3 * getattr(beam, side):g} mm" for side in sides}}
     return safe_dump(study, sort_keys=False)

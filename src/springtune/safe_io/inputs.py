@@ -96,7 +96,7 @@ def numbers(
     for line, row in rows:
         if len(row) != len(names):
             raise refuse(f"'{path}', line {line}: has {len(row)} values, and the head {len(names)}; correct it")
-        found.append([_number(text) for text in row])
+        found.append([number_of(text) for text in row])
         for name, text, number in zip(names, row, found[-1]):
             if name and not math.isfinite(number):
                 raise refuse(
@@ -106,10 +106,11 @@ def numbers(
     return found
 
 
-def _number(text: str) -> float:
+def number_of(text: object) -> float:
+    """Return the number of a text, or NaN."""
     try:
-        return float(text)
-    except ValueError:
+        return float(text)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
         return math.nan
 
 

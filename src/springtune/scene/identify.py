@@ -21,6 +21,7 @@ from ..problem.rubber import TestDataError, fit_rubber, relative_weights, stress
 from ..reference.answers import beyond_linear
 from ..reference.by_constants import ENTRIES, Family
 from ..registry import hook
+from ..safe_io.inputs import number_of
 from ..safe_io.tables import Tabled
 from .measured import Block, MeasuredTest, blocks, stated
 
@@ -55,22 +56,17 @@ MISFIT = 1.5
 LEAST_NOISE = 1e-9
 """Noise over the values' root mean square that is rounding."""
 
-WEIGHTINGS = 20
-"""Most fits until the noise of each block, estimated from the fit before, settles."""
-
-FARTHEST = 30.0
-"""Largest change of a logarithm of a modulus in a fit: where forces and displacements contradict each other."""
-
-Constants = dict[str, float]
-"""Constants in SI units by name."""
+Constants = dict[str, Any]
+"""Constants in SI units by name; complex where they are varied by complex steps."""
 
 
 def varied(constants: Constants, names: Iterable[str], steps: Iterable[complex]) -> Constants:
-    """Change constants by steps: ratios by addition, moduli by factors exp(step), coefficients of rubber relatively."""
+    """Change constants by steps: ratios by addition, moduli by factors exp(step), others relatively."""
     changed = dict(constants)
     for name, step in zip(names, steps):
-        factor = 1 + step if name.startswith("c") else np.exp(step)
-        changed[name] = constants[name] + step if name in ASSUMED else constants[name] * factor
+        value = constants[name]
+        added = step if name in ASSUMED else step * abs(value)
+        changed[name] = value * np.exp(step) if name[0] in "EG" else value + added
     return changed
 
 
@@ -114,7 +110,7 @@ class Model:
         slopes = np.concatenate(self.residuals(constants, names, self.sizes))[:, 1:]
         triangle, order = qr(slopes, mode="r", pivoting=True)
         own = np.abs(np.diag(triangle))
-        rank = np.count_nonzero(own > NULL * own[0])
+        rank = int(np.count_nonzero(own > NULL * own[0]))
         labels, unknowns = ", ".join(block.label for block in self.blocks), ", ".join(names)
         estimated = any(block.noise is None for block in self.blocks)
         if self.counts.sum() < max(rank, 1) + estimated or self.counts.min() < 1:
@@ -138,36 +134,33 @@ class Model:
         given = np.array([block.noise or 0.0 for block in self.blocks])
         noise = np.where(given, given, self.sizes)
         freedom = self.counts * max(1 - len(names) / self.counts.sum(), LEAST_NOISE)
-        bounds = np.array([(-1, 0.5) if name == "nu" else (-FARTHEST, FARTHEST) for name in names])
+        # Moduli stay within factors of exp(30), even where forces and displacements contradict each other.
+        bounds = np.array([(-1.0, 0.5) if name == "nu" else (-30.0, 30.0) for name in names])
         bounds -= [[constants[name] if name == "nu" else 0.0] for name in names]
 
-        def evaluated(steps: np.ndarray) -> np.ndarray:
+        def tables(steps: np.ndarray) -> list[np.ndarray]:
             tried = varied(constants, names, steps)
             if "G12" in tried and tried["nu12"] ** 2 > tried["E1"] / tried["E2"]:  # not positive definite
-                return np.full((sum(len(block.values) for block in self.blocks), 1), np.inf)  # a shorter step follows
-            return np.concatenate(self.residuals(tried, names, noise))
+                return [np.full((len(block.values), 1), np.inf) for block in self.blocks]  # a shorter step follows
+            return self.residuals(tried, names, noise)
+
+        def misfit(steps: np.ndarray) -> np.ndarray:
+            return np.concatenate(tables(steps))[:, 0]
+
+        def slopes(steps: np.ndarray) -> np.ndarray:
+            return np.concatenate(tables(steps))[:, 1:]
 
         steps = np.zeros(len(names))
-        for _ in range(WEIGHTINGS):
-            steps = least_squares(
-                lambda one: evaluated(one)[:, 0],
-                steps,
-                lambda one: evaluated(one)[:, 1:],
-                bounds.T,
-                xtol=1e-12,
-                ftol=1e-12,
-            ).x
-            found = self.residuals(varied(constants, names, steps), names, noise)
-            sums = np.array([table[:, 0] @ table[:, 0] for table in found])
-            before, settled = noise, np.maximum(noise * np.sqrt(sums / freedom), LEAST_NOISE * self.sizes)
-            noise = np.where(given, given, settled)
+        for _ in range(20):  # until the noise that is estimated settles
+            steps = least_squares(misfit, steps, slopes, bounds.T, xtol=1e-12, ftol=1e-12).x
+            sums = np.array([table[:, 0] @ table[:, 0] for table in tables(steps)])
+            settled = np.maximum(noise * np.sqrt(sums / freedom), LEAST_NOISE * self.sizes)
+            before, noise = noise, np.where(given, given, settled)
             if np.allclose(noise, before, rtol=1e-3, atol=0):
                 break
-        constants = varied(constants, names, steps)
-        tables = self.residuals(constants, names, noise)
-        slopes = np.concatenate(tables)[:, 1:]
-        deviations = np.sqrt(np.diag(np.linalg.inv(slopes.T @ slopes)))
-        return constants, tables, noise, t.ppf(0.975, freedom[given == 0].sum() or np.inf) * deviations
+        deviations = np.sqrt(np.diag(np.linalg.inv(slopes(steps).T @ slopes(steps))))
+        half = t.ppf(0.975, freedom[given == 0].sum() or np.inf) * deviations
+        return varied(constants, names, steps), tables(steps), noise, half.clip(max=600)  # exp(700) is infinite
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -326,10 +319,13 @@ def _sheet(tests: Sequence[MeasuredTest], law: str, known: Mapping[str, Number])
         constants = varied(constants, moduli, [_scale(model, constants)] * len(moduli))
         found = _identified(law, model, constants, free, notes)
         constants = found.values
+    materials: dict[str, AnyMaterial] = {
+        part: Material(constants[name], constants["nu"], name=f"measured-{part}".rstrip("-"))
+        for part, name in zip(parts, constants if law != "orthotropic" else ())
+    }
     if law == "orthotropic":
-        return replace(found, materials={"": AnisotropicMaterial.orthotropic(*constants.values(), name="measured")})
-    *each, nu = constants.values()
-    materials = {part: Material(one, nu, name=f"measured-{part}".rstrip("-")) for part, one in zip(parts, each)}
+        along, across, nu, shear = constants.values()
+        materials = {"": AnisotropicMaterial.orthotropic(along, across, nu, shear, name="measured")}
     return replace(found, materials=materials)
 
 
@@ -339,9 +335,9 @@ def _start(names: Sequence[str], known: Mapping[str, Number]) -> tuple[Constants
     for name, value in known.items():
         if name not in names:
             raise ValueError(f"known: {name!r} is no constant of this law; {nearest(str(name), names)}")
-        if name in ASSUMED and not (isinstance(value, int | float) and -1 < value <= 0.5):
+        if name in ASSUMED and not -1 < number_of(value) <= 0.5:
             raise ValueError(f"known: {name} is {value!r}; give a number above -1, at most 0.5")
-        constants[name] = value if name in ASSUMED else positive(value, "stress", f"known: {name}")
+        constants[name] = number_of(value) if name in ASSUMED else positive(value, "stress", f"known: {name}")
     if len(known) == len(names):
         raise ValueError(f"known: {', '.join(known)} are all constants of this law; leave out what is to be found")
     return constants, [name for name in names if name not in known]
@@ -377,11 +373,12 @@ def _identified(law: str, model: Model, constants: Constants, free: Sequence[str
                 f"{block.label}: residuals are not random, so the intervals are too narrow; leave out where the law "
                 "does not hold"
             )
-    ends = [varied(constants, names, one) for one in (-half, half)]
+    fitted = {name: value if name in names else np.nan for name, value in constants.items()}
+    low, high = (varied(fitted, names, one) for one in (-half, half))
     return Identified(
         law,
         {name: float(value) for name, value in constants.items()},
-        {name: tuple(sorted(float(end[name]) if name in names else np.nan for end in ends)) for name in constants},
+        {name: (float(low[name]), float(high[name])) for name in constants},
         tuple(lacking),
         tuple(notes),
         dict(zip(residuals, noise.tolist())),
@@ -395,11 +392,9 @@ class _Linear(Model):
     """Numbers that are linear in all constants."""
 
     def residuals(self, constants: Constants, names: Sequence[str], noise: np.ndarray) -> list[np.ndarray]:
-        (block,) = self.blocks
-        rows = block.rows * list(constants.values())  # derivatives by relative changes
-        return [
-            np.column_stack([rows.sum(axis=1) - block.values, rows[:, [one in names for one in constants]]]) / noise
-        ]
+        (block,), values = self.blocks, np.array(list(constants.values()))
+        slopes = (block.rows * abs(values))[:, [name in names for name in constants]]
+        return [np.column_stack([block.rows @ values - block.values, slopes]) / noise]
 
 
 def _rubber(file: str | Path, law: str) -> Identified:

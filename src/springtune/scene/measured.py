@@ -117,11 +117,10 @@ class MeasuredTest:
 
     def __post_init__(self) -> None:
         is_a(self.body, (Beam, Shape), "body", A_BEAM)
-        of_beam = isinstance(self.body, Beam)
-        chosen(LOADS if of_beam else self.body.loads, self.load, "load")
+        chosen(self.body.loads if isinstance(self.body, Shape) else LOADS, self.load, "load")
         columns, lines = _read(self.file)
         put(self, angle=quantity(self.angle, "angle", "angle"), columns=columns, _lines=lines)
-        if (self.force is None) == (of_beam and "u" in columns):
+        if (self.force is None) == (isinstance(self.body, Beam) and "u" in columns):
             raise ValueError(
                 f"force: {self.force!r}; give the force at which '{self.file}' was measured, as '400 N', if it is the "
                 "field of a beam, else none"
@@ -139,10 +138,9 @@ def stated(test: MeasuredTest) -> tuple[Shape, LoadCase, GroupedMesh | None]:
     (pull,) = kind.case.tractions
     case = replace(kind.case, tractions=(replace(pull, force=tuple(load.sign * np.array(pull.force))),))
     corners = {"bottom": (0.0, 0.0), "right": (size[0], 0.0), "top": size, "left": (0.0, size[1])}
-    points = {}
-    for name, side in zip((MIDDLE, *GAUGES), (kind.loaded, Side(kind.along, False), Side(kind.along, True))):
-        points[name] = 0.5 * np.array(size)
-        points[name][side.axis] = side.place(*size)
+    sides = dict(zip((MIDDLE, *GAUGES), (kind.loaded, Side(kind.along, False), Side(kind.along, True))))
+    points = {name: (0.5 * size[0], side.place(*size)) for name, side in sides.items() if side.axis}
+    points |= {name: (side.place(*size), 0.5 * size[1]) for name, side in sides.items() if not side.axis}
     outline = [Segment(corner, group=group) for group, corner in corners.items()]
     return Shape("beam", body.thickness, outline, points=points), case, None
 
