@@ -3,6 +3,7 @@
 import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -275,23 +276,22 @@ def about(net: Net, simulation: Simulation, integrator: str) -> list[str]:
 
 def filled(name: str, **values: Any) -> str:
     """Fill in a template; floats get the shortest text that is read back exactly."""
+    return str(_templates().get_template(f"{name}.jinja").render(values))
+
+
+@cache
+def _templates() -> Any:
     import jinja2
 
-    environment = jinja2.Environment(
+    return jinja2.Environment(
         loader=jinja2.PackageLoader(__package__, "templates"),
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    return environment.get_template(f"{name}.jinja").render(values)
 
 
 def numbers(values: np.ndarray) -> str:
     """Numbers of an array in a row, each in the shortest text that is read back exactly."""
     return " ".join(map(repr, values.ravel().tolist()))
-
-
-def commented(lines: Iterable[str], indent: str) -> list[str]:
-    """Lines as comments of XML."""
-    return [f"{indent}<!-- {line.replace('--', '- -')} -->" for line in lines]
