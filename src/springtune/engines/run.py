@@ -245,11 +245,9 @@ def net_of(scene: Scene, factor: float = 1.0) -> SpringNet:
     net = SpringNet.from_scene(scene, errors=False)
     if factor == 1:
         return net
-    energies = []
-    for one in net.energies:
-        moduli = {name: factor * values for name, values in one.values.items() if not name.startswith("rest_")}
-        energies.append(replace(one, values=one.values | moduli))
-    return replace(net, stiffness=factor * net.stiffness, energies=tuple(energies))
+    grown = [one.values | {name: factor * values for name, values in one.moduli.items()} for one in net.energies]
+    energies = tuple(replace(one, values=values) for one, values in zip(net.energies, grown))
+    return replace(net, stiffness=factor * net.stiffness, energies=energies)
 
 
 def follow(session: Session, window: int, most: int, tolerance: float, extent: float) -> Ended:

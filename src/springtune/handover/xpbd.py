@@ -109,10 +109,8 @@ def _check_positive(net: Net, values: np.ndarray, which: str, count: int) -> Non
 
 
 def _blocks(net: Net, terms: Terms) -> Blocks:
-    kind, values = terms.kind, terms.values
-    there = np.any([values[name] != 0 for name in VALUES[kind] if not name.startswith("rest_")], axis=0)
-    there = there.reshape(len(there), -1).any(axis=1)  # cells of other parts have none
-    cells, values = terms.cells[there], {name: one[there] for name, one in values.items()}
+    kind, there = terms.kind, terms.present
+    cells, values = terms.cells[there], {name: one[there] for name, one in terms.values.items()}
     if kind == "biquadratic":
         corners = np.arange(3)
         stiffness = np.zeros((len(cells), 3, 3))
