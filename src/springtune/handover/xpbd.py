@@ -110,7 +110,7 @@ def xpbd(net: Net) -> str:
     (0.0, '1.1e-08 m/N')
     """
     simulation = simulate(net, "XPBD", COMPLIANCE_UNITS)
-    there, whole = net.stiffness > 0, net.held.all(axis=1)
+    there, whole = net.stiffness > 0, np.asarray(net.held.all(axis=1))
     return filled(
         "xpbd.json",
         dumps=json.dumps,
