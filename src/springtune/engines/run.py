@@ -288,7 +288,7 @@ def follow(session: Session, window: int, most: int, tolerance: float, extent: f
         if calm == CALM or trembles:
             return Ended(now, "rest", "", done, _frame(seconds), 0.0)
     swing = _swing(seen[len(seen) // 2 :])
-    if _trembles(seen) and swing > STEADY * _swing(seen[: len(seen) // 2]):
+    if len(seen) > 1 and _trembles(seen) and swing > STEADY * _swing(seen[: len(seen) // 2]):
         said = f"swings by {swing:.3g} m about its mean after {done} frames; take more substeps or damping"
         return Ended(_mean(seen), "swings", said, done, _frame(seconds), swing)
     said = f"not at rest after {done} frames, still moving by {change:.3g} m in {window}; give more frames"
