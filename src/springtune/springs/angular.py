@@ -27,6 +27,8 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Springs for the bulk modulus and angular springs for the rest (Keating): any nu on lattices, no tuning.
 
     Raises DefinitionError on quadrilaterals.
+
+    Source: Keating and Kirkwood, by Ostoja-Starzewski, Appl. Mech. Rev. 55:35, 2002 (abstract, derived).
     """
     from ..mechanics.energies import AngleEnergy  # here: see `springtune.springs`
 

@@ -16,6 +16,9 @@ from .lattice import uniform
 
 @definition("density", order=40, uniform=True)
 def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
-    """Uniform stiffness from the density of springs, 3 E t A / sum L^2 (Kot 2015)."""
+    """Uniform stiffness from the density of springs, 3 E t A / sum L^2 (Kot 2015).
+
+    Source: Kot, Nagahashi and Szymczak, The Visual Computer 31:1339, 2015 (abstract, derived).
+    """
     total = float(np.sum(mesh.edge_lengths**2))
     return Springs(3 * material.young_modulus * thickness * mesh.area / total, uniform(mesh))

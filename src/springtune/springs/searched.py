@@ -32,7 +32,10 @@ MAX_GRADIENTS = 400
 def annealed(
     mesh: Mesh, material: AnyMaterial, thickness: float, cases: Sequence[Case], evaluations: int = MAX_EVALUATIONS
 ) -> Springs:
-    """Stiffness of each spring by simulated annealing on a scene's reference displacements."""
+    """Stiffness of each spring by simulated annealing on a scene's reference displacements.
+
+    Source: Deussen, Kobbelt and Tuecke, 1995 (abstract).
+    """
     from scipy.optimize import dual_annealing  # here: see `springtune.springs`
 
     misfit = Misfit(mesh, material, thickness, cases)
@@ -49,7 +52,10 @@ def annealed(
 def evolved(
     mesh: Mesh, material: AnyMaterial, thickness: float, cases: Sequence[Case], evaluations: int = MAX_EVALUATIONS
 ) -> Springs:
-    """Stiffness of each spring by a genetic search on a scene's reference displacements."""
+    """Stiffness of each spring by a genetic search on a scene's reference displacements.
+
+    Source: Bianchi, Solenthaler, Szekely and Harders, 2004 (abstract).
+    """
     from scipy.optimize import differential_evolution  # here: see `springtune.springs`
 
     misfit = Misfit(mesh, material, thickness, cases)
@@ -65,7 +71,10 @@ def evolved(
 
 @definition("adjoint", order=170, anisotropic=True)
 def adjoint(mesh: Mesh, material: AnyMaterial, thickness: float) -> Springs:
-    """Stiffness of each spring by exact gradients, bounded, from even tension and shear of the mesh itself."""
+    """Stiffness of each spring by exact gradients, bounded, from even tension and shear of the mesh itself.
+
+    Source: own rule (derived).
+    """
     from scipy.optimize import minimize  # here: see `springtune.springs`
 
     misfit = Misfit(mesh, material, thickness, patch_cases(mesh, material, thickness))

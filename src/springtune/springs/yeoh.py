@@ -24,6 +24,8 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Springs of zero rest length and areas: equal to linear triangles of rubber fitted to a uniaxial test.
 
     The material must be a `springtune.Rubber`. Raises DefinitionError for others and on quadrilaterals.
+
+    Source: Yeoh, Rubber Chem. Technol. 63:792, 1990; the law as other texts have it (not read, derived).
     """
     from ..mechanics.energies import YeohEnergy  # here: see `springtune.springs`
     from .neo_hooke import of_rubber
