@@ -45,7 +45,7 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
 def corrected(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Baudet's rectangles with his transverse correction: E and nu exact, but in uniaxial scenes alone.
 
-    Source: Baudet and others, as of `baudet`; their forces as a stress (abstract, derived).
+    Source: Baudet and others, as `baudet`; forces as a stress are ours (abstract, derived).
     """
     plain = springs(mesh, material, thickness)
     return Springs(plain.reference, plain.relative, lateral=(1 - 3 * material.poisson_ratio) / 2)
@@ -55,7 +55,7 @@ def corrected(mesh: Mesh, material: Material, thickness: float) -> Springs:
 def incompressible(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Baudet's rectangles with an area energy that keeps areas, in the manner of Flechon 2011 (ours).
 
-    Source: Flechon, 2011; ours in that manner (not read, derived).
+    Source: after Flechon, 2011 (not read, derived).
     """
     from ..mechanics.energies import AreaEnergy  # here: see `springtune.springs`
 

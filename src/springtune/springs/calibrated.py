@@ -31,6 +31,6 @@ def calibrate(curves: Iterable[tuple[str, float, str]]) -> float:
 def springs(mesh: Mesh, material: Material, thickness: float, stiffness: float) -> Springs:
     """Uniform stiffness calibrated as the paper did: the mean best stiffness of one beam's sensitivity curves.
 
-    Source: the paper that is reproduced; its choice by eye as a rule (read, derived).
+    Source: the paper that is reproduced; the mean over meshes is ours (read, derived).
     """
     return paper.springs(mesh, material, thickness, stiffness)

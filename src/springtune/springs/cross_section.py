@@ -24,7 +24,7 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
 
     Raises DefinitionError on quadrilaterals, and where the mesh is not Delaunay.
 
-    Source: practice of lattice programs, no text (derived).
+    Source: used in lattice programs; no text at hand (derived).
     """
     triangles_only(mesh)
     halves = 0.5 / np.tan(corner_angles(mesh.points, mesh.triangles))

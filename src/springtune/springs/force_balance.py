@@ -29,7 +29,7 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
 
     Raises DefinitionError where a spring becomes negative, and on meshes of several parts.
 
-    Source: Kot, ChemEngineering 5(1):3, 2021, by a solve in the plane (abstract, derived).
+    Source: Kot, ChemEngineering 5(1):3, 2021; the solve in the plane is ours (abstract, derived).
     """
     from ..mechanics.moduli import outline_forces  # here: see `springtune.springs`
     from ..mechanics.network import Network

@@ -28,7 +28,7 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
 
     Raises DefinitionError on quadrilaterals.
 
-    Source: linear triangles of the textbook's law (derived).
+    Source: linear triangles of the textbook law (derived).
     """
     from ..mechanics.energies import NeoHookeEnergy, YeohEnergy  # here: see `springtune.springs`
 

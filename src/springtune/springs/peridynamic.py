@@ -1,4 +1,4 @@
-r"""Bonds of peridynamics, over all edges and bonds of a mesh (Silling, J. Mech. Phys. Solids 48:175, 2000).
+r"""Bonds of peridynamics, over all edges and bonds of a mesh (Silling, J. Mech. Phys. Solids 48:175, 2000; not read).
 
 Particles of areas A within a horizon h have bonds of stiffness ``c A_i A_j t^2 / L`` with the micromodulus c; in plane
 stress ``c = 9 E / (pi t h^3)``, which is ``6 E / (t m)`` with ``m = 2 pi h^3 / 3``, the sum of ``A_j L`` over a full
@@ -27,7 +27,7 @@ from .base import Springs, definition
 def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Bonds of peridynamics over all shells that the mesh joins (Silling 2000), surfaces corrected: nu = 1/3.
 
-    Source: Silling, J. Mech. Phys. Solids 48:175, 2000; the handbook's corrections by abstract (not read, derived).
+    Source: Silling, J. Mech. Phys. Solids 48:175, 2000; the correction is ours (not read, derived).
     """
     first, second = mesh.edges.T
     areas, lengths = mesh.particle_areas, mesh.edge_lengths

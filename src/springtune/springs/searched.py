@@ -1,9 +1,11 @@
 """Stiffness of each spring by a search that minimises the misfit of `springtune.springs.identification`.
 
-- `annealed`: as Deussen, Kobbelt and Tuecke (1995) tuned springs: random changes of all stiffnesses, worse ones
-  accepted with falling probability. Uses scipy's generalised annealing without its local search, from a fixed seed.
-- `evolved`: as Bianchi and others (2003, 2004) did for topology and stiffness, here for stiffness: mutants and
-  crossings replace the worse networks of a population. Uses scipy's differential evolution, from a fixed seed.
+- `annealed`: as Deussen, Kobbelt and Tuecke (1995, abstract read) tuned springs: random changes of all stiffnesses,
+  worse ones accepted with falling probability. Uses scipy's generalised annealing without its local search, from a
+  fixed seed.
+- `evolved`: as Bianchi and others (2003; 2004, abstract read) did for topology and stiffness, here for stiffness:
+  mutants and crossings replace the worse networks of a population. Uses scipy's differential evolution, from a fixed
+  seed.
 - `adjoint`: the mesh itself in even tension and shear, no reference solution. L-BFGS-B minimises the misfit under
   tension along x and y and shear, whose displacements are known exactly; the gradient costs one back-substitution a
   case. Uneven motion of the particles reaches Poisson's ratios other than 1/3, with uneven stiffnesses. Derived here.
