@@ -42,6 +42,9 @@ SHELLS = (2, 3)
 PRINTED = {"equilateral": 170e6, "free": 185e6}
 """Stiffness of `paper` for steel of 1 mm on structured and on free meshes [N/m]."""
 
+PERCENT = "\u00a0%"
+"""A sign that no line breaks before."""
+
 EVEN = np.linspace(0, np.pi, 721)
 """Directions of anisotropy."""
 
@@ -83,7 +86,7 @@ def sources() -> str:
 
 
 def _serves(one: Definition) -> str:
-    cells = " or ".join(word for corners, word in ((3, "triangles"), (4, "rectangles")) if corners in one.cells)
+    cells = ", ".join(word for corners, word in ((3, "triangles"), (4, "rectangles")) if corners in one.cells)
     return ", ".join([cells, *["any anisotropy"] * one.anisotropic, *["loads along the beam"] * one.uniaxial])
 
 
@@ -112,7 +115,7 @@ def _moduli(one: Definition, kind: str, shells: int, asked: st.Material) -> str:
     except SingularError:
         return "unstable"
     ratio = f"{round(found.poisson_ratio, 3) + 0.0:.3f}".replace("-", "−")
-    anisotropy = [] if found.springs.lateral else [f"{100 * _anisotropy(found.stiffness):.0f} %"]
+    anisotropy = [] if found.springs.lateral else [f"{100 * _anisotropy(found.stiffness):.0f}{PERCENT}"]
     return ", ".join([_signed(found.young_modulus_error), ratio, *anisotropy])
 
 
@@ -178,7 +181,7 @@ def _errors(one: Definition, kind: str, shells: int) -> list[str]:
             continue
         found.append(result.error)
         cells.append(result.message or _signed(result.error))
-    return [*cells, f"{100 * max(map(abs, found)):.1f} %", cost] if found else []
+    return [*cells, f"{100 * max(map(abs, found)):.1f}{PERCENT}", cost] if found else []
 
 
 def _cost(mesh: st.Mesh, springs: Springs) -> str:
@@ -193,7 +196,8 @@ def _cost(mesh: st.Mesh, springs: Springs) -> str:
 
 
 def _signed(error: float) -> str:
-    return f"{round(100 * error, 1) + 0.0:+.1f} %".replace("-", "−").replace("+0.0", "0.0")
+    number = f"{round(100 * error, 1) + 0.0:+.1f}".replace("-", "−")
+    return f"{'0.0' if number == '+0.0' else number}{PERCENT}"
 
 
 def _table(head: list[str], table: list[list[str]]) -> str:
