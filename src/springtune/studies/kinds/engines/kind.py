@@ -143,7 +143,9 @@ def _engines():
 def _check(config, problems):
     section = config.engines
     for name, scene in section.scenes.items():
-        _check_scene(scene, ("engines", "scenes", name), config, problems)
+        place, why = ("engines", "scenes", name), "turns with its side, and forces in engines do not"
+        checks.check_scene(problems, place, scene, config, lambda load: not LOADS[load].follower, why)
+        checks.check_made(problems, (*place, "mesh_size"), scene.mesh_type, scene.mesh_size, scene.beam, config)
     for name, runs in section.runs.items():
         place, engines = ("engines", "runs", name), _engines()
         for engine in runs.engine:
@@ -162,23 +164,6 @@ def _check(config, problems):
     if cells > checks.MOST_CELLS:
         message = f"{cells:.3g} cells of all labels together; a dataset has at most {checks.MOST_CELLS}: {checks.FEWER}"
         problems.add(("engines", "runs"), message)
-
-
-def _check_scene(scene, place, config, problems):
-    checks.check_known(problems, (*place, "beam"), "beam", scene.beam, config.beams)
-    checks.check_beam_material(problems, (*place, "material"), scene.material, config)
-    checks.check_density(config, scene.material, (*place, "material"), problems)
-    if LOADS[scene.load].follower:
-        able = ", ".join(name for name, load in LOADS.items() if not load.follower)
-        message = f"'{scene.load}' turns with its side, and forces in engines do not; choose of {able}"
-        problems.add((*place, "load"), message)
-    if scene.beam in config.beams:
-        extent = config.beams[scene.beam].length, config.beams[scene.beam].height
-        refusal = MESH_TYPES[scene.mesh_type].refusal(*extent, scene.mesh_size, f"beam '{scene.beam}'")
-        if refusal:
-            problems.add((*place, "mesh_size"), f"{1e3 * scene.mesh_size:g} mm {refusal}")
-        else:
-            checks.check_particles(problems, (*place, "mesh_size"), [scene.mesh_size], *extent)
 
 
 def _expand(config, declared):
