@@ -65,7 +65,7 @@ class Block:
 
 @dataclass(frozen=True, eq=False)
 class MeasuredTest:
-    r"""A test of a sheet and the file of what was measured.
+    r"""A test of a sheet in plane stress, and the file of what was measured.
 
     Parameters
     ----------
@@ -182,7 +182,7 @@ def _curve(test: MeasuredTest, family: Family, load: LoadCase) -> list[Block]:
             f"{where}, column {driving!r}: all {len(loads)} values are {loads[0]:g} in SI units, so there is no slope; "
             "give other loads, or switch the shift off if the zero is known"
         )
-    if np.cov(loads, test.columns[measured])[0, 1] < 0:
+    if (loads - loads.mean()) @ test.columns[measured] < 0:
         raise TestDataError(
             f"{measured} of {where}: runs against the load; both are positive along the load, so change a column's sign"
         )
