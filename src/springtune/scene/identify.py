@@ -56,11 +56,8 @@ MISFIT = 1.5
 LEAST_NOISE = 1e-9
 """Noise over the values' root mean square that is rounding."""
 
-Constants = dict[str, Any]
-"""Constants in SI units by name; complex where they are varied by complex steps."""
 
-
-def varied(constants: Constants, names: Iterable[str], steps: Iterable[complex]) -> Constants:
+def varied(constants: dict[str, Any], names: Iterable[str], steps: Iterable[complex]) -> dict[str, Any]:
     """Change constants by steps: ratios by addition, moduli by factors exp(step), others relatively."""
     changed = dict(constants)
     for name, step in zip(names, steps):
@@ -70,8 +67,10 @@ def varied(constants: Constants, names: Iterable[str], steps: Iterable[complex])
     return changed
 
 
-def entries(constants: Constants, angle: float) -> np.ndarray:
-    """`ENTRIES` of each part, turned by an angle [rad], shape (n_parts, 6)."""
+def entries(constants: dict[str, Any], angle: float) -> np.ndarray:
+    """`ENTRIES` of each part, turned by an angle [rad], shape (n_parts, 6); coefficients of rubber, shape (n,)."""
+    if "c1" in constants:
+        return np.array([*constants.values()])
     *moduli, nu = constants.values()
     each = [(one, one, nu, one / (2 * (1 + nu))) for one in moduli]
     found = []
@@ -84,20 +83,25 @@ def entries(constants: Constants, angle: float) -> np.ndarray:
 
 
 class Model:
-    """Tests as functions of constants: for each a family of solutions, its numbers, and the material's angle."""
+    """Tests as functions of constants: for each a family of solutions, its numbers, and the material's angle.
+
+    Rubber has no family.
+    """
 
     def __init__(self, tests: Sequence[tuple[Any, list[Block], float]]) -> None:
         self.tests, self.blocks = tests, [block for _, own, _ in tests for block in own]
         self.counts = np.array([len(block.values) - block.shifts.shape[1] for block in self.blocks])
         self.sizes = np.array([np.sqrt(np.mean(block.values**2)) or 1.0 for block in self.blocks])
 
-    def residuals(self, constants: Constants, names: Sequence[str], noise: np.ndarray) -> list[np.ndarray]:
+    def residuals(self, constants: dict[str, Any], names: Sequence[str], noise: np.ndarray) -> list[np.ndarray]:
         """Residuals of each block over its noise, without shifts; beside them their derivatives by named constants."""
         found, scales, steps = [], iter(noise), 1e-30j * np.eye(len(names))  # complex steps are exact
         for family, own, angle in self.tests:
             slopes = [entries(varied(constants, names, step), angle).imag / 1e-30 for step in steps]
             columns = np.stack([entries(constants, angle), *slopes], axis=-1)
-            moved, work = family.solve(columns.reshape(-1, columns.shape[-1]))
+            moved = columns.reshape(-1, columns.shape[-1])
+            if family is not None:  # stresses of rubber are linear in its coefficients
+                moved, work = family.solve(moved)
             for block in own:
                 read = block.rows @ (work[None] if block.reaction else moved)
                 table = block.unshifted(block.factors[:, None] * read)
@@ -105,7 +109,7 @@ class Model:
                 found.append(table / next(scales))
         return found
 
-    def undetermined(self, constants: Constants, names: Sequence[str]) -> list[str]:
+    def undetermined(self, constants: dict[str, Any], names: Sequence[str]) -> list[str]:
         """Named constants whose derivatives are combinations of those by the others."""
         slopes = np.concatenate(self.residuals(constants, names, self.sizes))[:, 1:]
         triangle, order = qr(slopes, mode="r", pivoting=True)
@@ -125,8 +129,8 @@ class Model:
         return [names[place] for place in np.sort(order[rank:])]
 
     def fit(
-        self, constants: Constants, names: Sequence[str]
-    ) -> tuple[Constants, list[np.ndarray], np.ndarray, np.ndarray]:
+        self, constants: dict[str, Any], names: Sequence[str]
+    ) -> tuple[dict[str, Any], list[np.ndarray], np.ndarray, np.ndarray]:
         """Fit named constants; return all, `residuals`, the noise of each block, and halves of 95 % intervals of steps.
 
         Noise that is not given is estimated from the residuals of each block. Intervals are by Student's t.
@@ -171,7 +175,7 @@ class Identified(Tabled):
     ----------
     law : str
     values : dict of str to float
-        Constants, moduli in Pa; assumed where the tests do not tell.
+        dict[str, Any], moduli in Pa; assumed where the tests do not tell.
     intervals : dict of str to (float, float)
         Intervals of 95 %; NaN for known or undetermined constants.
     undetermined : tuple of str
@@ -329,7 +333,7 @@ def _sheet(tests: Sequence[MeasuredTest], law: str, known: Mapping[str, Number])
     return replace(found, materials=materials)
 
 
-def _start(names: Sequence[str], known: Mapping[str, Number]) -> tuple[Constants, list[str]]:
+def _start(names: Sequence[str], known: Mapping[str, Number]) -> tuple[dict[str, Any], list[str]]:
     """Constants of a usual material, with those that are known, and the names of the others."""
     constants = {name: ASSUMED.get(name, 1e9) for name in names}
     for name, value in known.items():
@@ -343,7 +347,7 @@ def _start(names: Sequence[str], known: Mapping[str, Number]) -> tuple[Constants
     return constants, [name for name in names if name not in known]
 
 
-def _scale(model: Model, constants: Constants) -> float:
+def _scale(model: Model, constants: dict[str, Any]) -> float:
     """Logarithm of the factor by which all moduli are larger than those that are given."""
     found = [0.0]
     for block, table in zip(model.blocks, model.residuals(constants, (), np.ones(len(model.blocks)))):
@@ -354,7 +358,7 @@ def _scale(model: Model, constants: Constants) -> float:
     return float(np.sum(found) / max(len(found) - 1, 1))
 
 
-def _identified(law: str, model: Model, constants: Constants, free: Sequence[str], notes: list[str]) -> Identified:
+def _identified(law: str, model: Model, constants: dict[str, Any], free: Sequence[str], notes: list[str]) -> Identified:
     """Result of a fit, with notes on what tests do not tell, and where the model does not fit; without materials."""
     lacking = model.undetermined(constants, free)
     names = [name for name in free if name not in lacking]
@@ -388,22 +392,12 @@ def _identified(law: str, model: Model, constants: Constants, free: Sequence[str
     )
 
 
-class _Linear(Model):
-    """Numbers that are linear in all constants."""
-
-    def residuals(self, constants: Constants, names: Sequence[str], noise: np.ndarray) -> list[np.ndarray]:
-        (block,), values = self.blocks, np.array(list(constants.values()))
-        slopes = (block.rows * abs(values))[:, [name in names for name in constants]]
-        return [np.column_stack([block.rows @ values - block.values, slopes]) / noise]
-
-
 def _rubber(file: str | Path, law: str) -> Identified:
     """Yeoh's law by `fit_rubber`, with the intervals of its least squares of relative errors."""
     test = told(file)
     material = fit_rubber(test, terms=3 if law == "yeoh" else 1)
-    weights = relative_weights(test)
-    rows = stress_columns(test.stretch, len(material.coefficients)) * weights[:, None]
+    weights, rows = relative_weights(test), stress_columns(test.stretch, len(material.coefficients))
     block = Block(f"stress of '{file}'", test.stress * weights, weights, rows, rows[:, :0], None, test.stretch)
     constants = {f"c{number}": value for number, value in enumerate(material.coefficients, 1)}
-    found = _identified(law, _Linear([(None, [block], 0.0)]), constants, list(constants), [])
+    found = _identified(law, Model([(None, [block], 0.0)]), constants, list(constants), [])
     return replace(found, materials={"": material})

@@ -6,7 +6,6 @@ Units stand in the heads, as in ``force [N],displacement [mm]``.
 """
 
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -41,8 +40,8 @@ class Block:
     """Numbers of one kind from one file.
 
     `values` (n,) are `factors` (n,) times what `rows` read, one for all or one each: of the displacements, or of the
-    work if the values are forces on a moved support (`reaction`). What the columns of `shifts` (n, n_shifts) explain
-    tells nothing of the material. `places` are loads, or points (n / 2, 2).
+    work if the values are forces on a moved support (`reaction`). What the columns of `shifts` (n, n_shifts), an
+    orthonormal basis, explain tells nothing of the material. `places` are loads, or points (n / 2, 2).
     """
 
     label: str
@@ -54,13 +53,9 @@ class Block:
     places: np.ndarray
     reaction: bool = False
 
-    @cached_property
-    def _basis(self) -> np.ndarray:
-        return np.linalg.qr(self.shifts)[0]
-
     def unshifted(self, columns: np.ndarray) -> np.ndarray:
         """Columns (n, ...) without what shifts explain."""
-        return np.asarray(columns - self._basis @ (self._basis.T @ columns))
+        return np.asarray(columns - self.shifts @ (self.shifts.T @ columns))
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,7 +156,7 @@ def _field(test: MeasuredTest, family: Family) -> list[Block]:
             "body; remove it, or correct the unit or the origin"
         )
     turned = (points - points.mean(axis=0))[:, ::-1] * [-1, 1] / (np.ptp(points) or 1.0)
-    rigid = np.column_stack([np.tile(np.eye(2), (len(points), 1)), turned.ravel()])
+    rigid, _ = np.linalg.qr(np.column_stack([np.tile(np.eye(2), (len(points), 1)), turned.ravel()]))
     factors, noise = np.full(values.size, test.force or 1.0), _noise(test, "length")
     label = f"field of '{test.file}'"
     return [Block(label, values.ravel(), factors, rows, rigid[:, : 3 * test.shift], noise, points)]
@@ -191,7 +186,7 @@ def _curve(test: MeasuredTest, family: Family, load: LoadCase) -> list[Block]:
         reaction = bool(moved) and name == measured
         row = np.array([1 / size]) if reaction else _row(test, name, family, load)
         noise = None if moved and not reaction else _noise(test, "force" if reaction else "length")
-        shifts, label = np.ones((len(loads), int(test.shift))), f"{name} of {where}"
+        shifts, label = np.full((len(loads), int(test.shift)), len(loads) ** -0.5), f"{name} of {where}"
         found.append(Block(label, test.columns[name], loads / size, row[None], shifts, noise, loads, reaction))
     return found
 
