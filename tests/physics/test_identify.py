@@ -212,6 +212,15 @@ def test_the_command_writes_a_study_that_loads(tmp_path, monkeypatch):
     assert len(st.load_study("mine.yaml").scenes) == 2
 
 
+def test_a_study_of_rubber_has_a_small_force(tmp_path):
+    made = tmp_path / "mine.yaml"
+    call = ["identify", "config/treloar/uniaxial.csv", "--law", "yeoh", "--beam", "60x30", "--write", str(made)]
+    assert CliRunner().invoke(main, call).exit_code == 0
+    study = st.load_study(made)
+    assert {scene.force for scene in study.scenes} == {1.0} and study.axes["beam"] == ("60x30",)
+    assert study.materials["rubber"].coefficients == st.fit_rubber("config/treloar/uniaxial.csv").coefficients
+
+
 CALLS = {
     ("c.csv",): (2, "--load: a test needs a body"),
     ("c.csv", "--beam", "100x20", "--load", "trction"): (2, "--load: 'trction' is unknown"),

@@ -152,8 +152,8 @@ def _study(found: "Identified", row: Mapping[str, Any], target: Path) -> str:
         raise ValueError("--write: beams of a study are isotropic; give a --shape, or leave --write out")
     else:
         beam = asked_beam(str(row["beam"] or "100x20"), row["thickness"])
-        (places, *_) = found.places.values()
-        force = row["force"] or (f"{abs(places).max():g} N" if row["beam"] else "1 N")
+        loads = next(iter(found.places.values())) if "nu" in found.values else [1.0]
+        force = row["force"] or f"{max(map(abs, loads)):g} N"
         grid |= {"beam": beam.name, "mesh_size": f"{250 * beam.height:g} mm", "force": force}
         (sides,) = study["beams"].values()
         study["beams"] = {beam.name: {side: f"{1e3 * getattr(beam, side):g} mm" for side in sides}}
