@@ -34,12 +34,8 @@ PLACE = {"left": 0.5, "right": 0.08, "bottom": 0.4, "top": 0.3}
 
 def engines(tree):
     """Stem, function that plots, and selection of each figure."""
-    plots = {
-        "errors": plot_engine_errors,
-        "maps": plot_engine_maps,
-        "curves": plot_engine_curves,
-        "factors": plot_engine_factors,
-    }
+    every = plot_engine_errors, plot_engine_maps, plot_engine_curves, plot_engine_factors
+    plots = {plot.__name__.removeprefix("plot_engine_"): plot for plot in every}
     names = "engines", "engine_curves"
     scenes = [labels_of(group(tree, name).status != 0, "scene") if name in tree else [] for name in names]
     for stem, selection in figures(*scenes).items():

@@ -32,9 +32,6 @@ MOST_ENGINE_RUNS = 10_000
 OF_RUNS = ("definition", "engine", *SETTING, "stiffness_factor")
 """What a set of runs lists values of, besides scenes."""
 
-OF_STUDY = ("scene", "of_curve", "program", "stated")
-"""What a run's result does not depend on."""
-
 OWN_PRECISION = "own"
 """The first precision of each engine."""
 
@@ -113,19 +110,12 @@ class EnginesConfig(Section):
 
 @dataclass(frozen=True)
 class EngineRun:
-    """A scene in an engine at a setting; `dt` is the time of a frame [s].
+    """A scene in an engine; `labels` are those of its cell, with the time of a frame [s].
 
     Runs `of_curve` have factors on what is typed.
     """
 
-    scene: str
-    definition: str
-    engine: str
-    precision: str
-    dt: float
-    substeps: int
-    iterations: int
-    stiffness_factor: float
+    labels: dict[str, str | float]
     of_curve: bool
     program: str
     stated: EngineSceneConfig
@@ -172,18 +162,19 @@ def _expand(config, declared):
     for runs in section.runs.values():
         names = product(runs.scene or section.scenes, runs.definition, runs.engine)
         settings = product(runs.precision, runs.dt, runs.substeps, runs.iterations, runs.stiffness_factor)
-        for labels, (precision, dt, substeps, iterations, factor) in product(names, settings):
-            stated, engine = section.scenes[labels[0]], engines[labels[-1]]
+        for of, (precision, dt, substeps, iterations, factor) in product(names, settings):
+            stated, engine, of_curve = section.scenes[of[0]], engines[of[-1]], runs.stiffness_factor != [1.0]
             precision = engine.precisions[0] if precision == OWN_PRECISION else precision
-            how = precision, dt, substeps, iterations if engine.iterates else 1, factor, runs.stiffness_factor != [1.0]
-            of = engine.program, stated, declared.beams[stated.beam], declared.materials[stated.material]
-            place = *(order.index(label) for order, label in zip(orders, labels)), *how
-            found[place] = EngineRun(*labels, *how, *of, section.frames, section.tolerance)
+            how = precision, dt, substeps, iterations if engine.iterates else 1, factor
+            labels = dict(zip(("scene", *OF_RUNS), (*of, *how)))
+            bodies = declared.beams[stated.beam], declared.materials[stated.material]
+            run = EngineRun(labels, of_curve, engine.program, stated, *bodies, section.frames, section.tolerance)
+            found[*(order.index(name) for order, name in zip(orders, of)), *how, of_curve] = run
     return tuple(found[place] for place in sorted(found))
 
 
 def _summary(runs):
-    engines = dict.fromkeys(run.engine for run in runs)
+    engines = dict.fromkeys(run.labels["engine"] for run in runs)
     absent = [name for name in engines if _engines()[name].absent]
     told = f"; not installed: {', '.join(absent)}" if absent else ""
     return [["engines", len(runs), f"runs in {', '.join(engines)}{told}"]]
@@ -198,15 +189,16 @@ def _version(engine):
 def _tasks(study):
     """Runs of an engine follow each other in one job, since their seconds are measured."""
     for run in study.parts["engines"]:
-        engine = _engines()[run.engine]
-        values = dict(run.stated) | {name: value for name, value in vars(run).items() if name not in OF_STUDY}
+        labels, mesh_size = run.labels, run.stated.mesh_size
+        engine = _engines()[labels["engine"]]
+        values = {name: value for name, value in labels.items() if name != "scene"} | dict(run.stated)
         values |= {"beam": beam_key(run.beam), "material": material_key(run.material, density=True)}
-        values["engine_version"] = _version(engine)
-        also = mesh_type_key(run.stated.mesh_type), definition_key(run.definition), declared_key(engine)
-        particles = run.beam.length * run.beam.height / (COEFFICIENT * run.stated.mesh_size**2)
+        values |= {"engine_version": _version(engine), "frames": run.frames, "tolerance": run.tolerance}
+        also = mesh_type_key(run.stated.mesh_type), definition_key(labels["definition"]), declared_key(engine)
+        particles = run.beam.length * run.beam.height / (COEFFICIENT * mesh_size**2)
         name = f"engines {run.program.lower()}"
-        cost = name if name in COSTS else "engines", run.substeps * run.iterations * particles
-        yield Task(values, also, {name: getattr(run, name) for name in ("scene", *OF_RUNS)}, run, [cost], run.engine)
+        cost = name if name in COSTS else "engines", labels["substeps"] * labels["iterations"] * particles
+        yield Task(values, also, labels, run, [cost], engine.name)
 
 
 COSTS = {
@@ -225,7 +217,7 @@ KIND = Kind(
                                       "`/engine_curves`.")},
     check=_check,
     expand=_expand,
-    axes=lambda runs: {"definition": {run.definition for run in runs}},
+    axes=lambda runs: {"definition": {run.labels["definition"] for run in runs}},
     summary=_summary,
     stages=(STAGE,),
     outputs=OUTPUTS,
