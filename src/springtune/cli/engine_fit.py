@@ -67,14 +67,12 @@ class EngineOptions(dict[str, Any]):
     def setting(self) -> "Setting":
         """Setting of the options."""
         from ..engines.base import ENGINES, Setting
+        from ..scene.sheet import chosen
 
-        if self["engine"] not in ENGINES:
-            from ..problem.quantities import nearest
-
-            raise ValueError(f"--engine: '{self['engine']}' is unknown; {nearest(self['engine'], ENGINES)}")
+        engine = chosen(ENGINES, self["engine"], "--engine")
         names = ("dt", "substeps", "iterations", "precision")
         setting = Setting(**{name: self[name] for name in names if self[name] is not None})
-        ENGINES[self["engine"]].check(setting)
+        engine.check(setting)
         return setting
 
 

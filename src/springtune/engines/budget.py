@@ -250,24 +250,22 @@ def fit_budget(
 
     tried: list[BudgetChoice] = []
     for family in [meshes] if meshes else made:
-        found = _until_worse(map(on_mesh, family.items()), lambda own: min((one.worst for one in own), default=np.inf))
-        tried += [one for _, choices in found for one in choices]
+        off = _until_worse(map(on_mesh, family.items()), lambda own: min((one.worst for one in own), default=np.inf))
+        tried += [one for _, found in off for one in found]
     if not tried:
         raise EngineError(why or "no mesh can be made; give others")
     return BudgetSearch(sorted(tried, key=lambda one: (not one.fit.bands, one.worst, one.frame_seconds)))
 
 
-def _until_worse(those: Iterable[One], error: Callable[[One], float]) -> list[tuple[float, One]]:
+def _until_worse(those: Iterable[One], error: Callable[[One], float]) -> Iterator[tuple[float, One]]:
     """Errors and what has them, up to two in a row that are worse than the best one before."""
-    found: list[tuple[float, One]] = []
-    worse = 0
+    best, worse = np.inf, 0
     for one in those:
         off = float(np.nan_to_num(error(one), nan=np.inf))
-        worse = 0 if off < min((least for least, _ in found), default=np.inf) else worse + 1
-        found.append((off, one))
+        yield off, one
+        best, worse = (off, 0) if off < best else (best, worse + 1)
         if worse == WORSE:
-            break
-    return found
+            return
 
 
 def graded_meshes(body: Beam | Shape, name: str, make: Callable[[float], AnyMesh]) -> dict[str, AnyMesh]:
@@ -313,8 +311,7 @@ def _split(
     def error(setting: Setting) -> float:
         return abs(in_engine(scene, engine.name, setting, damping=damping, tolerance=1e-3).solver_error)
 
-    errors = _until_worse(settings, error)
-    return min(errors, key=itemgetter(0))[1] if errors else None
+    return min(_until_worse(settings, error), key=itemgetter(0))[1] if settings else None
 
 
 def _measured(engine: Engine, net: SpringNet, start: Setting) -> Cost:

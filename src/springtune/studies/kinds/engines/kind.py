@@ -36,21 +36,11 @@ OWN_PRECISION = "own"
 """The first precision of each engine."""
 
 
-def _read_frame(value: str) -> float:
-    above, slash, below = value.strip().removesuffix("s").strip().partition("/")
-    if slash and above.isdecimal() and below.isdecimal() and int(above) and int(below):
-        return int(above) / int(below)
-    found: float = fields.quantity("time").read(value)
-    return found
-
-
 _WHOLE = number("a whole number from 1 to 100000, such as 10", 1, 100_000, whole=True)
 Count = Annotated[int, _WHOLE]
 Distance = Annotated[float, number("a number up to 0.01, such as 0.0001", 0, 0.01, above=True)]
 EngineName = Annotated[str, Scalar(str, {"type": "string", "examples": ["xpbd"]}, "an engine such as 'xpbd'")]
-FrameTime = Annotated[
-    float, Scalar(_read_frame, {"type": "string", "examples": ["1/60 s"]}, "a time such as '1/60 s' or '5 ms'")
-]
+FrameTime = Annotated[float, fields.quantity("time")]
 MadeType = Annotated[str, one_of("mesh type", MESH_TYPES)]
 Precision = Annotated[str, one_of("precision", (OWN_PRECISION, *PRECISIONS))]
 SceneName = Annotated[str, Scalar(str, {"type": "string"}, "the name of a scene")]
@@ -82,7 +72,7 @@ class EngineRunsConfig(Section):
         "10", description="Iterations of the engine's solver in a step; 1 where an engine has none."
     )
     substeps: Annotated[list[Count], OneOrMore()] = default("1", description="Steps of a frame.")
-    dt: Annotated[list[FrameTime], OneOrMore()] = default("1/60 s", description="Time of a frame.")
+    dt: Annotated[list[FrameTime], OneOrMore()] = default("1/60 s", description="Time of a frame, such as 1/60 s.")
     precision: Annotated[list[Precision], OneOrMore()] = default(
         OWN_PRECISION, description="Floating-point numbers; `own` is what an engine has by itself."
     )

@@ -36,10 +36,8 @@ def solve(task):
     except EngineError as error:
         end = "absent" if isinstance(error, EngineAbsentError) else "refused"
         return known | failed(task, str(error), end)
-    except MemoryError:
-        raise
     except Exception as error:  # a program of others may raise anything, and other runs go on
-        if engine.program == OUR_PROGRAM:
+        if engine.program == OUR_PROGRAM or isinstance(error, MemoryError):
             raise
         return known | failed(task, f"{engine.name}: {type(error).__name__}: {error}")
     result = known | {
