@@ -111,12 +111,8 @@ def fitted(
             how["meshes"] = graded_meshes(of.shape, "free", lambda size: replace(of, size=size).mesh())
     else:
         beam, material = sheet.asked_beam()
-        needs = {"load": (load, "traction"), "force": (asked["force"], "0.2 N")}
-        for name, (value, example) in (needs | {"density": (sheet.density, "1000 kg/m^3")}).items():
-            if value is None:
-                raise ValueError(
-                    f"--{name}: missing; an engine is calibrated to a load and moves masses; give '{example}'"
-                )
+        if load is None:
+            raise ValueError("--load: missing; an engine is calibrated to a load; give one such as 'traction'")
         if searched and sheet.mesh_type is not None:
             how["mesh_types"] = sheet.mesh_type.split(",")
         edge = None if searched else sheet.edge(beam)
@@ -138,7 +134,7 @@ def fitted(
     if asked["definition"] is not None:
         scenes, refused = [make(definition=asked["definition"])], ""
     else:
-        scenes, refused = runnable(make, CASES, ENGINES[engine], setting, 1, springs_alone)
+        scenes, refused = runnable(make, CASES, ENGINES[engine], setting, springs_alone)
     if not scenes:
         raise Unmet(refused)
     fit = fit_engine(scenes[0], engine, setting, **how)

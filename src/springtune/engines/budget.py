@@ -34,17 +34,11 @@ CELLS_ACROSS = (1, 2, 3, 4, 6, 8, 12, 16)
 BUDGET_MESHES = ("structured", "right")
 """Mesh types of a beam that are tried where none are named."""
 
-BEST_DEFINITIONS = 2
-"""Definitions on a mesh that are tried."""
-
 ITERATIONS_AT_MOST, SUBSTEPS = 400, tuple(2**power for power in range(8, -1, -1))
 """Limit of a setting's iterations, and its substeps that are tried."""
 
 PROBED = 16
 """Iterations of the second setting that is timed."""
-
-WORSE = 2
-"""Settings or meshes in a row that are worse than the best one before a search ends."""
 
 One = TypeVar("One")
 AnyMesh = TypeVar("AnyMesh", bound=Mesh | GroupedMesh)
@@ -234,7 +228,7 @@ def fit_budget(
         """Choices of the best definitions on a mesh."""
         nonlocal why
         make = partial(Scene, beam, named[1], material, load, force, scale=scale)
-        scenes, refused = runnable(make, names, chosen, start, BEST_DEFINITIONS, springs_alone)
+        scenes, refused = runnable(make, names, chosen, start, springs_alone, most=2)
         why = why or refused
         found = []
         for scene in scenes:
@@ -264,7 +258,7 @@ def _until_worse(those: Iterable[One], error: Callable[[One], float]) -> Iterato
         off = float(np.nan_to_num(error(one), nan=np.inf))
         yield off, one
         best, worse = (off, 0) if off < best else (best, worse + 1)
-        if worse == WORSE:
+        if worse == 2:
             return
 
 
@@ -279,7 +273,7 @@ def graded_meshes(body: Beam | Shape, name: str, make: Callable[[float], AnyMesh
 
 
 def runnable(
-    make: "partial[Scene]", loads: Iterable[str], engine: Engine, setting: Setting, most: int, springs_alone: bool
+    make: "partial[Scene]", loads: Iterable[str], engine: Engine, setting: Setting, springs_alone: bool, most: int = 1
 ) -> tuple[list[Scene], str]:
     """Scenes of the best definitions that an engine takes, at most some; and why there is no other one."""
     body, mesh, material, load, *_ = make.args

@@ -58,9 +58,6 @@ MOST_DOUBLINGS = 8
 STALLED = 0.9
 """Share of the solver error that two doublings leave where more of them are hopeless."""
 
-FINE = 200
-"""Sizes between two tested ones at which a band is looked at."""
-
 
 @dataclass(frozen=True, repr=False)
 class LoadBand(Tabled):
@@ -504,7 +501,7 @@ def range_within(sizes: np.ndarray, errors: np.ndarray, within: float) -> tuple[
     slopes = np.diff(errors) / np.diff(sizes)
     bends = np.pad(np.abs(np.diff(slopes) / (sizes[2:] - sizes[:-2])), 1, constant_values=np.nan)
     bend = np.fmax(bends[:-1], bends[1:])[:, np.newaxis]
-    share = np.linspace(0, 1, FINE)
+    share = np.linspace(0, 1, 200)  # between two sizes
     between = errors[:-1, np.newaxis] * (1 - share) + errors[1:, np.newaxis] * share
     bounds = np.abs(between) + 2 * bend * widths**2 * share * (1 - share) + SHAKE
     bounds = np.nan_to_num(bounds.ravel(), nan=np.inf)

@@ -261,6 +261,7 @@ class Values(OneOrMore):
         return spaced(first, last, points, spacing)
 
 
+DefinitionNames = Annotated[list[DefinitionName], OneOrMore()]
 Lengths = Annotated[list[Length], Values("a length such as '5 mm'")]
 Forces = Annotated[list[Force], Values("a force such as '400 kN'")]
 Stresses = Annotated[list[Stress], Values("a stress such as '210 GPa'")]

@@ -19,7 +19,7 @@ from springtune.springs import DEFINITIONS
 from ...config.checks import check_able, check_known, check_particles, check_product, check_scene
 from ...config.fields import (
     BeamName,
-    DefinitionName,
+    DefinitionNames,
     Force,
     Length,
     Load,
@@ -62,9 +62,7 @@ class BenchmarkConfig(Section):
         description="Beam on which every case is solved once more: an approach is the quickest to an error only where "
         "it keeps that on both. None is called the quickest without.",
     )
-    definition: Annotated[list[DefinitionName], OneOrMore()] = Field(
-        description="Definitions that derive a stiffness and need no reference."
-    )
+    definition: DefinitionNames = Field(description="Definitions that derive a stiffness and need no reference.")
     mesh_type: Annotated[list[MeshType], OneOrMore()] = Field(description="Mesh types of the definitions.")
     approach: Annotated[list[OtherApproach], OneOrMore()] = Field(
         list(OTHER_APPROACHES),

@@ -22,9 +22,6 @@ END_SIGNS = {"swings": "~", "moving": "→", "diverged": "!", "inverted": "↺"}
 NO_RUN = "∅"
 """Of runs that did not begin or end."""
 
-PANELS_IN_ROW = 3
-"""Panels in a row."""
-
 NARROW = 5
 """Largest over smallest best factor up to which their axis is not logarithmic."""
 
@@ -197,7 +194,7 @@ def plot_engine_maps(data, ax=None, *, scene=None):
             _map(panel, rows)
         return [], "", why
 
-    return labels.small_multiples(ax, shown or {"": []}, PANELS_IN_ROW, height, title, draw)
+    return labels.small_multiples(ax, shown or {"": []}, 3, height, title, draw)
 
 
 def _steps(rows):
@@ -276,7 +273,7 @@ def plot_engine_curves(data, ax=None, *, scene=None):
         return ends, "", why
 
     title = f"{case.scene.item()}, +: the network in equilibrium{'; not drawn: ' + lost if lost else ''}"
-    return labels.small_multiples(ax, shown or {"": []}, PANELS_IN_ROW, 2.1, title, draw, sharey=True)
+    return labels.small_multiples(ax, shown or {"": []}, 3, 2.1, title, draw, sharey=True)
 
 
 @style.styled

@@ -61,7 +61,7 @@ class EngineRunsConfig(Section):
     """Runs in engines: every combination of the values listed, as in a grid."""
 
     scene: Annotated[list[SceneName], OneOrMore()] | None = Field(None, description="Scenes; all of them without.")
-    definition: Annotated[list[fields.DefinitionName], OneOrMore()] = Field(
+    definition: fields.DefinitionNames = Field(
         description="Definitions that derive a stiffness and need no reference. An engine that lacks an energy of one "
         "refuses it, in a hole that says so."
     )

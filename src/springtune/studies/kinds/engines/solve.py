@@ -14,9 +14,6 @@ from springtune.scene.single import Scene
 
 from . import RUN_ENDS, SETTING
 
-OUR_PROGRAM = "springtune"
-"""Program of the engines whose errors are errors of this package."""
-
 OF_THE_SCENE = ("mesh_type", "mesh_size", "load", "force", "definition")
 """Values of a task that its scene depends on, besides beam and material."""
 
@@ -37,7 +34,7 @@ def solve(task):
         end = "absent" if isinstance(error, EngineAbsentError) else "refused"
         return known | failed(task, str(error), end)
     except Exception as error:  # a program of others may raise anything, and other runs go on
-        if engine.program == OUR_PROGRAM or isinstance(error, MemoryError):
+        if engine.program == "springtune" or isinstance(error, MemoryError):
             raise
         return known | failed(task, f"{engine.name}: {type(error).__name__}: {error}")
     result = known | {
