@@ -193,7 +193,7 @@ def test_what_is_unstable_at_rest_does_not_swing():
 
 
 def test_unknown_choices_and_bodies_without_masses_are_refused():
-    with pytest.raises(ValueError, match="over: 'time' is unknown; give one of mass, springs, both"):
+    with pytest.raises(ValueError, match="over: 'time' is unknown; known: mass, springs, both"):
         st.damping_of(scene(), ratio=0.1).options("time")
     light = st.Scene(BEAM, scene().mesh, st.Material("1 MPa", 0.45), "bending", "1 mN")
     with pytest.raises(ValueError, match="density: material .* has none"):

@@ -295,17 +295,14 @@ def _split(
     scene: Scene, engine: Engine, start: Setting, seconds: Callable[[Setting], float], limit: float
 ) -> Setting | None:
     """Best split of a time into substeps, with as many iterations as it has time for; None if it is too short."""
-    damping, settings = 2 * scene.motion().loaded_frequency, []
+    settings = []
     iterations = range(1, (ITERATIONS_AT_MOST if engine.iterates else 1) + 1)
     for substeps in SUBSTEPS:
         setting = replace(start, substeps=substeps)
         if count := bisect_right(iterations, limit, key=lambda number: seconds(replace(setting, iterations=number))):
             settings.append(replace(setting, iterations=count))
-
-    def error(setting: Setting) -> float:
-        return abs(in_engine(scene, engine.name, setting, damping=damping, tolerance=1e-3).solver_error)
-
-    return min(_until_worse(settings, error), key=itemgetter(0))[1] if settings else None
+    off = _until_worse(settings, lambda one: abs(in_engine(scene, engine.name, one, tolerance=1e-3).solver_error))
+    return min(off, key=itemgetter(0))[1] if settings else None
 
 
 def _measured(engine: Engine, net: SpringNet, start: Setting) -> Cost:

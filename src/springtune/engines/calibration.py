@@ -31,14 +31,12 @@ SIZES = (0.25, 0.5, 1.0, 2.0)
 WITHIN = 0.05
 """Error that a band keeps."""
 
-TUNED = 1e-3
-"""Error at which a factor is taken."""
+TUNED, ALLOWED = 1e-3, 0.02
+"""Error at which a factor is taken, and above which it is refused where nothing comes closer."""
 
-ALLOWED = 0.02
-"""Error above which a factor is refused where nothing comes closer."""
-
-BRACKET, BRACKETS = 8.0, 7
-"""Ratio of the factors that look for a bracket, and how many there are."""
+BRACKET, BRACKETS, SATURATED = 8.0, 7, 1e-3
+"""Ratio of the factors that look for a bracket, how many there are, and the change of the displacement over one below
+which stiffness no longer decides."""
 
 RESTING = {"float64": 1e-4, "float32": 1e-3}
 """Distance from rest that ends a run, over the displacement, by precision."""
@@ -46,17 +44,9 @@ RESTING = {"float64": 1e-4, "float32": 1e-3}
 SHAKE = 5e-3
 """Amplitude over the displacement up to which a run that does not rest counts, as those of single precision do."""
 
-SATURATED = 1e-3
-"""Change of the displacement over a `BRACKET` below which stiffness no longer decides."""
-
-CONVERGED = 0.01
-"""Solver error of a converged setting."""
-
-MOST_DOUBLINGS = 8
-"""Doublings of substeps or iterations that are tried."""
-
-STALLED = 0.9
-"""Share of the solver error that two doublings leave where more of them are hopeless."""
+CONVERGED, STALLED, MOST_DOUBLINGS = 0.01, 0.9, 8
+"""Solver error of a converged setting, the share of it that two doublings of substeps or iterations leave where more
+are hopeless, and how many are tried."""
 
 
 @dataclass(frozen=True, repr=False)

@@ -11,11 +11,8 @@ from ..safe_io.inputs import csv_rows, two_numbers
 from ..safe_io.tables import Tabled
 from .quantities import positive
 
-LEAST_POINTS = 12
-"""Points that a decay is fitted to, at least."""
-
-MOST_MISFIT = 0.5
-"""Misfit from which points are no damped swing [1]."""
+LEAST_POINTS, MOST_MISFIT = 12, 0.5
+"""Points that a decay is fitted to, at least, and the misfit from which they are no damped swing [1]."""
 
 COLUMNS_OF_DECAY = "give two columns with a head such as 'time [s],displacement [mm]'"
 

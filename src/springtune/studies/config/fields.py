@@ -134,6 +134,7 @@ Points = Annotated[int, number(f"a whole number from 2 to {MOST_POINTS}, such as
 MeshType = Annotated[
     str, Scalar(str, {"type": "string", "examples": list(MESH_TYPES)}, "a mesh type such as 'structured'")
 ]
+MadeType = Annotated[str, one_of("mesh type", MESH_TYPES)]
 Load = Annotated[str, one_of("load", LOADS)]
 Plane = Annotated[str, one_of("plane", PLANES)]
 FurtherReference = Annotated[str, one_of("reference", FURTHER_REFERENCES)]

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from itertools import product
-from math import prod
 from typing import Annotated
 
 from pydantic import Field
@@ -41,7 +40,6 @@ Count = Annotated[int, _WHOLE]
 Distance = Annotated[float, number("a number up to 0.01, such as 0.0001", 0, 0.01, above=True)]
 EngineName = Annotated[str, Scalar(str, {"type": "string", "examples": ["xpbd"]}, "an engine such as 'xpbd'")]
 FrameTime = Annotated[float, fields.quantity("time")]
-MadeType = Annotated[str, one_of("mesh type", MESH_TYPES)]
 Precision = Annotated[str, one_of("precision", (OWN_PRECISION, *PRECISIONS))]
 SceneName = Annotated[str, Scalar(str, {"type": "string"}, "the name of a scene")]
 
@@ -50,7 +48,7 @@ class EngineSceneConfig(Section):
     """A scene that is run in engines."""
 
     beam: fields.BeamName = Field(description="Beam.")
-    mesh_type: MadeType = default("right", description="Generated mesh type.")
+    mesh_type: fields.MadeType = default("right", description="Generated mesh type.")
     mesh_size: fields.Length = Field(description="Length of an edge.")
     material: fields.MaterialName = Field(description="Material, with a density.")
     load: fields.Load = Field(description="Load whose forces keep their direction.")
@@ -139,11 +137,8 @@ def _check(config, problems):
                 why = f"needs a reference or a stated stiffness, or other cells or loads than scene '{one}' has;"
                 checks.check_able(problems, (*place, "definition"), runs.definition, why, corners, uniaxial)
         checks.check_product(problems, runs, place, OF_RUNS, MOST_ENGINE_RUNS)
-    lists = [{value for runs in section.runs.values() for value in getattr(runs, name)} for name in OF_RUNS]
-    cells = len(section.scenes) * prod(map(len, lists))
-    if cells > checks.MOST_CELLS:
-        message = f"{cells:.3g} cells of all labels together; a dataset has at most {checks.MOST_CELLS}: {checks.FEWER}"
-        problems.add(("engines", "runs"), message)
+    lists = {name: {value for runs in section.runs.values() for value in getattr(runs, name)} for name in OF_RUNS}
+    checks.check_labels(problems, ("engines", "runs"), lists | {"scene": {*section.scenes}})
 
 
 def _expand(config, declared):

@@ -22,6 +22,7 @@ from ...config.fields import (
     Kinematics,
     Length,
     Load,
+    MadeType,
     MaterialName,
     Named,
     Scalar,
@@ -72,7 +73,6 @@ ENDS = {
 }
 """How the ends of each parameter are read."""
 
-MadeType = Annotated[str, one_of("mesh type", MESH_TYPES)]
 ParameterName = Annotated[str, one_of("parameter", VARIED)]
 Spacing = Annotated[str, one_of("spacing", SPACINGS)]
 
