@@ -302,7 +302,7 @@ def test_a_swing_is_read_from_a_file(tmp_path):
         ("time,displacement\n0,1\n", "line 1: 'time,displacement' is no head of a decay; give two columns"),
         ("time [s],displacement [N]\n0,1\n", "head: '1 N' is a force; give a length"),
         ("time [s],displacement [mm]\n0,zero\n", "line 2: '0,zero' is not two numbers; correct it"),
-        ("time [s],displacement [mm]\n", "times: have the shape .*; give 12 points or more"),
+        ("time [s],displacement [mm]\n", "times: have shape .*; give 12 points or more"),
     ],
 )
 def test_files_that_are_no_swing_are_refused(text, says, tmp_path):
@@ -319,7 +319,7 @@ TIMES = np.linspace(0, 1, 50)
 @pytest.mark.parametrize(
     "times, moved, says",
     [
-        (TIMES, TIMES[:-1], "times: have the shape"),
+        (TIMES, TIMES[:-1], "times: have shape"),
         (TIMES[::-1], np.cos(20 * TIMES), "times: are not ascending"),
         (TIMES, np.where(TIMES > 0.5, np.nan, TIMES), "no finite number"),
         (TIMES, 0 * TIMES + 2, "no swing that decays"),

@@ -41,7 +41,6 @@ PROBED = 16
 """Iterations of the second setting that is timed."""
 
 One = TypeVar("One")
-AnyMesh = TypeVar("AnyMesh", bound=Mesh | GroupedMesh)
 
 Cost = Callable[[SpringNet, Setting], float]
 """Seconds of a frame of a net at a setting."""
@@ -238,8 +237,7 @@ def fit_budget(
                 fit = fit_engine(scene, engine, setting, loads=names, within=within, needed=False)
                 found.append(BudgetChoice(named[0], fit, seconds(setting)))
             else:
-                coarsest = f"a frame of the coarsest mesh takes in engine '{engine}'"
-                why = f"budget: {budget!r} is less than {coarsest}; give more"
+                why = f"budget: {budget!r} is less than a frame of the coarsest mesh takes in '{engine}'; give more"
         return found
 
     tried: list[BudgetChoice] = []
@@ -262,7 +260,7 @@ def _until_worse(those: Iterable[One], error: Callable[[One], float]) -> Iterato
             return
 
 
-def graded_meshes(body: Beam | Shape, name: str, make: Callable[[float], AnyMesh]) -> dict[str, AnyMesh]:
+def graded_meshes(body: Beam | Shape, name: str, make: Callable[[float], One]) -> dict[str, One]:
     """Meshes by name, from coarse to fine; sizes at which there is none are left out."""
     found = {}
     side = min(np.ptp(body.extent, axis=0)) if isinstance(body, Shape) else min(body.length, body.height)

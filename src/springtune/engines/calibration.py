@@ -354,10 +354,7 @@ def fit_engine(
     runs = _Runs(scene, engine, frames)
     untuned = runs[1.0, setting]
     if not abs(untuned.reference) > 0:
-        raise EngineError(
-            f"load: {scene.load!r} has no displacement by finite elements to calibrate to; take a load case with a "
-            "quantity of kind 'displacement' that is not zero"
-        )
+        raise EngineError(f"load: {scene.load!r} has no displacement to calibrate to; give its case one as a quantity")
     factor, why = _factor(runs, setting)
     found = factor == factor
     tuned = runs[factor, setting] if found else min(runs.values(), key=_distance)

@@ -98,9 +98,7 @@ def fit_decay(times: np.ndarray | str | Path, displacements: np.ndarray | None =
     else:
         t, x = np.asarray(times, dtype=float), np.asarray(displacements, dtype=float)
     if t.ndim != 1 or t.shape != x.shape or len(t) < LEAST_POINTS:
-        raise ValueError(
-            f"times: have the shape {t.shape}, and displacements {x.shape}; give {LEAST_POINTS} points or more"
-        )
+        raise ValueError(f"times: have shape {t.shape}, displacements {x.shape}; give {LEAST_POINTS} points or more")
     if not (np.isfinite([t, x]).all() and (np.diff(t) > 0).all()):
         raise ValueError("times: are not ascending, or a value is no finite number; sort the points and leave gaps out")
     t, x = t - t[0], (x - x.mean()) / (np.std(x) or 1.0)  # the search ends at a gradient that is small beside 1

@@ -16,14 +16,8 @@ from .outputs import figures
 FRAME = 1 / 60
 """Time of motion that costs are given for [s]."""
 
-END_SIGNS = {"swings": "~", "moving": "→", "diverged": "!", "inverted": "↺"}
-"""Of runs that moved and have no error, on the map of settings."""
-
-NO_RUN = "∅"
-"""Of runs that did not begin or end."""
-
-NARROW = 5
-"""Largest over smallest best factor up to which their axis is not logarithmic."""
+END_SIGNS, NO_RUN = {"swings": "~", "moving": "→", "diverged": "!", "inverted": "↺"}, "∅"
+"""On the map of settings: of runs that moved and have no error, and of those that did not begin or end."""
 
 PLACE = {"left": 0.5, "right": 0.08, "bottom": 0.4, "top": 0.3}
 """Margins of a figure of one panel [inch]."""
@@ -317,7 +311,7 @@ def plot_engine_factors(data, ax=None, *, scene=None):
     ends = _lines(panel, points)
     panel.set(xlabel="Iterations", ylabel="Best factor on what is typed", title=case.scene.item())
     if ends:
-        wide = np.nanmax([1.0, *factors]) > NARROW * np.nanmin([1.0, *factors])
+        wide = np.nanmax([1.0, *factors]) > 5 * np.nanmin([1.0, *factors])  # on a logarithmic axis
         panel.set(xscale="log", yscale="log" if wide else "linear")
         style.plain(panel, "x", *(["y"] if wide else []))
         _across(panel, 1)

@@ -35,8 +35,7 @@ OWN_PRECISION = "own"
 """The first precision of each engine."""
 
 
-_WHOLE = number("a whole number from 1 to 100000, such as 10", 1, 100_000, whole=True)
-Count = Annotated[int, _WHOLE]
+Count = Annotated[int, number("a whole number from 1 to 100000, such as 10", 1, 100_000, whole=True)]
 Distance = Annotated[float, number("a number up to 0.01, such as 0.0001", 0, 0.01, above=True)]
 EngineName = Annotated[str, Scalar(str, {"type": "string", "examples": ["xpbd"]}, "an engine such as 'xpbd'")]
 FrameTime = Annotated[float, fields.quantity("time")]
@@ -60,8 +59,7 @@ class EngineRunsConfig(Section):
 
     scene: Annotated[list[SceneName], OneOrMore()] | None = Field(None, description="Scenes; all of them without.")
     definition: fields.DefinitionNames = Field(
-        description="Definitions that derive a stiffness and need no reference. An engine that lacks an energy of one "
-        "refuses it, in a hole that says so."
+        description="Definitions that need no reference. One whose energy an engine lacks is a hole that says so."
     )
     engine: Annotated[list[EngineName], OneOrMore()] = Field(
         description="Engines, keys of `springtune.ENGINES`. One that is not installed is a hole that says how it is."
@@ -75,9 +73,7 @@ class EngineRunsConfig(Section):
         OWN_PRECISION, description="Floating-point numbers; `own` is what an engine has by itself."
     )
     stiffness_factor: fields.Ratios = default(
-        "1",
-        description="Factors on all stiffnesses that are typed; several give a sensitivity curve in the engine, and "
-        "the factor at which its displacement is right.",
+        "1", description="Factors on what is typed; several give a sensitivity curve in the engine, and the right one."
     )
 
 
@@ -90,9 +86,7 @@ class EnginesConfig(Section):
     )
     frames: Count | None = Field(None, description="Most frames of a run; by default as many as its motion needs.")
     tolerance: Distance | None = Field(
-        None,
-        description="Distance from rest at which a run ends, over its displacement; by default 1e-7, and 1e-4 in "
-        "single precision.",
+        None, description="Distance from rest over its displacement that ends a run; 1e-7, in single precision 1e-4."
     )
 
 
@@ -198,8 +192,7 @@ STAGE = stage("engines", "studies.kinds.engines.solve", "Running scenes in engin
 
 KIND = Kind(
     "engines",
-    study_fields={"engines": optional(EnginesConfig, "Scenes in engines; they make the groups `/engines` and "
-                                      "`/engine_curves`.")},
+    study_fields={"engines": optional(EnginesConfig, "Scenes in engines: groups `/engines` and `/engine_curves`.")},
     check=_check,
     expand=_expand,
     axes=lambda runs: {"definition": {run.labels["definition"] for run in runs}},
@@ -209,4 +202,4 @@ KIND = Kind(
     tables=lambda study: ["engines"] if study.parts["engines"] else [],
     tables_by="outputs",
     costs=COSTS,
-)  # fmt: skip
+)

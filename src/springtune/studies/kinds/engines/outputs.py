@@ -81,8 +81,5 @@ def tables(tree: "xr.DataTree") -> list[dict[str, Any]]:
         row = {name: one[name] for name in ("scene", "definition", "engine", "precision", "substeps", "iterations")}
         row |= {column: factor * one[name] for name, (column, factor) in ENGINE_COLUMNS.items()}
         rows.append(row | {"end": RUN_ENDS[one["engine_status"]], "why": one["message"]})
-    note = (
-        "Displacement of the load where it rests in an engine, beside finite elements. The error is that of the "
-        "definition, which its network has in equilibrium, and what the engine's solver adds at this setting."
-    )
+    note = "Where the load rests, beside finite elements: errors of the definition, in equilibrium, and of the solver."
     return [{"stem": "engines", "title": "Scenes in engines", "note": note, "rows": rows}]
