@@ -32,13 +32,12 @@ MORE_SCENES = f"or allow more by 'springtune run --max-scenes', or by {MOST_SCEN
 
 
 def check_known(
-    problems: Problems, path: Sequence[Key], what: str, name: str, names: Iterable[str], section: str = ""
+    problems: Problems, path: Sequence[Key], what: str, name: str, names: Iterable[str], section: str | None = ""
 ) -> None:
-    """Check that the study declares a name; in a section of the name's kind, unless another one is given."""
+    """Check that a name is known; a study declares it in a section of its kind, in another one, or nowhere (None)."""
     if name not in names:
-        problems.add(
-            path, f"unknown {what} '{name}'; {nearest(name, names)}; or declare it under {section or f'{what}s'}"
-        )
+        declared = "" if section is None else f"; or declare it under {section or f'{what}s'}"
+        problems.add(path, f"unknown {what} '{name}'; {nearest(name, names)}{declared}")
 
 
 def check_beam_material(problems: Problems, path: Sequence[Key], name: str, config: StudyConfig) -> None:

@@ -124,8 +124,7 @@ def _check(config, problems):
         check_scene(problems, place, scene, config, in_benchmark, "is no load of the benchmark")
     check_able(problems, ("benchmark", "definition"), section.definition, "needs more than mesh and material;")
     for name in section.mesh_type:
-        if name not in MESH_TYPES:
-            problems.add(("benchmark", "mesh_type"), f"unknown mesh type '{name}'; {nearest(name, MESH_TYPES)}")
+        check_known(problems, ("benchmark", "mesh_type"), "mesh type", name, MESH_TYPES, None)
     approaches = approach_names(section.definition, section.mesh_type, section.approach)
     for name in section.finest_of:
         if name not in approaches:

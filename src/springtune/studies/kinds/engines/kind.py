@@ -11,7 +11,6 @@ from springtune.mesh import MESH_TYPES
 from springtune.problem.geometry import Beam
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import Material
-from springtune.problem.quantities import nearest
 from springtune.registry import imported
 from springtune.springs import DEFINITIONS
 from springtune.springs.lattice import COEFFICIENT
@@ -119,10 +118,9 @@ def _check(config, problems):
         checks.check_scene(problems, place, scene, config, lambda load: not LOADS[load].follower, why)
         checks.check_made(problems, (*place, "mesh_size"), scene.mesh_type, scene.mesh_size, scene.beam, config)
     for name, runs in section.runs.items():
-        place, engines = ("engines", "runs", name), _engines()
+        place = "engines", "runs", name
         for engine in runs.engine:
-            if engine not in engines:
-                problems.add((*place, "engine"), f"unknown engine '{engine}'; {nearest(engine, engines)}")
+            checks.check_known(problems, (*place, "engine"), "engine", engine, _engines(), None)
         for one in runs.scene or section.scenes:
             checks.check_known(problems, (*place, "scene"), "scene", one, section.scenes, "engines.scenes")
             if one in section.scenes:

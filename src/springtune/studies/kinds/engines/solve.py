@@ -14,9 +14,6 @@ from springtune.scene.single import Scene
 
 from . import RUN_ENDS, SETTING
 
-OF_THE_SCENE = ("mesh_type", "mesh_size", "load", "force", "definition")
-"""Values of a task that its scene depends on, besides beam and material."""
-
 
 def failed(task, why, end="failed"):
     """Result of a run that did not begin, or did not end by itself."""
@@ -25,8 +22,8 @@ def failed(task, why, end="failed"):
 
 def solve(task):
     """Result of a run; what an engine refuses, or fails in, is a hole with a reason."""
-    body = Beam(**task["beam"]), material_of(task["material"])
-    scene, known, objection = _scene(*body, *(task[name] for name in OF_THE_SCENE))
+    of = (task[name] for name in ("mesh_type", "mesh_size", "load", "force", "definition"))
+    scene, known, objection = _scene(Beam(**task["beam"]), material_of(task["material"]), *of)
     engine, how = ENGINES[task["engine"]], {name: task[name] for name in (*SETTING, "frames", "tolerance")}
     try:
         found = in_engine(scene, engine.name, factor=task["stiffness_factor"], **how)
