@@ -187,7 +187,9 @@ def test_stiffnesses_do_not_depend_on_the_size_of_the_sheet(name, factor):
     )
     assert other.reference == pytest.approx(one.reference, rel=1e-12)
     np.testing.assert_allclose(other.relative, one.relative, rtol=1e-9)
-    assert one.evaluations == other.evaluations and (one.evaluations == 0) != name.startswith(("patch", "force", "best"))
+    assert one.evaluations == other.evaluations and (one.evaluations == 0) != name.startswith(
+        ("patch", "force", "best")
+    )
     assert name != "patch" or one.evaluations == 1
 
 

@@ -13,6 +13,7 @@ from springtune.mesh import write_mesh
 from springtune.studies.archive import verify
 from springtune.studies.config.kind import outputs
 from springtune.studies.kinds import collect
+from springtune.studies.kinds.moduli.figures import definitions
 from springtune.studies.kinds.scenes import stored
 from springtune.studies.kinds.shapes.expand import READ_AT_ONCE
 from springtune.studies.kinds.shapes.kind import mesh_key, reference_task, scene_task
@@ -412,3 +413,17 @@ def test_datasets_without_beams_say_where_their_networks_and_tables_are(load, tm
     assert "rows" in export(tree, tmp_path / "table.csv", "shapes")
     with pytest.raises(ValueError, match="the dataset has no scenes of beams"):
         st.plot_size(tree, beam="200x40")
+
+
+def test_definitions_are_compared_under_the_loads_of_beams_alone(load, tmp_path):
+    """Loads of shapes are labels of the dataset, too, and no scene of a beam has them."""
+    grid = "beam: b, mesh_type: structured, mesh_size: 5 mm, material: third, load: traction, force: 1 N"
+    study = load(
+        COOK.replace(", 8 mm]", "]").replace("shear:", "sheared:")
+        + "beams: {b: {length: 20 mm, height: 10 mm}}\noutputs: [definitions]\n"
+        + f"grids: {{all: {{{grid}, definition: [lattice, area], kinematics: linear, moduli: true}}}}\n"
+    )
+    tree, _ = done(study, tmp_path / "results/study")
+    assert {"traction", "sheared"} <= set(tree["load"].values.tolist())
+    stems = ["definitions_moduli", "definitions_size_traction", "definitions_loads_structured"]
+    assert list(outputs()["definitions"].figures(study)) == [stem for stem, _, _ in definitions(tree)] == stems

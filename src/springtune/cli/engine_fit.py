@@ -1,7 +1,7 @@
 """`springtune predict --engine`: what to type into an engine at its setting, or within a frame's time."""
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, replace
 from functools import partial, reduce, wraps
 from typing import TYPE_CHECKING, Any
 
@@ -15,158 +15,120 @@ from .recommendation import json_text
 
 if TYPE_CHECKING:
     from ..engines.base import Setting
-    from ..engines.budget import BudgetSearch
+    from ..engines.budget import BudgetChoice, BudgetSearch
     from ..engines.calibration import EngineFit
     from ..handover.net import SpringNet
-    from ..mesh import Mesh
-    from ..mesh.groups import GroupedMesh
-    from ..problem.geometry import Beam
-    from ..problem.shapes import Shape
+
+ENGINE_OPTIONS: dict[str, dict[str, Any]] = {
+    "engine": {"shell_complete": names_from("engines.base:ENGINES"), "help": "Engine to calibrate to, such as xpbd."},
+    "dt": {"help": "Time that a frame advances, such as 1/60 or '5 ms'.  [default: 1/60]"},
+    "substeps": {"type": int, "help": "Steps of a frame.  [default: 1]"},
+    "iterations": {"type": int, "help": "Iterations of the engine's solver in a step.  [default: 10]"},
+    "precision": {"help": "float64 or float32.  [default: the engine's own]"},
+    "force": {"help": "Size of the force of --load on a beam, such as '0.2 N'."},
+    "scale": {"type": float, "help": "Factor on the load of a shape.  [default: 1]"},
+    "definition": {"shell_complete": names_from("springs:DEFINITIONS"), "help": "Rule for stiffness.  [default: best]"},
+    "within": {"help": "Error for which ranges of loads are printed.  [default: 5 %]"},
+    "budget": {"help": "Time of a frame here, such as '2 ms': find the mesh, definition, substeps and iterations."},
+}
+"""Options of `predict` that are of engines, as click takes them."""
 
 FOUND = ("substeps", "iterations", "size", "definition")
 """Options of what a budget finds."""
 
 
-@dataclass(frozen=True)
-class EngineOptions:
-    """Options of `predict` that are of engines."""
-
-    engine: str | None
-    dt: str | None
-    substeps: int | None
-    iterations: int | None
-    precision: str | None
-    force: str | None
-    scale: float | None
-    definition: str | None
-    within: str | None
-    budget: str | None
+class EngineOptions(dict[str, Any]):
+    """Values of `ENGINE_OPTIONS`, None where not given."""
 
     def check(self, sheet: SheetOptions, error: str | None) -> None:
         """Refuse options that are not for each other."""
-        for one in fields(self):
-            value = getattr(self, one.name)
-            if self.engine is None and value is not None:
-                raise ValueError(f"--{one.name}: '{value}' is of engines; give --engine, such as xpbd, or leave it out")
-        if error is not None and self.engine is not None:
-            raise ValueError(
-                f"--error: '{error}' is of equilibria, and --engine {self.engine} of settings; give --budget such as "
-                "'2 ms', or leave one of them out"
-            )
-        for name in FOUND if self.budget is not None else ():
-            value = getattr(sheet if name == "size" else self, name)
+        given = {name: value for name, value in self.items() if value is not None}
+        if "engine" not in given:
+            for name, value in given.items():
+                raise ValueError(f"--{name}: '{value}' is of engines; give --engine, such as xpbd, or leave it out")
+        elif error is not None:
+            raise ValueError(f"--error: '{error}' is of equilibria; give --budget such as '2 ms', or no --engine")
+        for name in FOUND if "budget" in given else ():
+            value = self.get(name, sheet.size)
             if value is not None:
                 raise ValueError(f"--{name}: '{value}' is what --budget finds; leave one of them out")
 
     def setting(self) -> "Setting":
         """Setting of the options."""
         from ..engines.base import ENGINES, Setting
+        from ..scene.sheet import chosen
 
-        if self.engine not in ENGINES:
-            from ..problem.quantities import nearest
-
-            raise ValueError(f"--engine: '{self.engine}' is unknown; {nearest(str(self.engine), ENGINES)}")
-        given = {name: getattr(self, name) for name in ("dt", "substeps", "iterations", "precision")}
-        setting = Setting(**{name: value for name, value in given.items() if value is not None})
-        ENGINES[str(self.engine)].check(setting)
+        engine = chosen(ENGINES, self["engine"], "--engine")
+        names = ("dt", "substeps", "iterations", "precision")
+        setting = Setting(**{name: self[name] for name in names if self[name] is not None})
+        engine.check(setting)
         return setting
 
 
 def engine_options(command: AnyCommand) -> AnyCommand:
     """Decorator that adds these options to a command, which gets them as `EngineOptions`."""
-    each = (
-        click.option(
-            "--engine",
-            shell_complete=names_from("engines.base:ENGINES"),
-            help="Calibrate to an engine, such as xpbd: what to type at its setting.",
-        ),
-        click.option("--dt", help="Time that a frame advances, such as 1/60 or '5 ms'.  [default: 1/60]"),
-        click.option("--substeps", type=int, help="Steps of a frame.  [default: 1]"),
-        click.option("--iterations", type=int, help="Iterations of the engine's solver in a step.  [default: 10]"),
-        click.option("--precision", help="float64 or float32.  [default: the engine's own]"),
-        click.option("--force", help="Size of the force of --load on a beam, such as '0.2 N'."),
-        click.option("--scale", type=float, help="Factor on the load of a shape.  [default: 1]"),
-        click.option(
-            "--definition",
-            shell_complete=names_from("springs:DEFINITIONS"),
-            help="Rule for the stiffness.  [default: the best one that the engine has]",
-        ),
-        click.option("--within", help="Error for which ranges of loads are printed.  [default: 5 %]"),
-        click.option(
-            "--budget",
-            help="Time of a frame on this machine, such as '2 ms': find the mesh, definition, substeps and iterations.",
-        ),
-    )
 
     @wraps(command)
     def call(*args: Any, **given: Any) -> None:
-        engine = EngineOptions(**{one.name: given.pop(one.name) for one in fields(EngineOptions)})
-        command(*args, engine=engine, **given)
+        command(*args, engine=EngineOptions({name: given.pop(name) for name in ENGINE_OPTIONS}), **given)
 
-    return reduce(lambda made, option: option(made), reversed(each), call)
+    return reduce(
+        lambda made, name: click.option(f"--{name}", **ENGINE_OPTIONS[name])(made), reversed(ENGINE_OPTIONS), call
+    )
 
 
 def fitted(
     sheet: SheetOptions, asked: EngineOptions, load: str | None, loads: str | None, springs_alone: bool
-) -> "tuple[Callable[[], str], Callable[[], str], Callable[[str], SpringNet]]":
-    """Text, JSON and springs of a calibration, or of a search within a budget."""
+) -> "tuple[str, str, EngineFit | None]":
+    """Text and JSON of a calibration, or of a search within a budget, and what is found."""
     from ..engines.base import ENGINES
     from ..engines.budget import fit_budget, graded_meshes, runnable
     from ..engines.calibration import WITHIN, fit_engine
     from ..prediction.choices import CASES
     from ..scene.single import Scene
 
-    setting, engine, within = asked.setting(), str(asked.engine), asked.within or WITHIN
+    setting, engine, searched = asked.setting(), asked["engine"], asked["budget"] is not None
     names = None if loads is None else [name.strip() for name in loads.split(",") if name.strip()]
-    searched, scale = asked.budget is not None, 1.0 if asked.scale is None else asked.scale
-    further: dict[str, Any] = {}
-    body: Beam | Shape
-    material: Any
-    make_mesh: Callable[[], Mesh | GroupedMesh]
+    how: dict[str, Any] = {"loads": names, "within": asked["within"] or WITHIN}
+    scale = 1.0 if asked["scale"] is None else asked["scale"]
+    case: tuple[Any, ...]
+    make_mesh: Callable[[], Any]
     if sheet.shape is not None:
         of = sheet.asked_shape(load, sized=not searched)
-        body, material, load, mesh_name = of.shape, of.materials, of.load, of.mesh_name
+        case, make_mesh, mesh_name = (of.shape, of.materials, of.load, None), of.mesh, of.mesh_name
         if searched and of.shape.file:
-            further["meshes"] = {mesh_name: of.mesh()}
+            how["meshes"] = {mesh_name: of.mesh()}
         elif searched:
-            further["meshes"] = graded_meshes(of.shape, "free", lambda size: replace(of, size=size).mesh())
-        make_mesh = of.mesh
+            how["meshes"] = graded_meshes(of.shape, "free", lambda size: replace(of, size=size).mesh())
     else:
-        body, material = beam, _ = sheet.asked_beam()
-        needs = {"load": (load, "traction"), "force": (asked.force, "0.2 N"), "density": (sheet.density, "1000 kg/m^3")}
-        for name, (value, example) in needs.items():
-            if value is None:
-                raise ValueError(
-                    f"--{name}: missing; an engine is calibrated to a load and moves masses; give '{example}'"
-                )
-        if sheet.mesh_type is not None:
-            further["mesh_types"] = sheet.mesh_type.split(",")
+        beam, material = sheet.asked_beam()
+        if load is None:
+            raise ValueError("--load: missing; an engine is calibrated to a load; give one such as 'traction'")
+        if searched and sheet.mesh_type is not None:
+            how["mesh_types"] = sheet.mesh_type.split(",")
         edge = None if searched else sheet.edge(beam)
-        make_mesh, mesh_name = partial(sheet.mesh, beam, edge), sheet.mesh_name(edge)
+        case, make_mesh = (beam, material, load, asked["force"]), partial(sheet.mesh, beam, edge)
+        mesh_name = sheet.mesh_name(edge)
     if searched:
-        limit = asked_quantity("--budget", str(asked.budget), "time")
-        given = {"engine": engine, "budget": limit, "dt": setting.dt, "precision": setting.precision}
-        given |= {"loads": names, "within": within, "scale": scale, "springs_alone": springs_alone}
-        search = fit_budget(body, material, str(load), asked.force, **given, **further)
-
-        def content() -> str:
-            keys = "mesh", "frame_seconds", "worst"
-            tried = [fit_json(one.fit) | {key: getattr(one, key) for key in keys} for one in search]
-            return json_text({"budget": limit, "chosen": 0 if search.best else None, "tried": tried})
-
-        return partial(budget_text, search), content, partial(_net, search.best.fit if search.best else None)
-    make = partial(Scene, body, make_mesh(), material, str(load), asked.force, scale=scale)
-    if asked.definition is not None:
-        scenes, refused = [make(definition=asked.definition)], ""
+        limit = asked_quantity("--budget", asked["budget"], "time")
+        how |= {"budget": limit, "dt": setting.dt, "precision": setting.precision, "scale": scale}
+        search = fit_budget(*case, engine=engine, springs_alone=springs_alone, **how)
+        found = {"budget": limit, "chosen": 0 if search.best else None, "tried": [choice_json(one) for one in search]}
+        return budget_text(search), json_text(found), best.fit if (best := search.best) else None
+    body, *others = case
+    make = partial(Scene, body, make_mesh(), *others, scale=scale)
+    if asked["definition"] is not None:
+        scenes, refused = [make(definition=asked["definition"])], ""
     else:
-        scenes, refused = runnable(make, CASES, ENGINES[engine], setting, 1, springs_alone)
+        scenes, refused = runnable(make, CASES, ENGINES[engine], setting, springs_alone)
     if not scenes:
         raise Unmet(refused)
-    fit = fit_engine(scenes[0], engine, setting, loads=names, within=within)
-    return partial(fit_text, fit, mesh_name), lambda: json_text(fit_json(fit)), partial(_net, fit)
+    fit = fit_engine(scenes[0], engine, setting, **how)
+    return fit_text(fit, mesh_name), json_text(fit_json(fit)), fit
 
 
-def _net(fit: "EngineFit | None", _: str) -> "SpringNet":
+def net_of_fit(fit: "EngineFit | None", _: str) -> "SpringNet":
+    """Springs of a calibration."""
     if fit is None or fit.factor != fit.factor:
         raise Unmet(f"--write: there is no factor, so nothing is written: {fit.message if fit else 'see above'}")
     return fit.net()
@@ -198,6 +160,11 @@ def budget_text(search: "BudgetSearch") -> str:
         least = error_text(search[0].worst).lstrip("+")
         return f"No stiffness makes any of them right; the nearest is off by {least}. Take a larger budget."
     return f"{search!r}\n\nchosen, the least error at worst:\n{fit_text(search.best.fit, search.best.mesh)}"
+
+
+def choice_json(one: "BudgetChoice") -> dict[str, Any]:
+    """Content of a choice of a search in SI units."""
+    return fit_json(one.fit) | {"mesh": one.mesh, "frame_seconds": one.frame_seconds, "worst": one.worst}
 
 
 def fit_json(fit: "EngineFit") -> dict[str, Any]:

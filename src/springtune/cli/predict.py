@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import click
 
 from . import examples
-from .engine_fit import EngineOptions, engine_options, fitted
+from .engine_fit import EngineOptions, engine_options, fitted, net_of_fit
 from .options import (
     SPRING_FILES,
     SheetOptions,
@@ -103,16 +103,16 @@ def predict(
     elements; over which loads that holds; and which settings converge. With --budget the setting is found, too.
     """
     with refusals("--write", target, _in_options):
-        check_kind(sheet.shape, sheet.beam, ("load",) if engine.engine is None else ("scale",))
+        check_kind(sheet.shape, sheet.beam, ("load",) if engine["engine"] is None else ("scale",))
         engine.check(sheet, error)
-        if best_springs and (error is not None or engine.engine is not None):
+        if best_springs and (error is not None or engine["engine"] is not None):
             raise ValueError("--best-springs: are of one mesh; leave out --error and --engine")
         also = ("best-springs",) * best_springs
         if target is not None:
             check_target("--write", target)
-        if engine.engine is not None:
-            text, json, net_of = fitted(sheet, engine, load, loads, springs_alone)
-            answer = _Answer(text, json, "", net_of)
+        if engine["engine"] is not None:
+            text, json, fit = fitted(sheet, engine, load, loads, springs_alone)
+            answer = _Answer(lambda: text, lambda: json, "", partial(net_of_fit, fit))
         elif sheet.shape is not None:
             asked = sheet.asked_shape(load, sized=error is None)
             answer = (

@@ -17,10 +17,11 @@ from ..handover.net import NOT_COMPUTED, SpringNet
 from ..prediction.choices import check_loads, check_names, predicted
 from ..prediction.search import asked_error
 from ..problem.compare import error_text
+from ..problem.loads import LOADS
 from ..reference.small_strain import ReferenceNotConvergedError
 from ..safe_io.tables import Tabled, TabledList, number_text
 from ..scene.single import Scene
-from ..scene.statements import ShapeStatement
+from ..scene.statements import ShapeStatement, unit_reference
 from .base import ENGINES, EngineError, Setting
 from .run import EngineResult, complete, in_engine, net_of
 
@@ -30,14 +31,12 @@ SIZES = (0.25, 0.5, 1.0, 2.0)
 WITHIN = 0.05
 """Error that a band keeps."""
 
-TUNED = 1e-3
-"""Error at which a factor is taken."""
+TUNED, ALLOWED = 1e-3, 0.02
+"""Error at which a factor is taken, and above which it is refused where nothing comes closer."""
 
-ALLOWED = 0.02
-"""Error above which a factor is refused where nothing comes closer."""
-
-BRACKET, BRACKETS = 8.0, 7
-"""Ratio of the factors that look for a bracket, and how many there are."""
+BRACKET, BRACKETS, SATURATED = 8.0, 7, 1e-3
+"""Ratio of the factors that look for a bracket, how many there are, and the change of the displacement over one below
+which stiffness no longer decides."""
 
 RESTING = {"float64": 1e-4, "float32": 1e-3}
 """Distance from rest that ends a run, over the displacement, by precision."""
@@ -45,20 +44,9 @@ RESTING = {"float64": 1e-4, "float32": 1e-3}
 SHAKE = 5e-3
 """Amplitude over the displacement up to which a run that does not rest counts, as those of single precision do."""
 
-SATURATED = 1e-3
-"""Change of the displacement over a `BRACKET` below which stiffness no longer decides."""
-
-CONVERGED = 0.01
-"""Solver error of a converged setting."""
-
-MOST_DOUBLINGS = 8
-"""Doublings of substeps or iterations that are tried."""
-
-STALLED = 0.9
-"""Share of the solver error that two doublings leave where more of them are hopeless."""
-
-FINE = 200
-"""Sizes between two tested ones at which a band is looked at."""
+CONVERGED, STALLED, MOST_DOUBLINGS = 0.01, 0.9, 8
+"""Solver error of a converged setting, the share of it that two doublings of substeps or iterations leave where more
+are hopeless, and how many are tried."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -230,18 +218,12 @@ class EngineFit(Tabled):
         """
         if self.factor != self.factor:
             raise EngineError(self.message)
-        net, result = net_of(self.scene, self.factor), self.result
+        result, springs = self.result, self.scene.springs
+        springs = replace(springs, reference=self.factor * springs.reference)
+        net = SpringNet.from_scene(self.scene, springs=springs, errors=False)
         why = f"{NOT_COMPUTED}: the stiffness is that for engine '{result.engine}' at {result.setting}, which has not"
-        steps = net.header["largest_stable_step"]
-        if isinstance(steps, dict):
-            steps = {name: one if isinstance(one, str) else one / self.factor**0.5 for name, one in steps.items()}
-        header = net.header | {
-            "reference_stiffness": self.factor * net.header["reference_stiffness"],
-            "calibrated": {"engine": result.engine, "setting": str(result.setting), "factor": self.factor},
-            "expected_error": f"{why} converged",
-            "largest_stable_step": steps,
-        }
-        return replace(net, header=header)
+        calibrated = {"engine": result.engine, "setting": str(result.setting), "factor": self.factor}
+        return replace(net, header=net.header | {"calibrated": calibrated, "expected_error": f"{why} converged"})
 
     def typed_rows(self) -> Iterator[tuple[str, str, str, str]]:
         """Name, value or range, unit and formula of each number to type, as texts; edges without springs left out.
@@ -333,8 +315,9 @@ def fit_engine(
     KeyError
         If no engine has the name.
     EngineError
-        If the engine is not installed or lacks what the scene has, the load has no displacement, or `within` is out of
-        its range.
+        If the engine is not installed or lacks what the scene has, or the load has no displacement.
+    ValueError
+        If `within` is out of its range.
 
     Notes
     -----
@@ -364,20 +347,14 @@ def fit_engine(
     nan 8.00 mm in place of 1.00
     """
     chosen = ENGINES[engine]
-    try:
-        within = asked_error(within)
-    except ValueError as error:
-        raise EngineError(f"within{str(error).removeprefix('error')}") from None
+    within = asked_error(within, "within")
     setting = complete(chosen, setting or Setting(**parts))
     chosen.check(setting, net_of(scene))
     names = _loads(scene, loads)
     runs = _Runs(scene, engine, frames)
     untuned = runs[1.0, setting]
     if not abs(untuned.reference) > 0:
-        raise EngineError(
-            f"load: {scene.load!r} has no displacement by finite elements to calibrate to; take a load case with a "
-            "quantity of kind 'displacement' that is not zero"
-        )
+        raise EngineError(f"load: {scene.load!r} has no displacement to calibrate to; give its case one as a quantity")
     factor, why = _factor(runs, setting)
     found = factor == factor
     tuned = runs[factor, setting] if found else min(runs.values(), key=_distance)
@@ -475,15 +452,9 @@ def _needed(runs: _Runs, raised: str, setting: Setting) -> NeededSetting:
     return NeededSetting(raised, more, found, untuned.solver_error, untuned.frame_seconds)
 
 
-def _loaded(scene: Scene, load: str, size: float, kinematics: str = "nonlinear") -> Scene:
+def _loaded(scene: Scene, load: str, size: float) -> Scene:
     """Scene of the same springs under a load of a size."""
-    make = partial(
-        Scene,
-        definition=scene.definition,
-        stiffness=scene.uniform_stiffness,
-        kinematics=kinematics,
-        sheet=scene.sheet,
-    )
+    make = partial(Scene, definition=scene.definition, stiffness=scene.uniform_stiffness, sheet=scene.sheet)
     if scene.definition.needs == "cases" and load != scene.load:
         raise EngineError(f"definition '{scene.definition.name}' is fitted to load '{scene.load}' alone")
     if isinstance(scene.statement, ShapeStatement):
@@ -498,7 +469,7 @@ def _band(runs: _Runs, load: str, tuned: EngineResult, within: float) -> LoadBan
     unit = "" if isinstance(scene.statement, ShapeStatement) else "N"
     try:
         if unit and load != scene.load:
-            (moved,) = _loaded(scene, load, 1.0, "linear").reference_values().values()
+            moved = unit_reference(scene.beam, scene.material, LOADS[load].kind, 1.0).displacement
             base = abs(tuned.reference / moved)
         sizes = tuple(float(share * base) for share in SIZES)
         found = [runs.under(_loaded(scene, load, size), tuned.factor, tuned.setting) for size in sizes]
@@ -517,7 +488,7 @@ def range_within(sizes: np.ndarray, errors: np.ndarray, within: float) -> tuple[
     slopes = np.diff(errors) / np.diff(sizes)
     bends = np.pad(np.abs(np.diff(slopes) / (sizes[2:] - sizes[:-2])), 1, constant_values=np.nan)
     bend = np.fmax(bends[:-1], bends[1:])[:, np.newaxis]
-    share = np.linspace(0, 1, FINE)
+    share = np.linspace(0, 1, 200)  # between two sizes
     between = errors[:-1, np.newaxis] * (1 - share) + errors[1:, np.newaxis] * share
     bounds = np.abs(between) + 2 * bend * widths**2 * share * (1 - share) + SHAKE
     bounds = np.nan_to_num(bounds.ravel(), nan=np.inf)

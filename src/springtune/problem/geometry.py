@@ -22,7 +22,7 @@ def warn_of_thickness(thickness: float, sides: tuple[float, float], what: str) -
     if thickness > smaller:
         _warn(
             f"{what}, thickness: {1e3 * thickness:g} mm exceeds its smaller side, {1e3 * smaller:.6g} mm, and plane "
-            "stress is an assumption about thin sheets; give a smaller thickness"
+            "stress is an assumption about thin sheets; give a smaller thickness, or a material in plane strain"
         )
 
 

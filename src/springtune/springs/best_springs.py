@@ -9,8 +9,8 @@ half; so the field counts, too. The springs minimise
           + \frac{\lambda}{n} \sum_e \ln^2 \frac{k_e}{k_{e,start}}
 
 with ``e_e`` (15) the stretches of a spring, one under each load, and u the displacements, weighted by area, without
-rigid motions, relative to the load's own. Gradients are exact: one factorization and 30 solves. The best of several
-searches is not the best there is.
+rigid motions, relative to the load's own. A spring changes by a factor of ten at most. Gradients are exact: one
+factorization and 30 solves. The best of several searches is not the best there is.
 
 **A bound that is proven.** Take any virtual displacements y, one field for each load, with work ``y . F >= 0``. Then
 ``sum_e k_e y_e . e_e = y . F >= 0`` in equilibrium, where ``y_e`` (15) are a spring's stretches by y. With k >= 0 some
@@ -34,7 +34,7 @@ from ..mesh import Mesh
 from ..problem.materials import Material
 from . import van_gelder
 from .base import Springs, definition, triangles_only
-from .identification import tested_body
+from .identification import SPAN, tested_body
 from .patch_fit import NU, polynomial_tests
 
 if TYPE_CHECKING:
@@ -171,7 +171,11 @@ class LoadSpace:
             return float(value), slope * step + 2 * START_WEIGHT / len(change) * change
 
         options = {"maxfun": evaluations, "maxiter": evaluations, "maxcor": 20, "ftol": 1e-9, "gtol": 1e-9}
-        found = minimize(objective, np.zeros(len(start)), jac=True, method="L-BFGS-B", options=options)
+        largest = SPAN if any_sign else math.log(SPAN)
+        found = minimize(
+            objective, np.zeros(len(start)), jac=True, method="L-BFGS-B", bounds=[(-largest, largest)] * len(start),
+            options=options,
+        )  # fmt: skip
         stiffness = start * (1 + found.x) if any_sign else start * np.exp(found.x)
         return stiffness, float(found.fun), int(found.nfev)
 

@@ -16,10 +16,10 @@ from springtune.problem.quantities import nearest
 from springtune.reference.calculix import program
 from springtune.springs import DEFINITIONS
 
-from ...config.checks import check_able, check_beam_material, check_density, check_known, check_particles, check_product
+from ...config.checks import check_able, check_known, check_particles, check_product, check_scene
 from ...config.fields import (
     BeamName,
-    DefinitionName,
+    DefinitionNames,
     Force,
     Length,
     Load,
@@ -62,9 +62,7 @@ class BenchmarkConfig(Section):
         description="Beam on which every case is solved once more: an approach is the quickest to an error only where "
         "it keeps that on both. None is called the quickest without.",
     )
-    definition: Annotated[list[DefinitionName], OneOrMore()] = Field(
-        description="Definitions that derive a stiffness and need no reference."
-    )
+    definition: DefinitionNames = Field(description="Definitions that derive a stiffness and need no reference.")
     mesh_type: Annotated[list[MeshType], OneOrMore()] = Field(description="Mesh types of the definitions.")
     approach: Annotated[list[OtherApproach], OneOrMore()] = Field(
         list(OTHER_APPROACHES),
@@ -123,16 +121,10 @@ def _check(config, problems):
                 problems.add(("benchmark", "mesh_size"), message)
     for name, scene in section.scenes.items():
         place = ("benchmark", "scenes", name)
-        check_known(problems, (*place, "beam"), "beam", scene.beam, config.beams)
-        check_beam_material(problems, (*place, "material"), scene.material, config)
-        check_density(config, scene.material, (*place, "material"), problems)
-        if not in_benchmark(scene.load):
-            able = ", ".join(filter(in_benchmark, LOADS))
-            problems.add((*place, "load"), f"'{scene.load}' is no load of the benchmark; choose of {able}")
+        check_scene(problems, place, scene, config, in_benchmark, "is no load of the benchmark")
     check_able(problems, ("benchmark", "definition"), section.definition, "needs more than mesh and material;")
     for name in section.mesh_type:
-        if name not in MESH_TYPES:
-            problems.add(("benchmark", "mesh_type"), f"unknown mesh type '{name}'; {nearest(name, MESH_TYPES)}")
+        check_known(problems, ("benchmark", "mesh_type"), "mesh type", name, MESH_TYPES, None)
     approaches = approach_names(section.definition, section.mesh_type, section.approach)
     for name in section.finest_of:
         if name not in approaches:

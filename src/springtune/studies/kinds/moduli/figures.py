@@ -23,7 +23,8 @@ BASELINE = "uniform"
 def definitions(tree):
     """Figures that compare definitions: moduli, errors against mesh size by load, and heat maps by mesh type."""
     root = unswept(group(tree, "/"))
-    for stem, selection in figures(root["load"].values.tolist(), root.mesh_type.values.tolist()).items():
+    asked = root.status != 0
+    for stem, selection in figures(labels_of(asked, "load"), labels_of(asked, "mesh_type")).items():
         if "load" in selection:
             yield stem, plot_definitions_size, _main(root, ("beam", "kinematics", "material"), selection)
         elif "mesh_type" in selection:

@@ -1,26 +1,35 @@
 """Figures and tables that compare definitions, and what the page to browse shows of their moduli."""
 
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 from ...config.kind import Output, needs
 from ...output.browse import Plot, View
+
+if TYPE_CHECKING:
+    from ...config.model import Study
 
 TABLES = ("definitions.csv", "moduli.csv", "which_definition.md")
 """Tables that compare definitions: of scenes, of moduli, and what to use."""
 
 
 def figures(loads: Iterable[object], mesh_types: Iterable[object]) -> dict[str, dict[str, object]]:
-    """Figures by stem: moduli, errors against mesh size by load, and heat maps by mesh type."""
+    """Figures by stem: moduli, errors against mesh size by load, and heat maps by mesh type, of the scenes of beams."""
     found: dict[str, dict[str, object]] = {"definitions_moduli": {}}
     found |= {f"definitions_size_{load}": {"load": load} for load in loads}
     return found | {f"definitions_loads_{mesh_type}": {"mesh_type": mesh_type} for mesh_type in mesh_types}
+
+
+def _figures(study: "Study") -> dict[str, dict[str, object]]:
+    loads = dict.fromkeys(scene.load for scene in study.scenes)
+    return figures(loads, dict.fromkeys(scene.mesh.mesh_type for scene in study.scenes))
 
 
 OUTPUTS = (
     Output(
         "definitions",
         "figures and tables that compare definitions",
-        figures=lambda study: figures(study.axes["load"], study.axes["mesh_type"]),
+        figures=_figures,
         plot="studies.kinds.moduli.figures:definitions",
         tables=lambda study: list(TABLES),
         write="studies.kinds.moduli.tables:write",

@@ -14,17 +14,17 @@ from springtune.problem.loads import LOADS
 from springtune.problem.materials import Material
 from springtune.springs import DEFINITIONS
 
-from ...config.checks import check_able, check_beam_material, check_compressible, check_known, check_particles
+from ...config.checks import check_able, check_beam_material, check_compressible, check_known, check_made
 from ...config.fields import (
     BeamName,
-    DefinitionName,
+    DefinitionNames,
     Force,
     Kinematics,
     Length,
     Load,
+    MadeType,
     MaterialName,
     Named,
-    OneOrMore,
     Scalar,
     number,
     one_of,
@@ -73,7 +73,6 @@ ENDS = {
 }
 """How the ends of each parameter are read."""
 
-MadeType = Annotated[str, one_of("mesh type", MESH_TYPES)]
 ParameterName = Annotated[str, one_of("parameter", VARIED)]
 Spacing = Annotated[str, one_of("spacing", SPACINGS)]
 
@@ -92,9 +91,7 @@ class RefinementConfig(Section):
     material: MaterialName = Field(description="Material.")
     load: Load = Field(description="Load.")
     force: Force | None = Field(None, description="Magnitude; required unless it is the parameter.")
-    definition: Annotated[list[DefinitionName], OneOrMore()] = Field(
-        description="Definitions that derive a stiffness and need no reference."
-    )
+    definition: DefinitionNames = Field(description="Definitions that derive a stiffness and need no reference.")
     kinematics: Kinematics = default("nonlinear", description="Kinematics of the network.")
     parameter: ParameterName = Field(description="Parameter to vary: " + "; ".join(
         f"`{name}`, {one.meaning}" for name, one in VARIED.items()) + ".")  # fmt: skip
@@ -154,8 +151,8 @@ def _check(config, problems):
             check_compressible(problems, (*path, "to"), section.material, config)
         if section.parameter == "mesh_size":
             sizes = dict(zip(("from", "to"), ends))
-        if section.beam in config.beams:
-            _check_sizes(section, sizes, config.beams[section.beam], path, problems)
+        for key, size in sizes.items():
+            check_made(problems, (*path, key), section.mesh_type, size, section.beam, config)
 
 
 def _ends(section, path, problems):
@@ -175,15 +172,6 @@ def _ends(section, path, problems):
     else:
         return found
     return []
-
-
-def _check_sizes(section, sizes, beam, path, problems):
-    for key, size in sizes.items():
-        refusal = MESH_TYPES[section.mesh_type].refusal(beam.length, beam.height, size, f"beam '{section.beam}'")
-        if refusal:
-            problems.add((*path, key), f"{1e3 * size:g} mm {refusal}")
-        else:
-            check_particles(problems, (*path, key), [size], beam.length, beam.height)
 
 
 def _check_definitions(section, path, problems):
