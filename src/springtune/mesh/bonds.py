@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from .cells import Mesh, MeshError
 
@@ -19,6 +18,8 @@ def bonded(mesh: Mesh, reach: float) -> Mesh:
     >>> len(mesh.edges), len(joined.edges), bool(joined.on_outline.sum() == mesh.on_outline.sum())
     (333, 900, True)
     """
+    from scipy.spatial import cKDTree  # here, since studies are read without scipy
+
     if not reach > 0:
         raise MeshError(f"reach: {reach!r} is not above zero; give a length in m")
     pairs = cKDTree(mesh.points).query_pairs(reach * (1 + 1e-9), output_type="ndarray")
