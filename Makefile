@@ -14,7 +14,7 @@ export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 # Jobs and tests are many processes: Python is to keep what it compiles.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: study report paper test test-browser test-engines test-faults test-fuzz test-versions test-reruns release-check slow lint licences docs site pictures lock test-slurm test-archive test-storage scale test-container million mutants clean
+.PHONY: study report paper test test-browser test-engines test-faults test-fuzz test-versions test-reruns release-check slow lint licences docs site pictures lock test-slurm test-archive test-storage scale test-container million mutants catalogue clean
 
 study: $(VENV)/.run
 	springtune run "$$STUDY"
@@ -137,6 +137,10 @@ results/quick/dataset.nc: | $(VENV)/.run
 pictures: $(VENV)/.run $(ENGINES)/.done
 	$(WITH_ENGINES) python tools/pictures.py
 	python tools/pages.py
+
+# Sources, moduli, errors and costs of all definitions, in docs/catalogue.md; half a minute.
+catalogue: $(VENV)/.run
+	SPRINGTUNE_PLUGINS=none OPENBLAS_NUM_THREADS=1 python tools/catalogue.py
 
 # The tables of a million particles in docs/speed.md, measured on this machine; some minutes and 3 GB.
 million: $(VENV)/.run

@@ -415,6 +415,12 @@ def test_a_pause_is_no_rest():
     assert found.status == "moving" and found.displacements[1, 0] == 35
 
 
+@pytest.mark.parametrize("most", [1, 9, 15])
+def test_a_run_of_a_window_or_two_tells_that_it_moves(most):
+    found = followed(lambda t: 1 - np.exp(-t / 5), most=most)
+    assert found.status == "moving" and found.frames == most and f"not at rest after {most} frames" in found.message
+
+
 @pytest.mark.parametrize("window", [2, 3, 10])
 @pytest.mark.parametrize("periods", [0.37, 1, 2])
 def test_it_swings(periods, window):

@@ -119,13 +119,13 @@ class TestPage:
         from springtune.studies.kinds.samples.collect import EFFECTS, SAMPLES, SOBOL
         from springtune.studies.kinds.samples.designs import PARAMETERS
         from springtune.studies.kinds.scenes.variables import BLOCK, FIELDS, FINITE_STRAIN, ROOT, SENSITIVITY
-        from springtune.studies.kinds.shapes.collect import SHAPE_FIELDS, SHAPES
+        from springtune.studies.kinds.shapes.collect import AT_FINITE_STRAIN, SHAPE_FIELDS, SHAPES
         from springtune.studies.kinds.stability.collect import STABILITY
         from springtune.studies.output.browse.page import views
 
         groups = (ROOT, SENSITIVITY, FINITE_STRAIN, BLOCK, FIELDS, LAYING, STABILITY, ENGINE_RUNS, ENGINE_CURVES)
         groups += tuple(map(group_of, (MODULI, BENCHMARK)))
-        groups += (SAMPLES, EFFECTS, SOBOL, REFINEMENT, SHAPES, SHAPE_FIELDS)
+        groups += (SAMPLES, EFFECTS, SOBOL, REFINEMENT, SHAPES, SHAPE_FIELDS, AT_FINITE_STRAIN)
         coordinates = {"/samples": {*PARAMETERS, "sample_mesh_size"}}
         known = {group.name: group for group in groups}
         for view in views().values():

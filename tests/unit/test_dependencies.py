@@ -86,6 +86,21 @@ def test_a_digest_is_that_of_all_that_is_imported(package, changed):
     assert package("a", **texts | {"room__in_d": "import xarray\ntwo = 4"})[2] == before  # not a name that is used
 
 
+def test_a_template_counts_with_the_module_of_its_name(package, tmp_path):
+    folder = tmp_path / "springtune" / "templates"
+    folder.mkdir(parents=True)
+    texts = {"a": "from .b import x", "b": "x = 1"}
+    before = package("a", **texts)
+    (folder / "c.xml.jinja").write_text("<c>{{ x }}</c>\n")
+    assert package("a", **texts) == before
+    digests = {before[2]}
+    for text in ("<b>{{ x }}</b>\n", "<b>{{ x + 1 }}</b>\n"):
+        (folder / "b.xml.jinja").write_text(text)
+        files, _, digest = package("a", **texts)
+        assert files == {"a.py", "b.py", "templates/b.xml.jinja"} and digest not in digests
+        digests.add(digest)
+
+
 def test_what_was_read_is_taken_from_a_note_where_it_is_the_same(tmp_path):
     folder, note = tmp_path / "springtune", tmp_path / "code.json"
     folder.mkdir()

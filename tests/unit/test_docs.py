@@ -103,6 +103,51 @@ def test_no_sentence_stands_on_two_pages():
                     assert seen.setdefault(sentence, page) == page, f"{page.name}, {seen[sentence].name}: {sentence}"
 
 
+@pytest.fixture(scope="module")
+def catalogue():
+    """Program that writes docs/catalogue.md, and the tables that stand there."""
+    tool = run_path(str(REPOSITORY / "tools/catalogue.py"))
+    return tool, tool["written"](tool["PAGE"].read_text())
+
+
+def test_catalogue_has_every_definition(catalogue):
+    """Sources as docstrings have them, moduli of all, errors of those that support a mesh: else `make catalogue`."""
+    tool, tables = catalogue
+    (_, sources), (_, moduli), (_, others), (_, free), (_, squares) = tables.items()
+    assert list(tables) == list(tool["PARTS"]) and sources == tool["sources"]()
+    labels = [label for label, *_ in tool["rows"]()]
+    names = [re.findall(r"^\| (`.+?) \| ", table, re.MULTILINE) for table in (moduli, others, free, squares)]
+    assert names[0] == names[1] == labels
+    triangles, rectangles = ([label for label, one, _ in tool["rows"]() if n in one.cells] for n in (3, 4))
+    assert names[2] == [label for label in triangles if label != "`axis-exact`"]  # on rows made for it alone
+    assert names[3] == [label for label in rectangles if label not in ("`paper`", "`calibrated`")]  # none is printed
+
+
+def test_a_definition_without_a_source_is_named(catalogue):
+    def bare(mesh, material, thickness):
+        """Springs of hearsay.
+
+        Source: hearsay (heard).
+        """
+
+    with pytest.raises(SystemExit, match="'bare': its docstring has no source; add a paragraph"):
+        catalogue[0]["source"](st.scene.sheet.definition_of(bare))
+
+
+@pytest.mark.slow
+def test_numbers_of_the_catalogue_are_those_of_the_code(catalogue):
+    """To the digit that rounding leaves; searches end elsewhere on other machines."""
+    tool, tables = catalogue
+    for heading, table in tool["PARTS"].items():
+        for old, new in zip(tables[heading].splitlines(), table().splitlines(), strict=True):
+            before, now = (re.split(r"([+-]?\d+\.?\d*)", row.replace("−", "-")) for row in (old, new))
+            if not old.startswith(("| `annealed`", "| `evolved`", "| `adjoint`")):
+                assert before[::2] == now[::2], new
+                for a, b in zip(before[1::2], now[1::2]):
+                    digits = len(a.partition(".")[2])
+                    assert abs(float(a) - float(b)) <= 1.5 * 10**-digits, new
+
+
 def test_python_of_the_readme_prints_what_it_says():
     (code,) = blocks("python")
     assert len(code.replace("\n\n", "\n").splitlines()) == 6

@@ -1,7 +1,7 @@
 """`springtune predict --engine`: what to type into an engine at its setting, or within a frame's time."""
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, replace
 from functools import partial, reduce, wraps
 from typing import TYPE_CHECKING, Any
 
@@ -18,43 +18,49 @@ if TYPE_CHECKING:
     from ..engines.budget import BudgetSearch
     from ..engines.calibration import EngineFit
     from ..handover.net import SpringNet
-    from ..mesh import Mesh
-    from ..mesh.groups import GroupedMesh
-    from ..problem.geometry import Beam
-    from ..problem.shapes import Shape
+
+OPTIONS: dict[str, dict[str, Any]] = {
+    "engine": {
+        "shell_complete": names_from("engines.base:ENGINES"),
+        "help": "Calibrate to an engine, such as xpbd: what to type at its setting.",
+    },
+    "dt": {"help": "Time that a frame advances, such as 1/60 or '5 ms'.  [default: 1/60]"},
+    "substeps": {"type": int, "help": "Steps of a frame.  [default: 1]"},
+    "iterations": {"type": int, "help": "Iterations of the engine's solver in a step.  [default: 10]"},
+    "precision": {"help": "float64 or float32.  [default: the engine's own]"},
+    "force": {"help": "Size of the force of --load on a beam, such as '0.2 N'."},
+    "scale": {"type": float, "help": "Factor on the load of a shape.  [default: 1]"},
+    "definition": {
+        "shell_complete": names_from("springs:DEFINITIONS"),
+        "help": "Rule for the stiffness.  [default: the best one that the engine has]",
+    },
+    "within": {"help": "Error for which ranges of loads are printed.  [default: 5 %]"},
+    "budget": {
+        "help": "Time of a frame on this machine, such as '2 ms': find the mesh, definition, substeps and iterations."
+    },
+}
+"""Options of `predict` that are of engines, as click takes them."""
 
 FOUND = ("substeps", "iterations", "size", "definition")
 """Options of what a budget finds."""
 
 
-@dataclass(frozen=True)
-class EngineOptions:
-    """Options of `predict` that are of engines."""
-
-    engine: str | None
-    dt: str | None
-    substeps: int | None
-    iterations: int | None
-    precision: str | None
-    force: str | None
-    scale: float | None
-    definition: str | None
-    within: str | None
-    budget: str | None
+class EngineOptions(dict[str, Any]):
+    """Values of `OPTIONS`, None where not given."""
 
     def check(self, sheet: SheetOptions, error: str | None) -> None:
         """Refuse options that are not for each other."""
-        for one in fields(self):
-            value = getattr(self, one.name)
-            if self.engine is None and value is not None:
-                raise ValueError(f"--{one.name}: '{value}' is of engines; give --engine, such as xpbd, or leave it out")
-        if error is not None and self.engine is not None:
+        given = {name: value for name, value in self.items() if value is not None}
+        if "engine" not in given:
+            for name, value in given.items():
+                raise ValueError(f"--{name}: '{value}' is of engines; give --engine, such as xpbd, or leave it out")
+        elif error is not None:
             raise ValueError(
-                f"--error: '{error}' is of equilibria, and --engine {self.engine} of settings; give --budget such as "
-                "'2 ms', or leave one of them out"
+                f"--error: '{error}' is of equilibria, and --engine {self['engine']} of settings; give --budget such "
+                "as '2 ms', or leave one of them out"
             )
-        for name in FOUND if self.budget is not None else ():
-            value = getattr(sheet if name == "size" else self, name)
+        for name in FOUND if "budget" in given else ():
+            value = self.get(name, sheet.size)
             if value is not None:
                 raise ValueError(f"--{name}: '{value}' is what --budget finds; leave one of them out")
 
@@ -62,48 +68,24 @@ class EngineOptions:
         """Setting of the options."""
         from ..engines.base import ENGINES, Setting
 
-        if self.engine not in ENGINES:
+        if self["engine"] not in ENGINES:
             from ..problem.quantities import nearest
 
-            raise ValueError(f"--engine: '{self.engine}' is unknown; {nearest(str(self.engine), ENGINES)}")
-        given = {name: getattr(self, name) for name in ("dt", "substeps", "iterations", "precision")}
-        setting = Setting(**{name: value for name, value in given.items() if value is not None})
-        ENGINES[str(self.engine)].check(setting)
+            raise ValueError(f"--engine: '{self['engine']}' is unknown; {nearest(self['engine'], ENGINES)}")
+        names = ("dt", "substeps", "iterations", "precision")
+        setting = Setting(**{name: self[name] for name in names if self[name] is not None})
+        ENGINES[self["engine"]].check(setting)
         return setting
 
 
 def engine_options(command: AnyCommand) -> AnyCommand:
     """Decorator that adds these options to a command, which gets them as `EngineOptions`."""
-    each = (
-        click.option(
-            "--engine",
-            shell_complete=names_from("engines.base:ENGINES"),
-            help="Calibrate to an engine, such as xpbd: what to type at its setting.",
-        ),
-        click.option("--dt", help="Time that a frame advances, such as 1/60 or '5 ms'.  [default: 1/60]"),
-        click.option("--substeps", type=int, help="Steps of a frame.  [default: 1]"),
-        click.option("--iterations", type=int, help="Iterations of the engine's solver in a step.  [default: 10]"),
-        click.option("--precision", help="float64 or float32.  [default: the engine's own]"),
-        click.option("--force", help="Size of the force of --load on a beam, such as '0.2 N'."),
-        click.option("--scale", type=float, help="Factor on the load of a shape.  [default: 1]"),
-        click.option(
-            "--definition",
-            shell_complete=names_from("springs:DEFINITIONS"),
-            help="Rule for the stiffness.  [default: the best one that the engine has]",
-        ),
-        click.option("--within", help="Error for which ranges of loads are printed.  [default: 5 %]"),
-        click.option(
-            "--budget",
-            help="Time of a frame on this machine, such as '2 ms': find the mesh, definition, substeps and iterations.",
-        ),
-    )
 
     @wraps(command)
     def call(*args: Any, **given: Any) -> None:
-        engine = EngineOptions(**{one.name: given.pop(one.name) for one in fields(EngineOptions)})
-        command(*args, engine=engine, **given)
+        command(*args, engine=EngineOptions({name: given.pop(name) for name in OPTIONS}), **given)
 
-    return reduce(lambda made, option: option(made), reversed(each), call)
+    return reduce(lambda made, name: click.option(f"--{name}", **OPTIONS[name])(made), reversed(OPTIONS), call)
 
 
 def fitted(
@@ -116,38 +98,36 @@ def fitted(
     from ..prediction.choices import CASES
     from ..scene.single import Scene
 
-    setting, engine, within = asked.setting(), str(asked.engine), asked.within or WITHIN
+    setting, engine, searched = asked.setting(), asked["engine"], asked["budget"] is not None
     names = None if loads is None else [name.strip() for name in loads.split(",") if name.strip()]
-    searched, scale = asked.budget is not None, 1.0 if asked.scale is None else asked.scale
-    further: dict[str, Any] = {}
-    body: Beam | Shape
-    material: Any
-    make_mesh: Callable[[], Mesh | GroupedMesh]
+    how: dict[str, Any] = {"loads": names, "within": asked["within"] or WITHIN}
+    scale = 1.0 if asked["scale"] is None else asked["scale"]
+    case: tuple[Any, ...]
+    make_mesh: Callable[[], Any]
     if sheet.shape is not None:
         of = sheet.asked_shape(load, sized=not searched)
-        body, material, load, mesh_name = of.shape, of.materials, of.load, of.mesh_name
+        case, make_mesh, mesh_name = (of.shape, of.materials, of.load, None), of.mesh, of.mesh_name
         if searched and of.shape.file:
-            further["meshes"] = {mesh_name: of.mesh()}
+            how["meshes"] = {mesh_name: of.mesh()}
         elif searched:
-            further["meshes"] = graded_meshes(of.shape, "free", lambda size: replace(of, size=size).mesh())
-        make_mesh = of.mesh
+            how["meshes"] = graded_meshes(of.shape, "free", lambda size: replace(of, size=size).mesh())
     else:
-        body, material = beam, _ = sheet.asked_beam()
-        needs = {"load": (load, "traction"), "force": (asked.force, "0.2 N"), "density": (sheet.density, "1000 kg/m^3")}
-        for name, (value, example) in needs.items():
+        beam, material = sheet.asked_beam()
+        needs = {"load": (load, "traction"), "force": (asked["force"], "0.2 N")}
+        for name, (value, example) in (needs | {"density": (sheet.density, "1000 kg/m^3")}).items():
             if value is None:
                 raise ValueError(
                     f"--{name}: missing; an engine is calibrated to a load and moves masses; give '{example}'"
                 )
-        if sheet.mesh_type is not None:
-            further["mesh_types"] = sheet.mesh_type.split(",")
+        if searched and sheet.mesh_type is not None:
+            how["mesh_types"] = sheet.mesh_type.split(",")
         edge = None if searched else sheet.edge(beam)
-        make_mesh, mesh_name = partial(sheet.mesh, beam, edge), sheet.mesh_name(edge)
+        case, make_mesh = (beam, material, load, asked["force"]), partial(sheet.mesh, beam, edge)
+        mesh_name = sheet.mesh_name(edge)
     if searched:
-        limit = asked_quantity("--budget", str(asked.budget), "time")
-        given = {"engine": engine, "budget": limit, "dt": setting.dt, "precision": setting.precision}
-        given |= {"loads": names, "within": within, "scale": scale, "springs_alone": springs_alone}
-        search = fit_budget(body, material, str(load), asked.force, **given, **further)
+        limit = asked_quantity("--budget", asked["budget"], "time")
+        how |= {"budget": limit, "dt": setting.dt, "precision": setting.precision, "scale": scale}
+        search = fit_budget(*case, engine=engine, springs_alone=springs_alone, **how)
 
         def content() -> str:
             keys = "mesh", "frame_seconds", "worst"
@@ -155,14 +135,15 @@ def fitted(
             return json_text({"budget": limit, "chosen": 0 if search.best else None, "tried": tried})
 
         return partial(budget_text, search), content, partial(_net, search.best.fit if search.best else None)
-    make = partial(Scene, body, make_mesh(), material, str(load), asked.force, scale=scale)
-    if asked.definition is not None:
-        scenes, refused = [make(definition=asked.definition)], ""
+    body, *others = case
+    make = partial(Scene, body, make_mesh(), *others, scale=scale)
+    if asked["definition"] is not None:
+        scenes, refused = [make(definition=asked["definition"])], ""
     else:
         scenes, refused = runnable(make, CASES, ENGINES[engine], setting, 1, springs_alone)
     if not scenes:
         raise Unmet(refused)
-    fit = fit_engine(scenes[0], engine, setting, loads=names, within=within)
+    fit = fit_engine(scenes[0], engine, setting, **how)
     return partial(fit_text, fit, mesh_name), lambda: json_text(fit_json(fit)), partial(_net, fit)
 
 

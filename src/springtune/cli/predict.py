@@ -101,11 +101,11 @@ def predict(
     elements; over which loads that holds; and which settings converge. With --budget the setting is found, too.
     """
     with refusals("--write", target, _in_options):
-        check_kind(sheet.shape, sheet.beam, ("load",) if engine.engine is None else ("scale",))
+        check_kind(sheet.shape, sheet.beam, ("load",) if engine["engine"] is None else ("scale",))
         engine.check(sheet, error)
         if target is not None:
             check_target("--write", target)
-        if engine.engine is not None:
+        if engine["engine"] is not None:
             text, json, net_of = fitted(sheet, engine, load, loads, springs_alone)
             answer = _Answer(text, json, "", net_of)
         elif sheet.shape is not None:

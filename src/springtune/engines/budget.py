@@ -37,8 +37,8 @@ BUDGET_MESHES = ("structured", "right")
 BEST_DEFINITIONS = 2
 """Definitions on a mesh that are tried."""
 
-ITERATIONS_AT_MOST, SUBSTEPS_AT_MOST = 400, 256
-"""Limits of a setting."""
+ITERATIONS_AT_MOST, SUBSTEPS = 400, tuple(2**power for power in range(8, -1, -1))
+"""Limit of a setting's iterations, and its substeps that are tried."""
 
 PROBED = 16
 """Iterations of the second setting that is timed."""
@@ -248,12 +248,9 @@ def fit_budget(
                 why = f"budget: {budget!r} is less than {coarsest}; give more"
         return found
 
-    def least_error(found: list[BudgetChoice]) -> float:
-        return min((one.worst for one in found), default=np.inf)
-
     tried: list[BudgetChoice] = []
     for family in [meshes] if meshes else made:
-        found = _until_worse(map(on_mesh, family.items()), least_error)
+        found = _until_worse(map(on_mesh, family.items()), lambda own: min((one.worst for one in own), default=np.inf))
         tried += [one for _, choices in found for one in choices]
     if not tried:
         raise EngineError(why or "no mesh can be made; give others")
@@ -307,13 +304,11 @@ def _split(
 ) -> Setting | None:
     """Best split of a time into substeps, with as many iterations as it has time for; None if it is too short."""
     damping, settings = 2 * scene.motion().loaded_frequency, []
-    substeps = SUBSTEPS_AT_MOST
     iterations = range(1, (ITERATIONS_AT_MOST if engine.iterates else 1) + 1)
-    while substeps >= 1:
+    for substeps in SUBSTEPS:
         setting = replace(start, substeps=substeps)
         if count := bisect_right(iterations, limit, key=lambda number: seconds(replace(setting, iterations=number))):
             settings.append(replace(setting, iterations=count))
-        substeps //= 2
 
     def error(setting: Setting) -> float:
         return abs(in_engine(scene, engine.name, setting, damping=damping, tolerance=1e-3).solver_error)

@@ -17,10 +17,11 @@ from ..handover.net import NOT_COMPUTED, SpringNet
 from ..prediction.choices import check_loads, check_names, predicted
 from ..prediction.search import asked_error
 from ..problem.compare import error_text
+from ..problem.loads import LOADS
 from ..reference.small_strain import ReferenceNotConvergedError
 from ..safe_io.tables import Tabled, TabledList, number_text
 from ..scene.single import Scene
-from ..scene.statements import ShapeStatement
+from ..scene.statements import ShapeStatement, unit_reference
 from .base import ENGINES, EngineError, Setting
 from .run import EngineResult, complete, in_engine, net_of
 
@@ -230,18 +231,12 @@ class EngineFit(Tabled):
         """
         if self.factor != self.factor:
             raise EngineError(self.message)
-        net, result = net_of(self.scene, self.factor), self.result
+        result, springs = self.result, self.scene.springs
+        springs = replace(springs, reference=self.factor * springs.reference)
+        net = SpringNet.from_scene(self.scene, springs=springs, errors=False)
         why = f"{NOT_COMPUTED}: the stiffness is that for engine '{result.engine}' at {result.setting}, which has not"
-        steps = net.header["largest_stable_step"]
-        if isinstance(steps, dict):
-            steps = {name: one if isinstance(one, str) else one / self.factor**0.5 for name, one in steps.items()}
-        header = net.header | {
-            "reference_stiffness": self.factor * net.header["reference_stiffness"],
-            "calibrated": {"engine": result.engine, "setting": str(result.setting), "factor": self.factor},
-            "expected_error": f"{why} converged",
-            "largest_stable_step": steps,
-        }
-        return replace(net, header=header)
+        calibrated = {"engine": result.engine, "setting": str(result.setting), "factor": self.factor}
+        return replace(net, header=net.header | {"calibrated": calibrated, "expected_error": f"{why} converged"})
 
     def typed_rows(self) -> Iterator[tuple[str, str, str, str]]:
         """Name, value or range, unit and formula of each number to type, as texts; edges without springs left out.
@@ -333,8 +328,9 @@ def fit_engine(
     KeyError
         If no engine has the name.
     EngineError
-        If the engine is not installed or lacks what the scene has, the load has no displacement, or `within` is out of
-        its range.
+        If the engine is not installed or lacks what the scene has, or the load has no displacement.
+    ValueError
+        If `within` is out of its range.
 
     Notes
     -----
@@ -364,10 +360,7 @@ def fit_engine(
     nan 8.00 mm in place of 1.00
     """
     chosen = ENGINES[engine]
-    try:
-        within = asked_error(within)
-    except ValueError as error:
-        raise EngineError(f"within{str(error).removeprefix('error')}") from None
+    within = asked_error(within, "within")
     setting = complete(chosen, setting or Setting(**parts))
     chosen.check(setting, net_of(scene))
     names = _loads(scene, loads)
@@ -475,15 +468,9 @@ def _needed(runs: _Runs, raised: str, setting: Setting) -> NeededSetting:
     return NeededSetting(raised, more, found, untuned.solver_error, untuned.frame_seconds)
 
 
-def _loaded(scene: Scene, load: str, size: float, kinematics: str = "nonlinear") -> Scene:
+def _loaded(scene: Scene, load: str, size: float) -> Scene:
     """Scene of the same springs under a load of a size."""
-    make = partial(
-        Scene,
-        definition=scene.definition,
-        stiffness=scene.uniform_stiffness,
-        kinematics=kinematics,
-        sheet=scene.sheet,
-    )
+    make = partial(Scene, definition=scene.definition, stiffness=scene.uniform_stiffness, sheet=scene.sheet)
     if scene.definition.needs == "cases" and load != scene.load:
         raise EngineError(f"definition '{scene.definition.name}' is fitted to load '{scene.load}' alone")
     if isinstance(scene.statement, ShapeStatement):
@@ -498,7 +485,7 @@ def _band(runs: _Runs, load: str, tuned: EngineResult, within: float) -> LoadBan
     unit = "" if isinstance(scene.statement, ShapeStatement) else "N"
     try:
         if unit and load != scene.load:
-            (moved,) = _loaded(scene, load, 1.0, "linear").reference_values().values()
+            moved = unit_reference(scene.beam, scene.material, LOADS[load].kind, 1.0).displacement
             base = abs(tuned.reference / moved)
         sizes = tuple(float(share * base) for share in SIZES)
         found = [runs.under(_loaded(scene, load, size), tuned.factor, tuned.setting) for size in sizes]

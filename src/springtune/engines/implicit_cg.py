@@ -17,14 +17,25 @@ from ..handover.terms import FORMULAS
 from ..mechanics.dynamics import Motion
 from ..mechanics.integrators import BackwardEuler
 from ..mechanics.stepping import make_stepper
-from .base import Session, Setting, engine
+from .base import Setting, engine
 from .textbook import as_they_are
 
 TOLERANCE = 1e-5
 """Relative residual that ends conjugate gradients: SOFA's default."""
 
 
-class _Session:
+@engine(
+    "implicit-cg",
+    order=50,
+    laws=tuple(FORMULAS),
+    parameters=as_they_are(*FORMULAS),
+    implicit=True,
+    measured="1e-6, twenty scenes",
+    source="Baraff 1998",
+)
+class ImplicitEuler:
+    """Implicit Euler, linearised once a step, with iterations of conjugate gradients; SOFA takes 25."""
+
     def __init__(self, net: SpringNet, setting: Setting, damping: float) -> None:
         assert net.masses is not None  # of a scene that moves
         reference = float(net.header["reference_stiffness"])
@@ -44,17 +55,3 @@ class _Session:
     def displacements(self) -> np.ndarray:
         """Displacement of each particle [m]."""
         return self.steps.u.astype(float)
-
-
-@engine(
-    "implicit-cg",
-    order=50,
-    laws=tuple(FORMULAS),
-    parameters=as_they_are(*FORMULAS),
-    implicit=True,
-    measured="1e-6, twenty scenes",
-    source="Baraff 1998",
-)
-def session(net: SpringNet, setting: Setting, damping: float) -> Session:
-    """Implicit Euler, linearised once a step, with iterations of conjugate gradients; SOFA takes 25."""
-    return _Session(net, setting, damping)

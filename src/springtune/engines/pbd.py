@@ -21,23 +21,8 @@ our equilibrium at small h.
 import numpy as np
 
 from ..handover.net import SpringNet
-from ..mechanics.kernels import compiled
-from .base import Parameter, Session, Setting, engine
-from .textbook import Textbook, pulling, spring_between, stretch_spring
-
-
-@compiled
-def _project(x, weights, springs, lengths, shares, iterations):  # type: ignore[no-untyped-def]
-    """Take away a share of each spring's stretch, in iterations over all springs."""
-    for _ in range(iterations):
-        for e in range(len(lengths)):
-            i, j = springs[e]
-            dx, dy, length, total = spring_between(x, weights, i, j)
-            if total == 0:
-                continue
-            change = shares[e] * (lengths[e] - length) / total
-            stretch_spring(x, weights, i, j, dx, dy, change)
-    return x
+from .base import Parameter, Setting, engine
+from .textbook import Textbook, project_springs, pulling
 
 
 def shares(net: SpringNet, setting: Setting) -> np.ndarray:
@@ -50,18 +35,6 @@ def shares(net: SpringNet, setting: Setting) -> np.ndarray:
     return found
 
 
-class _Session(Textbook):
-    def __init__(self, net: SpringNet, setting: Setting, damping: float) -> None:
-        pulling(net, "no share of a stretch is negative")
-        super().__init__(net, setting, damping)
-        self.shares = shares(net, setting)[net.stiffness != 0].astype(self.kind)
-
-    def solve(self, before: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Project the inertial positions."""
-        found: np.ndarray = _project(y, self.weights, self.springs, self.lengths, self.shares, self.iterations)
-        return found
-
-
 @engine(
     "pbd",
     order=10,
@@ -72,6 +45,16 @@ class _Session(Textbook):
     measured="falls as the step squared; iterations alone end elsewhere",
     source="Mueller 2007",
 )
-def session(net: SpringNet, setting: Setting, damping: float) -> Session:
+class PositionBased(Textbook):
     """Position-based dynamics: shares of stretches, which mean another stiffness at each setting; a warning."""
-    return _Session(net, setting, damping)
+
+    def __init__(self, net: SpringNet, setting: Setting, damping: float) -> None:
+        pulling(net, "no share of a stretch is negative")
+        super().__init__(net, setting, damping)
+        self.shares = shares(net, setting)[net.stiffness != 0].astype(self.kind)
+
+    def solve(self, before: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """Project the inertial positions: no constraint is compliant."""
+        none = np.zeros_like(self.lengths)
+        project_springs(y, self.weights, self.springs, self.lengths, self.shares, none, none.copy(), self.iterations)
+        return y

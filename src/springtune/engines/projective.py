@@ -15,7 +15,7 @@ from scipy.sparse.linalg import SuperLU, splu
 from ..handover.net import SpringNet
 from ..linalg.factors import SUPERLU
 from ..mechanics.kernels import compiled
-from .base import Session, Setting, engine
+from .base import Setting, engine
 from .textbook import Textbook, pulling, spring_between, stretch_spring
 
 
@@ -31,7 +31,10 @@ def _descent(x, y, inertia, free, springs, lengths, stiffness, descent):  # type
         stretch_spring(descent, free, i, j, dx, dy, stiffness[e] * (lengths[e] - length))
 
 
-class _Session(Textbook):
+@engine("projective", order=30, implicit=True, measured="1e-6, twenty scenes", source="Liu 2013")
+class Projective(Textbook):
+    """Projective dynamics: local directions of springs, and a global linear system that is factorized once."""
+
     def __init__(self, net: SpringNet, setting: Setting, damping: float) -> None:
         pulling(net, "the global step needs a positive one")
         super().__init__(net, setting, damping)
@@ -58,9 +61,3 @@ class _Session(Textbook):
             for factor, axes in self.systems:
                 x[:, axes] += factor.solve(self.descent[:, axes])
         return x
-
-
-@engine("projective", order=30, implicit=True, measured="1e-6, twenty scenes", source="Liu 2013")
-def session(net: SpringNet, setting: Setting, damping: float) -> Session:
-    """Projective dynamics: local directions of springs, and a global linear system that is factorized once."""
-    return _Session(net, setting, damping)

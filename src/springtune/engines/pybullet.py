@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 
 from ..handover.net import SpringNet
-from .base import EngineError, Parameter, Session, Setting, engine
+from .base import EngineError, Parameter, Setting, engine
 
 LARGEST_SPREAD = 1e-9
 """Of the stiffnesses of a body that counts as uniform, over their mean [1]."""
@@ -56,8 +56,25 @@ def _obj(net: SpringNet) -> str:
     return "\n".join(lines) + "\n"
 
 
-class _Session:
-    """A client of PyBullet with one deformable body."""
+@engine(
+    "pybullet",
+    order=120,
+    program="PyBullet",
+    needs=("pybullet",),
+    extra="pybullet",
+    precisions=("float64",),
+    parameters={
+        "springElasticStiffness": Parameter("N/m", "k of the definition, one for all springs"),
+        "springBendingStiffness": Parameter("N/m", "0; it is 0.1 where it is not given"),
+    },
+    iterates=False,
+    dampers={"springDampingStiffness": Parameter("N s/m", "beta k, one for all springs")},
+    typed=typed,
+    measured="1e-3, ten scenes; 1e-5 on sheets",
+    source="Bullet's source, btDeformableMassSpringForce.h",
+)
+class Deformable:
+    """PyBullet's deformable world: springs of one stiffness, explicit, dampers implicit."""
 
     def __init__(self, net: SpringNet, setting: Setting, damping: float) -> None:
         import pybullet
@@ -129,25 +146,3 @@ class _Session:
     def displacements(self) -> np.ndarray:
         """Displacement of each particle [m]."""
         return np.asarray(self._places() - self.rest)
-
-
-@engine(
-    "pybullet",
-    order=120,
-    program="PyBullet",
-    needs=("pybullet",),
-    extra="pybullet",
-    precisions=("float64",),
-    parameters={
-        "springElasticStiffness": Parameter("N/m", "k of the definition, one for all springs"),
-        "springBendingStiffness": Parameter("N/m", "0; it is 0.1 where it is not given"),
-    },
-    iterates=False,
-    dampers={"springDampingStiffness": Parameter("N s/m", "beta k, one for all springs")},
-    typed=typed,
-    measured="1e-3, ten scenes; 1e-5 on sheets",
-    source="Bullet's source, btDeformableMassSpringForce.h",
-)
-def session(net: SpringNet, setting: Setting, damping: float) -> Session:
-    """PyBullet's deformable world: springs of one stiffness, explicit, dampers implicit."""
-    return _Session(net, setting, damping)

@@ -245,11 +245,9 @@ def net_of(scene: Scene, factor: float = 1.0) -> SpringNet:
     net = SpringNet.from_scene(scene, errors=False)
     if factor == 1:
         return net
-    energies = []
-    for one in net.energies:
-        moduli = {name: factor * values for name, values in one.values.items() if not name.startswith("rest_")}
-        energies.append(replace(one, values=one.values | moduli))
-    return replace(net, stiffness=factor * net.stiffness, energies=tuple(energies))
+    grown = [one.values | {name: factor * values for name, values in one.moduli.items()} for one in net.energies]
+    energies = tuple(replace(one, values=values) for one, values in zip(net.energies, grown))
+    return replace(net, stiffness=factor * net.stiffness, energies=energies)
 
 
 def follow(session: Session, window: int, most: int, tolerance: float, extent: float) -> Ended:
@@ -290,7 +288,7 @@ def follow(session: Session, window: int, most: int, tolerance: float, extent: f
         if calm == CALM or trembles:
             return Ended(now, "rest", "", done, _frame(seconds), 0.0)
     swing = _swing(seen[len(seen) // 2 :])
-    if _trembles(seen) and swing > STEADY * _swing(seen[: len(seen) // 2]):
+    if len(seen) > 1 and _trembles(seen) and swing > STEADY * _swing(seen[: len(seen) // 2]):
         said = f"swings by {swing:.3g} m about its mean after {done} frames; take more substeps or damping"
         return Ended(_mean(seen), "swings", said, done, _frame(seconds), swing)
     said = f"not at rest after {done} frames, still moving by {change:.3g} m in {window}; give more frames"

@@ -33,6 +33,21 @@ def stretch_spring(x, weights, i, j, dx, dy, change):  # type: ignore[no-untyped
     x[j, 1] += weights[j, 1] * change * dy
 
 
+@compiled
+def project_springs(x, weights, springs, lengths, shares, compliance, multipliers, iterations):  # type: ignore[no-untyped-def]
+    """Project all springs some times, by a share of what each asks for; compliance is over the squared step."""
+    for _ in range(iterations):
+        for e in range(len(lengths)):
+            i, j = springs[e]
+            dx, dy, length, total = spring_between(x, weights, i, j)
+            total += compliance[e]
+            if total == 0:  # both ends are held
+                continue
+            change = shares[e] * (lengths[e] - length - compliance[e] * multipliers[e]) / total
+            multipliers[e] += change
+            stretch_spring(x, weights, i, j, dx, dy, change)
+
+
 class Textbook:
     """Session of implicit Euler steps ``M (x - y) / h^2 + dW/dx = 0``, solved as `solve` of a subclass does.
 

@@ -19,7 +19,8 @@ import numpy as np
 
 from ..handover.net import SpringNet
 from ..mechanics.kernels import compiled
-from .base import Session, Setting, engine
+from ..mesh.cells import no_cells
+from .base import Setting, engine
 from .textbook import Textbook, as_they_are, pulling
 
 
@@ -106,25 +107,25 @@ def _sweeps(x, y, inertia, weights, springs, squares, triangles, quads, iteratio
     return x
 
 
-class _Session(Textbook):
-    def __init__(self, net: SpringNet, setting: Setting, damping: float, adaptive: bool) -> None:
+class _Descent(Textbook):
+    adaptive = False
+    """Whether a step begins at the adaptive guess, or at the inertial position."""
+
+    def __init__(self, net: SpringNet, setting: Setting, damping: float) -> None:
         pulling(net, "blocks need positive ones")
         super().__init__(net, setting, damping)
-        self.adaptive, self.last = adaptive, self.v
+        self.last = self.v
         self.sizes = np.maximum((self.push**2).sum(axis=1, keepdims=True), np.finfo(self.kind).tiny) / self.h
-        named = {(one.kind, one.cells.shape[1]): one for one in net.energies}
-        self.groups = [self._group(self.springs, self.lengths, self.stiffness)]
-        for kind, corners in (("biquadratic", 3), ("area", 3), ("area", 4)):
-            one = named.get((kind, corners))
-            cells = np.empty((0, corners), int) if one is None else one.cells
-            given = {} if one is None else one.values
-            if kind == "area":
-                rest = given.get("rest_area", np.empty(0))
-                self.groups.append(self._group(cells, 2 * rest, given.get("modulus", rest) / (4 * rest)))
-            else:
-                names = ("rest_length", "tensile", "coupling")
-                lengths, *moduli = (given.get(name, np.empty((0, 3))) for name in names)
-                self.groups.append(self._group(cells, lengths**2, *moduli))
+        given = {
+            (one.kind, one.cells.shape[1]): (one.cells, *(one.values[name] for name in one.units))
+            for one in net.energies
+        }
+        none = np.empty((0, 3))
+        cells, rest, *moduli = given.get(("biquadratic", 3), (no_cells(3), none, none, none))
+        self.groups = [self._group(self.springs, self.lengths, self.stiffness), self._group(cells, rest**2, *moduli)]
+        for corners in (3, 4):
+            cells, rest, modulus = given.get(("area", corners), (no_cells(corners), np.empty(0), np.empty(0)))
+            self.groups.append(self._group(cells, 2 * rest, modulus / (4 * rest)))
 
     def _group(self, cells: np.ndarray, *values: np.ndarray) -> tuple[Any, ...]:
         """Places of each particle in cells, and the cells' values."""
@@ -156,12 +157,12 @@ IN_COMMON: dict[str, Any] = {
 
 
 @engine("vbd", order=40, **IN_COMMON)
-def adaptive(net: SpringNet, setting: Setting, damping: float) -> Session:
+class Adaptive(_Descent):
     """Vertex block descent from its paper's adaptive guess: at rest exact with any number of iterations."""
-    return _Session(net, setting, damping, True)
+
+    adaptive = True
 
 
 @engine("vbd-inertia", order=41, **IN_COMMON)
-def inertial(net: SpringNet, setting: Setting, damping: float) -> Session:
+class Inertial(_Descent):
     """Vertex block descent from the inertial position."""
-    return _Session(net, setting, damping, False)

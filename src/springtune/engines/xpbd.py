@@ -16,26 +16,14 @@ import numpy as np
 from ..handover.net import SpringNet
 from ..handover.xpbd import COMPLIANCE_UNITS, Blocks, blocks, compliances
 from ..mechanics.kernels import compiled
-from .base import EngineError, Parameter, Session, Setting, engine
-from .textbook import Textbook, spring_between, stretch_spring
+from .base import EngineError, Parameter, Setting, engine
+from .textbook import Textbook, project_springs
 
 BLOCK_KINDS = tuple(COMPLIANCE_UNITS)
 """Kinds of blocks, by their numbers here."""
 
 FLATTEST = 0.05
 """Area over the one at rest below which a triangle of rubber is taken for one that has it: steps may turn it over."""
-
-
-@compiled
-def _project_springs(x, weights, springs, lengths, compliance, multipliers, iterations):  # type: ignore[no-untyped-def]
-    """Project all springs some times; compliance over the squared step."""
-    for _ in range(iterations):
-        for e in range(len(lengths)):
-            i, j = springs[e]
-            dx, dy, length, total = spring_between(x, weights, i, j)
-            change = (lengths[e] - length - compliance[e] * multipliers[e]) / (total + compliance[e])
-            multipliers[e] += change
-            stretch_spring(x, weights, i, j, dx, dy, change)
 
 
 @compiled
@@ -126,7 +114,27 @@ def _project_cells(x, weights, kind, cells, rest, slopes, law, compliance, multi
                     x[cell[c], d] -= weights[cell[c], d] * by[a, c, d] * value[a]
 
 
-class _Session(Textbook):
+@engine(
+    "xpbd",
+    order=20,
+    laws=BLOCK_KINDS,
+    parameters={
+        "compliance": Parameter("m/N", "1 / k of a spring"),
+        "area compliance": Parameter("m3/N", "A0 / modulus, of C = A - A0"),
+        "biquadratic compliance": Parameter(
+            "m3/N", "inverse of [[k1, g3, g2], [g3, k2, g1], [g2, g1, k3]] / 2, tensile k, coupling g, of l^2 - L^2"
+        ),
+        "compressible compliance": Parameter("1/(N m)", "1 / (G h A0), G = E / (2 (1 + nu))"),
+        "incompressible compliance": Parameter("1/(N m)", "3 / (E h A0)"),
+    },
+    typed=compliances,
+    implicit=True,
+    measured="1e-6, twenty scenes; it falls as the step squared",
+    source="Macklin 2016",
+)
+class ExtendedPositionBased(Textbook):
+    """Extended position-based dynamics: springs as constraints with compliance, multipliers reset in each step."""
+
     def __init__(self, net: SpringNet, setting: Setting, damping: float) -> None:
         super().__init__(net, setting, damping)
         try:
@@ -147,35 +155,12 @@ class _Session(Textbook):
 
     def solve(self, before: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Project the inertial positions."""
-        springs = self.weights, self.springs, self.lengths, self.compliance
+        springs = self.weights, self.springs, self.lengths, np.ones_like(self.lengths), self.compliance
         pulls = np.zeros_like(self.lengths)
         groups = [(*one, np.zeros(one[-1].shape[:2], self.kind)) for one in self.groups]
         rounds, each = (self.iterations, 1) if groups else (1, self.iterations)
         for _ in range(rounds):
-            _project_springs(y, *springs, pulls, each)
+            project_springs(y, *springs, pulls, each)
             for group in groups:
                 _project_cells(y, self.weights, *group)
         return y
-
-
-@engine(
-    "xpbd",
-    order=20,
-    laws=BLOCK_KINDS,
-    parameters={
-        "compliance": Parameter("m/N", "1 / k of a spring"),
-        "area compliance": Parameter("m3/N", "A0 / modulus, of C = A - A0"),
-        "biquadratic compliance": Parameter(
-            "m3/N", "inverse of [[k1, g3, g2], [g3, k2, g1], [g2, g1, k3]] / 2, tensile k, coupling g, of l^2 - L^2"
-        ),
-        "compressible compliance": Parameter("1/(N m)", "1 / (G h A0), G = E / (2 (1 + nu))"),
-        "incompressible compliance": Parameter("1/(N m)", "3 / (E h A0)"),
-    },
-    typed=compliances,
-    implicit=True,
-    measured="1e-6, twenty scenes; it falls as the step squared",
-    source="Macklin 2016",
-)
-def session(net: SpringNet, setting: Setting, damping: float) -> Session:
-    """Extended position-based dynamics: springs as constraints with compliance, multipliers reset in each step."""
-    return _Session(net, setting, damping)

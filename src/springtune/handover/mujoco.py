@@ -20,11 +20,12 @@ file for version 3 that has such bodies is refused there.
 """
 
 from collections.abc import Sequence
+from typing import Any
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from .simulation import Simulation, about, commented, lame, load_in_words, numbers, simulate
+from .simulation import Simulation, about, filled, lame, load_in_words, numbers, simulate
 from .terms import Net, Terms
 
 VERSIONS = (3, 4)
@@ -32,9 +33,6 @@ VERSIONS = (3, 4)
 
 LEAST_MASS = 1e-15
 """Mass below which MuJoCo takes no body that moves [kg]."""
-
-REFUSED_BY_4 = "for MuJoCo 3 alone, write the file with --mujoco 4"
-"""Name of a tendon that MuJoCo 4 refuses, which its message has."""
 
 LARGEST_ACCELERATION = 1e9
 """Acceleration beyond which MuJoCo may take a run for a diverged one, a tenth of its limit [m/s2]."""
@@ -67,49 +65,37 @@ def model(net: Net, simulation: Simulation, version: int, integrator: str = "Eul
             f"masses: the least one is {least:.3g} kg, and MuJoCo takes {LEAST_MASS:g} kg and more; take larger "
             "cells or a thicker sheet"
         )
-    size = float(net.rest_lengths.mean())
     moved = 0.0 if simulation.displacements is None else simulation.displacements
     seen = np.concatenate([net.points, net.points + moved])
     low, high = seen.min(axis=0), seen.max(axis=0)
-    centre = " ".join(f"{value:.6g}" for value in (low + high) / 2)
     accelerations = np.abs(np.where(net.held, 0, net.forces)).max(axis=1) / simulation.masses
-    keep = ' autoreset="disable"' if accelerations.max() > LARGEST_ACCELERATION else ""
-    said = f"the one here is {simulation.step / simulation.largest_step:.2g} of it"
     load = net.header.get("load")
     title = net.header["definition"] + (f", {load_in_words(load)}" if load else "")
-    flex = [_flex(net, terms, size, version) for terms in net.energies]
-    # MuJoCo 3 has no other solver for a flex under it.
-    solver = ' solver="CG"' if flex and version == 3 and integrator == "discrete" else ""
-    lines = [
-        f"<mujoco model={quoteattr(title)}>",
-        *commented([*about(net, simulation, said), f"Written {for_versions(net.energies, version)}."], "  "),
-        f'  <option timestep="{simulation.step!r}" integrator="{integrator}"{solver} gravity="0 0 0">',
-        f'    <flag contact="disable"{keep}/>',
-        "  </option>",
-        f'  <statistic center="{centre} 0" extent="{0.6 * float(np.hypot(*(high - low))):.6g}" meansize="{size:.6g}"/>',
-        "  <visual>",
-        '    <global azimuth="90" elevation="-90"/>',
-        '    <headlight ambient="0.6 0.6 0.6" diffuse="0.4 0.4 0.4"/>',
-        "  </visual>",
-        "  <asset>",
-        '    <texture type="skybox" builtin="flat" rgb1="1 1 1" rgb2="1 1 1" width="8" height="8"/>',
-        "  </asset>",
-        "  <default>",
-        f'    <site size="{size / 8:.6g}" rgba="0.2 0.2 0.25 1"/>',
-        f'    <tendon width="{size / 16:.6g}" rgba="0.2 0.45 0.7 1"/>',
-        '    <default class="x"><joint type="slide" axis="1 0 0"/></default>',
-        '    <default class="y"><joint type="slide" axis="0 1 0"/></default>',
-        "  </default>",
-        "  <worldbody>",
-        *_particles(net, simulation, bool(flex)),
-        "  </worldbody>",
-        *flex,
-        *_tendons(net, simulation, bool(flex), version),
-        *_load(net, simulation),
-        *(_refused_before_3_15(net) if flex and version == 3 else []),
-        "</mujoco>",
-    ]
-    return "\n".join(lines) + "\n"
+    said = f"the one here is {simulation.step / simulation.largest_step:.2g} of it"
+    free = ["".join(axis for axis, fixed in zip("xy", held) if not fixed) for held in net.held.tolist()]
+    joints = [f"{axis}{number}" for number, axes in enumerate(free) for axis in axes]
+    shares = net.forces[~net.held] / (simulation.force or 1.0)
+    masses, dampers = simulation.masses, simulation.mass_damping * simulation.masses
+    return filled(
+        "mujoco.xml",
+        title=quoteattr(title),
+        about=[*about(net, simulation, said), f"Written {for_versions(net.energies, version)}."],
+        simulation=simulation,
+        integrator=integrator,
+        version=version,
+        fast=accelerations.max() > LARGEST_ACCELERATION,
+        centre=tuple((low + high) / 2),
+        extent=0.6 * float(np.hypot(*(high - low))),
+        size=float(net.rest_lengths.mean()),
+        particles=list(zip(range(len(free)), net.points.tolist(), free, masses.tolist(), dampers.tolist())),
+        flex=_flex(net, version),
+        springs=list(zip(net.springs.tolist(), net.stiffness.tolist(), net.rest_lengths.tolist())),
+        shares=[(joint, share) for joint, share in zip(joints, shares.tolist()) if share],
+        first_joint=joints[0],
+        of_beam=load and "force" in load,
+        predicted=None if simulation.displacements is None else numbers(simulation.displacements[~net.held]),
+        along_y=free.index("y") if "y" in free else None,
+    )
 
 
 def for_versions(energies: Sequence[Terms], version: int | None = None) -> str:
@@ -120,72 +106,6 @@ def for_versions(energies: Sequence[Terms], version: int | None = None) -> str:
     [other] = set(VERSIONS) - {version}
     refused = f"MuJoCo {other}, whose flex has other constants, refuses it"
     return f"for MuJoCo {version}; {refused}: write one with mujoco {other} for that"
-
-
-def _particles(net: Net, simulation: Simulation, bodies: bool) -> list[str]:
-    """Bodies of particles that can move; others are places in the world, or bodies without joints for a flex."""
-    lines = []
-    masses = simulation.masses.tolist()
-    for number, ((x, y), held) in enumerate(zip(net.points.tolist(), net.held.tolist())):
-        place = f'pos="{x!r} {y!r} 0"'
-        if all(held):
-            body = f'<body name="b{number}" {place}><site name="p{number}"/></body>'
-            lines.append(f"    {body}" if bodies else f'    <site name="p{number}" {place}/>')
-            continue
-        mass = masses[number]
-        joints = "".join(
-            f'<joint class="{axis}" name="{axis}{number}"{_damping(simulation, number, not bodies)}/>'
-            for axis, fixed in zip("xy", held)
-            if not fixed
-        )
-        inertia = f'<inertial pos="0 0 0" mass="{mass!r}" diaginertia="{mass!r} {mass!r} {mass!r}"/>'
-        lines.append(f'    <body name="b{number}" {place}>{joints}{inertia}<site name="p{number}"/></body>')
-    return lines
-
-
-def _damping(simulation: Simulation, number: int, here: bool) -> str:
-    """Damping of a particle, in proportion to its mass."""
-    return f' damping="{float(simulation.mass_damping * simulation.masses[number])!r}"' if here else ""
-
-
-def _tendons(net: Net, simulation: Simulation, dampers: bool, version: int) -> list[str]:
-    """Tendons: springs, what spreads the load, and dampers of joints that may have none: of the bodies of a flex."""
-    rows = zip(net.springs.tolist(), net.stiffness.tolist(), net.rest_lengths.tolist())
-    lines = [
-        f'    <spatial stiffness="{stiffness!r}" springlength="{length!r}">'
-        f'<site site="p{first}"/><site site="p{second}"/></spatial>'
-        for (first, second), stiffness, length in rows
-        if stiffness
-    ]
-    if simulation.force:
-        shares = np.where(net.held, 0.0, net.forces / simulation.force)
-        joints = "".join(
-            f'<joint joint="{"xy"[axis]}{number}" coef="{float(shares[number, axis])!r}"/>'
-            for number, axis in np.argwhere(shares).tolist()
-        )
-        lines.append(f'    <fixed name="load">{joints}</fixed>')
-    if dampers and simulation.mass_damping:
-        lines += [
-            f'    <fixed{_damping(simulation, number, True)}><joint joint="{"xy"[axis]}{number}" coef="1"/></fixed>'
-            for number, axis in np.argwhere(~net.held).tolist()
-        ]
-    if dampers and version == 3:
-        # MuJoCo 3 takes it, and it does nothing there; MuJoCo 4 refuses a joint that is repeated, and says the name.
-        number, axis = np.argwhere(~net.held)[0].tolist()
-        twice = "".join(f'<joint joint="{"xy"[axis]}{number}" coef="{sign}"/>' for sign in (1, -1))
-        lines.append(f'    <fixed name="{REFUSED_BY_4}">{twice}</fixed>')
-    return ["  <tendon>", *lines, "  </tendon>"] if lines else []
-
-
-def _refused_before_3_15(net: Net) -> list[str]:
-    """Sensor that MuJoCo takes since 3.15, where older ones get forces wrong: on bodies of a flex that move along y."""
-    number = next(iter(np.flatnonzero(net.held[:, 0] & ~net.held[:, 1]).tolist()), None)
-    if number is None:
-        return []
-    return [
-        "  <!-- MuJoCo 3.15 and later: before, forces on a flex were wrong at particles held in x alone. -->",
-        f'  <sensor><insidesite site="p{number}" objtype="site" objname="p{number}" enclosed="false"/></sensor>',
-    ]
 
 
 def elasticity(first: float, second: float, version: int) -> tuple[float, float]:
@@ -201,50 +121,11 @@ def elasticity(first: float, second: float, version: int) -> tuple[float, float]
     return (8 if version == 3 else 2) * (1 + poisson) * second, poisson
 
 
-def _flex(net: Net, terms: Terms, size: float, version: int) -> str:
+def _flex(net: Net, version: int) -> dict[str, Any] | None:
     """Triangles whose sides are coupled, as a flex: where all have one pair of Lame constants."""
-    first, second = lame(net, terms, "MuJoCo's flex")
-    young, poisson = elasticity(first, second, version)
-    # An attribute that MuJoCo 3 does not know, and refuses; 0 turns it off.
-    only = "" if version == 3 else ' yield="0"'
-    bodies = " ".join(f"b{number}" for number in range(len(net.points)))
-    return "\n".join(
-        [
-            "  <deformable>",
-            *commented(
-                [
-                    f"Delingette's springs: young and poisson are those with which a flex of MuJoCo {version} has the",
-                    f"Lame constants of plane stress, times the thickness: lambda t = {first:.6g} N/m, mu t = "
-                    f"{second:.6g} N/m.",
-                ],
-                "    ",
-            ),
-            f'    <flex name="sheet" dim="2" radius="{size / 20:.6g}" rgba="0.2 0.45 0.7 1" body="{bodies}" '
-            f'element="{" ".join(map(str, terms.cells.ravel().tolist()))}">',
-            f'      <elasticity young="{young!r}" poisson="{poisson!r}" thickness="1" elastic2d="stretch"{only}/>',
-            "    </flex>",
-            "  </deformable>",
-        ]
-    )
-
-
-def _load(net: Net, simulation: Simulation) -> list[str]:
-    """Actuator that holds the load, and the equilibrium as a keyframe."""
-    lines = []
-    if simulation.force:
-        most = abs(simulation.force)
-        what = "load [N]" if "force" in net.header["load"] else "factor on the load"
-        lines += [
-            "  <actuator>",
-            f"    <!-- The {what}; the control is added to it. -->",
-            f'    <general name="load" tendon="load" gaintype="fixed" gainprm="1" biastype="affine" '
-            f'biasprm="{simulation.force!r} 0 0" ctrllimited="true" ctrlrange="{-most!r} {most!r}"/>',
-            "  </actuator>",
-        ]
-    if simulation.displacements is not None:
-        lines += [
-            "  <keyframe>",
-            f'    <key name="predicted" qpos="{numbers(simulation.displacements[~net.held])}"/>',
-            "  </keyframe>",
-        ]
-    return lines
+    for terms in net.energies:
+        first, second = lame(net, terms, "MuJoCo's flex")
+        young, poisson = elasticity(first, second, version)
+        cells = terms.cells.ravel().tolist()
+        return {"first": first, "second": second, "young": young, "poisson": poisson, "cells": cells}
+    return None

@@ -23,10 +23,8 @@ import numpy as np
 
 from .. import __version__
 from ..mechanics.dynamics import masses
-from ..mechanics.energies import AngleEnergy, AreaEnergy, BiquadraticEnergy, Energy, NeoHookeEnergy, YeohEnergy
 from ..mechanics.integrators import IMPLICIT, INTEGRATORS
-from ..mesh import Mesh, corner_angles, signed_areas
-from ..mesh.cells import rows_of
+from ..mesh import Mesh
 from ..problem.compare import error_text, sign_sentence
 from ..problem.geometry import Beam
 from ..problem.loads import LOADS
@@ -40,7 +38,7 @@ from ..scene.sheet import AnyDefinition, Sheet, check_stiffness, definition_of, 
 from ..scene.single import Scene
 from ..scene.statements import BeamStatement, ShapeStatement
 from ..springs import Definition, DefinitionError, Springs
-from .terms import Net, Terms
+from .terms import Net, Terms, terms_of
 
 if TYPE_CHECKING:
     from ..prediction.choices import ShapeReferences
@@ -326,66 +324,14 @@ class SpringNet(Tabled, Net):
         return cls(**vars(hook("files").read(path)))
 
 
-def terms(energy: Energy, reference: float) -> Terms:
-    """Energy of a network as plain arrays; its moduli are over `reference` [N/m]."""
-    points, corners = energy.points, energy.corners
-    values: dict[str, np.ndarray]
-    if isinstance(energy, AreaEnergy):
-        values = {"rest_area": signed_areas(points, corners), "modulus": reference * energy.modulus}
-        return Terms("area", corners, values)
-    if isinstance(energy, AngleEnergy):
-        kind, name = ("angle", "modulus") if energy.modulus.ndim == 1 else ("corner", "rotational")
-        return Terms(kind, corners, {"rest_angle": corner_angles(points, corners), name: reference * energy.modulus})
-    if isinstance(energy, BiquadraticEnergy):
-        sides = np.roll(points[corners], 1, axis=1) - np.roll(points[corners], -1, axis=1)
-        coupling = np.zeros(energy.tensile.shape) if energy.coupling is None else energy.coupling
-        values = {
-            "rest_length": np.linalg.norm(sides, axis=2),
-            "tensile": reference * energy.tensile,
-            "coupling": reference * coupling,
-        }
-        return Terms("biquadratic", corners, values)
-    if isinstance(energy, YeohEnergy | NeoHookeEnergy):
-        areas, weights = signed_areas(points, corners), 0.5 / np.tan(corner_angles(points, corners))
-        values = {"rest_area": areas, "rest_weight": weights}
-        if isinstance(energy, NeoHookeEnergy):
-            moduli = {"shear": reference * energy.shear, "bulk": reference * energy.bulk}
-            return Terms("compressible", corners, values | moduli)
-        coefficients = reference * energy.coefficients.T
-        lacking = [np.zeros(len(corners))] * (3 - len(coefficients))
-        return Terms("incompressible", corners, values | dict(zip(("c1", "c2", "c3"), [*coefficients, *lacking])))
-    raise DefinitionError(
-        f"energy {type(energy).__name__} cannot be written out; use those of springtune.mechanics.energies"
-    )
-
-
-def _everywhere(energy: Energy, mesh: Mesh) -> Energy:
-    """Extend an energy to all cells with as many corners, by moduli of zero: files have all cells."""
-    if type(energy) not in (AngleEnergy, AreaEnergy, BiquadraticEnergy, NeoHookeEnergy, YeohEnergy):
-        return energy  # which `terms` refuses
-    cells = mesh.cells[energy.corners.shape[1]]
-    if len(energy.corners) == len(cells):
-        return energy
-    rows, moduli = rows_of(cells, energy.corners), {}
-    for name, own in energy.moduli.items():
-        if isinstance(own, np.ndarray):
-            moduli[name] = np.zeros((len(cells), *own.shape[1:]))
-            moduli[name][rows] = own
-    return replace(energy, corners=cells, **moduli)
-
-
 def _merged(given: list[Terms]) -> tuple[Terms, ...]:
     """Terms of one kind and the same cells as one: energies are proportional to their moduli."""
     found: dict[tuple[str, int], Terms] = {}
     for one in given:
         key = one.kind, one.cells.shape[1]
         if key in found:
-            moduli = {
-                name: found[key].values[name] + values
-                for name, values in one.values.items()
-                if not name.startswith("rest_")
-            }
-            one = Terms(one.kind, one.cells, one.values | moduli)
+            sums = {name: found[key].values[name] + values for name, values in one.moduli.items()}
+            one = replace(one, values=one.values | sums)
         found[key] = one
     return tuple(found.values())
 
@@ -434,7 +380,7 @@ def _parts(
         "springs": mesh.edges,
         "rest_lengths": mesh.edge_lengths,
         "stiffness": springs.reference * springs.relative,
-        "energies": _merged([terms(_everywhere(energy, mesh), springs.reference) for energy in springs.energies]),
+        "energies": _merged([terms_of(energy, mesh, springs.reference) for energy in springs.energies]),
         "masses": inertia,
         "thickness": sheet.thickness,
         "held": np.zeros(mesh.points.shape, dtype=bool) if held is None else held,

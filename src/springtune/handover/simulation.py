@@ -3,6 +3,7 @@
 import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -10,12 +11,12 @@ from scipy.sparse import diags_array
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from ..mechanics.dynamics import Motion
-from ..mechanics.energies import AngleEnergy, AreaEnergy, BiquadraticEnergy, Energy, NeoHookeEnergy, YeohEnergy
+from ..mechanics.energies import Energy
 from ..mechanics.network import Network
 from ..mechanics.statics import SingularError, StaticProblem
 from ..mesh import Mesh, corner_angles, signed_areas
 from ..problem.status import Status
-from .terms import Net, Terms
+from .terms import Net, Terms, energies_of
 
 STEP_SHARE = 0.8
 """Written step over the largest stable one, at rest, in equilibrium and as far as the net swings: fronts of waves
@@ -183,32 +184,7 @@ def network_of(net: Net, reference: float, energies: Callable[[Net, float], list
     mesh = Mesh(net.points, net.triangles, net.quads)
     if not np.array_equal(mesh.edges, net.springs):
         raise ValueError("springs: are not the edges of the cells in their order; write the springs of a scene anew")
-    return Network(mesh, net.held, net.stiffness / reference, (energies or _energies)(net, reference))
-
-
-MADE_OF: dict[str, tuple[type[Energy], tuple[str, ...]]] = {
-    "area": (AreaEnergy, ("modulus",)),
-    "angle": (AngleEnergy, ("modulus",)),
-    "corner": (AngleEnergy, ("rotational",)),
-    "biquadratic": (BiquadraticEnergy, ("tensile", "coupling")),
-    "compressible": (NeoHookeEnergy, ("shear", "bulk")),
-    "incompressible": (YeohEnergy, ("c1", "c2", "c3")),
-}
-"""Classes of energies that a network is made of again, and their moduli in order."""
-
-
-def _energies(net: Net, reference: float) -> list[Energy]:
-    """Energies that the terms of a net were written from."""
-    found = []
-    for terms in net.energies:
-        made, names = MADE_OF[terms.kind]
-        moduli = [terms.values[name] / reference for name in names]
-        there = np.any([one.reshape(len(one), -1).any(axis=1) for one in moduli], axis=0)  # others have no such energy
-        moduli = [one[there] for one in moduli]
-        if made is YeohEnergy:
-            moduli = [np.column_stack(moduli)]
-        found.append(made(net.points, terms.cells[there], *moduli))
-    return found
+    return Network(mesh, net.held, net.stiffness / reference, (energies or energies_of)(net, reference))
 
 
 def lame(net: Net, terms: Terms, program: str) -> tuple[float, float]:
@@ -275,23 +251,22 @@ def about(net: Net, simulation: Simulation, integrator: str) -> list[str]:
 
 def filled(name: str, **values: Any) -> str:
     """Fill in a template; floats get the shortest text that is read back exactly."""
+    return str(_templates().get_template(f"{name}.jinja").render(values))
+
+
+@cache
+def _templates() -> Any:
     import jinja2
 
-    environment = jinja2.Environment(
+    return jinja2.Environment(
         loader=jinja2.PackageLoader(__package__, "templates"),
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    return environment.get_template(f"{name}.jinja").render(values)
 
 
 def numbers(values: np.ndarray) -> str:
     """Numbers of an array in a row, each in the shortest text that is read back exactly."""
     return " ".join(map(repr, values.ravel().tolist()))
-
-
-def commented(lines: Iterable[str], indent: str) -> list[str]:
-    """Lines as comments of XML."""
-    return [f"{indent}<!-- {line.replace('--', '- -')} -->" for line in lines]

@@ -1,11 +1,15 @@
 """A network as plain arrays, and the energies besides its springs."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from ..mesh.cells import no_cells
+from ..mechanics.energies import AngleEnergy, AreaEnergy, BiquadraticEnergy, Energy, NeoHookeEnergy, YeohEnergy
+from ..mesh import Mesh, corner_angles, signed_areas
+from ..mesh.cells import no_cells, rows_of
+from ..springs import DefinitionError
 
 FORMULAS = {
     "area": "W = 1/2 modulus (A - rest_area)^2 / rest_area of each cell, A its area",
@@ -42,6 +46,30 @@ VALUES = {
 OF_CORNERS = ("rest_angle", "rotational", "rest_length", "tensile", "coupling", "rest_weight")
 """Values that each corner of a cell has its own of."""
 
+MADE_OF: dict[str, type[Energy]] = {
+    "area": AreaEnergy,
+    "angle": AngleEnergy,
+    "corner": AngleEnergy,
+    "biquadratic": BiquadraticEnergy,
+    "compressible": NeoHookeEnergy,
+    "incompressible": YeohEnergy,
+}
+"""Energies of a network by kind of terms."""
+
+
+def _rest_lengths(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    sides = np.roll(points[cells], 1, axis=1) - np.roll(points[cells], -1, axis=1)
+    return np.asarray(np.linalg.norm(sides, axis=2))
+
+
+AT_REST: dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]] = {
+    "rest_area": signed_areas,
+    "rest_angle": corner_angles,
+    "rest_length": _rest_lengths,
+    "rest_weight": lambda points, cells: 0.5 / np.tan(corner_angles(points, cells)),
+}
+"""Values that follow from the points and cells at rest; the others are moduli, which the energy is proportional to."""
+
 
 @dataclass(frozen=True, eq=False)
 class Terms:
@@ -66,6 +94,16 @@ class Terms:
         """Unit of each of the values."""
         return VALUES[self.kind]
 
+    @property
+    def moduli(self) -> dict[str, np.ndarray]:
+        """Values that the energy is proportional to."""
+        return {name: self.values[name] for name in VALUES[self.kind] if name not in AT_REST}
+
+    @property
+    def present(self) -> np.ndarray:
+        """Whether a cell has the energy: in those of other parts all moduli are zero."""
+        return np.any([one.reshape(len(one), -1).any(axis=1) for one in self.moduli.values()], axis=0)
+
 
 @dataclass(frozen=True, eq=False)
 class Net:
@@ -83,3 +121,38 @@ class Net:
     header: dict[str, Any]
     triangles: np.ndarray = field(default_factory=lambda: no_cells(3))
     quads: np.ndarray = field(default_factory=lambda: no_cells(4))
+
+
+def terms_of(energy: Energy, mesh: Mesh, reference: float) -> Terms:
+    """Energy of a network as plain arrays, for all cells with as many corners; moduli are over `reference` [N/m]."""
+    kind = next((kind for kind, made in MADE_OF.items() if isinstance(energy, made)), "")
+    if not kind:
+        raise DefinitionError(
+            f"energy {type(energy).__name__} cannot be written out; use those of springtune.mechanics.energies"
+        )
+    given = energy.moduli
+    if isinstance(energy, AngleEnergy) and energy.modulus.ndim > 1:
+        kind, given = "corner", {"rotational": energy.modulus}
+    elif isinstance(energy, YeohEnergy):
+        given = dict(zip(("c1", "c2", "c3"), energy.coefficients.T))
+    cells, values = mesh.cells[energy.corners.shape[1]], {}
+    rows = rows_of(cells, energy.corners)
+    for name in VALUES[kind]:
+        if name in AT_REST:
+            values[name] = AT_REST[name](mesh.points, cells)
+        else:
+            values[name] = np.zeros(cells.shape if name in OF_CORNERS else len(cells))
+            if given.get(name) is not None:
+                values[name][rows] = reference * given[name]
+    return Terms(kind, cells, values)
+
+
+def energies_of(net: Net, reference: float) -> list[Energy]:
+    """Energies that the terms of a net were written from."""
+    found = []
+    for terms in net.energies:
+        moduli = [one[terms.present] / reference for one in terms.moduli.values()]
+        if terms.kind == "incompressible":
+            moduli = [np.column_stack(moduli)]
+        found.append(MADE_OF[terms.kind](net.points, terms.cells[terms.present], *moduli))
+    return found

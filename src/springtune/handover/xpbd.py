@@ -22,53 +22,8 @@ from typing import Any
 import numpy as np
 
 from ..mechanics.energies import area_slopes
-from .simulation import simulate
+from .simulation import filled, simulate
 from .terms import VALUES, Net, Terms
-
-CONTENT = {
-    "points": "particles at rest [m]",
-    "inverse_masses": "of the particles [1/kg]; 0 where a particle is held",
-    "held_directions": "particle and axis of directions that are held, of particles that are not held as a whole",
-    "forces": "of the load on each particle [N]",
-    "constraints": "C = distance of the particles - rest_lengths [m], with compliance [m/N]; one list each",
-    "cell_constraints": "blocks of constraints C of triangles or quadrilaterals, particles counter-clockwise, in lists "
-    "with an entry for each cell; formulas say what C is, compliance is a matrix A for each cell, and the energy is C "
-    "A^-1 C / 2. A projection adds dl = -(G W G^T + A / h^2)^-1 (C + A l / h^2) to the multipliers l of a block, which "
-    "begin each step at 0, and W G^T dl to the positions: h is the time step, G the derivative of C by the positions, "
-    "W the inverse masses, 0 for what is held",
-    "time_step": "a fiftieth of the slowest period that the load excites [s]; XPBD is stable in any, and converges the "
-    "sooner the shorter it is",
-    "mass_damping": "damping over mass that is critical for the lowest frequency, or under large tension up to the "
-    "loaded one [1/s]; velocities go down to their share 1 / (1 + mass_damping * time_step) in each step",
-    "displacements": "where the load brings the particles in the end [m]; null where there is no stable equilibrium",
-}
-"""What each entry of a file is."""
-
-_GRADIENT = {
-    "F": "F_ab = sum over particles of position_a rest_slope_b, the deformation gradient",
-    "J": "area of the triangle / rest_area",
-}
-
-_DILATION = "(r - 1) sqrt(2 r + 1) / r"
-
-CONSTRAINTS: dict[str, dict[str, str]] = {
-    "area": {"C": "(A - rest_area), A the area of the cell"},
-    "biquadratic": {"C": "(l_i^2 - rest_length_i^2) for i = 0, 1, 2, l_i the side opposite particle i"},
-    "incompressible": _GRADIENT
-    | {
-        "B": f"(F_xx - F_yy, F_xy + F_yx, {_DILATION}) with r = J",
-        "e": "B_0^2 + B_1^2 + B_2^2",
-        "C": "B sqrt(1 + stiffening_0 e + stiffening_1 e^2)",
-    },
-    "compressible": _GRADIENT
-    | {
-        "v": "where shear/2 (tr(F^T F) exp(-2 v/3) + J^-2 exp(4 v/3)) + bulk/2 (exp(v) - 1)^2 has its minimum; it is "
-        "found in each projection, and held in the derivatives of C",
-        "C": f"(p (F_xx - F_yy), p (F_xy + F_yx), {_DILATION}) with p = exp(-v/3), r = J p^2; the energy has bulk "
-        "rest_area/2 (exp(v) - 1)^2 besides, which pulls on nothing",
-    },
-}
-"""Constraints of a cell by kind of its energy."""
 
 OWN_UNITS = {"rest_slope": "1/m", "stiffening": "1"}
 """Units of what the terms of an energy do not have."""
@@ -109,10 +64,8 @@ def _check_positive(net: Net, values: np.ndarray, which: str, count: int) -> Non
 
 
 def _blocks(net: Net, terms: Terms) -> Blocks:
-    kind, values = terms.kind, terms.values
-    there = np.any([values[name] != 0 for name in VALUES[kind] if not name.startswith("rest_")], axis=0)
-    there = there.reshape(len(there), -1).any(axis=1)  # cells of other parts have none
-    cells, values = terms.cells[there], {name: one[there] for name, one in values.items()}
+    kind, there = terms.kind, terms.present
+    cells, values = terms.cells[there], {name: one[there] for name, one in terms.values.items()}
     if kind == "biquadratic":
         corners = np.arange(3)
         stiffness = np.zeros((len(cells), 3, 3))
@@ -156,38 +109,25 @@ def xpbd(net: Net) -> str:
     >>> found["inverse_masses"][0], f"{found['constraints']['compliance'][0]:.3g} m/N"
     (0.0, '1.1e-08 m/N')
     """
-    simulation = simulate(net, "XPBD", CONSTRAINTS)
-    of_cells = blocks(net)
-    there = net.stiffness > 0
-    whole = np.asarray(net.held.all(axis=1))
-    displacements = simulation.displacements
-    content: dict[str, Any] = {
-        "header": dict(net.header) | {"springs_without_stiffness_left_out": int((~there).sum())},
-        "content": CONTENT,
-        "points": net.points.tolist(),
-        "inverse_masses": np.where(whole, 0.0, 1 / simulation.masses).tolist(),
-        "held_directions": np.argwhere(net.held & ~np.repeat(whole[:, None], 2, axis=1)).tolist(),
-        "forces": net.forces.tolist(),
-        "constraints": {
-            "particles": net.springs[there].tolist(),
-            "rest_lengths": net.rest_lengths[there].tolist(),
-            "compliance": (1 / net.stiffness[there]).tolist(),
-        },
-        "cell_constraints": [_as_json(one) for one in of_cells],
-        "time_step": simulation.implicit_step,
-        "mass_damping": simulation.mass_damping,
-        "displacements": None if displacements is None else displacements.tolist(),
-    }
-    # An entry a line: rows of their own would make most of the file blanks.
-    lines = [f" {json.dumps(key)}: {json.dumps(value)}" for key, value in content.items()]
-    return "{\n" + ",\n".join(lines) + "\n}\n"
+    simulation = simulate(net, "XPBD", COMPLIANCE_UNITS)
+    there, whole = net.stiffness > 0, np.asarray(net.held.all(axis=1))
+    return filled(
+        "xpbd.json",
+        dumps=json.dumps,
+        header=dict(net.header) | {"springs_without_stiffness_left_out": int((~there).sum())},
+        net=net,
+        simulation=simulation,
+        there=there,
+        inverse_masses=np.where(whole, 0.0, 1 / simulation.masses),
+        held_directions=np.argwhere(net.held & ~whole[:, None]),
+        cell_constraints=[(one.kind, _entries(one)) for one in blocks(net)],
+    )
 
 
-def _as_json(one: Blocks) -> dict[str, Any]:
+def _entries(one: Blocks) -> dict[str, Any]:
+    """Entries of a file for blocks of a kind, besides the kind and its formulas."""
     units = {name: VALUES[one.kind].get(name) or OWN_UNITS[name] for name in one.values}
     return {
-        "kind": one.kind,
-        "formulas": CONSTRAINTS[one.kind],
         "units": units | {"compliance": COMPLIANCE_UNITS[one.kind]},
         "particles": one.cells.tolist(),
         **{name: values.tolist() for name, values in one.values.items()},

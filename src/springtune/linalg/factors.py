@@ -65,7 +65,7 @@ class SuperLUFactor:
         try:
             self.lu = splu(matrix, permc_spec=chosen, diag_pivot_thresh=0.0, **SUPERLU)
         except RuntimeError as error:
-            raise SingularError(str(error)) from error
+            raise SingularError("the matrix is singular: some motion meets no resistance") from error
 
     def solve(self, right: np.ndarray) -> np.ndarray:
         """Solution of the factorized system, shape (unknowns,) or (unknowns, n)."""

@@ -288,8 +288,8 @@ class MeshSearch(Tabled):
         return order[0] if order else None
 
 
-def asked_error(value: float | str) -> float:
-    """Error to keep [1], of a number or a text such as "1 %"."""
+def asked_error(value: float | str, name: str = "error") -> float:
+    """Error to keep [1], of a number or a text such as "1 %"; messages call it by a name."""
     number = math.nan
     if isinstance(value, str) and value.strip().endswith("%"):
         with suppress(ValueError):
@@ -297,7 +297,7 @@ def asked_error(value: float | str) -> float:
     elif isinstance(value, int | float):
         number = value
     if not 0 < number < 1:
-        raise ValueError(f"error: {value!r} is no error above 0 and below 100 %; give one such as '1 %'")
+        raise ValueError(f"{name}: {value!r} is no error above 0 and below 100 %; give one such as '1 %'")
     return float(number)
 
 

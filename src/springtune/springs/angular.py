@@ -9,7 +9,7 @@ On an equilateral lattice of edge a
 has the bulk modulus ``sqrt(3) k / 2`` and the shear modulus ``sqrt(3) k / 4 + 3 sqrt(3) beta / (2 a^2)``: exact for
 every nu. beta is negative above 1/3, where the network stays stable. Outline edges have k/2; a is of the equilateral
 triangle of the same area. After Keating and Kirkwood, as reviewed by Ostoja-Starzewski (Appl. Mech. Rev. 55:35,
-2002); derived and checked here. Assumptions: near-equilateral triangles.
+2002, abstract read); derived and checked here. Assumptions: near-equilateral triangles.
 """
 
 import math
@@ -27,6 +27,8 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Springs for the bulk modulus and angular springs for the rest (Keating): any nu on lattices, no tuning.
 
     Raises DefinitionError on quadrilaterals.
+
+    Source: Keating and Kirkwood, reviewed by Ostoja-Starzewski, Appl. Mech. Rev. 55:35, 2002 (abstract, derived).
     """
     from ..mechanics.energies import AngleEnergy  # here: see `springtune.springs`
 

@@ -28,6 +28,8 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Springs whose E and nu along x and y are exact, on rectangles or on isosceles rows made for nu; shear pays.
 
     Raises DefinitionError for nu = 0, on slender rectangles, and on rows of triangles made for another nu.
+
+    Source: own rule (derived).
     """
     nu = material.poisson_ratio
     if nu <= 0:

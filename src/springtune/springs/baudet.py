@@ -29,6 +29,8 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Rectangles with both diagonals that keep the shear modulus (Baudet 2009); nu moves the wrong way.
 
     Raises DefinitionError on other cells, and on rectangles slender enough for a negative stiffness.
+
+    Source: Baudet and others, HAL hal-01493734 and hal-00994456, 2006 to 2009 (abstract, derived).
     """
     along, across = rectangles_only(mesh)
     nu = material.poisson_ratio
@@ -41,14 +43,20 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
 
 @definition("baudet-corrected", order=110, cells=(4,), uniaxial=True)
 def corrected(mesh: Mesh, material: Material, thickness: float) -> Springs:
-    """Baudet's rectangles with his transverse correction: E and nu exact, but in uniaxial scenes alone."""
+    """Baudet's rectangles with his transverse correction: E and nu exact, but in uniaxial scenes alone.
+
+    Source: Baudet and others, as `baudet`; forces as a stress are ours (abstract, derived).
+    """
     plain = springs(mesh, material, thickness)
     return Springs(plain.reference, plain.relative, lateral=(1 - 3 * material.poisson_ratio) / 2)
 
 
 @definition("flechon", order=120, cells=(4,))
 def incompressible(mesh: Mesh, material: Material, thickness: float) -> Springs:
-    """Baudet's rectangles with an area energy that keeps areas, in the manner of Flechon 2011 (ours)."""
+    """Baudet's rectangles with an area energy that keeps areas, in the manner of Flechon 2011 (ours).
+
+    Source: after Flechon, 2011 (not read, derived).
+    """
     from ..mechanics.energies import AreaEnergy  # here: see `springtune.springs`
 
     plain = springs(mesh, material, thickness)

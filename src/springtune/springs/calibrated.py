@@ -29,5 +29,8 @@ def calibrate(curves: Iterable[tuple[str, float, str]]) -> float:
 
 @definition("calibrated", order=20, uniform=True, needs="stiffness")
 def springs(mesh: Mesh, material: Material, thickness: float, stiffness: float) -> Springs:
-    """Uniform stiffness calibrated as the paper did: the mean best stiffness of one beam's sensitivity curves."""
+    """Uniform stiffness calibrated as the paper did: the mean best stiffness of one beam's sensitivity curves.
+
+    Source: the paper that is reproduced; the mean over meshes is ours (read, derived).
+    """
     return paper.springs(mesh, material, thickness, stiffness)

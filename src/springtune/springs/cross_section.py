@@ -23,6 +23,8 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Bars of the section thickness times dual edge, E A / L: a third too soft, nu = 1/3.
 
     Raises DefinitionError on quadrilaterals, and where the mesh is not Delaunay.
+
+    Source: used in lattice programs; no text at hand (derived).
     """
     triangles_only(mesh)
     halves = 0.5 / np.tan(corner_angles(mesh.points, mesh.triangles))

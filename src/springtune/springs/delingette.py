@@ -34,6 +34,8 @@ def springs(mesh: Mesh, material: AnyMaterial, thickness: float) -> Springs:
     """Tensile and coupling springs of squared lengths (Delingette 2008): equal to linear triangles of any material.
 
     Raises DefinitionError on quadrilaterals.
+
+    Source: Delingette, IEEE TVCG 14(2):329, 2008, and SOFA's code; any anisotropy is ours (read, derived).
     """
     return _springs(mesh, material, thickness, coupled=True)
 
@@ -43,6 +45,8 @@ def tensile(mesh: Mesh, material: AnyMaterial, thickness: float) -> Springs:
     """The tensile part of Delingette's springs alone: what is left without coupling.
 
     Raises DefinitionError on quadrilaterals.
+
+    Source: Delingette, IEEE TVCG 14(2):329, 2008, and SOFA's code (read).
     """
     return _springs(mesh, material, thickness, coupled=False)
 

@@ -31,6 +31,8 @@ def springs(mesh: Mesh, material: AnyMaterial, thickness: float) -> Springs:
     """Springs fitted by least squares to the strain energy of any material, none negative: C12 = C66 whatever is asked.
 
     Raises DefinitionError on quadrilaterals other than rectangles.
+
+    Source: own rule (derived).
     """
     reference = membrane_stiffness(material, 1.0)
     compliance = np.linalg.inv(material.plane_stress / reference)

@@ -28,6 +28,8 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Springs of `lattice` balanced under even tension (after Kot 2021): its stiffness is exact, nu = 1/3.
 
     Raises DefinitionError where a spring becomes negative, and on meshes of several parts.
+
+    Source: Kot, ChemEngineering 5(1):3, 2021; the solve in the plane is ours (abstract, derived).
     """
     from ..mechanics.moduli import outline_forces  # here: see `springtune.springs`
     from ..mechanics.network import Network

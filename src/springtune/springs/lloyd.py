@@ -26,6 +26,8 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Springs matched to finite elements at nu = 1/3: equilateral triangle, or square (Lloyd 2007).
 
     Raises DefinitionError on quadrilaterals other than squares.
+
+    Source: Lloyd, Szekely and Harders, IEEE TVCG 13(5):1081, 2007, its first page (abstract, derived).
     """
     if not len(mesh.quads):
         return lattice.springs(mesh, material, thickness)

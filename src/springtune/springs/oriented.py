@@ -19,6 +19,8 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Uniform stiffness from the affine moduli of the mesh along x, directions of springs and outline included.
 
     Raises DefinitionError if the springs of the mesh do not carry a load along x.
+
+    Source: Cauchy's and Born's affine moduli, textbook form (derived).
     """
     x, y = (mesh.points[mesh.edges[:, 1]] - mesh.points[mesh.edges[:, 0]]).T
     parts = np.stack([x * x, y * y, x * y])  # of the strain of each spring: xx, yy and shear

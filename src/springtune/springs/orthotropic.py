@@ -38,6 +38,9 @@ def springs(mesh: Mesh, material: AnyMaterial, thickness: float) -> Springs:
 
     Raises DefinitionError on other cells, if the material's axes are not along their sides, and for a negative side
     spring.
+
+    Source: Suryawanshi and Gupta, Journal of Mechanics of Materials and Structures 18:143, 2023; the area energy is
+    ours (abstract, derived).
     """
     from ..mechanics.energies import AreaEnergy  # here: see `springtune.springs`
 

@@ -21,13 +21,19 @@ from .base import Springs, definition
 
 @definition("patch", order=190)
 def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
-    """Springs of `lattice` scaled once by a patch test of the mesh itself: E exact on any mesh, nu is not."""
+    """Springs of `lattice` scaled once by a patch test of the mesh itself: E exact on any mesh, nu is not.
+
+    Source: own rule (derived).
+    """
     return _scaled(lattice.springs(mesh, material, thickness), mesh, material, thickness)
 
 
 @definition("patch-area", order=200)
 def with_area(mesh: Mesh, material: Material, thickness: float) -> Springs:
-    """Springs and area energy of `area` scaled once by a patch test of the mesh itself: any nu, any mesh."""
+    """Springs and area energy of `area` scaled once by a patch test of the mesh itself: any nu, any mesh.
+
+    Source: own rule (derived).
+    """
     return _scaled(area.springs(mesh, material, thickness), mesh, material, thickness)
 
 

@@ -64,6 +64,8 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Springs fitted to 15 patch tests of the mesh itself, from even to cubic stresses: none negative, nu = 1/3.
 
     Raises DefinitionError on quadrilaterals and on meshes of several parts.
+
+    Source: own rule (derived).
     """
     from ..mechanics.network import Network  # here: see `springtune.springs`
 

@@ -1,9 +1,11 @@
 """Stiffness of each spring by a search that minimises the misfit of `springtune.springs.identification`.
 
-- `annealed`: as Deussen, Kobbelt and Tuecke (1995) tuned springs: random changes of all stiffnesses, worse ones
-  accepted with falling probability. Uses scipy's generalised annealing without its local search, from a fixed seed.
-- `evolved`: as Bianchi and others (2003, 2004) did for topology and stiffness, here for stiffness: mutants and
-  crossings replace the worse networks of a population. Uses scipy's differential evolution, from a fixed seed.
+- `annealed`: as Deussen, Kobbelt and Tuecke (1995, abstract read) tuned springs: random changes of all stiffnesses,
+  worse ones accepted with falling probability. Uses scipy's generalised annealing without its local search, from a
+  fixed seed.
+- `evolved`: as Bianchi and others (2003; 2004, abstract read) did for topology and stiffness, here for stiffness:
+  mutants and crossings replace the worse networks of a population. Uses scipy's differential evolution, from a fixed
+  seed.
 - `adjoint`: the mesh itself in even tension and shear, no reference solution. L-BFGS-B minimises the misfit under
   tension along x and y and shear, whose displacements are known exactly; the gradient costs one back-substitution a
   case. Uneven motion of the particles reaches Poisson's ratios other than 1/3, with uneven stiffnesses. Derived here.
@@ -32,7 +34,10 @@ MAX_GRADIENTS = 400
 def annealed(
     mesh: Mesh, material: AnyMaterial, thickness: float, cases: Sequence[Case], evaluations: int = MAX_EVALUATIONS
 ) -> Springs:
-    """Stiffness of each spring by simulated annealing on a scene's reference displacements."""
+    """Stiffness of each spring by simulated annealing on a scene's reference displacements.
+
+    Source: Deussen, Kobbelt and Tuecke, 1995 (abstract).
+    """
     from scipy.optimize import dual_annealing  # here: see `springtune.springs`
 
     misfit = Misfit(mesh, material, thickness, cases)
@@ -49,7 +54,10 @@ def annealed(
 def evolved(
     mesh: Mesh, material: AnyMaterial, thickness: float, cases: Sequence[Case], evaluations: int = MAX_EVALUATIONS
 ) -> Springs:
-    """Stiffness of each spring by a genetic search on a scene's reference displacements."""
+    """Stiffness of each spring by a genetic search on a scene's reference displacements.
+
+    Source: Bianchi, Solenthaler, Szekely and Harders, 2004 (abstract).
+    """
     from scipy.optimize import differential_evolution  # here: see `springtune.springs`
 
     misfit = Misfit(mesh, material, thickness, cases)
@@ -65,7 +73,10 @@ def evolved(
 
 @definition("adjoint", order=170, anisotropic=True)
 def adjoint(mesh: Mesh, material: AnyMaterial, thickness: float) -> Springs:
-    """Stiffness of each spring by exact gradients, bounded, from even tension and shear of the mesh itself."""
+    """Stiffness of each spring by exact gradients, bounded, from even tension and shear of the mesh itself.
+
+    Source: own rule (derived).
+    """
     from scipy.optimize import minimize  # here: see `springtune.springs`
 
     misfit = Misfit(mesh, material, thickness, patch_cases(mesh, material, thickness))

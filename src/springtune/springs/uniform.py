@@ -13,5 +13,8 @@ from .lattice import COEFFICIENT, uniform
 
 @definition("uniform", order=30, uniform=True)
 def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
-    """Uniform stiffness sqrt(3)/2 E t of the equilateral lattice, full weight on the outline."""
+    """Uniform stiffness sqrt(3)/2 E t of the equilateral lattice, full weight on the outline.
+
+    Source: textbook form of the equilateral lattice (derived).
+    """
     return Springs(COEFFICIENT * material.young_modulus * thickness, uniform(mesh))

@@ -37,6 +37,8 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Springs by area over squared length, the form for nu = 0 (Van Gelder 1998): exact on lattices with no tuning.
 
     Raises DefinitionError on quadrilaterals.
+
+    Source: Van Gelder, J. Graphics Tools 3(2), 1998, its abstract and public code that cites it (read).
     """
     areas, squares = _shapes(mesh)
     return Springs(material.young_modulus * thickness, mesh.sum_to_edges({3: areas / squares}))
@@ -47,6 +49,8 @@ def general(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Springs by area over squared length, the general form (Van Gelder 1998), whose nu only scales E.
 
     Raises DefinitionError on quadrilaterals, and for angles so obtuse that a stiffness is negative.
+
+    Source: Van Gelder, J. Graphics Tools 3(2), 1998 (abstract, derived).
     """
     areas, squares = _shapes(mesh)
     nu = material.poisson_ratio

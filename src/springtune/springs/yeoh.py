@@ -1,7 +1,7 @@
 r"""Sheets of rubber that was tested: linear triangles of Yeoh's law, written as springs of zero rest length and areas.
 
 The law of a `springtune.Rubber`, which `springtune.fit_rubber` fits to a uniaxial test (O. H. Yeoh, Rubber Chem.
-Technol. 63:792, 1990), is
+Technol. 63:792, 1990, not read), is
 
 .. math:: W = \sum_{n=1}^{3} c_n (I_1 - 3)^n, \quad I_1 = tr C + J^{-2}.
 
@@ -24,6 +24,8 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Springs of zero rest length and areas: equal to linear triangles of rubber fitted to a uniaxial test.
 
     The material must be a `springtune.Rubber`. Raises DefinitionError for others and on quadrilaterals.
+
+    Source: Yeoh, Rubber Chem. Technol. 63:792, 1990; the law as other texts have it (not read, derived).
     """
     from ..mechanics.energies import YeohEnergy  # here: see `springtune.springs`
     from .neo_hooke import of_rubber

@@ -3,7 +3,7 @@
 import math
 import os
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -144,6 +144,27 @@ def _check_labels(config: StudyConfig, problems: Problems) -> None:
     labelled = (name for name in GRID_PARAMETERS if name != "pressure")
     lists = {name: {value for grid in config.grids.values() for value in values_of(grid, name)} for name in labelled}
     check_cells(config, {name: values for name, values in lists.items() if values}, False, problems)
+
+
+def check_scene(
+    problems: Problems, path: Sequence[Key], scene: Any, config: StudyConfig, able: Callable[[str], bool], why: str
+) -> None:
+    """Check that the beam of a scene is declared, its material, too, with a density, and that its load is able."""
+    check_known(problems, (*path, "beam"), "beam", scene.beam, config.beams)
+    check_beam_material(problems, (*path, "material"), scene.material, config)
+    check_density(config, scene.material, (*path, "material"), problems)
+    if not able(scene.load):
+        problems.add((*path, "load"), f"'{scene.load}' {why}; choose of {', '.join(filter(able, LOADS))}")
+
+
+def check_made(
+    problems: Problems, path: Sequence[Key], mesh_type: str, size: float, name: str, config: StudyConfig
+) -> None:
+    """Check that a mesh type that is made has a mesh of a size on a beam, if that is declared."""
+    if beam := config.beams.get(name):
+        refusal = MESH_TYPES[mesh_type].refusal(beam.length, beam.height, size, f"beam '{name}'")
+        if refusal:
+            problems.add(path, f"{in_mm(size)} {refusal}")
 
 
 def check_product(problems: Problems, section: object, path: Sequence[Key], labels: Iterable[str], most: int) -> None:

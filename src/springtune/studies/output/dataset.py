@@ -45,7 +45,7 @@ class Group:
     """A group of a dataset.
 
     `variables` maps names to (dimensions, units, long name, fill value), `dimensions` those of this group alone to long
-    name and unit. `flags` holds meanings by the last word of a variable's name, `further` more attributes by variable.
+    name and unit. `flags` holds meanings by a variable's name or its last word, `further` more attributes by variable.
     """
 
     name: str
@@ -60,7 +60,7 @@ class Group:
         data, used = {}, set()
         for name, (dimensions, units, long_name, nothing) in chosen.items():
             shape = [len(axes[dimension]) for dimension in dimensions]
-            meanings = ({"status": STATUS} | self.flags).get(name.rpartition("_")[2])
+            meanings = self.flags.get(name) or ({"status": STATUS} | self.flags).get(name.rpartition("_")[2])
             dtype = "int8" if meanings else object if isinstance(nothing, str) else None
             values = np.full(shape, nothing, dtype=dtype)
             attributes: dict[str, object] = {"long_name": long_name, "units": units}

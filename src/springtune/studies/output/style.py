@@ -95,7 +95,7 @@ def plain(panel: Axes, *axes: Literal["x", "y"]) -> None:
         if low <= 0 or high / low > 150:
             chosen.set_minor_locator(NullLocator())
             continue
-        kept = "25" if high / low > 5 else "2345678"
+        kept = "25" if high / low > 5 else "235" if high / low > 3 else "2345678"
         chosen.set_minor_formatter(
             FuncFormatter(lambda value, _, kept=kept: f"{value:g}" if f"{value:e}"[0] in kept else "")
         )

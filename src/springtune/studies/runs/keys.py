@@ -8,7 +8,8 @@ functions and ``try``; type-checking imports do not. Of an ``__init__`` that onl
 followed.
 
 Imports by a name in a text are not seen. Definitions and mesh types are added where they are chosen
-(`definition_closure`, `mesh_type_closure`), and modules of outputs in `rerun`.
+(`definition_closure`, `mesh_type_closure`), and modules of outputs in `rerun`. A template counts with the module that
+has its name, such as ``templates/mujoco.xml.jinja`` with ``mujoco``.
 """
 
 import ast
@@ -170,7 +171,7 @@ NOT_COUNTED = {
     ("studies/output/browse/page.py", "h5py"): "numbers come out of a dataset as they went in, or not at all",
     ("safe_io/inputs.py", "h5py"): "it refuses files, and reads none of their numbers",
     ("safe_io/atomic.py", "psutil"): "it says which processes live",
-    ("handover/simulation.py", "jinja2"): "it fills in files, which no study runs",
+    ("handover/simulation.py", "jinja2"): "it puts texts and numbers into files as they are",
     ("studies/runs/store.py", "h5py"): "numbers come out of a file as they went in, or not at all",
     ("studies/output/dataset.py", "h5py"): "texts go into a dataset as they are",
     ("studies/output/reading.py", "h5py"): "it looks at a dataset's links before netCDF opens it",
@@ -274,6 +275,8 @@ class Code:
                 digest, imports, face = known
                 names = None if face is None else {name: _import(one) for name, one in face.items()}
                 self._sources[path] = Source(digest, frozenset(map(_import, imports)), names)
+            elif path.suffix == ".jinja":
+                self._sources[path] = Source(_mark(content), frozenset(), None)
             else:
                 self._sources[path] = read(content, "" if ours else self.package.name)
         return self._sources[path]
@@ -283,9 +286,9 @@ class Code:
 
     def _imported(self, path: Path, imports: Iterable[Import]) -> tuple[set[Path], set[tuple[str, str]]]:
         """Imported files, and packages with the importing file as in `NOT_COUNTED`."""
-        files: set[Path] = set()
         packages: set[tuple[str, str]] = set()
         ours = self._has(path)
+        files = set((path.parent / "templates").glob(f"{path.stem}.*.jinja")) if ours else set()
         where = path.relative_to(self.package).as_posix() if ours else str(path)
         for name in () if ours else plugin_packages():
             place = _own(name)

@@ -16,7 +16,7 @@ from springtune.problem.quantities import nearest
 from springtune.reference.calculix import program
 from springtune.springs import DEFINITIONS
 
-from ...config.checks import check_able, check_beam_material, check_density, check_known, check_particles, check_product
+from ...config.checks import check_able, check_known, check_particles, check_product, check_scene
 from ...config.fields import (
     BeamName,
     DefinitionName,
@@ -123,12 +123,7 @@ def _check(config, problems):
                 problems.add(("benchmark", "mesh_size"), message)
     for name, scene in section.scenes.items():
         place = ("benchmark", "scenes", name)
-        check_known(problems, (*place, "beam"), "beam", scene.beam, config.beams)
-        check_beam_material(problems, (*place, "material"), scene.material, config)
-        check_density(config, scene.material, (*place, "material"), problems)
-        if not in_benchmark(scene.load):
-            able = ", ".join(filter(in_benchmark, LOADS))
-            problems.add((*place, "load"), f"'{scene.load}' is no load of the benchmark; choose of {able}")
+        check_scene(problems, place, scene, config, in_benchmark, "is no load of the benchmark")
     check_able(problems, ("benchmark", "definition"), section.definition, "needs more than mesh and material;")
     for name in section.mesh_type:
         if name not in MESH_TYPES:

@@ -12,18 +12,21 @@ from .outputs import divided
 
 NETWORK = ("scene", "definition")
 OF_A_RUN = (*NETWORK, "engine", *SETTING)
-OF_A_CURVE = (*OF_A_RUN, "stiffness_factor")
 
-OF_NETWORK = {
-    "network_displacement": (NETWORK, "m", "displacement of the network in equilibrium", np.nan),
-    "reference_displacement": (NETWORK, "m", "displacement of the converged finite elements", np.nan),
-    "definition_error": (NETWORK, "1", "error of the network in equilibrium: that of the definition", np.nan),
-    "particles": (NETWORK, "1", "number of particles", np.nan),
+COORDINATES = {
+    "scene_beam": (("scene",), "1", "beam", ""),
+    "scene_mesh_type": (("scene",), "1", "mesh type", ""),
+    "scene_mesh_size": (("scene",), "m", "asked length of an edge", np.nan),
+    "scene_material": (("scene",), "1", "material", ""),
+    "scene_load": (("scene",), "1", "load", ""),
+    "scene_force": (("scene",), "N", "magnitude of the force", np.nan),
+    "program": (("engine",), "1", "program that the engine is of", ""),
 }
+"""What scenes and engines are."""
 
 
-def _of_runs(cell):
-    """Variables of single runs."""
+def _variables(cell):
+    """Variables of runs, of their networks and engines."""
     return {
         "displacement": (cell, "m", "displacement at rest", np.nan),
         "last_displacement": (cell, "m", "displacement that a run ends with that is not at rest, mean where it swings",
@@ -37,22 +40,14 @@ def _of_runs(cell):
         "status": (cell, "1", "what became of the run", 0),
         "engine_status": (cell, "1", "how the run ended", 0),
         "message": (cell, "1", "why it is not at rest, or not comparable", ""),
+        "network_displacement": (NETWORK, "m", "displacement of the network in equilibrium", np.nan),
+        "reference_displacement": (NETWORK, "m", "displacement of the converged finite elements", np.nan),
+        "definition_error": (NETWORK, "1", "error of the network in equilibrium: that of the definition", np.nan),
+        "particles": (NETWORK, "1", "number of particles", np.nan),
+        "engine_version": (("engine",), "1", "versions of what the engine needs, as it was run", ""),
+        **COORDINATES,
     }  # fmt: skip
 
-
-SCENE_AND_PROGRAM = {
-    "engine_version": (("engine",), "1", "versions of what the engine needs, as it was run", ""),
-    "scene_beam": (("scene",), "1", "beam", ""),
-    "scene_mesh_type": (("scene",), "1", "mesh type", ""),
-    "scene_mesh_size": (("scene",), "m", "asked length of an edge", np.nan),
-    "scene_material": (("scene",), "1", "material", ""),
-    "scene_load": (("scene",), "1", "load", ""),
-    "scene_force": (("scene",), "N", "magnitude of the force", np.nan),
-    "program": (("engine",), "1", "program that the engine is of", ""),
-}
-
-IN_BOTH = OF_NETWORK | SCENE_AND_PROGRAM
-"""Variables of both groups."""
 
 ENGINE_DIMENSIONS: dict[str, str | tuple[str, str]] = {
     "scene": "scene in engines",
@@ -70,17 +65,10 @@ BEST = {
     "best_factor_message": (OF_A_RUN, "1", "why no factor is the best", ""),
 }
 
-END_FLAGS = {
-    "engine_status": {"flag_values": np.arange(len(RUN_ENDS), dtype="int8"), "flag_meanings": " ".join(RUN_ENDS)}
-}
+FLAGS: dict[str, tuple[str, ...]] = {"engine_status": RUN_ENDS}
 
-ENGINE_RUNS = Group("/engines", _of_runs(OF_A_RUN) | IN_BOTH, ENGINE_DIMENSIONS, further=END_FLAGS)
-ENGINE_CURVES = Group(
-    "/engine_curves",
-    _of_runs(OF_A_CURVE) | BEST | IN_BOTH,
-    ENGINE_DIMENSIONS,
-    further=END_FLAGS,
-)
+ENGINE_RUNS = Group("/engines", _variables(OF_A_RUN), ENGINE_DIMENSIONS, FLAGS)
+ENGINE_CURVES = Group("/engine_curves", _variables((*OF_A_RUN, "stiffness_factor")) | BEST, ENGINE_DIMENSIONS, FLAGS)
 
 
 def groups(study, folder):
@@ -98,13 +86,12 @@ def _gathered(group, study, found):
     axes |= {name: tuple(sorted(axes[name])) for name in ("dt", "substeps", "iterations", "stiffness_factor")}
     filler, curves = Filler(group.empty(study.axes | axes)), defaultdict(list)
     for run, labels, result in found:
-        about = {"scene_beam": run.beam.name, "scene_material": run.material.name, "program": run.program}
-        about |= {f"scene_{name}": getattr(run, name) for name in ("mesh_type", "mesh_size", "load", "force")}
+        about = {f"scene_{name}": value for name, value in run.stated} | {"program": run.program}
         filler.put({name: value for name, value in (result | about).items() if name in group.variables}, **labels)
         curves[tuple(labels[name] for name in OF_A_RUN)].append((labels["stiffness_factor"], result))
     for setting, points in curves.items() if group is ENGINE_CURVES else ():
         filler.put(_best(points), **dict(zip(OF_A_RUN, setting)))
-    return filler.data.set_coords([name for name in SCENE_AND_PROGRAM if name != "engine_version"])
+    return filler.data.set_coords([*COORDINATES])
 
 
 def _best(points):

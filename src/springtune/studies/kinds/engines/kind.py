@@ -32,7 +32,7 @@ MOST_ENGINE_RUNS = 10_000
 OF_RUNS = ("definition", "engine", *SETTING, "stiffness_factor")
 """What a set of runs lists values of, besides scenes."""
 
-OF_STUDY = ("scene", "program", "of_curve")
+OF_STUDY = ("scene", "of_curve", "program", "stated")
 """What a run's result does not depend on."""
 
 OWN_PRECISION = "own"
@@ -113,29 +113,26 @@ class EnginesConfig(Section):
 
 @dataclass(frozen=True)
 class EngineRun:
-    """A scene in an engine at a setting; the force is a magnitude [N], `dt` the time of a frame [s].
+    """A scene in an engine at a setting; `dt` is the time of a frame [s].
 
     Runs `of_curve` have factors on what is typed.
     """
 
     scene: str
-    beam: Beam
-    mesh_type: str
-    mesh_size: float
-    material: Material
-    load: str
-    force: float
     definition: str
     engine: str
-    program: str
     precision: str
     dt: float
     substeps: int
     iterations: int
     stiffness_factor: float
+    of_curve: bool
+    program: str
+    stated: EngineSceneConfig
+    beam: Beam
+    material: Material
     frames: int | None
     tolerance: float | None
-    of_curve: bool
 
 
 def _engines():
@@ -146,7 +143,9 @@ def _engines():
 def _check(config, problems):
     section = config.engines
     for name, scene in section.scenes.items():
-        _check_scene(scene, ("engines", "scenes", name), config, problems)
+        place, why = ("engines", "scenes", name), "turns with its side, and forces in engines do not"
+        checks.check_scene(problems, place, scene, config, lambda load: not LOADS[load].follower, why)
+        checks.check_made(problems, (*place, "mesh_size"), scene.mesh_type, scene.mesh_size, scene.beam, config)
     for name, runs in section.runs.items():
         place, engines = ("engines", "runs", name), _engines()
         for engine in runs.engine:
@@ -167,45 +166,20 @@ def _check(config, problems):
         problems.add(("engines", "runs"), message)
 
 
-def _check_scene(scene, place, config, problems):
-    checks.check_known(problems, (*place, "beam"), "beam", scene.beam, config.beams)
-    checks.check_beam_material(problems, (*place, "material"), scene.material, config)
-    checks.check_density(config, scene.material, (*place, "material"), problems)
-    if LOADS[scene.load].follower:
-        able = ", ".join(name for name, load in LOADS.items() if not load.follower)
-        message = f"'{scene.load}' turns with its side, and forces in engines do not; choose of {able}"
-        problems.add((*place, "load"), message)
-    if scene.beam in config.beams:
-        extent = config.beams[scene.beam].length, config.beams[scene.beam].height
-        refusal = MESH_TYPES[scene.mesh_type].refusal(*extent, scene.mesh_size, f"beam '{scene.beam}'")
-        if refusal:
-            problems.add((*place, "mesh_size"), f"{1e3 * scene.mesh_size:g} mm {refusal}")
-        else:
-            checks.check_particles(problems, (*place, "mesh_size"), [scene.mesh_size], *extent)
-
-
 def _expand(config, declared):
     section, engines, found = config.engines, _engines(), {}
+    orders = [list(one) for one in (section.scenes, DEFINITIONS, engines)]
     for runs in section.runs.values():
-        values = (runs.precision, runs.dt, runs.substeps, runs.iterations, runs.stiffness_factor)
-        names = runs.scene or section.scenes
-        for name, definition, engine, setting in product(names, runs.definition, runs.engine, product(*values)):
-            precision, dt, substeps, iterations, factor = setting
-            scene, solver = section.scenes[name], engines[engine]
-            precision = solver.precisions[0] if precision == OWN_PRECISION else precision
-            body = declared.beams[scene.beam], scene.mesh_type, scene.mesh_size, declared.materials[scene.material]
-            how = definition, engine, solver.program, precision, dt, substeps, iterations if solver.iterates else 1
-            of_curve = runs.stiffness_factor != [1.0]
-            ending = section.frames, section.tolerance
-            found[EngineRun(name, *body, scene.load, scene.force, *how, factor, *ending, of_curve)] = None
-    ranks = [list(one) for one in (section.scenes, DEFINITIONS, engines)]
-
-    def order(run):
-        names = (run.scene, run.definition, run.engine)
-        numbers = [getattr(run, name) for name in (*SETTING, "stiffness_factor", "of_curve")]
-        return [rank.index(name) for rank, name in zip(ranks, names)], numbers
-
-    return tuple(sorted(found, key=order))
+        names = product(runs.scene or section.scenes, runs.definition, runs.engine)
+        settings = product(runs.precision, runs.dt, runs.substeps, runs.iterations, runs.stiffness_factor)
+        for labels, (precision, dt, substeps, iterations, factor) in product(names, settings):
+            stated, engine = section.scenes[labels[0]], engines[labels[-1]]
+            precision = engine.precisions[0] if precision == OWN_PRECISION else precision
+            how = precision, dt, substeps, iterations if engine.iterates else 1, factor, runs.stiffness_factor != [1.0]
+            of = engine.program, stated, declared.beams[stated.beam], declared.materials[stated.material]
+            place = *(order.index(label) for order, label in zip(orders, labels)), *how
+            found[place] = EngineRun(*labels, *how, *of, section.frames, section.tolerance)
+    return tuple(found[place] for place in sorted(found))
 
 
 def _summary(runs):
@@ -225,11 +199,11 @@ def _tasks(study):
     """Runs of an engine follow each other in one job, since their seconds are measured."""
     for run in study.parts["engines"]:
         engine = _engines()[run.engine]
-        values = {name: value for name, value in vars(run).items() if name not in OF_STUDY}
+        values = dict(run.stated) | {name: value for name, value in vars(run).items() if name not in OF_STUDY}
         values |= {"beam": beam_key(run.beam), "material": material_key(run.material, density=True)}
         values["engine_version"] = _version(engine)
-        also = mesh_type_key(run.mesh_type), definition_key(run.definition), declared_key(engine)
-        particles = run.beam.length * run.beam.height / (COEFFICIENT * run.mesh_size**2)
+        also = mesh_type_key(run.stated.mesh_type), definition_key(run.definition), declared_key(engine)
+        particles = run.beam.length * run.beam.height / (COEFFICIENT * run.stated.mesh_size**2)
         name = f"engines {run.program.lower()}"
         cost = name if name in COSTS else "engines", run.substeps * run.iterations * particles
         yield Task(values, also, {name: getattr(run, name) for name in ("scene", *OF_RUNS)}, run, [cost], run.engine)

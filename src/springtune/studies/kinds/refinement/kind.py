@@ -14,7 +14,7 @@ from springtune.problem.loads import LOADS
 from springtune.problem.materials import Material
 from springtune.springs import DEFINITIONS
 
-from ...config.checks import check_able, check_beam_material, check_compressible, check_known, check_particles
+from ...config.checks import check_able, check_beam_material, check_compressible, check_known, check_made
 from ...config.fields import (
     BeamName,
     DefinitionName,
@@ -154,8 +154,8 @@ def _check(config, problems):
             check_compressible(problems, (*path, "to"), section.material, config)
         if section.parameter == "mesh_size":
             sizes = dict(zip(("from", "to"), ends))
-        if section.beam in config.beams:
-            _check_sizes(section, sizes, config.beams[section.beam], path, problems)
+        for key, size in sizes.items():
+            check_made(problems, (*path, key), section.mesh_type, size, section.beam, config)
 
 
 def _ends(section, path, problems):
@@ -175,15 +175,6 @@ def _ends(section, path, problems):
     else:
         return found
     return []
-
-
-def _check_sizes(section, sizes, beam, path, problems):
-    for key, size in sizes.items():
-        refusal = MESH_TYPES[section.mesh_type].refusal(beam.length, beam.height, size, f"beam '{section.beam}'")
-        if refusal:
-            problems.add((*path, key), f"{1e3 * size:g} mm {refusal}")
-        else:
-            check_particles(problems, (*path, key), [size], beam.length, beam.height)
 
 
 def _check_definitions(section, path, problems):
