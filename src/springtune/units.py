@@ -71,7 +71,7 @@ COMMON = {
 
 _KNOWN = {unit: (kind, Decimal(size)) for kind, units in COMMON.items() for unit, size in units.items()}
 
-_QUANTITY = re.compile(r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s*(.*)", re.DOTALL)
+_QUANTITY = re.compile(r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)(?:/([0-9]+))?\s*(.*)", re.DOTALL)
 
 
 LONGEST_QUANTITY = 100
@@ -98,7 +98,7 @@ class UnitError(ValueError):
 
 
 def parse(text: str, kind: str) -> float:
-    """Return the number in SI units of a quantity."""
+    """Return the number in SI units of a quantity; its number may be a fraction, such as 1/60."""
     wanted = QUANTITY_KINDS[kind]
     if len(text) > LONGEST_QUANTITY:
         text = f"{text[:57]}..."
@@ -107,7 +107,7 @@ def parse(text: str, kind: str) -> float:
     found = _QUANTITY.fullmatch(text.strip())
     if not found:
         raise UnitError(f"'{text}' does not begin with a finite number; {remedy}")
-    number, unit = found.groups()
+    number, below, unit = found.groups()
     if not unit:
         raise UnitError(f"'{text}' has no unit; {remedy}")
     spelling = _spelling(unit)
@@ -120,7 +120,7 @@ def parse(text: str, kind: str) -> float:
     if is_kind != kind:
         raise UnitError(f"'{text}' is {_article(is_kind)}; {remedy}")
     try:
-        value = float(Decimal(number) * size)
+        value = float(Decimal(number) * size / int(below or 1))
     except ArithmeticError:
         value = float("inf")
     if value in (float("inf"), float("-inf")):

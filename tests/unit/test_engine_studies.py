@@ -141,8 +141,11 @@ def test_runs_are_every_combination_once_and_in_a_canonical_order(load):
     text = STUDY.replace("ENGINES", "toy, xpbd")
     study = load(text + CURVE.replace("ENGINES", "xpbd"))
     runs = study.parts["engines"]
-    assert len(runs) == 2 * 2 * 2 * 2 + 2 * 5 and [one.engine for one in runs][:1] == ["xpbd"]
-    assert {run.precision for run in runs} == {"float64"} and {run.dt for run in runs} == {1 / 60, 5e-3}
+    assert len(runs) == 2 * 2 * 2 * 2 + 2 * 5 and [one.labels["engine"] for one in runs][:1] == ["xpbd"]
+    assert {run.labels["precision"] for run in runs} == {"float64"} and {run.labels["dt"] for run in runs} == {
+        1 / 60,
+        5e-3,
+    }
     backwards = text.replace("[1, 100]", "[100, 1]").replace("[toy, xpbd]", "[xpbd, toy]")
     assert load(backwards + CURVE.replace("ENGINES", "xpbd")).parts["engines"] == runs
 
@@ -151,7 +154,7 @@ def test_an_engine_without_iterations_has_one(load):
     st.ENGINES.discard("toy")
     st.engine("toy", program="toys", iterates=False)(Toy)
     runs = load(STUDY.replace("ENGINES", "toy")).parts["engines"]
-    assert len(runs) == 4 and {run.iterations for run in runs} == {1}
+    assert len(runs) == 4 and {run.labels["iterations"] for run in runs} == {1}
 
 
 def test_what_is_not_installed_is_said_before_a_run(load):

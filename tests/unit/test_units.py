@@ -33,6 +33,7 @@ USUAL = [(kind, unit) for kind, units in COMMON.items() for unit in units]
         ("170e6 N/m", "stiffness", 170e6),
         ("170e6 N/mm", "stiffness", 170e9),
         ("170 MN / m", "stiffness", 170e6),
+        ("1/60 s", "time", 1 / 60),
     ],
 )
 def test_reads_quantities(text, kind, value):
@@ -66,6 +67,8 @@ def test_examples_in_messages_are_right(kind):
         ("", "length", "does not begin with a finite number"),
         ("1e400 mm", "length", "too large"),
         ("1e99999999999999999999 mm", "length", "too large"),
+        ("1/0 s", "time", "too large"),
+        ("1/60", "time", "'1/60' has no unit"),
     ],
 )
 def test_refuses(text, kind, says):

@@ -15,29 +15,21 @@ from .recommendation import json_text
 
 if TYPE_CHECKING:
     from ..engines.base import Setting
-    from ..engines.budget import BudgetSearch
+    from ..engines.budget import BudgetChoice, BudgetSearch
     from ..engines.calibration import EngineFit
     from ..handover.net import SpringNet
 
-OPTIONS: dict[str, dict[str, Any]] = {
-    "engine": {
-        "shell_complete": names_from("engines.base:ENGINES"),
-        "help": "Calibrate to an engine, such as xpbd: what to type at its setting.",
-    },
+ENGINE_OPTIONS: dict[str, dict[str, Any]] = {
+    "engine": {"shell_complete": names_from("engines.base:ENGINES"), "help": "Engine to calibrate to, such as xpbd."},
     "dt": {"help": "Time that a frame advances, such as 1/60 or '5 ms'.  [default: 1/60]"},
     "substeps": {"type": int, "help": "Steps of a frame.  [default: 1]"},
     "iterations": {"type": int, "help": "Iterations of the engine's solver in a step.  [default: 10]"},
     "precision": {"help": "float64 or float32.  [default: the engine's own]"},
     "force": {"help": "Size of the force of --load on a beam, such as '0.2 N'."},
     "scale": {"type": float, "help": "Factor on the load of a shape.  [default: 1]"},
-    "definition": {
-        "shell_complete": names_from("springs:DEFINITIONS"),
-        "help": "Rule for the stiffness.  [default: the best one that the engine has]",
-    },
+    "definition": {"shell_complete": names_from("springs:DEFINITIONS"), "help": "Rule for stiffness.  [default: best]"},
     "within": {"help": "Error for which ranges of loads are printed.  [default: 5 %]"},
-    "budget": {
-        "help": "Time of a frame on this machine, such as '2 ms': find the mesh, definition, substeps and iterations."
-    },
+    "budget": {"help": "Time of a frame here, such as '2 ms': find the mesh, definition, substeps and iterations."},
 }
 """Options of `predict` that are of engines, as click takes them."""
 
@@ -46,7 +38,7 @@ FOUND = ("substeps", "iterations", "size", "definition")
 
 
 class EngineOptions(dict[str, Any]):
-    """Values of `OPTIONS`, None where not given."""
+    """Values of `ENGINE_OPTIONS`, None where not given."""
 
     def check(self, sheet: SheetOptions, error: str | None) -> None:
         """Refuse options that are not for each other."""
@@ -55,10 +47,7 @@ class EngineOptions(dict[str, Any]):
             for name, value in given.items():
                 raise ValueError(f"--{name}: '{value}' is of engines; give --engine, such as xpbd, or leave it out")
         elif error is not None:
-            raise ValueError(
-                f"--error: '{error}' is of equilibria, and --engine {self['engine']} of settings; give --budget such "
-                "as '2 ms', or leave one of them out"
-            )
+            raise ValueError(f"--error: '{error}' is of equilibria; give --budget such as '2 ms', or no --engine")
         for name in FOUND if "budget" in given else ():
             value = self.get(name, sheet.size)
             if value is not None:
@@ -67,14 +56,12 @@ class EngineOptions(dict[str, Any]):
     def setting(self) -> "Setting":
         """Setting of the options."""
         from ..engines.base import ENGINES, Setting
+        from ..scene.sheet import chosen
 
-        if self["engine"] not in ENGINES:
-            from ..problem.quantities import nearest
-
-            raise ValueError(f"--engine: '{self['engine']}' is unknown; {nearest(self['engine'], ENGINES)}")
+        engine = chosen(ENGINES, self["engine"], "--engine")
         names = ("dt", "substeps", "iterations", "precision")
         setting = Setting(**{name: self[name] for name in names if self[name] is not None})
-        ENGINES[self["engine"]].check(setting)
+        engine.check(setting)
         return setting
 
 
@@ -83,15 +70,17 @@ def engine_options(command: AnyCommand) -> AnyCommand:
 
     @wraps(command)
     def call(*args: Any, **given: Any) -> None:
-        command(*args, engine=EngineOptions({name: given.pop(name) for name in OPTIONS}), **given)
+        command(*args, engine=EngineOptions({name: given.pop(name) for name in ENGINE_OPTIONS}), **given)
 
-    return reduce(lambda made, name: click.option(f"--{name}", **OPTIONS[name])(made), reversed(OPTIONS), call)
+    return reduce(
+        lambda made, name: click.option(f"--{name}", **ENGINE_OPTIONS[name])(made), reversed(ENGINE_OPTIONS), call
+    )
 
 
 def fitted(
     sheet: SheetOptions, asked: EngineOptions, load: str | None, loads: str | None, springs_alone: bool
-) -> "tuple[Callable[[], str], Callable[[], str], Callable[[str], SpringNet]]":
-    """Text, JSON and springs of a calibration, or of a search within a budget."""
+) -> "tuple[str, str, EngineFit | None]":
+    """Text and JSON of a calibration, or of a search within a budget, and what is found."""
     from ..engines.base import ENGINES
     from ..engines.budget import fit_budget, graded_meshes, runnable
     from ..engines.calibration import WITHIN, fit_engine
@@ -113,12 +102,8 @@ def fitted(
             how["meshes"] = graded_meshes(of.shape, "free", lambda size: replace(of, size=size).mesh())
     else:
         beam, material = sheet.asked_beam()
-        needs = {"load": (load, "traction"), "force": (asked["force"], "0.2 N")}
-        for name, (value, example) in (needs | {"density": (sheet.density, "1000 kg/m^3")}).items():
-            if value is None:
-                raise ValueError(
-                    f"--{name}: missing; an engine is calibrated to a load and moves masses; give '{example}'"
-                )
+        if load is None:
+            raise ValueError("--load: missing; an engine is calibrated to a load; give one such as 'traction'")
         if searched and sheet.mesh_type is not None:
             how["mesh_types"] = sheet.mesh_type.split(",")
         edge = None if searched else sheet.edge(beam)
@@ -128,26 +113,22 @@ def fitted(
         limit = asked_quantity("--budget", asked["budget"], "time")
         how |= {"budget": limit, "dt": setting.dt, "precision": setting.precision, "scale": scale}
         search = fit_budget(*case, engine=engine, springs_alone=springs_alone, **how)
-
-        def content() -> str:
-            keys = "mesh", "frame_seconds", "worst"
-            tried = [fit_json(one.fit) | {key: getattr(one, key) for key in keys} for one in search]
-            return json_text({"budget": limit, "chosen": 0 if search.best else None, "tried": tried})
-
-        return partial(budget_text, search), content, partial(_net, search.best.fit if search.best else None)
+        found = {"budget": limit, "chosen": 0 if search.best else None, "tried": [choice_json(one) for one in search]}
+        return budget_text(search), json_text(found), best.fit if (best := search.best) else None
     body, *others = case
     make = partial(Scene, body, make_mesh(), *others, scale=scale)
     if asked["definition"] is not None:
         scenes, refused = [make(definition=asked["definition"])], ""
     else:
-        scenes, refused = runnable(make, CASES, ENGINES[engine], setting, 1, springs_alone)
+        scenes, refused = runnable(make, CASES, ENGINES[engine], setting, springs_alone)
     if not scenes:
         raise Unmet(refused)
     fit = fit_engine(scenes[0], engine, setting, **how)
-    return partial(fit_text, fit, mesh_name), lambda: json_text(fit_json(fit)), partial(_net, fit)
+    return fit_text(fit, mesh_name), json_text(fit_json(fit)), fit
 
 
-def _net(fit: "EngineFit | None", _: str) -> "SpringNet":
+def net_of_fit(fit: "EngineFit | None", _: str) -> "SpringNet":
+    """Springs of a calibration."""
     if fit is None or fit.factor != fit.factor:
         raise Unmet(f"--write: there is no factor, so nothing is written: {fit.message if fit else 'see above'}")
     return fit.net()
@@ -179,6 +160,11 @@ def budget_text(search: "BudgetSearch") -> str:
         least = error_text(search[0].worst).lstrip("+")
         return f"No stiffness makes any of them right; the nearest is off by {least}. Take a larger budget."
     return f"{search!r}\n\nchosen, the least error at worst:\n{fit_text(search.best.fit, search.best.mesh)}"
+
+
+def choice_json(one: "BudgetChoice") -> dict[str, Any]:
+    """Content of a choice of a search in SI units."""
+    return fit_json(one.fit) | {"mesh": one.mesh, "frame_seconds": one.frame_seconds, "worst": one.worst}
 
 
 def fit_json(fit: "EngineFit") -> dict[str, Any]:

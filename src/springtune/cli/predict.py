@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import click
 
 from . import examples
-from .engine_fit import EngineOptions, engine_options, fitted
+from .engine_fit import EngineOptions, engine_options, fitted, net_of_fit
 from .options import (
     SPRING_FILES,
     SheetOptions,
@@ -106,8 +106,8 @@ def predict(
         if target is not None:
             check_target("--write", target)
         if engine["engine"] is not None:
-            text, json, net_of = fitted(sheet, engine, load, loads, springs_alone)
-            answer = _Answer(text, json, "", net_of)
+            text, json, fit = fitted(sheet, engine, load, loads, springs_alone)
+            answer = _Answer(lambda: text, lambda: json, "", partial(net_of_fit, fit))
         elif sheet.shape is not None:
             asked = sheet.asked_shape(load, sized=error is None)
             answer = _on_shape(asked, springs_alone) if error is None else _find_on_shape(asked, error, springs_alone)

@@ -34,20 +34,13 @@ CELLS_ACROSS = (1, 2, 3, 4, 6, 8, 12, 16)
 BUDGET_MESHES = ("structured", "right")
 """Mesh types of a beam that are tried where none are named."""
 
-BEST_DEFINITIONS = 2
-"""Definitions on a mesh that are tried."""
-
 ITERATIONS_AT_MOST, SUBSTEPS = 400, tuple(2**power for power in range(8, -1, -1))
 """Limit of a setting's iterations, and its substeps that are tried."""
 
 PROBED = 16
 """Iterations of the second setting that is timed."""
 
-WORSE = 2
-"""Settings or meshes in a row that are worse than the best one before a search ends."""
-
 One = TypeVar("One")
-AnyMesh = TypeVar("AnyMesh", bound=Mesh | GroupedMesh)
 
 Cost = Callable[[SpringNet, Setting], float]
 """Seconds of a frame of a net at a setting."""
@@ -234,7 +227,7 @@ def fit_budget(
         """Choices of the best definitions on a mesh."""
         nonlocal why
         make = partial(Scene, beam, named[1], material, load, force, scale=scale)
-        scenes, refused = runnable(make, names, chosen, start, BEST_DEFINITIONS, springs_alone)
+        scenes, refused = runnable(make, names, chosen, start, springs_alone, most=2)
         why = why or refused
         found = []
         for scene in scenes:
@@ -244,33 +237,30 @@ def fit_budget(
                 fit = fit_engine(scene, engine, setting, loads=names, within=within, needed=False)
                 found.append(BudgetChoice(named[0], fit, seconds(setting)))
             else:
-                coarsest = f"a frame of the coarsest mesh takes in engine '{engine}'"
-                why = f"budget: {budget!r} is less than {coarsest}; give more"
+                why = f"budget: {budget!r} is less than a frame of the coarsest mesh takes in '{engine}'; give more"
         return found
 
     tried: list[BudgetChoice] = []
     for family in [meshes] if meshes else made:
-        found = _until_worse(map(on_mesh, family.items()), lambda own: min((one.worst for one in own), default=np.inf))
-        tried += [one for _, choices in found for one in choices]
+        off = _until_worse(map(on_mesh, family.items()), lambda own: min((one.worst for one in own), default=np.inf))
+        tried += [one for _, found in off for one in found]
     if not tried:
         raise EngineError(why or "no mesh can be made; give others")
     return BudgetSearch(sorted(tried, key=lambda one: (not one.fit.bands, one.worst, one.frame_seconds)))
 
 
-def _until_worse(those: Iterable[One], error: Callable[[One], float]) -> list[tuple[float, One]]:
+def _until_worse(those: Iterable[One], error: Callable[[One], float]) -> Iterator[tuple[float, One]]:
     """Errors and what has them, up to two in a row that are worse than the best one before."""
-    found: list[tuple[float, One]] = []
-    worse = 0
+    best, worse = np.inf, 0
     for one in those:
         off = float(np.nan_to_num(error(one), nan=np.inf))
-        worse = 0 if off < min((least for least, _ in found), default=np.inf) else worse + 1
-        found.append((off, one))
-        if worse == WORSE:
-            break
-    return found
+        yield off, one
+        best, worse = (off, 0) if off < best else (best, worse + 1)
+        if worse == 2:
+            return
 
 
-def graded_meshes(body: Beam | Shape, name: str, make: Callable[[float], AnyMesh]) -> dict[str, AnyMesh]:
+def graded_meshes(body: Beam | Shape, name: str, make: Callable[[float], One]) -> dict[str, One]:
     """Meshes by name, from coarse to fine; sizes at which there is none are left out."""
     found = {}
     side = min(np.ptp(body.extent, axis=0)) if isinstance(body, Shape) else min(body.length, body.height)
@@ -281,7 +271,7 @@ def graded_meshes(body: Beam | Shape, name: str, make: Callable[[float], AnyMesh
 
 
 def runnable(
-    make: "partial[Scene]", loads: Iterable[str], engine: Engine, setting: Setting, most: int, springs_alone: bool
+    make: "partial[Scene]", loads: Iterable[str], engine: Engine, setting: Setting, springs_alone: bool, most: int = 1
 ) -> tuple[list[Scene], str]:
     """Scenes of the best definitions that an engine takes, at most some; and why there is no other one."""
     body, mesh, material, load, *_ = make.args
@@ -303,18 +293,14 @@ def _split(
     scene: Scene, engine: Engine, start: Setting, seconds: Callable[[Setting], float], limit: float
 ) -> Setting | None:
     """Best split of a time into substeps, with as many iterations as it has time for; None if it is too short."""
-    damping, settings = 2 * scene.motion().loaded_frequency, []
+    settings = []
     iterations = range(1, (ITERATIONS_AT_MOST if engine.iterates else 1) + 1)
     for substeps in SUBSTEPS:
         setting = replace(start, substeps=substeps)
         if count := bisect_right(iterations, limit, key=lambda number: seconds(replace(setting, iterations=number))):
             settings.append(replace(setting, iterations=count))
-
-    def error(setting: Setting) -> float:
-        return abs(in_engine(scene, engine.name, setting, damping=damping, tolerance=1e-3).solver_error)
-
-    errors = _until_worse(settings, error)
-    return min(errors, key=itemgetter(0))[1] if errors else None
+    off = _until_worse(settings, lambda one: abs(in_engine(scene, engine.name, one, tolerance=1e-3).solver_error))
+    return min(off, key=itemgetter(0))[1] if settings else None
 
 
 def _measured(engine: Engine, net: SpringNet, start: Setting) -> Cost:

@@ -31,14 +31,12 @@ SIZES = (0.25, 0.5, 1.0, 2.0)
 WITHIN = 0.05
 """Error that a band keeps."""
 
-TUNED = 1e-3
-"""Error at which a factor is taken."""
+TUNED, ALLOWED = 1e-3, 0.02
+"""Error at which a factor is taken, and above which it is refused where nothing comes closer."""
 
-ALLOWED = 0.02
-"""Error above which a factor is refused where nothing comes closer."""
-
-BRACKET, BRACKETS = 8.0, 7
-"""Ratio of the factors that look for a bracket, and how many there are."""
+BRACKET, BRACKETS, SATURATED = 8.0, 7, 1e-3
+"""Ratio of the factors that look for a bracket, how many there are, and the change of the displacement over one below
+which stiffness no longer decides."""
 
 RESTING = {"float64": 1e-4, "float32": 1e-3}
 """Distance from rest that ends a run, over the displacement, by precision."""
@@ -46,20 +44,9 @@ RESTING = {"float64": 1e-4, "float32": 1e-3}
 SHAKE = 5e-3
 """Amplitude over the displacement up to which a run that does not rest counts, as those of single precision do."""
 
-SATURATED = 1e-3
-"""Change of the displacement over a `BRACKET` below which stiffness no longer decides."""
-
-CONVERGED = 0.01
-"""Solver error of a converged setting."""
-
-MOST_DOUBLINGS = 8
-"""Doublings of substeps or iterations that are tried."""
-
-STALLED = 0.9
-"""Share of the solver error that two doublings leave where more of them are hopeless."""
-
-FINE = 200
-"""Sizes between two tested ones at which a band is looked at."""
+CONVERGED, STALLED, MOST_DOUBLINGS = 0.01, 0.9, 8
+"""Solver error of a converged setting, the share of it that two doublings of substeps or iterations leave where more
+are hopeless, and how many are tried."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -367,10 +354,7 @@ def fit_engine(
     runs = _Runs(scene, engine, frames)
     untuned = runs[1.0, setting]
     if not abs(untuned.reference) > 0:
-        raise EngineError(
-            f"load: {scene.load!r} has no displacement by finite elements to calibrate to; take a load case with a "
-            "quantity of kind 'displacement' that is not zero"
-        )
+        raise EngineError(f"load: {scene.load!r} has no displacement to calibrate to; give its case one as a quantity")
     factor, why = _factor(runs, setting)
     found = factor == factor
     tuned = runs[factor, setting] if found else min(runs.values(), key=_distance)
@@ -504,7 +488,7 @@ def range_within(sizes: np.ndarray, errors: np.ndarray, within: float) -> tuple[
     slopes = np.diff(errors) / np.diff(sizes)
     bends = np.pad(np.abs(np.diff(slopes) / (sizes[2:] - sizes[:-2])), 1, constant_values=np.nan)
     bend = np.fmax(bends[:-1], bends[1:])[:, np.newaxis]
-    share = np.linspace(0, 1, FINE)
+    share = np.linspace(0, 1, 200)  # between two sizes
     between = errors[:-1, np.newaxis] * (1 - share) + errors[1:, np.newaxis] * share
     bounds = np.abs(between) + 2 * bend * widths**2 * share * (1 - share) + SHAKE
     bounds = np.nan_to_num(bounds.ravel(), nan=np.inf)

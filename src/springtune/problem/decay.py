@@ -7,15 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from ..safe_io.inputs import csv_rows, two_numbers
+from ..safe_io.inputs import csv_rows, numbers
 from ..safe_io.tables import Tabled
 from .quantities import positive
 
-LEAST_POINTS = 12
-"""Points that a decay is fitted to, at least."""
-
-MOST_MISFIT = 0.5
-"""Misfit from which points are no damped swing [1]."""
+LEAST_POINTS, MOST_MISFIT = 12, 0.5
+"""Points that a decay is fitted to, at least, and the misfit from which they are no damped swing [1]."""
 
 COLUMNS_OF_DECAY = "give two columns with a head such as 'time [s],displacement [mm]'"
 
@@ -101,9 +98,7 @@ def fit_decay(times: np.ndarray | str | Path, displacements: np.ndarray | None =
     else:
         t, x = np.asarray(times, dtype=float), np.asarray(displacements, dtype=float)
     if t.ndim != 1 or t.shape != x.shape or len(t) < LEAST_POINTS:
-        raise ValueError(
-            f"times: have the shape {t.shape}, and displacements {x.shape}; give {LEAST_POINTS} points or more"
-        )
+        raise ValueError(f"times: have shape {t.shape}, displacements {x.shape}; give {LEAST_POINTS} points or more")
     if not (np.isfinite([t, x]).all() and (np.diff(t) > 0).all()):
         raise ValueError("times: are not ascending, or a value is no finite number; sort the points and leave gaps out")
     t, x = t - t[0], (x - x.mean()) / (np.std(x) or 1.0)  # the search ends at a gradient that is small beside 1
@@ -133,8 +128,8 @@ def _read(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
     """Times [s] and displacements [m] of a CSV file."""
     (line, head), *rows = csv_rows(path, ValueError, COLUMNS_OF_DECAY)
     units = re.findall(r"\[(.+?)\]", ",".join(head))
-    if len(units) != 2:
+    if not len(units) == len(head) == 2:
         raise ValueError(f"'{path}', line {line}: {','.join(head)!r} is no head of a decay; {COLUMNS_OF_DECAY}")
     scales = [positive(f"1 {unit}", kind, f"'{path}', head") for unit, kind in zip(units, ("time", "length"))]
-    times, moved = np.array(two_numbers(path, rows, ValueError)).reshape(-1, 2).T
+    times, moved = np.array(numbers(path, rows, head, ValueError)).reshape(-1, 2).T
     return scales[0] * times, scales[1] * moved

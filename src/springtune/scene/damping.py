@@ -10,6 +10,7 @@ import numpy as np
 from ..mechanics.dynamics import Motion
 from ..problem.quantities import positive
 from ..safe_io.tables import Tabled, number_text
+from .sheet import chosen
 from .single import Scene
 
 MEASURES: dict[str, Callable[[float], float]] = {
@@ -176,9 +177,7 @@ class Damping(Tabled):
         '0.39, exp(-0.9) = 0.41'
         """
         known = {"mass": (self.mass_damping, 0.0), "springs": (0.0, self.stiffness_damping), "both": self.rayleigh}
-        if over not in known:
-            raise ValueError(f"over: {over!r} is unknown; give one of {', '.join(known)}")
-        alpha, beta = known[over]
+        alpha, beta = chosen(known, over, "over")
         dampers = beta / self.stiffness_damping * self.dashpots / self.scene.springs.reference
         return {"mass_damping": alpha} | ({"dampers": dampers} if beta else {})
 

@@ -3,7 +3,7 @@
 import math
 import os
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -32,13 +32,12 @@ MORE_SCENES = f"or allow more by 'springtune run --max-scenes', or by {MOST_SCEN
 
 
 def check_known(
-    problems: Problems, path: Sequence[Key], what: str, name: str, names: Iterable[str], section: str = ""
+    problems: Problems, path: Sequence[Key], what: str, name: str, names: Iterable[str], section: str | None = ""
 ) -> None:
-    """Check that the study declares a name; in a section of the name's kind, unless another one is given."""
+    """Check that a name is known; a study declares it in a section of its kind, in another one, or nowhere (None)."""
     if name not in names:
-        problems.add(
-            path, f"unknown {what} '{name}'; {nearest(name, names)}; or declare it under {section or f'{what}s'}"
-        )
+        declared = "" if section is None else f"; or declare it under {section or f'{what}s'}"
+        problems.add(path, f"unknown {what} '{name}'; {nearest(name, names)}{declared}")
 
 
 def check_beam_material(problems: Problems, path: Sequence[Key], name: str, config: StudyConfig) -> None:
@@ -193,17 +192,20 @@ def _too_many(size: float, length: float, height: float) -> str:
     return f"{particles:.0e} particles; give {least:.2g} mm or more"
 
 
-def check_cells(config: StudyConfig, lists: dict[str, set[Any]], curves: bool, problems: Problems) -> None:
-    """Check the size of the dataset, which has a cell for each combination of labels."""
-    shown = " x ".join(f"{len(values)} {label}" for label, values in lists.items() if len(values) > 1)
+def check_labels(problems: Problems, path: Sequence[Key], lists: Mapping[str, set[Any]], further: str = "") -> int:
+    """Check the number of cells that labels have together, and return it."""
     cells = math.prod(map(len, lists.values()))
     if cells > MOST_CELLS:
-        most = f"a dataset has at most {MOST_CELLS}"
-        problems.add(
-            ("grids",),
-            f"{_counted(cells)} cells of all labels together ({shown}); {most}: {FEWER}; parameters that change "
-            "together are better drawn under 'samples'",
-        )
+        shown = " x ".join(f"{len(values)} {label}" for label, values in lists.items() if len(values) > 1)
+        most = f"a dataset has at most {MOST_CELLS}: {FEWER}{further}"
+        problems.add(path, f"{_counted(cells)} cells of all labels together ({shown}); {most}")
+    return cells
+
+
+def check_cells(config: StudyConfig, lists: dict[str, set[Any]], curves: bool, problems: Problems) -> None:
+    """Check the size of the dataset, which has a cell for each combination of labels."""
+    further = "; parameters that change together are better drawn under 'samples'"
+    cells = check_labels(problems, ("grids",), lists, further)
     if not cells:
         return  # a study of study kinds alone
     once = cells // len(lists["definition"]) // len(lists.get("stiffness_scale", "1"))

@@ -134,6 +134,7 @@ Points = Annotated[int, number(f"a whole number from 2 to {MOST_POINTS}, such as
 MeshType = Annotated[
     str, Scalar(str, {"type": "string", "examples": list(MESH_TYPES)}, "a mesh type such as 'structured'")
 ]
+MadeType = Annotated[str, one_of("mesh type", MESH_TYPES)]
 Load = Annotated[str, one_of("load", LOADS)]
 Plane = Annotated[str, one_of("plane", PLANES)]
 FurtherReference = Annotated[str, one_of("reference", FURTHER_REFERENCES)]
@@ -261,6 +262,7 @@ class Values(OneOrMore):
         return spaced(first, last, points, spacing)
 
 
+DefinitionNames = Annotated[list[DefinitionName], OneOrMore()]
 Lengths = Annotated[list[Length], Values("a length such as '5 mm'")]
 Forces = Annotated[list[Force], Values("a force such as '400 kN'")]
 Stresses = Annotated[list[Stress], Values("a stress such as '210 GPa'")]

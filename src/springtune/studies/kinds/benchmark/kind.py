@@ -19,7 +19,7 @@ from springtune.springs import DEFINITIONS
 from ...config.checks import check_able, check_known, check_particles, check_product, check_scene
 from ...config.fields import (
     BeamName,
-    DefinitionName,
+    DefinitionNames,
     Force,
     Length,
     Load,
@@ -62,9 +62,7 @@ class BenchmarkConfig(Section):
         description="Beam on which every case is solved once more: an approach is the quickest to an error only where "
         "it keeps that on both. None is called the quickest without.",
     )
-    definition: Annotated[list[DefinitionName], OneOrMore()] = Field(
-        description="Definitions that derive a stiffness and need no reference."
-    )
+    definition: DefinitionNames = Field(description="Definitions that derive a stiffness and need no reference.")
     mesh_type: Annotated[list[MeshType], OneOrMore()] = Field(description="Mesh types of the definitions.")
     approach: Annotated[list[OtherApproach], OneOrMore()] = Field(
         list(OTHER_APPROACHES),
@@ -126,8 +124,7 @@ def _check(config, problems):
         check_scene(problems, place, scene, config, in_benchmark, "is no load of the benchmark")
     check_able(problems, ("benchmark", "definition"), section.definition, "needs more than mesh and material;")
     for name in section.mesh_type:
-        if name not in MESH_TYPES:
-            problems.add(("benchmark", "mesh_type"), f"unknown mesh type '{name}'; {nearest(name, MESH_TYPES)}")
+        check_known(problems, ("benchmark", "mesh_type"), "mesh type", name, MESH_TYPES, None)
     approaches = approach_names(section.definition, section.mesh_type, section.approach)
     for name in section.finest_of:
         if name not in approaches:

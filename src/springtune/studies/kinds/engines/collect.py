@@ -8,12 +8,11 @@ from ...output.dataset import Filler, Group
 from ...runs.stages import results
 from . import RUN_ENDS, SETTING
 from .kind import STAGE
-from .outputs import divided
 
 NETWORK = ("scene", "definition")
 OF_A_RUN = (*NETWORK, "engine", *SETTING)
 
-COORDINATES = {
+RUN_COORDINATES = {
     "scene_beam": (("scene",), "1", "beam", ""),
     "scene_mesh_type": (("scene",), "1", "mesh type", ""),
     "scene_mesh_size": (("scene",), "m", "asked length of an edge", np.nan),
@@ -45,7 +44,7 @@ def _variables(cell):
         "definition_error": (NETWORK, "1", "error of the network in equilibrium: that of the definition", np.nan),
         "particles": (NETWORK, "1", "number of particles", np.nan),
         "engine_version": (("engine",), "1", "versions of what the engine needs, as it was run", ""),
-        **COORDINATES,
+        **RUN_COORDINATES,
     }  # fmt: skip
 
 
@@ -73,25 +72,25 @@ ENGINE_CURVES = Group("/engine_curves", _variables((*OF_A_RUN, "stiffness_factor
 
 def groups(study, folder):
     """Groups of a dataset, see `springtune.studies.kinds.scenes.collect.groups`."""
-    found = {task.of: (task.labels, result) for task, result in results(STAGE, study, folder)}
-    made = {}
-    for group, runs in zip((ENGINE_RUNS, ENGINE_CURVES), divided(found)):
-        if runs:
-            made[group.name] = _gathered(group, study, [(run, *found[run]) for run in runs])
+    found, made = [(task.of, result) for task, result in results(STAGE, study, folder)], {}
+    for group, of_curve in ((ENGINE_RUNS, False), (ENGINE_CURVES, True)):
+        own = [(run, result) for run, result in found if run.of_curve == of_curve]
+        if own:
+            made[group.name] = _gathered(group, study, own)
     return made
 
 
 def _gathered(group, study, found):
-    axes = {name: tuple(dict.fromkeys(labels[name] for _, labels, _ in found)) for name in ENGINE_DIMENSIONS}
+    axes = {name: tuple(dict.fromkeys(run.labels[name] for run, _ in found)) for name in ENGINE_DIMENSIONS}
     axes |= {name: tuple(sorted(axes[name])) for name in ("dt", "substeps", "iterations", "stiffness_factor")}
     filler, curves = Filler(group.empty(study.axes | axes)), defaultdict(list)
-    for run, labels, result in found:
+    for run, result in found:
         about = {f"scene_{name}": value for name, value in run.stated} | {"program": run.program}
-        filler.put({name: value for name, value in (result | about).items() if name in group.variables}, **labels)
-        curves[tuple(labels[name] for name in OF_A_RUN)].append((labels["stiffness_factor"], result))
+        filler.put({name: value for name, value in (result | about).items() if name in group.variables}, **run.labels)
+        curves[tuple(run.labels[name] for name in OF_A_RUN)].append((run.labels["stiffness_factor"], result))
     for setting, points in curves.items() if group is ENGINE_CURVES else ():
         filler.put(_best(points), **dict(zip(OF_A_RUN, setting)))
-    return filler.data.set_coords([*COORDINATES])
+    return filler.data.set_coords([*RUN_COORDINATES])
 
 
 def _best(points):

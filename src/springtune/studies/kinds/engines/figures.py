@@ -16,17 +16,8 @@ from .outputs import figures
 FRAME = 1 / 60
 """Time of motion that costs are given for [s]."""
 
-END_SIGNS = {"swings": "~", "moving": "→", "diverged": "!", "inverted": "↺"}
-"""Of runs that moved and have no error, on the map of settings."""
-
-NO_RUN = "∅"
-"""Of runs that did not begin or end."""
-
-PANELS_IN_ROW = 3
-"""Panels in a row."""
-
-NARROW = 5
-"""Largest over smallest best factor up to which their axis is not logarithmic."""
+END_SIGNS, NO_RUN = {"swings": "~", "moving": "→", "diverged": "!", "inverted": "↺"}, "∅"
+"""On the map of settings: of runs that moved and have no error, and of those that did not begin or end."""
 
 PLACE = {"left": 0.5, "right": 0.08, "bottom": 0.4, "top": 0.3}
 """Margins of a figure of one panel [inch]."""
@@ -34,14 +25,10 @@ PLACE = {"left": 0.5, "right": 0.08, "bottom": 0.4, "top": 0.3}
 
 def engines(tree):
     """Stem, function that plots, and selection of each figure."""
-    plots = {
-        "errors": plot_engine_errors,
-        "maps": plot_engine_maps,
-        "curves": plot_engine_curves,
-        "factors": plot_engine_factors,
-    }
-    there = [group(tree, name) if name in tree else None for name in ("engines", "engine_curves")]
-    scenes = [[] if data is None else labels_of(data.status != 0, "scene") for data in there]
+    every = plot_engine_errors, plot_engine_maps, plot_engine_curves, plot_engine_factors
+    plots = {plot.__name__.removeprefix("plot_engine_"): plot for plot in every}
+    names = "engines", "engine_curves"
+    scenes = [labels_of(group(tree, name).status != 0, "scene") if name in tree else [] for name in names]
     for stem, selection in figures(*scenes).items():
         yield stem, plots[stem.split("_")[1]], selection
 
@@ -76,7 +63,7 @@ def _lines(panel, points):
     """Draw a line a name: the ends of the lines."""
     ends = []
     for number, (name, one) in enumerate(points.items()):
-        x, y = np.array(sorted(set(one))).T
+        x, y = np.array(sorted(one.items())).T
         ends += labels.line(panel, x, y, style.line(number), name)
     return ends
 
@@ -139,9 +126,8 @@ def plot_engine_errors(data, ax=None, *, scene=None):
         if low < 1e3 * FRAME < high:
             panel.axvline(1e3 * FRAME, color="0.7", linewidth=0.9, zorder=0)
             said.insert(0, "right of the grey line: slower than real time")
-        errors = {row["definition"]: 100 * abs(float(case.definition_error.sel(definition=row["definition"])))
-                  for rows in runs.values() for row in rows}  # fmt: skip
-        known = {name: error for name, error in errors.items() if error > 0}  # NaN is not
+        errors = 100 * np.abs(case.definition_error.sel(definition=labels_of(case.status != 0, "definition")))
+        known = {name: error for name, error in errors.to_series().items() if error > 0}  # NaN is not
         for error in known.values():
             _across(panel, error, linestyle=(0, (1, 1.5)))
         if known:
@@ -189,10 +175,10 @@ def plot_engine_maps(data, ax=None, *, scene=None):
              if any(RUN_ENDS[row["engine_status"]] not in WITHOUT_RUN for row in rows)}  # fmt: skip
     why = "" if shown else f"Nothing was run: {lost}."
     ends = {RUN_ENDS[row["engine_status"]] for rows in shown.values() for row in rows if not np.isfinite(row["error"])}
+    said = [f"{sign} {end}" for end, sign in END_SIGNS.items() if end in ends]
+    said += [f"{NO_RUN} no run"] * bool(ends & {*WITHOUT_RUN})
     title = f"{case.scene.item()}, rows: frame [ms] / substeps; error [%], × displacement over the reference's"
-    for end, sign in END_SIGNS.items():
-        title += f", {sign} {end}" if end in ends else ""
-    title += f", {NO_RUN} no run" if ends & {*WITHOUT_RUN} else ""
+    title = ", ".join([title, *said])
     absent = ", ".join(name for name in runs if name not in shown)
     title += f"; not run: {absent}" if absent else ""
     height = 0.8 + 0.19 * max([3, *(len(_steps(rows)) for rows in shown.values())])
@@ -202,7 +188,7 @@ def plot_engine_maps(data, ax=None, *, scene=None):
             _map(panel, rows)
         return [], "", why
 
-    return labels.small_multiples(ax, shown or {"": []}, PANELS_IN_ROW, height, title, draw)
+    return labels.small_multiples(ax, shown or {"": []}, 3, height, title, draw)
 
 
 def _steps(rows):
@@ -268,10 +254,10 @@ def plot_engine_curves(data, ax=None, *, scene=None):
 
     def draw(panel, rows):
         panel.set(xlabel="Factor on what is typed", ylabel="Displacement / reference")
-        names, points = _varying(rows, SETTING) or ["iterations"], defaultdict(list)
+        names, points = _varying(rows, SETTING) or ["iterations"], defaultdict(dict)
         for row in rows:
             ratio = 1 + row["error"]
-            points[_setting(row, names)].append((row["stiffness_factor"], ratio if ratio > 0 else np.nan))
+            points[_setting(row, names)][row["stiffness_factor"]] = ratio if ratio > 0 else np.nan
             panel.plot(1, 1 + case.definition_error.sel(definition=row["definition"]), "k+", markersize=7, zorder=4)
         ends = _lines(panel, points)
         if ends:
@@ -281,7 +267,7 @@ def plot_engine_curves(data, ax=None, *, scene=None):
         return ends, "", why
 
     title = f"{case.scene.item()}, +: the network in equilibrium{'; not drawn: ' + lost if lost else ''}"
-    return labels.small_multiples(ax, shown or {"": []}, PANELS_IN_ROW, 2.1, title, draw, sharey=True)
+    return labels.small_multiples(ax, shown or {"": []}, 3, 2.1, title, draw, sharey=True)
 
 
 @style.styled
@@ -314,23 +300,22 @@ def plot_engine_factors(data, ax=None, *, scene=None):
     'Best factor on what is typed'
     """
     case, runs, lost = _runs(data, "engine_curves", scene)
-    every, points = [row for rows in runs.values() for row in rows], defaultdict(list)
+    every, points = [row for rows in runs.values() for row in rows], defaultdict(dict)
     for name, rows in runs.items():
         for row in rows:
             line = ", ".join(filter(None, (name, _setting(row, _varying(every, SETTING[:3])))))
-            points[line].append((row["iterations"], row["best_factor"]))
+            points[line][row["iterations"]] = row["best_factor"]
+    factors = [factor for one in points.values() for factor in one.values()]
     figure, axes = style.panels(ax, figsize=(style.COLUMN, 2.6))
     panel = axes[0, 0]
     ends = _lines(panel, points)
     panel.set(xlabel="Iterations", ylabel="Best factor on what is typed", title=case.scene.item())
     if ends:
-        best = [1.0, *(row["best_factor"] for row in every)]
-        wide = np.nanmax(best) > NARROW * np.nanmin(best)
+        wide = np.nanmax([1.0, *factors]) > 5 * np.nanmin([1.0, *factors])  # on a logarithmic axis
         panel.set(xscale="log", yscale="log" if wide else "linear")
         style.plain(panel, "x", *(["y"] if wide else []))
         _across(panel, 1)
-    curves = {(line, count): factor for line, several in points.items() for count, factor in several}
-    none = f"{np.isnan([*curves.values()]).sum()} of {len(curves)} curves have no such factor"
+    none = f"{np.isnan(factors).sum()} of {len(factors)} curves have no such factor"
     why = "" if ends else f"{none}{lost and ': '}{lost}."
     labels.finish(figure, axes, PLACE, {panel: (ends, fitted(panel, [none]), why)}, 2.6 if ax is None else 0.0)
     return panel

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from itertools import product
-from math import prod
 from typing import Annotated
 
 from pydantic import Field
@@ -12,7 +11,6 @@ from springtune.mesh import MESH_TYPES
 from springtune.problem.geometry import Beam
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import Material
-from springtune.problem.quantities import nearest
 from springtune.registry import imported
 from springtune.springs import DEFINITIONS
 from springtune.springs.lattice import COEFFICIENT
@@ -32,29 +30,14 @@ MOST_ENGINE_RUNS = 10_000
 OF_RUNS = ("definition", "engine", *SETTING, "stiffness_factor")
 """What a set of runs lists values of, besides scenes."""
 
-OF_STUDY = ("scene", "of_curve", "program", "stated")
-"""What a run's result does not depend on."""
-
 OWN_PRECISION = "own"
 """The first precision of each engine."""
 
 
-def _read_frame(value: str) -> float:
-    above, slash, below = value.strip().removesuffix("s").strip().partition("/")
-    if slash and above.isdecimal() and below.isdecimal() and int(above) and int(below):
-        return int(above) / int(below)
-    found: float = fields.quantity("time").read(value)
-    return found
-
-
-_WHOLE = number("a whole number from 1 to 100000, such as 10", 1, 100_000, whole=True)
-Count = Annotated[int, _WHOLE]
+Count = Annotated[int, number("a whole number from 1 to 100000, such as 10", 1, 100_000, whole=True)]
 Distance = Annotated[float, number("a number up to 0.01, such as 0.0001", 0, 0.01, above=True)]
 EngineName = Annotated[str, Scalar(str, {"type": "string", "examples": ["xpbd"]}, "an engine such as 'xpbd'")]
-FrameTime = Annotated[
-    float, Scalar(_read_frame, {"type": "string", "examples": ["1/60 s"]}, "a time such as '1/60 s' or '5 ms'")
-]
-MadeType = Annotated[str, one_of("mesh type", MESH_TYPES)]
+FrameTime = Annotated[float, fields.quantity("time")]
 Precision = Annotated[str, one_of("precision", (OWN_PRECISION, *PRECISIONS))]
 SceneName = Annotated[str, Scalar(str, {"type": "string"}, "the name of a scene")]
 
@@ -63,7 +46,7 @@ class EngineSceneConfig(Section):
     """A scene that is run in engines."""
 
     beam: fields.BeamName = Field(description="Beam.")
-    mesh_type: MadeType = default("right", description="Generated mesh type.")
+    mesh_type: fields.MadeType = default("right", description="Generated mesh type.")
     mesh_size: fields.Length = Field(description="Length of an edge.")
     material: fields.MaterialName = Field(description="Material, with a density.")
     load: fields.Load = Field(description="Load whose forces keep their direction.")
@@ -74,9 +57,8 @@ class EngineRunsConfig(Section):
     """Runs in engines: every combination of the values listed, as in a grid."""
 
     scene: Annotated[list[SceneName], OneOrMore()] | None = Field(None, description="Scenes; all of them without.")
-    definition: Annotated[list[fields.DefinitionName], OneOrMore()] = Field(
-        description="Definitions that derive a stiffness and need no reference. An engine that lacks an energy of one "
-        "refuses it, in a hole that says so."
+    definition: fields.DefinitionNames = Field(
+        description="Definitions that need no reference. One whose energy an engine lacks is a hole that says so."
     )
     engine: Annotated[list[EngineName], OneOrMore()] = Field(
         description="Engines, keys of `springtune.ENGINES`. One that is not installed is a hole that says how it is."
@@ -85,14 +67,12 @@ class EngineRunsConfig(Section):
         "10", description="Iterations of the engine's solver in a step; 1 where an engine has none."
     )
     substeps: Annotated[list[Count], OneOrMore()] = default("1", description="Steps of a frame.")
-    dt: Annotated[list[FrameTime], OneOrMore()] = default("1/60 s", description="Time of a frame.")
+    dt: Annotated[list[FrameTime], OneOrMore()] = default("1/60 s", description="Time of a frame, such as 1/60 s.")
     precision: Annotated[list[Precision], OneOrMore()] = default(
         OWN_PRECISION, description="Floating-point numbers; `own` is what an engine has by itself."
     )
     stiffness_factor: fields.Ratios = default(
-        "1",
-        description="Factors on all stiffnesses that are typed; several give a sensitivity curve in the engine, and "
-        "the factor at which its displacement is right.",
+        "1", description="Factors on what is typed; several give a sensitivity curve in the engine, and the right one."
     )
 
 
@@ -105,27 +85,18 @@ class EnginesConfig(Section):
     )
     frames: Count | None = Field(None, description="Most frames of a run; by default as many as its motion needs.")
     tolerance: Distance | None = Field(
-        None,
-        description="Distance from rest at which a run ends, over its displacement; by default 1e-7, and 1e-4 in "
-        "single precision.",
+        None, description="Distance from rest over its displacement that ends a run; 1e-7, in single precision 1e-4."
     )
 
 
 @dataclass(frozen=True)
 class EngineRun:
-    """A scene in an engine at a setting; `dt` is the time of a frame [s].
+    """A scene in an engine; `labels` are those of its cell, with the time of a frame [s].
 
     Runs `of_curve` have factors on what is typed.
     """
 
-    scene: str
-    definition: str
-    engine: str
-    precision: str
-    dt: float
-    substeps: int
-    iterations: int
-    stiffness_factor: float
+    labels: dict[str, str | float]
     of_curve: bool
     program: str
     stated: EngineSceneConfig
@@ -147,10 +118,9 @@ def _check(config, problems):
         checks.check_scene(problems, place, scene, config, lambda load: not LOADS[load].follower, why)
         checks.check_made(problems, (*place, "mesh_size"), scene.mesh_type, scene.mesh_size, scene.beam, config)
     for name, runs in section.runs.items():
-        place, engines = ("engines", "runs", name), _engines()
+        place = "engines", "runs", name
         for engine in runs.engine:
-            if engine not in engines:
-                problems.add((*place, "engine"), f"unknown engine '{engine}'; {nearest(engine, engines)}")
+            checks.check_known(problems, (*place, "engine"), "engine", engine, _engines(), None)
         for one in runs.scene or section.scenes:
             checks.check_known(problems, (*place, "scene"), "scene", one, section.scenes, "engines.scenes")
             if one in section.scenes:
@@ -159,11 +129,8 @@ def _check(config, problems):
                 why = f"needs a reference or a stated stiffness, or other cells or loads than scene '{one}' has;"
                 checks.check_able(problems, (*place, "definition"), runs.definition, why, corners, uniaxial)
         checks.check_product(problems, runs, place, OF_RUNS, MOST_ENGINE_RUNS)
-    lists = [{value for runs in section.runs.values() for value in getattr(runs, name)} for name in OF_RUNS]
-    cells = len(section.scenes) * prod(map(len, lists))
-    if cells > checks.MOST_CELLS:
-        message = f"{cells:.3g} cells of all labels together; a dataset has at most {checks.MOST_CELLS}: {checks.FEWER}"
-        problems.add(("engines", "runs"), message)
+    lists = {name: {value for runs in section.runs.values() for value in getattr(runs, name)} for name in OF_RUNS}
+    checks.check_labels(problems, ("engines", "runs"), lists | {"scene": {*section.scenes}})
 
 
 def _expand(config, declared):
@@ -172,18 +139,19 @@ def _expand(config, declared):
     for runs in section.runs.values():
         names = product(runs.scene or section.scenes, runs.definition, runs.engine)
         settings = product(runs.precision, runs.dt, runs.substeps, runs.iterations, runs.stiffness_factor)
-        for labels, (precision, dt, substeps, iterations, factor) in product(names, settings):
-            stated, engine = section.scenes[labels[0]], engines[labels[-1]]
+        for of, (precision, dt, substeps, iterations, factor) in product(names, settings):
+            stated, engine, of_curve = section.scenes[of[0]], engines[of[-1]], runs.stiffness_factor != [1.0]
             precision = engine.precisions[0] if precision == OWN_PRECISION else precision
-            how = precision, dt, substeps, iterations if engine.iterates else 1, factor, runs.stiffness_factor != [1.0]
-            of = engine.program, stated, declared.beams[stated.beam], declared.materials[stated.material]
-            place = *(order.index(label) for order, label in zip(orders, labels)), *how
-            found[place] = EngineRun(*labels, *how, *of, section.frames, section.tolerance)
+            how = precision, dt, substeps, iterations if engine.iterates else 1, factor
+            labels = dict(zip(("scene", *OF_RUNS), (*of, *how)))
+            bodies = declared.beams[stated.beam], declared.materials[stated.material]
+            run = EngineRun(labels, of_curve, engine.program, stated, *bodies, section.frames, section.tolerance)
+            found[*(order.index(name) for order, name in zip(orders, of)), *how, of_curve] = run
     return tuple(found[place] for place in sorted(found))
 
 
 def _summary(runs):
-    engines = dict.fromkeys(run.engine for run in runs)
+    engines = dict.fromkeys(run.labels["engine"] for run in runs)
     absent = [name for name in engines if _engines()[name].absent]
     told = f"; not installed: {', '.join(absent)}" if absent else ""
     return [["engines", len(runs), f"runs in {', '.join(engines)}{told}"]]
@@ -198,15 +166,16 @@ def _version(engine):
 def _tasks(study):
     """Runs of an engine follow each other in one job, since their seconds are measured."""
     for run in study.parts["engines"]:
-        engine = _engines()[run.engine]
-        values = dict(run.stated) | {name: value for name, value in vars(run).items() if name not in OF_STUDY}
+        labels, mesh_size = run.labels, run.stated.mesh_size
+        engine = _engines()[labels["engine"]]
+        values = {name: value for name, value in labels.items() if name != "scene"} | dict(run.stated)
         values |= {"beam": beam_key(run.beam), "material": material_key(run.material, density=True)}
-        values["engine_version"] = _version(engine)
-        also = mesh_type_key(run.stated.mesh_type), definition_key(run.definition), declared_key(engine)
-        particles = run.beam.length * run.beam.height / (COEFFICIENT * run.stated.mesh_size**2)
+        values |= {"engine_version": _version(engine), "frames": run.frames, "tolerance": run.tolerance}
+        also = mesh_type_key(run.stated.mesh_type), definition_key(labels["definition"]), declared_key(engine)
+        particles = run.beam.length * run.beam.height / (COEFFICIENT * mesh_size**2)
         name = f"engines {run.program.lower()}"
-        cost = name if name in COSTS else "engines", run.substeps * run.iterations * particles
-        yield Task(values, also, {name: getattr(run, name) for name in ("scene", *OF_RUNS)}, run, [cost], run.engine)
+        cost = name if name in COSTS else "engines", labels["substeps"] * labels["iterations"] * particles
+        yield Task(values, also, labels, run, [cost], engine.name)
 
 
 COSTS = {
@@ -221,15 +190,14 @@ STAGE = stage("engines", "studies.kinds.engines.solve", "Running scenes in engin
 
 KIND = Kind(
     "engines",
-    study_fields={"engines": optional(EnginesConfig, "Scenes in engines; they make the groups `/engines` and "
-                                      "`/engine_curves`.")},
+    study_fields={"engines": optional(EnginesConfig, "Scenes in engines: groups `/engines` and `/engine_curves`.")},
     check=_check,
     expand=_expand,
-    axes=lambda runs: {"definition": {run.definition for run in runs}},
+    axes=lambda runs: {"definition": {run.labels["definition"] for run in runs}},
     summary=_summary,
     stages=(STAGE,),
     outputs=OUTPUTS,
     tables=lambda study: ["engines"] if study.parts["engines"] else [],
     tables_by="outputs",
     costs=COSTS,
-)  # fmt: skip
+)

@@ -16,17 +16,15 @@ def figures(scenes: Iterable[object], curves: Iterable[object]) -> dict[str, dic
     return {f"engines_{name}_{scene}": {"scene": scene} for name, own in shown.items() for scene in dict.fromkeys(own)}
 
 
-def divided(runs: Iterable[Any]) -> tuple[list[Any], list[Any]]:
-    """Runs with what is typed as it is, and those of curves."""
-    runs = list(runs)
-    return [run for run in runs if not run.of_curve], [run for run in runs if run.of_curve]
+def _scenes(runs: Iterable[Any]) -> list[list[object]]:
+    return [[run.labels["scene"] for run in runs if run.of_curve is curves] for curves in (False, True)]
 
 
 OUTPUTS = (
     Output(
         "engines",
         "figures of scenes in engines: error over the time of a frame, maps of settings, sensitivity curves",
-        figures=lambda study: figures(*([run.scene for run in own] for own in divided(study.parts["engines"]))),
+        figures=lambda study: figures(*_scenes(study.parts["engines"])),
         plot="studies.kinds.engines.figures:engines",
         lack=needs("engines", "shows scenes in engines and the study has none; add a section 'engines'"),
     ),
@@ -79,12 +77,9 @@ def tables(tree: "xr.DataTree") -> list[dict[str, Any]]:
         return []
     data = tree["engines"].to_dataset()
     rows = []
-    for one in records(data, data.status != 0, [*{*ENGINE_COLUMNS, "message", "engine_status"} & {*data.data_vars}]):
+    for one in records(data, data.status != 0, [*ENGINE_COLUMNS, "message", "engine_status"]):
         row = {name: one[name] for name in ("scene", "definition", "engine", "precision", "substeps", "iterations")}
-        row |= {column: factor * one[name] for name, (column, factor) in ENGINE_COLUMNS.items() if name in one}
+        row |= {column: factor * one[name] for name, (column, factor) in ENGINE_COLUMNS.items()}
         rows.append(row | {"end": RUN_ENDS[one["engine_status"]], "why": one["message"]})
-    note = (
-        "Displacement of the load where it rests in an engine, beside finite elements. The error is that of the "
-        "definition, which its network has in equilibrium, and what the engine's solver adds at this setting."
-    )
+    note = "Where the load rests, beside finite elements: errors of the definition, in equilibrium, and of the solver."
     return [{"stem": "engines", "title": "Scenes in engines", "note": note, "rows": rows}]

@@ -14,12 +14,6 @@ from springtune.scene.single import Scene
 
 from . import RUN_ENDS, SETTING
 
-OUR_PROGRAM = "springtune"
-"""Program of the engines whose errors are errors of this package."""
-
-OF_THE_SCENE = ("mesh_type", "mesh_size", "load", "force", "definition")
-"""Values of a task that its scene depends on, besides beam and material."""
-
 
 def failed(task, why, end="failed"):
     """Result of a run that did not begin, or did not end by itself."""
@@ -28,18 +22,16 @@ def failed(task, why, end="failed"):
 
 def solve(task):
     """Result of a run; what an engine refuses, or fails in, is a hole with a reason."""
-    body = Beam(**task["beam"]), material_of(task["material"])
-    scene, known, objection = _scene(*body, *(task[name] for name in OF_THE_SCENE))
+    of = (task[name] for name in ("mesh_type", "mesh_size", "load", "force", "definition"))
+    scene, known, objection = _scene(Beam(**task["beam"]), material_of(task["material"]), *of)
     engine, how = ENGINES[task["engine"]], {name: task[name] for name in (*SETTING, "frames", "tolerance")}
     try:
         found = in_engine(scene, engine.name, factor=task["stiffness_factor"], **how)
     except EngineError as error:
         end = "absent" if isinstance(error, EngineAbsentError) else "refused"
         return known | failed(task, str(error), end)
-    except MemoryError:
-        raise
     except Exception as error:  # a program of others may raise anything, and other runs go on
-        if engine.program == OUR_PROGRAM:
+        if engine.program == "springtune" or isinstance(error, MemoryError):
             raise
         return known | failed(task, f"{engine.name}: {type(error).__name__}: {error}")
     result = known | {

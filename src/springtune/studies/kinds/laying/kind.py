@@ -11,7 +11,7 @@ from springtune.problem.materials import Material
 from springtune.springs import DEFINITIONS
 
 from ...config.checks import check_beam_material, check_for_triangles, check_known, check_particles, check_product
-from ...config.fields import BeamName, DefinitionName, Length, MaterialName, OneOrMore, Stress, number, one_of
+from ...config.fields import BeamName, DefinitionNames, Length, MaterialName, OneOrMore, Stress, number, one_of
 from ...config.kind import Kind
 from ...config.sections import Section, default, optional
 from ...runs.keys import definition_key, material_key, mesh_type_key
@@ -52,9 +52,7 @@ class LayingConfig(Section):
     support: MaterialName = Field(
         description="Material of the trapezoid, which is rigid from 1e4 times the strip's modulus on."
     )
-    definition: Annotated[list[DefinitionName], OneOrMore()] = Field(
-        description="Definitions that derive a stiffness and need no reference."
-    )
+    definition: DefinitionNames = Field(description="Definitions that derive a stiffness and need no reference.")
     mesh_size: Annotated[list[Length], OneOrMore()] = Field(description="Lengths of an edge.")
     reference_size: Length = default("1 mm", description="Length of an edge of the reference's finest mesh.")
     loading: Annotated[list[Loading], OneOrMore()] = default(

@@ -17,14 +17,14 @@ from springtune.springs import DEFINITIONS
 from ...config.checks import check_able, check_beam_material, check_compressible, check_known, check_made
 from ...config.fields import (
     BeamName,
-    DefinitionName,
+    DefinitionNames,
     Force,
     Kinematics,
     Length,
     Load,
+    MadeType,
     MaterialName,
     Named,
-    OneOrMore,
     Scalar,
     number,
     one_of,
@@ -73,7 +73,6 @@ ENDS = {
 }
 """How the ends of each parameter are read."""
 
-MadeType = Annotated[str, one_of("mesh type", MESH_TYPES)]
 ParameterName = Annotated[str, one_of("parameter", VARIED)]
 Spacing = Annotated[str, one_of("spacing", SPACINGS)]
 
@@ -92,9 +91,7 @@ class RefinementConfig(Section):
     material: MaterialName = Field(description="Material.")
     load: Load = Field(description="Load.")
     force: Force | None = Field(None, description="Magnitude; required unless it is the parameter.")
-    definition: Annotated[list[DefinitionName], OneOrMore()] = Field(
-        description="Definitions that derive a stiffness and need no reference."
-    )
+    definition: DefinitionNames = Field(description="Definitions that derive a stiffness and need no reference.")
     kinematics: Kinematics = default("nonlinear", description="Kinematics of the network.")
     parameter: ParameterName = Field(description="Parameter to vary: " + "; ".join(
         f"`{name}`, {one.meaning}" for name, one in VARIED.items()) + ".")  # fmt: skip

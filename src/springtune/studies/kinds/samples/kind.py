@@ -16,7 +16,7 @@ from springtune.problem.quantities import LEAST, nearest
 from springtune.springs import DEFINITIONS
 
 from ...config.checks import MORE_SCENES, check_able, in_mm, most_scenes
-from ...config.fields import DefinitionName, Flag, Kinematics, Load, OneOrMore, Scalar, number, one_of, quantity
+from ...config.fields import DefinitionNames, Flag, Kinematics, Load, OneOrMore, Scalar, number, one_of, quantity
 from ...config.kind import Kind
 from ...config.messages import refuse, show
 from ...config.sections import Section, default, optional
@@ -225,9 +225,7 @@ class SamplesConfig(Section):
     seed: Seed = default("1", description="Seed of the random numbers.")
     mesh_type: MadeType = default("structured", description="Generated mesh type.")
     load: Annotated[list[Load], OneOrMore()] = Field(description="Loads; each acts on every point's scene.")
-    definition: Annotated[list[DefinitionName], OneOrMore()] = Field(
-        description="Definitions that need no reference and no stated stiffness."
-    )
+    definition: DefinitionNames = Field(description="Definitions that need no reference and no stated stiffness.")
     kinematics: Kinematics = default(
         "linear",
         description="`linear` solves scenes once that differ in thickness, Young's modulus and force alone; "

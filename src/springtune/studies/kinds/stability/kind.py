@@ -8,7 +8,7 @@ from pydantic import Field
 from springtune.mesh import MESH_TYPES
 
 from ...config.checks import check_beam_material, check_density, check_for_triangles, check_known, check_particles
-from ...config.fields import BeamName, DefinitionName, Force, Length, MaterialName, MeshType, OneOrMore, one_of
+from ...config.fields import BeamName, DefinitionNames, Force, Length, MaterialName, MeshType, OneOrMore, one_of
 from ...config.kind import Kind
 from ...config.sections import Section, default, optional
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key
@@ -25,7 +25,7 @@ class StabilityConfig(Section):
     beam: BeamName = Field(description="Beam.")
     material: MaterialName = Field(description="Material, with a density.")
     force: Force = Field(description="Traction on the right end.")
-    definition: Annotated[list[DefinitionName], OneOrMore()] = Field(
+    definition: DefinitionNames = Field(
         description="Definitions that derive a stiffness and need no reference; the first one stands for all where an "
         "experiment is not about definitions."
     )
