@@ -62,6 +62,8 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Springs found by a search over 15 loads and the field inside, none negative: a limit to compare with, slow.
 
     Raises DefinitionError on quadrilaterals and on meshes of several parts.
+
+    Source: own rule (derived).
     """
     space = LoadSpace(mesh, material.poisson_ratio)
     start = van_gelder.springs(mesh, material, thickness).relative
