@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 
 import springtune as st
-from springtune.handover.terms import terms_of
 from springtune.handover.simulation import WORDS
+from springtune.handover.terms import terms_of
 from springtune.linalg.factors import SingularError
 from springtune.mesh import lattice
 from springtune.mesh.bonds import bonded
