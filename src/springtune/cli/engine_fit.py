@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ..engines.calibration import EngineFit
     from ..handover.net import SpringNet
 
-OPTIONS: dict[str, dict[str, Any]] = {
+OF_ENGINES: dict[str, dict[str, Any]] = {
     "engine": {"shell_complete": names_from("engines.base:ENGINES"), "help": "Engine to calibrate to, such as xpbd."},
     "dt": {"help": "Time that a frame advances, such as 1/60 or '5 ms'.  [default: 1/60]"},
     "substeps": {"type": int, "help": "Steps of a frame.  [default: 1]"},
@@ -38,7 +38,7 @@ FOUND = ("substeps", "iterations", "size", "definition")
 
 
 class EngineOptions(dict[str, Any]):
-    """Values of `OPTIONS`, None where not given."""
+    """Values of `OF_ENGINES`, None where not given."""
 
     def check(self, sheet: SheetOptions, error: str | None) -> None:
         """Refuse options that are not for each other."""
@@ -70,9 +70,9 @@ def engine_options(command: AnyCommand) -> AnyCommand:
 
     @wraps(command)
     def call(*args: Any, **given: Any) -> None:
-        command(*args, engine=EngineOptions({name: given.pop(name) for name in OPTIONS}), **given)
+        command(*args, engine=EngineOptions({name: given.pop(name) for name in OF_ENGINES}), **given)
 
-    return reduce(lambda made, name: click.option(f"--{name}", **OPTIONS[name])(made), reversed(OPTIONS), call)
+    return reduce(lambda made, name: click.option(f"--{name}", **OF_ENGINES[name])(made), reversed(OF_ENGINES), call)
 
 
 def fitted(
