@@ -9,10 +9,11 @@ from click.testing import CliRunner
 
 import springtune as st
 from springtune.cli import main
+from springtune.cli.study import template_text
 from springtune.problem.rubber import TestDataError
 from springtune.reference.by_constants import ENTRIES, Family
 from springtune.reference.shapes import solve_shape
-from springtune.scene.identify import Model, fit, half_intervals, undetermined
+from springtune.scene.identify import Model
 from springtune.scene.measured import blocks, stated
 
 BEAM = st.Beam("100 mm", "20 mm")
@@ -38,8 +39,8 @@ def curve(path, material, load="traction", noise=0.0, seed=0, angle=0.0):
     write(path, "force [N],displacement [um]", [0.0, 1.0], [0.0, 1.0])
     shape, case, _ = stated(st.MeasuredTest(BEAM, load, path))
     turned = material.rotated(angle) if angle else material
-    family = Family(shape, case, {"": turned}, None)
-    moved = family.solve(np.array([turned.plane_stress[one] for one in ENTRIES]), np.eye(6))[0]
+    family = Family(shape, case, None, {"": turned})
+    moved = family.solve(np.array([[turned.plane_stress[one]] for one in ENTRIES]))[0][:, 0]
     across = family.mean("gauge-2", 1) - family.mean("gauge-1", 1)
     clean = np.stack([np.outer(FORCES, row @ moved) for row in (family.forces[None], across[None])])[:, :, 0]
     along, width = clean + np.random.default_rng(seed).normal(0.0, noise or 1e-12, clean.shape) + 3e-6
@@ -65,12 +66,12 @@ def within(found, **expected):
 def test_derivatives_by_constants_are_those_of_differences():
     case = CORE.loads["pull"]
     materials = {"": st.Material("2 GPa", 0.3), "core": st.Material("9 GPa", 0.2)}
-    family = Family(CORE, case, materials, None)
+    family = Family(CORE, case, None, materials)
     constants = np.array([one.plane_stress[entry] for one in materials.values() for entry in ENTRIES])
     directions = np.random.default_rng(0).normal(size=(len(constants), 3)) * 1e9
-    moved, slopes, _ = family.solve(constants, directions)
-    for slope, direction in zip(slopes.T, directions.T):
-        ahead, behind = (family.solve(constants + sign * 1e-5 * direction, directions)[0] for sign in (1, -1))
+    moved, *slopes = family.solve(np.column_stack([constants, directions]))[0].T
+    for slope, direction in zip(slopes, directions.T):
+        ahead, behind = (family.solve((constants + sign * 1e-5 * direction)[:, None])[0][:, 0] for sign in (1, -1))
         np.testing.assert_allclose((ahead - behind) / 2e-5, slope, rtol=1e-6, atol=1e-6 * np.abs(slope).max())
     points = np.array([[0.03, 0.015], [0.05, 0.02], [0.02, 0.007]])
     rows, apart = family.at(points)
@@ -150,17 +151,17 @@ def test_estimates_lie_within_their_intervals_as_often_as_they_say(tmp_path):
     file = curve(tmp_path / "c.csv", material)
     test = st.MeasuredTest(BEAM, "traction", file)
     shape, case, _ = stated(test)
-    family = Family(shape, case, {"": material}, None)
-    found = list(blocks(test, family, case))
-    model, random = Model(("E", "nu"), [(family, found, 0.0)]), np.random.default_rng(32)
-    true, clean, inside = np.array([np.log(3e9), 0.35]), [block.values.copy() for block in found], np.zeros(2)
+    family = Family(shape, case, None, {"": material})
+    found = blocks(test, family, case)
+    model, random = Model([(family, found, 0.0)]), np.random.default_rng(32)
+    clean, inside = [block.values.copy() for block in found], np.zeros(2)
     for _ in range(200):
         for block, values in zip(found, clean):
             block.values[:] = values + random.normal(0.0, 2e-6, values.shape)
-        start, free = np.array([np.log(2e9), 0.3]), np.ones(2, dtype=bool)
-        assert undetermined(model, start, free) == ()
-        unknowns, _, slopes, _, freedom = fit(model, start, free)
-        inside += np.abs(unknowns - true) < half_intervals(slopes, freedom)
+        start = {"E": 2e9, "nu": 0.3}
+        assert model.undetermined(start, list(start)) == []
+        constants, _, _, half = model.fit(start, list(start))
+        inside += np.abs([np.log(constants["E"] / 3e9), constants["nu"] - 0.35]) < half
     # A binomial count of 200 with a share of .95 is within these bounds with a probability of 99.9 %.
     assert (180 <= inside).all() and (inside <= 199).all(), inside
 
@@ -211,11 +212,26 @@ def test_the_command_writes_a_study_that_loads(tmp_path, monkeypatch):
     assert len(st.load_study("mine.yaml").scenes) == 2
 
 
+def test_a_study_of_rubber_has_a_small_force(tmp_path):
+    made = tmp_path / "mine.yaml"
+    call = ["identify", "config/treloar/uniaxial.csv", "--law", "yeoh", "--beam", "60x30", "--write", str(made)]
+    assert CliRunner().invoke(main, call).exit_code == 0
+    study = st.load_study(made)
+    assert {scene.force for scene in study.scenes} == {1.0} and study.axes["beam"] == ("60x30",)
+    assert study.materials["rubber"].coefficients == st.fit_rubber("config/treloar/uniaxial.csv").coefficients
+
+
 CALLS = {
     ("c.csv",): (2, "--load: a test needs a body"),
     ("c.csv", "--beam", "100x20", "--load", "trction"): (2, "--load: 'trction' is unknown"),
     ("c.csv", "--beam", "100x20", "--load", "traction", "--known", "mu=1"): (2, "--known: 'mu' is no constant"),
     ("c.csv", "--beam", "100x20", "--load", "traction", "--plot", "r.txt"): (2, "--plot: 'r.txt' has another ending"),
+    ("c.csv", "--beam", "100x20", "--load", "traction", "--known", "nu=x"): (2, "--known: nu is 'x'; give a number"),
+    ("c.csv", "--shape", "strain.yaml", "--load", "pull"): (
+        2,
+        "--shape: strain.yaml: material 'steel' is in plane str",
+    ),
+    ("c.csv", "--beam", "100x20", "--load", "traction", "--plot", "no/r.png"): (1, "folder no does not exist; make it"),
     ("none.yaml",): (1, "none.yaml: is no list of tests"),
     ("none.csv", "--beam", "100x20", "--load", "traction"): (1, "'none.csv' cannot be read"),
 }
@@ -225,6 +241,9 @@ CALLS = {
 def test_a_wrong_call_says_what_to_give(tmp_path, monkeypatch, arguments):
     monkeypatch.chdir(tmp_path)
     Path("c.csv").write_text("force [N],displacement [um]\n0,0\n1,1\n2,2.1\n")
+    Path("strain.yaml").write_text(
+        template_text(Path("x"), "shape").replace("ratio: 0.3}", "ratio: 0.3, plane: strain}")
+    )
     code, message = CALLS[arguments]
     made = CliRunner().invoke(main, ["identify", *arguments, *(() if "--plot" in arguments else ("--write", "m.yaml"))])
     assert (made.exit_code, Path("m.yaml").exists()) == (code, False), made.output

@@ -180,11 +180,11 @@ def test_a_test_over_strain_is_that_over_stretch(tmp_path, head, unit):
         ("strain,stress [MPa]\n0,0\n10,0.2\n20,0.3\n50,0.4\n", "name the column 'stretch' or 'strain [%]'"),
         ("stretch,stress [MPa]\n0.1,0.2\n0.2,0.3\n0.5,0.4\n", "or name the column 'strain'"),
         ("stretch,stress [mm]\n1.1,0.2\n", "nominal stress"),
-        (HEAD + "1.1,0.2\n1.2,zwei\n", "line 3: '1.2,zwei' is not two numbers"),
+        (HEAD + "1.1,0.2\n1.2,zwei\n", "line 3, column 'nominal stress [MPa]': 'zwei' is no finite number"),
         (HEAD + "1.1,0.2\n1.2,0.3,7\n", "line 3"),
         (HEAD + "1.1,0.2\n1.2,0.3\n", "fewer than three stretches"),
         (HEAD + "0.1,0.2\n0.2,0.3\n0.3,0.4\n", "over stretch (1 plus strain)"),
-        (HEAD + "1.1,nan\n1.2,0.3\n1.3,.4\n", "no number"),
+        (HEAD + "1.1,nan\n1.2,0.3\n1.3,.4\n", "'nan' is no finite number"),
         (HEAD + "1.1,0.2\n1.5,2\n2,0.5\n3,1\n4,0.3\n5,3\n6,0.01\n", "unstable"),
     ],
 )

@@ -94,7 +94,7 @@ def test_a_plan_takes_as_many_calls_a_scene_whatever_their_number(study_of):
     counts = [calls(partial(planned, study_of(forces))) for forces in (10, 20, 40)]
     # Twice the scenes added take twice the calls, and some more of a few further bundles.
     assert (counts[2] - counts[1]) / (counts[1] - counts[0]) == pytest.approx(2, rel=0.1)
-    assert (counts[2] - counts[1]) / (16 * 20) < 150
+    assert (counts[2] - counts[1]) / (16 * 20) < 50
 
 
 def test_a_key_is_made_once_a_scene_and_a_file_opened_once_a_mesh(tool, study_of):

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ..engines.calibration import EngineFit
     from ..handover.net import SpringNet
 
-OF_ENGINES: dict[str, dict[str, Any]] = {
+ENGINE_OPTIONS: dict[str, dict[str, Any]] = {
     "engine": {"shell_complete": names_from("engines.base:ENGINES"), "help": "Engine to calibrate to, such as xpbd."},
     "dt": {"help": "Time that a frame advances, such as 1/60 or '5 ms'.  [default: 1/60]"},
     "substeps": {"type": int, "help": "Steps of a frame.  [default: 1]"},
@@ -38,7 +38,7 @@ FOUND = ("substeps", "iterations", "size", "definition")
 
 
 class EngineOptions(dict[str, Any]):
-    """Values of `OF_ENGINES`, None where not given."""
+    """Values of `ENGINE_OPTIONS`, None where not given."""
 
     def check(self, sheet: SheetOptions, error: str | None) -> None:
         """Refuse options that are not for each other."""
@@ -70,9 +70,11 @@ def engine_options(command: AnyCommand) -> AnyCommand:
 
     @wraps(command)
     def call(*args: Any, **given: Any) -> None:
-        command(*args, engine=EngineOptions({name: given.pop(name) for name in OF_ENGINES}), **given)
+        command(*args, engine=EngineOptions({name: given.pop(name) for name in ENGINE_OPTIONS}), **given)
 
-    return reduce(lambda made, name: click.option(f"--{name}", **OF_ENGINES[name])(made), reversed(OF_ENGINES), call)
+    return reduce(
+        lambda made, name: click.option(f"--{name}", **ENGINE_OPTIONS[name])(made), reversed(ENGINE_OPTIONS), call
+    )
 
 
 def fitted(

@@ -9,18 +9,17 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from . import WrongCall, examples
+from . import examples
 from .options import asked_beam, refusals, shape_of_study
 
 if TYPE_CHECKING:
-    from ..problem.materials import AnyMaterial
     from ..scene.identify import Identified
     from ..scene.measured import MeasuredTest
 
-ARGUMENT = re.compile("^(?=(law|known|load|force|scale|angle|noise):)")
+ARGUMENT = re.compile("^(?=(law|known|load|force|angle|noise):)")
 """Begin of messages with the name of an argument, which is an option here."""
 
-KEYS = ("beam", "thickness", "shape", "load", "force", "scale", "angle", "noise", "shift", "file")
+KEYS = ("beam", "thickness", "shape", "load", "force", "angle", "noise", "shift", "file")
 """Keys of a test in a list of tests; all but the file are options, too."""
 
 
@@ -40,7 +39,6 @@ KEYS = ("beam", "thickness", "shape", "load", "force", "scale", "angle", "noise"
 @click.option("--thickness", default="1 mm", show_default=True, help="Thickness of a beam.")
 @click.option("--load", help="Load of the beam, or load case of the shape: what is held and which side is loaded.")
 @click.option("--force", help="Force on a beam at which a field was measured, such as '400 N'.")
-@click.option("--scale", type=float, default=1.0, help="Factor on the load case at which a shape's field was measured.")
 @click.option("--angle", default="0 deg", help="Angle of the material's first axis from x.")
 @click.option("--noise", help="Noise of the displacements, such as '1 um'; estimated without.")
 @click.option("--shift/--no-shift", default=True, help="Remove the rigid motion of fields, and the zero of curves.")
@@ -54,47 +52,44 @@ def identify(
     FILES are CSV files of one test, or YAML files with a list of tests, whose keys are the options and 'file'. Columns
     have units in their heads, such as 'force [N],displacement [mm]' or 'x [mm],y [mm],u [um],v [um]'.
     """
+    from ..safe_io.atomic import check_folder, replacing, write_text
     from ..scene.identify import SHEET_LAWS
     from ..scene.identify import identify as identified
 
-    target = plot or write
-    for option, path, endings in (("--plot", plot, (".png", ".svg", ".pdf")), ("--write", write, (".yaml", ".yml"))):
-        if path is not None and path.suffix not in endings:
-            raise WrongCall(f"{option}: '{path}' has another ending than {', '.join(endings)}; give one of these")
-    with refusals("--plot" if plot else "--write", target, partial(ARGUMENT.sub, "--")):
-        given = {name: _number(value) for name, _, value in (one.partition("=") for one in known)}
-        rows = [row for path in files for row in _rows(path, options)]
+    endings = {"--plot": (".png", ".svg", ".pdf"), "--write": (".yaml", ".yml")}
+    with refusals("--plot" if plot else "--write", plot or write, partial(ARGUMENT.sub, "--")):
+        for option, path in (("--plot", plot), ("--write", write)):
+            if path and path.suffix not in endings[option]:
+                raise ValueError(f"{option}: '{path}' has another ending than {', '.join(endings[option])}; give one")
+            if path:
+                check_folder(path)
+        rows = [options | row for path in files for row in _rows(path)]
         if SHEET_LAWS.get(law) == ():
             found = identified(files[0] if len(files) == 1 else [], law)
         else:
-            found = identified([_test(row) for row in rows], law, known=given)
+            given = {name: value for name, _, value in (one.partition("=") for one in known)}
+            found = identified([_test(**row) for row in rows], law, known=given)
         text = _study(found, rows[0], write) if write else ""
         if plot:
             import matplotlib.pyplot as plt
 
             found.plot()
-            plt.savefig(plot)
+            with replacing(plot) as unfinished:
+                plt.savefig(unfinished, format=plot.suffix[1:])
             plt.close()
         if write:
-            write.write_text(text)
+            write_text(write, text)
     click.echo(found)
 
 
-def _number(text: str) -> float | str:
-    try:
-        return float(text)
-    except ValueError:
-        return text
-
-
-def _rows(path: Path, options: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Options of each test of a file, with paths from here: one of a CSV file, those of the list in a YAML file."""
+def _rows(path: Path) -> list[dict[str, Any]]:
+    """Keys of each test of a file, with paths from here: one of a CSV file, those of the list in a YAML file."""
     from yaml import YAMLError, safe_load
 
     from ..safe_io.inputs import LARGEST_CSV, read
 
     if path.suffix not in (".yaml", ".yml"):
-        return [{**options, "file": path}]
+        return [{"file": path}]
     try:
         rows = [dict(row) for row in safe_load(read(path, LARGEST_CSV))["tests"].values()]
     except (AttributeError, KeyError, TypeError, ValueError, YAMLError) as error:
@@ -106,18 +101,26 @@ def _rows(path: Path, options: Mapping[str, Any]) -> list[dict[str, Any]]:
         if wrong := [key for key in row if key not in KEYS]:
             raise ValueError(f"{path}: a test has the key {wrong[0]!r}; known: {', '.join(KEYS)}")
         row |= {key: path.parent / row[key] for key in ("file", "shape") if row.get(key)}
-    return [{**options, **row} for row in rows]
+    return rows
 
 
-def _test(row: Mapping[str, Any]) -> "MeasuredTest":
+def _test(
+    beam: str | None, shape: str | None, thickness: str, load: str, file: Path | None = None, **others: Any
+) -> "MeasuredTest":
     """Test of its options."""
     from ..scene.measured import MeasuredTest
 
-    body, load, file = row["beam"] or row["shape"], row["load"], row.get("file")
-    if not (body and load and file):
+    if not ((beam or shape) and load and file):
         raise ValueError("--load: a test needs a body, a load and a file; give such as --beam 100x20 --load traction")
-    body = asked_beam(str(body), row["thickness"]) if row["beam"] else shape_of_study(str(body))[2]
-    return MeasuredTest(body, load, file, *(row[name] for name in ("force", "scale", "angle", "noise", "shift")))
+    if beam:
+        return MeasuredTest(asked_beam(str(beam), thickness), load, file, **others)
+    study, _, body = shape_of_study(str(shape))
+    if study.plane_strain:
+        raise ValueError(
+            f"--shape: {shape}: material {study.plane_strain[0]!r} is in plane strain, and tests are analysed in plane "
+            "stress; give a study in plane stress"
+        )
+    return MeasuredTest(body, load, file, **others)
 
 
 def _study(found: "Identified", row: Mapping[str, Any], target: Path) -> str:
@@ -126,43 +129,32 @@ def _study(found: "Identified", row: Mapping[str, Any], target: Path) -> str:
 
     from .study import template_text
 
-    materials = {one.name: _declared(one, row, target) for one in found.materials.values()}
-    main = found.materials[""].name
+    study = safe_load(template_text(target, "shape" if row["shape"] else "beam"))
+    (grid,) = (study.get("grids") or study["shape_grids"]).values()
+    names = {part: one.name for part, one in found.materials.items()}
+    texts = [round(one, 6) if name[:2] == "nu" else f"{one:.6g} Pa" for name, one in found.values.items()]
+    if found.law == "orthotropic":
+        keys = ("young_modulus_x", "young_modulus_y", "poisson_ratio_xy", "shear_modulus")
+        materials = [dict(zip(keys, texts))]
+    elif "nu" in found.values:
+        materials = [{"young_modulus": text, "poisson_ratio": texts[-1]} for text in texts[:-1]]
+    else:
+        materials = [{"uniaxial_test": os.path.relpath(row["file"], target.parent), "terms": len(texts)}]
+    study["materials"] = dict(zip(names.values(), materials))
+    grid |= {"material": names.pop("")} | ({"load": row["load"]} if row["load"] else {})
     if row["shape"]:
-        path, _, name = str(row["shape"]).rpartition(":")
-        source = safe_load(Path(path or row["shape"]).read_text())
-        body = source["shapes"][name or next(iter(source["shapes"]))]
-        parts = {part: one.name for part, one in found.materials.items() if part}
-        study = safe_load(template_text(target, "shape"))
-        study["shapes"] = {"plate": body | ({"parts": parts} if parts else {})}
-        if body.get("file"):
-            body["file"] = os.path.relpath(Path(path or row["shape"]).parent / body["file"], target.parent)
-            study["shape_grids"]["plate"].pop("mesh_size")
-        study["shape_grids"]["plate"] |= {"material": main, "load": row["load"]}
-    elif "young_modulus" not in materials[main] and "uniaxial_test" not in materials[main]:
+        source, _, shape = shape_of_study(str(row["shape"]))
+        study["shapes"] = {"plate": safe_load(source.text)["shapes"][shape.name] | {"parts": names}}
+        if shape.file:
+            study["shapes"]["plate"]["file"] = os.path.relpath(shape.file, target.parent)
+            del grid["mesh_size"]
+    elif found.law == "orthotropic":
         raise ValueError("--write: beams of a study are isotropic; give a --shape, or leave --write out")
     else:
-        study = safe_load(template_text(target, "beam"))
-        beam = asked_beam(row["beam"] or "100x20", row["thickness"])
-        sides = {side: f"{1e3 * getattr(beam, side):g} mm" for side in ("length", "height", "thickness")}
-        grid = {"beam": beam.name, "material": main, "mesh_size": f"{250 * beam.height:g} mm"}
-        curve = next((one for one in found.places.values() if one.ndim == 1), None)
-        force = row["force"] or (f"{abs(curve).max():g} N" if row["beam"] and curve is not None else "1 N")
-        study["beams"] = {beam.name: sides}
-        study["grids"]["pulled"] |= grid | {"load": row["load"] or "traction", "force": force}
-    study["materials"] = materials
+        beam = asked_beam(str(row["beam"] or "100x20"), row["thickness"])
+        loads = next(iter(found.places.values())) if "nu" in found.values else [1.0]
+        force = row["force"] or f"{max(map(abs, loads)):g} N"
+        grid |= {"beam": beam.name, "mesh_size": f"{250 * beam.height:g} mm", "force": force}
+        (sides,) = study["beams"].values()
+        study["beams"] = {beam.name: {side: f"{1e3 * getattr(beam, side):g} mm" for side in sides}}
     return safe_dump(study, sort_keys=False)
-
-
-def _declared(material: "AnyMaterial", row: Mapping[str, Any], target: Path) -> dict[str, Any]:
-    """Keys of a material in a study."""
-    from ..problem.materials import Material, Rubber
-
-    if isinstance(material, Rubber):
-        return {"uniaxial_test": os.path.relpath(row["file"], target.parent), "terms": len(material.coefficients)}
-    if isinstance(material, Material):
-        return {"young_modulus": f"{material.young_modulus:.6g} Pa", "poisson_ratio": round(material.poisson_ratio, 6)}
-    along, across, ratio, shear, _ = material.constants_at()
-    names = ("young_modulus_x", "young_modulus_y", "shear_modulus")
-    moduli = {name: f"{value:.6g} Pa" for name, value in zip(names, (along, across, shear))}
-    return moduli | {"poisson_ratio_xy": round(ratio, 6)}

@@ -288,7 +288,8 @@ class BiquadraticEnergy(Energy):
         return following(along) - preceding(along)
 
     def _couplings(self, moved: np.ndarray) -> np.ndarray:
-        sides, _, pull = self._stresses(moved)
+        at_rest = not moved.any()  # where nothing pulls
+        sides, _, pull = (self._sides(self._rest), None, None) if at_rest else self._stresses(moved)
         tensile, coupling = self._halves
         blocks = np.empty((3, 2, 2, sides.shape[2]))
         for i, (j, k) in enumerate(self._pairs):
@@ -299,8 +300,9 @@ class BiquadraticEnergy(Energy):
                 block -= _products(coupling[i] * at_k, at_j)
                 block += _products(coupling[j] * at_k, at_i)
                 block += _products(coupling[k] * at_i, at_j)
-            blocks[i] = 4 * block
-            blocks[i, [0, 1], [0, 1]] -= 2 * pull[i]
+            np.multiply(4, block, out=blocks[i])
+            if pull is not None:
+                blocks[i, [0, 1], [0, 1]] -= 2 * pull[i]
         return blocks
 
 

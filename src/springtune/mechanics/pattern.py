@@ -145,10 +145,10 @@ class Pattern:
         total = np.zeros((2, 2, count))
         for energy in energies:
             places = self._springs_of(energy.corners)
-            blocks = np.ascontiguousarray(energy.couplings(displacements).transpose(1, 2, 0, 3))
+            blocks = energy.couplings(displacements)
             for a in range(2):
                 for d in range(2):
-                    ours, turned = np.bincount(places, blocks[a, d].ravel(), 2 * count).reshape(2, count)
+                    ours, turned = np.bincount(places, blocks[:, a, d].ravel(), 2 * count).reshape(2, count)
                     total[a, d] += ours
                     total[d, a] += turned
         return total

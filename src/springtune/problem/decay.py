@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..safe_io.inputs import csv_rows, two_numbers
+from ..safe_io.inputs import csv_rows, numbers
 from ..safe_io.tables import Tabled
 from .quantities import positive
 
@@ -128,8 +128,8 @@ def _read(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
     """Times [s] and displacements [m] of a CSV file."""
     (line, head), *rows = csv_rows(path, ValueError, COLUMNS_OF_DECAY)
     units = re.findall(r"\[(.+?)\]", ",".join(head))
-    if len(units) != 2:
+    if not len(units) == len(head) == 2:
         raise ValueError(f"'{path}', line {line}: {','.join(head)!r} is no head of a decay; {COLUMNS_OF_DECAY}")
     scales = [positive(f"1 {unit}", kind, f"'{path}', head") for unit, kind in zip(units, ("time", "length"))]
-    times, moved = np.array(two_numbers(path, rows, ValueError)).reshape(-1, 2).T
+    times, moved = np.array(numbers(path, rows, head, ValueError)).reshape(-1, 2).T
     return scales[0] * times, scales[1] * moved

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..safe_io.inputs import csv_rows, two_numbers
+from ..safe_io.inputs import csv_rows, numbers
 from .materials import MOST_TERMS, RUBBER_TESTS, Rubber
 from .quantities import Number, positive, put
 
@@ -80,8 +80,7 @@ class TensileTest:
             scale = positive(f"1 {unit}", "stress", "nominal stress")
         except ValueError as error:
             raise TestDataError(f"{where}{error}") from None
-        found = [(one, scale * other) for one, other in two_numbers(path, rows[1:], TestDataError)]
-        stretches, stresses = np.array(found).reshape(-1, 2).T
+        stretches, stresses = np.array(numbers(path, rows[1:], head, TestDataError)).reshape(-1, 2).T
         if kinds == ["strain"]:
             strains = stretches / (100 if percent else 1)
             least = np.abs(strains[strains != 0]).min(initial=np.inf)
@@ -91,7 +90,7 @@ class TensileTest:
                     "'stretch' or 'strain [%]', or give stretches (1 plus strain)"
                 )
             stretches = 1 + strains
-        return cls(stretches, stresses, str(path))
+        return cls(stretches, scale * stresses, str(path))
 
 
 def told(test: TensileTest | str | Path) -> TensileTest:

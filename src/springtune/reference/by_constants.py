@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from copy import copy
 
 import numpy as np
-from scipy.sparse import csc_array, csr_array
+from scipy.sparse import csc_array, csr_array, eye_array, kron
 
 from ..linalg.factors import factorize
 from ..mesh.groups import GroupedMesh
@@ -33,50 +33,52 @@ class Family:
     """
 
     def __init__(
-        self, shape: Shape, load: LoadCase, materials: Mapping[str, AnyMaterial], grouped: GroupedMesh | None
+        self, shape: Shape, load: LoadCase, grouped: GroupedMesh | None, materials: Mapping[str, AnyMaterial]
     ) -> None:
         self.reference = solve_shape(shape, load, materials, grouped, tolerance=ACCURACY)
         self._level = level = copy(self.reference._level)
-        space, held = level.space, level.held.ravel()
-        self._free, self.forces, self._given = ~held, level.forces().ravel(), level.supports()[1].ravel()
-        sides = [group for side in space.mesh.sides.values() for group in side.groups]
+        space, mesh = level.space, level.space.mesh
+        self._free, self.forces, self._given = ~level.held.ravel(), level.forces().ravel(), level.supports()[1].ravel()
+        sides = [group for side in mesh.sides.values() for group in side.groups]
         self.groups = (*dict.fromkeys(sides), *level.problem.points)
         numbers = (2 * space.numbers[:, :, None] + np.arange(2)).reshape(len(space.corners), -1)
-        width = numbers.shape[1]
-        places = np.repeat(numbers, width, axis=1).ravel(), np.tile(numbers, width).ravel()
+        places = np.repeat(numbers, numbers.shape[1], axis=1).ravel(), np.tile(numbers, numbers.shape[1]).ravel()
         self._all = []
-        for part in (space.mesh.names.index(name) for name in materials):
+        for part in map(mesh.names.index, materials):
             for row, column in ENTRIES:
-                units = np.zeros((len(space.mesh.names), 3, 3))
+                units = np.zeros((len(mesh.names), 3, 3))
                 units[part, row, column] = units[part, column, row] = shape.thickness
                 level._tensor = units[:, VOIGT[:, :, None, None], VOIGT[None, None]]
-                self._all.append(csr_array((level._matrices().ravel(), places), shape=(len(held), len(held))))
-        self._inner = [one[self._free][:, self._free] for one in self._all]
+                self._all.append(csr_array((level._matrices().ravel(), places), shape=2 * self.forces.shape))
+        numbered = self._all[0].copy()
+        numbered.data = np.arange(numbered.nnz)
+        self._inner = numbered[self._free][:, self._free]
 
-    def solve(self, constants: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return displacements (unknowns,), derivatives along `slopes` (unknowns, n), and all K_i u.
+    def solve(self, constants: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return displacements (unknowns, n) and the work (n,) of forces and supports.
 
-        `constants` has `ENTRIES` of each part; `slopes` (n_constants, n) are directions of them.
+        The first column of `constants` (n_constants, n) has `ENTRIES` of each part, and yields values; the others have
+        directions, and yield the derivatives along them.
         """
-        first, free = self._inner[0], self._free
-        data = constants @ np.stack([one.data for one in self._inner])
-        factor = factorize(csc_array((data, first.indices, first.indptr), shape=first.shape))
-        found = self._given.copy()
-        pulls = np.stack([one @ found for one in self._all], axis=1)
-        found[free] = factor.solve((self.forces - pulls @ constants)[free])
-        pulls = np.stack([one @ found for one in self._all], axis=1)
-        derivatives = np.zeros((len(found), slopes.shape[1]))
-        derivatives[free] = -factor.solve(np.ascontiguousarray((pulls @ slopes)[free]))
-        return found, derivatives, pulls
+        free, inner = self._free, self._inner
+        whole = self._all[0].copy()
+        whole.data = constants[:, 0] @ np.stack([one.data for one in self._all])
+        factor = factorize(csc_array((whole.data[inner.data], inner.indices, inner.indptr), shape=inner.shape))
+        moved = np.zeros((len(free), constants.shape[1]))
+        moved[:, 0] = self._given
+        moved[free, 0] = factor.solve((self.forces - whole @ self._given)[free])
+        pulls = np.stack([one @ moved[:, 0] for one in self._all], axis=1) @ constants
+        moved[free, 1:] = -factor.solve(np.ascontiguousarray(pulls[free, 1:]))
+        work = moved[:, 0] @ pulls
+        work[1:] += 2 * self.forces @ moved[:, 1:]
+        return moved, work
 
     def mean(self, group: str, axis: int) -> np.ndarray:
         """Row (unknowns,) that reads the displacement of a point, or the mean one of sides, along an axis."""
-        level = self._level
-        if group in level.problem.points:
-            return self.at(np.array([level.problem.points[group]]))[0][[axis]].toarray()[0]
-        row = np.zeros((level.space.n_functions, 2))
-        row[:, axis] = level._shares(group)
-        return row.ravel()
+        points = self._level.problem.points
+        if group in points:
+            return self.at(np.array([points[group]]))[0][[axis]].toarray()[0]
+        return np.kron(self._level._shares(group), np.eye(2)[axis])
 
     def at(self, points: np.ndarray) -> tuple[csr_array, np.ndarray]:
         """Rows that read u and v at points (n, 2) in turn, and distances from the body over its extent [1]."""
@@ -84,9 +86,9 @@ class Family:
         found, local = self._level._located(points)
         shares = np.column_stack([1 - local.sum(axis=1), local]).clip(0)
         values, _ = shape_functions(space.degree, (shares / shares.sum(axis=1, keepdims=True))[:, 1:])
-        apart = np.linalg.norm(np.einsum("pi,pic->pc", values, space.places[space.numbers[found]]) - points, axis=1)
-        columns = (2 * space.numbers[found][:, None] + np.arange(2)[:, None]).reshape(2 * len(points), -1)
-        rows = np.repeat(np.arange(len(columns)), columns.shape[1])
-        shape = len(columns), 2 * space.n_functions
-        entries = np.repeat(values, 2, axis=0).ravel()
-        return csr_array((entries, (rows, columns.ravel())), shape=shape), apart / np.ptp(space.mesh.points)
+        ends = values.shape[1] * np.arange(len(points) + 1)
+        reading = csr_array(
+            (values.ravel(), space.numbers[found].ravel(), ends), shape=(len(points), len(space.places))
+        )
+        apart = np.linalg.norm(reading @ space.places - points, axis=1) / np.ptp(space.mesh.points)
+        return kron(reading, eye_array(2), format="csr"), apart

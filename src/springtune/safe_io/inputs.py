@@ -2,12 +2,13 @@
 
 import csv
 import errno
+import math
 import mmap
 import os
 import signal
 import stat
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -87,16 +88,30 @@ def csv_rows(path: str | Path, refuse: Callable[[str], ValueError], remedy: str)
     return rows
 
 
-def two_numbers(path: str | Path, rows: Rows, refuse: Callable[[str], ValueError]) -> list[tuple[float, float]]:
-    """Numbers of rows of two columns."""
+def numbers(
+    path: str | Path, rows: Rows, names: Sequence[str], refuse: Callable[[str], ValueError]
+) -> list[list[float]]:
+    """Numbers of rows below the names of their columns; those of columns without a name may be NaN."""
     found = []
-    for number, row in rows:
-        try:
-            first, second = map(float, row)
-        except ValueError:
-            raise refuse(f"'{path}', line {number}: {','.join(row)!r} is not two numbers; correct it") from None
-        found.append((first, second))
+    for line, row in rows:
+        if len(row) != len(names):
+            raise refuse(f"'{path}', line {line}: has {len(row)} values, and the head {len(names)}; correct it")
+        found.append([number_of(text) for text in row])
+        for name, text, number in zip(names, row, found[-1]):
+            if name and not math.isfinite(number):
+                raise refuse(
+                    f"'{path}', line {line}, column {name!r}: {text.strip()!r} is no finite number; correct the line, "
+                    "or remove it"
+                )
     return found
+
+
+def number_of(text: object) -> float:
+    """Return the number of a text, or NaN."""
+    try:
+        return float(text)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        return math.nan
 
 
 def virtual_memory() -> int:

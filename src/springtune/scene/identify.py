@@ -5,12 +5,15 @@ residuals r and derivatives J, both over the noise and without shifts, the covar
 :math:`(J^T J)^{-1}`. Along a direction in which J vanishes the tests tell nothing.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.linalg import qr
+from scipy.optimize import least_squares
+from scipy.stats import t
 
 from ..problem.materials import AnisotropicMaterial, AnyMaterial, Material, rotated
 from ..problem.quantities import Number, nearest, positive
@@ -18,6 +21,7 @@ from ..problem.rubber import TestDataError, fit_rubber, relative_weights, stress
 from ..reference.answers import beyond_linear
 from ..reference.by_constants import ENTRIES, Family
 from ..registry import hook
+from ..safe_io.inputs import number_of
 from ..safe_io.tables import Tabled
 from .measured import Block, MeasuredTest, blocks, stated
 
@@ -33,18 +37,15 @@ SHEET_LAWS = {
 }
 """Laws, and the names of their constants; regions have a modulus each, too, such as ``E core``."""
 
-POISSON_RATIOS = ("nu", "nu12")
-"""Constants that are no moduli."""
-
-ASSUMED_RATIO = 0.3
-"""Poisson's ratio at which a search begins, and which is assumed where tests do not tell."""
+ASSUMED = {"nu": 0.3, "nu12": 0.3}
+"""Poisson's ratios where a search begins, and which are assumed where tests do not tell."""
 
 REMEDIES = {"G12": "add a test in shear, or of a coupon cut at 45 degrees", "E2": "add a coupon cut across"}
-REMEDIES |= dict.fromkeys(POISSON_RATIOS, "add a transverse displacement or a field, or give it as known")
+REMEDIES |= dict.fromkeys(ASSUMED, "add a transverse displacement or a field, or give it as known")
 """What to add where a constant is not determined; for others a force."""
 
 NULL = 1e-7
-"""Singular value of the scaled derivatives, over the largest, below which tests tell nothing along its direction."""
+"""Derivative by a constant besides those by others, over the largest, below which tests do not tell the constant."""
 
 POOR = 0.5
 """Half of an interval from which on a constant is poorly determined: of a ratio, or relative."""
@@ -55,66 +56,115 @@ MISFIT = 1.5
 LEAST_NOISE = 1e-9
 """Noise over the values' root mean square that is rounding."""
 
-WEIGHTINGS = 20
-"""Most fits until the noise of each block, estimated from the fit before, settles."""
+
+def varied(constants: dict[str, Any], names: Iterable[str], steps: Iterable[complex]) -> dict[str, Any]:
+    """Change constants by steps: ratios by addition, moduli by factors exp(step), others relatively."""
+    changed = dict(constants)
+    for name, step in zip(names, steps):
+        value = constants[name]
+        added = step if name in ASSUMED else step * abs(value)
+        changed[name] = value * np.exp(step) if name[0] in "EG" else value + added
+    return changed
 
 
-@dataclass(frozen=True, eq=False)
+def entries(constants: dict[str, Any], angle: float) -> np.ndarray:
+    """`ENTRIES` of each part, turned by an angle [rad], shape (n_parts, 6); coefficients of rubber, shape (n,)."""
+    if "c1" in constants:
+        return np.array([*constants.values()])
+    *moduli, nu = constants.values()
+    each = [(one, one, nu, one / (2 * (1 + nu))) for one in moduli]
+    found = []
+    for along, across, ratio, shear in [constants.values()] if "G12" in constants else each:
+        mixed = -ratio / along
+        compliance = np.array([[1 / along, mixed, 0], [mixed, 1 / across, 0], [0, 0, 1 / shear]])
+        stiffness = rotated(np.linalg.inv(compliance), angle)
+        found.append([stiffness[place] for place in ENTRIES])
+    return np.array(found)
+
+
 class Model:
-    """Tests as functions of the unknowns: ratios, and logarithms of moduli."""
+    """Tests as functions of constants: for each a family of solutions, its numbers, and the material's angle.
 
-    names: tuple[str, ...]
-    tests: list[tuple[Family, list[Block], float]]
+    Rubber has no family.
+    """
 
-    @property
-    def blocks(self) -> list[Block]:
-        """Blocks of all tests."""
-        return [block for _, found, _ in self.tests for block in found]
+    def __init__(self, tests: Sequence[tuple[Any, list[Block], float]]) -> None:
+        self.tests, self.blocks = tests, [block for _, own, _ in tests for block in own]
+        self.counts = np.array([len(block.values) - block.shifts.shape[1] for block in self.blocks])
+        self.sizes = np.array([np.sqrt(np.mean(block.values**2)) or 1.0 for block in self.blocks])
 
-    def values(self, unknowns: np.ndarray) -> np.ndarray:
-        """Constants in SI units."""
-        ratio = np.isin(self.names, POISSON_RATIOS)
-        return np.where(ratio, unknowns, np.exp(np.where(ratio, 0.0, unknowns)))
+    def residuals(self, constants: dict[str, Any], names: Sequence[str], noise: np.ndarray) -> list[np.ndarray]:
+        """Residuals of each block over its noise, without shifts; beside them their derivatives by named constants."""
+        found, scales, steps = [], iter(noise), 1e-30j * np.eye(len(names))  # complex steps are exact
+        for family, own, angle in self.tests:
+            slopes = [entries(varied(constants, names, step), angle).imag / 1e-30 for step in steps]
+            columns = np.stack([entries(constants, angle), *slopes], axis=-1)
+            moved = columns.reshape(-1, columns.shape[-1])
+            if family is not None:  # stresses of rubber are linear in its coefficients
+                moved, work = family.solve(moved)
+            for block in own:
+                read = block.rows @ (work[None] if block.reaction else moved)
+                table = block.unshifted(block.factors[:, None] * read)
+                table[:, 0] -= block.unshifted(block.values)
+                found.append(table / next(scales))
+        return found
 
-    def entries(self, unknowns: np.ndarray, angle: float) -> np.ndarray:
-        """Constants of a family: `ENTRIES` of each part, turned by an angle [rad]."""
-        *moduli, nu = self.values(unknowns)
-        parts = [(one, one, nu, one / (2 * (1 + nu))) for one in moduli]
-        if "nu12" in self.names:
-            parts = [tuple(self.values(unknowns))]
-        found = []
-        for along, across, nu, shear in parts:
-            scale = 1 - nu**2 * across / along
-            mixed = nu * across / scale
-            stiffness = rotated(np.array([[along / scale, mixed, 0], [mixed, across / scale, 0], [0, 0, shear]]), angle)
-            found += [stiffness[place] for place in ENTRIES]
-        return np.array(found)
+    def undetermined(self, constants: dict[str, Any], names: Sequence[str]) -> list[str]:
+        """Named constants whose derivatives are combinations of those by the others."""
+        slopes = np.concatenate(self.residuals(constants, names, self.sizes))[:, 1:]
+        triangle, order = qr(slopes, mode="r", pivoting=True)
+        own = np.abs(np.diag(triangle))
+        rank = int(np.count_nonzero(own > NULL * own[0]))
+        labels, unknowns = ", ".join(block.label for block in self.blocks), ", ".join(names)
+        estimated = any(block.noise is None for block in self.blocks)
+        if self.counts.sum() < max(rank, 1) + estimated or self.counts.min() < 1:
+            raise TestDataError(
+                f"{labels}: {max(self.counts.sum(), 0)} numbers besides the shift, for the unknowns {unknowns} and the "
+                "noise; give more rows, or known constants and noise"
+            )
+        if not rank:
+            raise TestDataError(
+                f"{unknowns}: not determined by these data, which have no force; add one, as of a curve or the load"
+            )
+        return [names[place] for place in np.sort(order[rank:])]
 
-    def predict(self, unknowns: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Yield the predicted values of each block and their derivatives by the unknowns, without shifts."""
-        for family, found, angle in self.tests:
-            constants = self.entries(unknowns, angle)
-            steps = unknowns + 1e-30j * np.eye(len(unknowns))  # complex steps are exact
-            slopes = np.stack([self.entries(step, angle).imag / 1e-30 for step in steps], axis=1)
-            moved, derivatives, pulls = family.solve(constants, slopes)
-            for block in found:
-                if block.rows is None:  # the energy is stationary, and the force is twice it over the motion
-                    value, slope = moved @ pulls @ constants / block.moved, (moved @ pulls @ slopes / block.moved)[None]
-                else:
-                    value, slope = block.rows @ moved, block.rows @ derivatives
-                yield block.unshifted(block.factors * value), block.unshifted(block.factors[:, None] * slope)
+    def fit(
+        self, constants: dict[str, Any], names: Sequence[str]
+    ) -> tuple[dict[str, Any], list[np.ndarray], np.ndarray, np.ndarray]:
+        """Fit named constants; return all, `residuals`, the noise of each block, and halves of 95 % intervals of steps.
 
-    def residuals(self, unknowns: np.ndarray, noise: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Residuals over the noise of each block, and their derivatives by the unknowns."""
-        if "nu12" in self.names and unknowns[2] ** 2 > np.exp(unknowns[0] - unknowns[1]):  # not positive definite
-            size = sum(len(block.values) for block in self.blocks)
-            return np.full(size, np.inf), np.zeros((size, len(unknowns)))  # the search shortens its step
-        rows = [
-            ((value - block.unshifted(block.values)) / one, slope / one)
-            for block, one, (value, slope) in zip(self.blocks, noise, self.predict(unknowns))
-        ]
-        residuals, slopes = zip(*rows)
-        return np.concatenate(residuals), np.concatenate(slopes)
+        Noise that is not given is estimated from the residuals of each block. Intervals are by Student's t.
+        """
+        given = np.array([block.noise or 0.0 for block in self.blocks])
+        noise = np.where(given, given, self.sizes)
+        freedom = self.counts * max(1 - len(names) / self.counts.sum(), LEAST_NOISE)
+        # Moduli stay within factors of exp(30), even where forces and displacements contradict each other.
+        bounds = np.array([(-1.0, 0.5) if name == "nu" else (-30.0, 30.0) for name in names])
+        bounds -= [[constants[name] if name == "nu" else 0.0] for name in names]
+
+        def tables(steps: np.ndarray) -> list[np.ndarray]:
+            tried = varied(constants, names, steps)
+            if "G12" in tried and tried["nu12"] ** 2 > tried["E1"] / tried["E2"]:  # not positive definite
+                return [np.full((len(block.values), 1), np.inf) for block in self.blocks]  # a shorter step follows
+            return self.residuals(tried, names, noise)
+
+        def misfit(steps: np.ndarray) -> np.ndarray:
+            return np.concatenate(tables(steps))[:, 0]
+
+        def slopes(steps: np.ndarray) -> np.ndarray:
+            return np.concatenate(tables(steps))[:, 1:]
+
+        steps = np.zeros(len(names))
+        for _ in range(20):  # until the noise that is estimated settles
+            steps = least_squares(misfit, steps, slopes, bounds.T, xtol=1e-12, ftol=1e-12).x
+            sums = np.array([table[:, 0] @ table[:, 0] for table in tables(steps)])
+            settled = np.maximum(noise * np.sqrt(sums / freedom), LEAST_NOISE * self.sizes)
+            before, noise = noise, np.where(given, given, settled)
+            if np.allclose(noise, before, rtol=1e-3, atol=0):
+                break
+        deviations = np.sqrt(np.diag(np.linalg.inv(slopes(steps).T @ slopes(steps))))
+        half = t.ppf(0.975, freedom[given == 0].sum() or np.inf) * deviations
+        return varied(constants, names, steps), tables(steps), noise, half.clip(max=600)  # exp(700) is infinite
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -125,7 +175,7 @@ class Identified(Tabled):
     ----------
     law : str
     values : dict of str to float
-        Constants, moduli in Pa; assumed where the tests do not tell.
+        dict[str, Any], moduli in Pa; assumed where the tests do not tell.
     intervals : dict of str to (float, float)
         Intervals of 95 %; NaN for known or undetermined constants.
     undetermined : tuple of str
@@ -170,7 +220,7 @@ class Identified(Tabled):
 
     def _rows(self) -> Iterator[tuple[str, str]]:
         for name, value in self.values.items():
-            size, unit = (1.0, "") if name in POISSON_RATIOS else (1e9, " GPa") if value >= 1e9 else (1e6, " MPa")
+            size, unit = (1.0, "") if name.startswith("nu") else (1e9, " GPa") if value >= 1e9 else (1e6, " MPa")
             low, high = (f"{one / size:.5g}" for one in self.intervals[name])
             text = f"{value / size:.5g}{unit}"
             if name in self.undetermined:
@@ -249,171 +299,75 @@ def identify(
         raise ValueError(f"tests: {tests!r}; give the file of one test for rubber, else springtune.MeasuredTest")
     if isinstance(tests, str | Path):
         return _rubber(tests, law)
-    given = [tests] if isinstance(tests, MeasuredTest) else list(tests)
-    bodies = [stated(one) for one in given]
-    parts = list(
-        dict.fromkeys(part for shape, _, mesh in bodies for part in ("", *(mesh.parts if mesh else shape.parts)))
-    )
-    regions = tuple(f"E {part or 'main'}" for part in parts) if law == "regions" else ()
-    names = regions + SHEET_LAWS[law]
+    return _sheet([tests] if isinstance(tests, MeasuredTest) else list(tests), law, known or {})
+
+
+def _sheet(tests: Sequence[MeasuredTest], law: str, known: Mapping[str, Number]) -> Identified:
+    bodies = [stated(test) for test in tests]
+    parts = sorted({part for shape, _, mesh in bodies for part in ("", *(mesh or shape).parts)})
+    regions = [f"E {part or 'main'}" for part in parts] if law == "regions" else []
     if len(parts) > 1 and not regions:
         raise ValueError(f"law: {law!r} is of one material, and the body has the parts {parts}; take 'regions'")
-    unknowns, free = _start(names, known or {})
-    for settled in (False, True):  # elements for a usual material, then for what was found
-        materials = [_materials(Model(names, []), unknowns, parts, one.angle) for one in given]
-        families = [Family(*body[:2], own, body[2]) for body, own in zip(bodies, materials)]
-        model = Model(
-            names,
-            [
-                (family, list(blocks(one, family, body[1])), one.angle)
-                for one, family, body in zip(given, families, bodies)
-            ],
-        )
-        if not settled:
-            unknowns = np.where(free & ~np.isin(names, POISSON_RATIOS), unknowns + _scale(model, unknowns), unknowns)
-        lacking = undetermined(model, unknowns, free)
-        unknowns, residuals, slopes, noise, freedom = fit(model, unknowns, free & ~np.isin(names, lacking))
-    found = zip(np.flatnonzero(free & ~np.isin(names, lacking)), half_intervals(slopes, freedom))
-    values = model.values(unknowns).tolist()
-    ends = {name: (value, np.nan, np.nan) for name, value in zip(names, values)}
-    notes = [f"{name}: not determined by these data; {REMEDIES.get(name, 'add a force')}" for name in lacking]
-    for place, half in found:
-        low, high = (model.values(unknowns + step)[place] for step in half * np.eye(len(names))[place] * [[-1], [1]])
-        ends[names[place]] = (values[place], float(low), float(high))
-        if half > POOR:
-            notes.append(f"{names[place]}: poorly determined by these data; {REMEDIES.get(names[place], 'add a test')}")
-    for family, own, _ in model.tests:
-        factor = max(np.abs(block.factors).max() for block in own)
-        if why := beyond_linear(factor * family.reference.rotation, factor * family.reference.strain):
-            notes.append(f"{own[0].label}: {why}; leave out large loads")
-    main = _materials(model, unknowns, parts, 0.0)
-    return _result(law, ends, lacking, notes, model.blocks, noise, residuals, main)
+    constants, free = _start([*regions, *SHEET_LAWS[law]], known)
+    moduli = [name for name in free if name not in ASSUMED]
+    for _ in range(2):  # elements for a usual material, then for what was found
+        solved, notes = [], []
+        for test, body in zip(tests, bodies):
+            own = dict(zip(parts, entries(constants, test.angle).tolist()))
+            family = Family(*body, {part: AnisotropicMaterial(*one) for part, one in own.items()})
+            solved.append((family, blocks(test, family, body[1]), test.angle))
+            most = max(np.abs(block.factors).max() for block in solved[-1][1])
+            if why := beyond_linear(most * family.reference.rotation, most * family.reference.strain):
+                notes.append(f"'{test.file}': {why}; leave out large loads")
+        model = Model(solved)
+        constants = varied(constants, moduli, [_scale(model, constants)] * len(moduli))
+        found = _identified(law, model, constants, free, notes)
+        constants = found.values
+    materials: dict[str, AnyMaterial] = {
+        part: Material(constants[name], constants["nu"], name=f"measured-{part}".rstrip("-"))
+        for part, name in zip(parts, constants if law != "orthotropic" else ())
+    }
+    if law == "orthotropic":
+        along, across, nu, shear = constants.values()
+        materials = {"": AnisotropicMaterial.orthotropic(along, across, nu, shear, name="measured")}
+    return replace(found, materials=materials)
 
 
-def _start(names: tuple[str, ...], known: Mapping[str, Number]) -> tuple[np.ndarray, np.ndarray]:
-    """Unknowns of a usual material, with those that are known, and which are to be found."""
-    unknowns = np.array([ASSUMED_RATIO if name in POISSON_RATIOS else np.log(1e9) for name in names])
+def _start(names: Sequence[str], known: Mapping[str, Number]) -> tuple[dict[str, Any], list[str]]:
+    """Constants of a usual material, with those that are known, and the names of the others."""
+    constants = {name: ASSUMED.get(name, 1e9) for name in names}
     for name, value in known.items():
         if name not in names:
             raise ValueError(f"known: {name!r} is no constant of this law; {nearest(str(name), names)}")
-        if len(known) == len(names):
-            raise ValueError(f"known: {', '.join(known)} are all constants of this law; leave out what is to be found")
-        if name in POISSON_RATIOS and not (isinstance(value, int | float) and -1 < value <= 0.5):
+        if name in ASSUMED and not -1 < number_of(value) <= 0.5:
             raise ValueError(f"known: {name} is {value!r}; give a number above -1, at most 0.5")
-        number = value if name in POISSON_RATIOS else np.log(positive(value, "stress", f"known: {name}"))
-        unknowns[names.index(name)] = number
-    return unknowns, ~np.isin(names, list(known))
+        constants[name] = number_of(value) if name in ASSUMED else positive(value, "stress", f"known: {name}")
+    if len(known) == len(names):
+        raise ValueError(f"known: {', '.join(known)} are all constants of this law; leave out what is to be found")
+    return constants, [name for name in names if name not in known]
 
 
-def _materials(model: Model, unknowns: np.ndarray, parts: list[str], angle: float) -> dict[str, AnyMaterial]:
-    """Material of each part, turned by an angle [rad]."""
-    values = model.values(unknowns).tolist()
-    if "nu12" in model.names:
-        along, across, nu, shear = values
-        return {"": AnisotropicMaterial.orthotropic(along, across, nu, shear, angle, name="measured")}
-    *moduli, nu = values
-    own = moduli if len(moduli) == len(parts) else moduli * len(parts)
-    return {part: Material(one, min(nu, 0.5), name=f"measured-{part}".rstrip("-")) for part, one in zip(parts, own)}
+def _scale(model: Model, constants: dict[str, Any]) -> float:
+    """Logarithm of the factor by which all moduli are larger than those that are given."""
+    found = [0.0]
+    for block, table in zip(model.blocks, model.residuals(constants, (), np.ones(len(model.blocks)))):
+        measured = block.unshifted(block.values)
+        predicted = table[:, 0] + measured
+        if predicted @ measured > 0:
+            found.append(np.log(predicted @ measured / (predicted @ predicted)) * (1 if block.reaction else -1))
+    return float(np.sum(found) / max(len(found) - 1, 1))
 
 
-def _scale(model: Model, unknowns: np.ndarray) -> float:
-    """Logarithm of the factor by which all moduli are larger than those of the unknowns."""
-    found = []
-    for block, (predicted, _) in zip(model.blocks, model.predict(unknowns)):
-        ratio = float(predicted @ block.unshifted(block.values))
-        if ratio < 0 and block.label.startswith(("displacement", "force")):
-            raise TestDataError(
-                f"{block.label}: runs against the load; both are positive along the load, so change a column's sign"
-            )
-        if ratio > 0:
-            found.append(np.log(ratio / (predicted @ predicted)) * (1 if block.moved else -1))
-    return float(np.mean(found)) if found else 0.0
-
-
-def undetermined(model: Model, unknowns: np.ndarray, free: np.ndarray) -> tuple[str, ...]:
-    """Constants without which the derivatives by the others have no direction in which they vanish."""
-    sizes = np.array([np.linalg.norm(block.values) or 1.0 for block in model.blocks])
-    slopes, names = model.residuals(unknowns, sizes)[1], np.array(model.names)
-    lacking: list[str] = []
-    while (kept := free & ~np.isin(names, lacking)).any():
-        _, sizes, ways = np.linalg.svd(slopes[:, kept])
-        sizes = np.pad(sizes, (0, len(ways) - len(sizes)))
-        told_ = sizes > NULL * sizes[0]
-        if told_.all():
-            return tuple(lacking)
-        empty = np.abs(ways[~told_]).max(axis=0)
-        lacking.append(str(names[kept][np.argmax(empty + np.isin(names[kept], POISSON_RATIOS) * NULL)]))
-    _numbers(model, 1)
-    raise TestDataError(
-        f"{', '.join(lacking)}: not determined by these data, which have no force; add one, as of a curve or the load"
-    )
-
-
-def _numbers(model: Model, count: int) -> np.ndarray:
-    """Numbers of each block besides the shift; refused if they are too few for a count of unknowns."""
-    numbers = np.array([len(block.values) - block.shifts.shape[1] for block in model.blocks])
-    if numbers.sum() < count + any(block.noise is None for block in model.blocks) or numbers.min() < 1:
-        raise TestDataError(
-            f"{', '.join(block.label for block in model.blocks)}: {max(numbers.sum(), 0)} numbers besides the shift, "
-            f"for the unknowns {', '.join(model.names)} and the noise; give more rows, or known constants and noise"
-        )
-    return numbers
-
-
-def fit(
-    model: Model, unknowns: np.ndarray, free: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, float]:
-    """Fit free unknowns; return all, residuals and derivatives over the noise, the noise, and degrees of freedom.
-
-    Noise that is not given is estimated from the residuals of each block.
-    """
-    from scipy.optimize import least_squares
-
-    found, names = model.blocks, np.array(model.names)[free]
-    numbers, estimated = _numbers(model, len(names)), np.array([block.noise is None for block in found])
-    sizes = np.array([np.linalg.norm(block.values) / len(block.values) ** 0.5 or 1.0 for block in found])
-    noise = np.array([block.noise or size for block, size in zip(found, sizes)])
-    freedom = np.maximum(numbers * (1 - len(names) / numbers.sum()), LEAST_NOISE)
-    ends = np.cumsum([len(block.values) for block in found])[:-1]
-    most = np.where(names == "nu", 0.5, np.inf)
-    least = np.where(names == "nu", -1 + LEAST_NOISE, -np.inf)
-
-    def evaluated(part: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        whole = unknowns.copy()
-        whole[free] = part
-        residuals, slopes = model.residuals(whole, noise)
-        return residuals, slopes[:, free]
-
-    part = np.clip(unknowns[free], least, most - 1e-6)
-    for _ in range(WEIGHTINGS):
-        part = least_squares(
-            lambda one: evaluated(one)[0], part, lambda one: evaluated(one)[1], (least, most), xtol=1e-12, ftol=1e-12
-        ).x
-        sums = np.array([one @ one for one in np.split(evaluated(part)[0], ends)])
-        before, settled = noise, np.maximum(noise * np.sqrt(sums / freedom), LEAST_NOISE * sizes)
-        noise = np.where(estimated, settled, noise)
-        if np.allclose(noise, before, rtol=1e-3, atol=0):
-            break
-    unknowns = unknowns.copy()
-    residuals, slopes = evaluated(part)
-    unknowns[free] = part
-    return unknowns, residuals, slopes, noise, float(freedom[estimated].sum()) or np.inf
-
-
-def half_intervals(slopes: np.ndarray, freedom: float) -> np.ndarray:
-    """Halves of the 95 % intervals of unknowns by Student's t, from derivatives over the noise (n, n_unknowns)."""
-    from scipy.stats import t
-
-    return np.asarray(t.ppf(0.975, freedom) * np.sqrt(np.diag(np.linalg.inv(slopes.T @ slopes))))
-
-
-def _result(
-    law: str, ends: dict[str, tuple[float, float, float]], lacking: tuple[str, ...], notes: list[str],
-    found: list[Block], noise: np.ndarray, residuals: np.ndarray, materials: dict[str, AnyMaterial],
-) -> Identified:  # fmt: skip
-    """Result, with notes where the model does not fit; `ends` has each value and its interval."""
-    each = np.split(residuals, np.cumsum([len(block.values) for block in found])[:-1])
-    for block, one in zip(found, each):
+def _identified(law: str, model: Model, constants: dict[str, Any], free: Sequence[str], notes: list[str]) -> Identified:
+    """Result of a fit, with notes on what tests do not tell, and where the model does not fit; without materials."""
+    lacking = model.undetermined(constants, free)
+    names = [name for name in free if name not in lacking]
+    constants, tables, noise, half = model.fit(constants, names)
+    notes = [f"{name}: not determined by these data; {REMEDIES.get(name, 'add a force')}" for name in lacking] + notes
+    for name in np.array(names)[half > POOR]:
+        notes.append(f"{name}: poorly determined by these data; {REMEDIES.get(name, 'add a test')}")
+    residuals = {block.label: table[:, 0] for block, table in zip(model.blocks, tables)}
+    for block, one in zip(model.blocks, residuals.values()):
         size = np.sqrt((one @ one) / len(one))
         if block.noise is not None and size > MISFIT:
             notes.append(f"{block.label}: residuals are {size:.2g} times the given noise; the model does not fit")
@@ -423,31 +377,27 @@ def _result(
                 f"{block.label}: residuals are not random, so the intervals are too narrow; leave out where the law "
                 "does not hold"
             )
-    labels = [block.label for block in found]
-    values, intervals = (
-        {name: three[0] for name, three in ends.items()},
-        {name: three[1:] for name, three in ends.items()},
+    fitted = {name: value if name in names else np.nan for name, value in constants.items()}
+    low, high = (varied(fitted, names, one) for one in (-half, half))
+    return Identified(
+        law,
+        {name: float(value) for name, value in constants.items()},
+        {name: (float(low[name]), float(high[name])) for name in constants},
+        tuple(lacking),
+        tuple(notes),
+        dict(zip(residuals, noise.tolist())),
+        residuals,
+        {},
+        {block.label: block.places for block in model.blocks},
     )
-    data = (dict(zip(labels, one)) for one in (noise.tolist(), each, [block.places for block in found]))
-    kept, own, places = data
-    return Identified(law, values, intervals, lacking, tuple(notes), kept, own, materials, places)
 
 
 def _rubber(file: str | Path, law: str) -> Identified:
-    """Yeoh's law by `fit_rubber`, with intervals of its linear least squares of relative errors."""
+    """Yeoh's law by `fit_rubber`, with the intervals of its least squares of relative errors."""
     test = told(file)
     material = fit_rubber(test, terms=3 if law == "yeoh" else 1)
-    found, weights = np.array(material.coefficients), relative_weights(test)
-    freedom = len(weights) - len(found)
-    if freedom < 1:
-        raise TestDataError(
-            f"'{file}': {len(weights)} points, and {len(found)} unknowns and the noise; give more points"
-        )
-    columns = stress_columns(test.stretch, len(found))
-    residuals = (columns @ found - test.stress) * weights
-    noise = np.sqrt(residuals @ residuals / freedom)
-    block = Block(f"stress of '{file}'", test.stress, weights, None, columns[:, :0], None, test.stretch)
-    names = [f"c{number}" for number in range(1, len(found) + 1)]
-    half = half_intervals(columns * weights[:, None] / noise, freedom)
-    ends = dict(zip(names, zip(found.tolist(), (found - half).tolist(), (found + half).tolist())))
-    return _result(law, ends, (), [], [block], np.array([noise]), residuals / noise, {"": material})
+    weights, rows = relative_weights(test), stress_columns(test.stretch, len(material.coefficients))
+    block = Block(f"stress of '{file}'", test.stress * weights, weights, rows, rows[:, :0], None, test.stretch)
+    constants = {f"c{number}": value for number, value in enumerate(material.coefficients, 1)}
+    found = _identified(law, Model([(None, [block], 0.0)]), constants, list(constants), [])
+    return replace(found, materials={"": material})

@@ -5,9 +5,7 @@ gives them; its other columns are ignored. A curve has the columns ``force`` and
 Units stand in the heads, as in ``force [N],displacement [mm]``.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,12 +14,12 @@ from scipy.sparse import csr_array
 from ..mesh.formats import read_shape
 from ..mesh.groups import GroupedMesh
 from ..problem.geometry import Beam
-from ..problem.loads import LOADS, MIDDLE
+from ..problem.loads import LOADS, MIDDLE, Side
 from ..problem.quantities import Number, nearest, positive, put, quantity
 from ..problem.rubber import TestDataError
 from ..problem.shapes import LoadCase, Segment, Shape
 from ..reference.by_constants import Family
-from ..safe_io.inputs import csv_rows
+from ..safe_io.inputs import csv_rows, numbers
 from .meshes import A_BEAM, is_a
 from .sheet import chosen
 
@@ -41,33 +39,28 @@ OFF_BODY = 1e-3
 class Block:
     """Numbers of one kind from one file.
 
-    `values` (n,) are `factors` (n,) times the displacements that `rows` read, one for all or one each; without rows
-    times the force that moves a support by `moved` [m]. What the columns of `shifts` (n, n_shifts) explain tells
-    nothing of the material. `places` are loads, or points (n / 2, 2).
+    `values` (n,) are `factors` (n,) times what `rows` read, one for all or one each: of the displacements, or of the
+    work if the values are forces on a moved support (`reaction`). What the columns of `shifts` (n, n_shifts), an
+    orthonormal basis, explain tells nothing of the material. `places` are loads, or points (n / 2, 2).
     """
 
     label: str
     values: np.ndarray
     factors: np.ndarray
-    rows: csr_array | np.ndarray | None
+    rows: csr_array | np.ndarray
     shifts: np.ndarray
     noise: float | None
     places: np.ndarray
-    moved: float = 0.0
-    unit: str = "m"
-
-    @cached_property
-    def _basis(self) -> np.ndarray:
-        return np.linalg.qr(self.shifts)[0]
+    reaction: bool = False
 
     def unshifted(self, columns: np.ndarray) -> np.ndarray:
         """Columns (n, ...) without what shifts explain."""
-        return np.asarray(columns - self._basis @ (self._basis.T @ columns))
+        return np.asarray(columns - self.shifts @ (self.shifts.T @ columns))
 
 
 @dataclass(frozen=True, eq=False)
 class MeasuredTest:
-    r"""A test of a sheet and the file of what was measured.
+    r"""A test of a sheet in plane stress, and the file of what was measured.
 
     Parameters
     ----------
@@ -80,9 +73,7 @@ class MeasuredTest:
         or pressed, the growth of its width at the middle; and mean displacements of sides or points such as
         ``x right``.
     force : float or str, optional
-        Force on a beam [N] at which a field was measured.
-    scale : float, optional
-        Factor on the load case of a shape [1] at which a field was measured.
+        Force on a beam [N] at which a field was measured; the load case of a shape has its own.
     angle : float or str, optional
         Angle of the material's first axis from x [rad], of a coupon that was cut out at an angle.
     noise : float or str, optional
@@ -113,7 +104,6 @@ class MeasuredTest:
     load: str
     file: str | Path
     force: Number | None = None
-    scale: float = 1.0
     angle: Number = 0.0
     noise: Number | None = None
     shift: bool = True
@@ -122,78 +112,83 @@ class MeasuredTest:
 
     def __post_init__(self) -> None:
         is_a(self.body, (Beam, Shape), "body", A_BEAM)
-        is_beam = isinstance(self.body, Beam)
         chosen(self.body.loads if isinstance(self.body, Shape) else LOADS, self.load, "load")
-        put(self, angle=quantity(self.angle, "angle", "angle"))
         columns, lines = _read(self.file)
-        put(self, columns=columns, _lines=lines)
-        if is_beam and "u" in columns:
-            if self.force is None:
-                raise ValueError(f"force: missing; give the force at which '{self.file}' was measured, as '400 N'")
-            put(self, scale=LOADS[self.load].sign * positive(self.force, "force", "force"))
-        elif self.force is not None:
-            raise ValueError(f"force: {self.force!r} is for the field of a beam; leave it out, or give a scale")
+        put(self, angle=quantity(self.angle, "angle", "angle"), columns=columns, _lines=lines)
+        if (self.force is None) == (isinstance(self.body, Beam) and "u" in columns):
+            raise ValueError(
+                f"force: {self.force!r}; give the force at which '{self.file}' was measured, as '400 N', if it is the "
+                "field of a beam, else none"
+            )
+        put(self, force=None if self.force is None else positive(self.force, "force", "force"))
 
 
 def stated(test: MeasuredTest) -> tuple[Shape, LoadCase, GroupedMesh | None]:
-    """Body of a test as a shape, its load case, and the mesh of a file."""
+    """Body of a test as a shape, its load case, and the mesh of a file; a beam is loaded by 1 N."""
     body = test.body
     if isinstance(body, Shape):
         return body, body.loads[test.load], read_shape(body.file, body.unit) if body.file else None
-    kind, size = LOADS[test.load].kind, np.array([body.length, body.height])
-    corners = {"bottom": (0.0, 0.0), "right": (size[0], 0.0), "top": tuple(size), "left": (0.0, size[1])}
-    middle, gauges = 0.5 * size, np.outer([0.0, 1.0], size)
-    middle[kind.normal] = kind.loaded.place(*size)
-    gauges[:, kind.normal] = 0.5 * size[kind.normal]
-    points = {MIDDLE: tuple(middle)} | dict(zip(GAUGES, map(tuple, gauges)))
+    load, size = LOADS[test.load], (body.length, body.height)
+    kind = load.kind
+    (pull,) = kind.case.tractions
+    case = replace(kind.case, tractions=(replace(pull, force=tuple(load.sign * np.array(pull.force))),))
+    corners = {"bottom": (0.0, 0.0), "right": (size[0], 0.0), "top": size, "left": (0.0, size[1])}
+    sides = dict(zip((MIDDLE, *GAUGES), (kind.loaded, Side(kind.along, False), Side(kind.along, True))))
+    points = {name: (0.5 * size[0], side.place(*size)) for name, side in sides.items() if side.axis}
+    points |= {name: (side.place(*size), 0.5 * size[1]) for name, side in sides.items() if not side.axis}
     outline = [Segment(corner, group=group) for group, corner in corners.items()]
-    return Shape("beam", body.thickness, outline, points=points), kind.case, None
+    return Shape("beam", body.thickness, outline, points=points), case, None
 
 
-def blocks(test: MeasuredTest, family: Family, load: LoadCase) -> Iterator[Block]:
-    """Yield the numbers of a test's file, and how a family predicts them."""
-    columns, where = test.columns, f"'{test.file}'"
-    if "u" in columns:
-        points = np.stack([columns["x"], columns["y"]], axis=1)
-        rows, apart = family.at(points)
-        if apart.max() > OFF_BODY:
-            worst = int(np.argmax(apart))
-            x, y = 1e3 * points[worst]
-            raise TestDataError(
-                f"{where}, line {test._lines[worst]}: the point x = {x:.6g} mm, y = {y:.6g} mm is outside of the body; "
-                "remove it, or correct the unit or the origin"
-            )
-        rigid = np.zeros((len(points), 2, 3 * test.shift))
-        if test.shift:
-            rigid[:, :, :2] = np.eye(2)
-            rigid[:, :, 2] = (points - points.mean(axis=0))[:, ::-1] * [-1, 1] / (np.ptp(points) or 1.0)
-        values = np.stack([columns["u"], columns["v"]], axis=1).ravel()
-        noise, factors = _noise(test, "length"), np.full(len(values), test.scale)
-        yield Block(f"field of {where}", values, factors, rows, rigid.reshape(len(values), -1), noise, points)
-        return
-    pushed = [np.hypot(*one.force) for one in load.tractions]
+def blocks(test: MeasuredTest, family: Family, load: LoadCase) -> list[Block]:
+    """Return the numbers of a test's file, and how a family predicts them."""
+    return _field(test, family) if "u" in test.columns else _curve(test, family, load)
+
+
+def _field(test: MeasuredTest, family: Family) -> list[Block]:
+    points, values = (np.column_stack([test.columns[name] for name in pair]) for pair in ("xy", "uv"))
+    rows, apart = family.at(points)
+    worst = int(np.argmax(apart))
+    if apart[worst] > OFF_BODY:
+        x, y = 1e3 * points[worst]
+        raise TestDataError(
+            f"'{test.file}', line {test._lines[worst]}: the point x = {x:.6g} mm, y = {y:.6g} mm is outside of the "
+            "body; remove it, or correct the unit or the origin"
+        )
+    turned = (points - points.mean(axis=0))[:, ::-1] * [-1, 1] / (np.ptp(points) or 1.0)
+    rigid, _ = np.linalg.qr(np.column_stack([np.tile(np.eye(2), (len(points), 1)), turned.ravel()]))
+    factors, noise = np.full(values.size, test.force or 1.0), _noise(test, "length")
+    label = f"field of '{test.file}'"
+    return [Block(label, values.ravel(), factors, rows, rigid[:, : 3 * test.shift], noise, points)]
+
+
+def _curve(test: MeasuredTest, family: Family, load: LoadCase) -> list[Block]:
+    where, pushed = f"'{test.file}'", [np.hypot(*one.force) for one in load.tractions]
     moved = [np.hypot(one.x or 0.0, one.y or 0.0) for one in load.supports if one.x or one.y]
-    if len(pushed) + len(moved) != 1 or load.pressures or any(load.gravity):
+    if len(pushed + moved) != 1 or load.pressures or any(load.gravity):
         raise TestDataError(
             f"{where}: load {test.load!r} is not one force or one moved support; give a field of points"
         )
+    (size,) = pushed + moved
     driving, measured = CURVE_COLUMNS[:: -1 if moved else 1]
-    loads = columns[driving]
+    loads = test.columns[driving]
     if not np.ptp(loads) > 1e-9 * np.abs(loads).max() and (test.shift or not loads.any()):
         raise TestDataError(
             f"{where}, column {driving!r}: all {len(loads)} values are {loads[0]:g} in SI units, so there is no slope; "
             "give other loads, or switch the shift off if the zero is known"
         )
-    sign = LOADS[test.load].sign if isinstance(test.body, Beam) else 1.0
-    for name in columns:
-        if name == driving:
-            continue
-        own, reaction = name == measured, bool(moved) and name == measured
-        factors = (1.0 if own else sign) * loads / (moved or pushed)[0]
-        rows = None if reaction else _row(test, name, family, load)[None]
-        noise = _noise(test, "force" if moved else "length") if own or not moved else None
-        shifts, push = np.ones((len(loads), int(test.shift))), (moved[0], "N") if reaction else (0.0, "m")
-        yield Block(f"{name} of {where}", columns[name], factors, rows, shifts, noise, loads, *push)
+    if (loads - loads.mean()) @ test.columns[measured] < 0:
+        raise TestDataError(
+            f"{measured} of {where}: runs against the load; both are positive along the load, so change a column's sign"
+        )
+    found = []
+    for name in [name for name in test.columns if name != driving]:
+        reaction = bool(moved) and name == measured
+        row = np.array([1 / size]) if reaction else _row(test, name, family, load)
+        noise = None if moved and not reaction else _noise(test, "force" if reaction else "length")
+        shifts, label = np.full((len(loads), int(test.shift)), len(loads) ** -0.5), f"{name} of {where}"
+        found.append(Block(label, test.columns[name], loads / size, row[None], shifts, noise, loads, reaction))
+    return found
 
 
 def _noise(test: MeasuredTest, kind: str) -> float | None:
@@ -201,22 +196,20 @@ def _noise(test: MeasuredTest, kind: str) -> float | None:
 
 
 def _row(test: MeasuredTest, name: str, family: Family, load: LoadCase) -> np.ndarray:
-    """Row that reads the displacement of a curve's column."""
+    """Row (unknowns,) that reads the displacement of a curve's column."""
     kind = LOADS[test.load].kind if isinstance(test.body, Beam) else None
-    known = [f"{axis} {group}" for axis in "xy" for group in family.groups]
-    if name == "displacement" and kind is not None and kind.pressed:
-        return family.mean(MIDDLE, kind.axis)
-    if name == "displacement":
-        return family.forces / np.hypot(*load.tractions[0].force)  # the mean along the force
-    if kind is not None and kind.direct:
-        known.append("transverse")
-        if name == "transverse":
-            return family.mean(GAUGES[1], kind.along) - family.mean(GAUGES[0], kind.along)
-    if name not in known:
-        raise TestDataError(
-            f"'{test.file}', column {name!r}: {nearest(name, [*CURVE_COLUMNS, *known])}; or leave it out"
-        )
-    return family.mean(name[2:], "xy".index(name[0]))
+    known = {f"{axis} {group}": (group, number) for group in family.groups for number, axis in enumerate("xy")}
+    if name in known:
+        return family.mean(*known[name])
+    if name == "transverse" and kind and kind.direct:
+        return family.mean(GAUGES[1], kind.along) - family.mean(GAUGES[0], kind.along)
+    if name != "displacement":
+        names = [*CURVE_COLUMNS, *known, *(["transverse"] if kind and kind.direct else [])]
+        raise TestDataError(f"'{test.file}', column {name!r}: {nearest(name, names)}; or leave it out")
+    (pull,) = load.tractions
+    if kind and kind.pressed:
+        return pull.force[kind.axis] * family.mean(MIDDLE, kind.axis)
+    return family.forces / np.hypot(*pull.force)  # the mean along the force
 
 
 def _read(path: str | Path) -> tuple[dict[str, np.ndarray], list[int]]:
@@ -224,37 +217,22 @@ def _read(path: str | Path) -> tuple[dict[str, np.ndarray], list[int]]:
     (line, heads), *rows = csv_rows(path, TestDataError, HEADS)
     parts = [head.rstrip("] ").partition("[") for head in heads]
     names = [name.strip() for name, _, _ in parts]
-    wanted = FIELD_COLUMNS if set("uv") & set(names) else CURVE_COLUMNS
-    for name in wanted:
+    of_field = bool(set("uv") & set(names))
+    for name in FIELD_COLUMNS if of_field else CURVE_COLUMNS:
         if names.count(name) != 1:
             why = "is missing" if name not in names else "is there twice"
             raise TestDataError(f"'{path}', line {line}: column {name!r} {why} in {names}; {HEADS}")
-    found = {}
-    for place, (name, (_, _, unit)) in enumerate(zip(names, parts)):
-        if wanted is FIELD_COLUMNS and name not in FIELD_COLUMNS:
+    used = [name if name in FIELD_COLUMNS or not of_field else "" for name in names]
+    table = np.array(numbers(path, rows, used, TestDataError)).reshape(-1, len(used))
+    columns = {}
+    for name, (_, _, unit), values in zip(used, parts, table.T):
+        if not name:
             continue
         try:
             scale = positive(f"1 {unit}", "force" if name == "force" else "length", f"column {name!r}")
         except ValueError as error:
             raise TestDataError(f"'{path}', line {line}: {error} in '[ ]'") from None
-        values = [_number(path, number, name, row, place, len(names)) for number, row in rows]
-        found[name] = scale * np.array(values)
+        columns[name] = scale * values
     if not rows:
         raise TestDataError(f"'{path}': has no rows of numbers below its head; {HEADS}")
-    return found, [number for number, _ in rows]
-
-
-def _number(path: str | Path, line: int, name: str, row: list[str], place: int, count: int) -> float:
-    """Number in a column of a row."""
-    if len(row) != count:
-        raise TestDataError(f"'{path}', line {line}: has {len(row)} values, and the head {count}; correct it")
-    try:
-        value = float(row[place])
-    except ValueError:
-        value = np.nan
-    if not np.isfinite(value):
-        raise TestDataError(
-            f"'{path}', line {line}, column {name!r}: {row[place].strip()!r} is no finite number; correct the line, "
-            "or remove it"
-        )
-    return value
+    return columns, [number for number, _ in rows]

@@ -12,7 +12,7 @@ from .kind import STAGE
 NETWORK = ("scene", "definition")
 OF_A_RUN = (*NETWORK, "engine", *SETTING)
 
-SCENE_AND_PROGRAM = {
+RUN_COORDINATES = {
     "scene_beam": (("scene",), "1", "beam", ""),
     "scene_mesh_type": (("scene",), "1", "mesh type", ""),
     "scene_mesh_size": (("scene",), "m", "asked length of an edge", np.nan),
@@ -44,7 +44,7 @@ def _variables(cell):
         "definition_error": (NETWORK, "1", "error of the network in equilibrium: that of the definition", np.nan),
         "particles": (NETWORK, "1", "number of particles", np.nan),
         "engine_version": (("engine",), "1", "versions of what the engine needs, as it was run", ""),
-        **SCENE_AND_PROGRAM,
+        **RUN_COORDINATES,
     }  # fmt: skip
 
 
@@ -90,7 +90,7 @@ def _gathered(group, study, found):
         curves[tuple(run.labels[name] for name in OF_A_RUN)].append((run.labels["stiffness_factor"], result))
     for setting, points in curves.items() if group is ENGINE_CURVES else ():
         filler.put(_best(points), **dict(zip(OF_A_RUN, setting)))
-    return filler.data.set_coords([*SCENE_AND_PROGRAM])
+    return filler.data.set_coords([*RUN_COORDINATES])
 
 
 def _best(points):

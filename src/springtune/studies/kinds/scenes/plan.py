@@ -442,7 +442,7 @@ def _scenes(study, mesh):
     """Tasks of a mesh's scenes."""
     tasks, kept = [], shown_scenes(study)
     for scene, key in zip(scenes_by_mesh(study)[mesh], scene_keys(study)[mesh]):
-        task = _common(study, scene)[0] | {"key": key} | _own(study, scene)
+        task = {**_common(study, scene)[0], "key": key, **_own(study, scene)}
         if scene in kept:
             task["keep_fields"] = True
         if scene.definition == "calibrated":
