@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 
 import springtune as st
-from springtune.handover.net import terms
 from springtune.handover.simulation import WORDS
+from springtune.handover.terms import terms_of
 from springtune.linalg.factors import SingularError
 from springtune.mesh import lattice
 from springtune.mesh.bonds import bonded
@@ -188,7 +188,7 @@ def _cost(mesh: st.Mesh, springs: Springs) -> str:
     """Terms of the energy a particle, and solves that finding the stiffnesses took."""
     counts = {"springs": int(np.count_nonzero(springs.relative))}
     for energy in springs.energies:
-        kind = terms(energy, 1.0).kind
+        kind = terms_of(energy, mesh, 1.0).kind
         each = energy.corners.shape[1] if kind in ("angle", "corner") else 1
         counts[WORDS[kind]] = counts.get(WORDS[kind], 0) + each * len(energy.corners)
     said = [f"{word} {count / len(mesh.points):.1f}" for word, count in counts.items() if count]
