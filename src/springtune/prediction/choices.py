@@ -28,7 +28,7 @@ from ..reference.small_strain import ReferenceNotConvergedError, ReferenceSoluti
 from ..safe_io.tables import Tabled, TabledList
 from ..scene.meshes import A_BEAM, A_MATERIAL, A_MESH, is_a
 from ..scene.motion import stable_steps
-from ..scene.sheet import Sheet
+from ..scene.sheet import Sheet, chosen
 from ..scene.statements import BeamStatement, ShapeStatement, Statement
 from ..springs import DEFINITIONS, DefinitionError, Springs
 
@@ -327,9 +327,7 @@ def predict(
             )
         known = references(beam, under_loads[0].material, named) if known is None else known
         wanted = {load: cast(References, known)[load] for load in named}
-    able = [name for name, one in DEFINITIONS.items() if not (one.needs or one.uniaxial)]
-    further = check_names("also", also, able, ["best-springs"], "cannot be tried") if also else ()
-    tried = Trial(statements, wanted, also=further)
+    tried = Trial(statements, wanted, also=[chosen(DEFINITIONS, name, "also").name for name in also])
     if not tried.names and all("springs" in found for found in tried.failures.values()):
         raise DefinitionError("; ".join(f"{name}: {found['springs']}" for name, found in tried.failures.items()))
     return best_first([tried.choice(name) for name in (*tried.names, *tried.failures)], known)

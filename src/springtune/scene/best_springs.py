@@ -38,7 +38,8 @@ class BestSprings(Tabled):
     energy_error : float
         Worst error of the energy [1] over all loads of the fitted space: polynomial stresses up to cubic ones.
     displacement_error : float
-        Worst error of the displacement field there, root mean square over that of the load [1].
+        Worst error of the displacement field there [1], root mean square over that of the load, of which a hundredth of
+        the largest load's counts at least.
     stretch_error : float
         Worst error of a spring's stretch there, over the largest one that it has under a load of the same energy [1].
     further_error : float
@@ -48,8 +49,6 @@ class BestSprings(Tabled):
         allowed.
     objectives : dict of str to float
         What the search minimised [1], by its start: searches that agree may be near the best there is.
-    evaluations : int
-        Networks that were tried.
     seconds : float
         That the searches took.
 
@@ -81,7 +80,6 @@ class BestSprings(Tabled):
     further_error: float
     lower_bound: float | None
     objectives: dict[str, float]
-    evaluations: int
     seconds: float
 
     def __call__(self, mesh: Mesh, material: AnyMaterial, thickness: float) -> Springs:
@@ -127,7 +125,7 @@ class BestSprings(Tabled):
             ("no springs >= 0 below, proven", self.lower_bound),
         ):
             yield label, "" if error is None else f"{100 * error:.2g} %"
-        yield "searches", f"{len(self.objectives)}, {self.evaluations} networks, {self.seconds:.1f} s"
+        yield "searches", f"{len(self.objectives)}, {self.springs.evaluations} networks, {self.seconds:.1f} s"
 
     def _computed_rows(self) -> Iterator[tuple[str, str]]:
         yield from ((f"error in {load}", error_text(error)) for load, error in self.errors.items())
@@ -206,9 +204,8 @@ def best_springs(
     if negative:
         found = {name: space.search(stiffness, True, evaluations) for name, (stiffness, _, _) in found.items()}
     stiffness = min(found.values(), key=lambda one: one[1])[0]
-    counted = sum(count for _, _, count in found.values())
     return BestSprings(
-        Springs(scale, stiffness, evaluations=counted),
+        Springs(scale, stiffness, evaluations=sum(count for _, _, count in found.values())),
         space.mesh,
         material,
         thickness,
@@ -216,6 +213,5 @@ def best_springs(
         *space.errors(stiffness),
         None if negative else space.stretch_bound(),
         {name: value for name, (_, value, _) in found.items()},
-        counted,
         time.perf_counter() - begin,
     )

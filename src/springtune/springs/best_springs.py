@@ -33,7 +33,7 @@ import numpy as np
 from ..mesh import Mesh
 from ..problem.materials import Material
 from . import van_gelder
-from .base import Springs, definition, triangles_only
+from .base import DefinitionError, Springs, definition, triangles_only
 from .identification import SPAN, tested_body
 from .patch_fit import NU, polynomial_tests
 
@@ -50,6 +50,9 @@ EVALUATIONS = 400
 LEAST_START = 0.01
 """Least stiffness from which a search starts, over the mean [1]: logarithms need one above zero."""
 
+LEAST_DISPLACEMENT = 0.01
+"""Displacement over the largest load's below which it counts no less, as in slender sheets [1]."""
+
 LEAST_MOVE = 1e-4
 """Virtual stretch below which a spring's proves little [1]."""
 
@@ -65,9 +68,8 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
 
     Source: own rule (derived).
     """
-    space = LoadSpace(mesh, material.poisson_ratio)
     start = van_gelder.springs(mesh, material, thickness).relative
-    stiffness, _, evaluations = space.search(start)
+    stiffness, _, evaluations = LoadSpace(mesh, material.poisson_ratio).search(start)
     return Springs(material.young_modulus * thickness, stiffness, evaluations=evaluations)
 
 
@@ -86,16 +88,18 @@ class LoadSpace:
         self.normals = self.network.rest_vectors / self.network.rest_lengths[:, None]
         self._outside, fields = polynomial_tests(mesh, nu)
         self.forces = self._reduced(self._outside)
+        if len(self.forces) < len(fields):
+            raise DefinitionError(f"has {len(fields)} loads to fit, too many for so coarse a mesh; use a finer one")
         self.stretches = self._stretched(fields)
         self.sizes = np.linalg.norm(self.stretches, axis=1)
         # Displacements times the root of the area: rigid motions are taken off by a projection.
         self._roots = np.sqrt(np.repeat(mesh.particle_areas, 2))[:, None]
-        x, y = (mesh.points - mesh.points.mean(axis=0)).T
-        one, zero = np.ones(len(x)), np.zeros(len(x))
-        rigid = np.stack([np.stack(field, axis=1).ravel() for field in ((one, zero), (zero, one), (-y, x))], axis=1)
+        turned = (mesh.points - mesh.points.mean(axis=0))[:, ::-1] * [-1.0, 1.0]
+        rigid = np.column_stack([np.tile(np.eye(2), (len(turned), 1)), turned.ravel()])
         self._rigid = np.linalg.qr(self._roots * rigid)[0]
         self._wanted = self._deformed(fields)
-        self._scale = np.linalg.inv(np.linalg.cholesky(self._wanted.T @ self._wanted)).T
+        squares, mixtures = np.linalg.eigh(self._wanted.T @ self._wanted)
+        self._scale = mixtures / np.sqrt(squares + LEAST_DISPLACEMENT**2 * squares[-1])
 
     def _reduced(self, fields: Iterable[np.ndarray]) -> np.ndarray:
         return np.stack([self.network.reduce(field) for field in fields], axis=1)
@@ -172,12 +176,9 @@ class LoadSpace:
             step = start if any_sign else stiffness
             return float(value), slope * step + 2 * START_WEIGHT / len(change) * change
 
+        bounds = [(-SPAN, SPAN) if any_sign else (-math.log(SPAN), math.log(SPAN))] * len(start)
         options = {"maxfun": evaluations, "maxiter": evaluations, "maxcor": 20, "ftol": 1e-9, "gtol": 1e-9}
-        largest = SPAN if any_sign else math.log(SPAN)
-        found = minimize(
-            objective, np.zeros(len(start)), jac=True, method="L-BFGS-B", bounds=[(-largest, largest)] * len(start),
-            options=options,
-        )  # fmt: skip
+        found = minimize(objective, np.zeros(len(start)), jac=True, method="L-BFGS-B", bounds=bounds, options=options)
         stiffness = start * (1 + found.x) if any_sign else start * np.exp(found.x)
         return stiffness, float(found.fun), int(found.nfev)
 

@@ -36,6 +36,7 @@ KIND = Kind(
         "adjoint": (0.05, 2e-4),
         "annealed": (0.05, 1e-3),
         "evolved": (0.05, 1e-3),
+        "best-springs": (0.05, 5e-3),
     },
 )
 
