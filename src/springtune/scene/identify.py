@@ -175,7 +175,7 @@ class Identified(Tabled):
     ----------
     law : str
     values : dict of str to float
-        dict[str, Any], moduli in Pa; assumed where the tests do not tell.
+        Moduli in Pa; assumed where the tests do not tell.
     intervals : dict of str to (float, float)
         Intervals of 95 %; NaN for known or undetermined constants.
     undetermined : tuple of str
