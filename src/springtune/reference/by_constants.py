@@ -54,8 +54,8 @@ class Family:
         numbered.data = np.arange(numbered.nnz)
         self._inner = numbered[self._free][:, self._free]
 
-    def solve(self, constants: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return displacements (unknowns, n) and the work (n,) of forces and supports.
+    def solve(self, constants: np.ndarray) -> np.ndarray:
+        """Return displacements (unknowns, n).
 
         The first column of `constants` (n_constants, n) has `ENTRIES` of each part, and yields values; the others have
         directions, and yield the derivatives along them.
@@ -69,9 +69,7 @@ class Family:
         moved[free, 0] = factor.solve((self.forces - whole @ self._given)[free])
         pulls = np.stack([one @ moved[:, 0] for one in self._all], axis=1) @ constants
         moved[free, 1:] = -factor.solve(np.ascontiguousarray(pulls[free, 1:]))
-        work = moved[:, 0] @ pulls
-        work[1:] += 2 * self.forces @ moved[:, 1:]
-        return moved, work
+        return moved
 
     def mean(self, group: str, axis: int) -> np.ndarray:
         """Row (unknowns,) that reads the displacement of a point, or the mean one of sides, along an axis."""

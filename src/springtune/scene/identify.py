@@ -24,6 +24,7 @@ from ..registry import hook
 from ..safe_io.inputs import number_of
 from ..safe_io.tables import Tabled
 from .measured import Block, MeasuredTest, blocks, stated
+from .sheet import chosen
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -101,10 +102,9 @@ class Model:
             columns = np.stack([entries(constants, angle), *slopes], axis=-1)
             moved = columns.reshape(-1, columns.shape[-1])
             if family is not None:  # stresses of rubber are linear in its coefficients
-                moved, work = family.solve(moved)
+                moved = family.solve(moved)
             for block in own:
-                read = block.rows @ (work[None] if block.reaction else moved)
-                table = block.unshifted(block.factors[:, None] * read)
+                table = block.unshifted(block.factors[:, None] * (block.rows @ moved))
                 table[:, 0] -= block.unshifted(block.values)
                 found.append(table / next(scales))
         return found
@@ -293,9 +293,7 @@ def identify(
     >>> f"{found.values['E'] / 1e9:.0f} GPa", found.undetermined
     ('74 GPa', ('nu',))
     """
-    if law not in SHEET_LAWS:
-        raise ValueError(f"law: {law!r} is unknown; {nearest(str(law), SHEET_LAWS)}")
-    if isinstance(tests, str | Path) != (not SHEET_LAWS[law]):
+    if isinstance(tests, str | Path) != (not chosen(SHEET_LAWS, law, "law")):
         raise ValueError(f"tests: {tests!r}; give the file of one test for rubber, else springtune.MeasuredTest")
     if isinstance(tests, str | Path):
         return _rubber(tests, law)
@@ -354,7 +352,7 @@ def _scale(model: Model, constants: dict[str, Any]) -> float:
         measured = block.unshifted(block.values)
         predicted = table[:, 0] + measured
         if predicted @ measured > 0:
-            found.append(np.log(predicted @ measured / (predicted @ predicted)) * (1 if block.reaction else -1))
+            found.append(np.log(predicted @ predicted / (predicted @ measured)))
     return float(np.sum(found) / max(len(found) - 1, 1))
 
 

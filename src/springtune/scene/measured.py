@@ -39,9 +39,9 @@ OFF_BODY = 1e-3
 class Block:
     """Numbers of one kind from one file.
 
-    `values` (n,) are `factors` (n,) times what `rows` read, one for all or one each: of the displacements, or of the
-    work if the values are forces on a moved support (`reaction`). What the columns of `shifts` (n, n_shifts), an
-    orthonormal basis, explain tells nothing of the material. `places` are loads, or points (n / 2, 2).
+    `values` (n,) are `factors` (n,) times what `rows` read of the displacements, one for all or one each. What the
+    columns of `shifts` (n, n_shifts), an orthonormal basis, explain tells nothing of the material. `places` are loads,
+    or points (n / 2, 2).
     """
 
     label: str
@@ -51,7 +51,6 @@ class Block:
     shifts: np.ndarray
     noise: float | None
     places: np.ndarray
-    reaction: bool = False
 
     def unshifted(self, columns: np.ndarray) -> np.ndarray:
         """Columns (n, ...) without what shifts explain."""
@@ -77,8 +76,7 @@ class MeasuredTest:
     angle : float or str, optional
         Angle of the material's first axis from x [rad], of a coupon that was cut out at an angle.
     noise : float or str, optional
-        Standard deviation of displacements [m], or of the forces [N] of a curve whose support is moved. By default
-        estimated from the residuals.
+        Standard deviation of displacements [m]. By default estimated from the residuals.
     shift : bool, optional
         Whether a rigid motion of a field, or the zero of a curve, is estimated and removed.
 
@@ -120,7 +118,9 @@ class MeasuredTest:
                 f"force: {self.force!r}; give the force at which '{self.file}' was measured, as '400 N', if it is the "
                 "field of a beam, else none"
             )
-        put(self, force=None if self.force is None else positive(self.force, "force", "force"))
+        for name, kind in (("force", "force"), ("noise", "length")):
+            value = getattr(self, name)
+            put(self, **{name: None if value is None else positive(value, kind, name)})
 
 
 def stated(test: MeasuredTest) -> tuple[Shape, LoadCase, GroupedMesh | None]:
@@ -157,42 +157,32 @@ def _field(test: MeasuredTest, family: Family) -> list[Block]:
         )
     turned = (points - points.mean(axis=0))[:, ::-1] * [-1, 1] / (np.ptp(points) or 1.0)
     rigid, _ = np.linalg.qr(np.column_stack([np.tile(np.eye(2), (len(points), 1)), turned.ravel()]))
-    factors, noise = np.full(values.size, test.force or 1.0), _noise(test, "length")
-    label = f"field of '{test.file}'"
-    return [Block(label, values.ravel(), factors, rows, rigid[:, : 3 * test.shift], noise, points)]
+    factors, label = np.full(values.size, test.force or 1.0), f"field of '{test.file}'"
+    return [Block(label, values.ravel(), factors, rows, rigid[:, : 3 * test.shift], test.noise, points)]
 
 
 def _curve(test: MeasuredTest, family: Family, load: LoadCase) -> list[Block]:
-    where, pushed = f"'{test.file}'", [np.hypot(*one.force) for one in load.tractions]
-    moved = [np.hypot(one.x or 0.0, one.y or 0.0) for one in load.supports if one.x or one.y]
-    if len(pushed + moved) != 1 or load.pressures or any(load.gravity):
-        raise TestDataError(
-            f"{where}: load {test.load!r} is not one force or one moved support; give a field of points"
-        )
-    (size,) = pushed + moved
-    driving, measured = CURVE_COLUMNS[:: -1 if moved else 1]
-    loads = test.columns[driving]
+    where, loads = f"'{test.file}'", test.columns["force"]
+    moved = any(one.x or one.y for one in load.supports)
+    if len(load.tractions) != 1 or load.pressures or any(load.gravity) or moved:
+        raise TestDataError(f"{where}: load {test.load!r} is not one force; give a field of points")
     if not np.ptp(loads) > 1e-9 * np.abs(loads).max() and (test.shift or not loads.any()):
         raise TestDataError(
-            f"{where}, column {driving!r}: all {len(loads)} values are {loads[0]:g} in SI units, so there is no slope; "
+            f"{where}, column 'force': all {len(loads)} values are {loads[0]:g} in SI units, so there is no slope; "
             "give other loads, or switch the shift off if the zero is known"
         )
-    if (loads - loads.mean()) @ test.columns[measured] < 0:
+    if (loads - loads.mean()) @ test.columns["displacement"] < 0:
         raise TestDataError(
-            f"{measured} of {where}: runs against the load; both are positive along the load, so change a column's sign"
+            f"displacement of {where}: runs against the load; both are positive along the load, so change a column's "
+            "sign"
         )
-    found = []
-    for name in [name for name in test.columns if name != driving]:
-        reaction = bool(moved) and name == measured
-        row = np.array([1 / size]) if reaction else _row(test, name, family, load)
-        noise = None if moved and not reaction else _noise(test, "force" if reaction else "length")
-        shifts, label = np.full((len(loads), int(test.shift)), len(loads) ** -0.5), f"{name} of {where}"
-        found.append(Block(label, test.columns[name], loads / size, row[None], shifts, noise, loads, reaction))
-    return found
-
-
-def _noise(test: MeasuredTest, kind: str) -> float | None:
-    return None if test.noise is None else positive(test.noise, kind, "noise")
+    factors = loads / np.hypot(*load.tractions[0].force)
+    shifts = np.full((len(loads), int(test.shift)), len(loads) ** -0.5)
+    return [
+        Block(f"{name} of {where}", values, factors, _row(test, name, family, load)[None], shifts, test.noise, loads)
+        for name, values in test.columns.items()
+        if name != "force"
+    ]
 
 
 def _row(test: MeasuredTest, name: str, family: Family, load: LoadCase) -> np.ndarray:
