@@ -81,7 +81,8 @@ class Material:
 
     def __post_init__(self) -> None:
         _check_label(self)
-        _check_plane(self.plane)
+        if self.plane not in PLANES:
+            raise ValueError(f"plane: {self.plane!r} is unknown; give {' or '.join(map(repr, PLANES))}")
         put(self, young_modulus=positive(self.young_modulus, "stress", "Young's modulus"))
         if not (isinstance(self.poisson_ratio, Real) and -1 < self.poisson_ratio <= 0.5):
             raise ValueError(
@@ -724,11 +725,6 @@ def _known_test(test: str) -> str:
     if test not in RUBBER_TESTS:
         raise ValueError(f"test: {test!r} is unknown; known: {', '.join(RUBBER_TESTS)}")
     return test
-
-
-def _check_plane(plane: str) -> None:
-    if plane not in PLANES:
-        raise ValueError(f"plane: {plane!r} is unknown; give {' or '.join(map(repr, PLANES))}")
 
 
 def _check_label(material: AnyMaterial) -> None:

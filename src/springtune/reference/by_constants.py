@@ -50,9 +50,6 @@ class Family:
                 units[part, row, column] = units[part, column, row] = shape.thickness
                 level._tensor = units[:, VOIGT[:, :, None, None], VOIGT[None, None]]
                 self._all.append(csr_array((level._matrices().ravel(), places), shape=2 * self.forces.shape))
-        numbered = self._all[0].copy()
-        numbered.data = np.arange(numbered.nnz)
-        self._inner = numbered[self._free][:, self._free]
 
     def solve(self, constants: np.ndarray) -> np.ndarray:
         """Return displacements (unknowns, n).
@@ -60,10 +57,9 @@ class Family:
         The first column of `constants` (n_constants, n) has `ENTRIES` of each part, and yields values; the others have
         directions, and yield the derivatives along them.
         """
-        free, inner = self._free, self._inner
-        whole = self._all[0].copy()
+        free, whole = self._free, self._all[0].copy()
         whole.data = constants[:, 0] @ np.stack([one.data for one in self._all])
-        factor = factorize(csc_array((whole.data[inner.data], inner.indices, inner.indptr), shape=inner.shape))
+        factor = factorize(csc_array(whole[free][:, free]))
         moved = np.zeros((len(free), constants.shape[1]))
         moved[:, 0] = self._given
         moved[free, 0] = factor.solve((self.forces - whole @ self._given)[free])

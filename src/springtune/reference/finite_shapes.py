@@ -58,10 +58,11 @@ class _Levels:
 
 
 class _PartLaws:
-    """Laws of elements of several materials, which `parts` (elements,) number."""
+    """Laws of elements, by the `names` of their materials; `scales` (elements,) are their units of stress [Pa]."""
 
-    def __init__(self, parts: np.ndarray, laws: Mapping[int, Law]) -> None:
-        self.rows = [(parts == number, law) for number, law in laws.items()]
+    def __init__(self, names: np.ndarray, laws: Mapping[str, tuple[float, Law]]) -> None:
+        self.rows = [(names == name, laws[name][1]) for name in np.unique(names).tolist()]
+        self.scales = np.array([laws[name][0] for name in names.tolist()])
 
     def response(self, strain: np.ndarray) -> Response:
         """As of `Law`."""
@@ -103,13 +104,10 @@ class _FiniteLevel(Level, Body):
         problem, space = self.problem, self.space
         _, weights, _, gradients = tabulated(space.degree, 2 * space.degree + (4 if space.curved.any() else 0))
         jacobian, determinant = space.jacobians(gradients)
-        names = space.mesh.names
-        scales = np.array([self.levels.laws[name][0] if name in self.levels.laws else 0.0 for name in names])
-        parts = np.asarray(space.mesh.parts)
-        self.law = _PartLaws(parts, {one: self.levels.laws[names[one]][1] for one in np.unique(parts).tolist()})
+        self.law = law = self._laws(space.mesh.parts)
         self.nodes_of = space.numbers
         self.gradients = np.einsum("qiu,equa->eqai", gradients, inverse_of(jacobian, determinant), optimize=True)
-        self.weights = weights * np.abs(determinant) * (problem.shape.thickness * scales)[parts][:, None]
+        self.weights = weights * np.abs(determinant) * (problem.shape.thickness * law.scales)[:, None]
         self.held, self.given, self.turning = held, prescribed, self._turning()
         self.load, self.extent = forces, float(np.ptp(space.mesh.points, axis=0).max())
         moved = self._continued()
@@ -120,6 +118,9 @@ class _FiniteLevel(Level, Body):
         external = self.load + (self.turning @ moved.ravel()).reshape(-1, 2)
         residual = self._forces(gradient, self.law.response(strain).stress) - external
         return moved, residual, float((self.law.energy(strain) * self.weights).sum())
+
+    def _laws(self, parts: np.ndarray) -> _PartLaws:
+        return _PartLaws(np.array(self.space.mesh.names)[parts], self.levels.laws)
 
     def _continued(self) -> np.ndarray | None:
         """Equilibrium that Newton's method finds from that of the last level, if it is stable."""
@@ -154,9 +155,8 @@ class _FiniteLevel(Level, Body):
             for ends, sense in self.group_sides(pressure.group) if pressure.follower else ():
                 along, weights = np.polynomial.legendre.leggauss(space.degree + 1)
                 values, slopes = side_functions(space.degree, along)
-                block = (
-                    values.T @ (weights[:, None] * slopes) * (-pressure.pressure * sense * self.problem.shape.thickness)
-                )
+                scale = -pressure.pressure * sense * self.problem.shape.thickness
+                block = values.T @ (weights[:, None] * slopes) * scale
                 rows, columns = np.meshgrid(2 * space.on_side(ends), 2 * space.on_side(ends), indexing="ij")
                 for part, row, column in ((block, 0, 1), (-block, 1, 0)):
                     places = (rows + row).ravel(), (columns + column).ravel()
@@ -177,12 +177,8 @@ class _FiniteLevel(Level, Body):
         numbers = self.space.numbers[found]
         jacobian = np.einsum("pic,pia->pca", self.space.places[numbers], gradients)
         slopes = np.einsum("pic,pia->pca", self.field[numbers], gradients) @ np.linalg.inv(jacobian)
-        names, parts = self.space.mesh.names, np.asarray(self.space.mesh.parts)[found]
-        total = np.empty((len(found), 3))
-        for part in np.unique(parts):
-            scale, law = self.levels.laws[names[part]]
-            rows = parts == part
-            total[rows] = scale * law.response(strain_of(slopes[rows])).stress
+        law = self._laws(self.space.mesh.parts[found])
+        total = law.scales[:, None] * law.response(strain_of(slopes)).stress
         deformation = slopes + np.eye(2)
         cauchy = deformation @ matrix_of(total) @ np.swapaxes(deformation, 1, 2)
         return (cauchy / np.linalg.det(deformation)[:, None, None])[:, [0, 1, 0], [0, 1, 1]]

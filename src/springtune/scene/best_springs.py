@@ -204,14 +204,8 @@ def best_springs(
     if negative:
         found = {name: space.search(stiffness, True, evaluations) for name, (stiffness, _, _) in found.items()}
     stiffness = min(found.values(), key=lambda one: one[1])[0]
-    return BestSprings(
-        Springs(scale, stiffness, evaluations=sum(count for _, _, count in found.values())),
-        space.mesh,
-        material,
-        thickness,
-        negative,
-        *space.errors(stiffness),
-        None if negative else space.stretch_bound(),
-        {name: value for name, (_, value, _) in found.items()},
-        time.perf_counter() - begin,
-    )
+    springs = Springs(scale, stiffness, evaluations=sum(count for _, _, count in found.values()))
+    errors, bound = space.errors(stiffness), None if negative else space.stretch_bound()
+    objectives = {name: value for name, (_, value, _) in found.items()}
+    seconds = time.perf_counter() - begin
+    return BestSprings(springs, space.mesh, material, thickness, negative, *errors, bound, objectives, seconds)

@@ -321,14 +321,13 @@ def _sheet(tests: Sequence[MeasuredTest], law: str, known: Mapping[str, Number])
         constants = varied(constants, moduli, [_scale(model, constants)] * len(moduli))
         found = _identified(law, model, constants, free, notes)
         constants = found.values
-    materials: dict[str, AnyMaterial] = {
-        part: Material(constants[name], constants["nu"], name=f"measured-{part}".rstrip("-"))
-        for part, name in zip(parts, constants if law != "orthotropic" else ())
-    }
     if law == "orthotropic":
         along, across, nu, shear = constants.values()
-        materials = {"": AnisotropicMaterial.orthotropic(along, across, nu, shear, name="measured")}
-    return replace(found, materials=materials)
+        ply = AnisotropicMaterial.orthotropic(along, across, nu, shear, name="measured")
+        return replace(found, materials={"": ply})
+    names = [f"measured-{part}".rstrip("-") for part in parts]
+    each = [Material(modulus, constants["nu"], name=name) for modulus, name in zip(constants.values(), names)]
+    return replace(found, materials=dict(zip(parts, each)))
 
 
 def _start(names: Sequence[str], known: Mapping[str, Number]) -> tuple[dict[str, Any], list[str]]:
@@ -377,17 +376,11 @@ def _identified(law: str, model: Model, constants: dict[str, Any], free: Sequenc
             )
     fitted = {name: value if name in names else np.nan for name, value in constants.items()}
     low, high = (varied(fitted, names, one) for one in (-half, half))
-    return Identified(
-        law,
-        {name: float(value) for name, value in constants.items()},
-        {name: (float(low[name]), float(high[name])) for name in constants},
-        tuple(lacking),
-        tuple(notes),
-        dict(zip(residuals, noise.tolist())),
-        residuals,
-        {},
-        {block.label: block.places for block in model.blocks},
-    )
+    values = {name: float(value) for name, value in constants.items()}
+    intervals = {name: (float(low[name]), float(high[name])) for name in constants}
+    noises = dict(zip(residuals, noise.tolist()))
+    places = {block.label: block.places for block in model.blocks}
+    return Identified(law, values, intervals, tuple(lacking), tuple(notes), noises, residuals, {}, places)
 
 
 def _rubber(file: str | Path, law: str) -> Identified:

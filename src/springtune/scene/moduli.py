@@ -112,23 +112,18 @@ class MeshModuli:
     def __call__(self, material: AnyMaterial, definition: AnyDefinition) -> Moduli:
         """As `moduli`."""
         springs, seconds = self.sheet.derive(definition, material)
+        origin = springs, seconds, self.sheet.mesh, material
         if not isinstance(material, Material):
-            return Moduli(np.nan, np.nan, np.nan, springs, seconds, self.sheet.mesh, material)
+            return Moduli(np.nan, np.nan, np.nan, *origin)
         name = springs.relative.tobytes(), springs.lateral, *(energy.key for energy in springs.energies)
         if name not in self._found:
             self._found[name] = *self._test.axial(springs), self._test.shear(springs)
         young_modulus, poisson_ratio, shear_modulus = self._found[name]
         wanted = material.in_plane
         scale = wanted.young_modulus * self.sheet.thickness
-        return Moduli(
-            young_modulus * springs.reference / scale - 1,
-            poisson_ratio,
-            shear_modulus * springs.reference / scale * 2 * (1 + wanted.poisson_ratio) - 1,
-            springs,
-            seconds,
-            self.sheet.mesh,
-            material,
-        )
+        young_modulus_error = young_modulus * springs.reference / scale - 1
+        shear_modulus_error = shear_modulus * springs.reference / scale * 2 * (1 + wanted.poisson_ratio) - 1
+        return Moduli(young_modulus_error, poisson_ratio, shear_modulus_error, *origin)
 
 
 def moduli(mesh: Mesh, material: AnyMaterial, definition: AnyDefinition) -> Moduli:

@@ -45,11 +45,10 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     triangles_only(mesh)
     nu = material.poisson_ratio
     spring_modulus = COEFFICIENT * 4 / (3 * (1 + nu))  # over E
-    energies: tuple[BiquadraticEnergy, ...] = ()
-    if abs(1 - 3 * nu) > 1e-15:
-        modulus = (3 * nu - 1) / (2 * (1 - nu**2)) / spring_modulus
-        squares = (mesh.edge_lengths[mesh.cell_edges[3]] ** 2).sum(axis=1)
-        factor = 2 * modulus * signed_areas(mesh.points, mesh.triangles) / squares**2
-        of_corners = np.repeat(factor[:, None], 3, axis=1)
-        energies = (BiquadraticEnergy(mesh.points, mesh.triangles, of_corners, of_corners),)
-    return Springs(spring_modulus * material.young_modulus * thickness, half_weight(mesh), energies)
+    modulus = (3 * nu - 1) / (2 * (1 - nu**2)) / spring_modulus
+    squares = (mesh.edge_lengths[mesh.cell_edges[3]] ** 2).sum(axis=1)
+    factor = 2 * modulus * signed_areas(mesh.points, mesh.triangles) / squares**2
+    of_corners = np.repeat(factor[:, None], 3, axis=1)
+    energies = (BiquadraticEnergy(mesh.points, mesh.triangles, of_corners, of_corners),)
+    reference = spring_modulus * material.young_modulus * thickness
+    return Springs(reference, half_weight(mesh), energies if abs(1 - 3 * nu) > 1e-15 else ())

@@ -48,12 +48,10 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     squares = mesh.edge_lengths[mesh.cell_edges[3]] ** 2
     normal = math.sqrt(12) * signed_areas(mesh.points, mesh.triangles) / squares.sum(axis=1)
     normal = np.repeat(normal[:, None], 3, axis=1)
-    energies: tuple[BiquadraticEnergy, ...] = ()
-    if abs(1 - 3 * nu) > 1e-15:
-        form = slip_form(mesh, normal * (1 - 3 * nu) / (1 + nu))
-        tensile, coupling = form[:, [0, 1, 2], [0, 1, 2]], form[:, [1, 2, 0], [2, 0, 1]]
-        energies = (BiquadraticEnergy(mesh.points, mesh.triangles, tensile, coupling),)
-    return Springs(reference, mesh.sum_to_edges({3: normal}), energies)
+    form = slip_form(mesh, normal * (1 - 3 * nu) / (1 + nu))
+    tensile, coupling = form[:, [0, 1, 2], [0, 1, 2]], form[:, [1, 2, 0], [2, 0, 1]]
+    energies = (BiquadraticEnergy(mesh.points, mesh.triangles, tensile, coupling),)
+    return Springs(reference, mesh.sum_to_edges({3: normal}), energies if abs(1 - 3 * nu) > 1e-15 else ())
 
 
 def slip_form(mesh: Mesh, stiffness: np.ndarray) -> np.ndarray:

@@ -143,14 +143,9 @@ def _references(study, part, folder, found):
             for kinematics in study.axes["kinematics"]:
                 found.put({"reference_applies": not objections[kinematics]}, kinematics=kinematics, **labels)
             for one in case.quantities:
-                key = quantity_key(one)
-                value = result["values"].get(key, np.nan)
-                compared = {
-                    "reference_value": value,
-                    "reference_error_estimate": result["error_estimates"].get(key, np.nan),
-                    "reference_expected_error": _error(value, one.expected),
-                }
-                found.put(compared, quantity=one.name, **labels)
+                row = _value(result, one)
+                row |= {"reference_expected_error": _error(row["reference_value"], one.expected)}
+                found.put(row, quantity=one.name, **labels)
             lacking = (named(why, part.shape[shape], case) for why in result["lacking"].values())
             message = "; ".join(filter(None, (*lacking, objections["nonlinear"])))
         values["reference_message"] = message
@@ -165,19 +160,16 @@ def _finite_strain(study, part, folder, values):
     found = Filler(AT_FINITE_STRAIN.empty(study.axes | {"law": laws}))
     references = {}
     for shape, material, load, law in part.finite:
-        result = store.read_one(
-            folder / "shape_references", kind.reference_task(part, shape, material, load, law)["key"]
-        )
-        labels, case = {"shape": shape, "material": material, "load": load}, part.shape[shape].loads[load]
+        task = kind.reference_task(part, shape, material, load, law)
+        result = store.read_one(folder / "shape_references", task["key"])
+        labels = {"shape": shape, "material": material, "load": load, "law": law}
+        case = part.shape[shape].loads[load]
         references[shape, material, load, law] = result.get("values", {})
         whys = (result["message"], *result.get("lacking", {}).values())
         why = "; ".join(named(one, part.shape[shape], case) for one in whys if one)
-        found.put({"reference_message": why}, law=law, **labels)
-        for one in case.quantities:
-            key = quantity_key(one)
-            row = {"reference_value": result.get("values", {}).get(key, np.nan)}
-            row |= {"reference_error_estimate": result.get("error_estimates", {}).get(key, np.nan)}
-            found.put(row, law=law, quantity=one.name, **labels)
+        found.put({"reference_message": why}, **labels)
+        for one in case.quantities if not result["message"] else ():
+            found.put(_value(result, one), quantity=one.name, **labels)
     for one in part.scenes:
         reference = references.get((one.shape, one.material, one.load, law_of(one)), {})
         for quantity in part.shape[one.shape].loads[one.load].quantities if reference else ():
@@ -185,6 +177,13 @@ def _finite_strain(study, part, folder, values):
             error = _error(float(values.sel(labels)), reference.get(quantity_key(quantity), np.nan))
             found.put({"error": error}, **labels)
     return found.data
+
+
+def _value(result, quantity):
+    """Value of a quantity in a reference that did not fail, and its error estimate."""
+    key = quantity_key(quantity)
+    names = {"reference_value": "values", "reference_error_estimate": "error_estimates"}
+    return {name: result[stored_as].get(key, np.nan) for name, stored_as in names.items()}
 
 
 def _mesh(one, folder, found):

@@ -137,19 +137,16 @@ def law_of(one):
 def expand(config, declared):
     """Shapes of a study that has any, see `springtune.studies.config.kind.Kind`."""
     found, referred, finite = _scenes(config)
-    ranks = {
-        name: {label: rank for rank, label in enumerate(labels)}
-        for name, labels in (
-            ("shape", config.shapes),
-            ("mesh_type", (*OUTLINED, OWN_FILE)),
-            ("material", config.materials),
-            ("definition", DEFINITIONS),
-            ("kinematics", KINEMATICS),
-        )
+    known = {
+        "shape": [*config.shapes],
+        "mesh_type": [*OUTLINED, OWN_FILE],
+        "material": [*config.materials],
+        "definition": [*DEFINITIONS],
+        "kinematics": [*KINEMATICS],
     }
 
     def order(one):
-        shape, mesh_type, material, *rest = (known[getattr(one, name)] for name, known in ranks.items())
+        shape, mesh_type, material, *rest = (labels.index(getattr(one, name)) for name, labels in known.items())
         load = list(config.shapes[one.shape].loads).index(one.load)
         return shape, mesh_type, one.mesh_size, material, load, *rest
 

@@ -25,20 +25,16 @@ def solve(task):
     return _solved(task) | {"seconds": time.perf_counter() - begin}
 
 
-def _solver(task):
-    """What solves a reference: of small strain, or of a ``law`` at finite strain."""
-    if "law" not in task:
-        return None
-    from springtune.reference.finite_shapes import solve_finite_shape  # here: most references are of small strain
-
-    return partial(solve_finite_shape, law=task["law"])
-
-
 def _solved(task):
+    solver = None
+    if "law" in task:
+        from springtune.reference.finite_shapes import solve_finite_shape  # here: most references are of small strain
+
+        solver = partial(solve_finite_shape, law=task["law"])
     grouped = make(task["shape"]) if "file" in task["shape"] else None
     shape, materials = shape_of(task["shape"], task["thickness"], task["load"]), materials_of(task["materials"])
     case = shape.loads[ONE_LOAD]
-    found, lacking = solve_each(shape, case, materials, grouped, _solver(task))
+    found, lacking = solve_each(shape, case, materials, grouped, solver)
     if not found:
         return failed(task, "; ".join(dict.fromkeys(lacking.values())))
     values, estimates = {}, {}
