@@ -17,7 +17,7 @@ from ..problem.materials import AnyMaterial, Material
 from ..problem.shapes import LoadCase, Shape
 from .finite_strain import Body, Law, Response, StVenant, law_of, matrix_of, strain_of
 from .shapes import Level, Problem, ShapeReference, inverse_of, solve_shape
-from .triangles import shape_functions, side_fit, side_functions, tabulated
+from .triangles import side_fit, side_functions, tabulated
 
 TOLERANCE = 1e-3
 """Largest accepted relative error estimate."""
@@ -173,10 +173,7 @@ class _FiniteLevel(Level, Body):
 
     def _stresses(self, found: np.ndarray, local: np.ndarray) -> np.ndarray:
         """Forces over lengths as they are now and the thickness at rest [Pa], shape (n, 3)."""
-        _, gradients = shape_functions(self.space.degree, local)
-        numbers = self.space.numbers[found]
-        jacobian = np.einsum("pic,pia->pca", self.space.places[numbers], gradients)
-        slopes = np.einsum("pic,pia->pca", self.field[numbers], gradients) @ np.linalg.inv(jacobian)
+        slopes = self.slopes(found, local)
         law = self._laws(self.space.mesh.parts[found])
         total = law.scales[:, None] * law.response(strain_of(slopes)).stress
         deformation = slopes + np.eye(2)

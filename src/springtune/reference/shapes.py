@@ -769,11 +769,15 @@ class Level:
         values, _ = shape_functions(self.space.degree, local)
         return np.einsum("pi,pic->pc", values, self.field[self.space.numbers[found]])
 
-    def _stresses(self, found: np.ndarray, local: np.ndarray) -> np.ndarray:
-        """Stresses in triangles at reference coordinates [Pa], shape (n, 3)."""
+    def slopes(self, found: np.ndarray, local: np.ndarray) -> np.ndarray:
+        """Derivatives of displacements (component, axis) in triangles at reference coordinates, shape (n, 2, 2)."""
         _, gradients = shape_functions(self.space.degree, local)
         numbers = self.space.numbers[found]
         jacobian = np.einsum("pic,pia->pca", self.space.places[numbers], gradients)
-        slopes = np.einsum("pic,pia->pca", self.field[numbers], gradients) @ np.linalg.inv(jacobian)
+        return np.einsum("pic,pia->pca", self.field[numbers], gradients) @ np.linalg.inv(jacobian)
+
+    def _stresses(self, found: np.ndarray, local: np.ndarray) -> np.ndarray:
+        """Stresses in triangles at reference coordinates [Pa], shape (n, 3)."""
+        slopes = self.slopes(found, local)
         strains = np.stack([slopes[:, 0, 0], slopes[:, 1, 1], slopes[:, 0, 1] + slopes[:, 1, 0]], axis=1)
         return np.einsum("pij,pj->pi", self.problem.stiffness[self.space.mesh.parts[found]], strains)

@@ -118,8 +118,7 @@ class MeasuredTest:
                 f"force: {self.force!r}; give the force at which '{self.file}' was measured, as '400 N', if it is the "
                 "field of a beam, else none"
             )
-        for name, kind in (("force", "force"), ("noise", "length")):
-            value = getattr(self, name)
+        for name, value, kind in (("force", self.force, "force"), ("noise", self.noise, "length")):
             put(self, **{name: None if value is None else positive(value, kind, name)})
 
 

@@ -148,9 +148,6 @@ MATERIAL_FORMS = (
 """Keys of the four forms of a material; a material has the keys of one form."""
 
 
-IN_PLANE = {"stiffness": ", and give the stiffness of plane strain"}
-"""Remedies for forms that cannot have a plane, by their first key."""
-
 OF_A_TEST = ("terms", "equibiaxial_test", "pure_shear_test")
 
 
@@ -216,7 +213,7 @@ class MaterialConfig(Section):
         if self.angle is not None and form is not MATERIAL_FORMS[1]:
             raise refuse("turns the axes of an orthotropic material, and this is none; remove it", "angle")
         if self.plane is not None and form is not MATERIAL_FORMS[0]:
-            raise refuse(f"is for isotropic materials; remove it{IN_PLANE.get(form[0], '')}", "plane")
+            raise refuse("is for isotropic materials; remove it, and give a 'stiffness' in plane strain", "plane")
         for key in OF_A_TEST:
             if getattr(self, key) is not None and form is not MATERIAL_FORMS[3]:
                 raise refuse("goes with a 'uniaxial_test', and this material has none; remove it", key)
