@@ -254,8 +254,7 @@ def _summary(part):
     quantities = sum(len(part.shape[shape].loads[load].quantities) for shape, load in cases)
     shapes = f"{len(part.shapes)} shape{'s' * (len(part.shapes) > 1)}"
     rows = [["shape scenes", len(part.scenes), f"of {shapes} on {len(meshes)} meshes, {quantities} quantities"]]
-    if part.referred or part.finite:
-        count = len(part.referred) + len(part.finite)
+    if count := len(part.referred) + len(part.finite):
         rows.append(["shape references", count, "finite elements on the shapes themselves"])
     return rows
 
