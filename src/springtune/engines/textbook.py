@@ -61,7 +61,7 @@ class Textbook:
         self.kind, self.h = kind, kind.type(setting.step)
         self.substeps, self.iterations = setting.substeps, setting.iterations
         self.kept = kind.type(1 / (1 + damping * setting.step))
-        self.points = net.points.astype(kind)
+        self.points = (net.points - net.points.mean(axis=0)).astype(kind)  # small numbers lose least by rounding
         self.weights = np.where(net.held, 0, 1 / net.masses[:, None]).astype(kind)
         self.push = (setting.step**2 * np.where(net.held, 0, net.forces / net.masses[:, None])).astype(kind)
         self.inertia = (net.masses / setting.step**2).astype(kind)
