@@ -28,9 +28,10 @@ paper: $(VENV)/.run
 
 # Files in this order, those that take longest first: at the end no core waits for the other. The inputs of tests/fuzz are
 # others each day: the line that is printed has their seed, by which `make test FUZZ_SEED=...` makes them again.
+# A process that crashes ends the run: pytest-xdist 3.8 hangs if it starts another one.
 FUZZ_SEED := $(shell date -u +%Y%m%d)
 test: $(VENV)/.test
-	FUZZ_SEED=$(FUZZ_SEED) pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not slow" tests/workflow tests/fuzz tests/reruns tests/faults tests/physics tests/unit src
+	FUZZ_SEED=$(FUZZ_SEED) pytest -n 2 --max-worker-restart 0 --dist loadfile --no-loadscope-reorder -m "not slow" tests/workflow tests/fuzz tests/reruns tests/faults tests/physics tests/unit src
 	SPRINGTUNE_SOLVER=superlu pytest -q -n 2 -m "not slow" tests/physics/test_statics.py tests/physics/test_path.py tests/physics/test_continuation.py
 
 # The page to browse, in a headless Chromium: apt-get install chromium chromium-driver.
@@ -45,7 +46,7 @@ WITH_ENGINES = PYTHONPATH="$(CURDIR)/src:$(CURDIR)/$(ENGINES)"
 # Those of Newton first, since it compiles: at the end no core waits for the other.
 ENGINE_TESTS = $(wildcard tests/engines/test_newton*.py) $(filter-out tests/engines/test_newton%,$(wildcard tests/engines/test_*.py))
 test-engines: $(VENV)/.test $(ENGINES)/.done
-	$(WITH_ENGINES) pytest -n 2 --dist loadfile --no-loadscope-reorder -rs -m "not slow" $(ENGINE_TESTS)
+	$(WITH_ENGINES) pytest -n 2 --max-worker-restart 0 --dist loadfile --no-loadscope-reorder -rs -m "not slow" $(ENGINE_TESTS)
 	$(if $(ENGINES_STUDY),$(WITH_ENGINES) springtune run $(ENGINES_STUDY))
 
 $(ENGINES)/.done: requirements/engines.txt | $(VENV)/.test
@@ -112,7 +113,7 @@ $(MUTANTS): requirements/mutants.txt
 slow: $(VENV)/.test $(ENGINES)/.done
 	pytest -n 2 -m slow tests/workflow tests/fuzz tests/browser tests/physics tests/unit src
 	HYPOTHESIS_PROFILE=anew pytest -n 2 -m "not slow" tests/unit tests/physics
-	$(WITH_ENGINES) pytest -n 2 --dist loadfile -rs -m slow tests/engines
+	$(WITH_ENGINES) pytest -n 2 --max-worker-restart 0 --dist loadfile -rs -m slow tests/engines
 
 # Format, lint, types and spelling, as before each commit: .pre-commit-config.yaml. What can be mended is.
 lint: $(VENV)/.test

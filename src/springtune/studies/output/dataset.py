@@ -5,8 +5,7 @@ import shutil
 from collections.abc import Collection, Hashable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from itertools import groupby
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 import h5netcdf
@@ -184,18 +183,17 @@ def write(path: str | os.PathLike[str], groups: Mapping[str, xr.Dataset], attrib
     tree.attrs = dict(attributes)
     # What groups share with the root is written there alone.
     own = {node.path: node.to_dataset(inherit=False) for node in tree.subtree}
-    runs = {group: _runs(data) for group, data in own.items()}
-    for group, data in own.items():
-        own[group] = data.drop_vars([name for names in runs[group][1:] for name in names])
-    first = xr.DataTree.from_dict(own)
-    encoding = {group: {name: _encoding(data, name) for name in data.variables} for group, data in own.items()}
+    sparse = {group: [name for name in data.data_vars if _mostly_holes(data[name])] for group, data in own.items()}
+    others = xr.DataTree.from_dict({group: data.drop_vars(sparse[group]) for group, data in own.items()})
+    encoding = {
+        group: {name: _encoding(data, name) for name in data.variables if name not in sparse[group]}
+        for group, data in own.items()
+    }
     path = Path(path)
     try:
         with replacing(path, synced=True) as unfinished, _small_cache():
-            first.to_netcdf(unfinished, engine="netcdf4", encoding=encoding)
-            for group, (_, *others) in runs.items():
-                for names in others:
-                    _append(unfinished, group, tree[group].to_dataset(), names)
+            _make_texts(unfinished, own, sparse)
+            others.to_netcdf(unfinished, mode="a", engine="netcdf4", encoding=encoding)
     except (OSError, RuntimeError) as error:  # HDF5 says of a full disk that there is an error, at times of its own
         free = shutil.disk_usage(path.parent).free / 1e6 if path.parent.is_dir() else 0.0
         reason = getattr(error, "strerror", None) or error
@@ -218,12 +216,6 @@ def _small_cache() -> Iterator[None]:
         netCDF4.set_chunk_cache(*before)
 
 
-def _runs(data: xr.Dataset) -> list[list[Hashable]]:
-    """Split a group's variables into runs of sparse texts and of others, which come first."""
-    runs = [[*names] for _, names in groupby(data.data_vars, lambda name: _mostly_holes(data[name]))]
-    return [[], *runs] if runs and _mostly_holes(data[runs[0][0]]) else runs or [[]]
-
-
 def _mostly_holes(array: xr.DataArray) -> bool:
     """Return whether an array holds few texts in many cells."""
     if array.dtype != object or array.nbytes <= CHUNK or set(array.coords) - set(array.dims):
@@ -231,24 +223,32 @@ def _mostly_holes(array: xr.DataArray) -> bool:
     return float(np.mean(array.values == "")) > MOSTLY
 
 
-def _append(path: str | os.PathLike[str], group: str, data: xr.Dataset, names: Sequence[Hashable]) -> None:
-    """Append variables to a group of a file."""
-    if not _mostly_holes(data[names[0]]):
-        between = xr.Dataset({name: data.variables[name] for name in names})
-        encoding = {name: _encoding(data, name) for name in names}
-        between.to_netcdf(path, mode="a", group=group, engine="netcdf4", encoding=encoding)
-        return
-    # Not netCDF's own library: HDF5 would then have to write into a file to read texts that were never stored.
-    with h5netcdf.File(path, "a") as file:
-        for name, array in data[names].data_vars.items():
-            chunk = _block(array.shape)
-            at = f"{group.rstrip('/')}/{name}"
-            variable = file.create_variable(at, array.dims, h5py.string_dtype(), chunks=chunk)
-            variable.attrs.update(array.attrs)
-            # HDF5 stores a chunk when something is written into it, and says of others that there is no text.
-            for place in np.unique(np.argwhere(array.values != "") // chunk, axis=0).tolist():
-                cells = tuple(slice(number * length, (number + 1) * length) for number, length in zip(place, chunk))
-                variable[cells] = array.values[cells]
+def _make_texts(
+    path: str | os.PathLike[str], groups: Mapping[str, xr.Dataset], sparse: Mapping[str, Collection[Hashable]]
+) -> None:
+    """Create a file with the variables of texts of all groups, of which it writes those that are sparse.
+
+    netCDF's own library gives each a fill value, by which it crashes when a file is opened while it is open elsewhere
+    (netcdf4-python, issue 1444), and it writes into a file to read texts that were never stored.
+    """
+    with h5netcdf.File(path, "w") as file:
+        for group, data in groups.items():
+            place = file if group == "/" else file.create_group(group)
+            above = {dim for parent in PurePosixPath(group).parents for dim in groups[str(parent)].sizes}
+            place.dimensions = {dim: size for dim, size in data.sizes.items() if dim not in above}
+            for name, array in data.variables.items():
+                if array.dtype.kind not in "OU":
+                    continue
+                if name not in sparse[group]:
+                    place.create_variable(name, array.dims, h5py.string_dtype())
+                    continue
+                chunk = _block(array.shape)
+                variable = place.create_variable(name, array.dims, h5py.string_dtype(), chunks=chunk)
+                variable.attrs.update(array.attrs)
+                # HDF5 stores a chunk when something is written into it, and says of others that there is no text.
+                for start in np.unique(np.argwhere(array.values != "") // chunk, axis=0).tolist():
+                    cells = tuple(slice(number * length, (number + 1) * length) for number, length in zip(start, chunk))
+                    variable[cells] = array.values[cells]
 
 
 def _block(shape: Sequence[int]) -> tuple[int, ...]:

@@ -306,7 +306,7 @@ def _mesh(
         labels[name] = chosen[0]
     found = reading.field(tree, **labels)
     with replacing(path) as unfinished:
-        found.to_netcdf(unfinished, engine="netcdf4")
+        found.to_netcdf(unfinished, engine="h5netcdf")  # see _make_texts of dataset.py
     sizes = found.sizes
     return f"{path}: {sizes['particle']} particles, {sizes['spring']} springs, {sizes['cell']} cells, as UGRID has them"
 
