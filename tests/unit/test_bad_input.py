@@ -417,7 +417,8 @@ class TestCounts:
         try:
             with pytest.raises(MeshError, match=r"vtu: .*is damaged.*; write it again"):
                 read_beam_mesh(path, 0.1, 0.02)
-            assert tracemalloc.get_traced_memory()[1] < 0.7e9
+            # Of 1.3 GB and their copies. What earlier tests left mapped and free comes on top of the bound.
+            assert tracemalloc.get_traced_memory()[1] < 1.2e9
         finally:
             tracemalloc.stop()
 
