@@ -50,7 +50,9 @@ def errors(found, kind, aspects, ratios):
     return {name: np.abs(getattr(answers, name) - exact[name]) / scale[name] for name in NAMES}
 
 
-@pytest.mark.parametrize("kind", BOXES, ids=str)
+@pytest.mark.parametrize(
+    "kind", [FACE, BENDING, *(pytest.param(one, marks=pytest.mark.slow) for one in (AXIAL, SHEAR))], ids=str
+)
 def test_errors_are_below_the_estimate(kind):
     found = built(kind)
     difference = errors(found, kind, *points(BOXES[kind], 5, seed=1))

@@ -18,6 +18,7 @@ from click.testing import CliRunner
 import springtune as st
 from springtune.cli import main
 from springtune.mesh import write_mesh
+from springtune.scene.sheet import definition_of
 from springtune.studies.config.kind import outputs
 from springtune.studies.kinds import load_study
 
@@ -131,7 +132,7 @@ def test_a_definition_without_a_source_is_named(catalogue):
         """
 
     with pytest.raises(SystemExit, match="'bare': its docstring has no source; add a paragraph"):
-        catalogue[0]["source"](st.scene.sheet.definition_of(bare))
+        catalogue[0]["source"](definition_of(bare))
 
 
 @pytest.mark.slow
@@ -214,7 +215,13 @@ def repository(tmp_path_factory):
     return folder
 
 
-@pytest.mark.parametrize("page", FOLLOWED, ids=called)
+SLOW = {"take-results-elsewhere.md", "choose-a-mesh.md", "compare-studies.md", "fit-rubber.md"}
+"""Of these, which take some seconds each."""
+
+
+@pytest.mark.parametrize(
+    "page", [pytest.param(page, marks=pytest.mark.slow) if page.name in SLOW else page for page in FOLLOWED], ids=called
+)
 def test_a_page_can_be_followed(page, repository, monkeypatch):
     from matplotlib import pyplot
 

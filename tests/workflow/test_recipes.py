@@ -39,6 +39,7 @@ def add_row(path, row, tuple_name):
     path.write_text(text[:end] + row + text[end:])
 
 
+@pytest.mark.slow
 def test_a_group_is_a_module_and_a_row_and_a_kind_is_a_package_and_a_study(repository):
     """What CONTRIBUTING.md writes down, run by Snakemake: both have their group, their figures and their keys."""
     package, written = repository / "src/springtune", 0
