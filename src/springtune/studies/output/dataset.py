@@ -194,6 +194,7 @@ def write(path: str | os.PathLike[str], groups: Mapping[str, xr.Dataset], attrib
         with replacing(path, synced=True) as unfinished, _small_cache():
             _make_texts(unfinished, own, sparse)
             others.to_netcdf(unfinished, mode="a", engine="netcdf4", encoding=encoding)
+            _order(unfinished, own)
     except (OSError, RuntimeError) as error:  # HDF5 says of a full disk that there is an error, at times of its own
         free = shutil.disk_usage(path.parent).free / 1e6 if path.parent.is_dir() else 0.0
         reason = getattr(error, "strerror", None) or error
@@ -239,16 +240,24 @@ def _make_texts(
             for name, array in data.variables.items():
                 if array.dtype.kind not in "OU":
                     continue
-                if name not in sparse[group]:
-                    place.create_variable(name, array.dims, h5py.string_dtype())
+                chunks = _block(array.shape) if name in sparse[group] else None
+                variable = place.create_variable(name, array.dims, h5py.string_dtype(), chunks=chunks)
+                if chunks is None:
                     continue
-                chunk = _block(array.shape)
-                variable = place.create_variable(name, array.dims, h5py.string_dtype(), chunks=chunk)
                 variable.attrs.update(array.attrs)
                 # HDF5 stores a chunk when something is written into it, and says of others that there is no text.
-                for start in np.unique(np.argwhere(array.values != "") // chunk, axis=0).tolist():
-                    cells = tuple(slice(number * length, (number + 1) * length) for number, length in zip(start, chunk))
+                for start in np.unique(np.argwhere(array.values != "") // chunks, axis=0).tolist():
+                    cells = tuple(slice(number * size, (number + 1) * size) for number, size in zip(start, chunks))
                     variable[cells] = array.values[cells]
+
+
+def _order(path: str | os.PathLike[str], groups: Mapping[str, xr.Dataset]) -> None:
+    """Put the variables of a file in order by renaming them: HDF5 lists last what was named last."""
+    with h5py.File(path, "a") as file:
+        for group, data in groups.items():
+            for name in map(str, data.variables):
+                file[group].move(name, f"{name} ")
+                file[group].move(f"{name} ", name)
 
 
 def _block(shape: Sequence[int]) -> tuple[int, ...]:
