@@ -68,7 +68,8 @@ def test_energies_are_matrix_convex(seed, share):
 def test_equilateral_triangles_are_exact_under_even_stresses():
     one = LoadSpace(lattice(12, 8))
     edges = 3**0.5 / 4 * one.mesh.cells_per_edge
-    assert np.linalg.svd(one.misses(edges)[0])[1][-3:] == pytest.approx(0, abs=1e-12)
+    values = np.linalg.svd(one.misses(edges)[0])[1]
+    assert values[-3:] == pytest.approx(0, abs=1e-9 * values[0])
     assert one.search(edges)[1] < 0.5 * sum(np.sum(part**2) for part in one.misses(edges)[:1])
 
 

@@ -56,7 +56,7 @@ def pressed(points, side, vectors):
 
 def on(square, axis, value):
     """Nodes on a side of the square, in order along it."""
-    nodes = np.flatnonzero(np.abs(square[:, axis] - value) < 1e-12)
+    nodes = np.flatnonzero(np.abs(square[:, axis] - value) < 1e-9)
     return nodes[np.argsort(square[nodes, 1 - axis])]
 
 

@@ -145,8 +145,8 @@ def test_outline_has_the_body_on_its_left(mesh_type):
     mesh = MESH_TYPES[mesh_type](0.02, 0.01, 2.5e-3)
     first, last = mesh.points[oriented_outline(mesh)].transpose(1, 0, 2)
     area = 0.5 * (first[:, 0] * last[:, 1] - first[:, 1] * last[:, 0]).sum()
-    assert area == pytest.approx(0.02 * 0.01, rel=1e-12)
-    assert np.linalg.norm(last - first, axis=1).sum() == pytest.approx(2 * (0.02 + 0.01), rel=1e-12)
+    assert area == pytest.approx(0.02 * 0.01, rel=1e-9)
+    assert np.linalg.norm(last - first, axis=1).sum() == pytest.approx(2 * (0.02 + 0.01), rel=1e-9)
 
 
 @pytest.mark.parametrize("definition", ["uniform", "area", "delingette"])
@@ -295,7 +295,7 @@ def test_penetration_is_that_of_every_corner():
     """What is inside counts, however deep, and whether or not a contact watches it."""
     contact = pressed("structured", 2e-3, Obstacle(np.array([[-1e-3, -5e-3], [1e-3, -5e-3], [0, 4.5e-3]])), 0.0)
     assert len(contact.find().gaps) > 0
-    assert contact.penetration == pytest.approx(4.5e-3, rel=1e-12)
+    assert contact.penetration == pytest.approx(4.5e-3, rel=1e-9)
 
 
 def test_the_far_face_of_a_thin_sheet_is_no_contact():
@@ -378,7 +378,9 @@ def test_sliding_friction_is_the_normal_force_times_the_coefficient(way):
     assert normal > 0
     # Slips of a quarter of 1 mm, over SLIP * size: within 1 - 1 / sqrt(1 + (2e-6 / 2.5e-4)^2) = 3e-5 of the limit.
     assert along == pytest.approx(-way * 0.3 * normal, rel=1e-4)
-    assert (np.linalg.norm(contact.drag, axis=1) <= 0.3 * contact.forces * (1 + 1e-4) + 1e-12).all()
+    assert (
+        np.linalg.norm(contact.drag, axis=1) <= 0.3 * contact.forces * (1 + 1e-4) + 1e-9 * contact.forces.max()
+    ).all()
 
 
 def capstan(friction, wrap, size, radius=1e-2, thickness=4e-4, ratio=0.2):

@@ -38,7 +38,7 @@ def test_a_path_goes_through_a_limit_point():
     w = path.displacements[:, 2, 1]
     rest = np.hypot(1.0, rise)
     length = np.hypot(1.0, rise + w)
-    assert np.abs(2 * (length - rest) / length * (rise + w) - path.loads).max() <= 1e-12
+    assert np.abs(2 * (length - rest) / length * (rise + w) - path.loads).max() <= 1e-9 * np.abs(path.loads).max()
     at_limit = np.sqrt(rest ** (2 / 3) - 1) - rise
     assert (path.negative_pivots == (w < at_limit)).all()
     assert path.negative_pivots[-1] == 1 and abs(path.loads[-1]) < abs(path.loads).max()
@@ -164,7 +164,7 @@ def test_stiffness_contrast_is_solved_or_reported(contrast, kind):
     found = problem.linear(1e-6)
     assert found.converged == (contrast <= 1e12)
     if found.converged:
-        assert relative_error(problem, 1e-6, found) <= 2 * max(found.error_estimate, 1e-12)
+        assert relative_error(problem, 1e-6, found) <= 2 * max(found.error_estimate, 1e-9)
     else:
         assert "ill-conditioned" in found.reason
 
@@ -193,7 +193,7 @@ def exact(problem, s, displacements):
         np.subtract.at(missing, second, pulls)
         step = problem.network.rest_factor.solve(problem.network.reduce(missing).astype(float))
         moved = moved + problem.network.expand(step)
-    assert np.abs(step).max() <= 1e-12 * np.abs(moved).max()
+    assert np.abs(step).max() <= 1e-9 * np.abs(moved).max()
     return moved
 
 

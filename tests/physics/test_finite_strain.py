@@ -186,7 +186,7 @@ def test_compression_shortens_more_than_it_stretches():
 def test_profile_is_symmetric_and_holds_both_displacements():
     found = solve_finite_strain(BLOCK, Material(1e6, 0.49, name="rubber"), -20.0, follower=True)
     assert found.positions[[0, -1]].tolist() == [0, 1]
-    assert np.allclose(found.profile, found.profile[::-1], rtol=1e-12)
+    assert np.allclose(found.profile, found.profile[::-1], rtol=1e-9)
     assert found.displacement == found.profile[len(found.profile) // 2]
     assert found.profile.min() < found.mean_displacement < found.profile.max()
 

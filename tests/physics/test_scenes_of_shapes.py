@@ -102,17 +102,17 @@ class TestAffineFields:
         )
         shape = plate(pull, points={"somewhere": (0.037, 0.013)})
         values = solved(shape, grouped, THIRD, "lattice").values
-        assert values["end"] == pytest.approx(self.stress / 210e9 * LENGTH, rel=1e-10)
-        assert values["side"] == pytest.approx(-self.stress / 210e9 * 0.013 / 3, rel=1e-10)
-        assert values["xx"] == pytest.approx(self.stress, rel=1e-10)
+        assert values["end"] == pytest.approx(self.stress / 210e9 * LENGTH, rel=1e-9)
+        assert values["side"] == pytest.approx(-self.stress / 210e9 * 0.013 / 3, rel=1e-9)
+        assert values["xx"] == pytest.approx(self.stress, rel=1e-9)
 
     def test_a_prescribed_displacement_is_the_force_that_it_takes(self):
         reaction = st.Quantity("force", "reaction", "right", "x")
         stretch = load(END, reaction, supports=(*ROLLERS, st.Support("right", x=1e-4)))
         shape = plate(stretch)
         values = solved(shape, st.mesh_shape(shape, 6e-3)).values
-        assert values["end"] == pytest.approx(1e-4, rel=1e-14)
-        assert values["force"] == pytest.approx(210e9 * 1e-3 * HEIGHT * 1e-4 / LENGTH, rel=1e-10)
+        assert values["end"] == pytest.approx(1e-4, rel=1e-9)
+        assert values["force"] == pytest.approx(210e9 * 1e-3 * HEIGHT * 1e-4 / LENGTH, rel=1e-9)
 
 
 def test_a_rigid_motion_takes_no_force():
@@ -125,8 +125,8 @@ def test_a_rigid_motion_takes_no_force():
     shape = plate(move, points={"middle": (0.05, 0.02)})
     for kinematics in ("linear", "nonlinear"):
         values = solved(shape, st.mesh_shape(shape, 8e-3), kinematics=kinematics).values
-        assert values["middle"] == pytest.approx(1e-3, rel=1e-12)
-        assert abs(values["energy"]) < 1e-12 * 210e9 * 1e-3 * (1e-3) ** 2
+        assert values["middle"] == pytest.approx(1e-3, rel=1e-9)
+        assert abs(values["energy"]) < 1e-9 * 210e9 * 1e-3 * (1e-3) ** 2
 
 
 @pytest.mark.parametrize("definition", ["delingette", "area", "lattice"])
@@ -170,7 +170,7 @@ def test_a_path_of_prescribed_displacements():
     assert found.converged
     np.testing.assert_allclose(path.displacements[-1], found.displacements, atol=1e-8 * LENGTH)
     right = scene.grouped.sides["right"]
-    np.testing.assert_allclose(path.displacements[-1][right, 1], 0.5 * LENGTH * share, rtol=1e-12)
+    np.testing.assert_allclose(path.displacements[-1][right, 1], 0.5 * LENGTH * share, rtol=1e-9)
 
 
 class TestEquilibrium:
@@ -213,7 +213,7 @@ class TestEquilibrium:
         pull = forces(grouped, self.case, 1e-3, {"": 7850.0}).sum(axis=0)
         # An even pressure on a closed round has no resultant.
         expected = [300.0, -300.0 - 2e4 * LENGTH * 1e-3 - 9.81 * 7850 * area * 1e-3]
-        np.testing.assert_allclose(pull, expected, rtol=1e-10)
+        np.testing.assert_allclose(pull, expected, rtol=1e-9)
 
     def test_two_clamps_share_their_corner(self):
         held_twice = load(
@@ -223,7 +223,7 @@ class TestEquilibrium:
         )
         shape = plate(held_twice)
         values = solved(shape, st.mesh_shape(shape, 6e-3)).values
-        assert sum(values.values()) == pytest.approx(-1e3, rel=1e-10)
+        assert sum(values.values()) == pytest.approx(-1e3, rel=1e-9)
         assert min(map(abs, values.values())) > 10
 
 
@@ -244,8 +244,8 @@ def test_a_bar_hangs_by_its_weight():
     shape = plate(hang)
     material = st.Material("1 MPa", 0.0, density="1000 kg/m^3")
     values = solved(shape, st.mesh_shape(shape, 7e-3), material).values
-    assert values["carried"] == pytest.approx(-1000 * 9.81 * LENGTH * HEIGHT * 1e-3, rel=1e-10)
-    assert values["end"] == pytest.approx(1000 * 9.81 * LENGTH**2 / 2 / 1e6, rel=1e-10)
+    assert values["carried"] == pytest.approx(-1000 * 9.81 * LENGTH * HEIGHT * 1e-3, rel=1e-9)
+    assert values["end"] == pytest.approx(1000 * 9.81 * LENGTH**2 / 2 / 1e6, rel=1e-9)
 
 
 def test_a_ring_under_pressure():
@@ -328,7 +328,7 @@ class TestStress:
         scale = np.abs(expected).max()
         for values in (found[3], particle_stresses(mesh, found)):
             np.testing.assert_allclose(springs.reference / 1e-3 * values, np.broadcast_to(expected, values.shape),
-                                       atol=1e-10 * scale)  # fmt: skip
+                                       atol=1e-9 * scale)  # fmt: skip
 
     def test_parts_are_recovered_apart(self):
         """Stress that jumps from one part to the next is constant in either."""
@@ -338,7 +338,7 @@ class TestStress:
         for part, value in ((left, [1.0, 2.0, 3.0]), (~left, [5.0, 0.0, -1.0])):
             found = particle_stresses(mesh, jump, {3: part})
             here = np.unique(mesh.triangles[part])
-            np.testing.assert_allclose(found[here], np.broadcast_to(value, (len(here), 3)), atol=1e-12)
+            np.testing.assert_allclose(found[here], np.broadcast_to(value, (len(here), 3)), atol=1e-9)
             assert np.isnan(np.delete(found, here, axis=0)).all()
 
 
@@ -350,10 +350,10 @@ class TestQuantities:
         point = np.array([along * LENGTH, across * HEIGHT])
         grouped = GroupedMesh(mesh, points={"here": point})
         particles, shares = interpolation(grouped, "here")
-        assert shares.sum() == pytest.approx(1, rel=1e-12)
-        np.testing.assert_allclose(shares @ mesh.points[particles], point, atol=1e-12)
+        assert shares.sum() == pytest.approx(1, rel=1e-9)
+        np.testing.assert_allclose(shares @ mesh.points[particles], point, atol=1e-9 * LENGTH)
         count, cell, shares = cell_at(grouped, "here")
-        np.testing.assert_allclose(shares @ mesh.points[mesh.cells[count][cell]], point, atol=1e-12)
+        np.testing.assert_allclose(shares @ mesh.points[mesh.cells[count][cell]], point, atol=1e-9 * LENGTH)
         assert shares.min() > -1e-9
 
     def test_a_mean_is_by_length(self):
@@ -364,7 +364,7 @@ class TestQuantities:
         mesh = st.Mesh(points, mesh.triangles)
         grouped = GroupedMesh(mesh, {"right": mesh.outline_edges(0, LENGTH)})
         field = displacement_weights(grouped, END)
-        assert (field[:, 0] * points[:, 1]).sum() == pytest.approx(HEIGHT / 2, rel=1e-12)
+        assert (field[:, 0] * points[:, 1]).sum() == pytest.approx(HEIGHT / 2, rel=1e-9)
 
     def test_masses_of_parts(self):
         mesh = MESH_TYPES["free"](LENGTH, HEIGHT, 9e-3)
@@ -372,7 +372,7 @@ class TestQuantities:
         grouped = GroupedMesh(mesh, parts={"heavy": heavy})
         found = particle_masses(grouped, 1e-3, {"": 1.0, "heavy": 3.0})
         alone = st.Mesh(mesh.points, mesh.triangles[heavy[3]])
-        assert found.sum() == pytest.approx(1e-3 * (mesh.area + 2 * alone.area), rel=1e-12)
+        assert found.sum() == pytest.approx(1e-3 * (mesh.area + 2 * alone.area), rel=1e-9)
         with pytest.raises(ValueError, match="the material of part 'heavy' has none"):
             particle_masses(grouped, 1e-3, {"": 1.0, "heavy": None})
 
@@ -395,7 +395,7 @@ class TestMaterials:
         materials = {"": st.Material(2e9, 0.0), "far": st.Material(1e9, 0.0)}
         values = solved(shape, self.bar(), materials, "delingette").values
         stress = 1e3 / (HEIGHT * 1e-3)
-        assert values["end"] == pytest.approx(stress * LENGTH / 2 * (1 / 2e9 + 1 / 1e9), rel=1e-10)
+        assert values["end"] == pytest.approx(stress * LENGTH / 2 * (1 / 2e9 + 1 / 1e9), rel=1e-9)
         for name in ("in-near", "in-far"):
             assert values[name] == pytest.approx(stress, rel=1e-9)
 
@@ -551,7 +551,7 @@ class TestAgainstReferences:
         net = st.SpringNet.from_scene(result.scene)
         assert net.header["expected_error"].keys() == {"end", "force"}
         np.testing.assert_allclose(net.forces.sum(axis=0), [4e3, 0.0], atol=1e-8)
-        assert net.masses.sum() == pytest.approx(7850 * 1e-3 * self.grouped.mesh.area, rel=1e-12)
+        assert net.masses.sum() == pytest.approx(7850 * 1e-3 * self.grouped.mesh.area, rel=1e-9)
         net.write(tmp_path / "net.csv")
 
     def test_prescribed_displacements_are_in_no_file_of_springs(self, tmp_path):

@@ -259,10 +259,10 @@ def test_the_control_is_added_to_the_load(tmp_path):
     one = scene()
     model, data = loaded(one, tmp_path)
     mujoco.mj_forward(model, data)
-    assert data.qfrc_actuator.sum() == pytest.approx(20e3, rel=1e-12)
+    assert data.qfrc_actuator.sum() == pytest.approx(20e3, rel=1e-9)
     data.ctrl[0] = -5e3
     mujoco.mj_forward(model, data)
-    assert data.qfrc_actuator.sum() == pytest.approx(15e3, rel=1e-12)
+    assert data.qfrc_actuator.sum() == pytest.approx(15e3, rel=1e-9)
     assert model.actuator_ctrlrange.tolist() == [[-20e3, 20e3]]
 
 
@@ -321,7 +321,7 @@ def test_springs_without_a_load_are_free_and_at_rest(tmp_path):
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     assert model.nu == 0 and model.nq == 2 * len(net.points) and not model.dof_damping.any()
-    assert np.abs(data.qfrc_passive).max() < 1e-12 * net.stiffness.max() * net.rest_lengths.max()
+    assert np.abs(data.qfrc_passive).max() < 1e-9 * net.stiffness.max() * net.rest_lengths.max()
     sofa = as_sofa_reads((tmp_path / "net.scn").read_text())
     assert "ConstantForceField" not in sofa and len(sofa["MechanicalObject"]) == 1
     constraints = json.loads((tmp_path / "net.xpbd.json").read_text())
@@ -359,8 +359,8 @@ def test_single_triangles_of_a_flex_have_the_law_of_plane_stress(poisson, tmp_pa
         stress = gradient @ (first * np.trace(strain) * np.eye(2) + 2 * second * strain)
         forces = -abs(signed_areas(points, np.array([[0, 1, 2]]))[0]) * (stress @ edges.T).T
         forces = np.vstack([-forces.sum(axis=0), forces])
-        # The distance to poisson = 1/2 is rounded: 1 - 2 poisson of MuJoCo 3 has no part in it, 1e-10 is room for both.
-        assert np.abs(data.qfrc_passive.reshape(3, 2) - forces).max() < 1e-10 * np.abs(forces).max()
+        # The distance to poisson = 1/2 is rounded: 1 - 2 poisson of MuJoCo 3 has no part in it, 1e-9 is room for both.
+        assert np.abs(data.qfrc_passive.reshape(3, 2) - forces).max() < 1e-9 * np.abs(forces).max()
 
 
 def test_a_flex_is_for_one_version_which_it_says_and_the_other_refuses(tmp_path):

@@ -44,7 +44,7 @@ def test_nonlinear_equals_an_independent_solver(mesh_type, s):
 
     best = root(out_of_balance, problem.linear(s).displacements[free] / size, tol=1e-13)
     found = problem.nonlinear(s)
-    assert np.abs(best.fun).max() <= 1e-10
+    assert np.abs(best.fun).max() <= 1e-9
     assert found.converged and found.residual <= TOLERANCE
     assert np.abs(found.displacements[free] - size * best.x).max() <= 1e-8 * size
 
@@ -174,10 +174,10 @@ def test_a_prescribed_end_moves_a_chain_by_its_closed_form():
     problem = Starts(Network(mesh, held, stiffness), pattern, given=given)
     middle = (2 * 0.03 + 0.06) / 3
     pulls = np.array([-middle, 2 * (0.03 - middle)])  # of the network on its supports
-    assert problem.load_norm == pytest.approx(np.sqrt(0.06**2 + (pulls**2).sum()), rel=1e-12)
+    assert problem.load_norm == pytest.approx(np.sqrt(0.06**2 + (pulls**2).sum()), rel=1e-9)
     for found in (problem.linear(2.0), problem.nonlinear(2.0)):
         assert found.converged
-        np.testing.assert_allclose(found.displacements[:, 0], [0, 2 * middle, 0.06, 0], atol=1e-12)
+        np.testing.assert_allclose(found.displacements[:, 0], [0, 2 * middle, 0.06, 0], atol=1e-9 * 0.06)
     ((_, start),) = problem.guesses
     np.testing.assert_array_equal(start, 2.0 * problem.slope)
 
@@ -230,7 +230,7 @@ def test_springs_stretched_far_are_solved_in_load_steps(stretch, in_steps):
     network = Network(mesh, held, (mesh.edges == [0, 1]).all(axis=1).astype(float))
     problem = Starts(network, np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 0.0]]))
     found = problem.nonlinear(stretch)
-    assert found.converged and found.displacements[1, 0] == pytest.approx(stretch, rel=1e-12)
+    assert found.converged and found.displacements[1, 0] == pytest.approx(stretch, rel=1e-9)
     loads = [s for s, _ in problem.guesses]
     assert (len(set(loads)) > 1) is in_steps
     assert loads.count(stretch) == 1 + in_steps  # what is far is not sought from another first guess

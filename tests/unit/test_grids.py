@@ -70,8 +70,9 @@ class TestRanges:
         values = spaced(first, last, points, spacing)
         assert (values[0], values[-1], len(values)) == (first, last, points)
         scaled = np.array(values) if spacing == "linear" else np.log(values)
-        # Values are rounded to twelve digits, and steps are differences of them.
-        assert np.diff(scaled) == pytest.approx((scaled[-1] - scaled[0]) / (points - 1), abs=1e-11 * abs(scaled).max())
+        # Values are rounded to twelve digits, and steps are differences of them, or of their logarithms.
+        size = values[-1] if spacing == "linear" else 1.0
+        assert np.diff(scaled) == pytest.approx((scaled[-1] - scaled[0]) / (points - 1), abs=1e-9 * size)
 
     def test_values_are_those_that_a_reader_writes(self, load):
         study = load(mesh_size={"from": "1 mm", "to": "5 mm", "points": "9"})
@@ -301,7 +302,7 @@ def test_a_cell_of_a_sweep_is_that_of_a_study_of_its_own(swept):
         assert float(cell.beam_thickness.sel(beam="long")) == values["thickness"]
         assert float(cell.material_young_modulus.sel(material="steel")) == values["young_modulus"]
         for name in ("reference_displacement", "reference_error_estimate"):
-            assert cell[name].values == pytest.approx(single[name].values, rel=1e-15)
+            assert cell[name].values == pytest.approx(single[name].values, rel=1e-9)
         if scale == 1:
             assert cell.displacement.equals(single.displacement.reset_coords(drop=True).assign_coords(cell.coords))
         else:
@@ -408,7 +409,7 @@ def test_the_beam_that_calibrates_has_its_thickness_from_its_own_curves(here):
             root.sel(load="traction", thickness=[0.5e-3, 2e-3]),
         )
         assert abs(float(bending.deformation_error)) < 1e-9  # which is what it is calibrated for
-        assert traction.stiffness.values == pytest.approx(float(bending.stiffness) * np.array([0.5, 2.0]), rel=1e-12)
+        assert traction.stiffness.values == pytest.approx(float(bending.stiffness) * np.array([0.5, 2.0]), rel=1e-9)
         assert traction.deformation_error.values == pytest.approx([float(traction.deformation_error[0])] * 2, rel=1e-9)
 
 
@@ -502,7 +503,12 @@ def test_fields_of_a_sweep_say_of_which_values_they_are(here):
         steel = springtune.Material("210 GPa", 0.3)
         scene = springtune.Scene(beam, mesh, steel, "bending", "2 kN", definition="lattice", kinematics="linear")
         result = scene.solve()
-        assert np.allclose(network.displacement_y.values, result.displacements[:, 1], rtol=1e-9, atol=1e-15)
+        assert np.allclose(
+            network.displacement_y.values,
+            result.displacements[:, 1],
+            rtol=1e-9,
+            atol=1e-9 * np.abs(result.displacements).max(),
+        )
         assert np.allclose(network.spring_force.values, result.spring_forces, rtol=1e-5, atol=1e-3)
         with pytest.raises(ValueError, match=r"fields are not kept of force 1000.0; they are of 2000.0"):
             springtune.field(tree, **place, force=1e3)

@@ -80,7 +80,7 @@ def test_a_new_kind_in_the_references(lift):
     kind = LOADS["lift"].kind
     small = solve_small_strain(BEAM, CORK, FORCE, kind=kind)
     assert small.displacement == pytest.approx(EXACT, rel=1e-6)
-    assert small.displacement == pytest.approx(small.mean_displacement, rel=1e-12)
+    assert small.displacement == pytest.approx(small.mean_displacement, rel=1e-9)
     little = 1e-3 * FORCE
     finite = solve_finite_strain(BEAM, CORK, little, kind=kind)
     assert finite.displacement == pytest.approx(1e-3 * EXACT, rel=1e-4)

@@ -27,7 +27,8 @@ class TestSixLines:
         scene = st.Scene(beam, mesh, st.Material("210 GPa", 0.3), "traction", "400 kN", definition="patch")
         result = scene.solve()
         assert result.status is st.Status.SOLVED and result.message == "" and result.negative_pivots == 0
-        assert result.displacements.shape == mesh.points.shape and result.residual <= 1e-10 and result.iterations
+        assert result.displacements.shape == mesh.points.shape and result.iterations
+        assert result.residual <= 1e-10  # exact: the criterion itself
         assert result.stiffness.shape == (len(mesh.edges),) and result.seconds > 0 and result.definition_seconds > 0
         # The paper's finite elements give 9.49 mm.
         assert result.reference().displacement == pytest.approx(9.49e-3, rel=2e-3)
@@ -53,7 +54,7 @@ class TestSixLines:
     def test_kinematics(self, kinematics):
         forces = (10e3, 20e3)
         moved = [scene(force=force, kinematics=kinematics).solve().displacement for force in forces]
-        assert (moved[1] == pytest.approx(2 * moved[0], rel=1e-12)) == (kinematics == "linear")
+        assert (moved[1] == pytest.approx(2 * moved[0], rel=1e-9)) == (kinematics == "linear")
 
     def test_a_mesh_file(self, tmp_path):
         mesh = st.make_mesh(BEAM, "free", "5 mm")
@@ -72,7 +73,7 @@ class TestSixLines:
         own = scene(definition=halved, kinematics="linear")
         plain = scene(definition="lattice", kinematics="linear")
         assert own.definition.name == "halved"
-        assert own.solve().displacement == pytest.approx(2 * plain.solve().displacement, rel=1e-12)
+        assert own.solve().displacement == pytest.approx(2 * plain.solve().displacement, rel=1e-9)
 
     def test_a_uniform_stiffness(self):
         result = scene(definition="paper", stiffness="170e6 N/m").solve()
@@ -170,7 +171,7 @@ def test_moduli_scale_out():
     mesh = st.make_mesh(BEAM, "right", "5 mm")
     soft, hard = (st.moduli(mesh, st.Material(young, 0.3), "area") for young in (1.0, 210e9))
     for name in ("young_modulus_error", "poisson_ratio", "shear_modulus_error"):
-        assert getattr(hard, name) == pytest.approx(getattr(soft, name), abs=1e-12)
+        assert getattr(hard, name) == pytest.approx(getattr(soft, name), abs=1e-9)
 
 
 class TestErrors:

@@ -46,9 +46,9 @@ def check_sides(shape, grouped):
     for name, found in grouped.sides.items():
         sides = [side for one in shape.rounds for side in one.sides if side.group == name]
         for place in grouped.mesh.points[np.unique(found)]:
-            assert min(side.nearest(tuple(place))[1] for side in sides) <= 1e-12 * extent
+            assert min(side.nearest(tuple(place))[1] for side in sides) <= 1e-9 * extent
     for name, place in grouped.points.items():
-        assert grouped.mesh.points[grouped.particle(name)] == pytest.approx(shape.points[name], abs=1e-12 * extent)
+        assert grouped.mesh.points[grouped.particle(name)] == pytest.approx(shape.points[name], abs=1e-9 * extent)
         assert tuple(place) == shape.points[name]
 
 
@@ -80,7 +80,7 @@ def test_any_star_with_a_hole_is_filled(radii, hole, size, power):
     while len(chain) < len(around):
         chain.append(following[chain[-1]])
     area = polygon_area(corners) + polygon_area(grouped.mesh.points[chain])
-    assert grouped.mesh.area == pytest.approx(area, rel=1e-12)
+    assert grouped.mesh.area == pytest.approx(area, rel=1e-9)
     lengths = [np.linalg.norm(np.diff(grouped.mesh.points[edges], axis=1), axis=2) for edges in grouped.sides.values()]
     assert max(one.max() for one in lengths) <= scale * size * (1 + 1e-9)
 

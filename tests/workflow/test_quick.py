@@ -99,7 +99,7 @@ def test_stability_has_the_names_of_the_contract(tree):
     # At 1e12 one solver leaves ten digits, and another none: the same status by both.
     assert solved.sel(stiffness_contrast=slice(None, 1e10)).all()
     assert not solved.sel(stiffness_contrast=slice(1e12, None)).any()
-    assert (data.contrast_error.where(solved).fillna(0) <= 2 * data.contrast_estimate.clip(1e-12)).all()
+    assert (data.contrast_error.where(solved).fillna(0) <= 2 * data.contrast_estimate.clip(1e-9)).all()
     euler = data.buckling_load.sel(definition="delingette") / data.euler_load.sel(definition="delingette")
     assert abs(euler - 1).max() <= 0.02
     assert data.dt_limit_predicted.attrs["units"] == "s" and "flag_meanings" in data.strain_status.attrs
@@ -206,14 +206,14 @@ def test_what_was_asked_for_is_solved_and_nothing_else(tree):
     assert set(np.unique(meanings)) == {"not_requested", "solved"}
     assert (root.displacement.notnull() == (root.status == 1)).all()
     assert int((root.status == 1).sum()) == 24 + 3 + 6 + 3 + 8 + 6
-    assert (root.residual.where(root.status == 1, 0) <= 1e-10).all()
+    assert (root.residual.where(root.status == 1, 0) <= 1e-10).all()  # exact: the criterion itself
     assert (root.reference_error_estimate.max() <= 1e-4).all()
 
 
 def test_deformation_error_follows_its_formula(tree):
     root = tree.to_dataset()
     expected = (root.displacement - root.reference_displacement) / abs(root.reference_displacement)
-    xr.testing.assert_allclose(root.deformation_error, expected.transpose(*SCENE), rtol=1e-12)
+    xr.testing.assert_allclose(root.deformation_error, expected.transpose(*SCENE), rtol=1e-9)
 
 
 def test_uniform_scenes_lie_on_their_sensitivity_curve(tree):
@@ -239,7 +239,7 @@ def test_calibrated_is_the_mean_best_stiffness(tree):
     best = curves.best_stiffness.sel(place)
     assert best.sizes == {"mesh_size": 2}
     stiffness = root.stiffness.sel(place | {"definition": "calibrated"})
-    assert stiffness.values == pytest.approx(best.mean().item(), rel=1e-12)
+    assert stiffness.values == pytest.approx(best.mean().item(), rel=1e-9)
     assert np.isnan(root.stiffness.sel(place | {"definition": "lattice"})).all()
 
 
@@ -283,12 +283,17 @@ def test_paraview_has_the_scenes_whose_fields_are_kept(run, tree):
     result = st.Scene(
         beam, st.make_mesh(beam, "structured", "5 mm"), steel, "traction", "20 kN", definition="lattice"
     ).solve()
-    assert np.allclose(grid.point_data["displacement"][:, :2], result.displacements, rtol=0, atol=1e-12)
+    assert np.allclose(
+        grid.point_data["displacement"][:, :2],
+        result.displacements,
+        rtol=0,
+        atol=1e-9 * np.abs(result.displacements).max(),
+    )
     assert np.allclose(grid.cell_data["stiffness"][0], result.stiffness, rtol=1e-6)  # stored with seven digits
     assert np.allclose(grid.cell_data["force"][0], result.spring_forces, rtol=1e-6, atol=1e-6 * 20e3)
     assert grid.field_data["deformation_error"] == pytest.approx(result.error, rel=1e-9)
     error = result.displacements - result.reference().at(result.scene.mesh.points)
-    assert np.allclose(grid.point_data["error"][:, :2], error, rtol=0, atol=1e-12)
+    assert np.allclose(grid.point_data["error"][:, :2], error, rtol=0, atol=1e-9 * np.abs(result.displacements).max())
 
 
 def test_snippets_of_the_docs_run(run, tree, repository, monkeypatch):

@@ -132,7 +132,7 @@ class Scene(Tabled):
     The network without units, as the mechanics have it: force and stiffness over the reference stiffness.
 
     >>> moved = scene.problem.nonlinear(scene.force / scene.springs.reference)
-    >>> bool(abs(moved.displacements - result.displacements).max() < 1e-12)
+    >>> bool(abs(moved.displacements - result.displacements).max() < 1e-9 * abs(result.displacements).max())
     True
     """
 
@@ -648,7 +648,7 @@ class Result(Tabled):
     ((415, 2), (1143,), (1143,))
     >>> print(f"{result.stiffness.max():.4g} N/m, at most {1e-3 * result.spring_forces.max():.1f} kN in a spring")
     1.819e+08 N/m, at most 50.2 kN in a spring
-    >>> result.iterations, result.residual < 1e-10
+    >>> result.iterations, result.residual < 1e-10  # exact: the criterion itself
     (3, True)
     """
 
