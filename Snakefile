@@ -45,10 +45,6 @@ if not NOTED:
             OUTPUTS.values(),
             str(RESULTS / rerun.PAGE),  # no report(): the report names the rule that made it
 
-    if "storage" in config or {"publish", "fetch"} & {*WORDS}:
-
-        include: "workflow/rules/storage.smk"
-
     onstart:
         begin()
 

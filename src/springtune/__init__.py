@@ -51,7 +51,6 @@ _NAMES = {
     ),
     "mesh": ("MESH_TYPES", "Mesh", "MeshError", "mesh_type"),
     "mesh.groups": ("GroupedMesh",),
-    "studies.output.merging": ("merge",),
     "studies.output.reading": ("field", "open"),
     "studies.output.summing_up": ("info",),
     "prediction.choices": ("Choice", "predict"),

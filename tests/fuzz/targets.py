@@ -30,6 +30,7 @@ from markdown_it import MarkdownIt
 from matplotlib.figure import Figure
 from mutations import WORDS, spoil_bytes, spoil_counts, spoil_tree
 from snakemake.utils import format as rendered
+from springtune.studies.archive.contents import METADATA, SUMS
 
 import springtune as st
 from springtune.cli.diff import comparison_text
@@ -42,7 +43,6 @@ from springtune.mesh.outlines import mesh_shape
 from springtune.mesh.sheets import sheet_fault
 from springtune.safe_io.escapes import UNSEEN, markdown, no_mathematics, rst
 from springtune.studies.archive import reproduction
-from springtune.studies.archive.contents import METADATA, SUMS
 from springtune.studies.config.kind import kinds
 from springtune.studies.kinds import load_study
 from springtune.studies.kinds.scenes.kind import summary

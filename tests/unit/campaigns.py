@@ -93,8 +93,7 @@ class Campaign:
         if name in self.plan.jobs:
             self.do_stage(name)
         elif name == rerun.COLLECT:
-            untold = rerun.untold(self.folder, self.chosen)
-            collect.main(self.config, str(self.folder), dataset, str(job.record), job.digest, *untold)
+            collect.main(self.config, str(self.folder), dataset, str(job.record), job.digest)
         elif name == rerun.BROWSE:
             browse.main(dataset, job.products[0], str(job.record), job.digest, *rerun.linked(self.study))
         else:

@@ -47,20 +47,6 @@ def job_seconds():
     return 60.0 * minutes
 
 
-def left_empty():
-    """Attributes that the dataset leaves empty, by ``--config no_host=true``; also in studies that the paper reads."""
-    chosen = {}
-    for option in rerun.BLANKED:
-        # `springtune run` sets the variable: its --config would replace the one of a profile.
-        variable = f"SPRINGTUNE_{option.upper()}"
-        value = str(config.get(option, os.environ.get(variable, ""))).lower()
-        if value not in ("", "true", "false"):
-            refused(f"--config {option}={value}: neither true nor false; give one of them")
-        if value:
-            os.environ[variable], chosen[option] = value, value == "true"
-    return chosen
-
-
 # Keys of results have the versions of the packages that Snakemake sees, so jobs must run on these.
 # Snakemake takes braces in a path of it for wildcards.
 ENVIRONMENT = None if DEPLOYED or "{" in str(SOURCE) else "../envs/springtune.yaml"
@@ -76,7 +62,6 @@ if UNUSABLE_PATH and not IS_CHILD:
 if MOVED:
     refused(f"module {MODULE}: results are in results/<study> and take no other prefix; leave the prefix out")
 
-LEFT_EMPTY = left_empty()
 # Scenes and their tasks stay to the end: collecting garbage among them takes a fifth of the reading.
 gc.disable()
 STUDY = loaded_study()
@@ -88,7 +73,7 @@ if not MODULE:
 CORES = 1 if ON_CLUSTER or IS_CHILD else workflow.cores or 1
 OURS.recall(RESULTS.parent / CODE_FILE)
 PLAN = plan(STUDY, RESULTS, CORES, job_seconds())
-JOBS = rerun.jobs(STUDY, PLAN, LEFT_EMPTY)
+JOBS = rerun.jobs(STUDY, PLAN)
 gc.freeze()
 gc.enable()
 try:

@@ -68,7 +68,6 @@ COMMANDS = {
     "new": Row(STUDIES, "study", "new", "Write a small study to begin with."),
     "run": Row(STUDIES, "run", "run", "Run a study."),
     "scenes": Row(STUDIES, "study", "scenes", "Say what a study asks for, before anything runs."),
-    "split": Row(STUDIES, "study", "split", "Write the parts of a study for several sites."),
     "definitions": Row(STUDIES, "study", "definitions", "List the definitions of spring stiffness."),
     "predict": Row(STUDIES, "predict", "predict", "Recommend a definition for one mesh, or a mesh for one error."),
     "identify": Row(STUDIES, "identify", "identify", "Find a material's constants from measured tests."),
@@ -76,13 +75,8 @@ COMMANDS = {
     "browse": Row(RESULTS, "results", "browse", "Browse the results of a study."),
     "info": Row(RESULTS, "results", "info", "Say what a dataset holds, and where it comes from."),
     "diff": Row(RESULTS, "diff", "diff", "Say what changed from one dataset to another, scene by scene."),
-    "accept": Row(RESULTS, "diff", "accept", "Keep values and curves as right, or say what departs from them."),
     "export": Row(RESULTS, "results", "export", "Write a dataset as CSV, Parquet or Zarr."),
-    "merge": Row(RESULTS, "study", "merge", "Put the results of a study's parts together."),
-    "verify": Row(RESULTS, "results", "verify", "Compare results with their checksums, and compute some again."),
-    "archive": Row(
-        RESULTS, "results", "archive", "Pack a finished study into one file, to be cited and computed again."
-    ),
+    "archive": Row(RESULTS, "results", "archive", "Pack the results of a study into one file."),
     "clean": Row(RESULTS, "results", "clean", "List what no study asks for any more, and remove it."),
     "schema": Row(HOUSE, "study", "schema", "Print the JSON schema of studies, for editors."),
 }

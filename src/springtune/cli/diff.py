@@ -1,4 +1,4 @@
-"""Compare datasets, and keep accepted values."""
+"""Command diff: compare two datasets."""
 
 import json
 import math
@@ -12,9 +12,8 @@ import click
 from ..safe_io.escapes import clipped, shown
 from ..safe_io.tables import aligned
 from ..studies.output.text import cell_text, paragraphs, variable_name
-from ..studies.runs.source import CONFIG_FOLDER
 from . import examples
-from .options import RESULTS_FOLDER, dataset_path
+from .options import dataset_path
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -23,6 +22,8 @@ if TYPE_CHECKING:
 
 ROWS = 20
 """Rows of a table."""
+
+SIDES = ("before", "after")
 
 DIFFERENT, TROUBLE = 1, 2
 """Exit codes, as those of diff."""
@@ -93,34 +94,23 @@ def diff(
 
     Exits with 0 if nothing changed, 1 if something did, and 2 if nothing could be compared.
     """
-    from ..studies.output import comparison, expected, reading
+    from ..studies.output import comparison, reading
 
     if by_definition and (ignored or every or config or relative is not None or absolute is not None):
         raise click.UsageError("--definitions goes with --group and --json alone")
     try:
         paths = [dataset_path(before), dataset_path(after)]
         with opened(paths[0]) as one, opened(paths[1]) as other, reading.guarded(f"{paths[0]}, {paths[1]}"):
-            kept = expected.ACCEPTED in one.attrs
-            if expected.ACCEPTED in other.attrs:
-                raise ValueError(f"{paths[1]}: holds accepted values; give them first, and then results")
-            if kept and (relative is not None or absolute is not None):
-                raise ValueError(f"{paths[0]}: has its own tolerances; leave --relative and --absolute out, or edit it")
             if by_definition:
-                if kept:
-                    raise ValueError(f"{paths[0]}: holds accepted values; give two datasets")
                 errors = comparison.compare_definitions(one, other, groups)
                 click.echo(json.dumps(errors, indent=1) if as_json else definitions_text(errors, paths))
                 return
             given = comparison.Tolerance(comparison.RELATIVE if relative is None else relative, absolute)
-            found = comparison.compare(
-                one, other, None if kept else given, groups, ignored, None if every else rows,
-                own=expected.tolerances(one), part=kept,
-            )  # fmt: skip
+            found = comparison.compare(one, other, given, groups, ignored, None if every else rows)
             if as_json:
                 click.echo(json.dumps(as_dict(found, paths, config), indent=1))
             else:
-                sides = ("accepted", "now") if kept else ("before", "after")
-                click.echo(comparison_text(found, paths, sides, None if every else rows, config))
+                click.echo(comparison_text(found, paths, None if every else rows, config))
     except (OSError, ValueError) as error:
         raise Trouble(shown(error)) from None
     if found.different:
@@ -129,12 +119,9 @@ def diff(
 
 @contextmanager
 def opened(path: Path) -> "Iterator[xr.DataTree]":
-    """Context of an open dataset, or of accepted values."""
-    from ..studies.output import expected, reading
+    """Context of an open dataset."""
+    from ..studies.output import reading
 
-    if path.suffix == ".yaml":
-        yield expected.read(path)
-        return
     reading.check_opens(path)
     with reading.open(path) as tree:
         yield tree
@@ -143,18 +130,16 @@ def opened(path: Path) -> "Iterator[xr.DataTree]":
 # -- text --------------------------------------------------------------------------------------------------------------
 
 
-def comparison_text(
-    found: "Comparison", paths: Sequence[Path], sides: Sequence[str], most: int | None = ROWS, config: bool = False
-) -> str:
+def comparison_text(found: "Comparison", paths: Sequence[Path], most: int | None = ROWS, config: bool = False) -> str:
     """Comparison as text."""
-    width = max(map(len, sides)) + 1
-    head = [f"{f'{side}:':{width}} {path}" for side, path in zip(sides, paths)]
-    parts = [[*head, _summary(found, sides)]]
+    width = max(map(len, SIDES)) + 1
+    head = [f"{f'{side}:':{width}} {path}" for side, path in zip(SIDES, paths)]
+    parts = [[*head, _summary(found)]]
     for group in found.groups:
-        parts += _of_group(group, sides, most)
+        parts += _of_group(group, most)
     changes = found.changes
     if changes:
-        parts.append(_changes(found, changes, sides, most))
+        parts.append(_changes(found, changes, most))
     if found.attributes or found.config:
         parts.append(_told(found, config))
     return paragraphs(parts)
@@ -177,10 +162,10 @@ def definitions_text(errors: "Sequence[Mapping[str, Any]]", paths: Sequence[Path
     return paragraphs([*parts, *([] if errors else [["neither has errors of definitions"]])])
 
 
-def _summary(found: "Comparison", sides: Sequence[str]) -> str:
+def _summary(found: "Comparison") -> str:
     """Summary in one line."""
-    said = [f"group {path} only {side}" for side, own in zip(sides, found.alone) for path in own]
-    for number, side in enumerate(sides):
+    said = [f"group {path} only {side}" for side, own in zip(SIDES, found.alone) for path in own]
+    for number, side in enumerate(SIDES):
         for group in found.groups:
             count, what = group.cells[number].count, "scenes" if group.name == "/" else f"cells of {group.name}"
             said += [f"{count} {what} only {side}"] if count else []
@@ -198,12 +183,12 @@ def _summary(found: "Comparison", sides: Sequence[str]) -> str:
     return f"the same: {compared} values compared"
 
 
-def _of_group(group: "GroupChanges", sides: Sequence[str], most: int | None) -> Iterator[list[str]]:
+def _of_group(group: "GroupChanges", most: int | None) -> Iterator[list[str]]:
     """Paragraphs on the labels, cells, variables and statuses of a group."""
     what = "scenes" if group.name == "/" else f"cells of {group.name}"
     lines = []
     for name, both in group.labels.items():
-        for side, own in zip(sides, both):
+        for side, own in zip(SIDES, both):
             shown = own[:most]
             if own:
                 said = ", ".join(_place(group, {name: label}) for label in shown)
@@ -211,11 +196,11 @@ def _of_group(group: "GroupChanges", sides: Sequence[str], most: int | None) -> 
                 lines.append(f"  {name} only {side}: {said}{more}")
     if lines:
         yield [f"labels of {group.name}", *lines]
-    for side, alone in zip(sides, group.cells):
+    for side, alone in zip(SIDES, group.cells):
         if alone.count:
             lines = [f"  {_place(group, labels)}" for labels in alone.rows]
             yield [f"{what} only {side}: {alone.count}", *lines, *_more(alone.count - len(lines))]
-    lines = [f"  {name} only {side}" for side, own in zip(sides, group.variables) for name in own]
+    lines = [f"  {name} only {side}" for side, own in zip(SIDES, group.variables) for name in own]
     lines += [f"  {name} {why}" for name, why in group.unlike.items()]
     if lines:
         yield [f"variables of {group.name}", *lines]
@@ -240,7 +225,7 @@ def _place(group: "GroupChanges", labels: "Mapping[str, str | float]") -> str:
     return cell_text({name: label for name, label in labels.items() if group.sizes[name] > 1}, group.units)
 
 
-def _changes(found: "Comparison", changes: "list[Change]", sides: Sequence[str], most: int | None) -> list[str]:
+def _changes(found: "Comparison", changes: "list[Change]", most: int | None) -> list[str]:
     """Number of changes by variable, and the largest changes."""
     head = ["  variable", "cells", "changed", "largest change"]
     counts = [
@@ -250,7 +235,7 @@ def _changes(found: "Comparison", changes: "list[Change]", sides: Sequence[str],
         if one.changed
     ]
     axes = {group.name: group for group in found.groups}
-    rows = [["  variable", *sides, "change", "at"]]
+    rows = [["  variable", *SIDES, "change", "at"]]
     for row in changes[:most]:
         group = axes[row.group]
         at = _place(group, row.labels | row.point)
@@ -326,14 +311,13 @@ def as_dict(found: "Comparison", paths: Sequence[Path], config: bool = False) ->
 
 
 def _group_dict(group: "GroupChanges") -> dict[str, object]:
-    sides = ("before", "after")
     made: dict[str, object] = {
         "labels": {
-            name: {f"only_{side}": own for side, own in zip(sides, both)} for name, both in group.labels.items()
+            name: {f"only_{side}": own for side, own in zip(SIDES, both)} for name, both in group.labels.items()
         },
         "cells_in_both": group.both,
     }
-    for side, alone, names in zip(sides, group.cells, group.variables):
+    for side, alone, names in zip(SIDES, group.cells, group.variables):
         made[f"cells_only_{side}"] = {"count": alone.count, "rows": alone.rows}
         made[f"variables_only_{side}"] = names
     made["not_comparable"] = group.unlike
@@ -355,148 +339,3 @@ def _row_dict(row: "Change") -> dict[str, object]:
         "at": found, "before": plain(row.before), "after": plain(row.after), "difference": plain(row.difference),
         "over_tolerance": plain(row.excess), "units": row.units,
     }  # fmt: skip
-
-
-EXPECTED_FOLDER = CONFIG_FOLDER / "expected"
-
-LISTED_UNSOLVED = 10
-"""Unsolved scenes that are listed by name."""
-
-
-@click.command(
-    epilog=examples(
-        "springtune accept results/mine",
-        "springtune accept mine --variables displacement,sensitivity/displacement --relative 1e-4",
-        "springtune accept --check",
-        "springtune accept --check mine --to config/expected/mine.nc",
-    )
-)
-@click.argument("results", required=False)
-@click.option(
-    "--to",
-    "target",
-    type=click.Path(path_type=Path),
-    help="File: .yaml, or .nc.  [default: config/expected/<study>.yaml]",
-)
-@click.option("--check", is_flag=True, help="Compare results with what is accepted; of all studies without RESULTS.")
-@click.option("--variables", default="", help="Names with commas between, such as sensitivity/displacement.")
-@click.option("--relative", callback=tolerance, help="Tolerance of all values.  [default: that of the file, else 1e-6]")
-@click.option("--absolute", callback=tolerance, help="The same, in SI units.")
-@click.option("--unsolved", is_flag=True, help="Accept that scenes are not solved.")
-@click.option("--all", "every", is_flag=True, help="With --check, all rows.")
-def accept(
-    results: str | None,
-    target: Path | None,
-    check: bool,
-    variables: str,
-    relative: float | None,
-    absolute: float | None,
-    unsolved: bool,
-    every: bool,
-) -> None:
-    """Keep values and whole curves of a study as right, or say what departs from them.
-
-    RESULTS is results/<study>, its dataset.nc, or the name of a study. What is accepted is a file to be kept with the
-    study and reviewed as code is: a line a scene, with its status, displacement, error and stiffness, and one a curve.
-    Tolerances in it are yours: of all values, of a variable, of a line. Accepting anew says what changes, and keeps
-    them. Scenes that are not solved are listed and refused without --unsolved.
-
-    With --check, exits with 0 if all is as accepted, 1 if anything departs, and 2 if nothing could be compared.
-    """
-    if check:
-        if variables or relative is not None or absolute is not None or unsolved:
-            raise click.UsageError("--check takes variables and tolerances from the file; edit that")
-        _check(results, target, every)
-        return
-    if results is None:
-        raise click.UsageError("name the results to accept: springtune accept results/mine")
-    from ..studies.output import comparison, expected, reading
-
-    path, names = dataset_path(results), [name.strip() for name in variables.split(",") if name.strip()]
-    with opened(path) as tree, reading.guarded(path):
-        if expected.ACCEPTED in tree.attrs:
-            raise ValueError(f"{path}: holds accepted values; give the results of a study")
-        unsolved_cells = expected.unsolved(tree)
-        if unsolved_cells:
-            _tell_unsolved(unsolved_cells)
-            if not unsolved:
-                raise ValueError(f"{path}: nothing is accepted; mend these, or accept that they are so with --unsolved")
-        target = target or _usual_target(str(tree.attrs.get("study", path.parent.name)))
-        former = expected.read(target) if target.exists() else None
-        made = expected.accepted(tree, names or (_names(former) if former is not None else []))
-    if former is not None:
-        made = expected.with_tolerances_of(made, former)
-    if relative is not None or absolute is not None:
-        own = expected.tolerances(made)
-        before = own.get("", comparison.Tolerance())
-        given = comparison.Tolerance(
-            before.relative if relative is None else relative, before.absolute if absolute is None else absolute
-        )
-        made = expected.with_tolerances(made, own | {"": given})
-    if former is not None:
-        found = comparison.compare(former, made, groups=(), own=expected.tolerances(former), most=20)
-        click.echo(comparison_text(found, (target, path), sides=("accepted", "now")))
-    expected.write(target, made)
-    click.echo(
-        f"{target}: {_count(made)} accepted of {path}; keep it with the study, and `springtune accept --check` compares"
-    )
-
-
-def _usual_target(study: str) -> Path:
-    """File of the accepted values of a study."""
-    found = [EXPECTED_FOLDER / f"{study}{ending}" for ending in (".yaml", ".nc")]
-    return next((path for path in found if path.exists()), found[0])
-
-
-def _names(tree: "xr.DataTree") -> list[str]:
-    """Names of accepted variables."""
-    from ..studies.output.comparison import OF_CELLS
-
-    nodes = [(node.path, str(name)) for node in tree.subtree for name in node.data_vars]
-    return [variable_name(path, name) for path, name in nodes if name != OF_CELLS]
-
-
-def _count(tree: "xr.DataTree") -> str:
-    """Number of scenes and other cells in words."""
-    from ..studies.output.expected import cells
-
-    counts = cells(tree).items()
-    return ", ".join(f"{count} scenes" if path == "/" else f"{count} of {path}" for path, count in counts)
-
-
-def _tell_unsolved(unsolved_cells: list[tuple[str, str, str, str]]) -> None:
-    """Print the unsolved cells."""
-    click.echo(f"{len(unsolved_cells)} are not solved:", err=True)
-    for group, place, status, why in unsolved_cells[:LISTED_UNSOLVED]:
-        head = "" if group == "/" else f"{group}: "
-        click.echo(shown(f"  {head}{place}: {status}{f', {why}' if why else ''}"), err=True)
-    if len(unsolved_cells) > LISTED_UNSOLVED:
-        click.echo(f"  and {len(unsolved_cells) - LISTED_UNSOLVED} more", err=True)
-
-
-def _check(results: str | None, target: Path | None, every: bool) -> None:
-    """Compare with accepted values, and exit as diff does."""
-    from ..studies.output import comparison, expected, reading
-
-    try:
-        files = [path for path in EXPECTED_FOLDER.glob("*") if path.suffix in expected.EXPECTED_ENDINGS]
-        if target is not None:
-            files = [target]
-        elif results is not None:
-            files = [_usual_target(dataset_path(results).parent.name)]
-        if not files:
-            raise ValueError(f"{EXPECTED_FOLDER}: nothing is accepted; call `springtune accept results/<study>` first")
-        departed = False
-        for file in sorted(files):
-            kept = expected.read(file)
-            path = dataset_path(results or str(RESULTS_FOLDER / kept.attrs[expected.ACCEPTED]))
-            with opened(path) as tree, reading.guarded(path):
-                found = comparison.compare(
-                    kept, tree, own=expected.tolerances(kept), part=True, most=None if every else 20
-                )
-            departed |= found.different
-            click.echo(comparison_text(found, (file, path), sides=("accepted", "now")))
-    except (OSError, ValueError) as error:
-        raise Trouble(shown(error)) from None
-    if departed:
-        raise click.exceptions.Exit(DIFFERENT)

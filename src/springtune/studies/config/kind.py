@@ -175,11 +175,6 @@ class Kind:
         From a study to the stems of its tables on the page; module whose ``tables(tree)`` makes them.
     costs : dict of str to tuple
         Seconds of a task by its name in records, fixed and per unit, before any is measured.
-    pieces : callable, optional
-        From a study, `springtune.studies.runs.plan.Costs` and `springtune.studies.kinds.division.Division` to the
-        seconds of each piece that `springtune split` may deal out. A kind without pieces stays in one part.
-    take : callable, optional
-        From a study and names of pieces to the study with only these.
     """
 
     name: str
@@ -200,8 +195,6 @@ class Kind:
     tables: Callable[[Study], list[str]] | None = None
     tables_by: str = "tables"
     costs: dict[str, tuple[float, float]] = field(default_factory=dict)
-    pieces: Callable[[Study, Any, Any], Mapping[tuple[str | int, ...], float]] | None = None
-    take: Callable[[Study, Collection[tuple[str | int, ...]]], Study] | None = None
 
     def wanted(self, config: Any) -> bool:
         """Return whether a config has one of its sections; a kind without any depends on the grids."""

@@ -1,9 +1,5 @@
-"""Load a study from YAML: validate it, expand it, remove duplicates and sort.
+"""Load a study from YAML: validate it, expand it, remove duplicates and sort."""
 
-The file of a part has the whole study's text, then a section that names the part.
-"""
-
-import hashlib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -17,7 +13,7 @@ from .combinations import with_rows
 from .expand import build, expand, files_of_meshes, files_of_tests
 from .kind import Kind
 from .messages import Key, Problems, StudyError, read_study, read_yaml, show
-from .model import Part, Study
+from .model import Study
 from .sections import StudyConfig, study_model
 
 
@@ -46,7 +42,7 @@ def load(path: str | Path, kinds: Sequence[Kind], beside: Path | None = None) ->
     printed_path = beside / config.printed if config.printed else None
     about = {"name": path.stem, "path": path, "text": text, "printed_path": printed_path, "mesh_files": mesh_files}
     about["row_files"] = tuple(beside / grid.rows for grid in config.grids.values() if grid.rows)
-    about |= {"test_files": test_files, "part": declared_part(config, text, problems)}
+    about["test_files"] = test_files
     return build(config, grids, kinds, problems, about)
 
 
@@ -72,45 +68,6 @@ def _validate(model: type[StudyConfig], content: Any, problems: Problems) -> Stu
             problems.add(path, message)
         problems.stop()
         raise
-
-
-PART_BELOW = (
-    "\n# What stands above is the whole study; this file asks for a part of it. Written by `springtune split`.\n"
-)
-
-
-def is_part(text: str) -> bool:
-    """Return whether a text requests a part of a study."""
-    return PART_BELOW in text
-
-
-def whole_text(text: str) -> str:
-    """Text of the whole study without the section ``part``."""
-    return text.rpartition(PART_BELOW)[0] if is_part(text) else text
-
-
-def digest_of(text: str) -> str:
-    """SHA-256 of the text of a study."""
-    return hashlib.sha256(text.encode()).hexdigest()
-
-
-def part_text(text: str, part: Part) -> str:
-    """Text of a file that requests a part of a study."""
-    return f"{text}{PART_BELOW}part: {{number: {part.number}, of: {part.of}, by: {part.by}, study: {part.study}}}\n"
-
-
-def declared_part(config: StudyConfig, text: str, problems: Problems) -> Part | None:
-    """Part that a file requests; None for the whole study."""
-    if config.part is None:
-        return None
-    part = Part(config.part.number, config.part.of, config.part.by, config.part.study)
-    if digest_of(whole_text(text)) != part.study:
-        problems.stop_at(
-            ("part", "study"),
-            "the study above it was changed since it was split, so that its parts no longer fit together; change the "
-            "whole study and split it again, or remove this section",
-        )
-    return part
 
 
 def named_files(text: str, path: Path) -> list[Path]:

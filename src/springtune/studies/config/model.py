@@ -132,16 +132,6 @@ class PrintedCell:
 
 
 @dataclass(frozen=True)
-class Part:
-    """A part of a study; `by` names what stays together (`sections.DEALT_BY`)."""
-
-    number: int
-    of: int
-    by: str
-    study: str
-
-
-@dataclass(frozen=True)
 class Study:
     """A study, ready to run.
 
@@ -156,8 +146,7 @@ class Study:
     ``calibrated``.
 
     `axes` has the labels of each dimension of the dataset: texts, for ``mesh_size`` numbers [m]. `swept` are parameters
-    of `springtune.problem.parameters.SWEPT` that are dimensions. `test_files` are tests of rubber. A `part` of a study
-    has its own scenes, curves, meshes, references and `parts`; everything else is of the whole study.
+    of `springtune.problem.parameters.SWEPT` that are dimensions. `test_files` are tests of rubber.
     """
 
     name: str
@@ -184,7 +173,6 @@ class Study:
     swept: tuple[str, ...] = ()
     test_files: tuple[Path, ...] = ()
     row_files: tuple[Path, ...] = ()
-    part: Part | None = None
 
     @property
     def plane_strain(self) -> tuple[str, ...]:

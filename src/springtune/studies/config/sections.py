@@ -50,7 +50,6 @@ from .fields import (
     Stresses,
     Terms,
     Text,
-    number,
     one_of,
 )
 from .kind import RESERVED, Kind, Output, kinds
@@ -448,34 +447,6 @@ class GridConfig(Section):
     )
 
 
-DEALT_BY = ("mesh", "grid")
-"""What a split of a study keeps together."""
-
-
-PartNumber = Annotated[int, number("a whole number from 1, such as 2", 1, MOST_PARTS, whole=True)]
-PartCount = Annotated[int, number("a whole number from 2, such as 3", 2, MOST_PARTS, whole=True)]
-DealtBy = Annotated[str, one_of("way to split", DEALT_BY)]
-
-
-class PartConfig(Section):
-    """The part of the study that this file requests; written by `springtune split`, not by hand."""
-
-    number: PartNumber = Field(description="Number of the part.")
-    of: PartCount = Field(description="Number of parts.")
-    by: DealtBy = default(
-        "mesh",
-        description="What a part keeps together: the scenes of a `mesh`, unless they are more than a part, or of a "
-        "`grid`.",
-    )
-    study: Text = Field(description="SHA-256 of the whole study, which stands above the comment of this section.")
-
-    @model_validator(mode="after")
-    def _among_them(self) -> Self:
-        if self.number > self.of:
-            raise refuse(f"{self.number} is more than the {self.of} parts; give a number from 1 to {self.of}", "number")
-        return self
-
-
 class StudyConfig(Section):
     """A study."""
 
@@ -508,9 +479,6 @@ class StudyConfig(Section):
         None, description="CSV file of printed values to compare with, relative to the study's folder."
     )
     grids: dict[str, GridConfig] = Field({})
-    part: PartConfig | None = Field(
-        None, description="The part that this file requests; written by `springtune split`."
-    )
 
     alone: ClassVar[dict[str, tuple[str, ...]]] = {}
     """Keys of study kinds that a study may have instead of grids, and the keys that each needs."""

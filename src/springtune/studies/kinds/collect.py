@@ -1,7 +1,6 @@
 """Compare what was solved with its references and gather everything in one dataset."""
 
 import sys
-from collections.abc import Collection
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,11 +23,11 @@ if TYPE_CHECKING:
     from ..config.model import Study
 
 
-def run(study: "Study", config: str | Path, folder: Path, output: Path, untold: Collection[str] = ()) -> list[Path]:
+def run(study: "Study", config: str | Path, folder: Path, output: Path) -> list[Path]:
     """Build the dataset of a study from its stored results."""
     groups = with_repair(lambda: gathered(study, folder), folder)
     try:
-        dataset.write(output, groups, provenance.attributes(study, config, untold))
+        dataset.write(output, groups, provenance.attributes(study, config))
     except OSError as error:  # the message says it all
         raise SystemExit(str(error)) from None
     told = output.with_name(summary.FILE)
@@ -37,15 +36,14 @@ def run(study: "Study", config: str | Path, folder: Path, output: Path, untold: 
     return [output, told]
 
 
-def main(config: str, folder: str, output: str, record: str, digest: str, *untold: str) -> None:
+def main(config: str, folder: str, output: str, record: str, digest: str) -> None:
     """Build a dataset and write the record of it."""
     study = load_study(config)
     OURS.recall(Path(folder).parent / CODE_FILE)
-    chosen = {option: name in untold for option, name in rerun.BLANKED.items()}
-    if rerun.jobs(study, plan(study, Path(folder), 1), chosen)[rerun.COLLECT].digest != digest:
+    if rerun.jobs(study, plan(study, Path(folder), 1))[rerun.COLLECT].digest != digest:
         raise SystemExit(f"{config} was changed while the study ran; call the same command again")
-    made = run(study, config, Path(folder), Path(output), untold)
-    records.write(record, digest, made, untold=list(untold))
+    made = run(study, config, Path(folder), Path(output))
+    records.write(record, digest, made)
 
 
 def group_of(kind: "Kind") -> dataset.Group:
@@ -77,7 +75,7 @@ def gathered(study: "Study", folder: Path) -> dict[str, xr.Dataset]:
     for kind in kinds():
         if study.parts[kind.name]:
             groups |= _of_tasks(kind, study, folder) if kind.variables else kind.module("collect").groups(study, folder)
-    for made in () if study.part else outputs().values():
+    for made in outputs().values():
         if made.collect and made.name in study.outputs:
             groups |= imported(made.collect).groups(study, folder)
     return groups

@@ -16,7 +16,7 @@ from springtune.problem.quantities import nearest
 from .alignment import joined, on_common_axes
 from .dataset import NOT_REQUESTED, flag_words, is_flagged
 from .selection import judged
-from .text import NUMBER, from_json, variable_name, without_numbers
+from .text import NUMBER, from_json, without_numbers
 
 RELATIVE = 1e-6
 """Default relative tolerance."""
@@ -32,11 +32,8 @@ NOT_MEASURED = "not measured"
 
 TOLD_ATTRIBUTES = ("title", "study", "springtune_version", "git_commit", "study_commit")
 
-UNTOLD = {"created", "history", "host", "git_diff", "config", "config_sha256", "software", "inputs", "source"}
-UNTOLD |= {"Conventions", "references", "accepted", "tolerances"}
-
-OF_CELLS = "tolerance"
-"""Variable of relative tolerances by cell."""
+UNTOLD = {"created", "history", "config", "config_sha256", "software", "inputs", "source"}
+UNTOLD |= {"Conventions", "references"}
 
 AT_ONCE = 2**26
 """Bytes of an array compared at once."""
@@ -153,16 +150,13 @@ def compare(
     groups: Collection[str] = (),
     ignored: Collection[str] = (),
     most: int | None = None,
-    own: Mapping[str, Tolerance] | None = None,
-    part: bool = False,
     block: int = AT_ONCE,
 ) -> Comparison:
     """Compare two datasets by label.
 
     Numeric labels match within `alignment.SAME_NUMBER`; NaN equals NaN. Values of cells that one study does not request
     are not compared. Numbers inside texts are compared as numbers. `MEASURED` is left out. A parameter that only one
-    study sweeps becomes a dimension of both. `own` holds tolerances by `variable_name`, ``""`` for all others; a
-    variable `OF_CELLS` of the first dataset is the relative tolerance of its cells.
+    study sweeps becomes a dimension of both.
 
     Examples
     --------
@@ -186,15 +180,13 @@ def compare(
     sides = [[path for path in side if path in wanted] for side in nodes]
     alone = (
         [path for path in sides[0] if path not in sides[1]],
-        [path for path in sides[1] if path not in sides[0] and not part],
+        [path for path in sides[1] if path not in sides[0]],
     )
     roots = (nodes[0]["/"], nodes[1]["/"])
-    own = own or {}
-    how = _How(tolerance or own.get("", Tolerance()), own, (*MEASURED, *ignored), most, part, block)
+    how = _How(tolerance or Tolerance(), (*MEASURED, *ignored), most, block)
     shared = [path for path in sides[0] if path in sides[1]]
     found = [_Group(path, (nodes[0][path], nodes[1][path]), roots, how).compared() for path in shared]
-    kept = {name: text for name, text in after.attrs.items() if not part or name in before.attrs}
-    attributes, config = _attributes(before.attrs, kept)
+    attributes, config = _attributes(before.attrs, after.attrs)
     return Comparison(found, alone, attributes, config)
 
 
@@ -244,10 +236,8 @@ def _of_definitions(tree: xr.DataTree) -> dict[tuple[str, str], np.ndarray]:
 @dataclass(frozen=True)
 class _How:
     tolerance: Tolerance
-    own: Mapping[str, Tolerance]
     ignored: Collection[str]
     most: int | None
-    part: bool
     block: int
 
 
@@ -286,10 +276,9 @@ class _Group:
         found = GroupChanges(self.path, sizes, units, labels)
         names = [[str(name) for name in data.variables if name not in data.dims] for data in self.pair]
         left_out = [name for own in names for name in own if any(fnmatchcase(name, one) for one in self.how.ignored)]
-        left_out += [OF_CELLS]
         found.variables = (
             [name for name in names[0] if name not in names[1] and name not in left_out],
-            [name for name in names[1] if name not in [*names[0], *left_out] and not self.how.part],
+            [name for name in names[1] if name not in [*names[0], *left_out]],
         )
         own = all("status" in data for data in self.pair) and self._comparable("status") is None
         if own:
@@ -334,12 +323,7 @@ class _Group:
         return (alone(*asked), alone(*reversed(asked))), int((asked[0] & asked[1]).sum())
 
     def _arrays(self, name: str) -> tuple[xr.DataArray, xr.DataArray]:
-        a, b = self.pair[0][name], self.pair[1][name]
-        if self.how.part and set(b.dims) < set(a.dims):
-            b = b.expand_dims(
-                {one: self.pair[1][one] for one in a.dims if one in self.pair[1].coords and one not in b.dims}
-            )
-        return a, b
+        return self.pair[0][name], self.pair[1][name]
 
     def _variable(self, name: str) -> VariableChanges:
         pair = self._arrays(name)
@@ -349,9 +333,7 @@ class _Group:
         pair = xr.align(a, b, join="inner", copy=False)
         if not pair[0].size:
             return VariableChanges(name, 0, 0, [])
-        kind = Values(*pair, self.how.own.get(variable_name(self.path, name), self.how.tolerance))
-        tolerances = self.pair[0].get(OF_CELLS)
-        tolerances = tolerances if tolerances is not None and set(tolerances.dims) <= set(names) else None
+        kind = Values(*pair, self.how.tolerance)
         asked = [None if mask is None else mask.any(set(mask.dims) - set(names)) for mask in self.asked]
         compared = changed = 0
         rows: list[Change] = []
@@ -364,7 +346,6 @@ class _Group:
                 values,
                 [_over(mask, here[0], True) for mask in asked],
                 cells,
-                _over(tolerances, here[0], np.nan),
             )
             flat = excess.reshape(*excess.shape[:cells], -1)
             worst, largest = flat.argmax(axis=-1), flat.max(axis=-1)
@@ -435,7 +416,7 @@ class Values:
         return values == "" if values.dtype.kind in "OUS" else np.isnan(values)
 
     def excess(
-        self, values: Sequence[np.ndarray], asked: Sequence[np.ndarray], cells: int, tolerances: np.ndarray
+        self, values: Sequence[np.ndarray], asked: Sequence[np.ndarray], cells: int
     ) -> tuple[np.ndarray, np.ndarray]:
         """Difference over tolerance in the values' shape, and where it is defined."""
         text = self.text or self.words is not None
@@ -454,7 +435,7 @@ class Values:
         points = tuple(range(cells, a.ndim))
         if points:
             size = np.where(both & np.isfinite(size), size, 0.0).max(axis=points, keepdims=True)
-        relative = np.where(np.isnan(tolerances), self.tolerance.relative, tolerances)
+        relative = self.tolerance.relative
         dimensionless = self.units in ("", "1")
         least = relative if self.tolerance.absolute is None and dimensionless else self.tolerance.absolute or 0.0
         allowed = np.maximum(relative * size, least)

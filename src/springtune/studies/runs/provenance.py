@@ -4,7 +4,6 @@ import hashlib
 import json
 import platform
 import subprocess
-from collections.abc import Collection
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -40,30 +39,20 @@ SOFTWARE = (
 LOCK = Path("requirements/run.txt")
 """Lock file, beside the study or above it."""
 
-COMPARED_WITH_COMMIT = ("src", "Snakefile", "workflow/paper", "workflow/report", "workflow/rules")
-"""Compared files of the checkout; profiles may be a user's own."""
-
 CHANGED = "+changes"
 """Ending of `git_commit` if files differ from the commit."""
-
-LONGEST = 40_000
-"""Most characters of the stored difference."""
 
 PRINTED = {"paper_tables.csv": "the paper Mass-Spring Parameters Definition in 2D for Simulation"}
 """Sources of printed values by file name."""
 
 
-def attributes(
-    study: Study, config: str | Path, untold: Collection[str] = (), package: Path = PACKAGE
-) -> dict[str, str]:
+def attributes(study: Study, config: str | Path, package: Path = PACKAGE) -> dict[str, str]:
     """Attributes of the root of a study's dataset."""
     created = datetime.now(UTC).isoformat(timespec="seconds")
     software = {name: installed(name) for name in (*SOFTWARE, *_plugins(study))}
     software["python"] = platform.python_version()
     folder = Path(config).resolve().parent
     library, own = library_commit(package), study_commit(folder, package)
-    checkouts = ((clone(package), library), (folder, own))
-    changed = [place for place, commit in checkouts if place and commit.endswith(CHANGED)]
     found = {
         "title": study.title,
         "Conventions": "CF-1.11",
@@ -75,10 +64,8 @@ def attributes(
         "inputs": json.dumps(inputs(study, folder), sort_keys=True),
         "springtune_version": __version__,
         "git_commit": library,
-        "git_diff": "" if "git_diff" in untold else git_diff(study, *changed),
         "created": created,
         "software": json.dumps(software, sort_keys=True),
-        "host": "" if "host" in untold else platform.node(),
     }
     found |= {"plane_strain": ", ".join(study.plane_strain)} if study.plane_strain else {}
     return found | ({"study_commit": own} if own else {}) | _references(study)
@@ -147,28 +134,6 @@ def study_commit(folder: Path, package: Path) -> str:
     top, root = git(folder, "rev-parse", "--show-toplevel").removesuffix("\n"), clone(package)
     of_library = folder.is_relative_to(package.resolve()) or (root and root.resolve() == Path(top))
     return git_commit(folder) if top and not of_library else ""
-
-
-def git_diff(study: Study, *folders: Path) -> str:
-    """Differences of checkouts from their commits; a long text is clipped and ends in its SHA-256."""
-    # Whatever files are written in.
-    text = "".join(difference(study, folder) for folder in folders)
-    text = text.encode(errors="surrogateescape").decode(errors="replace").replace("\0", "")
-    if len(text) <= LONGEST:
-        return text
-    digest = hashlib.sha256(text.encode()).hexdigest()
-    kept = text[: text.rfind("\n", 0, LONGEST) + 1]
-    return f"{kept}... cut here; the whole difference has {len(text)} characters and SHA-256 {digest}\n"
-
-
-def difference(study: Study, folder: Path, *options: str) -> str:
-    """Difference of package, rules and the study's files from the commit, without untracked files."""
-    top, root = Path(git(folder, "rev-parse", "--show-toplevel").removesuffix("\n")), _checkout(folder)
-    files = {file.resolve() for file in input_files(study)}
-    files |= {root / name for name in COMPARED_WITH_COMMIT if root}
-    known = [str(file) for file in sorted(files) if file.is_relative_to(top)]
-    command = ("--literal-pathspecs", "diff", "--no-color", "--no-ext-diff", *options, "HEAD", "--")
-    return git(folder, *command, *known) if known else ""
 
 
 def git(folder: Path, *arguments: str) -> str:

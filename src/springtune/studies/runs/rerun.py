@@ -3,7 +3,7 @@
 Jobs of stages come from `springtune.studies.runs.plan`; the jobs after them are defined here.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -35,10 +35,6 @@ PAPER, PAPER_FILE = "paper", "paper.pdf"
 PAPER_STUDIES = ("paper", "definitions", "block", "laying", "stability", "benchmark", "shapes")
 
 
-BLANKED = {"no_diff": "git_diff", "no_host": "host"}
-"""Attributes that a dataset leaves empty, by the option of a run."""
-
-
 @dataclass(frozen=True)
 class Job:
     """A job of a run.
@@ -58,7 +54,7 @@ class Job:
 def output_jobs(study: "Study") -> "dict[str, list[Output]]":
     """Requested outputs of a study that have files, by the job that makes them."""
     found: dict[str, list[Output]] = {}
-    for one in () if study.part else outputs().values():  # figures and tables are of whole studies
+    for one in outputs().values():
         if one.name in study.outputs and output_files(one, study):
             found.setdefault(f"{PRESENT}_{one.job or one.name}", []).append(one)
     return found
@@ -76,18 +72,11 @@ def linked(study: "Study") -> list[str]:
     return [path for path in made if Path(path).suffix in (f".{FORMATS[0]}", ".html")]
 
 
-def untold(folder: Path, chosen: Mapping[str, bool] | None = None) -> list[str]:
-    """Attributes that the dataset of a study leaves empty."""
-    before = (checked_json.read(folder / RECORDS / f"{COLLECT}.json", products=dict) or {}).get("untold", [])
-    return [name for option, name in BLANKED.items() if (chosen or {}).get(option, name in before)]
-
-
-def jobs(study: "Study", plan: Plan, chosen: Mapping[str, bool] | None = None) -> dict[str, Job]:
+def jobs(study: "Study", plan: Plan) -> dict[str, Job]:
     """All jobs of a study."""
     folder = plan.folder
     found = [Job(one.name, one.digest, one.products, plan.record(one.name)) for one in plan.jobs.values()]
-    collected = hash_of(_collect_digest(study, plan), untold(folder, chosen))
-    made = [(COLLECT, collected, [DATASET, SUMMARY], "")]
+    made = [(COLLECT, _collect_digest(study, plan), [DATASET, SUMMARY], "")]
     for name, members in output_jobs(study).items():
         files = [file for one in members for file in output_files(one, study)]
         made.append((name, _present_digest(members, files), files, COLLECT))
@@ -150,7 +139,7 @@ def fault(job: Job, found: dict[str, Job]) -> str:
     return why
 
 
-def outdated(study: "Study", folder: Path, chosen: Mapping[str, bool] | None = None) -> dict[Path, str] | None:
+def outdated(study: "Study", folder: Path) -> dict[Path, str] | None:
     """Return the records of done jobs that must run again, with the reasons; None if a job was never done.
 
     Snakemake does not find these: it compares parameters with its own notes, and no content of products.
@@ -158,7 +147,7 @@ def outdated(study: "Study", folder: Path, chosen: Mapping[str, bool] | None = N
     if not (folder / BUNDLES_FILE).exists():  # never run: planning 10,000 scenes takes a second
         return None
     OURS.recall(folder.parent / CODE_FILE)
-    found = jobs(study, plan(study, folder), chosen)
+    found = jobs(study, plan(study, folder))
     faults = {job.record: why for job in found.values() if (why := fault(job, found))}
     known = {record: why for record, why in faults.items() if record.exists()}
     return known if len(known) == len(faults) else known or None

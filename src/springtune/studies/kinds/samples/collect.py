@@ -95,8 +95,6 @@ MOST_BINS, BIN_POINTS = 16, 16
 def groups(study, folder):
     """Groups of a dataset, see `springtune.studies.kinds.scenes.collect.groups`."""
     sample = study.parts["samples"]
-    if sample.blocks:  # a part of a study: indices and effects need all rows
-        return {}
     drawn, results = _stored(sample, folder / "samples")
     points = sample.size * min(2, sample.rows // sample.size)
     axes = study.axes | {

@@ -1,6 +1,6 @@
 """Samples: a study's section ``samples``."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from typing import Annotated, Any
 
@@ -244,7 +244,7 @@ class SamplesConfig(Section):
 
 @dataclass(frozen=True)
 class Sample:
-    """What a study samples; `blocks` are the tasks of a part of a study, and empty for a whole study."""
+    """What a study samples."""
 
     design: str
     size: int
@@ -256,7 +256,6 @@ class Sample:
     best_stiffness: bool
     failures: str
     parameters: dict[str, dict[str, Any]]
-    blocks: tuple[tuple[int, int], ...] = ()
 
     @property
     def varied(self) -> tuple[str, ...]:
@@ -430,34 +429,15 @@ def _blocks(study):
         "meshed": hash_of(stage_key(SOLVE), mesh_type_key(sample.mesh_type)),
         "results": scenes,
     }
-    for first, last in _drawn(sample):
+    for first, last in blocks(sample.design, sample.size):
         key, costs = block_key(sample, first, last), [("sampled", (last - first) * _scenes_each(sample))]
         values = {"first": first, "last": last}
         yield Task(values, costs=costs, name=f"{first}-{last}", file=key, key=key, shared=shared)
 
 
-def _drawn(sample):
-    """First and last base sample of each task: of the whole sample, or of the part that a study asks for."""
-    return sample.blocks or blocks(sample.design, sample.size)
-
-
 def _scenes_each(sample):
     """Number of networks of a base sample."""
     return sample.rows // sample.size * len(sample.loads) * len(solved_definitions(sample))
-
-
-def _pieces(study, costs, division):
-    """Seconds of each piece of a sample: of a task's base samples, or of all."""
-    sample = study.parts["samples"]
-    seconds = {ends: costs.of("sampled", (ends[1] - ends[0]) * _scenes_each(sample)) for ends in _drawn(sample)}
-    return division.of_section(seconds)
-
-
-def _take(study, names):
-    """The study with some of its pieces alone. What is estimated from all rows is left to the whole sample."""
-    sample, wanted = study.parts["samples"], set(names)
-    kept = tuple(ends for ends in _drawn(sample) if ends in wanted)
-    return replace(study, parts=study.parts | {"samples": replace(sample, blocks=kept) if kept else ()})
 
 
 def _tables(study):
@@ -480,8 +460,6 @@ KIND = Kind(
         stage("sample", SOLVE, "Solving the networks of samples", _blocks, folder="samples"),
     ),
     outputs=OUTPUTS,
-    pieces=_pieces,
-    take=_take,
     tables=_tables,
     tables_by="outputs",
     costs={"sampled": (0.05, 6e-4)},

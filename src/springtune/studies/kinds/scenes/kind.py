@@ -13,7 +13,7 @@ from springtune.springs import DEFINITIONS
 from ...config.kind import Kind
 from ...config.model import SceneSpec, Study
 from .outputs import OUTPUTS, stems
-from .plan import STAGES, expected_solves, interpolants, pieces, take
+from .plan import STAGES, expected_solves, interpolants
 
 KIND = Kind(
     "scenes",
@@ -22,8 +22,6 @@ KIND = Kind(
     stages=STAGES,
     outputs=OUTPUTS,
     tables=stems,
-    pieces=pieces,
-    take=take,
     costs={
         "mesh": (4e-3, 2.5e-5),
         "linear": (5e-4, 1e-6),
@@ -61,8 +59,6 @@ def summary(study: Study, further: list[list[object]]) -> str:
     users = len(study.scenes) + len(study.curves)
     repeated = requested - len(study.scenes)
     again = f"{requested} asked, {repeated} of them more than once" if repeated else ""
-    if study.part:
-        again = f"part {study.part.number} of {study.part.of} of the study"
     rows: list[list[object]] = [
         ["scenes", len(study.scenes), again],
         ["meshes", meshes, f"each serves {users / meshes:.3g} scenes and curves on average"],
@@ -119,7 +115,7 @@ def _contributions(study: Study) -> list[list[object]]:
     """Rows of a table of grids; new scenes are those that no grid above has."""
     rows: list[list[object]] = [["grid", "scenes", "new", "meshes", "references", "curves"]]
     seen: set[SceneSpec] = set()
-    own, traced = set(study.scenes), set(study.curves)  # of a part, some
+    own, traced = set(study.scenes), set(study.curves)
     for grid in study.grids:
         scenes = [scene for scene in grid.scenes if scene in own]
         meshes = {scene.mesh for scene in scenes}
@@ -127,8 +123,7 @@ def _contributions(study: Study) -> list[list[object]]:
         new = set(scenes) - seen
         seen |= new
         curves = traced.intersection(grid.curves)
-        if scenes or curves or not study.part:
-            rows.append([grid.name, len(scenes), len(new), len(meshes), len(references), len(curves)])
+        rows.append([grid.name, len(scenes), len(new), len(meshes), len(references), len(curves)])
     extra = set(study.curves) - {curve for grid in study.grids for curve in grid.curves}
     if extra:
         rows.append(["(calibration)", "", "", "", "", len(extra)])

@@ -2,11 +2,10 @@
 
 import hashlib
 from collections import defaultdict
-from dataclasses import replace
 from functools import cache, lru_cache, partial
 from math import ceil, floor, log, log10
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from springtune.problem.loads import LOADS
 from springtune.reference.answers import unit_problem, unit_scales
@@ -21,8 +20,6 @@ from . import stored
 from .stored import calibrated_key
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
-
     from springtune.problem.geometry import Beam
     from springtune.problem.materials import Material
 
@@ -303,8 +300,7 @@ def _commons(study):
 @once_a_study("grids")
 def shown_scenes(study):
     """Scenes whose whole fields are stored, chosen from the whole study."""
-    scenes = study.scenes if study.part is None else {scene for grid in study.grids for scene in grid.scenes}
-    return shown(scenes, study.swept)
+    return shown(study.scenes, study.swept)
 
 
 def solved_keys(study, mesh, calibration):
@@ -484,80 +480,6 @@ def _calibrate(study, folder, members):
         "groups": tasks,
         "code": stage_key("studies.kinds.scenes.calibrate"),
     }
-
-
-# -- parts of a study --------------------------------------------------------------------------------------------------
-
-
-def pieces(study, costs, division):
-    """Seconds of each piece: of a mesh's scenes and curves, of a part of them, or of a grid's."""
-    if division.by == "grid":
-        return {("grid", name): sum(_seconds(one, costs) for one in items) for name, items in _by_grid(study).items()}
-    found = {}
-    for name, items in _by_stem(study).items():
-        each = [_seconds(one, costs) for one in items]
-        meshed = costs.of("mesh", particles(items[0].mesh))
-        count = division.pieces(sum(each), len(each))
-        for number in range(count):
-            found[name, number, count] = meshed + sum(_slice(each, number, count))
-    return found
-
-
-def take(study, names):
-    """Study reduced to some pieces and what they need."""
-    by_grid, by_stem = _by_grid(study), _by_stem(study)
-    chosen = set()
-    for first, *rest in names:
-        chosen.update(by_grid[rest[0]] if first == "grid" else _slice(by_stem[first], *map(int, rest)))
-    return of_scenes(study, chosen)
-
-
-def of_scenes(study: "Study", chosen: "Collection[object]") -> "Study":
-    """Study reduced to some scenes and curves and what they need."""
-    scenes = tuple(scene for scene in study.scenes if scene in chosen)
-    groups = {calibration_name(scene) for scene in scenes if scene.definition == "calibrated"}
-    calibrating = {one for one in _calibrating_curves(study) if calibration_name(one) in groups}
-    curves = tuple(one for one in study.curves if one in chosen or one in calibrating)
-    asked: list[Any] = [*scenes, *curves]
-    bodies = {(one.mesh.beam, one.material, one.load, one.force) for one in asked}
-    meshes = {one.mesh for one in asked}
-    return replace(
-        study,
-        scenes=scenes,
-        curves=curves,
-        meshes=tuple(mesh for mesh in study.meshes if mesh in meshes),
-        references=tuple(one for one in study.references if (one.beam, one.material, one.load, one.force) in bodies),
-        parts=study.parts | {"scenes": study.parts["scenes"] if asked else ()},
-    )
-
-
-def _by_grid(study):
-    """Scenes and curves by the first grid that asks for them."""
-    found, seen = {}, set()
-    for grid in study.grids:
-        found[grid.name] = [one for one in dict.fromkeys((*grid.curves, *grid.scenes)) if one not in seen]
-        seen.update(found[grid.name])
-    return {name: asked for name, asked in found.items() if asked}
-
-
-def _by_stem(study):
-    """Scenes and curves by the file of their mesh, which sheets of several thicknesses share."""
-    found = defaultdict(list)
-    for one in (*study.curves, *study.scenes):
-        found[stem(one.mesh)].append(one)
-    return found
-
-
-def _slice(items, number, count):
-    """Piece `number` of `count` of some items."""
-    return items[len(items) * number // count : len(items) * (number + 1) // count]
-
-
-def _seconds(one, costs):
-    """Expected seconds of a scene or a curve."""
-    count = particles(one.mesh)
-    kinds = (one.kinematics, one.definition) if hasattr(one, "definition") else ("curve",)
-    return sum(costs.of(kind, count) for kind in kinds)
 
 
 STAGES = (

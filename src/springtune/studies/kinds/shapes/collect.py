@@ -110,7 +110,7 @@ def groups(study, folder):
         results = store.read(folder / "solutions" / f"{kind.file_name(scenes[0])}.h5", set(keys.values()))
         for one, key in keys.items():
             _scene(part, one, results[key], references, found)
-    drawn = DRAWING in study.outputs and not study.part
+    drawn = DRAWING in study.outputs
     finite = {AT_FINITE_STRAIN.name: _finite_strain(study, part, folder, found.data.value)} if part.finite else {}
     return {SHAPES.name: found.data} | finite | (_fields(study, folder) if drawn else {})
 

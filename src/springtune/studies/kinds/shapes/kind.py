@@ -5,7 +5,6 @@ are imported where one has.
 """
 
 from collections import defaultdict
-from dataclasses import replace
 from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -22,9 +21,7 @@ from ..scenes.plan import file_source, mesh_stage, on_meshes, parameters, partic
 from .outputs import DRAWING, OUTPUTS, OWN_FILE, mesh_name, stems
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
-
-    from ...config.model import Study
+    pass
 
 MOST_DRAWN = 1500
 """Particles, about, of the largest mesh that is drawn where a coarser one is there."""
@@ -174,44 +171,6 @@ def _solve(study, folder, members):
     return on_meshes(folder, "solutions", files)
 
 
-# -- parts of a study --------------------------------------------------------------------------------------------------
-
-
-def pieces(study, costs, division):
-    """Seconds of each piece: of a shape under a load, which says what of it is drawn, or of all grids."""
-    part = study.parts["shapes"]
-    found = defaultdict(float)
-    for one in part.scenes:
-        found[one.shape, one.load] += _seconds(part, one, costs)
-    for shape, _, load, *_ in (*part.referred, *part.finite):
-        found[shape, load] += costs.of("shape_reference")
-    return division.of_section(found)
-
-
-def take(study, names):
-    """Study reduced to some pieces."""
-    wanted = set(names)
-    return of_shape_scenes(study, {one for one in study.parts["shapes"].scenes if (one.shape, one.load) in wanted})
-
-
-def of_shape_scenes(study: "Study", chosen: "Collection[object]") -> "Study":
-    """Study reduced to some scenes of shapes and what they need."""
-    part = study.parts["shapes"]
-    scenes = tuple(scene for scene in part.scenes if scene in chosen) if part else ()
-    if not scenes:
-        return replace(study, parts=study.parts | {"shapes": ()})
-    cases = {(one.shape, one.material, one.load) for one in scenes}
-    names = {one.shape for one in scenes}
-    found = replace(
-        part,
-        shapes=tuple(shape for shape in part.shapes if shape.name in names),
-        scenes=scenes,
-        referred=tuple(case for case in part.referred if case in cases),
-        finite=tuple(case for case in part.finite if case[:3] in cases),
-    )
-    return replace(study, parts=study.parts | {"shapes": found})
-
-
 STAGES = (
     stage(
         "shape_reference",
@@ -285,7 +244,5 @@ KIND = Kind(
     outputs=OUTPUTS,
     tables=stems,
     tables_by="outputs",
-    pieces=pieces,
-    take=take,
     costs={"shape_mesh": (2e-2, 2.5e-5), "shape_reference": (2.0, 0.0), "shape_scene": (5e-3, 2e-5)},
 )

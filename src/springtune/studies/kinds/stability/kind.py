@@ -1,6 +1,6 @@
 """Experiments on numerical stability: a study's section ``stability``."""
 
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from typing import Annotated
 
 from pydantic import Field
@@ -87,20 +87,6 @@ def _tasks(study):
         yield Task(asdict(one) | own, also, labels, one, [(one.name, 0)])
 
 
-def _pieces(study, costs, division):
-    seconds = {_piece(task.of): task.seconds(costs) for task in _tasks(study)}
-    return division.of_section(seconds)
-
-
-def _take(study, names):
-    chosen = tuple(one for one in study.parts["stability"] if _piece(one) in set(names))
-    return replace(study, parts=study.parts | {"stability": chosen})
-
-
-def _piece(one):
-    return one.name, one.definition
-
-
 STAGE = stage("stability", "studies.kinds.stability.solve", "Experiments on stability", _tasks)
 
 KIND = Kind(
@@ -114,8 +100,6 @@ KIND = Kind(
     summary=lambda part: [["experiments", len(part), "on numerical stability"]],
     stages=(STAGE,),
     outputs=OUTPUTS,
-    pieces=_pieces,
-    take=_take,
     costs={
         "limits": (10.0, 0.0),
         "maps": (8.0, 0.0),
