@@ -19,7 +19,6 @@ if not NOTED:
     include: "workflow/rules/laying.smk"
     include: "workflow/rules/stability.smk"
     include: "workflow/rules/samples.smk"
-    include: "workflow/rules/refinement.smk"
     include: "workflow/rules/benchmark.smk"
     include: "workflow/rules/further.smk"
     include: "workflow/rules/collect.smk"

@@ -79,7 +79,6 @@ from .studies.kinds.laying.figures import plot_laying as plot_laying
 from .studies.kinds.moduli.figures import plot_definitions_loads as plot_definitions_loads
 from .studies.kinds.moduli.figures import plot_definitions_size as plot_definitions_size
 from .studies.kinds.moduli.figures import plot_moduli as plot_moduli
-from .studies.kinds.refinement.figures import plot_refinement as plot_refinement
 from .studies.kinds.samples.figures import plot_effects as plot_effects
 from .studies.kinds.samples.figures import plot_sobol as plot_sobol
 from .studies.kinds.scenes.errors import plot_size as plot_size
@@ -97,7 +96,6 @@ from .studies.kinds.stability.figures import plot_stability_maps as plot_stabili
 from .studies.kinds.stability.figures import plot_stability_meshes as plot_stability_meshes
 from .studies.kinds.stability.figures import plot_stability_rest as plot_stability_rest
 from .studies.kinds.stability.figures import plot_stability_strains as plot_stability_strains
-from .studies.output.merging import merge as merge
 from .studies.output.reading import field as field
 from .studies.output.reading import open as open
 from .studies.output.summing_up import info as info

@@ -17,7 +17,7 @@ import pytest
 from injection import FAULTS, Faults, operations
 
 STEPS = ["begin", "reference_0", "mesh_0", "sensitivity_0", "calibrate_0", "solve_0", "moduli_0", "laying_0",
-         "stability_0", "benchmark_traction", "interpolate_0", "sample_0", "refinement_0", "shape_reference_0",
+         "stability_0", "benchmark_traction", "interpolate_0", "sample_0", "shape_reference_0",
          "shape_mesh_0", "shape_solve_0", "collect", "present_scenes", "browse"]  # fmt: skip
 
 FEW = 97

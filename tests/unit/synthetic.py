@@ -133,29 +133,6 @@ def stability():
     return data.assign_coords(experiment=done)
 
 
-def refinement():
-    """Two refinements of two definitions; of one of them the last value is not there."""
-    labels = {"refinement": ["size", "thick"], "definition": DEFINITIONS, "point": range(4), "crossing": range(2)}
-    value, crossing = ("refinement", "definition", "point"), ("refinement", "definition", "crossing")
-    named = {"refined_mesh_size": value, "refined_thickness": value, "deformation_error": value}
-    named |= {f"crossing_{name}": crossing for name in ("mesh_size", "mesh_size_width", "thickness", "thickness_width")}
-    data = variables(labels, **named, crossing_change=crossing)
-    data["tolerance"] = "refinement", [0.01, 0.02]
-    data["parameter"] = "refinement", np.array(["mesh_size", "thickness"], dtype=object)
-    scenes = [
-        "100x20, structured mesh, steel, traction 10 kN, nonlinear",
-        "200x40, free mesh 5 mm, rubber, bending 1 N, linear",
-    ]
-    data["scene"] = "refinement", np.array(scenes, dtype=object)
-    data["spacing"] = "refinement", np.array(["logarithmic", "linear"], dtype=object)
-    data["value_count"] = ("refinement", "definition"), np.array([[4, 3], [4, 4]])
-    data["crossing_level"] = xr.zeros_like(data.crossing_change)
-    data["status"] = xr.ones_like(data.deformation_error, dtype=np.int8)
-    data["reference_applies"] = xr.ones_like(data.status)
-    data.deformation_error[0, 1, 3] = np.nan
-    return data
-
-
 def benchmark():
     labels = {
         "scene": ["traction", "bending"], "approach": ["delingette/structured", "relaxation", "calculix-cps3"],
@@ -275,7 +252,7 @@ def dataset(*names):
 @cache
 def _dataset():
     groups = {"sensitivity": sensitivity, "fields": fields, "block": block, "moduli": moduli, "laying": laying}
-    groups |= {"stability": stability, "benchmark": benchmark, "refinement": refinement}
+    groups |= {"stability": stability, "benchmark": benchmark}
     groups |= {"engines": engines, "engine_curves": engine_curves}
     groups |= {"shapes": shapes, "shape_fields": shape_fields}
     groups |= {"samples": samples, "effects": effects, "sobol": sobol}

@@ -115,7 +115,6 @@ class TestPage:
         from springtune.studies.kinds.engines.collect import ENGINE_CURVES, ENGINE_RUNS
         from springtune.studies.kinds.laying.collect import LAYING
         from springtune.studies.kinds.moduli.kind import KIND as MODULI
-        from springtune.studies.kinds.refinement.collect import REFINEMENT
         from springtune.studies.kinds.samples.collect import EFFECTS, SAMPLES, SOBOL
         from springtune.studies.kinds.samples.designs import PARAMETERS
         from springtune.studies.kinds.scenes.variables import BLOCK, FIELDS, FINITE_STRAIN, ROOT, SENSITIVITY
@@ -125,7 +124,7 @@ class TestPage:
 
         groups = (ROOT, SENSITIVITY, FINITE_STRAIN, BLOCK, FIELDS, LAYING, STABILITY, ENGINE_RUNS, ENGINE_CURVES)
         groups += tuple(map(group_of, (MODULI, BENCHMARK)))
-        groups += (SAMPLES, EFFECTS, SOBOL, REFINEMENT, SHAPES, SHAPE_FIELDS, AT_FINITE_STRAIN)
+        groups += (SAMPLES, EFFECTS, SOBOL, SHAPES, SHAPE_FIELDS, AT_FINITE_STRAIN)
         coordinates = {"/samples": {*PARAMETERS, "sample_mesh_size"}}
         known = {group.name: group for group in groups}
         for view in views().values():

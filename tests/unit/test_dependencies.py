@@ -204,7 +204,7 @@ def known():
     return _keys()
 
 
-KINDS = ("moduli", "laying", "stability", "benchmark", "refinement", "samples", "shapes", "engines")
+KINDS = ("moduli", "laying", "stability", "benchmark", "samples", "shapes", "engines")
 SOLVING = {"scenes.solve", "scenes.sensitivity", "patch", "annealed", *(f"{name}.solve" for name in KINDS)}
 REFERENCE = {"scenes.reference", "samples.interpolate", "shapes.reference", "unit"}
 

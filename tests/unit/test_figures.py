@@ -60,7 +60,6 @@ EVERY_PLOT = {
     st.plot_engine_maps: ({"scene": "sheet"}, 4),
     st.plot_engine_curves: ({"scene": "strip"}, 4),
     st.plot_engine_factors: ({"scene": "strip"}, None),
-    st.plot_refinement: ({}, 2),
     st.plot_shapes: ({}, None),
     st.plot_shape_errors: ({"shape": "cook", "load": "traction"}, (2, 2)),
     st.plot_shape: ({"shape": "hole"}, 2),
@@ -492,10 +491,6 @@ def group_of_one_size(tree):
 def test_counts_and_shares_of_large_strains_look_different(tree):
     texts = {text for panel in st.plot_stability_strains(tree) for text in (one.get_text() for one in panel.texts)}
     assert all(text.isdecimal() or text in ("", "f", "path") or text.endswith(" %") for text in texts), texts
-
-
-def test_the_grey_band_of_a_refinement_is_explained(tree):
-    assert any(text.startswith("grey: within the tolerance, ") for text in said(st.plot_refinement(tree)[0]))
 
 
 def test_a_number_keeps_its_unit():

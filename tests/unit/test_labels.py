@@ -30,7 +30,7 @@ def tree():
 
 HOSTILE = "$x_{$ </text><script>"
 
-RENAMED = ("beam", "mesh_type", "material", "definition", "shape", "quantity", "refinement")
+RENAMED = ("beam", "mesh_type", "material", "definition", "shape", "quantity")
 """Dimensions whose labels are somebody's, and not chosen by name in a figure."""
 
 

@@ -228,7 +228,7 @@ class TestExport:
 
     @pytest.mark.parametrize("ending", ["csv", "parquet"])
     def test_parameters_come_along(self, tmp_path, ending):
-        """Those of samples and refinements are coordinates besides the dimensions, not variables."""
+        """Those of samples are coordinates besides the dimensions, not variables."""
         error = xr.DataArray([[0.1, 0.2], [0.3, np.nan]], dims=("sample", "load"), coords={"load": ["a", "b"]})
         height = xr.DataArray([0.02, 0.03], dims="sample", attrs={"units": "m"})
         group = xr.Dataset(

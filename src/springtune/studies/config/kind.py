@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 _PACKAGES = Path(__file__).parents[1] / "kinds"
 
-_FIRST = ("scenes", "moduli", "laying", "stability", "benchmark", "samples", "refinement", "shapes")
+_FIRST = ("scenes", "moduli", "laying", "stability", "benchmark", "samples", "shapes")
 
 KINDS = _FIRST + tuple(sorted({path.parent.name for path in _PACKAGES.glob("*/kind.py")} - {*_FIRST}))
 """Packages of the study kinds, in the order of the dataset's groups; other kinds come last."""
