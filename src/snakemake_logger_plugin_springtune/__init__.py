@@ -52,17 +52,17 @@ class LogHandler(LogHandlerBase):
         super().close()
 
     def _show(self, record: LogRecord) -> None:
-        estimates, event = getattr(record, "estimates", None), getattr(record, "event", None)
+        work, event = getattr(record, "work", None), getattr(record, "event", None)
         if not self.wanted:
             self._plain().emit(record)
-        elif estimates is not None:
+        elif work is not None:
             from .display import Display
 
             stream = sys.stderr
             stream.write(f"{record.getMessage()}\n")
             self.held.clear()
             moves = stream.isatty() and os.environ.get("TERM", "dumb") != "dumb" and not os.environ.get("CI")
-            self.display = Display(estimates, record.cores, stream, moves, record.slowdown)  # type: ignore[attr-defined]
+            self.display = Display(work, stream, moves)
         elif getattr(record, "ends", False):
             self.wanted = False  # what Snakemake says after it is shown
             self._stop()

@@ -17,9 +17,6 @@ rule collect:
         config=lambda wildcards: str(CONFIG),
         folder=lambda wildcards, output: str(Path(output.dataset).parent),
         digest=JOBS["collect"].digest,
-    resources:
-        runtime=minutes(rerun.COLLECT),
-        mem_mb=megabytes(rerun.COLLECT),
     log:
         RESULTS / "logs/collect.log",
     benchmark:

@@ -1,11 +1,9 @@
 """The study, the plan of its jobs, and helpers that the rules share."""
 
 import gc
-import os
 import re
 import sys
 import warnings
-from math import inf
 from pathlib import Path
 
 from springtune.problem.geometry import AssumptionWarning
@@ -15,7 +13,7 @@ from springtune.studies.config.messages import StudyError
 from springtune.studies.kinds import load_study
 from springtune.studies.runs import locks, rerun, workload
 from springtune.studies.runs.keys import CODE_FILE, OURS
-from springtune.studies.runs.plan import plan, stages
+from springtune.studies.runs.plan import plan
 
 
 def refused(why):
@@ -34,17 +32,6 @@ def loaded_study():
     except StudyError as error:
         remedy = f"; as a module springtune takes its study by config: {{'study': 'config/mine.yaml'}}"
         refused(f"{error}{remedy if MODULE and 'study' not in config else ''}")
-
-
-def job_seconds():
-    """Intended seconds of a job, from a cluster's profile or ``--config job_minutes=5``; None in the jobs themselves."""
-    if IS_CHILD:
-        return None
-    minutes = config.get("job_minutes", 0)
-    if isinstance(minutes, bool) or not isinstance(minutes, int | float) or not 0 <= minutes < inf:
-        usual = "the profile slurm has 5, a machine of one's own 0, for as few as pay"
-        refused(f"--config job_minutes={minutes}: no number of minutes; {usual}")
-    return 60.0 * minutes
 
 
 # Keys of results have the versions of the packages that Snakemake sees, so jobs must run on these.
@@ -69,10 +56,8 @@ RESULTS = Path("results") / STUDY.name
 if not MODULE:
     config |= {"title": rst(STUDY.title), "results": str(RESULTS)}  # for the report's text
 
-# The number of jobs follows from the cores; on a cluster, which has room for all, from the seconds of a job.
-CORES = 1 if ON_CLUSTER or IS_CHILD else workflow.cores or 1
 OURS.recall(RESULTS.parent / CODE_FILE)
-PLAN = plan(STUDY, RESULTS, CORES, job_seconds())
+PLAN = plan(STUDY, RESULTS, cluster=ON_CLUSTER or IS_CHILD)
 JOBS = rerun.jobs(STUDY, PLAN)
 gc.freeze()
 gc.enable()
@@ -94,9 +79,9 @@ def done(stage):
     return [PLAN.record(job.name) for job in PLAN.jobs.values() if job.stage.name == stage]
 
 
-def bundles(stage):
-    """Pattern of a stage's bundles, for the constraint of its wildcard."""
-    return "|".join(map(re.escape, PLAN.labels(stage))) or "none"
+def bundles():
+    """Pattern of the labels of bundles."""
+    return "|".join(sorted({re.escape(job.label) for job in PLAN.jobs.values()})) or "none"
 
 
 def digest(name):
@@ -105,27 +90,6 @@ def digest(name):
     A function of the wildcards alone: Snakemake does not compare parameters that depend on input or output.
     """
     return lambda wildcards: JOBS[name.format(**dict(wildcards))].digest
-
-
-# A change of these resources is no reason to run a job again.
-
-
-def minutes(name):
-    """Resource ``runtime`` of the jobs of a rule, by the name of their record."""
-    return lambda wildcards, attempt: needs(name, wildcards).minutes(attempt)
-
-
-def megabytes(name):
-    """Resource ``mem_mb`` of the jobs of a rule, by the name of their record."""
-    return lambda wildcards, attempt: needs(name, wildcards).megabytes(attempt)
-
-
-def needs(name, wildcards):
-    """Expected seconds and memory of a job, from measured costs of its tasks."""
-    job = name.format(**dict(wildcards))
-    if job in PLAN.jobs:
-        return PLAN.needs[PLAN.jobs[job].stage.name, PLAN.jobs[job].label]
-    return workload.presented_needs(RESULTS, job, len(JOBS[job].products) if job in JOBS else 1)
 
 
 # Figures and tables in Snakemake's report.

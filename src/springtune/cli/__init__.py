@@ -77,7 +77,6 @@ COMMANDS = {
     "diff": Row(RESULTS, "diff", "diff", "Say what changed from one dataset to another, scene by scene."),
     "export": Row(RESULTS, "results", "export", "Write a dataset as CSV, Parquet or Zarr."),
     "archive": Row(RESULTS, "results", "archive", "Pack the results of a study into one file."),
-    "clean": Row(RESULTS, "results", "clean", "List what no study asks for any more, and remove it."),
     "schema": Row(HOUSE, "study", "schema", "Print the JSON schema of studies, for editors."),
 }
 """Commands by name, in the order of the help; each is imported when it is called."""

@@ -12,7 +12,7 @@ from springtune.safe_io.escapes import shown
 from .config.model import Study
 from .output import reading
 from .runs.provenance import input_files
-from .runs.records import checksum
+from .runs.source import checksum
 
 SUMS, VERSIONS, README = "SHA256SUMS", "versions.json", "README.md"
 

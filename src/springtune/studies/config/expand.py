@@ -313,7 +313,6 @@ def build(
         further_references=tuple(name for name in FURTHER_REFERENCES if name in config.further_references),
         materials=bodies.materials,
         parts=parts,
-        limits={"seconds": config.limits.seconds, "memory": config.limits.memory},
         grids=grids,
         stiffness_ratios=tuple(COEFFICIENT * step for step in steps),
         stiffness_table={(row.mesh_type, row.material): row.value for row in stated_rows(config)},

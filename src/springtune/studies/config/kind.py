@@ -90,7 +90,7 @@ def needs(part: str, why: str) -> Callable[[Study], str]:
 class Stage:
     """A stage before the dataset; each of its jobs does a bundle of tasks.
 
-    Its module defines one task, see `springtune.studies.runs.driver`. Most stages are made by
+    Its module defines one task, see `springtune.studies.runs.job`. Most stages are made by
     `springtune.studies.runs.stages.stage` from their tasks.
 
     Attributes
@@ -174,7 +174,7 @@ class Kind:
     tables, tables_by : callable and str, optional
         From a study to the stems of its tables on the page; module whose ``tables(tree)`` makes them.
     costs : dict of str to tuple
-        Seconds of a task by its name in records, fixed and per unit, before any is measured.
+        Expected seconds of a task by its name, fixed and per unit, for bundles of about equal work.
     """
 
     name: str

@@ -139,7 +139,7 @@ class Study:
     definition and kinematics, whatever the order of grids and of the lists in them.
 
     `mesh_files` has the `MeshSpec` of meshes from files by mesh type, beam's name and mesh size. `parts` has what study
-    kinds made of it, by their names. `limits` are ``seconds`` of the processor and ``memory`` [byte] of one task.
+    kinds made of it, by their names.
 
     `stiffness_ratios` are k / (E t) along every curve, ascending [1]; `stiffness_table` has the stiffness [N/m] of the
     definition ``paper`` by mesh type and material; the curves of a beam and load, `calibration`, calibrate
@@ -162,7 +162,6 @@ class Study:
     further_references: tuple[str, ...]
     materials: dict[str, AnyMaterial]
     parts: dict[str, Any]
-    limits: dict[str, float]
     grids: tuple[Grid, ...]
     stiffness_ratios: tuple[float, ...]
     stiffness_table: dict[tuple[str, str], float]

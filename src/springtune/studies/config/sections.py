@@ -28,10 +28,8 @@ from .fields import (
     Kinematics,
     Length,
     Lengths,
-    LimitSeconds,
     Load,
     MaterialName,
-    Memory,
     MeshType,
     Named,
     OneOrMore,
@@ -309,18 +307,6 @@ class SensitivityConfig(Section):
     points: Points = default("61", description="Number of stiffnesses, both ends included.")
 
 
-class LimitsConfig(Section):
-    """Limits of one task: a scene, a mesh, a curve or a reference. A task beyond them fails, and the others go on.
-
-    Results do not depend on limits. After a change of limits only the tasks that went beyond them are computed again.
-    """
-
-    seconds: LimitSeconds = default(
-        "3600", description="Processor time, which does not depend on other load of the machine."
-    )
-    memory: Memory = default("8 GB", description="Memory in addition to that of the idle job.")
-
-
 class MeshFileConfig(Section):
     """A mesh from a file that meshio reads. It fills its beam; its lower left corner may be anywhere."""
 
@@ -474,7 +460,6 @@ class StudyConfig(Section):
         "takes seconds. Incompressible materials have none in plane strain. 'yeoh-plane-stress' needs a material with "
         "a `uniaxial_test` and uses its fitted law.",
     )
-    limits: LimitsConfig = Field(default_factory=LimitsConfig, description="Limits of one task.")
     printed: FileName | None = Field(
         None, description="CSV file of printed values to compare with, relative to the study's folder."
     )

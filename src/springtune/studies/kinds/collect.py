@@ -11,10 +11,9 @@ from springtune.safe_io import atomic
 
 from ..config.kind import kinds, outputs
 from ..output import dataset, summary
-from ..runs import provenance, records, rerun
+from ..runs import job, provenance, rerun
 from ..runs.keys import CODE_FILE, OURS
-from ..runs.plan import COSTS_FILE, plan, remember_costs, usual_costs
-from ..runs.run_tasks import RECORDS, with_repair
+from ..runs.plan import plan
 from ..runs.stages import results
 from . import load_study
 
@@ -23,27 +22,28 @@ if TYPE_CHECKING:
     from ..config.model import Study
 
 
-def run(study: "Study", config: str | Path, folder: Path, output: Path) -> list[Path]:
+def run(study: "Study", config: str | Path, folder: Path, output: Path) -> None:
     """Build the dataset of a study from its stored results."""
-    groups = with_repair(lambda: gathered(study, folder), folder)
     try:
+        groups = gathered(study, folder)
         dataset.write(output, groups, provenance.attributes(study, config))
+    except job.DamagedError as error:
+        job.forget_job_of(error.path, folder)
+        raise SystemExit(str(error)) from None
     except OSError as error:  # the message says it all
         raise SystemExit(str(error)) from None
     told = output.with_name(summary.FILE)
     atomic.write_text(told, summary.text(groups, study.title))
-    remember_costs(folder.parent / COSTS_FILE, sorted(folder.glob(f"{RECORDS}/*_*.json")), usual_costs())
-    return [output, told]
 
 
 def main(config: str, folder: str, output: str, record: str, digest: str) -> None:
     """Build a dataset and write the record of it."""
     study = load_study(config)
     OURS.recall(Path(folder).parent / CODE_FILE)
-    if rerun.jobs(study, plan(study, Path(folder), 1))[rerun.COLLECT].digest != digest:
+    if rerun.jobs(study, plan(study, Path(folder)))[rerun.COLLECT].digest != digest:
         raise SystemExit(f"{config} was changed while the study ran; call the same command again")
-    made = run(study, config, Path(folder), Path(output))
-    records.write(record, digest, made)
+    run(study, config, Path(folder), Path(output))
+    atomic.write_json(record, {"digest": digest})
 
 
 def group_of(kind: "Kind") -> dataset.Group:

@@ -4,6 +4,7 @@ The stage `collect` writes `text` beside the dataset; Snakemake's process adds f
 without xarray.
 """
 
+import json
 import os
 import time
 from collections.abc import Iterator, Mapping
@@ -16,10 +17,9 @@ from springtune.problem.status import Status
 from springtune.safe_io.escapes import shown
 from springtune.safe_io.tables import aligned
 
-from ..runs import checked_json, rerun
-from ..runs.checked_json import ASIDE
+from ..runs import rerun
 from ..runs.plan import Plan
-from ..runs.workload import clock, computed, results_of
+from ..runs.workload import clock, results_of
 from .selection import judged, of_own_law
 from .text import place_text, sign_text, without_numbers
 
@@ -165,9 +165,6 @@ def ending(study: "Study", plan: Plan, since: float) -> str:
     """Report at the end of a successful run."""
     new, took = _computed(study, plan, since), clock(time.time() - since)
     rows = [["new", new], ["took", took], ["results", _places(plan.folder)]]
-    aside = [path for path in plan.folder.rglob(f"*{ASIDE}") if path.stat().st_ctime >= since]
-    if aside:
-        rows.insert(1, ["damaged", f"{len(aside)} set aside and made again: {', '.join(map(str, aside[:NAMED]))}"])
     return f"\n{_stored(study, plan)}\n{aligned(rows, 0)}\n"
 
 
@@ -228,12 +225,6 @@ def _time(path: Path) -> float:
     return path.stat().st_mtime if path.exists() else float("-inf")
 
 
-def _done(record: Path) -> float:
-    """Time of a job's last product, from its record; minus infinity if it made none."""
-    made = (checked_json.read(record, products=dict) or {"products": {}})["products"].values()
-    return max([_time(record), *(state[1] / 1e9 for state in made if state)])
-
-
 def _stored(study: "Study", plan: Plan) -> str:
     """Stored summary, if it is up to date."""
     path = plan.folder / FILE
@@ -245,24 +236,24 @@ def _stored(study: "Study", plan: Plan) -> str:
 
 
 def _computed(study: "Study", plan: Plan, since: float) -> str:
-    """Counts of computed, repeated and reused results by stage."""
+    """Counts of computed and stored results by stage."""
     new: dict[str, int] = {}
     asked: dict[str, int] = {}
     for name, job in plan.jobs.items():
         record, stage = plan.record(name), job.stage.name
-        number = computed(record)
-        if number is not None:
+        if record.exists():
             asked[stage] = asked.get(stage, 0) + len(set(results_of(job.content)))
-            new[stage] = new.get(stage, 0) + (number if _done(record) >= since else 0)
-    told = [f"{stage} {number} of {asked[stage]}" for stage, number in new.items() if number]
-    if told:
-        return ", ".join(told) + ("" if new == asked else "; the others were stored before")
-    ran = {name: job for name, job in rerun.jobs(study, plan).items() if _done(job.record) >= since}
-    if not ran:
-        return "nothing: all results were stored before"
-    files = [path for job in ran.values() for path in (job.record, *map(Path, job.products))]
-    count = sum(_time(path) >= since for path in files)
-    return f"{count} files made again by {', '.join(ran)}; all that is computed was stored before"
+            new[stage] = new.get(stage, 0) + (computed(record) if _time(record) >= since else 0)
+    counts = [f"{stage} {number} of {asked[stage]}" for stage, number in new.items() if number]
+    if counts:
+        return ", ".join(counts) + ("" if new == asked else "; the others were stored before")
+    ran = [job.name for job in rerun.jobs(study, plan).values() if _time(job.record) >= since]
+    return f"nothing but {', '.join(ran)}" if ran else "nothing: all results were stored before"
+
+
+def computed(record: Path) -> int:
+    """Number of tasks that a job computed, without those whose results were stored."""
+    return int(json.loads(record.read_text()).get("computed", 0))
 
 
 def _places(folder: Path) -> str:

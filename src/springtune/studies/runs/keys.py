@@ -15,10 +15,12 @@ has its name, such as ``templates/mujoco.xml.jinja`` with ``mujoco``.
 import ast
 import hashlib
 import inspect
+import json
 import os
 import sys
 import textwrap
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import asdict
 from functools import cache
 from importlib.util import find_spec
@@ -27,11 +29,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from springtune.mesh import MESH_TYPES
 from springtune.registry import Declared, full_name, plugin_packages
+from springtune.safe_io.atomic import write_json
 from springtune.springs import DEFINITIONS
 
-from . import checked_json
-from .checked_json import hash_of
-from .source import PACKAGE
+from .source import PACKAGE, hash_of
 
 if TYPE_CHECKING:
     from springtune.problem.geometry import Beam
@@ -212,9 +213,10 @@ class Code:
 
     def recall(self, path: Path) -> None:
         """Reuse cached source with the same content; parsing takes half of planning."""
-        note = checked_json.read(path, sources=dict)
-        if note is not None and note.get("reader") == READER:
-            self._known = note["sources"]
+        with suppress(OSError, ValueError, LookupError, TypeError):
+            seal, sources = json.loads(path.read_bytes())
+            if seal == hash_of(READER, sources):
+                self._known = sources
 
     def remember(self, path: Path) -> None:
         """Write the cache for `recall`."""
@@ -224,7 +226,7 @@ class Code:
             if self._has(file)
         }
         if not read_now.keys() <= self._known.keys():
-            checked_json.write(path, {"reader": READER, "sources": read_now})
+            write_json(path, [hash_of(READER, read_now), read_now])
 
     def closure(self, start: Path, without: frozenset[Path] = frozenset(), counted: str = "") -> Closure:
         """A file and all its direct and indirect imports."""

@@ -5,6 +5,7 @@ folder. So a run notes its process while it lasts. `springtune run` removes the 
 """
 
 import filecmp
+import json
 import os
 import re
 import shlex
@@ -14,10 +15,9 @@ from collections.abc import Collection, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-from springtune.safe_io.atomic import lives, this_host
+from springtune.safe_io.atomic import lives, this_host, write_json
 
-from . import checked_json
-from .run_tasks import TASKS
+from .job import TASKS
 
 RUNS = Path(".snakemake/springtune")
 """Notes of processes that run studies, in the folder that they were called in."""
@@ -34,14 +34,14 @@ def claim(folder: Path, config: Path) -> None:
     """Note the study that a folder belongs to."""
     place, path = (Path(os.path.abspath(one)) for one in (folder.parent.parent, config))
     note = {"config": str(path.relative_to(place) if path.is_relative_to(place) else path)}
-    if checked_json.read(folder / STUDY_FILE) != note:
-        checked_json.write(folder / STUDY_FILE, note)
+    if _read(folder / STUDY_FILE) != note:
+        write_json(folder / STUDY_FILE, note)
 
 
 def claimed(folder: Path) -> Path | None:
     """File of the study that a folder belongs to; None where it is not known or not there."""
-    note = checked_json.read(folder / STUDY_FILE, config=str)
-    path = folder.parent.parent / note["config"] if note else None
+    note = _read(folder / STUDY_FILE)
+    path = folder.parent.parent / str(note["config"]) if "config" in note else None
     return path if path and path.is_file() else None
 
 
@@ -71,7 +71,7 @@ def begin(folders: Iterable[Path]) -> None:
         "folders": sorted(named),
     }
     forget(Path(), named)
-    checked_json.write(_note(), note)
+    write_json(_note(), note)
 
 
 def forget(place: Path = Path(), locked: Collection[str] = ()) -> None:
@@ -115,6 +115,15 @@ def _told(folder: Path, note: dict[str, Any], where: str) -> str:
 
 def _notes(place: Path) -> Iterator[tuple[Path, dict[str, Any]]]:
     for path in sorted((place / RUNS).glob("*.json")):
-        note = checked_json.read(path, host=str, pid=int, start=float, folders=list)
-        if note is not None:
+        note = _read(path)
+        if {"host", "pid", "start", "folders", "command"} <= note.keys():
             yield path, note
+
+
+def _read(path: Path) -> dict[str, Any]:
+    """Content of a note; empty if it cannot be read."""
+    try:
+        found = json.loads(path.read_bytes())
+    except (OSError, ValueError):
+        return {}
+    return found if isinstance(found, dict) else {}

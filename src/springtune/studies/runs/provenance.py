@@ -17,8 +17,7 @@ from springtune.springs import DEFINITIONS
 from ..config.kind import OTHER_KINDS, kinds
 from ..config.model import Study
 from .keys import installed
-from .records import checksum
-from .source import COMMIT_FILE, PACKAGE, clone
+from .source import COMMIT_FILE, PACKAGE, checksum, clone
 
 SOFTWARE = (
     "cvxopt",

@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..config.kind import Stage
-from . import driver, store
-from .checked_json import hash_of
+from . import store
+from .job import JOB
 from .keys import stage_key
+from .source import hash_of
 
 if TYPE_CHECKING:
     from ..config.model import Study
@@ -55,7 +56,7 @@ class Task:
 
     def key_of(self, module: str) -> str:
         """Key of its result, computed by a module."""
-        return self.key or hash_of(self.values, stage_key(module, driver.DRIVER), self.also)
+        return self.key or hash_of(self.values, stage_key(module, JOB), self.also)
 
     def seconds(self, costs: "Costs") -> float:
         """Expected seconds."""
@@ -81,8 +82,7 @@ def stage(
         for task in chain.from_iterable(members):
             key = task.key_of(module)
             file = files.setdefault(task.file or key, {"name": task.file or key, **task.shared, "tasks": {}})
-            cost = {"cost": list(task.costs[0][:2])} if task.costs else {}
-            file["tasks"][key] = {"key": key, **cost, **task.values}
+            file["tasks"][key] = {"key": key, **task.values}
         return {
             "folder": str(results / folder),
             "files": [file | {"tasks": list(file["tasks"].values())} for file in files.values()],

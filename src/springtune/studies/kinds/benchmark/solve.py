@@ -36,7 +36,7 @@ from springtune.scene.sheet import Sheet
 from springtune.springs import DefinitionError, Springs
 from springtune.springs.lattice import COEFFICIENT, half_weight, uniform
 
-from ...runs.task_costs import go_with_parent, own_reason
+from ...runs.job import end_with_parent, own_reason
 from . import BUSY, CURVE_COUNTS, PARTS, THREAD_COUNTS
 from .approaches import APPROACHES, network
 
@@ -304,14 +304,14 @@ def in_process(function, most_seconds, *arguments):
 
 
 def _child(send, function, alarm, arguments):
-    go_with_parent()
+    end_with_parent()
     try:
         alarm.set()
         send.send(function(alarm, *arguments))
     except DefinitionError as error:
         send.send(_failed(str(error)))
     except MemoryError:
-        send.send(_failed("not enough memory: the limits of the study, or the machine's") | {"beyond": True})
+        send.send(_failed("not enough memory: the machine has no more") | {"beyond": True})
     except Exception as error:  # the other cases shall still be measured
         others = resource.getrusage(resource.RUSAGE_CHILDREN)
         why = own_reason(error)

@@ -20,8 +20,8 @@ from ...config.fields import DefinitionNames, Flag, Kinematics, Load, OneOrMore,
 from ...config.kind import Kind
 from ...config.messages import refuse, show
 from ...config.sections import Section, default, optional
-from ...runs.checked_json import hash_of
 from ...runs.keys import definition_key, mesh_type_key, stage_key
+from ...runs.source import hash_of
 from ...runs.stages import Task, stage
 from ..scenes.plan import expected_solves
 from .designs import DESIGNS, PARAMETERS, SMALLEST_SIZE, SOBOL_INDICES, blocks, roles, varied

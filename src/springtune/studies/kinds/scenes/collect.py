@@ -16,7 +16,7 @@ from springtune.springs.lattice import predicted_stiffness
 from ...config.model import Reference, keeps_fields
 from ...output.dataset import NO_NODE, Filler
 from ...output.selection import OF_FIELDS
-from ...runs import checked_json, store
+from ...runs import store
 from . import any_reference, plan, stored
 from .outputs import pressed
 from .stored import PACKED, fields_key, unpacked
@@ -140,7 +140,7 @@ def _reference(study, folder, one, fields=()):
 def _scenes(study, folder, root, block, fields, objections):
     """Write the results of the scenes into the root and the groups; each file is read once."""
     compared = set()  # places of fields that have their reference
-    calibration = checked_json.demand(plan.calibration_path(folder)) if plan.calibrated(study) else {}
+    calibration = store.everything(plan.calibration_path(folder)) if plan.calibrated(study) else {}
     arrays, known = ["face_profile"] * (block is not None), set(root.data.data_vars)
     shown = plan.shown_scenes(study) if fields else ()
     for mesh, scenes in plan.scenes_by_mesh(study).items():

@@ -13,8 +13,8 @@ from springtune.springs import DEFINITIONS
 
 from ...config.kind import Stage
 from ...config.model import keeps_fields, once_a_study, shown
-from ...runs.checked_json import hash_of
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key, stage_key
+from ...runs.source import hash_of
 from ...runs.stages import Task, products, stage
 from . import stored
 from .stored import calibrated_key
@@ -455,7 +455,7 @@ def calibrated(study):
 
 def calibration_path(folder):
     """Where the calibrated stiffnesses of a study are."""
-    return folder / "calibration.json"
+    return folder / "calibration.h5"
 
 
 def _calibrate_members(study, costs):

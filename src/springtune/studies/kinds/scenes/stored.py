@@ -1,7 +1,7 @@
 """Stored meshes, references and scenes, and how they are read.
 
-A mesh is a VTU file and a note with its key, its checksum, its quality and, of a shape, its groups. A mesh that cannot
-be made has no VTU file, and its note says why.
+A mesh is a VTU file and a stored result with the checksum of that file, its quality and, of a shape, its groups. A mesh
+that cannot be made has no VTU file, and its result says why.
 """
 
 from pathlib import Path
@@ -12,27 +12,29 @@ import numpy as np
 from springtune.mesh import read_mesh, write_mesh
 from springtune.mesh.groups import GroupedMesh
 
-from ...runs import checked_json, store
-from ...runs.checked_json import DamagedError, hash_of, set_aside
-from ...runs.driver import RefusedError
-from ...runs.records import checksum
+from ...runs import store
+from ...runs.job import RefusedError
+from ...runs.source import checksum, hash_of
+from ...runs.store import DamagedError
 
 # -- meshes ------------------------------------------------------------------------------------------------------------
 
 
+NOTES = "notes"
+"""Key of the only result of a mesh's file, which has the key of the mesh itself."""
+
+
 def files(folder: str | Path, name: str) -> tuple[Path, Path]:
     """File of a mesh, and that of its notes."""
-    return Path(folder) / f"{name}.vtu", Path(folder) / f"{name}.json"
+    return Path(folder) / f"{name}.vtu", Path(folder) / f"{name}.h5"
 
 
 def write_made(folder: str | Path, name: str, key: str, made: GroupedMesh, known: dict[str, float]) -> None:
     """Store a mesh and its groups."""
     path, notes = files(folder, name)
     path.parent.mkdir(parents=True, exist_ok=True)
-    # The notes name the mesh they belong to, so they go first and come last.
-    notes.unlink(missing_ok=True)
     write_mesh(path, made.mesh)
-    checked_json.write(notes, {"key": key, "checksum": checksum(path), **known, "groups": _plain(made)})
+    store.add(notes, {NOTES: {"key": key, "checksum": checksum(path), **known, "groups": _plain(made)}})
 
 
 def _plain(grouped: GroupedMesh) -> dict[str, Any]:
@@ -49,41 +51,31 @@ def _plain(grouped: GroupedMesh) -> dict[str, Any]:
 
 
 def refuse(folder: str | Path, name: str, key: str, why: dict[str, str]) -> None:
-    """Store that a mesh cannot be made: ``message``, and ``limits`` where it went beyond them."""
+    """Store that a mesh cannot be made, with its ``message``."""
     path, notes = files(folder, name)
     path.unlink(missing_ok=True)
-    checked_json.write(notes, {"key": key, **why})
+    store.add(notes, {NOTES: {"key": key, **why}})
 
 
-def is_stored(folder: str | Path, name: str, key: str, limits: str) -> bool:
-    """Whether a mesh, or the reason why it cannot be made, is stored; a damaged one is set aside."""
+def is_stored(folder: str | Path, name: str, key: str) -> bool:
+    """Whether a mesh, or the reason why it cannot be made, is stored."""
     path, notes = files(folder, name)
     if not notes.exists():
         return False
-    try:
-        known = read_notes(folder, name)
-        if known["key"] != key or known.get("limits", limits) != limits:
-            return False
-        if "message" not in known and path.exists():
-            _checked(path, known["checksum"])
-        return "message" in known or path.exists()
-    except DamagedError as error:
-        set_aside(error)
-        return False
+    known = read_notes(folder, name)
+    return bool(known["key"] == key and ("message" in known or path.exists()))
 
 
 def read_notes(folder: str | Path, name: str) -> dict[str, Any]:
     """Notes of a mesh: its ``key``, ``checksum``, seconds and quality."""
-    notes: dict[str, Any] = checked_json.demand(files(folder, name)[1])
-    return notes
+    return store.read(files(folder, name)[1], [NOTES])[NOTES]
 
 
 def prepared(folder: str | Path, name: str) -> GroupedMesh:
     """Mesh by its name, for tasks that need it."""
     if found := read(folder, name):
         return found
-    notes = read_notes(folder, name)
-    raise RefusedError(notes["message"], "limits" in notes)
+    raise RefusedError(read_notes(folder, name)["message"])
 
 
 def read(folder: str | Path, name: str) -> GroupedMesh | None:
@@ -110,7 +102,7 @@ def _checked(path: Path, wanted: str) -> None:
     if not path.exists():
         raise DamagedError(path, "it is missing")
     if checksum(path) != wanted:
-        raise DamagedError(path, "its checksum is not that of its content")
+        raise DamagedError(path, "it is damaged (its checksum is another one)")
 
 
 # -- references --------------------------------------------------------------------------------------------------------

@@ -13,9 +13,9 @@ from pydantic import Field
 
 from ...config.kind import Kind
 from ...config.sections import Later
-from ...runs import driver
-from ...runs.checked_json import hash_of
+from ...runs.job import JOB
 from ...runs.keys import definition_key, material_key, mesh_type_key, stage_key
+from ...runs.source import hash_of
 from ...runs.stages import Task, stage
 from ..scenes.plan import file_source, mesh_stage, on_meshes, parameters, particles_in, stage_on_meshes
 from .outputs import DRAWING, OUTPUTS, OWN_FILE, mesh_name, stems
@@ -86,7 +86,7 @@ def reference_task(part, shape, material, name, law=""):
     """Task of a reference of small strain, or of a law at finite strain."""
     task = {"shape": _source(part.shape[shape])} | _case(part, shape, material, name) | ({"law": law} if law else {})
     without = () if law else ("reference.finite_shapes", "reference.finite_strain")
-    code = stage_key("studies.kinds.shapes.reference", driver.DRIVER, without=without), _reader(part.shape[shape])
+    code = stage_key("studies.kinds.shapes.reference", JOB, without=without), _reader(part.shape[shape])
     key = hash_of(task | {"shape": parameters(task["shape"])}, code)
     return {"key": key} | task
 

@@ -17,4 +17,4 @@ def make(source):
     return read_shape(source["file"], source["unit"])
 
 
-run, gone = partial(mesh.run, make=make, counted="shape_mesh"), mesh.gone
+run, crashed = partial(mesh.run, make=make), mesh.crashed

@@ -9,7 +9,7 @@ from springtune.problem.status import Status
 from springtune.scene.single import Scene
 from springtune.springs import DefinitionError
 
-from ...runs.checked_json import hash_of
+from ...runs.source import hash_of
 from ..scenes import stored
 from .task_values import ONE_LOAD, by_key, materials_of, shape_of
 
@@ -65,10 +65,3 @@ def solve(task, family):
             "spring_forces": found.spring_forces,
         }
     return result
-
-
-def cost(task, family, result, seconds):
-    """Seconds of the network, and of deriving its springs in the scene that asked first."""
-    particles, deriving = len(family[1].mesh.points), result.pop("deriving", 0.0)
-    yield "shape_scene", particles, seconds - deriving
-    yield task["definition"], particles, deriving

@@ -25,11 +25,10 @@ import numpy as np
 from markupsafe import Markup
 
 from springtune.registry import imported
-from springtune.safe_io.atomic import write_text
+from springtune.safe_io.atomic import write_json, write_text
 from springtune.safe_io.inputs import bounded
 
 from ...config.kind import modules
-from ...runs import records
 from ..colours import ERROR_COLOURS, ERROR_RANGE
 from ..reading import REMEDY, check_links, dataset_file, guarded, most_of
 from . import View
@@ -279,9 +278,8 @@ def _rows(row: dict[str, Any], values: np.ndarray, present: np.ndarray) -> tuple
 
 def main(dataset: str, output: str, record: str, digest: str, *files: str) -> None:
     """Write the page of a dataset, and the record of it."""
-    read = records.checksum(dataset)
     write_text(output, page(dataset, files))
-    records.write(record, digest, [output], read=read)
+    write_json(record, {"digest": digest})
 
 
 if __name__ == "__main__":
