@@ -5,7 +5,6 @@ import logging
 import os
 import re
 import time
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -17,12 +16,12 @@ from snakemake_interface_logger_plugins.tests import MockOutputSettings, TestLog
 from snakemake_logger_plugin_springtune import LogHandler
 from snakemake_logger_plugin_springtune.display import Display
 from springtune.problem.status import Status
+from springtune.safe_io import atomic
 from springtune.studies.kinds import load_study
 from springtune.studies.kinds.scenes.variables import ROOT, SENSITIVITY
 from springtune.studies.output import summary
 from springtune.studies.output.dataset import Filler
-from springtune.studies.runs import checked_json, plan, records, rerun, workload
-from springtune.studies.runs.keys import CODE_FILE, Code
+from springtune.studies.runs import plan, rerun, workload
 
 from tables import STUDIES
 
@@ -141,28 +140,6 @@ def planned(tmp_path):
     return study, made, list(made.jobs)
 
 
-def test_notes_that_are_another_ones_are_as_good_as_none(planned):
-    study, made, names = planned
-    folder = made.folder
-    made.write()
-    for path in (folder / plan.BUNDLES_FILE, folder.parent / plan.COSTS_FILE, folder.parent / CODE_FILE):
-        checked_json.write(path, {"seconds": 0.25})
-    Code().recall(folder.parent / CODE_FILE)
-    plan.remember_costs(folder.parent / plan.COSTS_FILE, [], {})
-    again = plan.plan(study, folder, 2)
-    assert again.jobs == made.jobs
-    found = rerun.jobs(study, again)
-    for name in names:  # what a job is to do has its digest, too
-        found[name].record.parent.mkdir(exist_ok=True)
-        found[name].record.write_bytes(made.tasks(name).read_bytes())
-        assert rerun.fault(found[name], found).endswith("is damaged")
-    checked_json.write(found[rerun.COLLECT].record, {"seconds": 0.25})
-    assert rerun.fault(found[rerun.COLLECT], found).endswith("is damaged")
-    page = found[rerun.BROWSE]
-    records.write(page.record, page.digest, page.products, read="")
-    assert not rerun.fault(page, found)
-
-
 def test_outputs_without_files_have_no_job(planned, tmp_path):
     (tmp_path / "none.yaml").write_text(STUDY.replace("[lattice, patch]}", "lattice, sensitivity: false}"))
     study = load_study(tmp_path / "none.yaml")
@@ -172,74 +149,10 @@ def test_outputs_without_files_have_no_job(planned, tmp_path):
     assert not any("sensitivity" in name for name in found if name.startswith(rerun.PRESENT))
 
 
-def test_what_a_run_made_again_is_not_nothing(planned):
-    study, made, names = planned
-    found = rerun.jobs(study, made)
-
-    def do(name):
-        job, work = found[name], {"linear": [0, 0.0, 0.0]}  # all of its tasks were stored before
-        for product in map(Path, job.products):
-            product.parent.mkdir(exist_ok=True, parents=True)
-            product.write_text("")
-        more = {"work": work} if name in names else {"read": ""}
-        records.write(job.record, job.digest, job.products, **more)
-
-    for name in found:
-        do(name)
-    time.sleep(0.05)  # clocks of files tick slowly
-    since = time.time() - 0.02
-    assert "new      nothing: all results were stored before\n" in summary.ending(study, made, since)
-    do(rerun.COLLECT)
-    do(rerun.BROWSE)
-    line = "5 files made again by collect, browse; all that is computed was stored before\n"
-    assert f"new      {line}" in summary.ending(study, made, since)
-    assert summary.beside(study, made, since).startswith(f"new in two: {line}")
-
-
-def test_what_a_job_made_again_for_another_one_counts(planned):
-    """Such a job keeps its record's time, so that what waited for it does not run again."""
-    study, made, names = planned
-    now, name = time.time(), next(name for name in names if name.startswith("solve"))
-    made.folder.mkdir(parents=True)
-    (made.folder / "made.h5").write_text("")
-    records.write(made.record(name), "digest", [made.folder / "made.h5"], work={"linear": [1, 1.0, 0.1]})
-    os.utime(made.record(name), (now - 100, now - 100))
-    assert "new      solve 1 of 4" in summary.ending(study, made, now - 50)
-
-
-class TestWorkload:
-    def test_jobs_have_tasks_seconds_and_products(self, planned):
-        study, made, names = planned
-        folder = made.folder
-        jobs = [(number, "any", 1, [str(made.record(name))]) for number, name in enumerate(names)]
-        found = workload.estimates(study, made, [*jobs, (98, "present_x", 1, ["a.png", "a.pdf"]), (99, "all", 1, [])])
-        assert 99 not in found and found[98].part == workload.AFTER and found[98].tasks == 2
-        tasks = {load.part: load.tasks for load in found.values()}
-        assert tasks["Solving the networks"] == 4 and tasks["Meshing"] == 2
-        assert tasks["Tracing the sensitivity curves"] == 2
-        assert all(load.seconds > 0 and load.products for load in found.values())
-        # What stages cost that share bundles is shared out, start-up comes on top.
-        costs = plan.Costs(folder.parent / plan.COSTS_FILE, plan.usual_costs())
-        mesh = next(stage for stage in plan.stages() if stage.name == "mesh")
-        expected = sum(seconds for seconds, _ in mesh.members(study, costs).values()) + 3 * costs.start_up
-        stages = ("Meshing", "Tracing the sensitivity curves", "Solving the networks")
-        assert sum(load.seconds for load in found.values() if load.part in stages) == pytest.approx(expected)
-        assert re.fullmatch(r"\d+ jobs, about \d+ s on 2 idle cores if nothing is stored yet", workload.told(found, 2))
-
-    def test_the_load_that_was_assumed_is_told(self):
-        found = {1: workload.Estimate("a", 1, 30.0), 2: workload.Estimate("b", 1, 2.0)}
-        idle = "2 jobs, about 16 s on 2 idle cores if nothing is stored yet"
-        assert workload.told(found, 2, workload.slowdown(2, 0.3, 2), 0.3) == idle
-        busy = f"{idle}; the machine is busy now, load 5.2: then about 58 s"
-        assert workload.told(found, 2, workload.slowdown(2, 5.2, 2), 5.2) == busy
-
-    def test_tasks_computed_are_counted_without_their_definitions(self, tmp_path):
-        path = tmp_path / "done.json"
-        work = {"linear": [3, 1.0, 0.1], "nonlinear": [2, 1.0, 0.1], "patch": [5, 1, 1]}
-        records.write(path, "digest", [], work=work)
-        assert workload.computed(path) == 5
-        path.write_text("cut")
-        assert workload.computed(path) is None
+def mark_done(made, name, computed, moment):
+    """Mark a job done at a time."""
+    atomic.write_json(made.record(name), {"digest": made.jobs[name].digest, "computed": computed})
+    os.utime(made.record(name), (moment, moment))
 
 
 class TestEnding:
@@ -249,9 +162,7 @@ class TestEnding:
         since = time.time() - 100
         for name in names:
             count = len(workload.results_of(made.jobs[name].content))
-            records.write(made.record(name), "digest", [], work={"linear": [count, 1.0, 1.0]})
-            moment = since + (50 if name.startswith(new) else -50)
-            os.utime(made.record(name), (moment, moment))
+            mark_done(made, name, count, since + (50 if name.startswith(new) else -50))
         return summary.ending(study, made, since), made.folder, since
 
     def test_says_what_is_new_and_where_it_is(self, planned):
@@ -322,11 +233,10 @@ def record(message, level=logging.INFO, **more):
 
 def emit_run(made, error=""):
     """Records of a run of three jobs, the last of which may fail."""
-    loads = {1: workload.Estimate("Meshing", 3, 1.0), 2: workload.Estimate("Meshing", 3, 1.0)}
-    loads[3] = workload.Estimate("Solving", 4, 1.0)
+    work = {1: ("Meshing", 3), 2: ("Meshing", 3), 3: ("Solving", 4)}
     made.emit(record("Building DAG of jobs..."))
-    made.emit(record("two: 3 jobs", estimates=loads, cores=2, slowdown=1.0))
-    for number in loads:
+    made.emit(record("two: 3 jobs", work=work))
+    for number in work:
         made.emit(record("Select jobs to execute..."))
         made.emit(record("Job: message", event=LogEvent.JOB_INFO, jobid=number))
         if error and number == 3:
@@ -354,10 +264,10 @@ class TestHandler(TestLogHandlerBase):
     def test_elsewhere_than_on_terminals_a_run_is_a_line_a_stage(self, monkeypatch, stream):
         made = stream()
         emit_run(handler(monkeypatch, made, ci="true"))
-        assert re.sub(r"\d\.\d s", "SECONDS", made.getvalue()).splitlines() == [
+        assert made.getvalue().splitlines() == [
             "two: 3 jobs",
-            "Meshing: 2 jobs done, SECONDS; about 1 s left",
-            "Solving: 1 job done, SECONDS",
+            "Meshing: done; 2 of 3 jobs, 0 s, about 0 s left",
+            "Solving: done; 3 of 3 jobs, 0 s",
             "what became of it",
             "Complete log(s)",
         ]
@@ -376,7 +286,6 @@ class TestHandler(TestLogHandlerBase):
         text = re.sub(r"\r\x1b\[\?7l.*?\x1b\[\?7h", "", made.getvalue())
         assert "\nError in rule solve:\n    log: logs/solve.log (check it)\n" in text
         assert text.endswith("what became of it\nComplete log(s)\n")
-        assert ("Solving: 0 of 1 jobs done, 1 failed" in text) == (stream is io.StringIO)
 
     @pytest.mark.parametrize(
         ("setting", "value"), [("dryrun", True), ("verbose", True), ("quiet", {"all"}), ("printshellcmds", True)]
@@ -399,7 +308,7 @@ class TestHandler(TestLogHandlerBase):
         shown = handler(monkeypatch, made)
         shown.emit(record("take care", logging.WARNING))
         emit_run(shown)
-        assert made.getvalue().startswith("take care\ntwo: 3 jobs\nMeshing: 2 jobs")
+        assert made.getvalue().startswith("take care\ntwo: 3 jobs\nMeshing: done")
 
     def test_without_hooks_jobs_are_told_as_ever(self, monkeypatch):
         made = Terminal()
@@ -410,56 +319,25 @@ class TestHandler(TestLogHandlerBase):
         assert made.getvalue().split("\n") == ["Building DAG of jobs...", "", "Job 1: Meshing", "Finished", ""]
 
     def test_a_display_that_fails_takes_no_message_with_it(self, monkeypatch):
-        made = Terminal()
+        made = io.StringIO()
         shown = handler(monkeypatch, made)
-        shown.emit(record("two", estimates={1: SimpleNamespace()}, cores=2, slowdown=1.0))
-        shown.emit(record("still told"))
+        shown.emit(record("two", work={1: None}))
+        shown.emit(record("still told", event=LogEvent.JOB_FINISHED, job_id=1))
         assert "two" in made.getvalue() and "still told" in made.getvalue()
 
 
-class TestDisplay:
-    """At times that the tests set."""
-
-    def shown(self, loads, slowdown=1.0):
-        self.now = 1000.0
-        return Display(loads, 2, io.StringIO(), False, slowdown, clock=lambda: self.now)
-
-    def test_what_is_left_follows_jobs_that_are_done(self):
-        display = self.shown({1: workload.Estimate("a", 1, 100.0), 2: workload.Estimate("b", 1, 100.0)})
-        assert display.left() == pytest.approx(100.0)  # a job each core
-        display.begin(1)
-        self.now += 400
-        display.finish(1)
-        assert display.left() == pytest.approx(100 * 405 / 105)  # four times as long as expected, about
-        assert display.line() == "1 of 2 jobs, 6:40 min, about 6:26 min left"
-        assert display.stream.getvalue() == "a: 1 job done, 400.0 s; about 6:26 min left\n"
-        display.begin(2)
-        self.now += 100
-        assert display.line() == "1 of 2 jobs, 8:20 min, about 4:46 min left: b 0/1"
-        display.fail(2)
-        assert display.left() == 0
-
-    def test_a_busy_machine_is_expected_to_take_longer_until_jobs_show_that_it_does_not(self):
-        loads = {number: workload.Estimate("a", 1, 100.0) for number in range(4)}
-        display = self.shown(loads, slowdown=4.0)
-        assert display.left() == pytest.approx(4 * 200)
-        display.begin(0)
-        self.now += 100
-        display.finish(0)
-        assert display.left() == pytest.approx(150 * 120 / 105)
-
-    def test_files_that_a_job_has_made_count(self, tmp_path):
-        paths = [tmp_path / str(number) for number in range(4)]
-        paths[0].touch()
-        os.utime(paths[0], (0, 0))  # from an earlier run
-        display = self.shown({1: workload.Estimate("a", 8, 10.0, 1, paths)})
-        display.begin(1)
-        assert display.jobs[1].made() == 0
-        paths[1].touch()
-        os.utime(paths[1], (time.time() + 60,) * 2)
-        assert display.jobs[1].made() == 0.25 and display.line().endswith("left: a 2/8")
-        display.finish(1)
-        assert display.jobs[1].made() == 1
+def test_what_is_left_follows_the_rate_so_far():
+    now = [1000.0]
+    display = Display({1: ("a", 30), 2: ("b", 10), 3: ("b", 20)}, io.StringIO(), True, clock=lambda: now[0])
+    display.stop()
+    display.begin(1)
+    now[0] += 60
+    assert display.line() == "0 of 3 jobs, 1:00 min: a"
+    display.finish(1)
+    display.begin(2)
+    assert display.line() == "1 of 3 jobs, 1:00 min, about 1:00 min left: b"
+    display.fail(2)
+    assert display.line() == "1 of 3 jobs, 1 failed, 1:00 min, about 1:00 min left"
 
 
 def test_a_job_without_a_word_on_a_full_disk(planned, monkeypatch):

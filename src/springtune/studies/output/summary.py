@@ -253,7 +253,10 @@ def _computed(study: "Study", plan: Plan, since: float) -> str:
 
 def computed(record: Path) -> int:
     """Number of tasks that a job computed, without those whose results were stored."""
-    return int(json.loads(record.read_text()).get("computed", 0))
+    try:
+        return int(json.loads(record.read_bytes())["computed"])
+    except (OSError, ValueError, LookupError, TypeError):
+        return 0
 
 
 def _places(folder: Path) -> str:
