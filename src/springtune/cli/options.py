@@ -252,9 +252,7 @@ def _materials(
             raise ValueError(f"--material: missing; the study has {known} for shape '{shape.name}'; give one")
         (name,) = used
     try:
-        found = {"": study.material(name)} | {
-            one: study.material(other) for one, other in part.parts[shape.name].items()
-        }
+        found = study.materials_of(shape.name, name)
     except ValueError as error:
         raise ValueError(f"--{error}") from None
     if density is None:

@@ -212,6 +212,7 @@ def _check_file(name, shape, path, problems):
         return
     # Here, since few studies have files, and reading one takes scipy.
     from springtune.mesh.formats import read_shape
+    from springtune.mesh.groups import parts_of
     from springtune.problem.boundary import check_case
 
     try:
@@ -219,9 +220,12 @@ def _check_file(name, shape, path, problems):
     except MeshError as error:
         problems.add((*path, "file"), str(error))
         return
-    for part in sorted(set(grouped.parts) - set(shape.parts)):
+    parts = parts_of(grouped)
+    if len(parts) > 1 and not shape.parts:
+        names, first = ", ".join(f"'{one}'" for one in parts if one), next(filter(None, parts))
         problems.add(
-            (*path, "parts"), f"part '{part}' of {file} has no material; add it, such as {{{part}: <material>}}"
+            (*path, "parts"),
+            f"{file} has parts {names}; give their materials, such as {{{first}: <material>}}; the rest has the grid's",
         )
     for part in sorted(set(shape.parts) - set(grouped.parts)):
         there = nearest(part, grouped.parts) if grouped.parts else "the file has none"
