@@ -347,6 +347,49 @@ def test_each_part_of_a_file_has_its_material(load, refusal, tmp_path, monkeypat
     assert f"plate.{ending} has parts 'hard'" in refusal(text)
 
 
+def test_files_of_several_sizes_show_convergence(load, refusal, tmp_path, monkeypatch):
+    beam, files = st.Shape.rectangle("100 mm", "40 mm"), []
+    for size in (20, 10, 5):
+        write_mesh(tmp_path / f"{size}.msh", st.mesh_shape(beam, f"{size} mm"))
+        files.append({"file": f"{size}.msh", "mesh_size": f"{size} mm"})
+    text = yaml.safe_dump(PLATE | {"shapes": {"plate": PLATE["shapes"]["plate"] | {"file": files}}})
+    study = load(text)
+    tree, _ = done(study, tmp_path / "results/study")
+    data = tree["shapes"].to_dataset().squeeze(drop=True)
+    assert data.mesh_size.values.tolist() == [0.005, 0.01, 0.02] and study.axes["mesh_type"] == ("file",)
+    meshes = [st.read_shape(tmp_path / f"{size}.msh").mesh for size in (5, 10, 20)]
+    assert data.particles.values.tolist() == [len(mesh.points) for mesh in meshes]
+    assert np.all(np.diff(np.abs(data.error)) > 0) and np.abs(data.error[0]) < 0.003
+    line = st.plot_shape_errors(tree, shape="plate")[0, 0].lines[0]
+    np.testing.assert_allclose(line.get_xdata(), data.particles[::-1])
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "study.yaml").write_text(text)
+    predict = ["predict", "--shape", "study.yaml", "--material", "steel"]
+    said = CliRunner().invoke(main, predict).output
+    assert "--size: missing; 'plate' has files of 5 mm, 10 mm, 20 mm; give one" in said
+    assert "100 x 40 mm, steel" in CliRunner().invoke(main, [*predict, "--size", "20 mm"]).output
+    message = refusal(text.replace("mesh_size: 10 mm", "mesh_size: 20 mm"))
+    assert "shapes.plate.file[1]" in message and "another file has this mesh size" in message
+    write_mesh(tmp_path / "10.msh", st.mesh_shape(st.Shape.rectangle("100 mm", "80 mm"), "10 mm"))
+    assert "10.msh is 100 x 80 mm, and 5.msh 100 x 40 mm; give files of one body and unit" in refusal(text)
+
+
+@pytest.mark.filterwarnings("default::springtune.problem.geometry.AssumptionWarning")
+@pytest.mark.parametrize(("unit", "warned"), [({}, True), ({"unit": "1 m"}, False), ({"unit": "1 mm"}, False)])
+def test_extents_are_in_sight(tmp_path, monkeypatch, unit, warned):
+    """A file in mm that is read in m."""
+    write_mesh(tmp_path / "plate.msh", st.mesh_shape(st.Shape.rectangle(80, 60), 10))
+    shape = PLATE["shapes"]["plate"] | {"file": "plate.msh"} | unit
+    (tmp_path / "study.yaml").write_text(yaml.safe_dump(PLATE | {"shapes": {"plate": shape}}))
+    monkeypatch.chdir(tmp_path)
+    asked = ["--shape", "study.yaml", "--material", "steel"]
+    for command in (["scenes", "study.yaml"], ["predict", *asked], ["springs", *asked, "--out", "net.csv"]):
+        said = CliRunner().invoke(main, command)
+        assert ("80 x 60 mm," if unit.get("unit") == "1 mm" else "80 x 60 m,") in said.stdout
+        message = "'plate': 80 x 60 m, since numbers in plate.msh are read in m; give their unit, such as 'unit: 1 mm'"
+        assert (message in said.stderr) == warned
+
+
 def test_a_large_file_costs_its_own_scenes(load, plate, tmp_path):
     """What is too large to be looked at as the study is read is looked at by its stages."""
     comment = b"$Comments\n" + READ_AT_ONCE // 10 * b"nothing at all\n" + b"$EndComments\n"

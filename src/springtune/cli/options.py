@@ -1,5 +1,6 @@
 """Options that commands share: beams, shapes, meshes, materials, folders of studies, limits."""
 
+import math
 import os
 import re
 from collections.abc import Callable, Iterator, Mapping
@@ -316,11 +317,18 @@ class SheetOptions:
             raise ValueError(f"--load: shape '{shape.name}' has no load '{load}'; {nearest(load, shape.loads)}")
         materials = _materials(study, part, shape, self.material, self.density)
         if shape.file:
-            if self.size is not None:
+            files = part.files[shape.name]
+            asked = None if self.size is None else asked_quantity("--size", self.size, "length")
+            file = next((one for size, one in files.items() if asked is not None and math.isclose(size, asked)), None)
+            if len(files) < 2 and asked is not None:
                 raise ValueError(
                     f"--size: '{self.size}' is beside the mesh of {Path(shape.file).name}; leave --size out"
                 )
-            return AskedShape(part, shape, load, materials, None)
+            if len(files) > 1 and file is None and (sized or asked is not None):
+                known = ", ".join(f"{1e3 * size:.12g} mm" for size in files)
+                what = "missing" if asked is None else f"there is no file of '{self.size}'"
+                raise ValueError(f"--size: {what}; '{shape.name}' has files of {known}; give one")
+            return AskedShape(part, replace(shape, file=file or shape.file), load, materials, None)
         if self.size is None and sized:
             raise ValueError("--size: missing; give the length of an edge such as '2 mm'")
         edge = None if self.size is None else asked_quantity("--size", self.size, "length")
