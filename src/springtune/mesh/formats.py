@@ -151,12 +151,17 @@ def read_mesh(path: str | Path, unit: float = 1.0) -> Mesh:
     return assembled(path, file_content(path), unit)[0]
 
 
-def assembled(path: str | Path, content: Any, unit: float) -> tuple[Mesh, np.ndarray]:
+def read_stored(path: str | Path) -> Mesh:
+    """Read a mesh that `write_mesh` wrote and whose checksum was compared: of any size."""
+    return assembled(path, library().read(path), 1.0, np.inf)[0]
+
+
+def assembled(path: str | Path, content: Any, unit: float, most: float = MOST_IN_FILE) -> tuple[Mesh, np.ndarray]:
     """Return the mesh of meshio's data, and its particles' numbers in the file; `unit` in m."""
     cells = _read_cells(path, content)
     used = np.unique(np.concatenate([corners.ravel() for corners in cells.values()]))
     with np.errstate(over="ignore"):  # what is too far away is refused
-        points = _read_points(path, unit * coordinates(path, content), used)
+        points = _read_points(path, unit * coordinates(path, content, most), used)
     for count, corners in cells.items():
         cells[count] = _counter_clockwise(path, points, np.searchsorted(used, corners))
     return Mesh(points, cells.get(3, no_cells(3)), cells.get(4, no_cells(4))), used
@@ -219,7 +224,7 @@ def file_content(path: str | Path) -> Any:
         raise MeshError(f"{path}: {package.__name__} cannot read it: {why}") from None
 
 
-def coordinates(path: str | Path, content: Any) -> np.ndarray:
+def coordinates(path: str | Path, content: Any, most: float = MOST_IN_FILE) -> np.ndarray:
     """Coordinates of all points, shape (n_points, 2 or 3)."""
     try:
         points = np.asarray(content.points, dtype=float)
@@ -228,8 +233,8 @@ def coordinates(path: str | Path, content: Any) -> np.ndarray:
     if points.ndim != 2 or points.shape[1] not in (2, 3):
         shape = " x ".join(map(str, points.shape))
         raise MeshError(f"{path}: coordinates of points are {shape}, not 2 or 3 for each; write the mesh again")
-    if len(points) > MOST_IN_FILE:
-        raise MeshError(f"{path}: {len(points)} points, and at most {MOST_IN_FILE} are read; write a coarser mesh")
+    if len(points) > most:
+        raise MeshError(f"{path}: {len(points)} points, and at most {most} are read; write a coarser mesh")
     return points
 
 
