@@ -13,6 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from springtune.studies.kinds.scenes import stored
 from springtune.studies.runs import checked_json, driver, records, run_tasks, store
 from springtune.studies.runs import keys as code
 from springtune.studies.runs.checked_json import ASIDE, DamagedError, hash_of
@@ -99,6 +100,23 @@ class TestStore:
         assert re.fullmatch(rf"{path}: its checksum .*; set aside as {aside.name}, .*\n", capsys.readouterr().err)
         store.add(path, {"one": self.RESULT})
         assert store.stored(path) == {"one"}
+
+    def test_a_file_of_another_name_is_not_read(self, tmp_path, capsys):
+        """Such as two blocks of samples, whose results have the same keys."""
+        for name in ("a", "b"):
+            store.add(tmp_path / f"{name}.h5", {"one": self.RESULT})
+        (tmp_path / "a.h5").rename(tmp_path / "c.h5")
+        (tmp_path / "b.h5").rename(tmp_path / "a.h5")
+        (tmp_path / "c.h5").rename(tmp_path / "b.h5")
+        with pytest.raises(DamagedError, match=r"a\.h5: its name is not that of its content"):
+            store.read_one(tmp_path, "a")
+        assert store.stored(tmp_path / "b.h5") == set()
+        assert "its name is not that of its content; set aside as b.h5.damaged, and" in capsys.readouterr().err
+        stored.refuse(tmp_path, "a", "key", {"message": "too large"})
+        (tmp_path / "a.json").rename(tmp_path / "b.json")
+        with pytest.raises(DamagedError, match=r"b\.json: its name is not that of its content"):
+            stored.read(tmp_path, "b")
+        assert not stored.is_stored(tmp_path, "b", "key", "")
 
     def test_the_file_of_another_mesh_keeps_what_it_has_and_lacks_what_is_asked_for(self, tmp_path):
         path = tmp_path / "results.h5"

@@ -339,6 +339,16 @@ class TestRuns:
         assert [len(store.stored(path) - keys) for path, keys in before.items()] == [1] * len(before)
         assert (tree["samples"].status.sel(load="traction") == Status.SOLVED).all()
 
+    def test_exchanged_files_are_made_again(self, here):
+        before, campaign = run(("size: 16", "size: 64"), name="sample")
+        asked = products(content_of("sample", campaign.study, campaign.folder)[0])
+        one, other = asked[:2]
+        here = one.with_name("here")
+        for old, new in ((one, here), (other, one), (here, other)):
+            old.rename(new)
+        after, _ = run(("size: 16", "size: 64"), name="sample")
+        xr.testing.assert_identical(after["samples"].to_dataset(), before["samples"].to_dataset())
+
     def test_particles_are_those_of_the_mesh_type_whatever_was_solved_before(self, tmp_path):
         types = ("structured", "right", "structured")
         first, _, third = (

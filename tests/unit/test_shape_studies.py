@@ -12,7 +12,7 @@ from click.testing import CliRunner
 
 import springtune as st
 from springtune.cli import main
-from springtune.mesh import formats, write_mesh
+from springtune.mesh import write_mesh
 from springtune.studies.archive import verify
 from springtune.studies.config.kind import outputs
 from springtune.studies.kinds import collect
@@ -120,10 +120,7 @@ def test_tasks_have_all_of_a_shape():
     assert told == f"reference of shape '{shape.name}', load 'pull': 'b' of 'top'"
 
 
-def test_a_mesh_is_stored_with_its_groups(tmp_path, monkeypatch):
-    monkeypatch.setattr(formats, "MOST_IN_FILE", 10)  # bounds are for files of others
-    monkeypatch.setattr(formats, "LARGEST_FILE", 10)
-    monkeypatch.setattr(formats, "READ_MEMORY", 10)
+def test_a_mesh_is_stored_with_its_groups(tmp_path):
     core = st.Hole.circle((0.05, 0.02), 0.008, part="core")
     grouped = st.mesh_shape(st.Shape.rectangle(0.1, 0.04, holes=[core], points={"corner": (0, 0)}), 0.01)
     grouped = replace(grouped, unusable={"odd one": "is not on the outline"})

@@ -1,8 +1,8 @@
 """Stored results: one HDF5 file a mesh and stage, results by the hash of their inputs.
 
 Scalars and texts are one JSON text, since groups with attributes cost more than solving; arrays are datasets. Former
-results stay, so that going back to them is free. A file starts with a checksum in a user block, which is compared
-before HDF5 reads the rest.
+results stay, so that going back to them is free. A file starts with its checksum and its name in a user block, which
+are compared before HDF5 reads the rest: files whose names were exchanged are made again.
 """
 
 import hashlib
@@ -29,8 +29,8 @@ MAGIC = b"springtune results, SHA-256 of what follows after 512 bytes: "
 LIMITS = "limits"
 """Name under which the failed result of a task beyond its limits has these, in words; readers do not get it."""
 
-USER_BLOCK = 512
-"""Length of the block before HDF5's own [bytes]."""
+USER_BLOCK, CHECKSUM = 512, 64
+"""Length of the block before HDF5's own, and of the checksum in it [bytes]."""
 
 
 @contextmanager
@@ -51,13 +51,15 @@ def _check(path: str | Path) -> None:
         raise DamagedError(path, error.strerror or "cannot be read") from None
     if not content:
         raise DamagedError(path, "it is empty")
-    if content[:USER_BLOCK] != _user_block(content[USER_BLOCK:]):
-        whole = content.startswith(MAGIC)
-        raise DamagedError(path, "its checksum is not that of its content" if whole else "it is no file of results")
+    if content[:USER_BLOCK] != (wanted := _user_block(path, content[USER_BLOCK:])):
+        if not content.startswith(MAGIC):
+            raise DamagedError(path, "it is no file of results")
+        sound = content.startswith(wanted[: len(MAGIC) + CHECKSUM])
+        raise DamagedError(path, f"its {'name' if sound else 'checksum'} is not that of its content")
 
 
-def _user_block(image: bytes) -> bytes:
-    return (MAGIC + hashlib.sha256(image).hexdigest().encode()).ljust(USER_BLOCK, b"\0")
+def _user_block(path: str | Path, image: bytes) -> bytes:
+    return (MAGIC + hashlib.sha256(image).hexdigest().encode() + Path(path).name.encode()).ljust(USER_BLOCK, b"\0")
 
 
 def stored(path: str | Path, limits: str | None = None) -> set[str]:
@@ -162,4 +164,4 @@ def add(path: str | Path, results: Mapping[str, Mapping[str, Any]]) -> None:
         file[SCALARS] = json.dumps(scalars)
         file.flush()
         image = file.id.get_file_image()
-    atomic.write_bytes(path, _user_block(image) + image)
+    atomic.write_bytes(path, _user_block(path, image) + image)

@@ -32,7 +32,7 @@ def write_made(folder: str | Path, name: str, key: str, made: GroupedMesh, known
     # The notes name the mesh they belong to, so they go first and come last.
     notes.unlink(missing_ok=True)
     write_mesh(path, made.mesh)
-    checked_json.write(notes, {"key": key, "checksum": checksum(path), **known, "groups": _plain(made)})
+    checked_json.write(notes, {"name": name, "key": key, "checksum": checksum(path), **known, "groups": _plain(made)})
 
 
 def _plain(grouped: GroupedMesh) -> dict[str, Any]:
@@ -52,7 +52,7 @@ def refuse(folder: str | Path, name: str, key: str, why: dict[str, str]) -> None
     """Store that a mesh cannot be made: ``message``, and ``limits`` where it went beyond them."""
     path, notes = files(folder, name)
     path.unlink(missing_ok=True)
-    checked_json.write(notes, {"key": key, **why})
+    checked_json.write(notes, {"name": name, "key": key, **why})
 
 
 def is_stored(folder: str | Path, name: str, key: str, limits: str) -> bool:
@@ -73,8 +73,11 @@ def is_stored(folder: str | Path, name: str, key: str, limits: str) -> bool:
 
 
 def read_notes(folder: str | Path, name: str) -> dict[str, Any]:
-    """Notes of a mesh: its ``key``, ``checksum``, seconds and quality."""
-    notes: dict[str, Any] = checked_json.demand(files(folder, name)[1])
+    """Notes of a mesh: its ``name``, ``key``, ``checksum``, seconds and quality."""
+    path = files(folder, name)[1]
+    notes: dict[str, Any] = checked_json.demand(path)
+    if notes.get("name") != name:
+        raise DamagedError(path, "its name is not that of its content")
     return notes
 
 
