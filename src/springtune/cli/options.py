@@ -395,7 +395,7 @@ def sheet_options(
         click.option(
             "--mesh", "mesh_type", default=mesh_type, show_default=True, shell_complete=mesh_types, help=mesh_help
         ),
-        click.option("--size", help="Length of an edge, such as '2 mm'; not for a mesh file."),
+        click.option("--size", help="Length of an edge, such as '2 mm'; of mesh files only if a shape has several."),
         click.option("--unit", default="1 m", show_default=True, help="Unit of the coordinates in a mesh file."),
         click.option(
             "--material",
