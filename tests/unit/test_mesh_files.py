@@ -136,96 +136,73 @@ ABAQUS = {
     },
 }
 
-SPACED = [(10 * i, *place) for i, place in enumerate(POINTS, 1)]
+
+def section(name, *rows):
+    """A section of Gmsh's files, its rows given as numbers."""
+    return "".join(f"{line}\n" for line in (f"${name}", *(" ".join(map(str, row)) for row in rows), f"$End{name}"))
 
 
-def msh41(names=True, sign=-1, two=False, parametric=0, partitioned=False, loose=False):
+def named(groups, names):
+    return section("PhysicalNames", [len(groups)], *((d, tag, f'"{name}"') for d, tag, name in groups)) if names else ""
+
+
+def msh41(names=True, sign=-1, two=False, parametric=0, loose=False):
     """Version 4.1: curves 1 and 2 are the right side, surfaces 1 and 2 the parts; tags of points are spaced."""
-    curves = {1: [101], 2: [sign * 101], 3: [sign * 102]}
-    surfaces = {1: [sign * 201], 2: [202]}
+    curves, surfaces = {1: [101], 2: [sign * 101], 3: [sign * 102]}, {1: [sign * 201], 2: [202]}
     if two:
         curves = {tag: [*groups, -103] for tag, groups in curves.items()}
         surfaces = {tag: [203, *groups] for tag, groups in surfaces.items()}
-    given = {1: "right", 2: "right", 3: "left"} if names else {}
-    named = [
+    curves |= {4: []} if loose else {}
+    groups = [
         (1, 101, "right"),
         (1, 102, "left"),
         (2, 201, "hard"),
         (2, 202, "soft"),
         (1, 103, "ends"),
-        (2, 203, "hard all"),
+        (2, 203, "all"),
     ]
-    lines = ["$MeshFormat", "4.1 0 8", "$EndMeshFormat"]
-    if given:
-        lines += ["$PhysicalNames", "6", *(f'{d} {tag} "{name}"' for d, tag, name in named), "$EndPhysicalNames"]
-    entities = {1: curves | ({4: []} if loose else {}), 2: surfaces}
-    for title in ["Entities"] + ["PartitionedEntities"] * partitioned:
-        lines += [
-            f"${title}",
-            *(["2", "1", "7 1"] if title != "Entities" else []),
-            f"0 {len(entities[1])} {len(entities[2])} 0",
-        ]
-        for dimension, found in entities.items():
-            for tag, groups in found.items():
-                parent = [10 + tag, dimension, tag, 1, 1] if title != "Entities" else [tag]
-                own = [] if title != "Entities" else groups
-                lines.append(" ".join(map(str, [*parent, *[0.5] * 6, len(own), *own, 2, 1, -2])))
-        lines.append(f"$End{title}")
-    lines += ["$Nodes", "2 15 10 150", f"2 1 {parametric} 10", *(str(tag) for tag, *_ in SPACED[:10])]
-    lines += [f"{x} {y} 0" + " .1 .2" * parametric for _, x, y in SPACED[:10]]
-    lines += [
-        "2 2 0 5",
-        *(str(tag) for tag, *_ in SPACED[10:]),
-        *(f"{x} {y} 0" for _, x, y in SPACED[10:]),
-        "$EndNodes",
+    entities = [
+        (tag, *[0.5] * 6, len(own), *own, 2, 1, -2) for found in (curves, surfaces) for tag, own in found.items()
     ]
-    shift = 10 if partitioned else 0
-    parts = [
-        (1, 1, 1, RIGHT[:1]),
-        (1, 2, 1, RIGHT[1:, ::sign]),
-        (1, 3, 1, LEFT),
-        (2, 1, 3, QUADS[:2]),
-        (2, 1, 2, TRIANGLES[:4]),
-        (2, 2, 3, QUADS[2:]),
-        (2, 2, 2, TRIANGLES[4:]),
-    ] + [(1, 4, 1, np.array([[1, 2]]))] * loose
-    total = sum(len(cells) for *_, cells in parts)
-    lines += ["$Elements", f"{len(parts)} {total} 1 {total}"]
-    for dimension, tag, kind, cells in parts:
-        lines += [
-            f"{dimension} {tag + shift} {kind} {len(cells)}",
-            *(f"1 {' '.join(map(str, 10 * row))}" for row in cells),
-        ]
-    return "\n".join([*lines, "$EndElements", ""])
+    points = [
+        [(tag, x, y) for tag, (x, y) in zip(range(10, 151, 10), POINTS)][part] for part in (slice(10), slice(10, 15))
+    ]
+    nodes = [row for which, own in enumerate(points) for row in (
+        (2, which + 1, parametric * (1 - which), len(own)), *([tag] for tag, *_ in own),
+        *((x, y, 0, *[0.1, 0.2] * parametric * (1 - which)) for _, x, y in own))]  # fmt: skip
+    blocks = [(1, 1, 1, RIGHT[:1]), (1, 2, 1, RIGHT[1:, ::sign]), (1, 3, 1, LEFT), (2, 1, 3, QUADS[:2]),
+              (2, 1, 2, TRIANGLES[:4]), (2, 2, 3, QUADS[2:]), (2, 2, 2, TRIANGLES[4:])]  # fmt: skip
+    blocks += [(1, 4, 1, np.array([[1, 2]]))] * loose
+    count = sum(len(cells) for *_, cells in blocks)
+    cells = [row for *head, own in blocks for row in ([*head, len(own)], *([1, *corners] for corners in 10 * own))]
+    return (
+        section("MeshFormat", [4.1, 0, 8])
+        + named(groups, names)
+        + section("Entities", [0, len(curves), len(surfaces), 0], *entities)
+        + section("Nodes", [2, 15, 10, 150], *nodes)
+        + section("Elements", [len(blocks), count, 1, count], *cells)
+    )
 
 
-def msh22(names=True, nodes="Nodes"):
+def msh22(names=True, nodes="Nodes", partition=0):
     """Version 2.2, where an element that is in two groups stands twice."""
     groups = [
         (1, 101, "right"),
         (1, 102, "left"),
         (2, 201, "hard"),
         (2, 202, "soft"),
-        (2, 203, "whole"),
+        (2, 203, "all"),
         (1, 203, "ends"),
     ]
-    cells = [
-        (1, 101, RIGHT),
-        (1, 102, LEFT),
-        (2, 201, TRIANGLES[:4]),
-        (3, 201, QUADS[:2]),
-        (2, 202, TRIANGLES[4:]),
-        (3, 202, QUADS[2:]),
-        (3, 203, QUADS),
-        (2, 203, TRIANGLES),
-        (1, 203, RIGHT),
-        (1, 203, LEFT),
-    ]
-    listed = [f"1 {kind} 4 {tag} 1 1 2 {' '.join(map(str, row))}" for kind, tag, found in cells for row in found]
-    lines = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat"]
-    lines += ["$PhysicalNames", "6", *(f'{d} {tag} "{name}"' for d, tag, name in groups), "$EndPhysicalNames"] * names
-    lines += [f"${nodes}", "15", *(f"{n} {x} {y} 0" for n, (x, y) in enumerate(POINTS, 1)), f"$End{nodes}"]
-    return "\n".join([*lines, "$Elements", str(len(listed)), *listed, "$EndElements", ""])
+    cells = [(1, 101, RIGHT), (1, 102, LEFT), (2, 201, TRIANGLES[:4]), (3, 201, QUADS[:2]), (2, 202, TRIANGLES[4:]),
+             (3, 202, QUADS[2:]), (3, 203, QUADS), (2, 203, TRIANGLES), (1, 203, RIGHT), (1, 203, LEFT)]  # fmt: skip
+    listed = [(1, kind, 4, tag, 1, 1, partition or tag, *row) for kind, tag, found in cells for row in found]
+    return (
+        section("MeshFormat", [2.2, 0, 8])
+        + named(groups, names)
+        + section(nodes, [15], *((n, x, y, 0) for n, (x, y) in enumerate(POINTS, 1)))
+        + section("Elements", [len(listed)], *listed)
+    )
 
 
 NUMBERED = ("102", "101", "201", "202")
@@ -237,7 +214,6 @@ GMSH = {
     "4.1, two groups": msh41(two=True),
     "4.1, two groups, no names": msh41(two=True, names=False),
     "4.1, points with parameters": msh41(parametric=1),
-    "4.1, partitions": msh41(partitioned=True, two=True),
     "4.1, elements of no group": msh41(loose=True),
     "2.2, two groups": msh22(),
     "2.2, two groups, no names": msh22(names=False),
@@ -415,6 +391,11 @@ def raw_pieces(path):
     path.write_text(path.read_text().replace("</VTKFile>", '<AppendedData encoding="raw">_</AppendedData></VTKFile>'))
 
 
+def one_of_several(path):
+    ghosts = [np.array([0, 0, 0, 1], np.uint8)]
+    meshio.Mesh(POINTS, [("quad", QUADS - 1)], cell_data={"vtkGhostType": ghosts}).write(path)
+
+
 def replaced(write, old, new):
     """A writer of a file with something else in it."""
 
@@ -461,6 +442,11 @@ REFUSED = {
         msh22(nodes="ParametricNodes"),
         r"has \$ParametricNodes, which are not read; write Mesh.SaveParam",
     ),
+    "split.msh": (msh22(partition=2), "is one of several partitions; write all into one file: Mesh.PartitionSplit"),
+    "partitions.msh": (
+        msh41().replace("$Nodes", "$PartitionedEntities\n$EndPartitionedEntities\n$Nodes"),
+        r"has \$PartitionedEntities, which are not read; write the mesh before it is partitioned",
+    ),
     "order.msh": (msh41().replace("2 1 3 2\n", "2 1 16 2\n"), f"has cells 'quad8'; {LINEAR}: Mesh.ElementOrder = 1"),
     "short.msh": (msh41().replace("$EndElements", ""), "it is damaged, or has what is not supported; write it again"),
     "system.bdf": (
@@ -477,6 +463,7 @@ REFUSED = {
     ),
     "raw.vtu": (raw_pieces, "has 4 pieces in raw bytes; write it in text or base64, or as one piece"),
     "lz4.vtu": (replaced(pieces, b"ZLib", b"LZ4"), "is compressed by LZ4, which is not read; write it with ZLib"),
+    "ghosts.vtu": (one_of_several, OTHER_FILES),
     "parallel.vtu": (replaced(pieces, b'"Unstr', b'"PUnstr'), OTHER_FILES),
     "parallel.pvtu": ("<VTKFile/>", OTHER_FILES),
     "poly.vtk": (

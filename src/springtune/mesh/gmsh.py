@@ -1,7 +1,6 @@
 """Read Gmsh's MSH files, where an entity may be in several physical groups."""
 
 import re
-from collections import defaultdict
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -15,6 +14,10 @@ ELEMENT_TYPES = {15: ("vertex", 1), 1: ("line", 2), 2: ("triangle", 3), 3: ("qua
 
 OTHER_ELEMENTS = {4: "tetra", 5: "hexahedron", 8: "line3", 9: "triangle6", 10: "quad9", 16: "quad8"}
 """Names of elements that are refused."""
+
+
+REFUSED = {b"ParametricNodes": "Mesh.SaveParametric = 0", b"PartitionedEntities": "the mesh before it is partitioned"}
+"""Sections that are not read, with the remedy."""
 
 
 class _Numbers:
@@ -53,35 +56,34 @@ def read(raw: bytes, by_meshio: Callable[[], Any]) -> Content:
     version, binary, size, *rest = sections.get(b"MeshFormat", b"1 0 8").split(maxsplit=3)
     if version not in (b"2", b"2.0", b"2.1", b"2.2", b"4.1"):
         raise MeshError(f"is MSH of version {version.decode()}; write 4.1 or 2.2: Mesh.MshFileVersion = 4.1")
-    if b"ParametricNodes" in sections:
-        raise MeshError("has $ParametricNodes, which are not read; write Mesh.SaveParametric = 0")
-    order = (">" if rest[0][:1] == b"\0" else "<") if binary == b"1" else ""
-    names = {
-        (int(dimension), int(tag)): name.decode("utf-8", "replace")
-        for dimension, tag, name in re.findall(rb'(\d+)\s+(\d+)\s+"([^"\n]*)"', sections.get(b"PhysicalNames", b""))
-    }
+    for name, remedy in REFUSED.items():
+        if name in sections:
+            raise MeshError(f"has ${name.decode()}, which are not read; write {remedy}")
+    named = re.findall(rb'(\d+)\s+(\d+)\s+"([^"\n]*)"', sections.get(b"PhysicalNames", b""))
+    names = {(int(dimension), int(tag)): name.decode("utf-8", "replace") for dimension, tag, name in named}
     if version != b"4.1":
+        parted = re.findall(rb"^\d+ \d+ 4 -?\d+ -?\d+ 1 (\d+) ", sections[b"Elements"], flags=re.MULTILINE)
+        if len(set(parted)) == 1:
+            raise MeshError("is one of several partitions; write all into one file: Mesh.PartitionSplitMeshFiles = 0")
         return _once(by_meshio(), names)
-    numbers = {
-        name: _Numbers(sections[name], order, int(size))
-        for name in (b"Entities", b"PartitionedEntities", b"Nodes", b"Elements")
-        if name in sections
-    }
-    groups = _groups(numbers)
-    tags, points = (np.concatenate(arrays) for arrays in zip(*_points(numbers[b"Nodes"])))
-    content = Content(points, field_data=dict.fromkeys(names.values(), ()))
-    file, found = numbers[b"Elements"], []
-    for _ in range(file.blocks()):
-        dimension, entity, kind = file.take("i", 3).tolist()
+    order = (">" if rest[0][:1] == b"\0" else "<") if binary == b"1" else ""
+    nodes, elements = (_Numbers(sections[name], order, int(size)) for name in (b"Nodes", b"Elements"))
+    tags, points = (np.concatenate(arrays) for arrays in zip(*_points(nodes)))
+    groups = _groups(_Numbers(sections[b"Entities"], order, int(size))) if b"Entities" in sections else {}
+    found = []
+    for _ in range(elements.blocks()):
+        dimension, entity, kind = elements.take("i", 3).tolist()
         if kind not in ELEMENT_TYPES:
             raise MeshError(f"has cells '{OTHER_ELEMENTS.get(kind, kind)}'; {LINEAR}: Mesh.ElementOrder = 1")
-        count, width = file.one("u"), 1 + ELEMENT_TYPES[kind][1]
-        found.append((kind, dimension, entity, file.take("u", count * width).reshape(count, width)[:, 1:]))
-    for (kind, dimension, entity, _), corners in zip(found, places(tags, [one[-1] for one in found])):
-        own = (names.get((dimension, tag), str(tag)) for tag in sorted(groups[dimension, entity]))
-        content.add(ELEMENT_TYPES[kind][0], corners, *own)
-    if [len(tags), sum(len(block.data) for block in content.cells)] != [numbers[b"Nodes"].total, file.total]:
+        count, width = elements.one("u"), 1 + ELEMENT_TYPES[kind][1]
+        corners = elements.take("u", count * width).reshape(count, width)[:, 1:]
+        own = [names.get((dimension, tag), str(tag)) for tag in groups.get((dimension, entity), ())]
+        found.append((ELEMENT_TYPES[kind][0], corners, own))
+    if [len(tags), sum(len(corners) for _, corners, _ in found)] != [nodes.total, elements.total]:
         raise ValueError("it states other numbers of points or cells than it has")
+    content = Content(points, field_data=dict.fromkeys(names.values(), ()))
+    for (kind, _, own), corners in zip(found, places(tags, [corners for _, corners, _ in found])):
+        content.add(kind, corners, *own)
     return content
 
 
@@ -94,27 +96,16 @@ def _points(file: _Numbers) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         yield tags, file.take("f", count * width).reshape(count, width)[:, :3]
 
 
-def _groups(numbers: dict[bytes, _Numbers]) -> dict[tuple[int, int], set[int]]:
+def _groups(file: _Numbers) -> dict[tuple[int, int], list[int]]:
     """Physical groups of entities, by dimension and tag; the sign of a group is a direction."""
-    groups: dict[tuple[int, int], set[int]] = defaultdict(set)
-    for name in (b"Entities", b"PartitionedEntities"):
-        if name not in numbers:
-            continue
-        file, parted = numbers[name], name != b"Entities"
-        if parted:
-            file.one("u")
-            file.take("i", 2 * file.one("u"))
-        for dimension, count in enumerate(file.take("u", 4)):
-            for _ in range(count):
-                entity, parent = file.one("i"), (-1, 0)
-                if parted:
-                    parent = tuple(file.take("i", 2).tolist())
-                    file.take("i", file.one("u"))
-                file.take("f", 6 if dimension else 3)
-                own = {*np.abs(file.take("i", file.one("u"))).tolist()}
-                groups[dimension, entity] |= own | (groups[parent] if parent[0] == dimension else set())
-                if dimension:
-                    file.take("i", file.one("u"))
+    groups = {}
+    for dimension, count in enumerate(file.take("u", 4)):
+        for _ in range(count):
+            entity = file.one("i")
+            file.take("f", 6 if dimension else 3)
+            groups[dimension, entity] = np.abs(file.take("i", file.one("u"))).tolist()
+            if dimension:
+                file.take("i", file.one("u"))
     return groups
 
 

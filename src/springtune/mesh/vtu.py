@@ -24,7 +24,10 @@ def read(path: str | Path, raw: bytes, by_meshio: Callable[[str | Path], Any]) -
         raise MeshError(IN_OTHER_FILES)
     pieces = list(re.finditer(rb"<Piece\b([^>]*/>|.*?</Piece>)", head, flags=re.DOTALL))
     if len(pieces) < 2:
-        return by_meshio(path)
+        content = by_meshio(path)
+        if any(np.any(array) for key in COPIED for array in content.cell_data.get(key, ())):
+            raise MeshError(IN_OTHER_FILES)
+        return content
     if re.match(rb"[^>]*.raw.", tail):
         raise MeshError(f"has {len(pieces)} pieces in raw bytes; write it in text or base64, or as one piece")
     found = []
