@@ -376,10 +376,18 @@ def test_one_body_in_many_files(tmp_path, name):
 
 
 def test_sets_that_are_left_out_have_a_reason(tmp_path):
-    (tmp_path / "a.inp").write_text(ABAQUS["entities of Gmsh"])
+    text = ABAQUS["entities of Gmsh"] + "*SURFACE, NAME=Right\n4, S2\n*SURFACE, NAME=top\n5, S2\n"
+    (tmp_path / "a.inp").write_text(text)
     assert read_shape(tmp_path / "a.inp", 1e-3).unusable == {
-        f"Surface{n}": f"has cells of '{name}', which is a part; use that" for n, name in enumerate(("hard", "soft"), 1)
+        "top": "is a `*SURFACE`, which is not read; give a set of its points",
+        "Surface1": "has cells of 'hard', which is a part; use that",
+        "Surface2": "has cells of 'soft', which is a part; use that",
     }
+
+
+def test_blocks_without_name_and_number_are_the_body(tmp_path):
+    meshio.Mesh(POINTS, [("quad", QUADS - 1), ("triangle", TRIANGLES - 1)]).write(tmp_path / "a.e")
+    assert not read_shape(tmp_path / "a.e").parts
 
 
 def with_line(line, data="1, 2, 3\n"):

@@ -91,6 +91,7 @@ class _Model:
         self.sets: dict[tuple[bool, str, str], list[np.ndarray]] = defaultdict(list)
         self.shown: dict[str, str] = {}
         self.ranks: dict[str, int] = {}
+        self.surfaces: list[str] = []
 
     def add(self, one: _Section, above: bool) -> None:
         """Add a section; points of the assembly itself are for reference only."""
@@ -98,6 +99,8 @@ class _Model:
         name = one.given.get(kind, "")
         if one.keyword.endswith("SECTION"):
             self.ranks[one.given.get("ELSET", "").upper()] = 2
+        if one.keyword == "SURFACE":
+            self.surfaces.append(one.given.get("NAME", ""))
         named = one.keyword in ("NSET", "ELSET") and ("INSTANCE" in one.given or any("." in row for row in one.rows))
         if one.keyword not in ("NODE", "ELEMENT", "NSET", "ELSET") or (above and not named):
             return
@@ -173,6 +176,9 @@ class _Model:
             axis = (end - start) / np.linalg.norm(end - start)
             points = start + Rotation.from_rotvec(angle * axis).apply(points - start)
         content = Content(points)
+        for name in self.surfaces:
+            if name.upper() not in self.shown:
+                content.unusable[name] = "is a `*SURFACE`, which is not read; give a set of its points"
         for (kind, _), corners in zip(self.elements, places(tags, [rows[:, 1:] for _, rows in self.elements])):
             content.add(kind, corners)
         cells = [rows[:, 0] for _, rows in self.elements]
@@ -206,6 +212,7 @@ class _Model:
 
     def _better(self, name: str, mine: np.ndarray, other: str, its: np.ndarray, total: int) -> bool:
         """Whether another set is what the file means as a part: it has a section, or is no block of elements."""
+        if self.ranks[other] <= self.ranks[name] or len(its) == total:
+            return False
         shared = np.isin(mine, its)
-        enough = bool(shared.any() if self.ranks[other] == 2 else shared.size and shared.all())
-        return enough and self.ranks[other] > self.ranks[name] and len(its) < total
+        return bool(shared.any() and (self.ranks[other] == 2 or shared.all()))

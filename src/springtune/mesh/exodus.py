@@ -38,7 +38,8 @@ def _named(file: Any, array: str, kind: str) -> Iterator[tuple[str, str]]:
     texts = [b"".join(row).partition(b"\0")[0].decode("utf-8", "replace") for row in file.get(f"{kind}_names", ())]
     ids = file[f"{kind}_prop1"][:] if f"{kind}_prop1" in file else range(1, len(file))
     for number in sorted(int(name[len(array) :]) for name in file if re.fullmatch(rf"{array}\d+", name)):
-        yield str(number), "".join(texts[number - 1 : number]).strip() or str(ids[number - 1])
+        own = str(ids[number - 1]) if min(ids) > 0 else ""  # meshio writes numbers from 0, which mean nothing
+        yield str(number), "".join(texts[number - 1 : number]).strip() or own
 
 
 def _content(file: Any) -> Content:
@@ -53,7 +54,7 @@ def _content(file: Any) -> Content:
         pattern, kind = ELEMENT_NAMES.get(corners.shape[1], ("", ""))
         if not re.fullmatch(pattern, given):
             raise MeshError(f"has cells '{given}' of {corners.shape[1]} points; {LINEAR}")
-        content.add(kind, corners, name)
+        content.add(kind, corners, *filter(None, [name]))
         starts.append(starts[-1] + len(corners))
         # Sides 1 and 2 of a shell are its faces.
         faces.append(2 * ("SHELL" in given or (given.startswith("TRI") and len(axes) == 3)))
