@@ -5,7 +5,7 @@ from math import log, pi
 import numpy as np
 
 from springtune.problem.materials import Material
-from springtune.problem.shapes import LoadCase, Pressure, Quantity, Segment, Shape, Support, Traction
+from springtune.problem.shapes import Hole, LoadCase, Pressure, Quantity, Segment, Shape, Support, Traction
 
 CENTRE = (0.0, 0.0)
 
@@ -213,3 +213,40 @@ def curved_beam():
 
 
 ALL = (cook, holed_plate, nafems_le1, ring, curved_bar, l_shape, straight_beam, curved_beam)
+
+
+def sector(angle, inner, outer, holes=()):
+    """A sheet of .1 mm between two arcs [m] and two radii `angle` apart [rad], one held, pressed from within.
+
+    `holes` are of radius, angle and place.
+    """
+
+    def at(radius, turn):
+        return radius * np.cos(turn), radius * np.sin(turn)
+
+    outline = (
+        Segment(at(inner, 0.0), group="end"),
+        Segment(at(outer, 0.0), (0.0, 0.0)),
+        Segment(at(outer, angle), group="clamp"),
+        Segment(at(inner, angle), (0.0, 0.0), "inner"),
+    )
+    asked = tuple(Quantity(axis, "displacement", "end", axis) for axis in "xy")
+    load = LoadCase("press", (Support("clamp", x=0, y=0),), pressures=(Pressure("inner", 1e5),), quantities=asked)
+    rounds = tuple(Hole.circle(at(place, turn), radius) for radius, turn, place in holes)
+    return Shape("sector", 1e-4, outline, rounds, loads={"press": load})
+
+
+def random_sector(seed):
+    """One with up to three holes that are apart from each other and from the outline, and material 1 GPa, .3."""
+    rng = np.random.default_rng(seed)
+    angle, inner = rng.uniform(0.5, 3.0), rng.uniform(0.02, 0.08)
+    outer = inner * rng.uniform(1.3, 2.5)
+    holes = []
+    for _ in range(rng.integers(0, 4)):
+        radius, turn = (outer - inner) * rng.uniform(0.05, 0.3), rng.uniform(0, angle)
+        place = rng.uniform(inner + 1.2 * radius, outer - 1.2 * radius)
+        others = [np.hypot(place * np.cos(turn - t) - p, place * np.sin(turn - t)) - 1.2 * r for r, t, p in holes]
+        others += [place * np.sin(turn), place * np.sin(angle - turn)]
+        if min(others) > 1.2 * radius:
+            holes.append((radius, turn, place))
+    return sector(angle, inner, outer, holes)

@@ -179,7 +179,8 @@ class TestMeshOfAnotherShape:
             quantities=(st.Quantity("end", "displacement", "right", "x"),),
         )  # fmt: skip
         shape = st.Shape("knee", 1e-3, outline, nested, loads={"pull": case})
-        assert st.Scene(shape, st.mesh_shape(shape, size, refined=refined), STEEL, "pull", definition="lattice")
+        steel = {"ring": STEEL, "": STEEL}
+        assert st.Scene(shape, st.mesh_shape(shape, size, refined=refined), steel, "pull", definition="lattice")
 
 
 def test_sides_of_one_s_own_are_sides():
@@ -279,7 +280,7 @@ def test_a_stress_where_materials_meet_is_refused_at_once():
     meshed = st.mesh_shape(shape, "8 mm")
     with pytest.raises(ValueError, match="quantity 'in_core': 'core' is where different materials meet"):
         st.Scene(shape, meshed, {"": STEEL, "core": THIRD}, "pull", definition="delingette")
-    assert st.Scene(shape, meshed, STEEL, "pull", definition="delingette").solve().message == ""
+    assert st.Scene(shape, meshed, {"": STEEL, "core": STEEL}, "pull", definition="delingette").solve().message == ""
 
 
 def test_a_material_of_no_part_is_told_why_it_is_none(grouped):

@@ -72,7 +72,8 @@ def displaced(shape, points, elements, material, load, held):
     CalculiX makes solids of plane elements, which in a thick one shear where the strain across them changes.
     """
     load = np.vectorize(lambda force: float(f"{0.01 * force:.12g}"))(load)
-    return calculix.solve(points, elements, "CPS8", material, 0.01 * shape.thickness, load, held)
+    thickness = float(f"{0.01 * shape.thickness:.12g}")
+    return calculix.solve(points, elements, "CPS8", material, thickness, load, held)
 
 
 def odd_slope(places, values):
@@ -101,6 +102,27 @@ def test_cook():
     np.testing.assert_allclose(points[middle], [48, 52])
     assert theirs[middle, 1] == pytest.approx(ours.values["tip"], rel=1e-4)
     np.testing.assert_allclose(ours.at(points), theirs, rtol=0, atol=1e-4 * np.abs(theirs).max())
+
+
+@pytest.mark.parametrize("seed", [62, 160])
+def test_sectors_whose_triangles_once_folded(seed):
+    shape = others.random_sector(seed)
+    first, second, third = (segment.start for segment in shape.outline[:3])
+    inner, outer, angle = first[0], second[0], np.arctan2(third[1], third[0])
+
+    def place(s, t):
+        radius, turn = inner + s * (outer - inner), t * angle
+        return np.stack([radius * np.cos(turn), radius * np.sin(turn)], axis=1)
+
+    points, elements, square = mapped(48, 96, place, power=2.2)
+    held = np.zeros(points.shape, dtype=bool)
+    held[on(square, 1, 1.0)] = True
+    load = 1e5 * shape.thickness * pressed(points, on(square, 0, 0.0), lambda way: np.array([way[1], -way[0]]))
+    material = Material(1e9, 0.3)
+    theirs = displaced(shape, points, elements, material, load, held)
+    ours = solve_shape(shape, shape.loads["press"], material, tolerance=1e-5)
+    for axis, name in enumerate("xy"):
+        assert mean(points, on(square, 1, 0.0), theirs[:, axis]) == pytest.approx(ours.values[name], rel=1e-4)
 
 
 def test_a_plate_with_a_hole():

@@ -154,15 +154,93 @@ def test_stress_of_a_lattice_is_the_derivative_of_its_springs_energy(test, acros
 HEAD = "stretch,nominal stress [MPa]\n"
 
 
-@pytest.mark.parametrize(("head", "unit"), [("strain", 1), ("Strain [%]", 100), ("engineering strain in percent", 100)])
-def test_a_test_over_strain_is_that_over_stretch(tmp_path, head, unit):
-    test = treloar("uniaxial")
-    path = tmp_path / "strain.csv"
-    rows = [f"{unit * (stretch - 1):.12g},{stress / 1e6:.12g}" for stretch, stress in zip(test.stretch, test.stress)]
-    path.write_text("\n".join([f"{head},nominal stress [MPa]", "0,0", *rows]))
-    found = TensileTest.read(path)
-    np.testing.assert_allclose(found.stretch, test.stretch, rtol=1e-9)
-    assert fit_rubber(path).coefficients == pytest.approx(fit_rubber(test).coefficients, rel=1e-6)
+NEAR = 1 + np.array([0.004, 0.03, 0.1, 0.3, 0.6, 0.9])
+FAR, PRESSED, SMALL = NEAR**2, 2 - NEAR[1:-1], 1 + np.array([0.001, 0.004, 0.02, 0.06, 0.08])
+STRAINS = {
+    "stretch": lambda q: q,
+    "nominal": lambda q: q - 1,
+    "log": np.log,
+    "green": lambda q: (q**2 - 1) / 2,
+    "almansi": lambda q: (1 - q**-2) / 2,
+}
+OTHERS = (
+    "true log Logarithmic Hencky natural Green Green-Lagrange Almansi Euler_Almansi shear compressive transverse "
+    "volumetric plastic Cauchy Kirchhoff Piola Piola-Kirchhoff second_Piola-Kirchhoff PK2 second_PK reduced Mooney Biot"
+).split()
+
+
+def misread(folder, pairs, stretches, strains, stresses, separator=",", decimal="."):
+    """Pairs of heads, of points of a law whose c1 is 0.2 MPa, that are neither right nor, with an !, refused."""
+    rows = [separator.join(f"{x:.12g}" for x in pair).replace(".", decimal) for pair in zip(strains, stresses)]
+    found, path = [], folder / "test.csv"
+    for pair in pairs:
+        heads = [head.removeprefix("!") for head in pair]
+        path.write_text("\n".join([separator.join(heads), *rows]), encoding="utf-8-sig")
+        try:
+            (c1,) = fit_rubber(path, terms=1).coefficients
+            right = heads == list(pair) and c1 == pytest.approx(2e5, rel=1e-6)
+        except TestDataError as error:
+            words, there = str(error), any(head.strip('"') in str(error) for head in heads)
+            right = heads != list(pair) and "test.csv" in words and ("column" in words and there) and ";" in words
+            c1 = words
+        if not right:
+            found.append((pair, c1))
+    return found
+
+
+@pytest.mark.parametrize(
+    ("measure", "scale", "stretches", "heads"),
+    [
+        ("stretch", 1, FAR, ["stretch", "Stretch [-]", "stretch ratio", "stretch_ratio", "stretch (mm/mm)",
+                             "stretch λ [1]", '"stretch"']),
+        ("nominal", 1, FAR, ["strain [-]", "strain [mm/mm]", "Engineering strain (m/m)", "nominal_strain [1]",
+                             "strain ε / -", "eng. strain [in/in]", "strain mm/mm", "strain [fraction]"]),
+        ("nominal", 1, NEAR, ["strain", "tensile strain", "engineering_strain", '"strain"', "strain []"]),
+        ("nominal", 1, SMALL, ["strain"]),
+        ("nominal", 100, FAR, ["strain [%]", "Strain (%)", "strain / %", "strain_pct", "strain [pct]", "strain%",
+                               "engineering strain in percent", '"strain, %"', "strain [per cent]"]),
+        ("nominal", 1e3, FAR, ["strain [mm/m]", "strain [‰]", "strain (per mille)", "strain_permille"]),
+        ("nominal", 1e6, FAR, ["strain [µm/m]", "strain (microstrain)", "strain [um/m]"]),
+        ("stretch", 1, PRESSED, ["stretch", "!compression"]),
+        ("nominal", 1, PRESSED, ["strain", "strain [-]"]),
+        ("nominal", 100, PRESSED, ["strain [%]"]),
+        ("nominal", 1, FAR, [*(f"!{word} strain [-]" for word in OTHERS), *(f"!strain ({word})" for word in OTHERS),
+                             *(f"!strain {word} [-]" for word in OTHERS), "!strain_true", '!"strain, log"',
+                             "!strain [mm]", "!strain / mm", "!strain [s]", "!strain rate [1/s]", "!strain [1/s]",
+                             "!strain [mm/s]", "!strain % [mm/mm]", "!log(strain)", "!elongation", "!strain"]),
+        ("log", 1, NEAR, ["!Hencky strain", "!ln(stretch)", "!e_true"]),
+        ("green", 1, NEAR, ["!Green strain", "!strain E_xx [-]"]),
+        ("almansi", 1, NEAR, ["!Almansi strain"]),
+        ("stretch", 1, FAR, ["!stretch [mm]", "!stretch [%]", "!stretch [mm/m]", "!strain", "!log stretch",
+                             "!stretch rate", "!inverse stretch", "!strain stretch", "!strain [-] stretch"]),
+        ("stretch", 100, FAR, ["!stretch", "!stretch [-]"]),
+        ("nominal", 100, FAR, ["!strain", "!strain [-]", "!strain [mm/mm]"]),
+        ("nominal", 100, SMALL, ["!strain"]),
+        ("nominal", 100, 1 + (NEAR - 1) / 100, ["!strain"]),
+        ("nominal", -1, PRESSED, ["!compressive strain", "!strain (compression)"]),
+    ],
+)  # fmt: skip
+def test_strains_are_nominal_or_refused(tmp_path, measure, scale, stretches, heads):
+    strains, stresses = scale * STRAINS[measure](stretches), Rubber((0.2,)).stress("uniaxial", stretches)
+    assert misread(tmp_path, [(head, "stress [MPa]") for head in heads], stretches, strains, stresses) == []
+    swapped = [("stress [MPa]", head) for head in heads]
+    assert misread(tmp_path, swapped, stretches, stresses, strains) == []
+
+
+@pytest.mark.parametrize(("separator", "decimal"), [(",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ",")])
+def test_stresses_are_nominal_or_refused(tmp_path, separator, decimal):
+    heads = [
+        *(f"nominal stress{unit}" for unit in (
+            " [MPa]", "[MPa]", " (MPa)", " / MPa", "_MPa", " in MPa", " MPa", " [N/mm²]", " / N/mm^2")),
+        "stress [MPa]", "Engineering Stress (MPa)", "tensile_stress_MPa", '"nominal stress, MPa"',
+        "first Piola-Kirchhoff stress [MPa]", "1st Piola–Kirchhoff stress P (MPa)", "PK1 stress [MPa]",
+        "nominal stress σ [MPa]",
+        "!stress", "!stress []", "!stress [-]", "!stress [mm]", "!stress [N]", "!stress [MPa/s]", "!force [N]",
+        *(f"!{word} stress [MPa]" for word in OTHERS), *(f"!stress ({word}) [MPa]" for word in OTHERS),
+        *(f"!stress {word} [MPa]" for word in OTHERS), "!stress [MPa] (true)", "!pressure [MPa]", "!stress [mPa]",
+    ]  # fmt: skip
+    stresses = Rubber((0.2,)).stress("uniaxial", FAR)
+    assert misread(tmp_path, [("stretch", head) for head in heads], FAR, FAR, stresses, separator, decimal) == []
 
 
 @pytest.mark.parametrize(
@@ -170,18 +248,27 @@ def test_a_test_over_strain_is_that_over_stretch(tmp_path, head, unit):
     [
         (None, "cannot be read"),
         ("", "is empty"),
-        ("1.1,0.2\n1.2,0.3\n", "no head of a test"),
-        ("stretch,stress\n1.1,0.2\n", "no head of a test"),
+        ("1.1,0.2\n1.2,0.3\n", "line 1, column '1.1': is neither"),
         ("load,nominal stress [MPa]\n1.1,0.2\n", "with a head such as 'stretch,nominal stress [MPa]' or 'strain [%]"),
-        ("stretch,strain,stress [MPa]\n1.1,0.1,0.2\n", "is no head of a test; give two columns, stretch or"),
-        ("true strain,stress [MPa]\n0.1,0.2\n", "no head of a test; give two columns, stretch or engineering strain"),
-        ("stretch [%],stress [MPa]\n110,0.2\n", "no head of a test"),
-        ("strain,stress [MPa]\n1.1,0.2\n1.2,0.3\n1.5,0.4\n", "smallest strain is 1.1, as of a stretch or of percent"),
-        ("strain,stress [MPa]\n0,0\n10,0.2\n20,0.3\n50,0.4\n", "name the column 'stretch' or 'strain [%]'"),
+        ("stretch,strain,stress [MPa]\n1.1,0.1,0.2\n", "has 3 columns; give two columns, stretch or"),
+        ("stretch,strain\n1.1,0.1\n", "column 'stretch': the other column is 'strain'; give two"),
+        ("strain,stress [MPa]\n1.1,0.2\n1.2,0.3\n1.5,0.4\n", "name it 'strain [-]', 'strain [%]' or 'stretch'"),
         ("stretch,stress [MPa]\n0.1,0.2\n0.2,0.3\n0.5,0.4\n", "or name the column 'strain'"),
-        ("stretch,stress [mm]\n1.1,0.2\n", "nominal stress"),
+        ("stretch,stress [mm]\n1.1,0.2\n", "column 'stress [mm]': '[mm]' is no unit of stress; give two"),
         (HEAD + "1.1,0.2\n1.2,zwei\n", "line 3, column 'nominal stress [MPa]': 'zwei' is no finite number"),
-        (HEAD + "1.1,0.2\n1.2,0.3,7\n", "line 3"),
+        (HEAD + "1.1,0.2\n1.2,0.3,7\n", "line 3: has 3 values, and the head 2"),
+        (HEAD + "1,1,0,2\n1,2,0,3\n", "line 2: has 4 values, and the head 2; decimal commas need ';' between columns"),
+        (HEAD.replace(",", ";") + "1,125;1,234\n", "'1,125' is 1.125 or 1125; write a decimal point"),
+        (HEAD.replace(",", ";") + "1.125;1,2\n1,3;2.5", "'1.125' and '1,2' have different decimal signs"),
+        (HEAD + "1.1,0.2\n1.2,1e400\n", "line 3, column 'nominal stress [MPa]': '1e400' is no finite number"),
+        (HEAD + "1.1,inf\n", "'inf' is no finite number"),
+        (
+            HEAD + "1.1,0.2\n1.2,0.4\n1.3,1e300\n",
+            "column 'nominal stress [MPa]': a largest stress of 1e+306 Pa is out of range",
+        ),
+        (HEAD + "1.1,0.2\n1.2,0.4\n1e200,0.6\n", "column 'stretch': a stretch of 1e+200 is out of range"),
+        (HEAD + "1.1,0.2\n1e-200,-0.4\n1.3,0.6\n", "column 'stretch': a stretch of 1e-200 is out of range"),
+        (HEAD + f"1.1,{'1' * 131_073}\n", "line 2: a cell has over 131072 characters; correct it"),
         (HEAD + "1.1,0.2\n1.2,0.3\n", "fewer than three stretches"),
         (HEAD + "0.1,0.2\n0.2,0.3\n0.3,0.4\n", "over stretch (1 plus strain)"),
         (HEAD + "1.1,nan\n1.2,0.3\n1.3,.4\n", "'nan' is no finite number"),

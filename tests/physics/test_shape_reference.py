@@ -6,18 +6,23 @@ import numpy as np
 import pytest
 
 import shapes_of_others as others
-from springtune.mesh.cells import Mesh
+from springtune.mesh.cells import Mesh, MeshError, signed_areas
 from springtune.mesh.groups import GroupedMesh
 from springtune.mesh.outlines import mesh_shape
 from springtune.problem.geometry import Beam
 from springtune.problem.loads import BOTTOM, LEFT, LOAD_KINDS, RIGHT, TOP
 from springtune.problem.materials import Material
 from springtune.problem.shapes import Hole, LoadCase, Pressure, Quantity, Segment, Shape, Support, Traction
+from springtune.reference import shapes
 from springtune.reference.shapes import Level, solve_each, solve_shape
 from springtune.reference.small_strain import ReferenceNotConvergedError, solve_small_strain
-from springtune.reference.triangles import side_fit, side_functions
+from springtune.reference.triangles import side_fit, side_functions, tabulated
 
 STEEL = Material(210e9, 0.3, density=7850.0, name="steel")
+PLASTIC = Material(1e9, 0.3, name="plastic")
+FOLDED = [6, 62, 118, 197]
+"""Random sectors whose triangles once folded."""
+
 EVERY = [(make, name) for make in others.ALL for name in make()[0].loads]
 IDS = [f"{make.__name__}-{name}" for make, name in EVERY]
 LONG_SOLVED = (others.l_shape, others.cook)
@@ -205,6 +210,63 @@ def test_kirsch():
     displacements, stresses = others.kirsch(points, 0.01, 1e6, material)
     np.testing.assert_allclose(found.at(points), displacements, rtol=0, atol=2e-5 * np.abs(displacements).max())
     np.testing.assert_allclose(found.stress_at(points), stresses, rtol=0, atol=1e-3 * 1e6)
+
+
+@pytest.mark.parametrize("factor", [1e-6, 1.0, 1e6])
+def test_a_sector_whose_triangles_once_folded(factor):
+    """Right values are of quadratic triangles on three meshes, to 2e-6, and of CalculiX."""
+    shape = others.sector(np.radians(120), 0.055, 0.1, [(0.005, np.radians(55), 0.0775)])
+    found = solve_shape(shape, shape.loads["press"], Material(factor * 1e9, 0.3))
+    for axis, right in (("x", 3.78166e-4), ("y", 4.26196e-4)):
+        assert found.values[axis] * factor == pytest.approx(right, rel=found.error_estimates[axis] + 3e-6)
+
+
+def folded(shape):
+    """Triangles of the first levels that have a determinant of the wrong sign somewhere."""
+    problem, count = shapes.Problem(shape, shape.loads["press"], {"": PLASTIC}, None), 0
+    for degree in (2, 3, 4):
+        mesh = problem.graded(degree)
+        space, (*_, gradients) = shapes._Space(mesh, degree), tabulated(degree, 2 * degree + 4)
+        corners = mesh.points[space.corners]
+        at = np.einsum("eic,qia->eqca", space.places[space.numbers], gradients)
+        turned = signed_areas(mesh.points, mesh.triangles) * np.linalg.det(corners[:, 1:] - corners[:, :1]) < 0
+        count += (np.linalg.det(at) * np.where(turned, -1, 1)[:, None] <= 0).any(axis=1).sum()
+    return count
+
+
+def estimates_hold(shape, monkeypatch):
+    """Estimates bound the distance to a solution on shorter sides and of a tenth of the tolerance."""
+    found = solve_shape(shape, shape.loads["press"], PLASTIC)
+    with monkeypatch.context() as patch:
+        patch.setattr(shapes, "LARGEST_TURN", np.pi / 20)
+        fine = solve_shape(shape, shape.loads["press"], PLASTIC, tolerance=1e-5)
+    for name in set(found.values) - set(found.negligible):
+        both = found.error_estimates[name] + fine.error_estimates[name]
+        assert found.values[name] == pytest.approx(fine.values[name], rel=both)
+
+
+@pytest.mark.parametrize("seed", FOLDED)
+def test_no_triangle_of_a_sector_folds(seed, monkeypatch):
+    shape = others.random_sector(seed)
+    assert folded(shape) == 0
+    estimates_hold(shape, monkeypatch)
+
+
+@pytest.mark.slow
+def test_no_triangle_of_many_sectors_folds(monkeypatch):
+    for seed in range(260):
+        shape = others.random_sector(seed)
+        assert folded(shape) == 0, seed
+        if seed % 3 == 0:
+            estimates_hold(shape, monkeypatch)
+
+
+def test_a_folded_triangle_is_refused(monkeypatch):
+    """Where none looks before, each level does."""
+    monkeypatch.setattr(shapes, "_unfolded", lambda mesh: True)
+    shape = others.random_sector(FOLDED[0])
+    with pytest.raises(MeshError, match=r"a triangle folds along an arc near \(.*\) mm; give the arc as shorter arcs"):
+        solve_shape(shape, shape.loads["press"], PLASTIC)
 
 
 def test_a_re_entrant_corner():

@@ -123,7 +123,7 @@ class TestError:
 
     def test_it_says_what_it_found(self):
         said = run(*self.ASKED).stdout
-        assert said.startswith("cook, load shear; third, t = 1 mm; an error of at most 3 % in tip and edge")
+        assert said.startswith("cook, load shear; 48 x 60 mm, third, t = 1 mm; an error of at most 3 % in tip and edge")
         assert "recommended: free " in said and "with springs alone: free " in said
 
     @pytest.mark.parametrize(

@@ -73,6 +73,13 @@ def test_a_file_that_is_none_is_one_sentence(path, content):
         store.read(path, RESULTS)
 
 
+def test_a_file_of_another_name_is_not_read(path):
+    """Such as two blocks of samples, whose results have the same keys."""
+    other = path.rename(path.with_name("other.h5"))
+    with pytest.raises(DamagedError, match="other.h5: it is damaged .it is results.h5.; delete it"):
+        store.read(other, RESULTS)
+
+
 def test_adding_keeps_what_was_there_and_leaves_nothing_half_written(path):
     before = path.read_bytes()
     with pytest.raises(TypeError):

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from scipy import stats
+from springtune.studies.runs.task_costs import TaskCosts
 
 from springtune.mesh import MESH_TYPES
 from springtune.problem.loads import LOADS
@@ -28,7 +29,6 @@ from springtune.studies.kinds.samples.kind import MOST_SOLVED
 from springtune.studies.runs import store
 from springtune.studies.runs.rerun import orphans
 from springtune.studies.runs.stages import products
-from springtune.studies.runs.task_costs import TaskCosts
 
 import tables
 from campaigns import Campaign, load_text
@@ -338,6 +338,16 @@ class TestRuns:
         tree, _ = run(("size: 16", "size: 32"), further, name="sample")
         assert [len(store.stored(path) - keys) for path, keys in before.items()] == [1] * len(before)
         assert (tree["samples"].status.sel(load="traction") == Status.SOLVED).all()
+
+    def test_exchanged_files_are_made_again(self, here):
+        before, campaign = run(("size: 16", "size: 64"), name="sample")
+        asked = products(content_of("sample", campaign.study, campaign.folder)[0])
+        one, other = asked[:2]
+        here = one.with_name("here")
+        for old, new in ((one, here), (other, one), (here, other)):
+            old.rename(new)
+        after, _ = run(("size: 16", "size: 64"), name="sample")
+        xr.testing.assert_identical(after["samples"].to_dataset(), before["samples"].to_dataset())
 
     def test_particles_are_those_of_the_mesh_type_whatever_was_solved_before(self, tmp_path):
         types = ("structured", "right", "structured")

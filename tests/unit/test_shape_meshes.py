@@ -235,7 +235,7 @@ def squares():
     return GroupedMesh(mixed, {"left": left}, {"between": np.array([0.033, 0.021])}, {"below": parts})
 
 
-def msh4(grouped, others=99):
+def msh4(grouped):
     """Text of Gmsh's format 4.1, which meshio reads and does not write with groups; cells of no part in a group."""
     kinds = (grouped.points, grouped.sides, grouped.parts)
     names = {name: (kind, tag) for kind, found in enumerate(kinds) for tag, name in enumerate(found, start=1)}
@@ -243,8 +243,7 @@ def msh4(grouped, others=99):
     lines += [f'{kind} {tag} "{name}"' for name, (kind, tag) in names.items()]
     lines += ["$EndPhysicalNames", "$Entities", f"{len(kinds[0])} {len(kinds[1])} {len(kinds[2]) + 1} 0"]
     for kind, tag in [*names.values(), (2, 99)]:
-        physical = f"1 {others if tag == 99 else tag}" if tag != 99 or others else "0"
-        lines.append(f"{tag} {'0 ' * (6 if kind else 3)}{physical}{' 0' if kind else ''}")
+        lines.append(f"{tag} {'0 ' * (6 if kind else 3)}1 {tag}{' 0' if kind else ''}")
     count, points = len(grouped.mesh.points), grouped.mesh.points
     lines += ["$EndEntities", "$Nodes", f"1 {count} 1 {count}", f"2 99 0 {count}"]
     lines += [*map(str, range(1, count + 1)), *(f"{x!r} {y!r} 0" for x, y in points.tolist()), "$EndNodes", "$Elements"]
@@ -413,14 +412,6 @@ def test_notes_of_a_format_are_no_groups(tmp_path):
     by_meshio(grouped, point_data={"left": points}).write(tmp_path / "plate.med")
     found = read_shape(tmp_path / "plate.med")
     assert list(found.sides) == ["left"] and not found.unusable
-
-
-@pytest.mark.usefixtures("mesh_library")
-def test_elements_without_group_in_gmsh_4_are_told(tmp_path):
-    """What Gmsh writes where elements are in no group and all are saved, meshio does not read."""
-    (tmp_path / "all.msh").write_text(msh4(mesh_shape(plate(), 5e-3), others=0))
-    with pytest.raises(MeshError, match=r"some of its elements are in no physical group .*, or write format 2\.2"):
-        read_shape(tmp_path / "all.msh")
 
 
 @pytest.mark.usefixtures("mesh_library")

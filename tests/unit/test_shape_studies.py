@@ -1,5 +1,6 @@
 """Studies of shapes: what they may hold, what they expand to, and what their dataset says."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -7,8 +8,11 @@ import numpy as np
 import pytest
 import xarray as xr
 import yaml
+from click.testing import CliRunner
+from springtune.studies.runs.task_costs import TaskCosts
 
 import springtune as st
+from springtune.cli import main
 from springtune.mesh import write_mesh
 from springtune.studies.archive import verify
 from springtune.studies.config.kind import outputs
@@ -24,7 +28,6 @@ from springtune.studies.output.dataset import STATUS
 from springtune.studies.output.export import export
 from springtune.studies.runs import driver, store
 from springtune.studies.runs.plan import plan, table_files
-from springtune.studies.runs.task_costs import TaskCosts
 from springtune.studies.runs.workload import results_of
 
 from campaigns import do_stages, load_text
@@ -281,6 +284,110 @@ def test_groups_of_a_file_are_looked_at_as_the_study_is_read(refusal, plate):
     assert "unknown part 'core'; the file has none" in refusal(
         text.replace("    file:", "    parts: {core: steel}\n    file:")
     )
+
+
+TWO = yaml.safe_load(yaml.safe_dump(PLATE))
+TWO["materials"] = {
+    "steel": {"young_modulus": "210 GPa", "poisson_ratio": 0},
+    "polymer": {"young_modulus": "2 GPa", "poisson_ratio": 0},
+    "other": {"young_modulus": "3 Pa", "poisson_ratio": 0},
+}
+TWO["shapes"]["plate"]["loads"]["pull"]["supports"] = {"left": {"x": 0}, "lower": {"y": 0}}
+STRETCH = 1e3 / (0.04 * 1e-3) * (0.05 / 210e9 + 0.05 / 2e9)
+"""Of the plate, its left half of steel, its right half of a polymer [m]."""
+
+
+@pytest.mark.parametrize(
+    ("ending", "whole", "parts", "material"),
+    [
+        ("msh", True, {"hard": "steel", "soft": "polymer"}, "other"),
+        ("vtu", True, {"hard": "steel"}, "polymer"),
+        ("vtu", True, {"soft": "polymer"}, "steel"),
+        ("msh", False, {"hard": "steel"}, "polymer"),
+    ],
+)
+def test_each_part_of_a_file_has_its_material(load, refusal, tmp_path, monkeypatch, ending, whole, parts, material):
+    mesh = st.make_mesh(st.Beam("100 mm", "40 mm"), "right", "10 mm")
+    left = mesh.points[mesh.triangles, 0].mean(axis=1) < 0.05
+    sides = {"left": mesh.outline_edges(0, 0), "right": mesh.outline_edges(0, 0.1), "lower": mesh.outline_edges(1, 0)}
+    both = {"hard": {3: left}} | ({"soft": {3: ~left}} if whole else {})
+    write_mesh(tmp_path / f"plate.{ending}", st.GroupedMesh(mesh, sides, {}, both))
+    shape = TWO["shapes"]["plate"] | {"file": f"plate.{ending}", "parts": parts}
+    grid = TWO["shape_grids"]["plate"] | {"material": material, "kinematics": "linear"}
+    text = yaml.safe_dump(TWO | {"shapes": {"plate": shape}, "shape_grids": {"plate": grid}})
+    study = load(text)
+    tree, _ = done(study, tmp_path / "results/study")
+    assert not any(tree["shapes"].message.values.ravel()), tree["shapes"].message.values
+    np.testing.assert_allclose(tree["shapes"].value.values.ravel(), STRETCH, rtol=1e-9)
+    np.testing.assert_allclose(tree["shapes"].reference_value.values.ravel(), STRETCH, rtol=1e-9)
+
+    body, mesh = study.shape("plate"), st.read_shape(tmp_path / f"plate.{ending}")
+    with pytest.raises(ValueError, match="material: one is given, and the body has the parts"):
+        st.Scene(body, mesh, study.material(material), "pull")
+    materials = study.materials_of("plate", material)
+    scene = st.Scene(body, mesh, materials, "pull", definition="delingette", kinematics="linear")
+    assert scene.solve().values["stretch"] == pytest.approx(STRETCH, rel=1e-9)
+    rows = [f"{share},{share * STRETCH}" for share in (0.0, 0.5, 1.0, 2.0)]
+    (tmp_path / "curve.csv").write_text("\n".join(["force [kN],displacement [m]", *rows]))
+    known = {"nu": 0, "E hard": 210e9} if whole else {"nu": 0, "E main": 2e9}
+    found = st.identify(st.MeasuredTest(body, "pull", tmp_path / "curve.csv"), "regions", known=known)
+    assert list(found.materials) == (["hard", "soft"] if whole else ["", "hard"])
+    assert found.values["E soft" if whole else "E hard"] == pytest.approx(2e9 if whole else 210e9, rel=1e-4)
+
+    monkeypatch.chdir(tmp_path)
+    call = ["--shape", "study.yaml:plate", "--material", material]
+    (tmp_path / "study.yaml").write_text(text)
+    said = CliRunner().invoke(main, ["predict", *call, "--json"])
+    best = json.loads(said.output)["choices"][0]
+    assert best["errors"]["stretch"] == pytest.approx(0, abs=1e-9), said.output
+    said = CliRunner().invoke(main, ["springs", *call, "--definition", "delingette", "--out", "net.json"])
+    assert said.exit_code == 0 and "stretch +" in said.output, said.output
+    del shape["parts"]
+    text = yaml.safe_dump(TWO | {"shapes": {"plate": shape}, "shape_grids": {"plate": grid}})
+    assert f"plate.{ending} has parts 'hard'" in refusal(text)
+
+
+def test_files_of_several_sizes_show_convergence(load, refusal, tmp_path, monkeypatch):
+    beam, files = st.Shape.rectangle("100 mm", "40 mm"), []
+    for size in (20, 10, 5):
+        write_mesh(tmp_path / f"{size}.msh", st.mesh_shape(beam, f"{size} mm"))
+        files.append({"file": f"{size}.msh", "mesh_size": f"{size} mm"})
+    text = yaml.safe_dump(PLATE | {"shapes": {"plate": PLATE["shapes"]["plate"] | {"file": files}}})
+    study = load(text)
+    tree, _ = done(study, tmp_path / "results/study")
+    data = tree["shapes"].to_dataset().squeeze(drop=True)
+    assert data.mesh_size.values.tolist() == [0.005, 0.01, 0.02] and study.axes["mesh_type"] == ("file",)
+    meshes = [st.read_shape(tmp_path / f"{size}.msh").mesh for size in (5, 10, 20)]
+    assert data.particles.values.tolist() == [len(mesh.points) for mesh in meshes]
+    assert np.all(np.diff(np.abs(data.error)) > 0) and np.abs(data.error[0]) < 0.003
+    line = st.plot_shape_errors(tree, shape="plate")[0, 0].lines[0]
+    np.testing.assert_allclose(line.get_xdata(), data.particles[::-1])
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "study.yaml").write_text(text)
+    predict = ["predict", "--shape", "study.yaml", "--material", "steel"]
+    said = CliRunner().invoke(main, predict).output
+    assert "--size: missing; 'plate' has files of 5 mm, 10 mm, 20 mm; give one" in said
+    assert "100 x 40 mm, steel" in CliRunner().invoke(main, [*predict, "--size", "20 mm"]).output
+    message = refusal(text.replace("mesh_size: 10 mm", "mesh_size: 20 mm"))
+    assert "shapes.plate.file[1]" in message and "another file has this mesh size" in message
+    write_mesh(tmp_path / "10.msh", st.mesh_shape(st.Shape.rectangle("100 mm", "80 mm"), "10 mm"))
+    assert "10.msh is 100 x 80 mm, and 5.msh 100 x 40 mm; give files of one body and unit" in refusal(text)
+
+
+@pytest.mark.filterwarnings("default::springtune.problem.geometry.AssumptionWarning")
+@pytest.mark.parametrize(("unit", "warned"), [({}, True), ({"unit": "1 m"}, False), ({"unit": "1 mm"}, False)])
+def test_extents_are_in_sight(tmp_path, monkeypatch, unit, warned):
+    """A file in mm that is read in m."""
+    write_mesh(tmp_path / "plate.msh", st.mesh_shape(st.Shape.rectangle(80, 60), 10))
+    shape = PLATE["shapes"]["plate"] | {"file": "plate.msh"} | unit
+    (tmp_path / "study.yaml").write_text(yaml.safe_dump(PLATE | {"shapes": {"plate": shape}}))
+    monkeypatch.chdir(tmp_path)
+    asked = ["--shape", "study.yaml", "--material", "steel"]
+    for command in (["scenes", "study.yaml"], ["predict", *asked], ["springs", *asked, "--out", "net.csv"]):
+        said = CliRunner().invoke(main, command)
+        assert ("80 x 60 mm," if unit.get("unit") == "1 mm" else "80 x 60 m,") in said.stdout
+        message = "'plate': 80 x 60 m, since numbers in plate.msh are read in m; give their unit, such as 'unit: 1 mm'"
+        assert (message in said.stderr) == warned
 
 
 def test_a_large_file_costs_its_own_scenes(load, plate, tmp_path):

@@ -2,7 +2,7 @@
 
 from snakemake.logging import logger
 
-from springtune.safe_io.atomic import remove_unfinished
+from springtune.safe_io.atomic import remove_unfinished, to_present
 from springtune.studies.runs.workload import READ
 
 
@@ -17,6 +17,7 @@ def begin():
         locks.begin([one.folder for _, one in READ])
         for study, one in READ:
             remove_unfinished(one.folder)
+            to_present(one.folder)  # Snakemake refuses products that are older than what they are made of
             remove_unfinished(one.folder.parent, below=False)  # of what studies share
             locks.claim(one.folder, study.path)
             one.write()

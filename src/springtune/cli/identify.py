@@ -141,7 +141,7 @@ def _study(found: "Identified", row: Mapping[str, Any], target: Path) -> str:
     else:
         materials = [{"uniaxial_test": os.path.relpath(row["file"], target.parent), "terms": len(texts)}]
     study["materials"] = dict(zip(names.values(), materials))
-    grid |= {"material": names.pop("")} | ({"load": row["load"]} if row["load"] else {})
+    grid |= {"material": names.pop("", next(iter(names.values())))} | ({"load": row["load"]} if row["load"] else {})
     if row["shape"]:
         source, _, shape = shape_of_study(str(row["shape"]))
         study["shapes"] = {"plate": safe_load(source.text)["shapes"][shape.name] | {"parts": names}}

@@ -1,5 +1,6 @@
 """Options that commands share: beams, shapes, meshes, materials, folders of studies, limits."""
 
+import math
 import os
 import re
 from collections.abc import Callable, Iterator, Mapping
@@ -252,9 +253,7 @@ def _materials(
             raise ValueError(f"--material: missing; the study has {known} for shape '{shape.name}'; give one")
         (name,) = used
     try:
-        found = {"": study.material(name)} | {
-            one: study.material(other) for one, other in part.parts[shape.name].items()
-        }
+        found = study.materials_of(shape.name, name)
     except ValueError as error:
         raise ValueError(f"--{error}") from None
     if density is None:
@@ -318,11 +317,18 @@ class SheetOptions:
             raise ValueError(f"--load: shape '{shape.name}' has no load '{load}'; {nearest(load, shape.loads)}")
         materials = _materials(study, part, shape, self.material, self.density)
         if shape.file:
-            if self.size is not None:
+            files = part.files[shape.name]
+            asked = None if self.size is None else asked_quantity("--size", self.size, "length")
+            file = next((one for size, one in files.items() if asked is not None and math.isclose(size, asked)), None)
+            if len(files) < 2 and asked is not None:
                 raise ValueError(
                     f"--size: '{self.size}' is beside the mesh of {Path(shape.file).name}; leave --size out"
                 )
-            return AskedShape(part, shape, load, materials, None)
+            if len(files) > 1 and file is None and (sized or asked is not None):
+                known = ", ".join(f"{1e3 * size:.12g} mm" for size in files)
+                what = "missing" if asked is None else f"there is no file of '{self.size}'"
+                raise ValueError(f"--size: {what}; '{shape.name}' has files of {known}; give one")
+            return AskedShape(part, replace(shape, file=file or shape.file), load, materials, None)
         if self.size is None and sized:
             raise ValueError("--size: missing; give the length of an edge such as '2 mm'")
         edge = None if self.size is None else asked_quantity("--size", self.size, "length")
@@ -389,7 +395,7 @@ def sheet_options(
         click.option(
             "--mesh", "mesh_type", default=mesh_type, show_default=True, shell_complete=mesh_types, help=mesh_help
         ),
-        click.option("--size", help="Length of an edge, such as '2 mm'; not for a mesh file."),
+        click.option("--size", help="Length of an edge, such as '2 mm'; of mesh files only if a shape has several."),
         click.option("--unit", default="1 m", show_default=True, help="Unit of the coordinates in a mesh file."),
         click.option(
             "--material",

@@ -440,12 +440,14 @@ def written_text(net: "SpringNet", written: "Iterable[Path]", mujoco: int | None
     """Written files and their expected errors, as text."""
     from ..handover.formats import for_mujoco
     from ..handover.mujoco import for_versions
+    from ..problem.geometry import size_text
 
     header = net.header
     first, *others = written
     besides = [f"{terms.kind} terms of {len(terms.cells)} cells" for terms in net.energies]
     springs = f"{len(net.springs)} springs" if net.stiffness.any() else f"{len(net.springs)} edges with no own springs"
-    counts = [f"{len(net.points)} particles", springs, *besides]
+    extent = [] if header["beam"] else [size_text(*(max(one) - min(one) for one in zip(*net.points.tolist())))]
+    counts = [*extent, f"{len(net.points)} particles", springs, *besides]
     lines = [f"{first}: {', '.join(counts)} of definition {header['definition']}"]
     lines += [f"beside it: {', '.join(str(other) for other in others)}"] if others else []
     lines += [for_versions(net.energies, mujoco)] if for_mujoco(first) else []

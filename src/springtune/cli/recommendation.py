@@ -10,6 +10,7 @@ import numpy as np
 
 from .. import __version__
 from ..problem.compare import error_text, sign_sentence, sign_word
+from ..problem.geometry import size_text
 from ..problem.shapes import QUANTITY_UNITS
 from ..safe_io.tables import TabledList, aligned
 
@@ -80,8 +81,10 @@ def shape_subject(statement: "ShapeStatement", known: "ShapeReferences") -> Subj
     moved = {name: value for name, (value, of) in compared.items() if of == "displacement"}
     of = "errors" if len(moved) == len(compared) else "errors of displacements"
     sign = [f"Of {of}, {sign_sentence(moved, 'of')}."] if moved else []
+    sides = np.ptp(statement.mesh.points, axis=0).tolist()
     about = {
         "shape": statement.shape.name,
+        "extent": sides,
         "load": statement.load,
         "thickness": statement.thickness,
         "materials": {part: asdict(one) for part, one in statement.by_part.items()},
@@ -96,7 +99,7 @@ def shape_subject(statement: "ShapeStatement", known: "ShapeReferences") -> Subj
     ]
     return Subject(
         f"{statement.shape.name}, load {statement.load}",
-        f"{statement.named_materials}, t = {1e3 * statement.thickness:g} mm",
+        f"{size_text(*sides)}, {statement.named_materials}, t = {1e3 * statement.thickness:g} mm",
         about,
         known,
         compared,

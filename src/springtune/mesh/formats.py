@@ -1,13 +1,15 @@
-"""Mesh files: VTU, as meshio and ParaView open them, and whatever else meshio reads.
+"""Mesh files: Gmsh's, Abaqus', Nastran's and Exodus by readers of their own, all others by meshio.
 
 Groups are Gmsh's physical groups, sets of Abaqus and others, and marks in VTU.
 """
 
 import io
+import re
 import warnings
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import redirect_stderr, redirect_stdout
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +18,9 @@ import numpy as np
 from ..registry import NAME, NAME_RULE
 from ..safe_io.atomic import check_folder, replacing
 from ..safe_io.inputs import BeyondBound, DataElsewhere, bounded, check_alone, fault
+from . import abaqus, exodus, gmsh, nastran, vtu
 from .cells import Mesh, MeshError, no_cells, signed_areas
+from .content import IN_OTHER_FILES, LINEAR
 from .groups import GroupedMesh, part_names
 from .sheets import DIGITS, box_fault, in_words, on_sides, outline_of, sheet_fault
 
@@ -32,7 +36,20 @@ PART_NUMBERS = "part"
 PHYSICAL = "gmsh:physical"
 """Cell data in which meshio gives numbers of Gmsh's physical groups; 0 is none."""
 
-COMPANIONS = (".xdmf", ".xmf", ".node", ".ele")
+TAGS = (PHYSICAL, "medit:ref", "avsucd:material", "su2:tag", "ugrid:ref", "netgen:index")
+"""Cell data in which meshio gives numbers of groups; 0 is none."""
+
+FAMILIES = ("cell_tags", "point_tags")
+"""Data in which meshio gives families of MED, and attributes with the groups of each."""
+
+READERS: dict[str, Callable[[bytes], Any]] = {
+    ".inp": abaqus.read,
+    **dict.fromkeys((".bdf", ".nas", ".fem"), nastran.read),
+    **dict.fromkeys((".e", ".exo", ".ex2"), exodus.read),
+}
+"""Readers of a file's bytes, by ending."""
+
+COMPANIONS = (".xdmf", ".xmf", ".node", ".ele", ".pvtu", ".pvd", ".vtm")
 """Endings of files that hold only a part of a mesh."""
 
 LARGEST_FILE = 60_000_000
@@ -151,12 +168,17 @@ def read_mesh(path: str | Path, unit: float = 1.0) -> Mesh:
     return assembled(path, file_content(path), unit)[0]
 
 
-def assembled(path: str | Path, content: Any, unit: float) -> tuple[Mesh, np.ndarray]:
+def read_stored(path: str | Path) -> Mesh:
+    """Read a mesh that `write_mesh` wrote and whose checksum was compared: of any size."""
+    return assembled(path, library().read(path), 1.0, np.inf)[0]
+
+
+def assembled(path: str | Path, content: Any, unit: float, most: float = MOST_IN_FILE) -> tuple[Mesh, np.ndarray]:
     """Return the mesh of meshio's data, and its particles' numbers in the file; `unit` in m."""
     cells = _read_cells(path, content)
     used = np.unique(np.concatenate([corners.ravel() for corners in cells.values()]))
     with np.errstate(over="ignore"):  # what is too far away is refused
-        points = _read_points(path, unit * coordinates(path, content), used)
+        points = _read_points(path, unit * coordinates(path, content, most), used)
     for count, corners in cells.items():
         cells[count] = _counter_clockwise(path, points, np.searchsorted(used, corners))
     return Mesh(points, cells.get(3, no_cells(3)), cells.get(4, no_cells(4))), used
@@ -182,10 +204,9 @@ def file_content(path: str | Path) -> Any:
             f"{path}: {size / 1e6:.0f} MB, and at most {most} are read; write a coarser mesh, or binary VTU"
         )
     content = Path(path).read_bytes()
-    if Path(path).suffix.lower() in COMPANIONS or b"*include" in content.lower():
-        raise MeshError(
-            f"{path}: parts of it are in other files, whose changes would not be seen; write it as one .vtu or .msh"
-        )
+    ending = Path(path).suffix.lower()
+    if ending in COMPANIONS:
+        raise MeshError(f"{path}: {IN_OTHER_FILES}")
     if HDF5 in content:
         try:
             check_alone(path)
@@ -199,7 +220,9 @@ def file_content(path: str | Path) -> Any:
         with redirect_stdout(told), redirect_stderr(told), warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
             with bounded(memory, READ_SECONDS + READ_SECONDS_SHARE * size):
-                return package.read(path)
+                return _read(path, content, ending)
+    except MeshError as error:
+        raise MeshError(f"{path}: {error}") from None
     except (Exception, SystemExit) as error:
         if _is_the_machines(error, memory):
             raise
@@ -208,18 +231,26 @@ def file_content(path: str | Path) -> Any:
             raise MeshError(f"{path}: is damaged: {stated}; write it again") from None
         said = " ".join(told.getvalue().split() if isinstance(error, SystemExit) else str(error).split())
         said = said.partition("Error: Couldn't read")[0].removeprefix("ReadError:").strip()
-        if not isinstance(error, SystemExit):
-            said = said or type(error).__name__
+        said = said if re.search(r"\w{2} \S", said) else ""  # a key alone says nothing
         shown = f" ({said[:LONGEST_SAID]}{'...' * (len(said) > LONGEST_SAID)})" if said else ""
-        why = f"it is damaged, or not what its name says{shown}; write it again"
-        if PHYSICAL in said:
-            why = f"some of its elements are in no physical group{shown}; give all of them one, or write format 2.2"
-        if Path(path).suffix.lower() not in package.extension_to_filetypes:
+        why = f"it is damaged, or has what is not supported{shown}; write it again, in text, or as .vtu"
+        if ending not in {**package.extension_to_filetypes, **READERS}:
             why = f"unknown format '{Path(path).suffix}'; convert it to .vtu or .msh"
-        raise MeshError(f"{path}: {package.__name__} cannot read it: {why}") from None
+        raise MeshError(f"{path}: cannot be read: {why}") from None
 
 
-def coordinates(path: str | Path, content: Any) -> np.ndarray:
+def _read(path: str | Path, content: bytes, ending: str) -> Any:
+    """Content of a file, by the reader of its format."""
+    if ending in READERS:
+        return READERS[ending](content)
+    if ending == ".vtu":
+        return vtu.read(path, content, library().read)
+    if ending == ".msh" and content.lstrip()[:1] == b"$":  # others are of Ansys
+        return gmsh.read(content, partial(library().read, path))
+    return library().read(path)
+
+
+def coordinates(path: str | Path, content: Any, most: float = MOST_IN_FILE) -> np.ndarray:
     """Coordinates of all points, shape (n_points, 2 or 3)."""
     try:
         points = np.asarray(content.points, dtype=float)
@@ -228,8 +259,8 @@ def coordinates(path: str | Path, content: Any) -> np.ndarray:
     if points.ndim != 2 or points.shape[1] not in (2, 3):
         shape = " x ".join(map(str, points.shape))
         raise MeshError(f"{path}: coordinates of points are {shape}, not 2 or 3 for each; write the mesh again")
-    if len(points) > MOST_IN_FILE:
-        raise MeshError(f"{path}: {len(points)} points, and at most {MOST_IN_FILE} are read; write a coarser mesh")
+    if len(points) > most:
+        raise MeshError(f"{path}: {len(points)} points, and at most {most} are read; write a coarser mesh")
     return points
 
 
@@ -246,7 +277,7 @@ def _read_cells(path: str | Path, content: Any) -> dict[int, np.ndarray]:
                 raise MeshError(f"{path}: cells '{block.type}' by {shape}; write the mesh again")
             cells.setdefault(CELLS[block.type], []).append(data)
         elif block.type not in CELL_DIMENSIONS:
-            raise MeshError(f"{path}: has cells '{block.type}'; write linear triangles and quadrilaterals only")
+            raise MeshError(f"{path}: has cells '{block.type}'; {LINEAR}")
     if not cells:
         raise MeshError(f"{path}: no cell block 'triangle' or 'quad'; write the mesh with triangles or quadrilaterals")
     return {count: np.concatenate(blocks).astype(np.int64) for count, blocks in cells.items()}
@@ -349,7 +380,7 @@ class _Groups:
         self.sides: dict[str, np.ndarray] = {}
         self.points: dict[str, np.ndarray] = {}
         self.parts: dict[str, dict[int, np.ndarray]] = {}
-        self.unusable: dict[str, str] = {}
+        self.unusable: dict[str, str] = dict(getattr(content, "unusable", {}))
         self.outline, _ = outline_of(mesh)
         count = len(mesh.points)
         self.codes = self.outline @ [count, 1]
@@ -411,6 +442,7 @@ class _Groups:
     def _sets(self) -> Iterator[tuple[str, int, np.ndarray]]:
         """Name, number of the block of cells, and numbers of cells in it, of all sets of cells."""
         content, blocks = self.content, self.content.cells
+        yield from getattr(content, "members", ())
         named = [name for name in content.cell_sets if not name.startswith("gmsh:")]
         for name in named:
             parts = content.cell_sets[name]
@@ -426,10 +458,13 @@ class _Groups:
                 values = np.asarray(values)
                 if values.ndim != 1 or values.dtype.kind not in "iub" or blocks[number].type not in CELL_DIMENSIONS:
                     continue
-                if key in (PHYSICAL, PART_NUMBERS):
+                if key in FAMILIES:
+                    for name, chosen in self._families(key, values):
+                        yield name, number, chosen
+                elif key in (*TAGS, PART_NUMBERS):
                     for tag in np.unique(values[values != 0]).tolist():
                         group = tag, CELL_DIMENSIONS[blocks[number].type]
-                        name = tags.get(group, str(tag)) if key == PHYSICAL else str(tag)
+                        name = str(tag) if key == PART_NUMBERS else tags.get(group, str(tag))
                         if name not in named or key == PART_NUMBERS:
                             yield name, number, np.flatnonzero(values == tag)
                 elif ":" not in key and self._marks(key, arrays):
@@ -441,8 +476,15 @@ class _Groups:
             yield name, np.asarray(nodes, dtype=np.int64).ravel()
         for name, values in self.content.point_data.items():
             values = np.asarray(values)
-            if values.ndim == 1 and values.dtype.kind in "iub" and ":" not in name and self._marks(name, [values]):
+            if name in FAMILIES:
+                yield from self._families(name, values)
+            elif values.ndim == 1 and values.dtype.kind in "iub" and ":" not in name and self._marks(name, [values]):
                 yield name, np.flatnonzero(values)
+
+    def _families(self, key: str, values: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
+        """Groups of the families of MED, and what is in them."""
+        for tag, names in getattr(self.content, key, {}).items():
+            yield from ((name, np.flatnonzero(values == tag)) for name in names)
 
     def _marks(self, name: str, arrays: list[Any]) -> bool:
         """Whether data are zeros and ones."""

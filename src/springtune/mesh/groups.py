@@ -132,6 +132,11 @@ class GroupedMesh:
         return ""
 
 
+def parts_of(grouped: GroupedMesh) -> list[str]:
+    """Return the parts that have cells, sorted: ``""`` for the main part."""
+    return sorted({str(name) for labels in part_names(grouped).values() for name in labels})
+
+
 def part_names(grouped: GroupedMesh) -> dict[int, np.ndarray]:
     """Return the part of each cell, by number of corners: ``""`` for the main part."""
     found = {}

@@ -106,6 +106,19 @@ def beam_label(name: str, length: float, height: float) -> str:
     return f"{name} mm" if name == f"{long:g}x{high:g}" else f"{name} ({long:.4g} x {high:.4g} mm)"
 
 
+def size_text(length: float, height: float) -> str:
+    """Return extents [m] in words.
+
+    Examples
+    --------
+    >>> size_text(0.08, 0.06), size_text(80, 60), size_text(8e-5, 1e-6)
+    ('80 x 60 mm', '80 x 60 m', '80 x 1 um')
+    """
+    longer = max(length, height)
+    unit, name = (1.0, "m") if longer >= 10 else (1e-3, "mm") if longer >= 1e-4 else (1e-6, "um")
+    return f"{length / unit:.4g} x {height / unit:.4g} {name}"
+
+
 @dataclass(frozen=True)
 class Strip:
     """Strip to be laid; lengths in m."""

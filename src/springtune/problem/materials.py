@@ -703,6 +703,35 @@ def material_of(fields: Mapping[str, Any]) -> AnyMaterial:
     return Material(**fields) if "young_modulus" in fields else AnisotropicMaterial(**fields)
 
 
+def of_parts(given: Mapping[str, AnyMaterial], parts: Sequence[str]) -> dict[str, AnyMaterial]:
+    """Return the material of each part of a body; parts without one of their own have that of the main part, ``""``.
+
+    Examples
+    --------
+    >>> steel, foam = Material("210 GPa", 0.3, name="steel"), Material("1 MPa", 0.3, name="foam")
+    >>> {part: one.name for part, one in of_parts({"": steel, "core": foam}, ["core", "rim"]).items()}
+    {'core': 'foam', 'rim': 'steel'}
+    >>> of_parts({"": steel}, ["core", "rim"])
+    Traceback (most recent call last):
+    ...
+    ValueError: material: one is given, and the body has the parts 'core', 'rim'; name those of other materials, such \
+as {'': ..., 'core': ...}, or `study.materials_of(shape, material)`
+    """
+    names = ", ".join(map(repr, parts))
+    if len(parts) > 1 and not any(given):
+        example = next(filter(None, parts))
+        raise ValueError(
+            f"material: one is given, and the body has the parts {names}; name those of other materials, such as "
+            f"{{'': ..., {example!r}: ...}}, or `study.materials_of(shape, material)`"
+        )
+    found = {part: given.get(part, given.get("")) for part in parts}
+    for part, one in found.items():
+        if one is None:
+            said = f"part {part!r}" if part else "the main part, ''"
+            raise ValueError(f"material: {said} has none; given: {', '.join(map(repr, given)) or 'none'}")
+    return {part: one for part, one in found.items() if one is not None}
+
+
 def only_isotropic(material: AnyMaterial, remedy: str) -> Material:
     """Return an isotropic material; raise ValueError with the remedy for any other.
 

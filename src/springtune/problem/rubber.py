@@ -3,12 +3,13 @@
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 
 from ..safe_io.inputs import csv_rows, numbers
 from .materials import MOST_TERMS, RUBBER_TESTS, Rubber
-from .quantities import Number, positive, put
+from .quantities import LONGEST_WORD, Number, positive, put
 
 LEAST_SHARE = 0.05
 """Share of the largest stress below which errors are relative to it: small stresses are read off coarsely."""
@@ -22,6 +23,24 @@ FIT_DIGITS = 10
 TWO_COLUMNS = (
     "give two columns, stretch or engineering strain and nominal stress, with a head such as 'stretch,nominal stress "
     "[MPa]' or 'strain [%],nominal stress [MPa]'"
+)
+
+LITTLE = 0.1
+"""Strains up to which rubber is nearly linear."""
+
+STRETCHES, STRESSES = (0.01, 50.0), (0.1, 1e12)
+"""Stretches [1] and largest stresses [Pa] that are read."""
+
+_WORDS = r"engineering|eng\.?|nominal|tensile|uniaxial|equibiaxial|biaxial|(?:first|1st) piola.kirchhoff|pk1|[λεσ]"
+_NAME = re.compile(
+    rf"((?:[\s_]*(?:{_WORDS}|stretch[\s_]ratio|stretch|strain|stress(?:[\s_]p)?)(?![^\W_]))*)(.*)", re.I | re.DOTALL
+)
+_UNIT = re.compile(r"[\s_]*(?:in |[/,])?\s*[\[(]?\s*(.*?)\s*[\])]?\s*", re.DOTALL)
+_STRAIN_UNITS = (
+    dict.fromkeys(("", "-", "1", "fraction", "dimensionless"), 1.0)
+    | dict.fromkeys(("%", "pct", "percent", "per cent"), 1e-2)
+    | dict.fromkeys(("‰", "permille", "per mille"), 1e-3)
+    | dict.fromkeys(("microstrain", "µε", "με"), 1e-6)
 )
 
 
@@ -67,30 +86,70 @@ class TensileTest:
     @classmethod
     def read(cls, path: str | Path) -> "TensileTest":
         """Read a CSV file of stretch or engineering strain and of nominal stress, with units in the columns' heads."""
-        rows = csv_rows(path, TestDataError, TWO_COLUMNS)
-        head = rows[0][1]
-        where, column = f"'{path}', line {rows[0][0]}: ", head[0].lower()
-        kinds = [kind for kind in ("stretch", "strain") if kind in column]
-        percent = "%" in column or "percent" in column
-        unit = head[1].partition("[")[2].partition("]")[0] if len(head) == 2 else ""
-        other = percent and kinds != ["strain"] or re.search("true|log|cauchy", ",".join(head).lower())
-        if len(kinds) != 1 or not unit or other:
-            raise TestDataError(f"{where}{','.join(head)!r} is no head of a test; {TWO_COLUMNS}")
-        try:
-            scale = positive(f"1 {unit}", "stress", "nominal stress")
-        except ValueError as error:
-            raise TestDataError(f"{where}{error}") from None
-        stretches, stresses = np.array(numbers(path, rows[1:], head, TestDataError)).reshape(-1, 2).T
-        if kinds == ["strain"]:
-            strains = stretches / (100 if percent else 1)
-            least = np.abs(strains[strains != 0]).min(initial=np.inf)
-            if 1 <= least < np.inf:
+        (line, heads), *rows = csv_rows(path, TestDataError, TWO_COLUMNS)
+        where = [f"'{path}', line {line}, column {head!r}: " for head in heads]
+        if len(heads) != 2:
+            raise TestDataError(f"{where[0]}the file has {len(heads)} columns; {TWO_COLUMNS}")
+        read = list(map(_column, heads, where))
+        order = [0, 1] if read[1][0] == "stress" else [1, 0]
+        (kind, scale, unit), (other, factor, _) = (read[n] for n in order)
+        if kind == "stress" or other != "stress":
+            raise TestDataError(f"{where[0]}the other column is {heads[1]!r}; {TWO_COLUMNS}")
+        x, y = np.array(numbers(path, rows, heads, TestDataError)).reshape(-1, 2).T[order]
+        if kind == "strain" and not unit and _may_be_percent(x, y):
+            raise TestDataError(
+                f"{where[order[0]]}its values may be fractions, percent or stretches; name it 'strain [-]', "
+                "'strain [%]' or 'stretch'"
+            )
+        with np.errstate(over="ignore"):
+            stretch, stress = scale * x + (kind == "strain"), factor * y
+        for n, what, sizes, (least, most) in (
+            (0, "a stretch of {:g}", stretch, STRETCHES),
+            (1, "a largest stress of {:g} Pa", np.abs(stress).max(keepdims=True, initial=0), STRESSES),
+        ):
+            wrong = sizes[(sizes < least) | (sizes > most)]
+            if len(wrong) and rows:
                 raise TestDataError(
-                    f"'{path}': its smallest strain is {least:g}, as of a stretch or of percent; name the column "
-                    "'stretch' or 'strain [%]', or give stretches (1 plus strain)"
+                    f"{where[order[n]]}{what.format(wrong[0])} is out of range; correct the head, its unit or the value"
                 )
-            stretches = 1 + strains
-        return cls(stretches, scale * stresses, str(path))
+        return cls(stretch, stress, str(path))
+
+
+def _column(head: str, where: str) -> tuple[str, float, str]:
+    """Return whether a head is of stretch, strain or stress, the size of its unit, and the unit as written."""
+    name, rest = cast("re.Match[str]", _NAME.fullmatch(head)).groups()
+    kinds = re.findall("stretch|strain|stress", name.lower())
+    if len(kinds) != 1 or len(head) > LONGEST_WORD:
+        raise TestDataError(f"{where}is neither stretch, engineering strain nor nominal stress; {TWO_COLUMNS}")
+    unit = cast("re.Match[str]", _UNIT.fullmatch(rest)).group(1)
+    try:
+        if kinds == ["stress"]:
+            return "stress", positive(f"1 {unit}", "stress", "unit"), unit
+        size = _STRAIN_UNITS.get(unit) or _ratio(unit)
+        if kinds == ["stretch"] and size != 1:
+            raise ValueError
+    except ValueError:
+        raise TestDataError(f"{where}{rest.strip()!r} is no unit of {kinds[0]}; {TWO_COLUMNS}") from None
+    return kinds[0], size, unit
+
+
+def _ratio(unit: str) -> float:
+    """Size of a unit of strain such as mm/m."""
+    above, _, below = unit.partition("/")
+    return positive(f"1 {above}", "length", "unit") / positive(f"1 {below}", "length", "unit")
+
+
+def _may_be_percent(strain: np.ndarray, stress: np.ndarray) -> bool:
+    """Whether strains without a unit reach 1, or the stress over them bends less than half as much as rubber's."""
+    order = np.argsort(np.abs(strain), kind="stable")
+    ends = order[strain[order] != 0][[0, -1]] if strain.any() else order[:0]
+    x, y = strain[ends], stress[ends]
+    if not x.any() or not LITTLE <= abs(x[1]) < 1:
+        return bool((np.abs(x) >= 1).any())
+    law = stress_columns(1 + x, 1)[:, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        bends = [np.divide(*(one / x)[::-1]) - 1 for one in (y, law)]
+    return bool(abs(bends[0]) < abs(bends[1]) / 2)
 
 
 def told(test: TensileTest | str | Path) -> TensileTest:
@@ -207,10 +266,8 @@ def fit_rubber(
 def _check(law: Rubber, name: str) -> None:
     """Refuse a law whose true stress falls somewhere in the range of I_1 of the data, in one of the tests."""
     for test in RUBBER_TESTS:
-        most = 1.0
-        while law.excess(test, 1.1 * most) <= law.largest:
-            most *= 1.1
-        q = np.linspace(1, most, CHECKED)
+        q = np.linspace(1, np.sqrt(law.largest + 3), CHECKED)  # I_1 is above the square of the stretch
+        q = q[law.excess(test, q) <= law.largest]
         falls = np.flatnonzero(np.diff(q * law.stress(test, q)) <= 0)
         if len(falls):
             raise TestDataError(

@@ -41,6 +41,9 @@ SMALLEST_REACTION = 1e-6
 #: Most entries of the triangles' matrices on a level: half a gigabyte.
 LARGEST_LEVEL = 60_000_000
 
+#: Layers at corners, from none, whose triangles are looked at before: those of later ones have the same form.
+LAYERS_CHECKED = 4
+
 Field = Callable[[np.ndarray, np.ndarray], np.ndarray]
 """Vectors, shape (n, 2), at points of sides and their outward normals, shape (n, 2) each."""
 
@@ -236,20 +239,26 @@ class Problem:
             self.points |= {name: np.array(point, dtype=float) for name, point in grouped.points.items()}
         elif not shape.outline:
             raise ValueError(f"shape {shape.name!r} has no outline; give the mesh of its file")
-        held = [support.group for support in load.supports]
-        used = {*held, *(traction.group for traction in load.tractions)} & set(self.points)
+        used = {*(support.group for support in load.supports), *(traction.group for traction in load.tractions)} & set(
+            self.points
+        )
         # Small triangles where something is asked for: values at points are the last to converge.
         probed = {quantity.of for quantity in load.quantities} & set(self.points)
         corners = {name: tuple(self.points[name]) for name in sorted(used | probed)}
-        turn = LARGEST_TURN
-        for _ in range(5):
-            self.mesh = outline_mesh(shape, grouped, corners, turn)
-            if _unfolded(self.mesh):
-                break
-            turn /= 2
-        else:
-            raise MeshError(f"triangles of {shape.name!r} fold along its arcs; look for sides that nearly touch")
+        for halvings in range(5):
+            self.mesh = outline_mesh(shape, grouped, corners, LARGEST_TURN / 2**halvings)
+            self._look_at_corners(materials, used, probed)
+            graded = [self._graded.copy() for _ in range(LAYERS_CHECKED)]
+            for layers, mesh in enumerate(graded):
+                for _ in range(layers):
+                    mesh.grade(self._rough)
+            if all(_unfolded(mesh) for mesh in (self.mesh, *graded)):
+                return
+        raise MeshError(f"triangles of {shape.name!r} fold along its arcs; look for sides that nearly touch")
 
+    def _look_at_corners(self, materials: Mapping[str, AnyMaterial], used: set[str], probed: set[str]) -> None:
+        """Check materials, groups and quantities on the mesh, and find its corners."""
+        load = self.load
         present = [self.mesh.names[part] for part in np.unique(self.mesh.parts)]
         if missing := [name for name in present if name not in materials]:
             raise ValueError(
@@ -383,11 +392,17 @@ class Problem:
 
 
 def _unfolded(mesh: CoarseMesh) -> bool:
-    """Whether triangles along arcs are the right way round everywhere."""
-    space = _Space(mesh, 4)
-    _, _, _, gradients = tabulated(4, 10)
-    corners = shape_functions(4, np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.5, 0.0], [0.5, 0.5], [0.0, 0.5]]))[1]
-    return bool((space.jacobians(np.concatenate([gradients, corners]))[1] * space.sense[:, None] > 0).all())
+    """Whether all triangles are the right way round everywhere."""
+    if not (signed_areas(mesh.points, mesh.triangles) > 0).all():
+        return False
+    corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.5, 0.0], [0.5, 0.5], [0.0, 0.5]])
+    try:
+        for degree in (2, 4):
+            gradients = tabulated(degree, 10)[3], shape_functions(degree, corners)[1]
+            _Space(mesh, degree).jacobians(np.concatenate(gradients))
+    except MeshError:
+        return False
+    return True
 
 
 class _Space:
@@ -434,10 +449,17 @@ class _Space:
         return np.concatenate([np.array(ends), np.arange(first, first + per_side)])
 
     def jacobians(self, gradients: np.ndarray, rows: np.ndarray | slice = slice(None)) -> tuple[np.ndarray, np.ndarray]:
-        """Derivatives of the places, shape (n, points, 2, 2), last by reference coordinate, and their determinants."""
+        """Derivatives of the places, shape (n, points, 2, 2), last by reference coordinate, and their determinants.
+
+        Determinants have the sign of their triangle everywhere: a folded triangle is refused.
+        """
         at = self.places[self.numbers[rows]]
         derivatives = np.einsum("eic,qia->eqca", at, gradients, optimize=True)
         determinants = derivatives[..., 0, 0] * derivatives[..., 1, 1] - derivatives[..., 0, 1] * derivatives[..., 1, 0]
+        folded = (determinants * self.sense[rows, None] <= 0).any(axis=1)
+        if folded.any():
+            x, y = 1e3 * self.mesh.points[self.corners[rows][folded][0]].mean(axis=0)
+            raise MeshError(f"a triangle folds along an arc near ({x:.4g}, {y:.4g}) mm; give the arc as shorter arcs")
         return derivatives, determinants
 
     def side_points(self, ends: tuple[int, int], outwards: float, count: int) -> tuple[np.ndarray, ...]:

@@ -67,6 +67,14 @@ def remove_unfinished(folder: str | Path, below: bool = True) -> None:
                 path.unlink()
 
 
+def to_present(folder: str | Path) -> None:
+    """Give the present time to files of a folder from the future, as a clock that was set back leaves them."""
+    now = time.time()
+    for path in Path(folder).rglob("*"):
+        if path.is_file() and path.stat().st_mtime > now:
+            os.utime(path)
+
+
 def _is_written(path: Path) -> bool:
     """Whether the process that writes an unfinished file lives, or may live."""
     number, _, host = path.name.removesuffix(UNFINISHED).rpartition(".")[2].partition("@")

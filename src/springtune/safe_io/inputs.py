@@ -5,6 +5,7 @@ import errno
 import math
 import mmap
 import os
+import re
 import signal
 import stat
 import threading
@@ -74,18 +75,48 @@ Rows = list[tuple[int, list[str]]]
 """Rows of a CSV file with their line numbers."""
 
 
+DECIMAL = re.compile(r"[+-]?\d*[.,]\d*(?:[eE][+-]?\d+)?")
+THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
+
+
 def csv_rows(path: str | Path, refuse: Callable[[str], ValueError], remedy: str) -> Rows:
-    """Rows of a CSV file, the head first, without comments after #."""
+    """Rows of a CSV file, the head first, without comments after #.
+
+    Semicolons or tabs in the head separate its columns, else commas. Decimal commas become points.
+    """
     try:
         lines = read(path, LARGEST_CSV).decode("utf-8-sig").splitlines()
     except ValueError as error:
         why = "not UTF-8 text" if isinstance(error, UnicodeDecodeError) else error
         raise refuse(f"'{path}' cannot be read: {why}; {remedy}") from None
-    rows = [(number, row) for number, line in enumerate(lines, 1) if line.strip() and not line.startswith("#")
-            for row in csv.reader([line])]  # fmt: skip
-    if not rows:
+    texts = [(number, line) for number, line in enumerate(lines, 1) if line.strip(" \t,;") and line[0] != "#"]
+    if not texts:
         raise refuse(f"'{path}' is empty; {remedy}")
-    return rows
+    separator = next((sign for sign in ";\t" if sign in texts[0][1]), ",")
+    rows: Rows = []
+    for number, line in texts:
+        try:
+            rows += [(number, row) for row in csv.reader([line], delimiter=separator, skipinitialspace=True)]
+        except csv.Error:
+            most = csv.field_size_limit()
+            raise refuse(f"'{path}', line {number}: a cell has over {most} characters; correct it") from None
+    return rows[:1] + _with_points(path, rows[1:], refuse)
+
+
+def _with_points(path: str | Path, rows: Rows, refuse: Callable[[str], ValueError]) -> Rows:
+    """Rows with decimal points for commas; refuse commas that may separate thousands."""
+    found = [cell.strip() for _, row in rows for cell in row if DECIMAL.fullmatch(cell.strip())]
+    commas = [cell for cell in found if "," in cell]
+    if not commas:
+        return rows
+    point = next((cell for cell in found if "." in cell), "")
+    if point:
+        raise refuse(f"'{path}': {point!r} and {commas[0]!r} have different decimal signs; write decimal points")
+    if all(map(THOUSANDS.fullmatch, commas)):
+        one = commas[0]
+        what = f"{one!r} is {one.replace(',', '.')} or {one.replace(',', '')}"
+        raise refuse(f"'{path}': {what}; write a decimal point, or no comma")
+    return [(number, [c.replace(",", ".") if DECIMAL.fullmatch(c.strip()) else c for c in row]) for number, row in rows]
 
 
 def numbers(
@@ -95,7 +126,8 @@ def numbers(
     found = []
     for line, row in rows:
         if len(row) != len(names):
-            raise refuse(f"'{path}', line {line}: has {len(row)} values, and the head {len(names)}; correct it")
+            commas = "decimal commas need ';' between columns" if len(row) == 2 * len(names) else "correct it"
+            raise refuse(f"'{path}', line {line}: has {len(row)} values, and the head {len(names)}; {commas}")
         found.append([number_of(text) for text in row])
         for name, text, number in zip(names, row, found[-1]):
             if name and not math.isfinite(number):

@@ -15,6 +15,7 @@ from scipy.linalg import qr
 from scipy.optimize import least_squares
 from scipy.stats import t
 
+from ..mesh.groups import parts_of
 from ..problem.materials import AnisotropicMaterial, AnyMaterial, Material, rotated
 from ..problem.quantities import Number, nearest, positive
 from ..problem.rubber import TestDataError, fit_rubber, relative_weights, stress_columns, told
@@ -302,7 +303,7 @@ def identify(
 
 def _sheet(tests: Sequence[MeasuredTest], law: str, known: Mapping[str, Number]) -> Identified:
     bodies = [stated(test) for test in tests]
-    parts = sorted({part for shape, _, mesh in bodies for part in ("", *(mesh or shape).parts)})
+    parts = sorted({part for shape, _, mesh in bodies for part in (parts_of(mesh) if mesh else ("", *shape.parts))})
     regions = [f"E {part or 'main'}" for part in parts] if law == "regions" else []
     if len(parts) > 1 and not regions:
         raise ValueError(f"law: {law!r} is of one material, and the body has the parts {parts}; take 'regions'")

@@ -49,7 +49,7 @@ class Scene(Tabled):
     mesh : Mesh or GroupedMesh
         That fills the beam, see `springtune.make_mesh` and `springtune.read_mesh`; of a shape with its groups.
     material : Material, AnisotropicMaterial or mapping of str to those
-        Isotropic of a beam; of a shape of several parts by their names, the main one at ``""``.
+        Isotropic of a beam; of a shape of several parts by their names, and at ``""`` that of all others.
     load : str
         Key of `springtune.LOADS`: what is held, and where the force acts; of a shape key of its own ``loads``.
     force : float or str, optional

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..mechanics.network import FollowerPressure, Network
 from ..mesh import Mesh
-from ..mesh.groups import GroupedMesh, part_names
+from ..mesh.groups import GroupedMesh, part_names, parts_of
 from ..problem.boundary import (
     cell_at,
     check_case,
@@ -28,7 +28,7 @@ from ..problem.boundary import (
 )
 from ..problem.geometry import Beam, warn_of_size, warn_of_thickness
 from ..problem.loads import LOADS, LoadKind
-from ..problem.materials import ANY_MATERIAL, AnyMaterial, Material
+from ..problem.materials import ANY_MATERIAL, AnyMaterial, Material, of_parts
 from ..problem.quantities import positive
 from ..problem.shapes import LoadCase, Quantity, Shape
 from ..reference.answers import beyond_linear
@@ -408,20 +408,17 @@ def scaled(case: LoadCase, scale: float) -> LoadCase:
 
 def _materials(material: AnyMaterial | Mapping[str, AnyMaterial], grouped: GroupedMesh) -> dict[str, AnyMaterial]:
     """Material of each part that the mesh has, checked."""
-    parts = {str(name) for labels in part_names(grouped).values() for name in np.unique(labels)}
-    given = dict(material) if isinstance(material, Mapping) else dict.fromkeys(sorted(parts), material)
+    parts = parts_of(grouped)
+    given = dict(material) if isinstance(material, Mapping) else {"": material}
     for name, one in given.items():
         if not isinstance(one, ANY_MATERIAL):
             of = f" of part {name!r}" if name else ""
             raise ValueError(f"material{of}: {one!r} is not a Material; give one such as {A_MATERIAL}")
-    for name in sorted(parts - set(given)):
-        said = f"part {name!r}" if name else "the main part, ''"
-        raise ValueError(f"material: {said} has none; given: {', '.join(map(repr, given)) or 'none'}")
     for name in given:
-        if name not in parts:
-            known = f"is no part of the mesh; known: {', '.join(map(repr, sorted(parts)))}"
+        if name and name not in parts:
+            known = f"is no part of the mesh; known: {', '.join(map(repr, parts))}"
             raise ValueError(f"material: {name!r} {grouped.unusable.get(name, known)}")
-    return given
+    return of_parts(given, parts)
 
 
 def _growth(mesh: Mesh, displacements: np.ndarray, linear: bool) -> float:

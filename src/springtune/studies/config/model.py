@@ -201,7 +201,7 @@ class Study:
         >>> import springtune as st
         >>> study = st.load_study("config/shapes.yaml")
         >>> cook = study.shape("cook")
-        >>> choices = st.predict(cook, st.mesh_shape(cook, "4 mm"), study.material("third"), load="shear")
+        >>> choices = st.predict(cook, st.mesh_shape(cook, "4 mm"), study.materials_of("cook", "third"), load="shear")
         >>> print(f"{choices[0].definition}: {100 * choices[0].errors['edge']:+.1f} %")
         patch: -0.4 %
         """
@@ -211,6 +211,20 @@ class Study:
             raise ValueError(f"shape: '{name}' is unknown; {there}")
         found: Shape = known[name]
         return found
+
+    def materials_of(self, shape: str, material: str) -> dict[str, AnyMaterial]:
+        """Material of each part of a shape, as the study declares it, and that of the main part, ``""``.
+
+        Examples
+        --------
+        >>> import springtune as st
+        >>> study = st.load_study("config/shapes.yaml")
+        >>> {part: one.name for part, one in study.materials_of("cook", "third").items()}
+        {'': 'third'}
+        """
+        self.shape(shape)
+        own = next(part.parts[shape] for part in self.parts.values() if shape in getattr(part, "declared", {}))
+        return {"": self.material(material)} | {part: self.material(name) for part, name in own.items()}
 
     def labels(self, one: SceneSpec | CurveSpec | Reference) -> dict[str, str | float]:
         """Labels of the dataset cell of a scene, curve or reference."""

@@ -2,7 +2,8 @@
 
 Scalars and texts are one JSON text, since groups with attributes cost more than solving; arrays are datasets. Former
 results stay, so that going back to them is free. HDF5 has checksums of all that it reads: of its own structures in the
-file format ``latest``, and of data by the filter Fletcher-32.
+file format ``latest``, and of data by the filter Fletcher-32. A file has its name in it: one that was exchanged with
+another is not read.
 """
 
 import json
@@ -43,7 +44,10 @@ def _opened(path: str | Path) -> "Iterator[tuple[h5py.File, dict[str, dict[str, 
         raise DamagedError(path, "it is missing")
     try:
         with h5py.File(path) as file:
-            yield file, json.loads(file[SCALARS][()].tobytes())
+            name, scalars = json.loads(file[SCALARS][()].tobytes())
+            if name != Path(path).name:
+                raise ValueError(f"it is {name}")
+            yield file, scalars
     except (OSError, RuntimeError, LookupError, ValueError) as error:
         reason = str(error).strip("'\"").partition("\n")[0]
         raise DamagedError(path, f"it is damaged ({reason})") from None
@@ -140,7 +144,7 @@ def add(path: str | Path, results: Mapping[str, Mapping[str, Any]]) -> None:
                     _put(file, f"{name}/{label}", value)
                 else:
                     scalars[name][label] = value.item() if isinstance(value, np.generic | np.ndarray) else value
-        _put(file, SCALARS, np.frombuffer(json.dumps(scalars).encode(), np.uint8))
+        _put(file, SCALARS, np.frombuffer(json.dumps([Path(path).name, scalars]).encode(), np.uint8))
         file.flush()
         image = file.id.get_file_image()
     atomic.write_bytes(path, image)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from springtune.mesh import read_mesh, write_mesh
+from springtune.mesh.formats import read_stored, write_mesh
 from springtune.mesh.groups import GroupedMesh
 
 from ...runs import store
@@ -84,7 +84,7 @@ def read(folder: str | Path, name: str) -> GroupedMesh | None:
     if "message" in notes:
         return None
     _checked(path, notes["checksum"])
-    mesh = read_mesh(path)
+    mesh = read_stored(path)
     groups, count = notes["groups"], {corners: len(cells) for corners, cells in mesh.cells.items()}
     return GroupedMesh(
         mesh,

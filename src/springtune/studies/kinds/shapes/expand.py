@@ -1,14 +1,17 @@
 """Scenes of shapes that a study asks for, and checks of its shapes and their grids."""
 
 import re
+import warnings
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
+from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
 
 from springtune.mesh import MeshError
+from springtune.problem.geometry import AssumptionWarning, size_text
 from springtune.problem.loads import KINEMATICS
 from springtune.problem.materials import Material
 from springtune.problem.quantities import nearest
@@ -23,7 +26,7 @@ from .sections import OUTLINED
 
 @dataclass(frozen=True)
 class ShapeScene:
-    """A scene of a shape; ``mesh_size`` is 0 and ``mesh_type`` ``"file"`` where the mesh is that of a file."""
+    """A scene of a shape; of a mesh file ``mesh_type`` is ``"file"``, and of a single one ``mesh_size`` is 0."""
 
     shape: str
     mesh_type: str
@@ -41,7 +44,7 @@ class ShapeScene:
 
 @dataclass(frozen=True)
 class Shapes:
-    """Shapes of a study, their scenes, the materials of parts, and refinements."""
+    """Shapes of a study, their scenes, the materials of parts, refinements, and mesh files by size."""
 
     declared: dict[str, Shape]
     shapes: tuple[Shape, ...]
@@ -51,6 +54,7 @@ class Shapes:
     referred: tuple[tuple[str, str, str], ...]
     finite: tuple[tuple[str, str, str, str], ...]
     refined: dict[str, dict[str, float]]
+    files: dict[str, dict[float, str]]
 
     @cached_property
     def shape(self) -> dict[str, Shape]:
@@ -99,9 +103,14 @@ def shape_of_config(name, shape, folder):
         tuple(map(_hole, shape.holes)),
         dict(shape.points),
         {label: _load(label, case) for label, case in shape.loads.items()},
-        "" if shape.file is None else str(folder / shape.file),
+        next(iter(files_of(shape, folder).values()), ""),
         shape.unit,
     )
+
+
+def files_of(shape, folder):
+    """Mesh files of a shape's section by mesh size, the finest first."""
+    return {one.mesh_size: str(folder / one.file) for one in sorted(shape.file or (), key=attrgetter("mesh_size"))}
 
 
 def _scenes(config):
@@ -110,9 +119,8 @@ def _scenes(config):
     for grid in config.shape_grids.values():
         for name in grid.shape:
             shape = config.shapes[name]
-            meshes = (
-                [(OWN_FILE, 0.0)] if shape.file is not None else product(grid.mesh_type or OUTLINED, grid.mesh_size)
-            )
+            own = [(OWN_FILE, one.mesh_size) for one in shape.file or ()]
+            meshes = own or product(grid.mesh_type or OUTLINED, grid.mesh_size)
             for mesh, material, load in product(list(meshes), grid.material, grid.load or shape.loads):
                 if grid.reference:
                     referred[name, material, load] = None
@@ -164,10 +172,17 @@ def expand(config, declared):
         tuple(dict.fromkeys(key for one in scenes for key in [(one.shape, one.material, one.load)] if key in referred)),
         tuple(dict.fromkeys(key for one in scenes for key in [_finite(one)] if key in finite)),
         {name: dict(one.refined) for name, one in config.shapes.items()},
+        {name: files_of(one, declared.folder) for name, one in config.shapes.items()},
     )
 
 
 MOST_SHAPE_SCENES = 100_000
+
+UNIT_NEEDED = 1.0
+"""Longer side [m] from which the unit of a mesh file has to be given, or there is a warning."""
+
+ONE_BODY = 0.1
+"""Largest relative difference of the extents of meshes of one body: coarse ones cut off arcs."""
 
 READ_AT_ONCE = 1_000_000
 """Size of a mesh file up to which its groups are looked at as a study is read [B]."""
@@ -184,11 +199,12 @@ def check(config, problems):
         for load, case in shape.loads.items():
             _check_something(case, (*path, "loads", load), problems)
         if shape.file is not None:
-            fault = file_fault(problems.folder / shape.file)
-            if fault:
-                problems.add((*path, "file"), f"'{problems.folder / shape.file}' {fault}")
-            elif problems.nothing:
-                _check_file(name, shape, path, problems)
+            extents = {}
+            for file in files_of(shape, problems.folder).values():
+                if fault := file_fault(Path(file)):
+                    problems.add((*path, "file"), f"'{file}' {fault}")
+                elif problems.nothing:
+                    _check_file(name, shape, Path(file), path, problems, extents)
             continue
         _check_outlines(shape, path, problems)
         _check_names(shape, path, problems)
@@ -205,13 +221,13 @@ def check(config, problems):
         _check_grid(config, grid, ("shape_grids", name), problems)
 
 
-def _check_file(name, shape, path, problems):
-    """Check the groups of a small mesh file; faults of large files show in their scenes."""
-    file = problems.folder / shape.file
+def _check_file(name, shape, file, path, problems, extents):
+    """Check the groups and the extents of a small mesh file; faults of large files show in their scenes."""
     if file.stat().st_size > READ_AT_ONCE:
         return
     # Here, since few studies have files, and reading one takes scipy.
     from springtune.mesh.formats import read_shape
+    from springtune.mesh.groups import parts_of
     from springtune.problem.boundary import check_case
 
     try:
@@ -219,9 +235,23 @@ def _check_file(name, shape, path, problems):
     except MeshError as error:
         problems.add((*path, "file"), str(error))
         return
-    for part in sorted(set(grouped.parts) - set(shape.parts)):
+    sides = np.ptp(grouped.mesh.points, axis=0)
+    if max(sides) > UNIT_NEEDED and "unit" not in shape.model_fields_set:
+        message = f"shape '{name}': {size_text(*sides)}, since numbers in {file.name} are read in m; give their unit"
+        warnings.warn(f"{message}, such as 'unit: 1 mm', or 'unit: 1 m'", AssumptionWarning, stacklevel=2)
+    first, others = next(iter(extents.items()), (file.name, sides))
+    if not np.allclose(sides, others, rtol=ONE_BODY):
+        message = (
+            f"{file.name} is {size_text(*sides)}, and {first} {size_text(*others)}; give files of one body and unit"
+        )
+        problems.add((*path, "file"), message)
+    extents[file.name] = sides
+    parts = parts_of(grouped)
+    if len(parts) > 1 and not shape.parts:
+        names, first = ", ".join(f"'{one}'" for one in parts if one), next(filter(None, parts))
         problems.add(
-            (*path, "parts"), f"part '{part}' of {file} has no material; add it, such as {{{part}: <material>}}"
+            (*path, "parts"),
+            f"{file} has parts {names}; give their materials, such as {{{first}: <material>}}; the rest has the grid's",
         )
     for part in sorted(set(shape.parts) - set(grouped.parts)):
         there = nearest(part, grouped.parts) if grouped.parts else "the file has none"

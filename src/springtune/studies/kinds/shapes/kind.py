@@ -4,7 +4,7 @@ Stages with the tasks of their jobs, and keys of results. Most studies have no s
 are imported where one has.
 """
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -44,16 +44,16 @@ def particles(part, one):
 # -- keys --------------------------------------------------------------------------------------------------------------
 
 
-def _source(shape):
-    """Geometry of a shape, or its file."""
+def _source(shape, file=""):
+    """Geometry of a shape, or one of its files."""
     from .task_values import geometry  # here, as below: studies of beams read the stages as well
 
-    return geometry(shape) | (file_source(shape.file, shape.unit) if shape.file else {})
+    return geometry(shape) | (file_source(file or shape.file, shape.unit) if shape.file else {})
 
 
 def mesh_source(part, one):
     """Source of a scene's mesh."""
-    source = _source(part.shape[one.shape])
+    source = _source(part.shape[one.shape], part.files[one.shape].get(one.mesh_size, ""))
     if "file" in source:
         return source
     refined = {name: share * one.mesh_size for name, share in part.refined[one.shape].items()}
@@ -207,19 +207,37 @@ def _axes(part):
     return labels | {"quantity": tuple(dict.fromkeys(asked))}
 
 
+def _size(shape, file):
+    """Extents of a shape in words, or of a mesh file of it."""
+    import numpy as np  # here, as those below: few studies have files
+
+    from springtune.mesh import MeshError
+    from springtune.mesh.formats import read_shape
+    from springtune.problem.geometry import size_text
+
+    try:
+        (left, low), (right, top) = shape.extent
+        sides = np.ptp(read_shape(file, shape.unit).mesh.points, axis=0) if file else (right - left, top - low)
+    except MeshError as error:
+        return str(error)
+    return size_text(*sides) + (f", {Path(file).name} in units of {shape.unit:g} m" if file else "")
+
+
 def _summary(part):
     meshes = {(one.shape, one.mesh_type, one.mesh_size) for one in part.scenes}
     cases = {(one.shape, one.load) for one in part.scenes}
     quantities = sum(len(part.shape[shape].loads[load].quantities) for shape, load in cases)
     shapes = f"{len(part.shapes)} shape{'s' * (len(part.shapes) > 1)}"
     rows = [["shape scenes", len(part.scenes), f"of {shapes} on {len(meshes)} meshes, {quantities} quantities"]]
+    counts = Counter((one.shape, part.files[one.shape].get(one.mesh_size, "")) for one in part.scenes)
+    rows += [[f"  {name}", count, _size(part.shape[name], file)] for (name, file), count in counts.items()]
     if count := len(part.referred) + len(part.finite):
         rows.append(["shape references", count, "finite elements on the shapes themselves"])
     return rows
 
 
 def _files(part):
-    return [Path(shape.file) for shape in part.shapes if shape.file] if part else []
+    return [Path(file) for shape in part.shapes for file in part.files[shape.name].values()] if part else []
 
 
 KIND = Kind(

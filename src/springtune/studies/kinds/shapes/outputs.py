@@ -30,7 +30,7 @@ ERRORS, DEFORMED = "shapes_errors", "shapes_deformed"
 
 def mesh_name(one: Any) -> str:
     """Readable name of a scene's mesh."""
-    return f"{one.shape}_{one.mesh_type}" + ("" if one.mesh_type == OWN_FILE else f"_{1e3 * one.mesh_size:.9g}mm")
+    return f"{one.shape}_{one.mesh_type}" + (f"_{1e3 * one.mesh_size:.9g}mm" if one.mesh_size else "")
 
 
 def figures(cases: "list[dict[str, str]]") -> "dict[str, dict[str, str]]":

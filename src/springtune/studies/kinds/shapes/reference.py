@@ -5,6 +5,8 @@ from functools import partial
 
 import numpy as np
 
+from springtune.mesh.groups import parts_of
+from springtune.problem.materials import of_parts
 from springtune.reference.shapes import solve_each
 
 from .mesh import make
@@ -33,6 +35,7 @@ def _solved(task):
         solver = partial(solve_finite_shape, law=task["law"])
     grouped = make(task["shape"]) if "file" in task["shape"] else None
     shape, materials = shape_of(task["shape"], task["thickness"], task["load"]), materials_of(task["materials"])
+    materials = of_parts(materials, parts_of(grouped)) if grouped else materials
     case = shape.loads[ONE_LOAD]
     found, lacking = solve_each(shape, case, materials, grouped, solver)
     if not found:

@@ -20,6 +20,7 @@ from ...config.fields import (
     Ratio,
     Scalar,
     Text,
+    Wrapped,
     one_of,
 )
 from ...config.messages import refuse, show
@@ -300,6 +301,34 @@ class ShapeLoadConfig(Section):
     )
 
 
+class ShapeFileConfig(Section):
+    """A mesh file of a shape that has several."""
+
+    file: FileName = Field(description="The file, relative to the study's folder.")
+    mesh_size: Length = Field(description="Length of an edge, which names the mesh in the dataset.")
+
+
+class OneFileOrMore(Words, Wrapped):
+    """Annotation of a list of mesh files; a path alone is a list of one, of no mesh size."""
+
+    def __get_pydantic_json_schema__(self, schema: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        return {"anyOf": [{"type": "string", "minLength": 1}, handler(schema["schema"]) | {"minItems": 1}]}
+
+    def _read(self, value: object, handler: core_schema.ValidatorFunctionWrapHandler) -> Any:
+        if isinstance(value, str):
+            return [ShapeFileConfig.model_construct(file=value, mesh_size=0.0)]
+        if not isinstance(value, list) or not value:
+            raise refuse(f"{show(value)} instead of {self.words}")
+        files = handler(value)
+        for number, one in enumerate(files):
+            if one.mesh_size in [other.mesh_size for other in files[:number]]:
+                raise refuse(f"{show(value[number])}: another file has this mesh size; correct one", number)
+        return files
+
+
+SHAPE_FILES = OneFileOrMore("the path of a file, or a list such as [{file: fine.msh, mesh_size: 2 mm}]")
+
+
 class ShapeConfig(Section):
     """A body of any outline, or that of a mesh file, with named groups of its sides and points."""
 
@@ -308,10 +337,11 @@ class ShapeConfig(Section):
         None, description="Round of its sides, counter-clockwise."
     )
     holes: list[HoleConfig] = Field([], description="Holes, and parts of other materials.")
-    file: FileName | None = Field(
+    file: Annotated[list[ShapeFileConfig], SHAPE_FILES] | None = Field(
         None,
         description="Mesh file in the place of an outline, of a format that meshio reads, its path relative to the "
-        "study's folder; its groups are the shape's.",
+        "study's folder; its groups are the shape's. Or a list of several with their mesh sizes: the finest one is the "
+        "geometry of the reference.",
     )
     unit: Length = default("1 m", description="Unit of the coordinates in the file.")
     points: Annotated[dict[str, Place], Words("places such as [48 mm, 52 mm], by name")] = Field(

@@ -1,0 +1,503 @@
+"""Mesh files that say one body in many ways: each moves as the clean one does, or is refused by its true reason."""
+
+import re
+
+import h5py
+import meshio
+import numpy as np
+import pytest
+from scipy.io import netcdf_file
+
+import springtune as st
+from springtune.mesh import MeshError, write_mesh
+from springtune.mesh.formats import read_shape
+
+# Two rows of four cells of 15 x 10 mm, the upper ones halved; the left half is hard.
+POINTS = np.array([[15.0 * i, 10.0 * j] for j in range(3) for i in range(5)])
+QUADS = np.array([[1, 2, 7, 6], [2, 3, 8, 7], [3, 4, 9, 8], [4, 5, 10, 9]])
+TRIANGLES = np.array([half for a, b, c, d in QUADS + 5 for half in ([a, b, c], [a, c, d])])
+RIGHT, LEFT = np.array([[5, 10], [10, 15]]), np.array([[11, 6], [6, 1]])
+HARD = {4: np.array([1, 1, 0, 0], bool), 3: np.repeat(np.array([1, 1, 0, 0], bool), 2)}
+SOFT = {count: ~mask for count, mask in HARD.items()}
+CLEAN = st.GroupedMesh(
+    st.Mesh(1e-3 * POINTS, TRIANGLES - 1, QUADS - 1),
+    {"left": LEFT - 1, "right": RIGHT - 1},
+    parts={"hard": HARD, "soft": SOFT},
+)
+STEEL, POLYMER = st.Material("210 GPa", 0.3, name="steel"), st.Material("3 GPa", 0.35, name="polymer")
+
+
+def moves(grouped, names=("left", "right", "hard", "soft")):
+    """Displacements of the right side that is pulled up and away, the left one fixed."""
+    left, right, hard, soft = names
+    found = [st.Quantity(axis, "displacement", right, axis) for axis in "xy"]
+    load = st.LoadCase("pull", [st.Support(left, 0, 0)], [st.Traction(right, ("1 kN", "300 N"))], quantities=found)
+    shape = st.Shape("own", 1e-3, file="own.msh", loads={"pull": load})
+    materials = {name: {hard: STEEL, soft: POLYMER}[name] for name in grouped.parts}
+    if len(materials) == 1:  # the other part is the main one
+        materials[""] = POLYMER if hard in materials else STEEL
+    return st.Scene(shape, grouped, materials, "pull", definition="uniform", kinematics="linear").solve().values
+
+
+EXPECTED = moves(CLEAN)
+
+
+def rows(table, first=1):
+    return "".join(
+        f"{', '.join(map(str, [number, *row]))}\n" for number, row in enumerate(np.asarray(table).tolist(), first)
+    )
+
+
+NODES, CPS4, CPS3 = rows(POINTS), rows(QUADS), rows(TRIANGLES, 5)
+MESH = f"*NODE\n{NODES}*ELEMENT, TYPE=CPS4\n{CPS4}*ELEMENT, TYPE=CPS3\n{CPS3}"
+SIDES = """*NSET, NSET=left
+1, 6, 11
+*NSET, NSET=right
+5, 10, 15
+"""
+PARTS = """*ELSET, ELSET=hard
+1, 2, 5, 6,
+7, 8
+*ELSET, ELSET=soft
+3, 4, 9, 10, 11, 12
+"""
+SETS = SIDES + PARTS
+INP = f"*HEADING\nplate\n{MESH}{SETS}"
+
+
+def blocks(quads="CPS4", triangles="CPS3", hard="", soft=""):
+    """Elements in four blocks."""
+    lines = [one.splitlines(keepends=True) for one in (CPS4, CPS3)]
+    parts = [
+        (quads, hard, lines[0][:2]),
+        (quads, soft, lines[0][2:]),
+        (triangles, soft, lines[1][4:]),
+        (triangles, hard, lines[1][:4]),
+    ]
+    return "".join(f"*ELEMENT, TYPE={kind}{name}\n{''.join(found)}" for kind, name, found in parts)
+
+
+POLAR = rows([[float(np.hypot(x, y)), float(np.degrees(np.arctan2(y, x)))] for x, y in POINTS])
+TURNED = rows([[float(y) + 3, 7 - float(x)] for x, y in POINTS])
+PART = f"*PART, NAME=Plate\n*NODE\n{TURNED}{MESH.partition(NODES)[2]}"
+END = "*END ASSEMBLY\n"
+PLACE = "*ASSEMBLY, NAME=a\n*INSTANCE, NAME=Plate-1, PART=PLATE\n-7., 3., 0.\n0., 0., 0., 0., 0., 1., 90.\n"
+REFERENCE = "*Node\n1, 500., 500., 0.\n*NSET, NSET=ref\n1,\n"
+ASSEMBLED = SETS.replace("=left", "=left, INSTANCE=Plate-1").replace("=right", "=right, instance=Plate-1")
+
+ABAQUS = {
+    "clean": INP,
+    "lower case, with comments, blanks and CR": INP.lower().replace("\n", "\r\n** a, 1\r\n\r\n  "),
+    "upper case of keywords in two sets of one name": INP.replace("right\n5, 10,", "right\n5, 10\n*Nset, nset=RIGHT\n"),
+    "sets of cells twice": INP.replace("7, 8\n", "*ELSET, ELSET=Hard\n7, 8\n"),
+    "sets over blocks and types": INP.replace(MESH, f"*NODE\n{NODES}" + blocks()),
+    "sets on blocks": INP.partition("*ELSET")[0].replace(
+        MESH, f"*NODE\n{NODES}" + blocks(hard=", ELSET=hard", soft=",elset=soft")
+    ),
+    "ranges": INP.replace("hard\n1, 2, 5, 6,\n7, 8", "hard, GENERATE\n1, 2\n5, 8, 1"),
+    "ranges with steps": INP.replace("right\n5, 10, 15", "right, generate\n5, 15, 5"),
+    "sets of sets": INP.replace("hard\n1, 2, 5, 6,\n7, 8", "low\n1, 2\n*ELSET, ELSET=hard\nLOW, 5, 6, 7, 8"),
+    "a keyword in two lines": INP.replace("*ELSET, ELSET=hard", "*ELSET,\n  ELSET=hard"),
+    "sets on nodes": INP.replace("*NSET, NSET=left\n1, 6, 11\n", "").replace(
+        f"*NODE\n{NODES}",
+        "*NODE, NSET=left\n1, 0, 0\n6, 0, 10\n11, 0, 20\n*NODE\n"
+        + "".join(line for line in NODES.splitlines(keepends=True) if not re.match(r"(1|6|11),", line)),
+    ),
+    "exponents of Fortran and directions": INP.replace("15.0, 10.0\n", "1.5D1, 1.0d+01, 0., 0., 0., 1.\n"),
+    "points of parts": INP + "*NSET, NSET=hard, ELSET=hard\n*NSET, NSET=soft, ELSET=soft\n",
+    "entities of Gmsh": INP.replace(MESH, f"*NODE\n{NODES}" + blocks(hard=", ELSET=Surface1", soft=", ELSET=Surface2"))
+    + "*ELSET, ELSET=all\nhard, soft\n",
+    "parts by sections": INP.replace("CPS3\n", "CPS3, ELSET=upper\n")
+    + "*ELSET, ELSET=probe\n2, 3\n*SOLID SECTION, ELSET=hard, "
+    "MATERIAL=a\n*SOLID SECTION, ELSET=SOFT\n*ELSET, ELSET=_S1, INTERNAL\n1, 3\n",
+    "polar coordinates": INP.replace(f"*NODE\n{NODES}", f"*NODE, SYSTEM=C\n{POLAR}"),
+    "an instance": f"{PART}*END PART\n{PLACE}*END INSTANCE\n{REFERENCE}"
+    + ASSEMBLED.replace("T=hard", "T=hard, instance=Plate-1").replace("T=soft", "T=soft, instance=Plate-1")
+    + END,
+    "an instance, other sets of its names in the part": f"{PART}{PARTS}*NSET, NSET=left\n3, 4\n*END PART\n"
+    f"*PART, NAME=other\n*NODE\n1, 9, 9\n*END PART\n{PLACE}*END INSTANCE\n{ASSEMBLED.partition('*ELSET')[0]}{END}",
+    "sets of an assembly by the name of the instance": f"{PART}{PARTS}*END PART\n{PLACE}*END INSTANCE\n{REFERENCE}"
+    f"*NSET, NSET=left\nPlate-1.1, Plate-1.6,PLATE-1.11\n*NSET, NSET=right\nPlate-1.5, Plate-1.10, Plate-1.15\n{END}",
+    "a mesh in an instance": f"*PART, NAME=Plate\n*END PART\n{PLACE}{PART.partition('Plate')[2]}{SETS}"
+    f"*END INSTANCE\n{END}",
+    **{
+        f"types {quads} and {triangles}": INP.replace(MESH, f"*NODE\n{NODES}" + blocks(quads, triangles))
+        for quads, triangles in [
+            ("CPE4", "CPE3"),
+            ("cps4i", "cps3"),
+            ("CPS4R", "CPS3T"),
+            ("CPE4RH", "CPE3H"),
+            ("M3D4R", "M3D3"),
+            ("S4R", "S3R"),
+            ("S4R5", "STRI3"),
+            ("S4", "S3"),
+            ("CPEG4I", "CPEG3"),
+        ]
+    },
+}
+
+
+def section(name, *rows):
+    """A section of Gmsh's files, its rows given as numbers."""
+    return "".join(f"{line}\n" for line in (f"${name}", *(" ".join(map(str, row)) for row in rows), f"$End{name}"))
+
+
+def named(groups, names):
+    return section("PhysicalNames", [len(groups)], *((d, tag, f'"{name}"') for d, tag, name in groups)) if names else ""
+
+
+def msh41(names=True, sign=-1, two=False, parametric=0, loose=False):
+    """Version 4.1: curves 1 and 2 are the right side, surfaces 1 and 2 the parts; tags of points are spaced."""
+    curves, surfaces = {1: [101], 2: [sign * 101], 3: [sign * 102]}, {1: [sign * 201], 2: [202]}
+    if two:
+        curves = {tag: [*groups, -103] for tag, groups in curves.items()}
+        surfaces = {tag: [203, *groups] for tag, groups in surfaces.items()}
+    curves |= {4: []} if loose else {}
+    groups = [
+        (1, 101, "right"),
+        (1, 102, "left"),
+        (2, 201, "hard"),
+        (2, 202, "soft"),
+        (1, 103, "ends"),
+        (2, 203, "all"),
+    ]
+    entities = [
+        (tag, *[0.5] * 6, len(own), *own, 2, 1, -2) for found in (curves, surfaces) for tag, own in found.items()
+    ]
+    points = [
+        [(tag, x, y) for tag, (x, y) in zip(range(10, 151, 10), POINTS)][part] for part in (slice(10), slice(10, 15))
+    ]
+    nodes = [row for which, own in enumerate(points) for row in (
+        (2, which + 1, parametric * (1 - which), len(own)), *([tag] for tag, *_ in own),
+        *((x, y, 0, *[0.1, 0.2] * parametric * (1 - which)) for _, x, y in own))]  # fmt: skip
+    blocks = [(1, 1, 1, RIGHT[:1]), (1, 2, 1, RIGHT[1:, ::sign]), (1, 3, 1, LEFT), (2, 1, 3, QUADS[:2]),
+              (2, 1, 2, TRIANGLES[:4]), (2, 2, 3, QUADS[2:]), (2, 2, 2, TRIANGLES[4:])]  # fmt: skip
+    blocks += [(1, 4, 1, np.array([[1, 2]]))] * loose
+    count = sum(len(cells) for *_, cells in blocks)
+    cells = [row for *head, own in blocks for row in ([*head, len(own)], *([1, *corners] for corners in 10 * own))]
+    return (
+        section("MeshFormat", [4.1, 0, 8])
+        + named(groups, names)
+        + section("Entities", [0, len(curves), len(surfaces), 0], *entities)
+        + section("Nodes", [2, 15, 10, 150], *nodes)
+        + section("Elements", [len(blocks), count, 1, count], *cells)
+    )
+
+
+def msh22(names=True, nodes="Nodes", partition=0):
+    """Version 2.2, where an element that is in two groups stands twice."""
+    groups = [
+        (1, 101, "right"),
+        (1, 102, "left"),
+        (2, 201, "hard"),
+        (2, 202, "soft"),
+        (2, 203, "all"),
+        (1, 203, "ends"),
+    ]
+    cells = [(1, 101, RIGHT), (1, 102, LEFT), (2, 201, TRIANGLES[:4]), (3, 201, QUADS[:2]), (2, 202, TRIANGLES[4:]),
+             (3, 202, QUADS[2:]), (3, 203, QUADS), (2, 203, TRIANGLES), (1, 203, RIGHT), (1, 203, LEFT)]  # fmt: skip
+    listed = [(1, kind, 4, tag, 1, 1, partition or tag, *row) for kind, tag, found in cells for row in found]
+    return (
+        section("MeshFormat", [2.2, 0, 8])
+        + named(groups, names)
+        + section(nodes, [15], *((n, x, y, 0) for n, (x, y) in enumerate(POINTS, 1)))
+        + section("Elements", [len(listed)], *listed)
+    )
+
+
+NUMBERED = ("102", "101", "201", "202")
+
+GMSH = {
+    "4.1": msh41(sign=1),
+    "4.1, reversed": msh41(),
+    "4.1, all reversed": msh41().replace(" 1 101 2 1 -2", " 1 -101 2 1 -2"),
+    "4.1, two groups": msh41(two=True),
+    "4.1, two groups, no names": msh41(two=True, names=False),
+    "4.1, points with parameters": msh41(parametric=1),
+    "4.1, elements of no group": msh41(loose=True),
+    "2.2, two groups": msh22(),
+    "2.2, two groups, no names": msh22(names=False),
+}
+
+
+def bulk(grid, cell, end="ENDDATA\n", begin="CEND\nBEGIN BULK\n"):
+    cells = [
+        ("CBAR", 101, RIGHT),
+        ("CBAR", 102, LEFT),
+        ("CQUAD4", 201, QUADS[:2]),
+        ("CQUAD4", 202, QUADS[2:]),
+        ("CTRIA3", 201, TRIANGLES[:4]),
+        ("CTRIA3", 202, TRIANGLES[4:]),
+    ]
+    listed = [(name, group, *row) for name, group, found in cells for row in found]
+    lines = [grid(n, x, y) for n, (x, y) in enumerate(POINTS, 1)]
+    return begin + "".join(lines) + "".join(cell(n, *one) for n, one in enumerate(listed, 1)) + end
+
+
+def small(*fields):
+    return "".join(f"{field:<8}" for field in fields) + "\n"
+
+
+def wide(name, *fields):
+    """Lines of four fields of 16 characters."""
+    text = f"{name + '*':<8}" + "".join(f"{field:<16}" for field in fields[:4]) + "\n"
+    return text + (f"{'*':<8}" + "".join(f"{field:<16}" for field in fields[4:]) + "\n") * (len(fields) > 4)
+
+
+def angled(number, name, group, *corners):
+    """A cell with an angle, or the direction of a bar."""
+    return small(name, number, group, *corners, *([0.0, 0.0, 1.0] if name == "CBAR" else [30.0]))
+
+
+NASTRAN = {
+    "small": bulk(lambda n, x, y: small("GRID", n, "", x, y, "0."), lambda n, name, *one: small(name, n, *one)),
+    "small, exponents, angles, no ENDDATA": bulk(
+        lambda n, x, y: small("GRID", n, 0, f"{x / 10}+1", f"{y * 10}-1"), angled, end="PSHELL,201,1,.5\n"
+    ),
+    "wide": bulk(lambda n, x, y: wide("GRID", n, "", x, y, 0.0), lambda n, name, *one: wide(name, n, *one)),
+    "commas, no BEGIN": bulk(
+        lambda n, x, y: f"grid,{n},,{x},{y},0.0 $ a comment\n",
+        lambda n, name, group, *one: f"{name},{n},{group},{','.join(map(str, one))},+\n+,,\n",
+        begin="$ Created by Gmsh\n",
+    ),
+    "tabs": bulk(
+        lambda n, x, y: f"GRID\t{n}\t\t{x}\t{y}\n", lambda *one: "\t".join(map(str, [one[1], one[0], *one[2:]])) + "\n"
+    ),
+}
+
+
+def write_exodus(path, names=True, classic=False, sides=True, kinds=("QUAD4", "TRI3")):
+    """Blocks of quadrilaterals and triangles of each part, side sets and node sets."""
+    connect = [(kinds[0], QUADS[:2]), (kinds[0], QUADS[2:]), (kinds[1], TRIANGLES[:4]), (kinds[1], TRIANGLES[4:])]
+    arrays = {"coordx": POINTS[:, 0], "coordy": POINTS[:, 1], "eb_prop1": np.array([201, 202, 201, 202], "i4")}
+    arrays |= {f"connect{n}": cells.astype("i4") for n, (_, cells) in enumerate(connect, 1)}
+    shift = 2 if "SHELL" in kinds[0] else 0
+    if sides:  # quadrilateral 4, triangle 7 of the upper row; quadrilateral 1 and triangle 2
+        arrays |= {"elem_ss1": np.array([4, 11], "i4"), "side_ss1": shift + np.array([2, 2], "i4")}
+        arrays |= {"elem_ss2": np.array([1, 6], "i4"), "side_ss2": shift + np.array([4, 3], "i4")}
+        arrays["ss_prop1"] = np.array([101, 102], "i4")
+    else:
+        arrays |= {"node_ns1": np.array([5, 10, 15], "i4"), "node_ns2": np.array([1, 6, 11], "i4")}
+        arrays["ns_prop1"] = np.array([101, 102], "i4")
+    if names:
+        texts = {"eb_names": ["hard", "soft", "hard", "soft"], "ss_names" if sides else "ns_names": ["right", "left"]}
+        arrays |= {key: np.array([list(one.ljust(9, "\0")) for one in value], "S1") for key, value in texts.items()}
+    if classic:
+        with netcdf_file(path, "w") as file:
+            for name, array in arrays.items():
+                axes = [f"{name}_{n}" for n in range(array.ndim)]
+                [file.createDimension(axis, size) for axis, size in zip(axes, array.shape)]
+                made = file.createVariable(name, array.dtype, axes)
+                made[:] = array
+                if name.startswith("connect"):
+                    made.elem_type = connect[int(name[7:]) - 1][0]
+    else:
+        with h5py.File(path, "w") as file:
+            for name, array in arrays.items():
+                file[name] = array
+                if name.startswith("connect"):
+                    file[name].attrs["elem_type"] = np.bytes_(connect[int(name[7:]) - 1][0])
+
+
+def pieces(path, binary=True, ghosts=False, **options):
+    """Three pieces with points of their own, in one file: the lower row in two, the upper one."""
+    found = []
+    for number, (kind, cells, hard) in enumerate(
+        [("quad", QUADS[:2], [1, 1]), ("quad", QUADS[2:], [0, 0]), ("triangle", TRIANGLES, HARD[3])]
+    ):
+        ghost = np.zeros(len(cells), np.uint8)
+        if ghosts and number == 0:  # the last cell is that of another piece
+            cells, hard, ghost = QUADS[:3], [1, 1, 0], np.array([0, 0, 1], np.uint8)
+        used, corners = np.unique(cells, return_inverse=True)
+        x = POINTS[used - 1, 0]
+        marks = {"right": (x == 60).astype(int), "left": (x == 0).astype(int), "u": POINTS[used - 1]}
+        if number == 1:
+            del marks["left"]
+        data = {"hard": [np.array(hard, int)]} | ({"vtkGhostType": [ghost]} if ghosts else {})
+        places = np.column_stack([POINTS[used - 1], -0.0 * used])
+        one = meshio.Mesh(places, [(kind, corners.reshape(cells.shape))], point_data=marks, cell_data=data)
+        one.write(path, binary=binary, **options)
+        found.append(path.read_text())
+    texts = [re.search(r"<Piece.*?</Piece>", text, re.DOTALL)[0] for text in found]
+    empty = '<Piece NumberOfPoints="0" NumberOfCells="0"></Piece>'
+    path.write_text(found[0].replace(texts[0], "\n".join([texts[0], empty, *texts[1:]])))
+
+
+def write_med(path):
+    """Families of cells with one group, with two and with none."""
+    cells = [("line", np.concatenate([RIGHT, LEFT]) - 1), ("quad", QUADS - 1), ("triangle", TRIANGLES - 1)]
+    tags = [np.array([-1, -1, -2, -2]), np.where(HARD[4], -3, -4), np.where(HARD[3], -3, -4)]
+    mesh = meshio.Mesh(POINTS, cells, cell_data={"cell_tags": tags})
+    mesh.cell_tags = {-1: ["right", "ends"], -2: ["left", "ends"], -3: ["hard", "all"], -4: ["all"]}
+    mesh.write(path)
+
+
+def write_refs(path, key):
+    """Numbers of groups as other formats have them."""
+    cells = [("line", np.concatenate([RIGHT, LEFT]) - 1), ("quad", QUADS - 1), ("triangle", TRIANGLES - 1)]
+    tags = [np.array([101, 101, 102, 102]), np.where(HARD[4], 201, 202), np.where(HARD[3], 201, 202)]
+    meshio.Mesh(np.column_stack([POINTS, 0 * POINTS[:, 0]]), cells, cell_data={key: tags}).write(path)
+
+
+WRITTEN = {
+    "exodus.e": write_exodus,
+    "shells.exo": lambda path: write_exodus(path, kinds=("SHELL4", "TRISHELL")),
+    "nodes.e": lambda path: write_exodus(path, sides=False),
+    "classic.e": lambda path: write_exodus(path, classic=True),
+    "numbers.e": lambda path: write_exodus(path, names=False),
+    "text.vtu": lambda path: pieces(path, binary=False),
+    "binary.vtu": lambda path: pieces(path, compression=None),
+    "zlib.vtu": pieces,
+    "ghosts.vtu": lambda path: pieces(path, ghosts=True),
+    "plate.med": write_med,
+    "numbers.mesh": lambda path: write_refs(path, "medit:ref"),
+    "numbers.avs": lambda path: write_refs(path, "avsucd:material"),
+}
+
+TEXTS = {
+    **{f"inp: {name}": ("plate.inp", text) for name, text in ABAQUS.items()},
+    **{f"msh: {name}": ("plate.msh", text) for name, text in GMSH.items()},
+    **{f"bdf: {name}": ("plate.bdf", text) for name, text in NASTRAN.items()},
+}
+
+
+@pytest.mark.usefixtures("mesh_library")
+@pytest.mark.parametrize("name", [*TEXTS, *WRITTEN])
+def test_one_body_in_many_files(tmp_path, name):
+    file, text = TEXTS.get(name, (name, ""))
+    if text:
+        (tmp_path / file).write_bytes(text.encode())
+    else:
+        WRITTEN[name](tmp_path / file)
+    found = read_shape(tmp_path / file, 1e-3)
+    names = NUMBERED if NUMBERED[0] in found.sides else ("left", "right", "hard", "soft")
+    assert found.mesh.area == pytest.approx(CLEAN.mesh.area, rel=1e-9)
+    assert moves(found, names) == pytest.approx(EXPECTED, rel=1e-9)
+
+
+def test_sets_that_are_left_out_have_a_reason(tmp_path):
+    text = ABAQUS["entities of Gmsh"] + "*SURFACE, NAME=Right\n4, S2\n*SURFACE, NAME=top\n5, S2\n"
+    (tmp_path / "a.inp").write_text(text)
+    assert read_shape(tmp_path / "a.inp", 1e-3).unusable == {
+        "top": "is a `*SURFACE`, which is not read; give a set of its points",
+        "Surface1": "has cells of 'hard', which is a part; use that",
+        "Surface2": "has cells of 'soft', which is a part; use that",
+    }
+
+
+def test_blocks_without_name_and_number_are_the_body(tmp_path):
+    meshio.Mesh(POINTS, [("quad", QUADS - 1), ("triangle", TRIANGLES - 1)]).write(tmp_path / "a.e")
+    assert not read_shape(tmp_path / "a.e").parts
+
+
+def with_line(line, data="1, 2, 3\n"):
+    return INP.replace("*ELEMENT, TYPE=CPS4\n", f"{line}\n{data}*ELEMENT, TYPE=CPS4\n")
+
+
+def raw_pieces(path):
+    pieces(path)
+    path.write_text(path.read_text().replace("</VTKFile>", '<AppendedData encoding="raw">_</AppendedData></VTKFile>'))
+
+
+def one_of_several(path):
+    ghosts = [np.array([0, 0, 0, 1], np.uint8)]
+    meshio.Mesh(POINTS, [("quad", QUADS - 1)], cell_data={"vtkGhostType": ghosts}).write(path)
+
+
+def replaced(write, old, new):
+    """A writer of a file with something else in it."""
+
+    def written(path):
+        write(path)
+        path.write_bytes(path.read_bytes().replace(old, new))
+
+    return written
+
+
+ALL_NODES = "is not supported; mesh the part in the program and write all nodes and elements"
+OTHER_FILES = "parts of it are in other files, whose changes would not be seen"
+LINEAR = "write linear triangles and quadrilaterals only"
+MSH = "write 4.1 or 2.2: Mesh.MshFileVersion = 4.1"
+
+REFUSED = {
+    **{
+        f"{name}.inp": (with_line(f"*{name}"), rf"`\*{name.upper()}` in line 19 {ALL_NODES}")
+        for name in ("ngen", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SYSTEM", "PARAMETER")
+    },
+    **{
+        f"{name}.inp": (
+            INP.replace("CPS4\n", f"{name}\n"),
+            rf"`\*ELEMENT` in line 19 has TYPE={name.upper()}, which is not supp",
+        )
+        for name in ("CPS8R", "cps8r", "S8R", "CPS6", "CAX4", "C3D8", "SPRINGA", "B22")
+    },
+    "sphere.inp": (INP.replace("*NODE\n", "*NODE, SYSTEM=S\n"), r"`\*NODE` in line 3 has SYSTEM=S; write x and y"),
+    "include.inp": (with_line("*INCLUDE, INPUT=a.inp", ""), OTHER_FILES),
+    "input.inp": (INP.replace("*NODE\n", "*NODE, INPUT=a.inp\n"), OTHER_FILES),
+    "parts.inp": (f"{PART}*END PART\n{PART}*END PART\n", r"`\*PART` in line 33 is a second one"),
+    "instances.inp": (f"{PART}*END PART\n" + 2 * f"{PLACE}*END INSTANCE\n", r"`\*INSTANCE` in line 39 is a second one"),
+    "later.inp": (INP.replace("5, 10, 15", "late"), r"`\*NSET` in line 35 has the set 'late', which is not before it"),
+    "columns.inp": (INP.replace("CPS3\n", "CPS4\n"), "TYPE=CPS4, and rows that are not 5 numbers"),
+    "twice.inp": (INP.replace("\n2, 15.0", "\n1, 15.0"), "points have one number twice: 1; renumber them"),
+    "elements.inp": (INP.replace("\n5, 6, 7, 12", "\n4, 6, 7, 12"), "elements have one number twice"),
+    "lines.inp": (INP.replace("CPS4", "T2D2").replace("CPS3", "T2D2"), "rows that are not 3 numbers"),
+    "bars.inp": ("*NODE\n1, 0, 0\n2, 1, 0\n*ELEMENT, TYPE=T2D2\n1, 1, 2\n", "no cell block 'triangle' or 'quad'"),
+    "missing.inp": (INP.replace("12, 9, 15, 14", "12, 9, 15, 99"), "a cell has point 99, which the file does not have"),
+    "old.msh": (msh41().replace("4.1 0", "4 0"), f"is MSH of version 4; {MSH}"),
+    "40.msh": (msh41().replace("4.1 0", "4.0 0"), f"is MSH of version 4.0; {MSH}"),
+    "1.msh": ("$NOD\n1\n1 0 0 0\n$ENDNOD\n", f"is MSH of version 1; {MSH}"),
+    "parameters.msh": (
+        msh22(nodes="ParametricNodes"),
+        r"has \$ParametricNodes, which are not read; write Mesh.SaveParam",
+    ),
+    "split.msh": (msh22(partition=2), "is one of several partitions; write all into one file: Mesh.PartitionSplit"),
+    "partitions.msh": (
+        msh41().replace("$Nodes", "$PartitionedEntities\n$EndPartitionedEntities\n$Nodes"),
+        r"has \$PartitionedEntities, which are not read; write the mesh before it is partitioned",
+    ),
+    "order.msh": (msh41().replace("2 1 3 2\n", "2 1 16 2\n"), f"has cells 'quad8'; {LINEAR}: Mesh.ElementOrder = 1"),
+    "short.msh": (msh41().replace("$EndElements", ""), "it is damaged, or has what is not supported; write it again"),
+    "system.bdf": (
+        NASTRAN["small"].replace("GRID    3       ", "GRID    3       7"),
+        "GRID 3 is in coordinate system 7; write all in the basic one, CP = 0",
+    ),
+    "default.bdf": (NASTRAN["wide"].replace("BULK\n", "BULK\nGRDSET,,1\n"), "GRDSET  is in coordinate system 1"),
+    "include.bdf": (NASTRAN["wide"].replace("BULK\n", "BULK\ninclude 'a.bdf'\n"), OTHER_FILES),
+    "order.bdf": (NASTRAN["small"].replace("CTRIA3", "CTRIA6"), f"has cells CTRIA6; {LINEAR}"),
+    "solid.bdf": (NASTRAN["wide"].replace("CQUAD4", "CTETRA"), f"has cells CTETRA; {LINEAR}"),
+    "hexahedra.e": (
+        lambda path: write_exodus(path, kinds=("TETRA4", "TRI3")),
+        f"has cells 'TETRA4' of 4 points; {LINEAR}",
+    ),
+    "raw.vtu": (raw_pieces, "has 4 pieces in raw bytes; write it in text or base64, or as one piece"),
+    "lz4.vtu": (replaced(pieces, b"ZLib", b"LZ4"), "is compressed by LZ4, which is not read; write it with ZLib"),
+    "ghosts.vtu": (one_of_several, OTHER_FILES),
+    "parallel.vtu": (replaced(pieces, b'"Unstr', b'"PUnstr'), OTHER_FILES),
+    "parallel.pvtu": ("<VTKFile/>", OTHER_FILES),
+    "poly.vtk": (
+        "# vtk DataFile Version 3.0\na\nASCII\nDATASET POLYDATA\n",
+        r"not supported \(Only VTK .*not POLYDATA\)",
+    ),
+    "binary.vtk": (
+        replaced(
+            lambda path: (
+                write_mesh(path.with_suffix(".vtu"), CLEAN) or meshio.read(path.with_suffix(".vtu")).write(path)
+            ),
+            b"CELL_TYPES",
+            b"NO_TYPES__",
+        ),
+        "has what is not supported.*; write it again, in text",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_is_not_read_is_refused_by_its_reason(tmp_path, name):
+    content, says = REFUSED[name]
+    if callable(content):
+        content(tmp_path / name)
+    else:
+        (tmp_path / name).write_text(content)
+    with pytest.raises(MeshError, match=says) as caught:
+        read_shape(tmp_path / name, 1e-3)
+    assert not re.search(r"\(np\.|Error\)|\('", str(caught.value))
