@@ -72,10 +72,10 @@ COMMANDS = {
     "predict": Row(STUDIES, "predict", "predict", "Recommend a definition for one mesh, or a mesh for one error."),
     "identify": Row(STUDIES, "identify", "identify", "Find a material's constants from measured tests."),
     "springs": Row(STUDIES, "predict", "springs", "Write the springs of one mesh for another program."),
-    "browse": Row(RESULTS, "results", "browse", "Browse the results of a study."),
+    "browse": Row(RESULTS, "results", "browse", "Open the page of a study in a browser."),
     "info": Row(RESULTS, "results", "info", "Say what a dataset holds, and where it comes from."),
     "diff": Row(RESULTS, "diff", "diff", "Say what changed from one dataset to another, scene by scene."),
-    "export": Row(RESULTS, "results", "export", "Write a dataset as CSV, Parquet or Zarr."),
+    "export": Row(RESULTS, "results", "export", "Write a group of a dataset as CSV or Parquet."),
     "archive": Row(RESULTS, "results", "archive", "Pack the results of a study into one file."),
     "schema": Row(HOUSE, "study", "schema", "Print the JSON schema of studies, for editors."),
 }

@@ -1,6 +1,5 @@
 """Commands for results: info, export, browse and archive."""
 
-import tempfile
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -35,73 +34,38 @@ def info(path: Path, study: bool) -> None:
 @click.command(
     epilog=examples(
         "springtune export results/paper --to cells.csv",
-        "springtune export results/paper --group sensitivity --select beam=200x30 --to curves.parquet",
-        "springtune export results/paper --group fields --select beam=200x40,mesh_type=free --to network.nc",
-        "springtune export results/paper --select beam=200x40,load=traction --to traction.pvd",
-        "springtune export results/shapes --select shape=cook,definition=lattice --to cook.vtu",
+        "springtune export results/paper --group sensitivity --to curves.parquet",
     )
 )
 @click.argument("path", type=click.Path(path_type=Path))
-@click.option(
-    "--to",
-    "target",
-    required=True,
-    type=click.Path(path_type=Path),
-    help="File: .csv, .parquet, .zarr, .nc, .vtu or .pvd.",
-)
+@click.option("--to", "target", required=True, type=click.Path(path_type=Path), help="File: .csv or .parquet.")
 @click.option("--group", default="/", show_default=True, help="Group of the table, such as sensitivity.")
-@click.option("--variables", default="", help="Names of variables, with commas between; all without.")
-@click.option("--select", "pairs", multiple=True, help="Labels to keep, such as beam=200x40,mesh_size='5 mm'.")
 @click.option("--force", is_flag=True, help="Replace the file if it is there.")
-def export(path: Path, target: Path, group: str, variables: str, pairs: tuple[str, ...], force: bool) -> None:
-    """Write a dataset as a long table, one row a cell (CSV, Parquet), whole (Zarr), or one mesh with its fields (.nc).
-
-    For ParaView: one scene with displacements, their error, and each spring's stiffness and force (.vtu), or a
-    collection of all that are selected (.pvd); of shapes, by shape, load and definition, the networks that are drawn.
+def export(path: Path, target: Path, group: str, force: bool) -> None:
+    """Write a group of a dataset as a long table, one row a cell, with all its variables and dimensions.
 
     PATH is results/<study>, or its dataset.nc.
     """
     from ..studies.output import reading
     from ..studies.output.export import export as write
-    from ..studies.output.export import selected
 
-    names = [name.strip() for name in variables.split(",") if name.strip()]
     reading.check_opens(path)
     with reading.open(path) as tree, reading.guarded(path):
-        click.echo(write(tree, target, group, names, selected(pairs), force))
+        click.echo(write(tree, target, group, force))
 
 
-@click.command(
-    epilog=examples(
-        "springtune browse results/paper", "springtune browse results/paper/dataset.nc --port 8000 --no-open"
-    )
-)
-@click.argument("dataset", type=click.Path(path_type=Path))
-@click.option("--port", type=click.IntRange(0, 65535), default=0, help="Port; by default one that is free.")
-@click.option("--no-open", is_flag=True, help="Print the address, and open no browser.")
-def browse(dataset: Path, port: int, no_open: bool) -> None:
-    """Browse a study's results: serve the page of a dataset to this machine alone, until Ctrl-C.
+@click.command(epilog=examples("springtune browse results/paper"))
+@click.argument("path", type=click.Path(path_type=Path))
+def browse(path: Path) -> None:
+    """Open the page of a study's results in a browser, and print its path.
 
-    DATASET is results/<study>/dataset.nc, or its folder. The address holds a token, anew each time.
+    PATH is results/<study>, or a file in it.
     """
-    from ..studies.output.browse.server import Server  # here, so that --help does not wait for it
-    from ..studies.output.reading import check_opens
-
-    check_opens(dataset)
-    server = Server(dataset, port)
-    try:
-        with server:
-            click.echo(f"{server.address}\nCtrl-C ends it.")
-            if no_open:
-                server.serve_forever()
-            # All users of the machine see a browser's arguments, so the address goes through a private file.
-            with tempfile.TemporaryDirectory(prefix="springtune-") as folder:
-                way = Path(folder, "browse.html")
-                way.write_text(f'<meta http-equiv="refresh" content="0; url={server.address}">')
-                click.launch(str(way))
-                server.serve_forever()
-    except KeyboardInterrupt:
-        click.echo()
+    page = (path if path.is_dir() else path.parent) / "index.html"
+    if not page.is_file():
+        raise click.ClickException(f"{page}: there is no such page; run the study, which writes it")
+    click.echo(str(page))
+    click.launch(str(page))
 
 
 @click.command(

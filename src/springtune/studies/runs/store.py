@@ -35,6 +35,10 @@ class DamagedError(Exception):
         return f"{self.args[0]}: {self.args[1]}; delete it, and call the same command again, which makes it anew"
 
 
+class OtherVersionError(DamagedError):
+    """A sound file of another version of springtune, which has none of the results that are asked for."""
+
+
 @contextmanager
 def _opened(path: str | Path) -> "Iterator[tuple[h5py.File, dict[str, dict[str, Any]]]]":
     """Context of a file, and its scalars."""
@@ -44,7 +48,10 @@ def _opened(path: str | Path) -> "Iterator[tuple[h5py.File, dict[str, dict[str, 
         raise DamagedError(path, "it is missing")
     try:
         with h5py.File(path) as file:
-            name, scalars = json.loads(file[SCALARS][()].tobytes())
+            content = file[SCALARS][()]
+            if not isinstance(content, np.ndarray):
+                raise OtherVersionError(path, "another version of springtune wrote it")
+            name, scalars = json.loads(content.tobytes())
             if name != Path(path).name:
                 raise ValueError(f"it is {name}")
             yield file, scalars
@@ -57,8 +64,11 @@ def stored(path: str | Path) -> set[str]:
     """Keys of stored results."""
     if not Path(path).exists():
         return set()
-    with _opened(path) as (_, scalars):
-        return set(scalars)
+    try:
+        with _opened(path) as (_, scalars):
+            return set(scalars)
+    except OtherVersionError:
+        return set()
 
 
 def read(path: str | Path, names: Iterable[str], fields: Sequence[str] = ()) -> dict[str, dict[str, Any]]:
@@ -131,7 +141,7 @@ def add(path: str | Path, results: Mapping[str, Mapping[str, Any]]) -> None:
     scalars: dict[str, dict[str, Any]] = {}
     # In memory: what is on the disk is written at once.
     with h5py.File("results", "w", driver="core", backing_store=False, libver="latest") as file:
-        if Path(path).exists():
+        if stored(path):
             with _opened(path) as (before, known):
                 scalars = {name: kept for name, kept in known.items() if name not in results}
                 for name in before:

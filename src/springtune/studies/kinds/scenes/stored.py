@@ -60,7 +60,7 @@ def refuse(folder: str | Path, name: str, key: str, why: dict[str, str]) -> None
 def is_stored(folder: str | Path, name: str, key: str) -> bool:
     """Whether a mesh, or the reason why it cannot be made, is stored."""
     path, notes = files(folder, name)
-    if not notes.exists():
+    if NOTES not in store.stored(notes):
         return False
     known = read_notes(folder, name)
     return bool(known["key"] == key and ("message" in known or path.exists()))
