@@ -260,6 +260,28 @@ def test_an_implicit_engine_is_given_what_its_steps_lack(name):
         engine.typed_dampers(damping, st.Setting("1/60"))
 
 
+@pytest.mark.parametrize(
+    ("engine", "of_springs", "of_triangles"),
+    [
+        ("newton-vbd", {"kd"}, {"tri_kd"}),
+        ("newton-semi-implicit", {"kd"}, set()),
+        ("mujoco-discrete", {"joint damping", "tendon damping"}, {"flex damping"}),
+        ("mujoco-euler", {"joint damping", "tendon damping"}, {"flex damping"}),
+        ("xpbd", {"damping"}, {"damping"}),
+    ],
+)
+def test_dampers_are_those_of_springs_or_of_triangles(engine, of_springs, of_triangles):
+    for definition, names in (("patch", of_springs), ("delingette", of_triangles)):
+        one = scene(size="10 mm", definition=definition)
+        damping = st.damping_of(one, decrement=DECREMENT)
+        typed = st.ENGINES[engine].typed_dampers(damping, st.Setting(1e-4))
+        assert set(typed) == names
+    if "tri_kd" in typed:
+        left, net = damping.implicit_euler(1e-4), st.SpringNet.from_scene(one, errors=False)
+        shear = st.ENGINES[engine].typed(net)["tri_ke"]
+        assert typed["tri_kd"] == pytest.approx(left.stiffness_damping * shear / 2)
+
+
 # -- fits --------------------------------------------------------------------------------------------------------------
 
 
