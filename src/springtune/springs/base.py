@@ -112,6 +112,9 @@ class Definition(Declared):
         Whether it has the material's law at finite strain; its nonlinear error is then against a reference of that law.
     st_venant : bool
         Whether it is linear triangles of St. Venant and Kirchhoff's law in nonlinear kinematics.
+    cost : int
+        What deriving springs costs: 0 for closed forms, 1 for a few solves, 2 for a search of seconds, which
+        `springtune.predict` tries only if it is asked to.
 
     Examples
     --------
@@ -130,6 +133,7 @@ class Definition(Declared):
     anisotropic: bool
     finite_strain: bool
     st_venant: bool = False
+    cost: int = 0
 
     @property
     def law(self) -> str:
@@ -226,6 +230,7 @@ def definition(
     anisotropic: bool = False,
     finite_strain: bool = False,
     st_venant: bool = False,
+    cost: int = 0,
 ) -> Callable[[Function], Function]:
     """Declare a function as a definition, by a decorator that returns it unchanged.
 
@@ -235,7 +240,7 @@ def definition(
         Label in a study and in the dataset.
     order : float, optional
         Place in the order of labels, between its neighbours' numbers; by default last.
-    uniform, cells, uniaxial, needs, anisotropic, finite_strain, st_venant
+    uniform, cells, uniaxial, needs, anisotropic, finite_strain, st_venant, cost
         As of `Definition`.
 
     Returns
@@ -268,7 +273,7 @@ def definition(
             raise ValueError(f"definition {name!r}: cells {cells!r}; give the corners of cells that it can have: 3, 4")
         if needs not in NEEDS:
             raise ValueError(f"definition {name!r}: needs {needs!r}; give one of {', '.join(map(repr, NEEDS))}")
-        traits = uniform, tuple(cells), uniaxial, needs, anisotropic, finite_strain, st_venant
+        traits = uniform, tuple(cells), uniaxial, needs, anisotropic, finite_strain, st_venant, cost
         DEFINITIONS.declare(Definition(name, function, order, *traits))
         return function
 

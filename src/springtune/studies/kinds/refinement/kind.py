@@ -16,6 +16,7 @@ from springtune.springs import DEFINITIONS
 
 from ...config.checks import check_able, check_beam_material, check_compressible, check_known, check_made
 from ...config.fields import (
+    POISSON_RATIO,
     BeamName,
     DefinitionNames,
     Force,
@@ -68,7 +69,7 @@ ENDS = {
     "force": quantity("force"),
     "thickness": quantity("length"),
     "young_modulus": quantity("stress"),
-    "poisson_ratio": number("a value from 0 to 0.5, such as 0.3", 0, 0.5),
+    "poisson_ratio": POISSON_RATIO,
     "stiffness_scale": number("a value above 0, such as 0.5", 0, inf, above=True),
 }
 """How the ends of each parameter are read."""
