@@ -313,6 +313,7 @@ def pieces(path, binary=True, ghosts=False, **options):
         marks = {"right": (x == 60).astype(int), "left": (x == 0).astype(int), "u": POINTS[used - 1]}
         if number == 1:
             del marks["left"]
+        marks |= {"vtkGhostType": np.ones(len(used), np.uint8)} if ghosts else {}
         data = {"hard": [np.array(hard, int)]} | ({"vtkGhostType": [ghost]} if ghosts else {})
         places = np.column_stack([POINTS[used - 1], -0.0 * used])
         one = meshio.Mesh(places, [(kind, corners.reshape(cells.shape))], point_data=marks, cell_data=data)
@@ -320,7 +321,8 @@ def pieces(path, binary=True, ghosts=False, **options):
         found.append(path.read_text())
     texts = [re.search(r"<Piece.*?</Piece>", text, re.DOTALL)[0] for text in found]
     empty = '<Piece NumberOfPoints="0" NumberOfCells="0"></Piece>'
-    path.write_text(found[0].replace(texts[0], "\n".join([texts[0], empty, *texts[1:]])))
+    whole = found[0].replace(texts[0], "\n".join([texts[0], empty, *texts[1:]]))
+    path.write_text(re.sub('version="[0-9.]+"', 'version="2.3"', whole) if ghosts else whole)
 
 
 def write_med(path):
