@@ -104,6 +104,7 @@ ABAQUS = {
         + "".join(line for line in NODES.splitlines(keepends=True) if not re.match(r"(1|6|11),", line)),
     ),
     "exponents of Fortran and directions": INP.replace("15.0, 10.0\n", "1.5D1, 1.0d+01, 0., 0., 0., 1.\n"),
+    "cells of sides": INP + "*ELSET, ELSET=left\n1, 6\n*ELSET, ELSET=right\n4, 11\n",
     "points of parts": INP + "*NSET, NSET=hard, ELSET=hard\n*NSET, NSET=soft, ELSET=soft\n",
     "entities of Gmsh": INP.replace(MESH, f"*NODE\n{NODES}" + blocks(hard=", ELSET=Surface1", soft=", ELSET=Surface2"))
     + "*ELSET, ELSET=all\nhard, soft\n",
