@@ -190,10 +190,11 @@ def test_every_parameter_is_that_of_the_scene(load, tmp_path, parameter, first, 
     assert float(one.deformation_error[2]) == pytest.approx(result.error, abs=1e-9)
 
 
-def test_a_logarithm_of_zero_is_refused(refusal):
+@pytest.mark.parametrize("start", ["0", "-0.3"])
+def test_a_logarithm_of_no_positive_number_is_refused(refusal, start):
     spacing = ("to: 2", "to: 0.5\n    spacing: logarithmic")
-    text = study_text("refinement", ("stiffness_scale", "poisson_ratio"), ("from: 0.5", "from: 0"), spacing)
-    assert "refine.scale.from: 0 has no logarithm; give a larger one, or spac" in refusal(text)
+    text = study_text("refinement", ("stiffness_scale", "poisson_ratio"), ("from: 0.5", f"from: {start}"), spacing)
+    assert f"refine.scale.from: {start} has no logarithm; give a larger one, or spac" in refusal(text)
 
 
 def test_an_output_without_a_section_is_refused(refusal):

@@ -168,8 +168,8 @@ def _ends(section, path, problems):
         return []
     if not found[0] < found[1]:
         problems.add((*path, "from"), f"'{section.start}' is not below 'to', '{section.stop}'; give a smaller 'from'")
-    elif section.spacing == SPACINGS[1] and not found[0]:
-        problems.add((*path, "from"), "0 has no logarithm; give a larger one, or spacing: linear")
+    elif section.spacing == SPACINGS[1] and not found[0] > 0:
+        problems.add((*path, "from"), f"{found[0]:g} has no logarithm; give a larger one, or spacing: linear")
     else:
         return found
     return []
