@@ -207,6 +207,8 @@ class Definition(Declared):
         if not isinstance(found, Springs) or len(found.relative) != len(mesh.edges):
             what = f"{len(found.relative)} springs" if isinstance(found, Springs) else type(found).__name__
             raise DefinitionError(f"returns {what}; return springtune.Springs, one for each of {len(mesh.edges)} edges")
+        if not found.energies:
+            _held_together(mesh, found.relative)
         return found
 
 
@@ -312,6 +314,17 @@ def from_rectangles(mesh: Mesh, first: np.ndarray, second: np.ndarray, diagonal:
 
 NO_STIFFNESS = 1e-12
 """Stiffness over E t that counts as zero: of terms that cancel rounding decides the sign."""
+
+
+def _held_together(mesh: Mesh, stiffness: np.ndarray) -> None:
+    """Refuse springs that are fewer than n particles need, 2 n - 3 (Maxwell 1864), once those without stiffness go."""
+    none = np.abs(stiffness) <= 1e3 * NO_STIFFNESS * np.abs(stiffness).max()
+    free = 2 * len(mesh.points) - 3 - int((~none).sum())
+    if none.any() and free > 0:
+        raise DefinitionError(
+            f"gives {none.sum()} of {len(stiffness)} springs no stiffness, and without them {free} or more motions of "
+            "the mesh meet no resistance; use a mesh without right angles, such as mesh type 'structured' or 'free'"
+        )
 
 
 def not_negative(stiffness: np.ndarray) -> np.ndarray:
