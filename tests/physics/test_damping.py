@@ -310,7 +310,9 @@ def test_a_fit_of_few_points_a_period_is_refused(points, period):
     times = np.arange(80) * period / points
     moved = np.exp(-0.1 * times / period) * np.cos(2 * np.pi * times / period)
     if points < 4:
-        with pytest.raises(ValueError, match="points a period of .* a faster swing would give.* take 4 points a period"):
+        with pytest.raises(
+            ValueError, match="points a period of .* a faster swing would give.* take 4 points a period"
+        ):
             st.fit_decay(times, moved)
     else:
         assert st.fit_decay(times, moved).period == pytest.approx(period, rel=1e-6)
