@@ -181,7 +181,7 @@ def test_predict_shows_them_if_asked(capsys):
     ask = "predict --beam 60x20 --mesh free --size 5mm --young 1MPa --poisson 0.33333"
     for more, shown in (("", False), (" --best-springs", True)):
         main((ask + more).split(), standalone_mode=False)
-        assert ("best-springs" in capsys.readouterr().out) == shown
+        assert ("\n  best-springs " in capsys.readouterr().out) == shown
     with pytest.raises(ValueError, match="also: 'bst-springs' is unknown; did you mean 'best-springs'"):
         st.predict(BEAM, space().mesh, THIRD, also=["bst-springs"])
 

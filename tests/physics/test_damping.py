@@ -6,6 +6,7 @@ from functools import cache
 import mujoco
 import numpy as np
 import pytest
+from scipy.linalg import eigh
 
 import springtune as st
 from springtune.mechanics.dynamics import Motion
@@ -89,12 +90,21 @@ def test_dashpots_are_beta_times_stiffness():
     assert damping.stiffness_damping == pytest.approx(2 * 0.05 / damping.frequency)
 
 
-def test_the_loaded_mode_is_a_mode():
-    motion = scene().motion()
+@pytest.mark.parametrize("mesh_type", ["right", "structured", "free"])
+@pytest.mark.parametrize("load", ["pressure", "traction", "bending", "shear"])
+@pytest.mark.parametrize("definition", ["area", "delingette"])
+def test_the_loaded_mode_has_the_largest_share_of_all_modes(mesh_type, load, definition):
+    beam = st.Beam("200 mm", "20 mm")
+    material = st.Material("1 MPa", 0.3, density="1000 kg/m^3")
+    mesh = st.make_mesh(beam, mesh_type, 0.02 / 3)
+    motion = st.Scene(beam, mesh, material, load, "1 N", definition=definition).motion()
     frequency, shape = motion.loaded_mode
+    squares, modes = eigh(motion.stiffness_matrix.toarray(), np.diag(motion.mass))
+    shares = (modes.T @ motion.network.reduce(motion.load)) ** 2 / squares
+    assert frequency == pytest.approx(np.sqrt(squares[np.argmax(shares)]), rel=1e-9)
     assert shape @ (motion.mass * shape) == pytest.approx(1)
-    away = motion.stiffness_matrix @ shape - frequency**2 * motion.mass * shape
-    assert np.linalg.norm(away) < 1e-6 * np.linalg.norm(frequency**2 * motion.mass * shape)
+    inertia = frequency**2 * motion.mass * shape
+    assert np.linalg.norm(motion.stiffness_matrix @ shape - inertia) < 1e-6 * np.linalg.norm(inertia)
 
 
 @pytest.mark.parametrize("count", [20, 100])
@@ -260,6 +270,28 @@ def test_an_implicit_engine_is_given_what_its_steps_lack(name):
         engine.typed_dampers(damping, st.Setting("1/60"))
 
 
+@pytest.mark.parametrize(
+    ("engine", "of_springs", "of_triangles"),
+    [
+        ("newton-vbd", {"kd"}, {"tri_kd"}),
+        ("newton-semi-implicit", {"kd"}, set()),
+        ("mujoco-discrete", {"joint damping", "tendon damping"}, {"flex damping"}),
+        ("mujoco-euler", {"joint damping", "tendon damping"}, {"flex damping"}),
+        ("xpbd", {"damping"}, {"damping"}),
+    ],
+)
+def test_dampers_are_those_of_springs_or_of_triangles(engine, of_springs, of_triangles):
+    for definition, names in (("patch", of_springs), ("delingette", of_triangles)):
+        one = scene(size="10 mm", definition=definition)
+        damping = st.damping_of(one, decrement=DECREMENT)
+        typed = st.ENGINES[engine].typed_dampers(damping, st.Setting(1e-4))
+        assert set(typed) == names
+    if "tri_kd" in typed:
+        left, net = damping.implicit_euler(1e-4), st.SpringNet.from_scene(one, errors=False)
+        shear = st.ENGINES[engine].typed(net)["tri_ke"]
+        assert typed["tri_kd"] == pytest.approx(left.stiffness_damping * shear / 2)
+
+
 # -- fits --------------------------------------------------------------------------------------------------------------
 
 
@@ -270,6 +302,20 @@ def test_a_fit_finds_what_made_the_points(decrement, size):
     moved = size * (5 + np.exp(-decrement * (times - 2) / 0.2) * np.cos(2 * np.pi * times / 0.2 + 1))
     found = st.fit_decay(times, moved)
     assert (found.period, found.decrement) == pytest.approx((0.2, decrement), rel=1e-5)
+
+
+@pytest.mark.parametrize("points", [1.4, 1.5, 1.9, 2.1, 2.5, 3.0, 3.9, 4.1, 5.0, 10.0])
+@pytest.mark.parametrize("period", [1e-3, 1.0, 60.0])
+def test_a_fit_of_few_points_a_period_is_refused(points, period):
+    times = np.arange(80) * period / points
+    moved = np.exp(-0.1 * times / period) * np.cos(2 * np.pi * times / period)
+    if points < 4:
+        with pytest.raises(
+            ValueError, match="points a period of .* a faster swing would give.* take 4 points a period"
+        ):
+            st.fit_decay(times, moved)
+    else:
+        assert st.fit_decay(times, moved).period == pytest.approx(period, rel=1e-6)
 
 
 def test_errors_of_a_fit_are_those_of_noise():

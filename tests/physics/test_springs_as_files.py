@@ -219,7 +219,7 @@ class TestHeader:
 
     def test_errors_are_of_the_loads_asked_for(self):
         mesh, loads = scene_of("patch").mesh, ["pressure", "compression"]
-        choices = {choice.definition: choice for choice in st.predict(BEAM, mesh, STEEL, loads=loads)}
+        choices = {choice.definition: choice for choice in st.predict(BEAM, mesh, STEEL, loads=loads, also=["patch"])}
         net = st.SpringNet.from_mesh(mesh, STEEL, "patch", beam=BEAM, loads=loads)
         assert net.header["expected_error"] == choices["patch"].errors
         for given, options in (["shake"], {"beam": BEAM}), (["traction"], {}):

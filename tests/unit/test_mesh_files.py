@@ -104,6 +104,7 @@ ABAQUS = {
         + "".join(line for line in NODES.splitlines(keepends=True) if not re.match(r"(1|6|11),", line)),
     ),
     "exponents of Fortran and directions": INP.replace("15.0, 10.0\n", "1.5D1, 1.0d+01, 0., 0., 0., 1.\n"),
+    "cells of sides": INP + "*ELSET, ELSET=left\n1, 6\n*ELSET, ELSET=right\n4, 11\n",
     "points of parts": INP + "*NSET, NSET=hard, ELSET=hard\n*NSET, NSET=soft, ELSET=soft\n",
     "entities of Gmsh": INP.replace(MESH, f"*NODE\n{NODES}" + blocks(hard=", ELSET=Surface1", soft=", ELSET=Surface2"))
     + "*ELSET, ELSET=all\nhard, soft\n",
@@ -313,6 +314,7 @@ def pieces(path, binary=True, ghosts=False, **options):
         marks = {"right": (x == 60).astype(int), "left": (x == 0).astype(int), "u": POINTS[used - 1]}
         if number == 1:
             del marks["left"]
+        marks |= {"vtkGhostType": np.ones(len(used), np.uint8)} if ghosts else {}
         data = {"hard": [np.array(hard, int)]} | ({"vtkGhostType": [ghost]} if ghosts else {})
         places = np.column_stack([POINTS[used - 1], -0.0 * used])
         one = meshio.Mesh(places, [(kind, corners.reshape(cells.shape))], point_data=marks, cell_data=data)
@@ -320,7 +322,8 @@ def pieces(path, binary=True, ghosts=False, **options):
         found.append(path.read_text())
     texts = [re.search(r"<Piece.*?</Piece>", text, re.DOTALL)[0] for text in found]
     empty = '<Piece NumberOfPoints="0" NumberOfCells="0"></Piece>'
-    path.write_text(found[0].replace(texts[0], "\n".join([texts[0], empty, *texts[1:]])))
+    whole = found[0].replace(texts[0], "\n".join([texts[0], empty, *texts[1:]]))
+    path.write_text(re.sub('version="[0-9.]+"', 'version="2.3"', whole) if ghosts else whole)
 
 
 def write_med(path):

@@ -345,6 +345,13 @@ def test_each_part_of_a_file_has_its_material(load, refusal, tmp_path, monkeypat
     del shape["parts"]
     text = yaml.safe_dump(TWO | {"shapes": {"plate": shape}, "shape_grids": {"plate": grid}})
     assert f"plate.{ending} has parts 'hard'" in refusal(text)
+    path = tmp_path / f"plate.{ending}"  # too large to be looked at as the study is read
+    if ending == "msh":
+        path.write_bytes(
+            b"$Comments\n" + READ_AT_ONCE // 10 * b"nothing at all\n" + b"$EndComments\n" + path.read_bytes()
+        )
+        cell = done(load(text), tmp_path / "results/large")[0]["shapes"].to_dataset().squeeze(drop=True)
+        assert STATUS[int(cell.status)] == "failed" and "the body has the parts" in cell.message.item()
 
 
 def test_files_of_several_sizes_show_convergence(load, refusal, tmp_path, monkeypatch):

@@ -4,14 +4,17 @@ import csv
 import itertools
 import math
 import shutil
+from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 
 import pytest
 import yaml
+from click.testing import CliRunner
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from springtune.cli import main
 from springtune.problem.geometry import Beam
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import Material
@@ -513,3 +516,27 @@ def test_a_grid_cannot_make_plane_strain_incompressible(refusal):
     said = "in plane strain, and this ratio is 0.5: in plane strain an incompressible material has no finite stiffness"
     swept = text.replace("load: traction\n", "load: traction\n    poisson_ratio: [0.2, 0.5]\n")
     assert f"grids.pull.poisson_ratio: material 'steel' is {said}" in refusal(swept)
+
+
+@pytest.mark.parametrize("ratio", ["-0.99", "-0.3", "-0.0", "0.5", "-1", "-1.2", "0.51", "nan"])
+def test_one_range_of_poissons_ratio(refusal, tmp_path, ratio):
+    """Above -1 and at most 0.5: for the library, `predict`, `springs`, and materials, grids, samples."""
+    legal, value = -1 < float(ratio) <= 0.5, float(ratio)
+    with nullcontext() if legal else pytest.raises(ValueError, match="Poisson's ratio of 'm' is .*: isotropic"):
+        Material(1e9, value, name="m")
+    sheet = ["--beam", "40x10", "--size", "5 mm", "--young", "1 GPa", "--poisson", ratio]
+    out = ["--definition", "patch", "--out", str(tmp_path / "net.csv")]
+    for call in (["predict", *sheet, "--loads", "traction"], ["springs", *sheet, *out]):
+        result = CliRunner().invoke(main, call)
+        assert result.exit_code == (0 if legal else 2), result.output
+        assert legal or f"--poisson: '{ratio}' is out of range; give a number above -1 and at most 0.5" in result.stderr
+    for text in (
+        STUDIES["small"].replace("poisson_ratio: 0.3", f"poisson_ratio: {ratio}"),
+        STUDIES["small"].replace("load: traction\n", f"load: traction\n    poisson_ratio: [{ratio}]\n"),
+        study_text("samples", ("poisson_ratio: {from: 0, to: 0.4}", f"poisson_ratio: {ratio}")),
+    ):
+        (tmp_path / "one.yaml").write_text(text)
+        if legal:
+            load_study(tmp_path / "one.yaml")
+        else:
+            assert "is out of range; give a number above -1 and at most 0.5" in refusal(text)

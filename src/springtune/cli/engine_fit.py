@@ -117,14 +117,16 @@ def fitted(
         return budget_text(search), json_text(found), best.fit if (best := search.best) else None
     body, *others = case
     make = partial(Scene, body, make_mesh(), *others, scale=scale)
+    tried: tuple[str, ...] = ()
     if asked["definition"] is not None:
         scenes, refused = [make(definition=asked["definition"])], ""
     else:
-        scenes, refused = runnable(make, CASES, ENGINES[engine], setting, springs_alone)
+        scenes, refused, tried = runnable(make, CASES, ENGINES[engine], setting, springs_alone)
     if not scenes:
         raise Unmet(refused)
     fit = fit_engine(scenes[0], engine, setting, **how)
-    return fit_text(fit, mesh_name), json_text(fit_json(fit)), fit
+    text = fit_text(fit, mesh_name) + (f"\n\nTried: {', '.join(tried)}." if tried else "")
+    return text, json_text(fit_json(fit) | {"tried": list(tried)}), fit
 
 
 def net_of_fit(fit: "EngineFit | None", _: str) -> "SpringNet":

@@ -127,8 +127,8 @@ def asked_material(
         ratio = float(poisson)
     except ValueError:
         ratio = float("nan")
-    if not 0 <= ratio <= 0.5:
-        raise ValueError(f"--poisson: '{poisson}' is out of range; give a number from 0 to 0.5")
+    if not -1 < ratio <= 0.5:
+        raise ValueError(f"--poisson: '{poisson}' is out of range; give a number above -1 and at most 0.5")
     heavy = None if density is None else asked_quantity("--density", density, "density")
     if plane == "strain" and ratio == 0.5:
         option, given = ("--poisson", f"'{poisson}'") if name is None else ("--material", f"nu of '{name}'")
@@ -403,7 +403,7 @@ def sheet_options(
             help=f"One of {', '.join(MATERIALS)}; or give --young and --poisson; of a shape one of its study.",
         ),
         click.option("--young", help="Young's modulus, such as '210 GPa'."),
-        click.option("--poisson", help="Poisson's ratio, from 0 to 0.5."),
+        click.option("--poisson", help="Poisson's ratio, above -1 and at most 0.5."),
         click.option(
             "--plane",
             type=click.Choice(PLANES),

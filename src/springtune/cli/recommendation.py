@@ -56,10 +56,15 @@ def beam_subject(beam: "Beam", material: "Material", known: "References") -> Sub
     """Beam of a prediction."""
     from ..problem.loads import LOADS
 
-    young = material.young_modulus
-    modulus = f"{young / 1e9:g} GPa" if young >= 1e9 else f"{young / 1e6:g} MPa"
-    made_of = f"{material.name}, E = {modulus}, nu = {material.poisson_ratio:g}, t = {1e3 * beam.thickness:g} mm"
-    made_of += ", plane strain" if material.plane == "strain" else ""
+    def constants(one: "Material") -> str:
+        young = one.young_modulus
+        return f"E = {young / 1e9:.6g} GPa" if young >= 1e9 else f"E = {young / 1e6:.6g} MPa"
+
+    made_of = f"{material.name}, {constants(material)}, nu = {material.poisson_ratio:g}, "
+    made_of += f"t = {1e3 * beam.thickness:g} mm"
+    if material.plane == "strain":
+        sheet = material.in_plane
+        made_of += f", plane strain: in the plane {constants(sheet)}, nu = {sheet.poisson_ratio:.4g}"
     references = {
         load: {"message": found}
         if isinstance(found, str)
@@ -123,6 +128,8 @@ def prediction_text(
     heads, *rows = TabledList(choices).table()
     kept = [place for place, head in enumerate(heads) if of_beam or head not in ("E", "nu")]
     rows = [[row[place] for place in kept] for row in (heads, *rows)]
+    if of_beam and subject.about["material"]["plane"] == "strain":
+        rows[0] = ["nu in plane" if head == "nu" else head for head in rows[0]]
     notes = [f"{name}: no reference; {found}" for name, found in subject.known.items() if isinstance(found, str)]
     for choice in choices:
         notes += [f"{choice.definition}, {part}: {reason}" for part, reason in choice.failures.items()]
@@ -148,6 +155,7 @@ def prediction_text(
         f"{KINEMATICS_TEXT} (error estimate {subject.estimate})." if of_beam else f"{KINEMATICS_TEXT}.",
         *subject.sign,
         f"{ranked} E, its error, and nu are of a patch test between rollers." if of_beam else ranked,
+        *_also_tried(choices),
     ]
     if subject.references:
         heads = ["quantity", "reference", "error estimate"]
@@ -157,7 +165,7 @@ def prediction_text(
 
 def search_text(subject: Subject, search: "MeshSearch", springs_alone: bool = False) -> str:
     """Text of a search for a mesh."""
-    from ..prediction.search import answer_text
+    from ..prediction.search import answer_text, tried_names
 
     where, steps = "in" if subject.load else "under", subject.dense
     wanted = f"{100 * search.error:.6g} %"
@@ -185,10 +193,11 @@ def search_text(subject: Subject, search: "MeshSearch", springs_alone: bool = Fa
         change = "extrapolated by its change over the last doubling"
         explained.append(f"None: a definition is given up if its error, {change},")
         explained.append(f"is too large at {search.most:,} particles, too.")
-    counts = [one.particles for one in search.tried]
+    counts, names = [one.particles for one in search.tried], tried_names(search.tried, springs_alone)
     lines += [
         "",
         f"Solved: {len(search.tried)} meshes of {min(counts, default=0):,} to {max(counts, default=0):,} particles.",
+        f"Tried: {', '.join(name for name in names if any(one.worst(name) < math.inf for one in search.tried))}.",
         f"A mesh counts if its error and that of all finer meshes tried, up to twice as fine, stay below {wanted},",
         "with a margin: the last change may happen once more. Sizes between whole divisions are tried, too.",
         "Meshes are ranked by their particles.",
@@ -214,6 +223,7 @@ def prediction_json(
         | {
             "recommended": first,
             "recommended_springs_alone": plain,
+            "tried": list(choices[0].tried) if choices else [],
             "choices": [_choice_json(choice) for choice in choices],
         }
     )
@@ -261,24 +271,37 @@ def _at_worst(subject: Subject, choices: "Sequence[Choice]", names: Sequence[str
     return [f"at worst: {', '.join(texts)}"] if texts else []
 
 
+def _also_tried(choices: "Sequence[Choice]") -> list[str]:
+    """Line with the definitions that were tried and have no row, and with those that were not."""
+    from ..springs import DEFINITIONS
+
+    if not choices:
+        return []
+    rows, tried = [choice.definition for choice in choices], choices[0].tried
+    slow = [name for name, one in DEFINITIONS.items() if one.cost > 1 and not one.needs and name not in (*tried, *rows)]
+    left = f"; not tried, since they search for seconds: {', '.join(slow)}" if slow else ""
+    return [f"Also tried: {', '.join(name for name in tried if name not in rows) or 'none'}{left}."]
+
+
 def _listed(words: Sequence[str]) -> str:
     return " and ".join([", ".join(words[:-1]), words[-1]] if words[1:] else words)
 
 
 def _nearest(search: "MeshSearch", mesh_type: str, springs_alone: bool) -> str:
     """Reason why no mesh was found, and the nearest one."""
-    from ..prediction.choices import NEED_ENERGIES, as_sure_as, in_order
-    from ..prediction.search import SPRINGS_ALONE, size_text
+    from ..prediction.choices import as_sure_as, in_order
+    from ..prediction.search import size_text, tried_names
 
     tried = [one for one in search.tried if one.mesh_type == mesh_type]
-    names = [(one, name) for one in tried for name in one.errors if name in SPRINGS_ALONE or not springs_alone]
+    allowed = tried_names(tried, springs_alone)
+    names = [(one, name) for one in tried for name in one.errors if name in allowed]
     near = [(one.worst(name), one, name) for one, name in names if one.worst(name) < math.inf]
     if not near:
         return f"none; of at most {search.most:,} particles there is no mesh, or no network on it is stable"
     ordered = in_order(
         near,
         lambda found: found[0],
-        lambda found: (found[2] in NEED_ENERGIES, found[1].particles, found[2], found[1].size),
+        lambda found: (found[2] in found[1].energies, found[1].particles, found[2], found[1].size),
         as_sure_as(search.known),
     )
     worst, one, name = ordered[0]
@@ -292,7 +315,9 @@ def _nearest(search: "MeshSearch", mesh_type: str, springs_alone: bool) -> str:
 
 
 def _choice_json(choice: "Choice") -> dict[str, Any]:
-    return asdict(choice) | {"worst": choice.worst}
+    found = asdict(choice) | {"worst": choice.worst}
+    del found["tried"]  # of all choices together
+    return found
 
 
 def json_text(content: dict[str, Any]) -> str:

@@ -15,6 +15,7 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 
 from ..handover.net import SpringNet
+from ..handover.newton import membrane
 from ..handover.simulation import WORDS
 from ..mechanics.integrators import PRECISIONS
 from ..problem.quantities import positive
@@ -129,12 +130,18 @@ SPRING = Parameter("N/m", "k of the definition, one for each spring")
 """Stiffness of a spring."""
 
 
+def _of_triangles(damping: Damping) -> float:
+    shear, _ = membrane(SpringNet.from_scene(damping.scene, errors=False))
+    return float(damping.stiffness_damping * shear / 2)
+
+
 DAMPERS: dict[str, Callable[[Damping], Any]] = {
     "alpha": lambda damping: damping.mass_damping,
     "alpha m, one for each particle": lambda damping: damping.particle_dampers,
-    "beta": lambda damping: damping.stiffness_damping,
     "beta k, one for each spring": lambda damping: damping.dashpots,
     "beta k, one for all springs": lambda damping: damping.dashpots.mean(),
+    "beta of triangles": lambda damping: damping.stiffness_damping,
+    "beta tri_ke / 2 of triangles": _of_triangles,
 }
 """Dampers that are typed into engines, by the formula of their parameter; each alone has the damping ratio."""
 
@@ -310,7 +317,7 @@ class Engine(Declared):
         Returns
         -------
         dict of str to float or ndarray
-            In the units of `dampers`.
+            In the units of `dampers`; those of springs where the scene has springs alone, else those of triangles.
 
         Raises
         ------
@@ -328,7 +335,9 @@ class Engine(Declared):
         2.402
         """
         left = damping.implicit_euler(setting.step) if self.implicit else damping
-        return {name: DAMPERS[one.formula](left) for name, one in self.dampers.items()}
+        unfit = "one for" if damping.scene.springs.energies else "of triangles"
+        typed = {name: one.formula for name, one in self.dampers.items() if unfit not in one.formula}
+        return {name: DAMPERS[formula](left) for name, formula in typed.items()}
 
     def start(self, net: SpringNet, setting: Setting, damping: float) -> Session:
         """Start a session.

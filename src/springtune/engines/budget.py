@@ -15,7 +15,7 @@ from ..handover.net import SpringNet
 from ..mesh import MESH_TYPES, Mesh
 from ..mesh.groups import GroupedMesh
 from ..mesh.outlines import mesh_shape
-from ..prediction.choices import CASES, check_loads, check_names, predict
+from ..prediction.choices import CASES, check_loads, check_names, trial
 from ..problem.compare import error_text
 from ..problem.geometry import Beam
 from ..problem.materials import AnyMaterial
@@ -227,7 +227,7 @@ def fit_budget(
         """Choices of the best definitions on a mesh."""
         nonlocal why
         make = partial(Scene, beam, named[1], material, load, force, scale=scale)
-        scenes, refused = runnable(make, names, chosen, start, springs_alone, most=2)
+        scenes, refused, _ = runnable(make, names, chosen, start, springs_alone, most=2)
         why = why or refused
         found = []
         for scene in scenes:
@@ -272,21 +272,24 @@ def graded_meshes(body: Beam | Shape, name: str, make: Callable[[float], One]) -
 
 def runnable(
     make: "partial[Scene]", loads: Iterable[str], engine: Engine, setting: Setting, springs_alone: bool, most: int = 1
-) -> tuple[list[Scene], str]:
-    """Scenes of the best definitions that an engine takes, at most some; and why there is no other one."""
+) -> tuple[list[Scene], str, tuple[str, ...]]:
+    """Scenes of the best definitions that an engine takes, at most some; why there is no other one; what was tried."""
     body, mesh, material, load, *_ = make.args
     about: dict[str, Any] = {"load": load} if isinstance(body, Shape) else {"loads": loads}
-    found: list[Scene] = []
-    refused = "no definition has a stable network on this mesh; take another mesh"
-    for choice in predict(body, mesh, material, **about):
-        if len(found) < most and choice.worst < np.inf and not (springs_alone and choice.energies):
-            scene = make(definition=choice.definition)
+    tried, taken, refused = trial(body, mesh, material, **about), dict[str, Scene](), dict[str, str]()
+    while True:
+        able = [one for one in tried.choices(refused) if one.worst < np.inf and not (springs_alone and one.energies)]
+        # Of several with one stiffness matrix, and so the same errors, the first.
+        names = [*{round(one.worst, 9): one.definition for one in reversed(able)}.values()][: -most - 1 : -1]
+        for name in [name for name in names if name not in taken]:
+            taken[name] = make(definition=name)
             try:
-                engine.start(net_of(scene), setting, 1.0)
-                found.append(scene)
+                engine.start(net_of(taken[name]), setting, 1.0)
             except EngineError as error:
-                refused = str(error)
-    return found, refused
+                refused[name] = str(error)
+        if not set(names) & set(refused):
+            why = next(reversed(refused.values()), "no definition has a stable network on this mesh; take another mesh")
+            return [taken[name] for name in names], why, tried.tried
 
 
 def _split(

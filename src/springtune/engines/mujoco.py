@@ -34,8 +34,8 @@ TYPED = {
 }
 """Stiffness of a tendon; or what an ``elastic2d="stretch"`` flex has."""
 
-JOINTS = {"joint damping": Parameter("N s/m", "alpha m, one for each particle")}
-STIFF = {"tendon damping": DASHPOT, "flex damping": Parameter("s", "beta")}
+JOINTS = {"joint damping": Parameter("N s/m", "alpha m, one for each particle")}  # MuJoCo 4 refuses it on a flex
+STIFF = {"tendon damping": DASHPOT, "flex damping": Parameter("s", "beta of triangles")}
 """Dampers over stiffness. `implicit` and `implicitfast` leave out what a tendon between two bodies does to the other
 one, so that it slows them as a mass does: there, joints alone damp as they should."""
 

@@ -41,6 +41,7 @@ FASTEST = 1e30
 """Largest velocity [m/s]: none. By default Newton has 1e5."""
 
 TRI_KE = Parameter("N/m", "mu h = E h / (2 (1 + nu))")
+TRI_KD = Parameter("N s/m", "beta tri_ke / 2 of triangles")
 VBD = {"ke": SPRING, "tri_ke": TRI_KE, "tri_ka": Parameter("N/m", "lambda h = E h nu / (1 - nu^2)")}
 SEMI_IMPLICIT = {"ke": SPRING, "tri_ke": TRI_KE, "tri_ka": Parameter("N/m", "(lambda + mu) h = E h / (2 (1 - nu))")}
 STYLE3D = {"tri_aniso_ke": Parameter("N/m", "(E h, E h, E h / 2) along, across, in shear; for nu = 0 alone")}
@@ -170,7 +171,7 @@ def _declared(solver: str, **own: Any) -> dict[str, Any]:
         "extra": "newton",
         "precisions": ("float32",),
         "laws": ("biquadratic",),
-        "dampers": {"kd": DASHPOT},
+        "dampers": {"kd": DASHPOT} | ({"tri_kd": TRI_KD} if solver == "VBD" else {}),
         "measured": "1e-3, ten scenes, by the law that it has",
         "source": "Newton 1.8, newton.solvers",
     }

@@ -31,6 +31,9 @@ OWN_UNITS = {"rest_slope": "1/m", "stiffening": "1"}
 COMPLIANCE_UNITS = {"area": "m3/N", "biquadratic": "m3/N", "incompressible": "1/(N m)", "compressible": "1/(N m)"}
 
 
+WELL_SHAPED = "take a mesh with less slender or obtuse cells"
+
+
 @dataclass(frozen=True, eq=False)
 class Blocks:
     """Constraints of cells of one kind: `compliance` is (n_cells, m, m), `values` have a row for each cell."""
@@ -54,12 +57,12 @@ def compliances(net: Net) -> dict[str, Any]:
     return found | {f"{one.kind} compliance": one.compliance for one in blocks(net)}
 
 
-def _check_positive(net: Net, values: np.ndarray, which: str, count: int) -> None:
+def _check_positive(net: Net, values: np.ndarray, which: str, count: int, remedy: str = WELL_SHAPED) -> None:
     negative = int((values < 0).sum())
     if negative:
         raise ValueError(
             f"definition '{net.header['definition']}': {negative} of {count} {which}, and no compliance of XPBD is "
-            "negative; take a mesh with less slender or obtuse cells, or 'patch' or 'lattice', whose springs all pull"
+            f"negative; {remedy}, or 'patch' or 'lattice', whose springs all pull"
         )
 
 
@@ -78,7 +81,8 @@ def _blocks(net: Net, terms: Terms) -> Blocks:
         return Blocks(kind, cells, np.linalg.inv(stiffness), {"rest_length": values["rest_length"]})
     areas = values["rest_area"]
     if kind == "area":
-        _check_positive(net, values["modulus"], "areas have a negative modulus", len(cells))
+        which = "areas have a negative modulus: springs alone have a Poisson's ratio of 1/3, the material a smaller one"
+        _check_positive(net, values["modulus"], which, len(cells), "take 'delingette'")
         return Blocks(kind, cells, (areas / values["modulus"])[:, None, None], {"rest_area": areas})
     slopes = area_slopes(net.points[cells].transpose(2, 1, 0)).transpose(2, 1, 0) / areas[:, None, None]
     kept = {"rest_area": areas, "rest_slope": slopes}
@@ -117,6 +121,7 @@ def xpbd(net: Net) -> str:
         header=dict(net.header) | {"springs_without_stiffness_left_out": int((~there).sum())},
         net=net,
         simulation=simulation,
+        sweeps=max(10, int((2 * simulation.implicit_step / simulation.largest_step) ** 2)),
         there=there,
         inverse_masses=np.where(whole, 0.0, 1 / simulation.masses),
         held_directions=np.argwhere(net.held & ~whole[:, None]),

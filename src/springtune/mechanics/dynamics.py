@@ -32,6 +32,9 @@ from .stepping import Moving, make_stepper
 CHECK = 64
 """Steps between checks of an explicit run; a check costs about two steps, one for rest some twenty."""
 
+MODES, MODE_RESIDUAL = 12, 1e-9
+"""Vectors of Lanczos' method between looks at its modes; how far inertia may move a mode from its shape [1]."""
+
 BLOWN_UP = 1e3
 """Displacement over the largest of the network's extents beyond which a run has left its model."""
 
@@ -144,28 +147,35 @@ class Motion(Moving):
     def loaded_mode(self) -> tuple[float, np.ndarray]:
         """Frequency [rad/s] and shape of the mode that has the largest share in the static answer to the load.
 
-        By Lanczos' method from the static answer, which keeps to the load's symmetry; one factorization. The shape
-        (unknowns,) has an inertia of 1.
+        By Lanczos' method from the static answer, which keeps to the load's symmetry; one factorization. It ends when
+        modes that have converged leave less of the answer than the largest share. The shape (unknowns,) has an inertia
+        of 1.
         """
         factor, load = self.network.rest_factor, self.network.reduce(self.load)
         if not load.any():
             raise ValueError("no load, so no mode is loaded; ask the motion under the load, without released=True")
         found: list[np.ndarray] = []
-        vector = factor.solve(load)
-        for _ in range(min(12, len(load))):
+        solved: list[np.ndarray] = []
+        vector = answer = factor.solve(load)
+        while True:
             for _ in range(2):
                 for other in found:
                     vector = vector - (other @ (self.mass * vector)) * other
             size = np.sqrt(vector @ (self.mass * vector))
-            if size <= 1e-12 * (np.sqrt(found[0] @ (self.mass * found[0])) if found else 0.0):
-                break
+            last = len(found) == len(load) or size <= 1e-12 * (np.sqrt(answer @ (self.mass * answer)) if found else 0.0)
+            if last or found and len(found) % MODES == 0:
+                basis = np.array(found)
+                squares, shapes = np.linalg.eigh(basis @ (self.stiffness_matrix @ basis.T))
+                shares = (shapes.T @ (basis @ load)) ** 2 / squares
+                modes, images = shapes.T @ basis, shapes.T @ np.array(solved)
+                off = images - ((images * modes) @ self.mass)[:, None] * modes
+                left = np.sqrt((off**2 @ self.mass) / (images**2 @ self.mass))
+                shares[left > MODE_RESIDUAL] = 0.0  # not a mode yet
+                most = int(np.argmax(shares))
+                if last or shares[most] >= load @ answer - shares.sum():
+                    return float(np.sqrt(squares[most])), modes[most]
             found.append(vector / size)
-            vector = factor.solve(self.mass * found[-1])
-        basis = np.array(found)
-        squares, shapes = np.linalg.eigh(basis @ (self.stiffness_matrix @ basis.T))
-        shares = (shapes.T @ (basis @ load)) ** 2 / squares
-        most = int(np.argmax(shares))
-        return float(np.sqrt(squares[most])), shapes[:, most] @ basis
+            solved.append(vector := factor.solve(self.mass * found[-1]))
 
     @property
     def critical_damping(self) -> float:

@@ -3,7 +3,7 @@
 import re
 from collections import defaultdict
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -90,7 +90,7 @@ class _Model:
         self.elements: list[tuple[str, np.ndarray]] = []
         self.sets: dict[tuple[bool, str, str], list[np.ndarray]] = defaultdict(list)
         self.shown: dict[str, str] = {}
-        self.ranks: dict[str, int] = {}
+        self.ranks: dict[tuple[bool, str], int] = {}
         self.surfaces: list[str] = []
 
     def add(self, one: _Section, above: bool) -> None:
@@ -98,7 +98,7 @@ class _Model:
         kind = "ELSET" if one.keyword in ("ELEMENT", "ELSET") else "NSET"
         name = one.given.get(kind, "")
         if one.keyword.endswith("SECTION"):
-            self.ranks[one.given.get("ELSET", "").upper()] = 2
+            self.ranks[above, one.given.get("ELSET", "").upper()] = 2
         if one.keyword == "SURFACE":
             self.surfaces.append(one.given.get("NAME", ""))
         named = one.keyword in ("NSET", "ELSET") and ("INSTANCE" in one.given or any("." in row for row in one.rows))
@@ -108,7 +108,7 @@ class _Model:
         self.sets[above, kind, name.upper()].append(found)
         if name and "INTERNAL" not in one.given:
             self.shown.setdefault(name.upper(), name)
-            self.ranks.setdefault(name.upper(), 0 if one.keyword == "ELEMENT" else 1)
+            self.ranks.setdefault((above, name.upper()), 0 if one.keyword == "ELEMENT" else 1)
 
     def _nodes(self, one: _Section) -> np.ndarray:
         """Add points, and return their numbers."""
@@ -140,7 +140,7 @@ class _Model:
         """Numbers of points or cells in a set, by numbers, ranges and names of sets."""
         found = [np.zeros(0, dtype=np.int64)]
         if one.keyword == "NSET" and "ELSET" in one.given:
-            found.append(self._corners(self._named(one, "ELSET", one.given["ELSET"])))
+            found += map(np.ravel, self._corners(self._named(one, "ELSET", one.given["ELSET"])))
         for items in one.items():
             row = [item.rpartition(".")[2] for item in items]  # without the instance's name
             numbers = [int(item) for item in row if item.isdigit()]
@@ -157,10 +157,9 @@ class _Model:
             raise one.refused(f"has the set '{name}', which is not before it; put it there")
         return np.concatenate(found)
 
-    def _corners(self, cells: np.ndarray) -> np.ndarray:
-        """Points of elements, sorted."""
-        found = [rows[np.isin(rows[:, 0], cells), 1:].ravel() for _, rows in self.elements]
-        return np.unique(np.concatenate([cells[:0], *found]))
+    def _corners(self, cells: np.ndarray) -> list[np.ndarray]:
+        """Points of elements, by block."""
+        return [rows[np.isin(rows[:, 0], cells), 1:] for _, rows in self.elements]
 
     def content(self, instance: _Section | None) -> Content:
         """Return all of it."""
@@ -187,6 +186,14 @@ class _Model:
             raise MeshError("elements have one number twice; renumber them")
         body = np.concatenate([tags[:0], *(rows[:, 0] for kind, rows in self.elements if kind != "line")])
         sets = {key: np.unique(np.concatenate(numbers)) for key, numbers in self.sets.items() if key[2] in self.shown}
+        for above, name in [
+            (above, name) for above, kind, name in sets if kind == "NSET" and (above, "ELSET", name) in sets
+        ]:
+            own, chosen = self._corners(sets[above, "ELSET", name]), sets[above, "NSET", name]
+            if np.array_equal(chosen, np.unique(np.concatenate([tags[:0], *map(np.ravel, own)]))):
+                del sets[above, "NSET", name]  # all points of a part
+            elif all((np.isin(ends, chosen).sum(axis=1) > 1).all() for ends in own):
+                del sets[above, "ELSET", name]  # the cells along a side
         parts = {key: np.intersect1d(chosen, body) for key, chosen in sets.items() if key[1] == "ELSET"}
         for key, chosen in sets.items():
             above, kind, name = key
@@ -196,23 +203,19 @@ class _Model:
             if not np.isin(chosen, every if kind == "ELSET" else tags).all():
                 content.unusable[shown] = "has what is not in the file; remove this"
             elif kind == "NSET":
-                # Many programs write the points of a set of cells, too.
-                same = sets.get((above, "ELSET", name))
-                if same is None or not np.array_equal(chosen, self._corners(same)):
-                    content.point_sets[shown] = places(tags, [chosen])[0]
+                content.point_sets[shown] = places(tags, [chosen])[0]
             else:
-                better = [
-                    one for (*_, one), its in parts.items() if self._better(name, parts[key], one, its, len(body))
-                ]
+                better = [one for one in parts if self._better(key, one, parts, len(body))]
                 if better:
-                    content.unusable[shown] = f"has cells of '{self.shown[better[0]]}', which is a part; use that"
+                    content.unusable[shown] = f"has cells of '{self.shown[better[0][2]]}', which is a part; use that"
                 else:
                     content.members += [(shown, n, np.flatnonzero(np.isin(ids, chosen))) for n, ids in enumerate(cells)]
         return content
 
-    def _better(self, name: str, mine: np.ndarray, other: str, its: np.ndarray, total: int) -> bool:
+    def _better(self, key: tuple[bool, str, str], other: tuple[bool, str, str], parts: Any, total: int) -> bool:
         """Whether another set is what the file means as a part: it has a section, or is no block of elements."""
-        if self.ranks[other] <= self.ranks[name] or len(its) == total:
+        rank, own = (self.ranks[one[0], one[2]] for one in (other, key))
+        if rank <= own or len(parts[other]) == total:
             return False
-        shared = np.isin(mine, its)
-        return bool(shared.any() and (self.ranks[other] == 2 or shared.all()))
+        shared = np.isin(parts[key], parts[other])
+        return bool(shared.any() and (rank == 2 or shared.all()))

@@ -45,7 +45,13 @@ def _inside(bonds: np.ndarray, outline: np.ndarray) -> np.ndarray:
 
     size = np.linalg.norm(d - c, axis=1)
     rounding = 1e-9 * size * np.linalg.norm(b - a, axis=2)
-    crossed = (turn(c, d, a) * turn(c, d, b) < -(rounding**2)) & (turn(a, b, c) * turn(a, b, d) < -(rounding**2))
+    # Sides that only touch do not cross: each end is clearly on its side of the other line.
+    crossed = (
+        (np.minimum(turn(c, d, a), turn(c, d, b)) < -rounding)
+        & (np.maximum(turn(c, d, a), turn(c, d, b)) > rounding)
+        & (np.minimum(turn(a, b, c), turn(a, b, d)) < -rounding)
+        & (np.maximum(turn(a, b, c), turn(a, b, d)) > rounding)
+    )
     found: np.ndarray = ~crossed.any(axis=1)
     for share in (0.125, 0.375, 0.625, 0.875):  # a bond may also leave the body through a corner
         at = a + share * (b - a)

@@ -12,7 +12,7 @@ from .cells import MeshError
 from .content import IN_OTHER_FILES, Content
 
 COPIED = ("vtkGhostType", "vtkGhostLevels")
-"""Cell data of pieces in which cells of other pieces are not 0."""
+"""Data in which what belongs to other pieces is not 0."""
 
 
 def read(path: str | Path, raw: bytes, by_meshio: Callable[[str | Path], Any]) -> Any:
@@ -22,22 +22,24 @@ def read(path: str | Path, raw: bytes, by_meshio: Callable[[str | Path], Any]) -
         raise MeshError("is compressed by LZ4, which is not read; write it with ZLib, or without compression")
     if re.search(rb"type\s*=\s*.P(Unstr|Poly)", head):
         raise MeshError(IN_OTHER_FILES)
+    # Version 2 tells copies and polyhedra in another way, cells alike; meshio knows version 1.
+    head = re.sub(rb"(<VTKFile[^>]*version\s*=\s*.)2\.\d", rb"\g<1>1.0", head)
     pieces = list(re.finditer(rb"<Piece\b([^>]*/>|.*?</Piece>)", head, flags=re.DOTALL))
-    if len(pieces) < 2:
-        content = by_meshio(path)
-        if any(np.any(array) for key in COPIED for array in content.cell_data.get(key, ())):
-            raise MeshError(IN_OTHER_FILES)
-        return content
-    if re.match(rb"[^>]*.raw.", tail):
+    if len(pieces) > 1 and re.match(rb"[^>]*.raw.", tail):
         raise MeshError(f"has {len(pieces)} pieces in raw bytes; write it in text or base64, or as one piece")
     found = []
     with TemporaryDirectory() as folder:
-        path = Path(folder) / "piece.vtu"
+        file = Path(folder) / "piece.vtu"
         for piece in pieces:
-            if not re.match(rb"<Piece[^>]*NumberOf(Points|Cells)\s*=\s*.0\D", piece[0]):
-                path.write_bytes(head[: pieces[0].start()] + piece[0] + head[pieces[-1].end() :] + mark + tail)
-                found.append(by_meshio(path))
-    return _joined(found)
+            if len(pieces) == 1 or not re.match(rb"<Piece[^>]*NumberOf(Points|Cells)\s*=\s*.0\D", piece[0]):
+                file.write_bytes(head[: pieces[0].start()] + piece[0] + head[pieces[-1].end() :] + mark + tail)
+                found.append(by_meshio(file))
+    if len(pieces) > 1:
+        return _joined(found)
+    content = found[0] if found else by_meshio(path)
+    if any(np.any(array) for key in COPIED for array in content.cell_data.get(key, ())):
+        raise MeshError(IN_OTHER_FILES)
+    return content
 
 
 def _joined(pieces: list[Any]) -> Content:
@@ -52,11 +54,12 @@ def _joined(pieces: list[Any]) -> Content:
     np.minimum.at(first, place, np.arange(count))
     joint = np.where(np.isin(place, place[often[same] > 1]), np.arange(count), first[place])
     content = Content(points)
-    for key in {key for one in pieces for key, values in one.point_data.items() if values.dtype.kind in "iu"}:
+    whole = {key for one in pieces for key, values in one.point_data.items() if values.dtype.kind in "iu"}
+    for key in sorted(whole.difference(COPIED)):
         values = np.concatenate([one.point_data.get(key, np.zeros(n, int)) for one, n in zip(pieces, counts)])
         content.point_data[key] = np.zeros_like(values)
         np.maximum.at(content.point_data[key], joint, values)
-    keys = {key for one in pieces for key in one.cell_data}
+    keys = sorted({key for one in pieces for key in one.cell_data}.difference(COPIED))
     for one, start, count in zip(pieces, starts, counts):
         for number, block in enumerate(one.cells):
             if not 0 <= block.data.min() <= block.data.max() < count:
@@ -65,6 +68,6 @@ def _joined(pieces: list[Any]) -> Content:
             none = np.zeros(len(block.data), dtype=np.int64)
             own = np.all([given.get(key, none) == 0 for key in COPIED], axis=0)
             content.add(block.type, joint[block.data[own] + start])
-            for key in keys.difference(COPIED):
+            for key in keys:
                 content.cell_data.setdefault(key, []).append(given.get(key, none)[own])
     return content

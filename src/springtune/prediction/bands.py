@@ -2,14 +2,27 @@
 
 from collections.abc import Iterable
 from dataclasses import replace
-from math import sqrt
+from functools import partial
+from math import inf, sqrt
+from typing import Any
 
 import numpy as np
 
 from ..mesh import MESH_TYPES
 from ..problem.geometry import Beam
 from ..problem.materials import Material
-from .choices import CASES, Choice, Number, References, best_first, check_beam, check_loads, predict, references
+from ..safe_io.tables import TabledList
+from .choices import (
+    CASES,
+    Choice,
+    References,
+    check_beam,
+    check_loads,
+    contest,
+    references,
+    trial,
+    worst_of,
+)
 
 BANDS_FROM = 10_000
 """Particles of the finest mesh for a band."""
@@ -54,14 +67,24 @@ def extrapolate(
     sizes = [_like(mesh_type, beam, size, part, sign) for part, sign in zip(parts, COARSER // 2 * (1, -1))]
     loads = check_loads(loads)
     known = references(beam, material, loads) if known is None else known
-    solved = []
-    for one in sizes:
-        mesh = MESH_TYPES[mesh_type](beam.length, beam.height, one)
-        solved.append({choice.definition: choice for choice in predict(beam, mesh, material, known, loads=loads)})
-    # The same springs may go by one name on one mesh and by two on another.
-    names = [name for name in solved[0] if all(name in one for one in solved)]
-    choices = [_band([one[name] for one in solved], sizes, size) for name in names]
-    return best_first(choices, known), sizes
+    made = (MESH_TYPES[mesh_type](beam.length, beam.height, one) for one in sizes)
+    trials = [trial(beam, mesh, material, known, loads=loads) for mesh in made]
+
+    def measured(name: str, limits: tuple[float, float]) -> tuple[bool, float] | None:
+        found = []
+        for one in reversed(trials):  # the coarsest one first
+            if (there := one.measured(name, limits)) is None:
+                return None  # also where it has the springs of another one on some of the meshes
+            found.append(there)
+        if any(worst == inf for _, worst in found):
+            return found[0][0], inf
+        errors = [one.errors(name) for one in trials]
+        bands = [band((one[load] for one in errors), sizes, size, own=LEAST_OF_ERROR) for load in errors[0]]
+        return found[0][0], worst_of(bands)
+
+    best = contest(trials[0].names, measured, trials[0].known)
+    choices = [_band([one.choice(name) for one in trials], sizes, size) for name in best]
+    return TabledList(replace(one, tried=trials[0].tried) for one in choices), sizes
 
 
 def _like(mesh_type: str, beam: Beam, size: float, sizes: np.ndarray, sign: int) -> float:
@@ -71,30 +94,34 @@ def _like(mesh_type: str, beam: Beam, size: float, sizes: np.ndarray, sign: int)
     return float(sizes[np.argmin(np.where(apart >= -1e-9, np.abs(apart), 1 + np.abs(apart)))])
 
 
+def band(
+    numbers: Iterable[Any], sizes: list[float], size: float, least: float = LEAST_MARGIN, own: float = 0.0
+) -> tuple[float, float]:
+    """Band of a number at a size, from those at other sizes."""
+    values = np.array([*numbers], dtype=float)
+    values = np.append(values, np.polyval(np.polyfit(sizes, values, 1), size))
+    low, high = values.min(), values.max()
+    margin = MARGIN * (high - low)
+    if margin > 1e-9:  # what is exact is so on every mesh
+        margin = max(margin, least, own * np.abs(values).max())
+    return float(low - margin), float(high + margin)
+
+
 def _band(choices: list[Choice], sizes: list[float], size: float) -> Choice:
     """Bands of a definition at a size, from choices on meshes of other sizes."""
-
-    def band(numbers: Iterable[Number], least: float = LEAST_MARGIN, own: float = 0.0) -> tuple[float, float]:
-        values = np.array([*numbers], dtype=float)
-        values = np.append(values, np.polyval(np.polyfit(sizes, values, 1), size))
-        low, high = values.min(), values.max()
-        margin = MARGIN * (high - low)
-        if margin > 1e-9:  # what is exact is so on every mesh
-            margin = max(margin, least, own * np.abs(values).max())
-        return float(low - margin), float(high + margin)
-
+    own = partial(band, sizes=sizes, size=size)
     failures: dict[str, str] = {}
     for choice in choices:
         failures |= choice.failures
     return replace(
         choices[0],
-        inside=band((choice.inside for choice in choices), least=0.0),
-        outline=band((choice.outline for choice in choices), least=0.0),
+        inside=own((choice.inside for choice in choices), least=0.0),
+        outline=own((choice.outline for choice in choices), least=0.0),
         errors={
-            load: band((choice.errors[load] for choice in choices), own=LEAST_OF_ERROR) for load in choices[0].errors
+            load: own((choice.errors[load] for choice in choices), own=LEAST_OF_ERROR) for load in choices[0].errors
         },
-        young_modulus_error=band(choice.young_modulus_error for choice in choices),
-        poisson_ratio=band(choice.poisson_ratio for choice in choices),
+        young_modulus_error=own(choice.young_modulus_error for choice in choices),
+        poisson_ratio=own(choice.poisson_ratio for choice in choices),
         extra="" if failures else _band_in_words([choice.extra.split(" ") for choice in choices]),
         failures=failures,
     )

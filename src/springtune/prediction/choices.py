@@ -1,18 +1,20 @@
 """Which definition and stiffness to use on a mesh, and how far off it is: solved, with linear kinematics.
 
-Every definition worth a choice is solved on the mesh itself under some loads and compared with the converged reference
-of small strain; a patch test between rollers measures Young's modulus and Poisson's ratio of the network.
+All registered definitions that suit the mesh and the materials are solved on the mesh itself under some loads and
+compared with the converged reference of small strain. The best ones are kept, of all and of springs alone; what cannot
+be among them is given up at the first load that says so. A patch test between rollers measures Young's modulus and
+Poisson's ratio of the network.
 """
 
 import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import inf, nan
 from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
 
-from ..mechanics.energies import AreaEnergy
+from ..mechanics.energies import AngleEnergy, AreaEnergy, BiquadraticEnergy, Energy
 from ..mechanics.moduli import PatchTest
 from ..mechanics.statics import SingularError
 from ..mesh import Mesh
@@ -30,7 +32,7 @@ from ..scene.meshes import A_BEAM, A_MATERIAL, A_MESH, is_a
 from ..scene.motion import stable_steps
 from ..scene.sheet import Sheet, chosen
 from ..scene.statements import BeamStatement, ShapeStatement, Statement
-from ..springs import DEFINITIONS, DefinitionError, Springs
+from ..springs import DEFINITIONS, Definition, DefinitionError, Springs
 
 CASES = ("traction", "bending", "shear")
 """Loads that are predicted where none are named."""
@@ -38,24 +40,17 @@ CASES = ("traction", "bending", "shear")
 SHORTEST_SIDE, LONGEST_SIDE, MOST_SLENDER = 1e-9, 1e7, 1e4
 """Limits of a beam's sides [m] and aspect ratio: beyond them the unit is likely wrong, or bending has no reference."""
 
-ON_TRIANGLES = ("patch", "lattice", "van-gelder", "oriented", "delingette", "area", "patch-area")
-"""Definitions that are tried on triangles, springs alone first: of all that need no tuning, those that are the best one
-by their worst load on many beams; without any of them the choice is worse by points of percent."""
-
-ON_QUADS = ("patch", "baudet", "element-fit", "area")
-"""As `ON_TRIANGLES`, on meshes that have quadrilaterals. On rectangles a patch test changes nothing."""
-
-ANISOTROPIC = {3: ("energy-fit", "element-fit", "delingette"), 4: ("energy-fit", "element-fit", "orthotropic")}
-"""As `ON_TRIANGLES` and `ON_QUADS`, of materials that are not isotropic, by corners of the cells."""
-
-NEED_ENERGIES = ("delingette", "area", "patch-area", "orthotropic")
-"""Those of them that need more than springs."""
+KEPT = 4
+"""Choices that are kept of all definitions, and of those of springs alone."""
 
 ALIKE = 1e-5
 """Relative difference below which stiffnesses count as equal: five digits are shown."""
 
+EQUAL = 1e-11
+"""Relative difference below which stiffness matrices count as equal, but for rounding."""
+
 SOLVED, SOLVED_FROM_FILE = 20_000, 100_000
-"""Particles up to which a mesh is solved, in some three seconds; up to which one from a file is, in some twenty."""
+"""Particles up to which a mesh is solved, in some six seconds; up to which one from a file is, in a minute."""
 
 
 ROUNDED = 1e-9
@@ -105,10 +100,12 @@ class Choice(Tabled):
     young_modulus_error : float
         Young's modulus along x between rollers over the material's, less one [1].
     poisson_ratio : float
-        Poisson's ratio there [1].
+        Poisson's ratio there [1], in the plane: in plane strain nu / (1 - nu) is exact.
     failures : dict of str to str
         Why numbers are missing, by load, ``"patch test"`` or ``"springs"``: the network is unstable, singular or
         ill-conditioned at rest, or the definition does not support the mesh.
+    tried : tuple of str
+        All definitions that were tried there; those without a choice are no better than those with one.
 
     Examples
     --------
@@ -116,8 +113,8 @@ class Choice(Tabled):
     >>> beam, steel = st.Beam("100 mm", "20 mm"), st.Material("210 GPa", 0.3)
     >>> choices = st.predict(beam, st.make_mesh(beam, "structured", "5 mm"), steel)
     >>> [choice.definition for choice in choices if not choice.energies]
-    ['patch', 'van-gelder', 'lattice', 'oriented']
-    >>> best = choices[0]
+    ['van-gelder-general', 'element-fit', 'patch', 'energy-fit']
+    >>> best = choices[2]
     >>> print(f"{best.inside:.4g} N/m inside, {best.outline:.4g} N/m on the outline, {best.extra}")
     1.742e+08 N/m inside, 8.71e+07 N/m on the outline, area energy, K_A = -1.078e+04 MPa; 0.93393 times area
     >>> print(*(f"{load} {100 * error:+.1f} %," for load, error in best.errors.items()))
@@ -136,12 +133,12 @@ class Choice(Tabled):
     young_modulus_error: Number
     poisson_ratio: Number
     failures: dict[str, str] = field(default_factory=dict)
+    tried: tuple[str, ...] = ()
 
     @property
     def worst(self) -> float:
         """Largest size of an error under the loads that have a reference [1]; infinite where the network fails."""
-        errors = np.abs([np.broadcast_to(error, 2) for error in self.errors.values()])
-        return inf if self.failures or np.isnan(errors).all() else float(np.nanmax(errors))
+        return inf if self.failures else worst_of(self.errors.values())
 
     def _rows(self) -> Iterator[tuple[str, str]]:
         yield "definition", self.definition
@@ -165,6 +162,12 @@ class Choice(Tabled):
 
 
 NO_REFERENCE = "no reference"
+
+
+def worst_of(errors: Iterable[Number]) -> float:
+    """Largest size of errors or of the bounds of their bands [1]; infinite if all are missing."""
+    sizes = np.abs([np.broadcast_to(error, 2) for error in errors])
+    return inf if np.isnan(sizes).all() else float(np.nanmax(sizes))
 
 
 def bounds_text(value: Number, form: Callable[[float], str], missing: str) -> str:
@@ -259,14 +262,14 @@ def predict(
     load : str, optional
         Load case of a shape; its only one without.
     also : iterable of str, optional
-        Further definitions to try, such as ``["best-springs"]``, a search that takes seconds.
+        Definitions to try in any case, such as ``["best-springs"]``, a search that takes seconds.
 
     Returns
     -------
     list of Choice
-        Of `ON_TRIANGLES`, `ON_QUADS` or `ANISOTROPIC`, the same springs once; those that fail come last. Errors that
-        differ by less than the reference's error estimate are equal: springs alone come first, then names. On a shape
-        errors are by quantity of interest, and moduli are NaN: a patch test between rollers needs a strip.
+        The best four of all definitions, and the best four of springs alone, the same springs once. Errors that differ
+        by less than the reference's error estimate are equal: springs alone come first, then names. On a shape errors
+        are by quantity of interest, and moduli are NaN: a patch test between rollers needs a strip.
 
     Raises
     ------
@@ -278,6 +281,8 @@ def predict(
     Notes
     -----
     Each number equals that of a scene of the same beam, mesh, material, load and definition in linear kinematics.
+    Tried are all of `springtune.DEFINITIONS` that suit the cells and the material, but for searches, those that are
+    given a stiffness, and forces that go with uniaxial loads.
 
     Examples
     --------
@@ -286,10 +291,10 @@ def predict(
     >>> mesh = st.make_mesh(beam, "structured", "5 mm")
     >>> best = st.predict(beam, mesh, steel)[0]
     >>> print(f"{best.definition}: {100 * best.worst:.1f} % at worst")
-    patch-area: 6.3 % at worst
+    van-gelder-general: 5.0 % at worst
     >>> scene = st.Scene(beam, mesh, steel, "bending", "1 N", definition=best.definition, kinematics="linear")
     >>> print(f"{100 * best.errors['bending']:.4f} %, {100 * scene.solve().error:.4f} %")
-    -6.3087 %, -6.3087 %
+    -5.0296 %, -5.0296 %
 
     A part that is pulled, and pressed upon:
 
@@ -305,32 +310,44 @@ def predict(
     >>> plate = st.Shape.rectangle("100 mm", "40 mm", holes=[hole], loads={"pull": pull})
     >>> for choice in st.predict(plate, st.mesh_shape(plate, "2 mm"), steel, load="pull")[:2]:
     ...     print(choice.definition, f"{100 * choice.errors['end']:+.1f} %")
-    delingette -0.8 %
-    patch-area -2.3 %
+    element-fit +0.0 %
+    energy-fit -0.5 %
     """
-    statements: Sequence[Statement]
-    wanted: References | ShapeReferences
+    tried = trial(beam, mesh, material, known, loads=loads, load=load, also=also)
+    found = tried.choices()
+    if all("springs" in one.failures for one in found):
+        raise DefinitionError("; ".join(f"{name}: {why['springs']}" for name, why in tried.failures.items()))
+    return found
+
+
+def trial(
+    beam: Beam | Shape,
+    mesh: Mesh | GroupedMesh,
+    material: AnyMaterial | Mapping[str, AnyMaterial],
+    known: References | ShapeReferences | None = None,
+    *,
+    loads: Iterable[str] = CASES,
+    load: str | None = None,
+    also: Iterable[str] = (),
+) -> "Trial":
+    """Definitions to solve on a mesh, with the arguments of `predict`."""
+    more = [chosen(DEFINITIONS, name, "also").name for name in also]
     if isinstance(beam, Shape):
         statement = ShapeStatement(beam, mesh, material, only_load(beam, load), 1.0, "linear")
-        statements = [statement]
-        known = wanted = shape_references(statement) if known is None else cast(ShapeReferences, known)
-    else:
-        if load is not None:
-            raise ValueError(f"load: {load!r} is of shapes alone; give loads for a beam")
-        check_beam(beam)
-        statements = under_loads = beam_statements(beam, mesh, material, loads)
-        named = [one.load for one in under_loads]
-        missing = [load for load in named if known is not None and not (isinstance(known, dict) and load in known)]
-        if missing:
-            raise ValueError(
-                f"known: has no references of {', '.join(missing)}; give what springtune.prediction.references returns"
-            )
-        known = references(beam, under_loads[0].material, named) if known is None else known
-        wanted = {load: cast(References, known)[load] for load in named}
-    tried = Trial(statements, wanted, also=[chosen(DEFINITIONS, name, "also").name for name in also])
-    if not tried.names and all("springs" in found for found in tried.failures.values()):
-        raise DefinitionError("; ".join(f"{name}: {found['springs']}" for name, found in tried.failures.items()))
-    return best_first([tried.choice(name) for name in (*tried.names, *tried.failures)], known)
+        known = shape_references(statement) if known is None else cast(ShapeReferences, known)
+        return Trial([statement], known, also=more)
+    if load is not None:
+        raise ValueError(f"load: {load!r} is of shapes alone; give loads for a beam")
+    check_beam(beam)
+    under_loads = beam_statements(beam, mesh, material, loads)
+    named = [one.load for one in under_loads]
+    missing = [load for load in named if known is not None and not (isinstance(known, dict) and load in known)]
+    if missing:
+        raise ValueError(
+            f"known: has no references of {', '.join(missing)}; give what springtune.prediction.references returns"
+        )
+    known = references(beam, under_loads[0].material, named) if known is None else known
+    return Trial(under_loads, {load: cast(References, known)[load] for load in named}, also=more)
 
 
 def beam_statements(
@@ -343,15 +360,6 @@ def beam_statements(
     is_a(mesh, Mesh, "mesh", A_MESH)
     is_a(material, Material, "material", A_MATERIAL)
     return [BeamStatement(beam, mesh, material, load, 1.0, "linear") for load in check_loads(loads)]
-
-
-def best_first(choices: Iterable[Choice], known: References | ShapeReferences) -> TabledList[Choice]:
-    """Choices of a mesh, the least worst error first.
-
-    Errors that differ by less than the error estimates count as equal: then springs alone come first, then names.
-    """
-    order = in_order(choices, lambda one: one.worst, lambda one: (one.energies, one.definition), as_sure_as(known))
-    return TabledList(order)
 
 
 def as_sure_as(known: Mapping[str, Any]) -> float:
@@ -424,14 +432,40 @@ def errors_under(
     return dict(quantity_errors({name: values[name] for name in known}, wanted))
 
 
+def contest(
+    names: Iterable[str],
+    measured: Callable[[str, tuple[float, float]], tuple[bool, float] | None],
+    known: References | ShapeReferences,
+    also: Collection[str] = (),
+) -> list[str]:
+    """The best definitions of springs alone and of all, and those of `also`, the least worst error first.
+
+    `measured` tells of a definition whether it has energies, and its worst error; None where it has no springs of its
+    own or an error above a limit, the first one of springs alone, the second one of all.
+    """
+    found: dict[str, tuple[bool, float]] = {}
+    equal = as_sure_as(known)
+
+    def limit(energies: bool) -> float:
+        errors = sorted(worst for other, worst in found.values() if energies or not other)
+        return errors[KEPT - 1] + equal if len(errors) >= KEPT else inf
+
+    for name in names:
+        if (one := measured(name, (limit(False), limit(True)))) is not None:
+            found[name] = one
+    order = in_order(found, lambda name: found[name][1], lambda name: (found[name][0], name), equal)
+    best = order[:KEPT] + [name for name in order if not found[name][0]][:KEPT]
+    return [name for name in order if name in best or name in also]
+
+
 class Trial:
     """Definitions solved on a mesh, under loads of a beam or a load case of a shape; equal springs once.
 
     `statements` are of one mesh, in linear kinematics; `known` are references by load of a beam or by quantity of a
-    shape; `among` restricts the definitions, `also` adds some.
+    shape; `among` replaces the definitions that suit the mesh, `also` adds some that are not given up.
 
-    `names` are the definitions with springs, equal springs once; `same` has the one of `names` for each definition with
-    springs; `failures` are as of `Choice`, for each definition without.
+    `names` are these definitions; `same` has for each one with springs the first one with the same springs;
+    `failures` are as of `Choice`, for each definition without.
     """
 
     def __init__(
@@ -443,49 +477,102 @@ class Trial:
     ) -> None:
         self.statements, self.known, first = statements, known, statements[0]
         self.mesh, self.materials, self.thickness = first.mesh, first.materials, first.thickness
-        # Definitions that differ by a scalar follow each other: networks under the loads are kept for the next one.
         self._sheet = Sheet(self.mesh, self.thickness, networks=len({one.loading.held.tobytes() for one in statements}))
-        self._errors: dict[str, dict[str, float | str]] = {}
+        self._errors: dict[str, tuple[dict[str, float | str], list[Statement]]] = {}  # and what is left to solve
+        self._forces: dict[str, np.ndarray] = {}
         self._moduli: dict[tuple[bytes, ...], tuple[float, float] | str] = {}
         self._test = PatchTest(self.mesh) if isinstance(first, BeamStatement) else None
         self._springs: dict[str, Springs] = {}
+        self._first: dict[tuple[object, ...], str] = {}  # definition by its springs
+        self._also = tuple(also)
+        suited = (one for one in DEFINITIONS.values() if _suits(one, self.mesh, self.materials))
+        cheap_first = [one.name for one in sorted(suited, key=lambda one: one.cost)]
+        self.names = [*dict.fromkeys((*(cheap_first if among is None else among), *self._also))]
         self.same: dict[str, str] = {}
         self.failures: dict[str, dict[str, str]] = {}
-        found: dict[tuple[object, ...], str] = {}  # definition by its springs
-        quads, isotropic = len(self.mesh.quads) > 0, all(one.isotropic for one in self.materials)
-        usual: tuple[str, ...] = ON_QUADS if quads else ON_TRIANGLES
-        for name in dict.fromkeys((*(usual if isotropic else ANISOTROPIC[4 if quads else 3]), *also)):
-            if among is not None and name not in among:
-                continue
+
+    def springs(self, name: str) -> Springs | None:
+        """Springs of a definition, derived once; None where it has none, for a reason in `failures`."""
+        if name not in self.same and name not in self.failures:
             try:
-                springs = first.springs(self._sheet, DEFINITIONS[name], None)[0]
+                springs = self.statements[0].springs(self._sheet, DEFINITIONS[name], None)[0]
             except DefinitionError as error:
                 self.failures[name] = {"springs": str(error)}
             except SingularError as error:
                 self.failures[name] = {"patch test": f"unstable: {error}"}
+            except Exception as error:
+                if name not in DEFINITIONS.packages:
+                    raise
+                self.failures[name] = {"springs": f"{type(error).__name__}: {error}"}  # another package's fault
             else:
                 # Some are the same network: at nu = 1/3 no energy is left, on rectangles no scalar.
                 label = f"{springs.reference:.9g}", *key_of(springs)
-                self.same[name] = found.setdefault(label, name)
-                if self.same[name] == name:
-                    self._springs[name] = springs
-        self.names = list(self._springs)
+                self.same[name] = self._first.setdefault(label, name)
+                self._springs.setdefault(self.same[name], springs)
+        return self._springs.get(self.same.get(name, ""))
 
-    def errors(self, name: str) -> dict[str, float | str]:
-        """Errors of a definition [1] by load or quantity; NaN without a reference, or why the network fails."""
-        if name not in self._errors:
-            springs = self._springs[name]
-            self._errors[name] = {}
-            for statement in self.statements:
-                self._errors[name] |= errors_under(statement, self._sheet, springs, self.known)
-        return self._errors[name]
+    def errors(self, name: str, limit: float = inf) -> dict[str, float | str]:
+        """Errors of a definition [1] by load or quantity; NaN without a reference, or why the network fails.
+
+        Loads are left out after one with an error above the limit.
+        """
+        if (name := self.same[name]) not in self._errors:
+            self._errors[name] = self._errors.get(self._alike(name), ({}, [*self.statements]))
+        found, left = self._errors[name]
+        while left and not _exceeds(found, limit):
+            found |= errors_under(left.pop(0), self._sheet, self._springs[name], self.known)
+        return found
+
+    def _alike(self, name: str) -> str:
+        """The first definition with the same stiffness matrix, and so the same errors, by its forces on some motion."""
+        springs, first = self._springs[name], self.statements[0]
+        if any(one.kind == "stress" for one in first.case.quantities):  # that is of single springs
+            return name
+        motion = np.random.default_rng(0).standard_normal(self.mesh.points.shape)
+        forces = springs.reference * self._sheet.network(first.loading.held, springs).linear_forces(motion)
+        for other, known in self._forces.items():
+            if np.linalg.norm(forces - known) <= EQUAL * np.linalg.norm(known):
+                return other
+        self._forces[name] = forces
+        return name
+
+    def choices(self, without: Collection[str] = ()) -> TabledList[Choice]:
+        """The best choices of all but the definitions `without`, the least worst error first.
+
+        Errors that differ by less than the error estimates are equal: then springs alone come first, then names.
+        """
+        names = [name for name in self.names if name not in without]
+        found = [self.choice(name) for name in contest(names, self.measured, self.known, self._also)]
+        # The patch test is for the best ones alone, and may find one of them unstable.
+        failed = {one.definition for one in found if one.failures and {*one.failures} <= {"patch test"}} - {*self._also}
+        if failed and len(failed) < len(names):
+            return self.choices({*without, *failed})
+        return TabledList(replace(one, tried=self.tried) for one in found)
+
+    @property
+    def tried(self) -> tuple[str, ...]:
+        """Definitions that were solved, or have no stable network."""
+        return tuple(name for name in self.names if name in self.same or "patch test" in self.failures.get(name, ()))
+
+    def measured(self, name: str, limits: tuple[float, float]) -> tuple[bool, float] | None:
+        """Whether a definition has energies, and its worst error, infinite where it is unstable; see `contest`."""
+        springs = self.springs(name)
+        if springs is None:
+            return None if "springs" in self.failures[name] and name not in self._also else (False, inf)
+        limit = inf if name in self._also else limits[bool(springs.energies)]
+        found = self.errors(name, limit)
+        if self.same[name] != name or _exceeds(found, limit):
+            return None
+        errors = [one for one in found.values() if not isinstance(one, str)]
+        return bool(springs.energies), worst_of(errors) if len(errors) == len(found) else inf
 
     def choice(self, name: str) -> Choice:
-        """Choice of a definition that was tried; one without springs has NaN for all numbers."""
-        if name in self.failures:
+        """Choice of a definition; one without springs has NaN for all numbers."""
+        springs = self.springs(name)
+        if springs is None:
             errors: dict[str, Number] = dict.fromkeys(self.known, nan)
-            return Choice(name, nan, nan, "", name in NEED_ENERGIES, errors, nan, nan, self.failures[name])
-        springs, found = self._springs[name], self.errors(name)
+            return Choice(name, nan, nan, "", False, errors, nan, nan, self.failures[name])
+        found = self.errors(name)
         failures = {label: error for label, error in found.items() if isinstance(error, str)}
         if failures and self._test is None:
             failures = {self.statements[0].load: next(iter(failures.values()))}
@@ -528,6 +615,14 @@ class Trial:
         return seconds, nan if isinstance(steps, str) else float(steps["central-difference"])
 
 
+IN_WORDS = (
+    (AngleEnergy, "springs at the corners of each triangle"),
+    (BiquadraticEnergy, "coupling of the sides of each triangle"),
+    (Energy, "a law of each triangle"),
+)
+"""Words for energies besides areas."""
+
+
 def in_words(sheet: Sheet, material: AnyMaterial | None, name: str, springs: Springs) -> tuple[float, float, str]:
     """Stiffness of sides inside and on the outline, and the rest in words."""
     mesh = sheet.mesh
@@ -541,7 +636,7 @@ def in_words(sheet: Sheet, material: AnyMaterial | None, name: str, springs: Spr
             modulus = _common(springs.reference * energy.modulus) / sheet.thickness
             extra.append(f"area energy, K_A = {1e-6 * modulus:.4g} MPa")
         else:
-            extra.append("coupling of the sides of each triangle")
+            extra.append(next(words for kind, words in IN_WORDS if isinstance(energy, kind)))
     if len(mesh.quads):
         extra.append(f"diagonals {diagonals:.5g} N/m" if diagonals == diagonals else "diagonals each its own")
     plain = {"patch": "lattice", "patch-area": "area"}.get(name)
@@ -555,6 +650,16 @@ def _common(values: np.ndarray) -> float:
     """The common value of all, NaN where they differ."""
     alike = len(values) and values.any() and np.ptp(values) <= ALIKE * np.abs(values).max()
     return float(np.median(values)) if alike else nan
+
+
+def _exceeds(errors: Mapping[str, float | str], limit: float) -> bool:
+    return any(abs(one) > limit for one in errors.values() if not isinstance(one, str))
+
+
+def _suits(one: Definition, mesh: Mesh, materials: Collection[AnyMaterial]) -> bool:
+    """Whether a definition is for cells and materials, and gives springs to type, without a search."""
+    given = one.needs or one.uniaxial or one.cost > 1
+    return not given and set(mesh.cells) <= set(one.cells) and (one.anisotropic or all(m.isotropic for m in materials))
 
 
 def key_of(springs: Springs) -> tuple[bytes, ...]:

@@ -10,7 +10,7 @@ meshes have whole numbers of cells across, and some sizes between, whose cells a
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import count, takewhile
 
@@ -30,9 +30,6 @@ from ..scene.statements import ShapeStatement, Statement
 from .bands import FEWEST_CELLS
 from .choices import (
     CASES,
-    NEED_ENERGIES,
-    ON_QUADS,
-    ON_TRIANGLES,
     SOLVED,
     Choice,
     References,
@@ -64,12 +61,6 @@ EVERY_UP_TO, STEPS_A_DOUBLING, TRIED_BETWEEN = 16, 4, 2
 """Cells across up to which every number of them is tried; steps by which they double beyond that; and numbers that are
 tried between two of these, where the coarsest mesh is."""
 
-DEFINITIONS_TRIED = tuple(dict.fromkeys((*ON_TRIANGLES, *ON_QUADS)))
-"""Definitions to try; each mesh supports some."""
-
-SPRINGS_ALONE = tuple(name for name in DEFINITIONS_TRIED if name not in NEED_ENERGIES)
-"""Definitions of springs alone."""
-
 BETWEEN_DIVISIONS = (0.98, 0.95, 0.9, 0.83, 0.7, 0.56)
 """Sizes between whole divisions that an answer is tried on, over its own."""
 
@@ -99,6 +90,8 @@ class SolvedMesh:
     particles, springs : int
     errors : dict of str to dict of str to float
         By definition that was tried, the error under each load [1]; NaN where the network fails.
+    energies : tuple of str
+        Definitions that need more than springs there.
 
     Examples
     --------
@@ -115,6 +108,7 @@ class SolvedMesh:
     particles: int
     springs: int
     errors: dict[str, dict[str, float]]
+    energies: tuple[str, ...]
 
     def worst(self, definition: str) -> float:
         """Largest size of the errors of a definition [1]; infinite where it fails under a load, or was not tried.
@@ -165,7 +159,7 @@ class MeshChoice(Tabled):
     >>> best.size, best.cells, best.particles, best.confirmed
     (0.006599, 7, 252, True)
     >>> [finer.cells for finer in best.finer][:6]
-    [7.142, 7.368, 7.502, 7.777, 8, 8.433]
+    [7.141, 7.368, 7.502, 7.777, 8, 8.433]
     >>> mesh = st.make_mesh(beam, best.mesh_type, best.size)
     >>> scene = st.Scene(beam, mesh, steel, "bending", "1 N", definition=best.choice.definition, kinematics="linear")
     >>> print(f"{100 * best.choice.errors['bending']:.3f} %, {100 * scene.solve().error:.3f} %")
@@ -361,9 +355,9 @@ def find_mesh(
     >>> search = st.find_mesh(beam, steel, "2 %", loads=["traction", "bending"], mesh_types=["structured"])
     >>> best = search.best
     >>> print(f"{best.mesh_type} {1e3 * best.size:g} mm, {best.choice.definition}: {best.particles} particles")
-    structured 5.133 mm, patch-area: 405 particles
+    structured 5.774 mm, patch-fit: 328 particles
     >>> print(f"at worst {100 * best.choice.worst:.1f} %, steps up to {1e9 * best.step_limit:.0f} ns")
-    at worst 1.9 %, steps up to 641 ns
+    at worst 0.4 %, steps up to 502 ns
     >>> st.find_mesh(beam, steel, "0.2 %", mesh_types=["right"], most=500).best is None
     True
     """
@@ -493,6 +487,12 @@ def _cells(rung: int) -> int:
     return rung + 1 if beyond <= 0 else math.ceil(EVERY_UP_TO * 2 ** (beyond / STEPS_A_DOUBLING))
 
 
+def tried_names(solved: Iterable[SolvedMesh], springs_alone: bool = False) -> list[str]:
+    """Definitions that were tried on meshes; all of them, or those that need no more than springs."""
+    names = dict.fromkeys(name for one in solved for name in one.errors)
+    return [name for name in names if not (springs_alone and any(name in one.energies for one in solved))]
+
+
 class _Search:
     """Meshes of a family, by the number of cells across; each solved once."""
 
@@ -520,12 +520,16 @@ class _Search:
         """Try meshes from coarse to fine until both questions are answered, or no larger one may be."""
         for rung in count():
             # Where the first question is answered, the other one is of springs alone.
-            asked = SPRINGS_ALONE if self._settled(springs_alone=False) else DEFINITIONS_TRIED
+            asked = self._names(springs_alone=self._settled(springs_alone=False))
             if self._settled(springs_alone=True):
                 break
             names, cells = [name for name in asked if self._promising(name)], _cells(rung)
-            if not names or (cells not in self._tried and not self._try(cells, names)):
+            if self._tried and not names or cells not in self._tried and not self._try(cells, names):
                 break
+
+    def _names(self, springs_alone: bool) -> list[str]:
+        """Definitions that were tried; all of them, or those that need no more than springs."""
+        return tried_names(self._tried.values(), springs_alone)
 
     def _settled(self, springs_alone: bool) -> bool:
         """Look for an answer among all meshes up to those that were tried; whether there is one."""
@@ -583,14 +587,14 @@ class _Search:
             return None
         cells, names = start
         one = self._tried[cells]
-        name = in_order(names, one.worst, lambda name: (name in NEED_ENERGIES, name), as_sure_as(self.known))[0]
+        name = in_order(names, one.worst, lambda name: (name in one.energies, name), as_sure_as(self.known))[0]
         if (cells, name) not in self._found:
             tried = Trial(self.family.statements(one.size), self.known, [name])
             self._found[cells, name] = MeshChoice(
                 self.name,
                 one.size,
                 cells,
-                tried.choice(name),
+                replace(tried.choice(name), tried=tuple(self._names(springs_alone))),
                 one.particles,
                 one.springs,
                 *tried.cost(name),
@@ -627,13 +631,17 @@ class _Search:
         """Solve the definitions that were not solved on a mesh before."""
         mesh = statements[0].mesh
         self._first.setdefault(mesh.points.tobytes(), cells)
-        errors = dict(self._tried[cells].errors) if cells in self._tried else {}
-        tried = Trial(statements, self.known, [name for name in names if name not in errors])
-        for name, same in tried.same.items():
-            found = tried.errors(same)
+        former = self._tried.get(cells)
+        errors, energies = (dict(former.errors), former.energies) if former else ({}, ())
+        tried = Trial(statements, self.known, [name for name in names if name not in errors] if self._tried else None)
+        for name in tried.names:
+            springs = tried.springs(name)
+            found = dict.fromkeys(self.known, "") if springs is None else tried.errors(name)
             errors[name] = {load: math.nan if isinstance(one, str) else one for load, one in found.items()}
-        errors |= {name: dict.fromkeys(self.known, math.nan) for name in tried.failures}
-        self._tried[cells] = SolvedMesh(self.name, self.size(cells), cells, len(mesh.points), len(mesh.edges), errors)
+            energies += (name,) * bool(springs and springs.energies)
+        self._tried[cells] = SolvedMesh(
+            self.name, self.size(cells), cells, len(mesh.points), len(mesh.edges), errors, energies
+        )
 
     def _keeps(self, name: str, cells: float) -> bool:
         """Whether a definition keeps the error on a mesh, even if the reference is off by its estimate."""
@@ -654,7 +662,7 @@ class _Search:
         on = self._on(name)
         doubling = self._doubling(name)
         if doubling is None or ENOUGH_FINER * FEWEST_CELLS > on[-1]:
-            return bool(on) or not self._tried
+            return bool(on)
         left = LEFT_TO_GO * (1 - on[-1] / self._finest)
         before, last = doubling
         if any(before[load] != before[load] and last[load] != last[load] for load in last):
@@ -680,7 +688,7 @@ class _Search:
     def _start(self, springs_alone: bool, confirmed: bool = True) -> tuple[int, list[str]] | None:
         """Coarsest mesh from which on a definition keeps the error, and the definitions that do; None without any."""
         starts: dict[int, list[str]] = {}
-        for name in SPRINGS_ALONE if springs_alone else DEFINITIONS_TRIED:
+        for name in self._names(springs_alone):
             tried = (cells for cells, one in self._tried.items() if name in one.errors)
             failing = max((cells for cells in tried if not self._keeps(name, cells)), default=0)
             kept = [cells for cells in self._on(name) if cells > failing]

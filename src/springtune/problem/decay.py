@@ -11,8 +11,8 @@ from ..safe_io.inputs import csv_rows, numbers
 from ..safe_io.tables import Tabled
 from .quantities import positive
 
-LEAST_POINTS, MOST_MISFIT = 12, 0.5
-"""Points that a decay is fitted to, at least, and the misfit from which they are no damped swing [1]."""
+LEAST_POINTS, MOST_MISFIT, POINTS_A_PERIOD = 12, 0.5, 4.0
+"""Least points of a decay, the misfit from which they are no damped swing [1], and least points a period."""
 
 COLUMNS_OF_DECAY = "give two columns with a head such as 'time [s],displacement [mm]'"
 
@@ -72,12 +72,14 @@ def fit_decay(times: np.ndarray | str | Path, displacements: np.ndarray | None =
     Raises
     ------
     ValueError
-        If a file cannot be read, points are too few or no numbers, or they are no swing that decays.
+        If a file cannot be read, points are too few, in all or a period, or no numbers, or they are no swing that
+        decays.
 
     Notes
     -----
     ``exp(-a t) (A cos w t + B sin w t) + C`` by least squares: A, B and C linearly for each a and w. The period is
     2 pi / w, and the decrement a times it. Errors are for noise that is the same and independent in all points.
+    Even times of less than 4/3 points a period look like a slow swing, and cannot be told from one.
 
     Examples
     --------
@@ -118,6 +120,11 @@ def fit_decay(times: np.ndarray | str | Path, displacements: np.ndarray | None =
     if not decay > 0 or misfit > MOST_MISFIT or frequency * t[-1] < 2 * np.pi:
         raise ValueError("displacements: are no swing that decays, over a period or more; give those of one free mode")
     period, decrement = 2 * np.pi / frequency, 2 * np.pi * decay / frequency
+    if (points := period * (len(t) - 1) / t[-1]) < (1 - 1e-6) * POINTS_A_PERIOD:
+        raise ValueError(
+            f"times: have {points:.2g} points a period of {period:.3g} s, which a faster swing would give, too (an "
+            f"alias); take {POINTS_A_PERIOD:g} points a period or more"
+        )
     covariance = 2 * best.cost / (len(t) - 5) * np.linalg.inv(best.jac.T @ best.jac)
     slopes = np.array([[0, -period / frequency], [period, -decrement / frequency]])
     errors = np.sqrt(np.diag(slopes @ covariance @ slopes.T))

@@ -715,14 +715,15 @@ def of_parts(given: Mapping[str, AnyMaterial], parts: Sequence[str]) -> dict[str
     Traceback (most recent call last):
     ...
     ValueError: material: one is given, and the body has the parts 'core', 'rim'; name those of other materials, such \
-as {'': ..., 'core': ...}, or `study.materials_of(shape, material)`
+as {'': ..., 'core': ...}; a study has them under 'parts', in Python `study.materials_of(shape, material)`
     """
     names = ", ".join(map(repr, parts))
     if len(parts) > 1 and not any(given):
         example = next(filter(None, parts))
         raise ValueError(
             f"material: one is given, and the body has the parts {names}; name those of other materials, such as "
-            f"{{'': ..., {example!r}: ...}}, or `study.materials_of(shape, material)`"
+            f"{{'': ..., {example!r}: ...}}; a study has them under 'parts', in Python "
+            "`study.materials_of(shape, material)`"
         )
     found = {part: given.get(part, given.get("")) for part in parts}
     for part, one in found.items():

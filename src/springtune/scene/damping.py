@@ -203,7 +203,9 @@ class Damping(Tabled):
         Notes
         -----
         A step h of implicit Euler has the matrix ``M + h C + h^2 K``: it damps as a stiffness damping of h, and a mode
-        of frequency w by the ratio w h / 2. That is more than was measured where h is above `stiffness_damping`.
+        of frequency w by the ratio w h / 2, to first order in w h. That is more than was measured where h is above
+        `stiffness_damping`. What is left to type makes a decrement that is 3 to 9 % too small at w h = 0.3, and 10 to
+        16 % at 0.6, for ratios up to 0.5: take steps of w h <= 0.1 for 3 %.
 
         Examples
         --------

@@ -112,6 +112,9 @@ class Definition(Declared):
         Whether it has the material's law at finite strain; its nonlinear error is then against a reference of that law.
     st_venant : bool
         Whether it is linear triangles of St. Venant and Kirchhoff's law in nonlinear kinematics.
+    cost : int
+        What deriving springs costs: 0 for closed forms, 1 for a few solves, 2 for a search of seconds, which
+        `springtune.predict` tries only if it is asked to.
 
     Examples
     --------
@@ -130,6 +133,7 @@ class Definition(Declared):
     anisotropic: bool
     finite_strain: bool
     st_venant: bool = False
+    cost: int = 0
 
     @property
     def law(self) -> str:
@@ -203,6 +207,8 @@ class Definition(Declared):
         if not isinstance(found, Springs) or len(found.relative) != len(mesh.edges):
             what = f"{len(found.relative)} springs" if isinstance(found, Springs) else type(found).__name__
             raise DefinitionError(f"returns {what}; return springtune.Springs, one for each of {len(mesh.edges)} edges")
+        if not found.energies:
+            _held_together(mesh, found.relative)
         return found
 
 
@@ -226,6 +232,7 @@ def definition(
     anisotropic: bool = False,
     finite_strain: bool = False,
     st_venant: bool = False,
+    cost: int = 0,
 ) -> Callable[[Function], Function]:
     """Declare a function as a definition, by a decorator that returns it unchanged.
 
@@ -235,7 +242,7 @@ def definition(
         Label in a study and in the dataset.
     order : float, optional
         Place in the order of labels, between its neighbours' numbers; by default last.
-    uniform, cells, uniaxial, needs, anisotropic, finite_strain, st_venant
+    uniform, cells, uniaxial, needs, anisotropic, finite_strain, st_venant, cost
         As of `Definition`.
 
     Returns
@@ -268,7 +275,7 @@ def definition(
             raise ValueError(f"definition {name!r}: cells {cells!r}; give the corners of cells that it can have: 3, 4")
         if needs not in NEEDS:
             raise ValueError(f"definition {name!r}: needs {needs!r}; give one of {', '.join(map(repr, NEEDS))}")
-        traits = uniform, tuple(cells), uniaxial, needs, anisotropic, finite_strain, st_venant
+        traits = uniform, tuple(cells), uniaxial, needs, anisotropic, finite_strain, st_venant, cost
         DEFINITIONS.declare(Definition(name, function, order, *traits))
         return function
 
@@ -307,6 +314,17 @@ def from_rectangles(mesh: Mesh, first: np.ndarray, second: np.ndarray, diagonal:
 
 NO_STIFFNESS = 1e-12
 """Stiffness over E t that counts as zero: of terms that cancel rounding decides the sign."""
+
+
+def _held_together(mesh: Mesh, stiffness: np.ndarray) -> None:
+    """Refuse springs that are fewer than n particles need, 2 n - 3 (Maxwell 1864), once those without stiffness go."""
+    none = np.abs(stiffness) <= 1e3 * NO_STIFFNESS * np.abs(stiffness).max()
+    free = 2 * len(mesh.points) - 3 - int((~none).sum())
+    if none.any() and free > 0:
+        raise DefinitionError(
+            f"gives {none.sum()} of {len(stiffness)} springs no stiffness, and without them {free} or more motions of "
+            "the mesh meet no resistance; use a mesh without right angles, such as mesh type 'structured' or 'free'"
+        )
 
 
 def not_negative(stiffness: np.ndarray) -> np.ndarray:

@@ -60,7 +60,7 @@ ROUNDING = 1e-9
 """By which a bound is lowered, and below which numbers are zero [1]."""
 
 
-@definition("best-springs", order=197, cells=(3,))
+@definition("best-springs", order=197, cells=(3,), cost=2)
 def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Springs found by a search over 15 loads and the field inside, none negative: a limit to compare with, slow.
 

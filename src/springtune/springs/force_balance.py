@@ -23,7 +23,7 @@ from .base import Springs, definition, not_negative
 from .identification import tested_body
 
 
-@definition("force-balance", order=195)
+@definition("force-balance", order=195, cost=1)
 def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Springs of `lattice` balanced under even tension (after Kot 2021): its stiffness is exact, nu = 1/3.
 

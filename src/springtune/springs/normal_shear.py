@@ -15,8 +15,9 @@ the triangle,
 .. math:: L_i e_{ns, i} = \frac{L_i}{8 A} \Big( q_{i+2} - q_{i+1} - \frac{L_{i+2}^2 - L_{i+1}^2}{L_i^2} q_i \Big),
 
 so slip needs no energy of its own: W_s is a coupling of squared lengths (`springtune.springs.delingette`), and e is
-Green's strain. E, nu and G are exact on equilateral rows; on free meshes of a/H = 0.1 E and G are within 6 % and nu
-within 0.06. On alternating diagonals G is exact and the network isotropic.
+Green's strain. E, nu and G are exact on equilateral rows; on free meshes of a/H = 0.1 E and G are within 6.1 % and nu
+within 0.06. Random Delaunay meshes are mostly unstable for nu >= 0.4. On alternating diagonals G is exact and the
+network isotropic.
 
 After the distinct lattice spring model (G.-F. Zhao, Int. J. Numer. Anal. Methods Geomech. 35:859, 2011, abstract read):
 shear springs take their slip from the local strain, and Cauchy and Born's rule gives both stiffnesses. The plane

@@ -19,7 +19,7 @@ from . import area, lattice
 from .base import Springs, definition
 
 
-@definition("patch", order=190)
+@definition("patch", order=190, cost=1)
 def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Springs of `lattice` scaled once by a patch test of the mesh itself: E exact on any mesh, nu is not.
 
@@ -28,7 +28,7 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     return _scaled(lattice.springs(mesh, material, thickness), mesh, material, thickness)
 
 
-@definition("patch-area", order=200)
+@definition("patch-area", order=200, cost=1)
 def with_area(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Springs and area energy of `area` scaled once by a patch test of the mesh itself: any nu, any mesh.
 

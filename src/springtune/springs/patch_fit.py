@@ -59,7 +59,7 @@ STEPS, LARGEST_STEP, ENOUGH = 4, 1.0, 0.3
 """Most Gauss-Newton steps; largest change of a logarithm in one, and that below which it is the last [1]."""
 
 
-@definition("patch-fit", order=195, cells=(3,))
+@definition("patch-fit", order=195, cells=(3,), cost=1)
 def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
     """Springs fitted to 15 patch tests of the mesh itself, from even to cubic stresses: none negative, nu = 1/3.
 

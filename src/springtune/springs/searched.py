@@ -30,7 +30,7 @@ MAX_GRADIENTS = 400
 """Networks that `adjoint` tries, each with the gradient of its misfit."""
 
 
-@definition("annealed", order=150, needs="cases", anisotropic=True)
+@definition("annealed", order=150, needs="cases", anisotropic=True, cost=2)
 def annealed(
     mesh: Mesh, material: AnyMaterial, thickness: float, cases: Sequence[Case], evaluations: int = MAX_EVALUATIONS
 ) -> Springs:
@@ -50,7 +50,7 @@ def annealed(
     return misfit.springs(found.x)
 
 
-@definition("evolved", order=160, needs="cases", anisotropic=True)
+@definition("evolved", order=160, needs="cases", anisotropic=True, cost=2)
 def evolved(
     mesh: Mesh, material: AnyMaterial, thickness: float, cases: Sequence[Case], evaluations: int = MAX_EVALUATIONS
 ) -> Springs:
@@ -71,7 +71,7 @@ def evolved(
     return misfit.springs(found.x)
 
 
-@definition("adjoint", order=170, anisotropic=True)
+@definition("adjoint", order=170, anisotropic=True, cost=2)
 def adjoint(mesh: Mesh, material: AnyMaterial, thickness: float) -> Springs:
     """Stiffness of each spring by exact gradients, bounded, from even tension and shear of the mesh itself.
 

@@ -126,7 +126,8 @@ Density = Annotated[float, quantity("density")]
 Angle = Annotated[float, quantity("angle", signed=True)]
 SignedStress = Annotated[float, quantity("stress", signed=True)]
 OrthotropicRatio = Annotated[float, number("a number such as 0.3", -100, 100)]
-PoissonRatio = Annotated[float, number("a number from 0 to 0.5, such as 0.3", 0, 0.5)]
+POISSON_RATIO = number("a number above -1 and at most 0.5, such as 0.3", -1, 0.5, above=True)
+PoissonRatio = Annotated[float, POISSON_RATIO]
 Ratio = Annotated[float, number("a number above 0", 0, math.inf, above=True)]
 Terms = Annotated[int, number(f"a whole number from 1 to {MOST_TERMS}", 1, MOST_TERMS, whole=True)]
 Points = Annotated[int, number(f"a whole number from 2 to {MOST_POINTS}, such as 61", 2, MOST_POINTS, whole=True)]
@@ -266,7 +267,7 @@ DefinitionNames = Annotated[list[DefinitionName], OneOrMore()]
 Lengths = Annotated[list[Length], Values("a length such as '5 mm'")]
 Forces = Annotated[list[Force], Values("a force such as '400 kN'")]
 Stresses = Annotated[list[Stress], Values("a stress such as '210 GPa'")]
-PoissonRatios = Annotated[list[PoissonRatio], Values("a number from 0 to 0.5")]
+PoissonRatios = Annotated[list[PoissonRatio], Values("a number above -1 and at most 0.5")]
 Ratios = Annotated[list[Ratio], Values("a number above 0")]
 
 

@@ -1,5 +1,6 @@
 """Samples: a study's section ``samples``."""
 
+import math
 from dataclasses import dataclass
 from functools import cache
 from typing import Annotated, Any
@@ -16,7 +17,18 @@ from springtune.problem.quantities import LEAST, nearest
 from springtune.springs import DEFINITIONS
 
 from ...config.checks import MORE_SCENES, check_able, in_mm, most_scenes
-from ...config.fields import DefinitionNames, Flag, Kinematics, Load, OneOrMore, Scalar, number, one_of, quantity
+from ...config.fields import (
+    POISSON_RATIO,
+    DefinitionNames,
+    Flag,
+    Kinematics,
+    Load,
+    OneOrMore,
+    Scalar,
+    number,
+    one_of,
+    quantity,
+)
 from ...config.kind import Kind
 from ...config.messages import refuse, show
 from ...config.sections import Section, default, optional
@@ -40,11 +52,11 @@ DEVIATIONS = 4.0
 MOST_DEVIATIONS = 8.0
 """Largest distance of the range of a normal distribution from its mean, in standard deviations."""
 
-LEGAL = {"poisson_ratio": (0.0, 0.5), "relative_mesh_size": (LEAST, 1.0)}
+LEGAL = {"poisson_ratio": (math.nextafter(-1.0, 0.0), 0.5), "relative_mesh_size": (LEAST, 1.0)}
 """Range of the parameters that are not just positive."""
 
 _NUMBERS = {
-    "poisson_ratio": number("a number from 0 to 0.5, such as 0.3", 0, 0.5),
+    "poisson_ratio": POISSON_RATIO,
     "relative_mesh_size": number("a number above 0 and at most 1, such as 0.2", 0, 1, above=True),
 }
 

@@ -35,7 +35,10 @@ def _solved(task):
         solver = partial(solve_finite_shape, law=task["law"])
     grouped = make(task["shape"]) if "file" in task["shape"] else None
     shape, materials = shape_of(task["shape"], task["thickness"], task["load"]), materials_of(task["materials"])
-    materials = of_parts(materials, parts_of(grouped)) if grouped else materials
+    try:
+        materials = of_parts(materials, parts_of(grouped)) if grouped else materials
+    except ValueError as error:  # of a file that is too large to be checked before
+        return failed(task, str(error))
     case = shape.loads[ONE_LOAD]
     found, lacking = solve_each(shape, case, materials, grouped, solver)
     if not found:
