@@ -56,9 +56,6 @@ OF_PROCESSOR = 0.8
 WAITING = 2.0
 """Seconds for which runs are repeated on a busy machine, besides those that are wanted."""
 
-BESIDE = 10.0
-"""Seconds of the processor that a case takes at most besides its longest run, imports and all."""
-
 UPDATES = 4_000_000
 """Springs that an explicit run advances, each step counted anew,"""
 
@@ -168,16 +165,15 @@ class Clock:
 
 
 class Alarm:
-    """Limits of what a process does: seconds of the processor for each run, and what is left to the task of all."""
+    """Limit of what a process does: seconds of the processor for each run."""
 
-    def __init__(self, most, left):
-        self.most, self.left = most, left
+    def __init__(self, most):
+        self.most = most
 
     def set(self):
         """Begin a run: what it takes beyond its limit ends the process, and what it starts."""
         used = time.process_time()
-        left = max(self.left - used, 1e-3) if self.left else self.most
-        signal.setitimer(signal.ITIMER_PROF, min(self.most, left))
+        signal.setitimer(signal.ITIMER_PROF, self.most)
         # Whole seconds; counted anew in a program that is started, whose own they are.
         resource.setrlimit(resource.RLIMIT_CPU, (int(used + self.most) + 2, resource.getrlimit(resource.RLIMIT_CPU)[1]))
 
@@ -283,8 +279,7 @@ def in_process(function, most_seconds, *arguments):
     """Result of a function in a process of its own, or `status`, `message` and whether it went `beyond` its limits."""
     context = multiprocessing.get_context("fork")
     receive, send = context.Pipe(duplex=False)
-    left = signal.getitimer(signal.ITIMER_PROF)[0]  # of the task's limit, which a new process does not have
-    process = context.Process(target=_child, args=(send, function, Alarm(most_seconds, left), arguments))
+    process = context.Process(target=_child, args=(send, function, Alarm(most_seconds), arguments))
     process.start()
     send.close()
     try:
@@ -295,10 +290,8 @@ def in_process(function, most_seconds, *arguments):
     except EOFError:
         process.join()
         if process.exitcode == -signal.SIGPROF:
-            own = not left or left > most_seconds + BESIDE
-            limits = _limit(most_seconds) if own else f"{_limit(most_seconds)}, or what is left of the study's `limits`"
-            return _failed(f"not done within {limits}") | {"beyond": True}
-        return _failed("ended: by the limits of the study, or for lack of memory") | {"beyond": True}
+            return _failed(f"not done within {_limit(most_seconds)}") | {"beyond": True}
+        return _failed("its process died: a crash, or too little memory") | {"beyond": True}
     finally:
         process.join()
 
