@@ -40,9 +40,7 @@ PROGRAMS = {
     ".scn": "SOFA",
     ".py": "SOFA",
     ".newton.py": "Newton",
-    ".usda": "Newton",
     ".xpbd.json": "XPBD",
-    ".lmp": "LAMMPS",
 }
 
 
@@ -312,8 +310,7 @@ def test_accelerations_beyond_those_of_mujoco_start_nothing_anew(tmp_path):
 def test_springs_without_a_load_are_free_and_at_rest(tmp_path):
     net = SpringNet.from_mesh(st.make_mesh(BEAM, "free", "5 mm"), STEEL, "lattice", errors=False)
     for ending in PROGRAMS:
-        if ending != ".usda":  # which has no springs
-            net.write(tmp_path / f"net{ending}")
+        net.write(tmp_path / f"net{ending}")
     model = mujoco.MjModel.from_xml_path(str(tmp_path / "net.mjcf"))
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
@@ -420,7 +417,7 @@ def test_the_command_writes_for_a_version_and_says_so(tmp_path):
 @pytest.mark.parametrize("ending", PROGRAMS)
 def test_a_file_of_springs_is_enough_for_a_simulator(ending, tmp_path):
     """What is read from a file of arrays is written as the scene itself is."""
-    one = scene("free", "shear", "delingette" if ending == ".usda" else "patch")
+    one = scene("free", "shear", "patch")
     direct = written(one, tmp_path, ending)
     [path] = one.springs.write(tmp_path / "arrays.h5", errors=False)
     version = {"mujoco": VERSION} if PROGRAMS[ending] == "MuJoCo" else {}
@@ -598,58 +595,9 @@ def test_xpbd_comes_to_rest_in_our_equilibrium(load, definition, tmp_path):
     assert np.abs(found - result.displacements).max() < 1e-3 * np.abs(result.displacements).max()
 
 
-def test_every_stiffness_is_a_type_of_bonds_of_lammps(tmp_path):
-    """The file as it is read: k without a half, both ends of each spring, masses, load and supports of particles."""
-    one = scene("free", "shear", "patch")
-    script, data = (path.read_text() for path in one.springs.write(tmp_path / "net.lmp", errors=False))
-    typed = {int(row.split()[1]): float(row.split()[2]) for row in script.splitlines() if row.startswith("bond_coeff")}
-    rows = {title: data.partition(f"\n{title}\n\n")[2].partition("\n\n")[0].split("\n") for title in LAMMPS_SECTIONS}
-    points, bonds, particles = (np.array([row.split() for row in rows[title] if row], float) for title in rows)
-    net = SpringNet.from_scene(one, errors=False)
-    assert np.array_equal(points[:, 3:5], net.points) and np.array_equal(bonds[:, 2:] - 1, net.springs)
-    assert np.array_equal([typed[kind] for kind in bonds[:, 1]], net.stiffness)
-    assert np.array_equal(particles[:, 1], net.masses) and np.array_equal(particles[:, 6:].astype(bool), net.held)
-    assert np.array_equal(particles[:, 2:4], np.where(net.held, 0, net.forces))
-    expected = net.points + one.solve().displacements
-    assert np.allclose(particles[:, 4:6], expected, rtol=0, atol=1e-9 * np.abs(net.points).max())
-
-
-@pytest.mark.parametrize("name", ["angular", "ielsm"])
-def test_every_angle_is_one_of_lammps(name, tmp_path):
-    """Half the modulus, the angle at rest in degrees, and the corner between the two others."""
-    one = scene("free", "traction", name)
-    script, data = (path.read_text() for path in one.springs.write(tmp_path / "net.lmp", errors=False))
-    assert "atom_style angle" in script and "Atoms # angle" in data and "angle_style harmonic" in script
-    rows = [row.split() for row in script.splitlines() if row.startswith("angle_coeff")]
-    typed = {int(row[1]): (float(row[2]), float(row[3])) for row in rows}
-    angles = np.array([row.split() for row in data.partition("\nAngles\n\n")[2].partition("\n\n")[0].split("\n")], int)
-    net = SpringNet.from_scene(one, errors=False)
-    [terms] = net.energies
-    modulus = terms.values["rotational"] if name == "ielsm" else np.repeat(terms.values["modulus"][:, None], 3, axis=1)
-    expected = {
-        (*np.roll(cell, 1 - corner).tolist(), float(modulus[row, corner]) / 2)
-        for row, cell in enumerate(terms.cells)
-        for corner in range(3)
-    }
-    assert {(*(row[2:] - 1).tolist(), typed[row[1]][0]) for row in angles} == expected
-    first, middle, last = (net.points[angles[:, column] - 1] for column in (2, 3, 4))
-    a, b = first - middle, last - middle
-    rest = np.degrees(np.arccos((a * b).sum(axis=1) / np.linalg.norm(a, axis=1) / np.linalg.norm(b, axis=1)))
-    assert np.allclose([typed[kind][1] for kind in angles[:, 1]], rest, rtol=1e-9)
-    assert f"{len(angles)} angles" in data and f"{len(typed)} angle types" in data
-
-
-def test_springs_without_angles_are_written_as_before(tmp_path):
-    script, data = (path.read_text() for path in scene(definition="patch").springs.write(tmp_path / "net.lmp"))
-    assert "angle" not in script + data and "atom_style bond" in script and "Atoms # bond" in data
-
-
-LAMMPS_SECTIONS = ("Atoms # bond", "Bonds", "Particles")
-
-
 def test_the_package_itself_imports_no_simulator():
     """Engines import one when they start, the rest of it never."""
-    imports = re.compile(r"^(\s*)(import|from) (mujoco|Sofa|newton|warp|pybullet|lammps)\b", re.MULTILINE)
+    imports = re.compile(r"^(\s*)(import|from) (mujoco|Sofa|newton|warp)\b", re.MULTILINE)
     for path in Path(st.__file__).parent.rglob("*.py"):
         found = [match[1] for match in imports.finditer(path.read_text())]
         assert not found or path.parent.name == "engines" and all(found), path
@@ -671,7 +619,6 @@ def test_what_a_simulator_lacks_is_refused_and_nothing_written(ending, program, 
         *(
             (scene(definition=name), f"definition '{name}': has energies of angles.*{program}.*such as 'patch'")
             for name in ("angular", "ielsm")
-            if program != "LAMMPS"  # which has them
         ),
         *((scene(definition=name), f"definition '{name}': .*'patch'") for name in ("normal-shear", "many-body")),
         (scene(material=weightless), f"density: material 'ideal' has none, and {program} moves masses; give a density"),
@@ -722,8 +669,6 @@ def test_a_load_without_equilibrium_is_written_and_says_so(tmp_path):
         assert json.loads(written(one, tmp_path, ".xpbd.json"))["displacements"] is None
     with pytest.warns(EquilibriumWarning):
         assert 'name="predicted"' not in written(one, tmp_path, ".scn")
-    with pytest.warns(EquilibriumWarning):
-        assert "predicted equilibrium" not in written(one, tmp_path, ".lmp")
 
 
 def test_the_command_says_of_an_equilibrium_that_there_is_none_or_that_it_is_far(tmp_path):

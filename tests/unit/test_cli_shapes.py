@@ -171,7 +171,7 @@ def test_refusals_of_one_command(arguments, message, here):
     assert len(result.stderr.splitlines()) == 1 and sorted(here.iterdir()) == before
 
 
-@pytest.mark.parametrize("ending", [".xml", ".scn", ".xpbd.json", ".lmp"])
+@pytest.mark.parametrize("ending", [".xml", ".scn", ".xpbd.json"])
 def test_follower_pressure_is_refused_by_simulators(ending, here, tmp_path):
     asked = ("--shape", "study.yaml:plate", "--load", "push", "--size", "4 mm", "--definition", "lattice")
     result = run("springs", *asked, "--out", tmp_path / f"net{ending}")

@@ -16,9 +16,8 @@ import numpy as np
 from ..mesh.formats import LONGEST_SAID, library
 from ..safe_io.atomic import check_folder, replacing, write_text
 from ..safe_io.inputs import DataElsewhere, check_alone
-from .lammps import lammps
 from .mujoco import mjcf
-from .newton import newton_script, newton_usd
+from .newton import newton_script
 from .paraview import comment_of, write_vtu
 from .sofa import sofa_python, sofa_xml
 from .terms import OF_CORNERS, VALUES, Net, Terms
@@ -477,13 +476,6 @@ def _as_text(text: Callable[[Net], str]) -> Callable[[Path, Net], None]:
     return lambda path, net: write_text(path, text(net))
 
 
-def _write_lammps(path: Path, net: Net) -> list[Path]:
-    data = path.with_suffix(".data")
-    script, particles = lammps(net, data.name)
-    _write_all({data: particles, path: script})
-    return [path, data]
-
-
 class _Format(NamedTuple):
     """How a net is written in a format, and read."""
 
@@ -508,10 +500,8 @@ _SIMULATORS = {
     ".mjcf": _MUJOCO,
     ".scn": _for_simulator("SOFA", _as_text(sofa_xml)),
     ".py": _for_simulator("SOFA", _as_text(sofa_python)),
-    ".lmp": _for_simulator("LAMMPS", _write_lammps),
     ".xpbd.json": _for_simulator("XPBD", _as_text(xpbd)),
     ".newton.py": _for_simulator("Newton", _as_text(newton_script)),
-    ".usda": _for_simulator("Newton", _as_text(newton_usd)),
 }
 
 

@@ -276,9 +276,7 @@ class SpringNet(Tabled, Net):
             ``.csv`` has the springs as a table, with the header ahead as comments, and particles and cells in tables
             beside it, such as ``net.particles.csv``; ``.json`` and ``.h5`` (HDF5) have the arrays by their names here;
             ``.vtu`` has springs as lines, for ParaView and meshio. Models that run, and are not read again: ``.xml`` or
-            ``.mjcf`` for MuJoCo, ``.scn`` or ``.py`` for SOFA, ``.newton.py`` or, of `delingette` alone, ``.usda``
-            for Newton, ``.xpbd.json`` for XPBD, ``.lmp`` for LAMMPS, with
-            particles and bonds beside it, such as ``net.data``.
+            ``.mjcf`` for MuJoCo, ``.scn`` or ``.py`` for SOFA, ``.newton.py`` for Newton, ``.xpbd.json`` for XPBD.
         mujoco : int, optional
             Version of MuJoCo that its file is for, 3 or 4; 4 without. Springs alone are the same in both; squared
             lengths (`delingette`) are not, and each version refuses the file for the other.
