@@ -318,6 +318,7 @@ BAD = {
     "x [mm],y [mm],u [um],v [%]\n5,5,1,1\n": "line 1: column 'v': '1 %' is of dimension dimensionless",
     "x [mm],y [mm],u [um],v [um]\n5,5,1e400,1\n": "line 2, column 'u': '1e400' is no finite number",
     "x [mm],y [mm],u [um],v [um]\n5,5,1.2.3,1\n": "line 2, column 'u': '1.2.3' is no finite number",
+    "x [mm],y [mm],u [um],v [um]\n5,5,0,0\n6,5,0,0\n": "all 2 points have the same displacement",
     "force [N],displacement [mm]\n1,1e300\n2,2\n": "line 2, column 'displacement': 1e+300 mm is beyond all measure",
     "x [mm],y [mm],u [um]\n5,5,1\n": "line 1: column 'v' is missing",
     "x [mm],y [mm],u [um],v [um]\n5,5,1,1\n": "numbers besides the shift",

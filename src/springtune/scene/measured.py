@@ -173,6 +173,11 @@ def _field(test: MeasuredTest, family: Family) -> list[Block]:
             f"'{test.file}', line {test._lines[worst]}: the point x = {x:.6g} mm, y = {y:.6g} mm is outside of the "
             "body; remove it, or correct the unit or the origin"
         )
+    if len(points) > 1 and not np.ptp(values, axis=0).any():
+        raise TestDataError(
+            f"'{test.file}': all {len(points)} points have the same displacement, so nothing was measured; give the "
+            "field under the load"
+        )
     turned = (points - points.mean(axis=0))[:, ::-1] * [-1, 1] / (np.ptp(points) or 1.0)
     rigid, _ = np.linalg.qr(np.column_stack([np.tile(np.eye(2), (len(points), 1)), turned.ravel()]))
     factors, label = np.full(values.size, test.force or 1.0), f"field of '{test.file}'"
