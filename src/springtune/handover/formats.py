@@ -469,7 +469,21 @@ def _for_simulator(program: str, write: Callable[[Path, Net], list[Path] | None]
     def refuse(path: Path) -> Read:
         raise ValueError(f"it is for {program}; read the springs from .json, .h5, .csv or .vtu")
 
-    return _Format(write, refuse)
+    def checked(path: Path, net: Net) -> list[Path] | None:
+        made_for = net.header.get("calibrated")
+        if made_for and not path.name.endswith(AT_SETTING.get(made_for["engine"], "/")):
+            kept = " or ".join(filter(None, [AT_SETTING.get(made_for["engine"]), ".csv, .json, .vtu or .h5"]))
+            raise ValueError(
+                f"{path}: runs {program} at a step of its own, and the stiffness is that for {made_for['engine']} at "
+                f"{made_for['setting']} alone; give a name ending in {kept}"
+            )
+        return write(path, net)
+
+    return _Format(checked, refuse)
+
+
+AT_SETTING = {"newton-vbd": ".newton.py", "xpbd": ".xpbd.json"}
+"""Endings of files that run a calibrated stiffness at the setting that it is for, by engine."""
 
 
 def _as_text(text: Callable[[Net], str]) -> Callable[[Path, Net], None]:
