@@ -26,7 +26,7 @@ from ..registry import Declared, Registry, how_to_install
 from ..safe_io.tables import number_text
 from ..scene.damping import Damping
 
-MOST, LONGEST = 100_000, 1.0
+MOST_COUNTED, LONG_FRAME = 100_000, 1.0
 """Most substeps and iterations, and the longest frame [s]."""
 
 
@@ -38,7 +38,7 @@ def number(value: Any, name: str, least: float = np.nextafter(0, 1)) -> float:
     return float(value)
 
 
-def count(value: Any, name: str, most: int = MOST) -> int:
+def count(value: Any, name: str, most: int = MOST_COUNTED) -> int:
     """Return a whole number above zero, up to the most that is run."""
     if isinstance(value, bool) or not isinstance(value, Integral) or int(value) < 1:
         raise ValueError(f"{name}: {value!r} is not a whole number above zero; give one")
@@ -104,8 +104,10 @@ class Setting:
             above, below = map(int, dt.split("/"))
             dt = above / below if below else 0.0
         object.__setattr__(self, "dt", positive(dt, "time", "dt"))
-        if self.dt > LONGEST:
-            raise ValueError(f"dt: {self.dt:g} s is longer than {LONGEST:g} s; give the time of a frame such as 1/60")
+        if self.dt > LONG_FRAME:
+            raise ValueError(
+                f"dt: {self.dt:g} s is longer than {LONG_FRAME:g} s; give the time of a frame such as 1/60"
+            )
         for name in ("substeps", "iterations"):
             object.__setattr__(self, name, count(getattr(self, name), name))
 

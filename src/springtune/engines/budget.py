@@ -31,7 +31,7 @@ from .run import DRIFT, drift, in_engine, net_of
 CELLS_ACROSS = (4, 6, 8, 12, 16)
 """Cells across the smaller side of a body, of the meshes that are tried: fewer are too stiff in bending."""
 
-ALIKE = 1e-3
+ALIKE_ERRORS = 1e-3
 """Difference of errors up to which the choice with the factor nearer to 1 is taken."""
 
 BUDGET_MESHES = ("structured", "right")
@@ -252,7 +252,7 @@ def fit_budget(
     if not tried:
         raise EngineError(why or "no mesh can be made; give others")
     tried.sort(key=lambda one: (not one.fit.bands, one.worst, one.frame_seconds))
-    alike = [one for one in tried if one.fit.bands and one.worst <= tried[0].worst + ALIKE]
+    alike = [one for one in tried if one.fit.bands and one.worst <= tried[0].worst + ALIKE_ERRORS]
     if alike:
         nearest = min(alike, key=lambda one: abs(np.log(one.fit.factor)))
         tried.remove(nearest)

@@ -38,7 +38,7 @@ BRACKET, BRACKETS, SATURATED = 8.0, 7, 1e-3
 """Ratio of the factors that look for a bracket, how many there are, and the change of the displacement over one below
 which stiffness no longer decides."""
 
-ORDERS = 4
+TRIED_ORDERS = 4
 """Orders of particles, springs and cells that a calibration is tried in."""
 
 DAMPED = "critical for the loaded mode: velocities go over 1 + damping times the step after each step"
@@ -293,7 +293,7 @@ class _Runs(dict[tuple[float, Setting], EngineResult]):
 
     def orders(self, factor: float, setting: Setting) -> list[EngineResult]:
         """Runs in all orders of particles, springs and cells, of which engines without iterations have one."""
-        others = range(1, ORDERS if ENGINES[self.engine].iterates else 1)
+        others = range(1, TRIED_ORDERS if ENGINES[self.engine].iterates else 1)
         return [self[factor, setting], *(self.under(self.scene, factor, setting, order) for order in others)]
 
     def spread(self, factor: float, setting: Setting, within: float) -> tuple[tuple[float, float], str]:
@@ -304,9 +304,9 @@ class _Runs(dict[tuple[float, Setting], EngineResult]):
             return (low, high), ""
         between = f"is {error_text(low)} to {error_text(high)}" if low == low else "has no end in some"
         return (low, high), (
-            f"the error at {setting} {between} in {ORDERS} orders of the same particles, with {factor:.4g} times the "
-            "numbers of the definition: the solver has not converged, so no factor holds in other scripts; take more "
-            "substeps or iterations"
+            f"the error at {setting} {between} in {TRIED_ORDERS} orders of the same particles, with {factor:.4g} times "
+            "the numbers of the definition: the solver has not converged, so no factor holds in other scripts; take "
+            "more substeps or iterations"
         )
 
     def ratio(self, factor: float, setting: Setting) -> float:

@@ -25,7 +25,7 @@ from ..registry import hook
 from ..safe_io.inputs import number_of
 from ..safe_io.tables import Tabled
 from .measured import Block, MeasuredTest, blocks, stated
-from .residuals import LEAST, Noise, correlated, excess, measured
+from .residuals import FEWEST_POINTS, Noise, correlated, excess, measured
 from .sheet import chosen
 
 if TYPE_CHECKING:
@@ -526,7 +526,7 @@ def _checked(
     basis = np.hstack([left, others[:, strong > 1e-6 * sizes[0]]])
     along, known, elastic = basis.T @ residual, len(sizes), model.tests[0][0] is not None
     freedom = float(model.counts.sum() - basis.shape[1])
-    if freedom < LEAST:
+    if freedom < FEWEST_POINTS:
         return np.ones(known), []
     rest, law = residual - basis @ along, basis[:, known:] @ along[known:]
     notes, least, misfit = [], freedom, False

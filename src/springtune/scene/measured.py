@@ -33,7 +33,7 @@ HEADS = "give columns such as 'force [N],displacement [mm]' or 'x [mm],y [mm],u 
 GAUGES = ("gauge-1", "gauge-2")
 """Points of a beam between which ``transverse`` is measured: the middles of the sides beside the load."""
 
-LARGEST = 1e30
+LARGEST_NUMBER = 1e30
 """Number beyond which a cell has no measurement, but the largest number of a program."""
 
 OFF_BODY = 1e-3
@@ -248,7 +248,7 @@ def _read(path: str | Path) -> tuple[dict[str, np.ndarray], list[int], int]:
             scale = positive(f"1 {unit}", "force" if name == "force" else "length", f"column {name!r}")
         except ValueError as error:
             raise TestDataError(f"'{path}', line {line}: {error} in '[ ]'") from None
-        if (far := np.abs(values) > LARGEST / scale).any():
+        if (far := np.abs(values) > LARGEST_NUMBER / scale).any():
             worst = int(np.argmax(far))
             raise TestDataError(
                 f"'{path}', line {rows[worst][0]}, column {name!r}: {values[worst]:g} {unit} is beyond all measure; "
@@ -264,4 +264,4 @@ def _absent(name: str, text: str) -> bool:
     """Whether a cell of a field says that nothing was measured: empty, NaN, a word, or the largest number."""
     if not name or not re.search("[0-9]", text) or "#" in text:
         return bool(name) and not math.isfinite(number_of(text))
-    return LARGEST < abs(number_of(text)) < math.inf
+    return LARGEST_NUMBER < abs(number_of(text)) < math.inf

@@ -12,10 +12,10 @@ from scipy.linalg import solve_triangular
 from scipy.spatial import KDTree
 from scipy.spatial.distance import cdist
 
-FAR = 5.0
+OUTLYING = 5.0
 """Deviations from which on a value is no measurement; more of few values."""
 
-LEAST = 10
+FEWEST_POINTS = 10
 """Places from which on their residuals are looked at."""
 
 ROBUST = 1.4826
@@ -24,7 +24,7 @@ ROBUST = 1.4826
 UNLIKELY = 2.75
 """Deviations of the correlation of neighbours from which on it is no chance."""
 
-SHARES, REACHES, POWERS = (0.25, 0.5, 0.75, 0.95, 0.999), 12, (1, 2)
+SHARES, REACHES, EXPONENTS = (0.25, 0.5, 0.75, 0.95, 0.999), 12, (1, 2)
 """Shares of correlated noise, numbers of distances l, and powers of d / l that are tried."""
 
 FITTED, SUMMED = 300, 1500
@@ -37,25 +37,25 @@ def measured(values: np.ndarray, columns: np.ndarray, places: np.ndarray, floor:
     What is measured is a combination of `columns`, fitted to least magnitudes, within some noise above `floor`.
     """
     count = len(places)
-    if count < LEAST:
+    if count < FEWEST_POINTS:
         return np.ones(count, bool)
     spread = np.abs(values - np.median(values, axis=0))
     begin = (spread <= 100 * np.median(spread, axis=0)).all(axis=1) & ((values != 0).any(axis=1) | (places.ndim == 1))
-    begin = begin if begin.sum() >= LEAST else np.ones(count, bool)
+    begin = begin if begin.sum() >= FEWEST_POINTS else np.ones(count, bool)
     table = columns[begin].reshape(-1, columns.shape[-1])
     sizes, wanted, weights = np.linalg.norm(table, axis=0) + 1e-300, values[begin].ravel(), np.ones(table.shape[:1])
     for _ in range(30):
         found = np.linalg.lstsq(table / sizes * weights[:, None], wanted * weights, rcond=1e-9)[0] / sizes
         apart = np.abs(wanted - table @ found)
         weights = np.maximum(apart, 1e-3 * np.median(apart) + 1e-300) ** -0.5
-    apart, limit = values - columns @ found, FAR * (1 + LEAST / count)
+    apart, limit = values - columns @ found, OUTLYING * (1 + FEWEST_POINTS / count)
     far = np.abs(apart) > limit * np.maximum(ROBUST * np.median(np.abs(apart[begin]), axis=0), floor)
     gone = np.zeros(count, bool)
     for number in range(values.shape[1] * (places.ndim - 1)):  # of fields
         _, group, sizes = np.unique(values[:, number], return_inverse=True, return_counts=True)
         gone |= ((sizes > 2) & (np.bincount(group, far[:, number]) >= sizes / 2))[group]
     rest = np.flatnonzero(~gone)
-    if len(rest) >= LEAST:
+    if len(rest) >= FEWEST_POINTS:
         near = _tree(places[rest])[1][:, 1:]
         alone = np.abs(apart[rest] - np.median(apart[rest][near], axis=1))
         own = np.maximum(ROBUST * np.median(alone, axis=0), floor)
@@ -73,7 +73,7 @@ def _tree(places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def excess(residual: np.ndarray, places: np.ndarray) -> float:
     """Correlation of neighbours less what chance may yield; above 0 residuals are not random."""
-    if len(places) < LEAST or not residual.any():
+    if len(places) < FEWEST_POINTS or not residual.any():
         return -1.0
     if places.ndim == 1:
         order = np.argsort(places, kind="stable")
@@ -124,7 +124,7 @@ def correlated(residual: np.ndarray, columns: np.ndarray, places: np.ndarray) ->
     extent, best = np.ptp(at, axis=0).max() or 1.0, (np.inf, Noise())
     least = max(np.median(KDTree(at).query(at, k=2)[0][:, 1]), 1e-3 * extent)  # points may be given twice
     for reach in np.geomspace(least / 2, extent / 2, REACHES):
-        for power in POWERS:
+        for power in EXPONENTS:
             pairs = Noise(reach=reach, power=power).between(at)
             for share in SHARES:
                 lower = np.linalg.cholesky(share * pairs + (1 - share) * np.eye(count))
