@@ -74,6 +74,8 @@ _KNOWN = {unit: (kind, Decimal(size)) for kind, units in COMMON.items() for unit
 _QUANTITY = re.compile(r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)(?:/([0-9]+))?\s*(.*)", re.DOTALL)
 
 
+_OF_PRINT = re.compile("pixel|point|pica|didot|cicero|dot")
+
 LONGEST_QUANTITY = 100
 """Most characters of a quantity."""
 
@@ -171,6 +173,8 @@ def _ask_pint(unit: str) -> tuple[str, Decimal] | None:
         size = registry.Quantity(1.0, given).to_base_units().magnitude
     except Exception:  # pint raises many kinds, tokenizer's and its own
         return None
+    if of_print := _OF_PRINT.search(str(given)):  # to pint lengths, or numbers of dots
+        return f"a number of {of_print[0]}s, which have no size of their own", Decimal(1)
     for kind in QUANTITY_KINDS.values():
         if kind.name in ("angle", "frequency"):
             continue  # to pint an angle is a number, as a percentage is, and a speed of rotation a frequency

@@ -1,5 +1,6 @@
 """The page in a real browser: what it shows, how it answers, and that it asks for nothing."""
 
+import ast
 import os
 import statistics
 import threading
@@ -10,9 +11,9 @@ import pytest
 from selenium.webdriver import Keys
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
+from springtune.studies.output.browse.server import Server
 
 from springtune.problem.compare import sign_sentence
-from springtune.studies.output.browse.server import Server
 from springtune.studies.output.colours import ERROR_COLOURS
 
 CURVE = "springtune.charts.curve.sources.points.data.y.join()"
@@ -157,6 +158,20 @@ def test_hostile_texts_are_shown_as_texts(browser, small):
     assert browser.driver.title == "<script>alert(1)</script>"
     assert browser.ask("return document.querySelector('h1').textContent") == "<script>alert(1)</script>"
     assert not browser.ask("return document.querySelectorAll('h1 *').length")
+
+
+def test_names_of_strangers_are_no_code(browser, small, strange):
+    codes = []
+    for address in (small, strange):
+        browser.open(address)
+        codes.append(browser.ask("return document.querySelector('pre.code')?.textContent"))
+        assert all(line.isprintable() for line in codes[-1].split("\n"))
+    calls = [
+        [ast.unparse(one.func) for one in ast.walk(ast.parse(code)) if isinstance(one, ast.Call)] for code in codes
+    ]
+    assert calls[0] == calls[1]
+    labels = next(one for one in ast.walk(ast.parse(codes[1])) if isinstance(one, ast.Dict))
+    assert labels.keys[0].value in labels.values[0].value and "results/study/dataset.nc" in codes[1]
 
 
 def test_a_group_that_nobody_knows_has_a_view(browser, small):

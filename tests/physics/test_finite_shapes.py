@@ -178,3 +178,26 @@ def test_what_is_not_stable_says_where_it_ends():
     case = st.LoadCase("push", CLAMP, [st.Traction("right", (-20, 0))], quantities=(END,))
     with pytest.raises(FiniteStrainError, match=r"shape '100x40', load 'push': no .* beyond .* % of the load"):
         solved(case)
+
+
+def cook(force):
+    outline = [
+        st.Segment((0, 0)),
+        st.Segment((0.048, 0.044), group="right"),
+        st.Segment((0.048, 0.060), group="upper"),
+        st.Segment((0, 0.044), group="left"),
+    ]
+    tip = (st.Quantity("tip", "displacement", "tip", "y"), st.Quantity("end", "displacement", "right", "y"))
+    case = st.LoadCase("shear", CLAMP, [st.Traction("right", (0, force))], quantities=tip)
+    return st.Shape("cook", THICKNESS, outline, points={"tip": (0.048, 0.060)}, loads={"shear": case}), case
+
+
+def test_cooks_panel_of_rubber():
+    """At 1.5 N it has a limit; at 3 N finer triangles give way at the clamp's corner."""
+    shape, case = cook(1.5)
+    found = solve_finite_shape(shape, case, {"": RUBBER})
+    assert found.values["tip"] == pytest.approx(19.32e-3, rel=1e-3)
+    shape, case = cook(3.0)
+    why = r"carry it all, and are pressed to 0\.\d+ of their area near \(.*, 4.*\) mm.* need not have a limit"
+    with pytest.raises(FiniteStrainError, match=why):
+        solve_finite_shape(shape, case, {"": RUBBER})

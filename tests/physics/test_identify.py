@@ -1,5 +1,6 @@
 """Constants of a sheet from measured tests: synthetic ones with noise, rubber's, and what is refused."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from springtune.scene.measured import blocks, stated
 BEAM = st.Beam("100 mm", "20 mm")
 PLY = st.AnisotropicMaterial.orthotropic("14 GPa", "5 GPa", 0.3, "2 GPa", name="ply")
 FORCES = np.linspace(0.0, 500.0, 21)
+SHEET = st.Material("3 GPa", 0.35)
 CORE = st.Shape.rectangle(
     "60 mm", "30 mm", holes=[st.Hole.circle(("30 mm", "15 mm"), "8 mm", part="core")],
     loads={"pull": st.LoadCase("pull", (st.Support("left", 0, 0),), (st.Traction("right", (300.0, 0.0)),))},
@@ -54,6 +56,41 @@ def field(path, shape, load, materials, noise, seed=0):
     moved = solve_shape(shape, shape.loads[load], materials).at(points)
     moved += random.normal(0.0, noise, moved.shape) + [2e-6, -5e-6] + 1e-5 * points[:, ::-1] * [-1, 1]
     return write(path, "x [mm],y [mm],u [um],v [um],exx [1]", 1e3 * points, 1e6 * moved, 0 * points[:, 0])
+
+
+def beam_field(path, material=SHEET, load="traction", spoil=lambda points, moved, random: moved, seed=0):
+    """File of a field of 300 points of a beam under 500 N, with noise of 1 um, and the test of it."""
+    random, test = np.random.default_rng(seed), write(path, "force [N],displacement [um]", [0.0, 1.0], [0.0, 1.0])
+    points = random.uniform(0, (0.1, 0.02), (300, 2))
+    shape, case, _ = stated(st.MeasuredTest(BEAM, load, test))
+    moved = 500 * solve_shape(shape, case, {"": material}).at(points) + random.normal(0.0, 1e-6, (300, 2))
+    moved = spoil(points, moved, random)
+    return write(path, "x [mm],y [mm],u [um],v [um]", 1e3 * points, 1e6 * moved)
+
+
+def windows(points, moved, random):
+    """Noise of a grid of 1 mm, averaged over windows of 5 mm, at points."""
+    places = np.stack(np.meshgrid(np.arange(-3, 104), np.arange(-3, 24), indexing="ij"), axis=-1).reshape(-1, 2) * 1e-3
+    near = np.abs(points[:, None] - places).max(axis=2) < 2.5e-3
+    return moved + 4e-6 * near @ random.normal(size=(len(places), 2)) / 5
+
+
+def put(share, value):
+    def spoil(points, moved, random):
+        moved[random.random(len(moved)) < share] = value
+        return moved
+
+    return spoil
+
+
+def patch(points, moved, random):
+    moved[np.linalg.norm(points - [0.06, 0.012], axis=1) < 4e-3] = 0
+    return moved
+
+
+def gross(points, moved, random):
+    moved[:8, 1] += random.normal(0, 1e-4, 8)
+    return moved
 
 
 def within(found, **expected):
@@ -142,6 +179,100 @@ def test_a_moved_support_tells_no_modulus(tmp_path):
         st.identify(st.MeasuredTest(GRIPPED, "grip", path))
 
 
+UNMEASURED = {
+    "zeros": put(0.04, 0), "many zeros": put(0.4, 0), "of no camera": put(0.03, [0, -1]), "-999": put(0.03, -999e-6),
+    "1e20": put(0.03, 1e14), "patch": patch, "gross": gross,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", UNMEASURED)
+def test_points_that_were_not_measured_are_left_out(tmp_path, kind):
+    file = beam_field(tmp_path / "f.csv", spoil=UNMEASURED[kind], seed=1)
+    found = st.identify(st.MeasuredTest(BEAM, "traction", file, force=500))
+    within(found, E=3e9, nu=0.35)
+    assert len(found.notes) == 1 and " of 300 points are left out, the first at x, y = " in found.notes[0]
+
+
+@pytest.mark.parametrize("cell", ["", "NaN", "-nan(ind)", "1.#QNAN", "masked", "inf", "1.79769e308"])
+def test_points_without_numbers_are_left_out(tmp_path, cell):
+    lines = Path(beam_field(tmp_path / "f.csv")).read_text().splitlines()
+    for line, column in ((1, 2), (5, 3), (9, 0)):
+        lines[line] = ",".join(cell if n == column else text for n, text in enumerate(lines[line].split(",")))
+    (tmp_path / "f.csv").write_text("\n".join(lines))
+    found = st.identify(st.MeasuredTest(BEAM, "traction", tmp_path / "f.csv", force=500))
+    within(found, E=3e9, nu=0.35)
+    assert found.notes == (f"'{tmp_path / 'f.csv'}': 3 points have no numbers and are left out",)
+
+
+NOT_AS_STATED = {
+    "v runs down": (SHEET, "traction", lambda _, moved, __: moved * [1, -1], "change the sign of v"),
+    "v of shear": (SHEET, "shear", lambda _, moved, __: moved * [1, -1], "with v reversed|does not fit"),
+    "windows": (SHEET, "traction", windows, "correlated over some"),
+    "isotropic law": (PLY, "shear", lambda _, moved, __: moved, "the law does not fit"),
+    "angle": (PLY.rotated(0.3), "traction", lambda _, moved, __: moved, "the law does not fit"),
+}
+
+
+@pytest.mark.parametrize("kind", NOT_AS_STATED)
+def test_what_does_not_fit_is_noted(tmp_path, kind):
+    material, load, spoil, note = NOT_AS_STATED[kind]
+    file = beam_field(tmp_path / "f.csv", material, load, spoil)
+    found = st.identify(st.MeasuredTest(BEAM, load, file, force=500), "orthotropic" if kind == "angle" else "isotropic")
+    assert re.search(note, " ".join(found.notes))
+    if kind == "windows":
+        within(found, E=3e9, nu=0.35)
+
+
+@pytest.mark.parametrize(
+    ("load", "sign", "why"),
+    [("traction", -1, "runs against the load"), ("shear", 1, "explains"), ("compression", 1, "runs against"),
+     ("pressure", 1, "explains|runs against"), ("bending", 1, "explains|runs against")],
+)  # fmt: skip
+def test_a_field_of_another_load_is_refused(tmp_path, load, sign, why):
+    file = beam_field(tmp_path / "f.csv", SHEET, load, lambda _, moved, __: sign * moved)
+    with pytest.raises(TestDataError, match=f"f.csv.*({why})"):
+        st.identify(st.MeasuredTest(BEAM, "traction", file, force=500))
+
+
+@pytest.mark.parametrize(("along", "across", "ratio"), [(14, 5, 0.3), (5, 14, 0.3 * 5 / 14), (1, 30, 0.01)])
+def test_three_curves_tell_three_constants_and_a_usual_ratio_is_assumed(tmp_path, along, across, ratio):
+    ply, tests = st.AnisotropicMaterial.orthotropic(along * 1e9, across * 1e9, ratio, "2 GPa", name="ply"), []
+    for n, angle in enumerate((0.0, np.pi / 2, np.pi / 4)):
+        path = tmp_path / f"{n}.csv"
+        lines = Path(curve(path, ply, noise=1e-6, seed=n, angle=angle)).read_text().splitlines()
+        path.write_text("\n".join(line.rpartition(",")[0] for line in lines))
+        tests.append(st.MeasuredTest(BEAM, "traction", path, angle=angle))
+    found = st.identify(tests, "orthotropic")
+    within(found, E1=along * 1e9, E2=across * 1e9, G12=2e9)
+    assert found.undetermined == ("nu12",) and found.values["nu12"] == pytest.approx(ratio, rel=0.02)
+    if along != 14:
+        return
+    isotropic = st.identify(tests, "isotropic")
+    assert isotropic.undetermined == ("nu",) and isotropic.values["nu"] == 0.3
+    assert "law does not fit" in " ".join(isotropic.notes)
+
+
+def test_constants_without_influence_have_intervals_without_bounds(tmp_path):
+    test = st.MeasuredTest(BEAM, "traction", curve(tmp_path / "c.csv", PLY, noise=1e-6))
+    shape, case, _ = stated(test)
+    family = Family(shape, case, None, {"": PLY})
+    start = {"E1": 14e9, "E2": 5e9, "nu12": 0.3, "G12": 2e9}
+    *_, half = Model([(family, blocks(test, family, case), 0.0)]).fit(start, list(start))  # of two numbers
+    assert half.max() > 100
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("spoil", "noted"), [(lambda _, moved, __: moved, 0), (windows, 20), (put(0.05, 0), 20)])
+def test_intervals_of_fields_hold(tmp_path, spoil, noted):
+    inside, notes = np.zeros(2), 0
+    for seed in range(20):
+        file = beam_field(tmp_path / "f.csv", spoil=spoil, seed=seed)
+        found = st.identify(st.MeasuredTest(BEAM, "traction", file, force=500))
+        inside += [low < value < high for value, (low, high) in zip((3e9, 0.35), found.intervals.values())]
+        notes += bool(found.notes)
+    assert inside.min() >= 16 and abs(notes - noted) <= 1, (inside, notes)
+
+
 @pytest.mark.slow
 def test_estimates_lie_within_their_intervals_as_often_as_they_say(tmp_path):
     material = st.Material("3 GPa", 0.35)
@@ -183,6 +314,12 @@ BAD = {
     "force [N],displacement [mm]\n5,1\n6,1.1\n": "1 numbers besides the shift, for the unknowns",
     "force [N],displacement [mm],widht [mm]\n5,1,1\n6,1.1,1\n": "column 'widht': ",
     "x [mm],y [mm],u [um],v [um]\n5,5,1,1\n300,5,2,1\n": "line 3: the point x = 300 mm, y = 5 mm is outside",
+    "x [px],y [mm],u [um],v [um]\n5,5,1,1\n": "line 1: column 'x': '1 px' is a number of pixels",
+    "x [mm],y [mm],u [um],v [%]\n5,5,1,1\n": "line 1: column 'v': '1 %' is of dimension dimensionless",
+    "x [mm],y [mm],u [um],v [um]\n5,5,1e400,1\n": "line 2, column 'u': '1e400' is no finite number",
+    "x [mm],y [mm],u [um],v [um]\n5,5,1.2.3,1\n": "line 2, column 'u': '1.2.3' is no finite number",
+    "x [mm],y [mm],u [um],v [um]\n5,5,0,0\n6,5,0,0\n": "all 2 points have the same displacement",
+    "force [N],displacement [mm]\n1,1e300\n2,2\n": "line 2, column 'displacement': 1e+300 mm is beyond all measure",
     "x [mm],y [mm],u [um]\n5,5,1\n": "line 1: column 'v' is missing",
     "x [mm],y [mm],u [um],v [um]\n5,5,1,1\n": "numbers besides the shift",
 }
@@ -207,6 +344,17 @@ def test_the_command_writes_a_study_that_loads(tmp_path, monkeypatch):
     material = yaml.safe_load(Path("mine.yaml").read_text())["materials"]["measured"]
     assert material["poisson_ratio"] == pytest.approx(0.35, abs=0.05)
     assert len(st.load_study("mine.yaml").scenes) == 2
+
+
+def test_no_study_is_written_that_would_be_refused(tmp_path, monkeypatch):
+    beam_field(tmp_path / "f.csv", spoil=lambda _, moved, __: moved * [1, -1])
+    monkeypatch.chdir(tmp_path)
+    call = ["identify", "f.csv", "--beam", "100x20", "--load", "traction", "--force", "500 N", "--write", "mine.yaml"]
+    made = CliRunner().invoke(main, call)
+    if made.exit_code == 0:
+        assert st.load_study("mine.yaml").scenes
+    else:
+        assert "mine.yaml" in made.output and "poisson_ratio" in made.output and not Path("mine.yaml").exists()
 
 
 def test_a_study_of_rubber_has_a_small_force(tmp_path):

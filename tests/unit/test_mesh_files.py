@@ -87,7 +87,8 @@ ASSEMBLED = SETS.replace("=left", "=left, INSTANCE=Plate-1").replace("=right", "
 
 ABAQUS = {
     "clean": INP,
-    "lower case, with comments, blanks and CR": INP.lower().replace("\n", "\r\n** a, 1\r\n\r\n  "),
+    "lower case, with comments, blanks, CR and a mark at the beginning": "\ufeff"
+    + (MESH + SETS).lower().replace("\n", "\r\n** a, 1\r\n\r\n  "),
     "upper case of keywords in two sets of one name": INP.replace("right\n5, 10,", "right\n5, 10\n*Nset, nset=RIGHT\n"),
     "sets of cells twice": INP.replace("7, 8\n", "*ELSET, ELSET=Hard\n7, 8\n"),
     "sets over blocks and types": INP.replace(MESH, f"*NODE\n{NODES}" + blocks()),

@@ -40,10 +40,14 @@ FOUND = ("substeps", "iterations", "size", "definition")
 class EngineOptions(dict[str, Any]):
     """Values of `ENGINE_OPTIONS`, None where not given."""
 
-    def check(self, sheet: SheetOptions, error: str | None) -> None:
+    def check(self, sheet: SheetOptions, error: str | None, load: str | None) -> None:
         """Refuse options that are not for each other."""
         given = {name: value for name, value in self.items() if value is not None}
         if "engine" not in given:
+            if load is not None and sheet.shape is None:
+                raise ValueError(
+                    f"--load: '{load}' is of engines and shapes; give --engine or --shape, or leave it out"
+                )
             for name, value in given.items():
                 raise ValueError(f"--{name}: '{value}' is of engines; give --engine, such as xpbd, or leave it out")
         elif error is not None:
@@ -132,7 +136,9 @@ def fitted(
 def net_of_fit(fit: "EngineFit | None", _: str) -> "SpringNet":
     """Springs of a calibration."""
     if fit is None or fit.factor != fit.factor:
-        raise Unmet(f"--write: there is no factor, so nothing is written: {fit.message if fit else 'see above'}")
+        raise Unmet(
+            f"--write: there is no factor, so nothing is written: {fit.message if fit else 'take a larger budget'}"
+        )
     return fit.net()
 
 

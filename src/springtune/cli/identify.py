@@ -70,6 +70,8 @@ def identify(
             given = {name: value for name, _, value in (one.partition("=") for one in known)}
             found = identified([_test(**row) for row in rows], law, known=given)
         text = _study(found, rows[0], write) if write else ""
+        if write:
+            _check(text, write)
         if plot:
             import matplotlib.pyplot as plt
 
@@ -80,6 +82,22 @@ def identify(
         if write:
             write_text(write, text)
     click.echo(found)
+
+
+def _check(text: str, target: Path) -> None:
+    """Refuse a study that would not load, with the reason."""
+    from tempfile import TemporaryDirectory
+
+    from ..studies.kinds import load_study
+
+    with TemporaryDirectory() as folder:
+        trial = Path(folder, target.name)
+        trial.write_text(text, "utf-8")
+        try:
+            load_study(trial, target.absolute().parent)
+        except ValueError as error:
+            said = str(error).replace(str(trial), str(target))
+            raise ValueError(f"--write: the study of what was found would be refused: {said}") from None
 
 
 def _rows(path: Path) -> list[dict[str, Any]]:

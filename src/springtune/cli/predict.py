@@ -103,8 +103,8 @@ def predict(
     elements; over which loads that holds; and which settings converge. With --budget the setting is found, too.
     """
     with refusals("--write", target, _in_options):
-        check_kind(sheet.shape, sheet.beam, ("load",) if engine["engine"] is None else ("scale",))
-        engine.check(sheet, error)
+        check_kind(sheet.shape, sheet.beam, () if engine["engine"] is None else ("scale",))
+        engine.check(sheet, error, load)
         if best_springs and (error is not None or engine["engine"] is not None):
             raise ValueError("--best-springs: are of one mesh; leave out --error and --engine")
         also = ("best-springs",) * best_springs

@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from importlib import metadata
 from importlib.util import find_spec
+from numbers import Integral, Real
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
@@ -17,11 +18,33 @@ import numpy as np
 from ..handover.net import SpringNet
 from ..handover.newton import membrane
 from ..handover.simulation import WORDS
+from ..handover.terms import Net
+from ..mechanics.energies import Energy
 from ..mechanics.integrators import PRECISIONS
 from ..problem.quantities import positive
 from ..registry import Declared, Registry, how_to_install
 from ..safe_io.tables import number_text
 from ..scene.damping import Damping
+
+MOST_COUNTED, LONG_FRAME = 100_000, 1.0
+"""Most substeps and iterations, and the longest frame [s]."""
+
+
+def number(value: Any, name: str, least: float = np.nextafter(0, 1)) -> float:
+    """Return a finite number that is not below the least one."""
+    if isinstance(value, bool) or not isinstance(value, Real) or not least <= float(value) < np.inf:
+        what = "of zero or more" if least == 0 else "above zero"
+        raise ValueError(f"{name}: {value!r} is not a finite number {what}; give one")
+    return float(value)
+
+
+def count(value: Any, name: str, most: int = MOST_COUNTED) -> int:
+    """Return a whole number above zero, up to the most that is run."""
+    if isinstance(value, bool) or not isinstance(value, Integral) or int(value) < 1:
+        raise ValueError(f"{name}: {value!r} is not a whole number above zero; give one")
+    if int(value) > most:
+        raise ValueError(f"{name}: {value!r} is more than {most}; give fewer")
+    return int(value)
 
 
 class EngineError(ValueError):
@@ -49,18 +72,18 @@ class Setting:
     Attributes
     ----------
     dt : float or str
-        Time of a frame [s]; a text such as ``"1/60"`` or ``"5 ms"`` becomes a number.
+        Time of a frame [s], at most 1; a text such as ``"1/60"`` or ``"5 ms"`` becomes a number.
     substeps : int
-        Steps of a frame.
+        Steps of a frame, at most 100,000.
     iterations : int
-        Of the engine's solver in a step; without meaning where an engine has none.
+        Of the engine's solver in a step, at most 100,000; without meaning where an engine has none.
     precision : str
         ``"float64"`` or ``"float32"``; by default the first one that an engine has.
 
     Raises
     ------
     ValueError
-        If a number is out of its range.
+        If a number is out of its range; the message names it.
 
     Examples
     --------
@@ -81,10 +104,12 @@ class Setting:
             above, below = map(int, dt.split("/"))
             dt = above / below if below else 0.0
         object.__setattr__(self, "dt", positive(dt, "time", "dt"))
+        if self.dt > LONG_FRAME:
+            raise ValueError(
+                f"dt: {self.dt:g} s is longer than {LONG_FRAME:g} s; give the time of a frame such as 1/60"
+            )
         for name in ("substeps", "iterations"):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int) or value < 1:
-                raise ValueError(f"{name}: {value!r} is not a whole number above zero; give one")
+            object.__setattr__(self, name, count(getattr(self, name), name))
 
     @property
     def step(self) -> float:
@@ -196,6 +221,10 @@ class Engine(Declared):
         calls it.
     of_setting : bool
         Whether these numbers follow the setting: `typed` takes (net, setting).
+    law : callable, optional
+        (net, reference stiffness) -> energies that its triangles have in the place of the net's.
+    besides : str
+        What else a script sets, as runs here do.
     measured : str
         Bound of the difference from the equilibrium of its own law, over the displacement, at converged settings.
     source : str
@@ -235,6 +264,8 @@ class Engine(Declared):
     implicit: bool = False
     typed: Callable[..., dict[str, Any]] = field(default_factory=lambda: typed_springs)
     of_setting: bool = False
+    law: Callable[[Net, float], list[Energy]] | None = None
+    besides: str = ""
     measured: str = ""
     source: str = ""
 
@@ -355,7 +386,7 @@ class Engine(Declared):
         Session
         """
         self.check(setting, net)
-        session: Session = self.function(net, setting, damping)
+        session: Session = self.function(net, setting, number(damping, "damping", 0))
         return session
 
 

@@ -6,7 +6,7 @@ springs are: a factor hides it for one load and not for the others, and where ``
 no factor does.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
@@ -22,14 +22,14 @@ from ..reference.small_strain import ReferenceNotConvergedError
 from ..safe_io.tables import Tabled, TabledList, number_text
 from ..scene.single import Scene
 from ..scene.statements import ShapeStatement, unit_reference
-from .base import ENGINES, EngineError, Setting
-from .run import EngineResult, complete, in_engine, net_of
+from .base import ENGINES, Engine, EngineError, Setting
+from .run import DRIFT, EngineResult, complete, in_engine, net_of
 
 SIZES = (0.25, 0.5, 1.0, 2.0)
 """Sizes of a load that a calibration is tried on, over its own."""
 
 WITHIN = 0.05
-"""Error that a band keeps."""
+"""Error that a band keeps, and how far orders of the particles may differ from each other."""
 
 TUNED, ALLOWED = 1e-3, 0.02
 """Error at which a factor is taken, and above which it is refused where nothing comes closer."""
@@ -37,6 +37,12 @@ TUNED, ALLOWED = 1e-3, 0.02
 BRACKET, BRACKETS, SATURATED = 8.0, 7, 1e-3
 """Ratio of the factors that look for a bracket, how many there are, and the change of the displacement over one below
 which stiffness no longer decides."""
+
+TRIED_ORDERS = 4
+"""Orders of particles, springs and cells that a calibration is tried in."""
+
+DAMPED = "critical for the loaded mode: velocities go over 1 + damping times the step after each step"
+"""What is said of a run's damping."""
 
 RESTING = {"float64": 1e-4, "float32": 1e-3}
 """Distance from rest that ends a run, over the displacement, by precision."""
@@ -125,9 +131,11 @@ class NeededSetting(Tabled):
     found : bool
         Whether it serves.
     solver_error : float
-        There, without a factor [1].
+        There, without a factor [1]: the largest one in some orders of particles.
     frame_seconds : float
         Time that a frame took there [s].
+    typed : str
+        The numbers to type there, those of the definition.
 
     Examples
     --------
@@ -137,7 +145,7 @@ class NeededSetting(Tabled):
     >>> for one in st.fit_engine(scene, "xpbd", substeps=16, loads=["traction"]).needed:
     ...     print(f"{one.raised}: {one.setting}, {one.found}, {100 * one.solver_error:+.1f} %")
     substeps: dt 1/60 s, 32 substeps, 10 iterations, float64, True, +0.5 %
-    iterations: dt 1/60 s, 16 substeps, 40 iterations, float64, True, +0.0 %
+    iterations: dt 1/60 s, 16 substeps, 40 iterations, float64, True, -0.3 %
     """
 
     raised: str
@@ -145,6 +153,7 @@ class NeededSetting(Tabled):
     found: bool
     solver_error: float
     frame_seconds: float
+    typed: str = ""
 
     def _rows(self) -> Iterator[tuple[str, str]]:
         yield "more", self.raised
@@ -174,6 +183,9 @@ class EngineFit(Tabled):
         What a converged setting needs.
     message : str
         Why there is no factor, or what else is to be known.
+    spread : tuple of float
+        Least and largest error with the factor in other orders of particles, springs and cells [1]; where these are too
+        far apart for a factor, without one.
 
     Examples
     --------
@@ -197,6 +209,7 @@ class EngineFit(Tabled):
     bands: TabledList[LoadBand] = field(repr=False)
     needed: TabledList[NeededSetting] = field(repr=False)
     message: str
+    spread: tuple[float, float] = (np.nan, np.nan)
 
     @property
     def error(self) -> float:
@@ -222,7 +235,16 @@ class EngineFit(Tabled):
         springs = replace(springs, reference=self.factor * springs.reference)
         net = SpringNet.from_scene(self.scene, springs=springs, errors=False)
         why = f"{NOT_COMPUTED}: the stiffness is that for engine '{result.engine}' at {result.setting}, which has not"
-        calibrated = {"engine": result.engine, "setting": str(result.setting), "factor": self.factor}
+        calibrated = {
+            "engine": result.engine,
+            "setting": str(result.setting),
+            "factor": self.factor,
+            "step": result.setting.step,
+            "iterations": result.setting.iterations,
+            "damping": result.damping,
+            "seconds": result.frames * result.setting.dt,
+            "displacement": float((net.forces * result.displacements).sum() / np.abs(net.forces).sum()),
+        }
         return replace(net, header=net.header | {"calibrated": calibrated, "expected_error": f"{why} converged"})
 
     def typed_rows(self) -> Iterator[tuple[str, str, str, str]]:
@@ -232,11 +254,7 @@ class EngineFit(Tabled):
         -------
         iterator of tuple of str
         """
-        for name, value in self.typed.items():
-            known, values = ENGINES[self.result.engine].parameters[name], np.ravel(value)
-            values = values[np.isfinite(values)]
-            low, high = f"{values.min():.5g}", f"{values.max():.5g}"
-            yield name, low if low == high else f"{low} to {high}", known.unit, known.formula
+        yield from _typed_rows(ENGINES[self.result.engine], self.typed)
 
     def _rows(self) -> Iterator[tuple[str, str]]:
         yield "engine", f"{self.result.engine}, {self.result.setting}"
@@ -246,8 +264,13 @@ class EngineFit(Tabled):
         yield "displacement", number_text(self.result.displacement, "m")
         yield "by finite elements", number_text(self.result.reference, "m")
         yield "error", error_text(self.error)
+        if ENGINES[self.result.engine].iterates:
+            yield "in other orders", f"{error_text(self.spread[0])} to {error_text(self.spread[1])}"
+        yield "drift across", error_text(self.result.drift)
         yield "without a factor", error_text(self.untuned.error)
         yield "run", f"{self.result.status} after {self.result.frames} frames"
+        yield "damping", f"{self.result.damping:.4g} 1/s, {DAMPED}"
+        yield "set besides", ENGINES[self.result.engine].besides
         yield "a frame", f"{1e3 * self.result.frame_seconds:.3g} ms"
         yield "note", self.message
 
@@ -262,11 +285,28 @@ class _Runs(dict[tuple[float, Setting], EngineResult]):
         self[key] = self.under(self.scene, *key)
         return self[key]
 
-    def under(self, scene: Scene, factor: float, setting: Setting) -> EngineResult:
+    def under(self, scene: Scene, factor: float, setting: Setting, order: int = 0) -> EngineResult:
         """Run of a scene of the same springs, damped critically for the loaded mode of the material."""
         damping, rest = 2 * scene.motion().loaded_frequency, RESTING[setting.precision]
-        return in_engine(
-            scene, self.engine, setting, factor=factor, frames=self.frames, tolerance=rest, damping=damping
+        about: dict[str, Any] = {"frames": self.frames, "tolerance": rest, "damping": damping, "order": order}
+        return in_engine(scene, self.engine, setting, factor=factor, **about)
+
+    def orders(self, factor: float, setting: Setting) -> list[EngineResult]:
+        """Runs in all orders of particles, springs and cells, of which engines without iterations have one."""
+        others = range(1, TRIED_ORDERS if ENGINES[self.engine].iterates else 1)
+        return [self[factor, setting], *(self.under(self.scene, factor, setting, order) for order in others)]
+
+    def spread(self, factor: float, setting: Setting, within: float) -> tuple[tuple[float, float], str]:
+        """Least and largest error over these orders, and why no factor is right where they are too far apart."""
+        errors = np.array([one.error for one in self.orders(factor, setting)])
+        low, high = float(errors.min()), float(errors.max())
+        if np.isnan(errors[0]) or np.abs(errors - errors[0]).max() <= within:
+            return (low, high), ""
+        between = f"is {error_text(low)} to {error_text(high)}" if low == low else "has no end in some"
+        return (low, high), (
+            f"the error at {setting} {between} in {TRIED_ORDERS} orders of the same particles, with {factor:.4g} times "
+            "the numbers of the definition: the solver has not converged, so no factor holds in other scripts; take "
+            "more substeps or iterations"
         )
 
     def ratio(self, factor: float, setting: Setting) -> float:
@@ -344,7 +384,7 @@ def fit_engine(
 
     >>> none = st.fit_engine(scene, "xpbd", dt="1/60", substeps=4, needed=False)
     >>> print(none.factor, f"{1e3 * none.result.displacement:.2f} mm in place of {1e3 * none.result.reference:.2f}")
-    nan 8.00 mm in place of 1.00
+    nan 8.61 mm in place of 1.00
     """
     chosen = ENGINES[engine]
     within = asked_error(within, "within")
@@ -355,10 +395,16 @@ def fit_engine(
     untuned = runs[1.0, setting]
     if not abs(untuned.reference) > 0:
         raise EngineError(f"load: {scene.load!r} has no displacement to calibrate to; give its case one as a quantity")
-    factor, why = _factor(runs, setting)
+    spread, why = runs.spread(1.0, setting, within)
+    factor, why = (np.nan, why) if why else _factor(runs, setting)
+    tuned = runs[factor, setting] if factor == factor else min(runs.values(), key=_distance)
+    if factor == factor:
+        spread, why = runs.spread(factor, setting, within)
+        factor, tuned = (np.nan, untuned) if why else (factor, tuned)
     found = factor == factor
-    tuned = runs[factor, setting] if found else min(runs.values(), key=_distance)
     why = why or ("" if _rests(tuned) else tuned.message)
+    if abs(tuned.drift) > DRIFT:
+        why = "; ".join(filter(None, (why, tuned.drifts)))
     numbers = chosen.numbers(net_of(scene, factor), setting) if found else {}
     raised = ("substeps", "iterations") if chosen.iterates else ("substeps",)
     return EngineFit(
@@ -367,10 +413,21 @@ def fit_engine(
         tuned,
         untuned,
         {name: value for name, value in numbers.items() if name in chosen.parameters},
-        TabledList(_band(runs, name, tuned, within) for name in names if found),
+        TabledList(_band(runs, name, tuned, within, spread) for name in names if found),
         TabledList(_needed(runs, name, setting) for name in raised if needed),
         "; ".join(filter(None, (why, scene.objection))),
+        spread,
     )
+
+
+def _typed_rows(engine: Engine, typed: Mapping[str, Any]) -> Iterator[tuple[str, str, str, str]]:
+    """Name, value or range, unit and formula of each number to type, as texts."""
+    for name, known in engine.parameters.items():
+        if name in typed:
+            values = np.ravel(typed[name])
+            values = values[np.isfinite(values)]
+            low, high = f"{values.min():.5g}", f"{values.max():.5g}"
+            yield name, low if low == high else f"{low} to {high}", known.unit, known.formula
 
 
 def _rests(one: EngineResult) -> bool:
@@ -446,10 +503,16 @@ def _needed(runs: _Runs, raised: str, setting: Setting) -> NeededSetting:
         more = replace(setting, **{raised: getattr(setting, raised) * 2**power})
         untuned = runs[1.0, more]
         errors.append(abs(untuned.solver_error))
-        found = _rests(untuned) and errors[-1] <= CONVERGED
+        if found := _rests(untuned) and errors[-1] <= CONVERGED:
+            untuned = max(runs.orders(1.0, more), key=lambda one: abs(np.nan_to_num(one.solver_error, nan=np.inf)))
+            errors[-1] = abs(untuned.solver_error)
+            found = errors[-1] <= CONVERGED
         if found or (power > 1 and errors[-1] > STALLED * errors[-3]):
             break
-    return NeededSetting(raised, more, found, untuned.solver_error, untuned.frame_seconds)
+    engine = ENGINES[runs.engine]
+    rows = _typed_rows(engine, engine.numbers(net_of(runs.scene), more)) if found else ()
+    typed = ", ".join(f"{name} {value} {unit}" for name, value, unit, _ in rows)
+    return NeededSetting(raised, more, found, untuned.solver_error, untuned.frame_seconds, typed)
 
 
 def _loaded(scene: Scene, load: str, size: float) -> Scene:
@@ -462,8 +525,8 @@ def _loaded(scene: Scene, load: str, size: float) -> Scene:
     return make(scene.beam, scene.mesh, scene.material, load, size)
 
 
-def _band(runs: _Runs, load: str, tuned: EngineResult, within: float) -> LoadBand:
-    """Band of a load: the engine at each size, with the factor."""
+def _band(runs: _Runs, load: str, tuned: EngineResult, within: float, spread: tuple[float, float]) -> LoadBand:
+    """Band of a load: the engine at each size, with the factor; other orders of particles narrow its range."""
     scene = runs.scene
     base, nothing = scene.statement.size, (np.nan,) * len(SIZES)
     unit = "" if isinstance(scene.statement, ShapeStatement) else "N"
@@ -477,8 +540,10 @@ def _band(runs: _Runs, load: str, tuned: EngineResult, within: float) -> LoadBan
         return LoadBand(load, nothing, nothing, np.nan, within, np.nan, np.nan, str(error), unit)
     errors = tuple(one.error if _rests(one) else np.nan for one in found)
     why = next((one.message for one in found if not _rests(one)), "")
+    why = why or next((one.drifts for one in found if abs(one.drift) > DRIFT), "")
+    apart = max(abs(one - tuned.error) for one in spread)
     definition_error = found[SIZES.index(1.0)].definition_error
-    least, most = range_within(np.array(sizes), np.array(errors), within)
+    least, most = range_within(np.array(sizes), np.array(errors), within - apart)
     return LoadBand(load, sizes, errors, definition_error, within, least, most, why, unit)
 
 

@@ -116,6 +116,7 @@ def _declare(order: float, integrator: str, summary: str, **declared: Any) -> No
         parameters=TYPED,
         typed=typed,
         source="MuJoCo's documentation, Computation",
+        besides="flag autoreset=disable: by default what explodes is put back, and the sheet stands at 0; gravity 0",
         **common | {"measured": "1e-7, ten scenes"} | declared,
     )(session)
 

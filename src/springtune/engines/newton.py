@@ -11,13 +11,15 @@ Triangles of VBD and of the semi-implicit solver have one law, which is typed in
     W = A_0 [mu h/2 (tr C - 2 J) + (lambda + mu) h/2 (J - 1)^2]
 
 ``tri_ke = mu h`` in both, but ``tri_ka = lambda h`` in VBD and ``(lambda + mu) h`` in the semi-implicit solver. At
-small strain it is St. Venant-Kirchhoff's law, which `delingette` has; at a strain e displacements differ by some 2 e.
-Style3D has stiffnesses along, across and in shear, and no contraction across: a material of nu = 0. It has no springs.
+small strain it is Hooke's law. At a strain e, displacements differ by some 2 e from those by St. Venant-Kirchhoff's
+law, which `delingette` has, and by less than e from those of small strain. Style3D has stiffnesses along, across and in
+shear, and no contraction across: a material of nu = 0. It has no springs.
 
 What is set besides, because Newton's defaults differ: gravity 0 and no ground; radius of particles 0, so that they do
-not touch; ``tri_kd`` (10 by default) and ``kd`` 0; no limit of velocities (1e5 m/s); contacts of Style3D off; VBD's
-colours by springs, too, which `ModelBuilder.color` does not see. Left as they are: Style3D multiplies velocities by
-0.998 in each step, and takes 10 iterations of conjugate gradients in each of its iterations.
+not touch; ``tri_kd`` (10 by default) and ``kd`` 0; no limit of velocities (1e5 m/s); contacts of Style3D off. VBD has
+the colours of `ModelBuilder.color`, as other scripts do, and its own by springs, which that does not see. Left as they
+are: Style3D multiplies velocities by 0.998 in each step, and takes 10 iterations of conjugate gradients in each of its
+iterations.
 
 Positions are of single precision, and absolute: what a step moves below the last place of a position is lost. So nets
 are centred at zero, which leaves XPBD's and VBD's slender bending 2e-4 off in place of 6e-3. Do the same in Newton.
@@ -34,7 +36,7 @@ from typing import Any
 import numpy as np
 
 from ..handover.net import SpringNet
-from ..handover.newton import colours, membrane
+from ..handover.newton import colours, membrane, membrane_energies
 from .base import DASHPOT, MASS_DAMPING, SPRING, EngineError, Parameter, Session, Setting, engine
 
 FASTEST = 1e30
@@ -152,11 +154,22 @@ def _model(net: SpringNet, solver: str) -> Any:
             first, second = map(int, cells[0, :2])
             free = {"style3d:edge_rest_area": 1.0}
             builder.add_edge(-1, -1, first, second, rest=0.0, edge_ke=0.0, edge_kd=0.0, custom_attributes=free)
-    builder.set_coloring(colours(net))
+    if there.any():
+        builder.set_coloring(colours(net))
+    else:
+        builder.color()
     builder.particle_max_velocity = FASTEST
     model = builder.finalize(device="cpu")
     model.particle_grid = None
     return model
+
+
+BESIDES = (
+    "tri_kd=0, tri_drag=0, tri_lift=0 and kd=0 (tri_kd is 10 by default); edge_ke=0; radius=0 of particles (0.1 m by "
+    "default) and model.particle_grid=None; gravity 0; masses density times thickness times a third of the triangles' "
+    "areas; points about the origin"
+)
+"""What a script sets besides, as runs here do."""
 
 
 def _declared(solver: str, **own: Any) -> dict[str, Any]:
@@ -172,13 +185,22 @@ def _declared(solver: str, **own: Any) -> dict[str, Any]:
         "precisions": ("float32",),
         "laws": ("biquadratic",),
         "dampers": {"kd": DASHPOT} | ({"tri_kd": TRI_KD} if solver == "VBD" else {}),
+        "besides": BESIDES,
         "measured": "1e-3, ten scenes, by the law that it has",
         "source": "Newton 1.8, newton.solvers",
     }
     return in_common | {"typed": typed} | own
 
 
-@engine("newton-vbd", order=150, parameters=VBD, **_declared("VBD", implicit=True))
+COLOURS = "builder.color() before finalize(), of springs builder.set_coloring(groups that no spring joins); "
+
+
+@engine(
+    "newton-vbd",
+    order=150,
+    parameters=VBD,
+    **_declared("VBD", implicit=True, law=membrane_energies, besides=COLOURS + BESIDES),
+)
 def vbd(net: SpringNet, setting: Setting, damping: float) -> Session:
     """Newton's solver VBD: implicit steps by vertex block descent."""
     return _Session(net, setting, damping, "VBD")
@@ -198,7 +220,12 @@ def xpbd(net: SpringNet, setting: Setting, damping: float) -> Session:
     return _Session(net, setting, damping, "XPBD")
 
 
-@engine("newton-semi-implicit", order=152, parameters=SEMI_IMPLICIT, **_declared("SemiImplicit", iterates=False))
+@engine(
+    "newton-semi-implicit",
+    order=152,
+    parameters=SEMI_IMPLICIT,
+    **_declared("SemiImplicit", iterates=False, law=membrane_energies),
+)
 def semi_implicit(net: SpringNet, setting: Setting, damping: float) -> Session:
     """Newton's solver SemiImplicit: explicit steps."""
     return _Session(net, setting, damping, "SemiImplicit")

@@ -1,6 +1,7 @@
 """A scene in an engine: moved until it rests, swings or flies apart, and compared."""
 
 import time
+import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -10,10 +11,18 @@ from typing import Any
 import numpy as np
 
 from ..handover.net import SpringNet
+from ..handover.simulation import EquilibriumWarning, simulate
+from ..problem.boundary import displacement_weights
 from ..problem.compare import error_text
 from ..safe_io.tables import Tabled, number_text
 from ..scene.single import Result, Scene
-from .base import ENGINES, Engine, EngineError, Session, Setting
+from .base import ENGINES, Engine, EngineError, Session, Setting, count, number
+
+DRIFT = 0.05
+"""Error across what is measured, over it, above which it is said, and springs are not recommended."""
+
+MOST_WORK = 1_000_000_000
+"""Most frames times substeps times iterations of a run."""
 
 MOST_FRAMES = 600
 """Frames after which a run ends that has not come to rest; more where the scene's period is long."""
@@ -82,6 +91,8 @@ class EngineResult(Tabled, Ended):
     setting : Setting
     factor : float
         On all stiffnesses and moduli that were typed [1].
+    damping : float
+        Over mass [1/s].
 
     Examples
     --------
@@ -92,8 +103,9 @@ class EngineResult(Tabled, Ended):
     >>> found = st.in_engine(scene, "xpbd", dt="1/60", substeps=10, iterations=20)
     >>> print(f"{found.status}: {1e3 * found.displacement:.3f} mm, by the definition {1e3 * found.exact:.3f} mm")
     rest: 1.776 mm, by the definition 1.000 mm
-    >>> f"{found.error:.2f} = {found.definition_error:.2f} + {found.solver_error:.2f}", f"{found.residual:.2f}"
-    ('0.78 = 0.00 + 0.78', '0.65')
+    >>> parts = found.definition_error, found.law_error, found.solver_error
+    >>> f"{found.error:.2f} = {' + '.join(f'{one:.2f}' for one in parts)}", f"{found.residual:.2f}"
+    ('0.78 = 0.00 + 0.00 + 0.78', '0.65')
     >>> found.network.status, f"{1e3 * found.reference:.3f} mm"
     (<Status.SOLVED: 1>, '0.998 mm')
     """
@@ -102,6 +114,7 @@ class EngineResult(Tabled, Ended):
     engine: str
     setting: Setting
     factor: float
+    damping: float
 
     @property
     def displacement(self) -> float:
@@ -126,7 +139,7 @@ class EngineResult(Tabled, Ended):
 
     @property
     def error(self) -> float:
-        """Error in the engine: (engine - reference) / abs(reference) [1], the sum of the next two."""
+        """Error in the engine: (engine - reference) / abs(reference) [1], the sum of the next three."""
         return (self.displacement - self.reference) / abs(self.reference)
 
     @property
@@ -134,10 +147,30 @@ class EngineResult(Tabled, Ended):
         """Error of the definition: that of the network's equilibrium, with a factor of 1 [1]."""
         return (self.exact - self.reference) / abs(self.reference)
 
+    @cached_property
+    def by_law(self) -> float:
+        """Displacement of the load in the equilibrium of the engine's own law of triangles, with a factor of 1 [m]."""
+        net, engine = net_of(self.scene), ENGINES[self.engine]
+        moved = None
+        if engine.law and net.energies:
+            with warnings.catch_warnings(action="ignore", category=EquilibriumWarning):
+                moved = simulate(net, engine.program, engine.laws, engine.law).displacements
+        return self.exact if moved is None else self.scene.displacement_of(moved)
+
+    @property
+    def law_error(self) -> float:
+        """What the engine's own law of triangles adds to it [1]: 0 where it has the definition's."""
+        return (self.by_law - self.exact) / abs(self.reference)
+
     @property
     def solver_error(self) -> float:
-        """What the engine adds to it: (engine - network's equilibrium) / abs(reference) [1]."""
-        return (self.displacement - self.exact) / abs(self.reference)
+        """What the engine's solver adds to both: (engine - equilibrium of its law) / abs(reference) [1]."""
+        return (self.displacement - self.by_law) / abs(self.reference)
+
+    @cached_property
+    def drift(self) -> float:
+        """Error across what is measured: displacement in the other direction, over abs(reference) [1]."""
+        return drift(self.scene, self.displacements)
 
     @property
     def residual(self) -> float:
@@ -146,6 +179,13 @@ class EngineResult(Tabled, Ended):
         load = network.reduce(self.scene.forces) / reference
         with np.errstate(over="ignore", invalid="ignore"):
             return float(np.linalg.norm(load - network.resistance(self.displacements)) / np.linalg.norm(load))
+
+    @property
+    def drifts(self) -> str:
+        """A sentence on `drift`."""
+        return (
+            f"moves across by {error_text(self.drift)} of what finite elements move along, which 'error' does not say"
+        )
 
     def _rows(self) -> Iterator[tuple[str, str]]:
         yield "engine", f"{self.engine}, {self.setting}"
@@ -157,7 +197,10 @@ class EngineResult(Tabled, Ended):
     def _computed_rows(self) -> Iterator[tuple[str, str]]:
         yield "error", error_text(self.error)
         yield "of it definition", error_text(self.definition_error)
+        if self.by_law != self.exact:
+            yield "of it law", error_text(self.law_error)
         yield "of it solver", error_text(self.solver_error)
+        yield "drift across", error_text(self.drift)
 
 
 def in_engine(
@@ -169,6 +212,7 @@ def in_engine(
     frames: int | None = None,
     tolerance: float | None = None,
     damping: float | None = None,
+    order: int = 0,
     **parts: Any,
 ) -> EngineResult:
     """Move a scene in an engine, at the setting that it is used at, until it rests.
@@ -188,6 +232,8 @@ def in_engine(
         Distance from rest over the largest displacement that ends the run [1]; by default `REST` of the precision.
     damping : float, optional
         Over mass [1/s]; by default the critical one of the loaded mode.
+    order : int, optional
+        0 for the mesh's order of particles, springs and cells, 1 for the reverse one, others for random ones.
     **parts
         In the place of a setting its parts: ``dt``, ``substeps``, ``iterations``, ``precision``.
 
@@ -201,6 +247,8 @@ def in_engine(
         If no engine has the name.
     EngineError
         If the engine is not installed, or lacks what the scene has; the message says what to do.
+    ValueError
+        If a number is out of its range.
 
     Examples
     --------
@@ -218,23 +266,67 @@ def in_engine(
     """
     chosen = ENGINES[engine]
     setting = complete(chosen, setting or Setting(**parts))
-    net = net_of(scene, factor)
+    net, places = net_of(scene, number(factor, "factor")), np.arange(len(scene.mesh.points))
+    if order:
+        net, places = reordered(net, order)
     chosen.check(setting, net)
     frequency = scene.motion().loaded_frequency * factor**0.5
-    session = chosen.start(net, setting, 2 * frequency if damping is None else damping)
+    damping = 2 * frequency if damping is None else damping
+    session = chosen.start(net, setting, damping)
     window = max(1, round(WINDOW * 2 * np.pi / frequency / setting.dt))
-    most = frames or max(MOST_FRAMES, ceil(PERIODS / WINDOW) * window)
+    asked = max(MOST_FRAMES, ceil(PERIODS / WINDOW) * window) if frames is None else count(frames, "frames", MOST_WORK)
+    if asked * setting.substeps * (setting.iterations if chosen.iterates else 1) > MOST_WORK:
+        raise EngineError(
+            f"dt: {asked} frames of {setting} are over {MOST_WORK:.0e} iterations, and {PERIODS} periods of the load's "
+            "motion take as many frames; take a longer dt, or fewer substeps, iterations or frames"
+        )
     extent = float(np.ptp(net.points, axis=0).max())
-    ended = follow(session, window, most, REST[setting.precision] if tolerance is None else tolerance, extent)
+    rest = REST[setting.precision] if tolerance is None else number(tolerance, "tolerance")
+    ended = follow(session, window, asked, rest, extent)
+    ended = replace(ended, displacements=ended.displacements[places])
     if ended.status == "rest" and scene.network.inverted(ended.displacements):
         said = "at rest with cells turned inside out; take shorter steps, or less load"
         ended = replace(ended, status="inverted", message=said)
-    return EngineResult(**vars(ended), scene=scene, engine=engine, setting=setting, factor=factor)
+    return EngineResult(**vars(ended), scene=scene, engine=engine, setting=setting, factor=factor, damping=damping)
 
 
 def complete(engine: Engine, setting: Setting) -> Setting:
     """Return a setting with the engine's own precision where it has none."""
     return setting if setting.precision else replace(setting, precision=engine.precisions[0])
+
+
+def drift(scene: Scene, displacements: np.ndarray) -> float:
+    """Error of what is measured in the other direction, over what finite elements move along [1]; or NaN."""
+    grouped, quantities = scene.statement.grouped, scene.statement.case.quantities
+    for one in quantities:
+        if one.kind == "displacement":
+            exact = scene.reference().at(scene.mesh.points)
+            across = displacement_weights(grouped, replace(one, component="y" if one.component == "x" else "x"))
+            along = np.tensordot(exact, displacement_weights(grouped, one), axes=2)
+            return float(np.tensordot(displacements - exact, across, axes=2) / abs(along))
+    return np.nan
+
+
+def reordered(net: SpringNet, order: int) -> tuple[SpringNet, np.ndarray]:
+    """Net of the same mesh with its particles and cells in another order, and the new place of each particle."""
+    random = np.random.default_rng(order)
+    rows = {
+        name: (random.permutation(count) if order > 1 else np.arange(count)[:: -1 if order else 1])
+        for name in ("points", "triangles", "quads")
+        for count in [len(getattr(net, name))]
+    }
+    points, places = rows["points"], np.argsort(rows["points"])
+    springs = np.sort(places[net.springs], axis=1)
+    edges = np.lexsort(springs.T[::-1])
+    arrays = {name: getattr(net, name)[points] for name in ("points", "masses", "held", "forces")}
+    arrays |= {name: getattr(net, name)[edges] for name in ("rest_lengths", "stiffness")}
+    arrays |= {name: places[getattr(net, name)[rows[name]]] for name in ("triangles", "quads")}
+    energies = []
+    for one in net.energies:
+        cells = rows["triangles" if one.cells.shape[1] == 3 else "quads"]
+        values = {name: values[cells] for name, values in one.values.items()}
+        energies.append(replace(one, cells=places[one.cells[cells]], values=values))
+    return replace(net, **arrays, springs=springs[edges], energies=tuple(energies)), places
 
 
 def net_of(scene: Scene, factor: float = 1.0) -> SpringNet:

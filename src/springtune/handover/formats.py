@@ -15,6 +15,7 @@ import numpy as np
 
 from ..mesh.formats import LONGEST_SAID, library
 from ..safe_io.atomic import check_folder, replacing, write_text
+from ..safe_io.escapes import json_line, shown
 from ..safe_io.inputs import DataElsewhere, check_alone
 from .mujoco import mjcf
 from .newton import newton_script
@@ -197,13 +198,13 @@ def _write_csv(path: Path, net: Net) -> list[Path]:
     for count, name in CELL_ARRAYS.items():
         if len(arrays[name]):
             tables[others[name]] = _table(arrays, (name,)) | _corner_columns(terms.get(count, {}), count)
-    said = [f"# springs of a network; particles are counted from 0, and stand in {others['particles'].name}"]
+    said = [f"# springs of a network; particles are counted from 0, and stand in {shown(others['particles'].name)}"]
     said += [
-        f"# cells of {count} corners, and what energies they have, stand in {others[name].name}"
+        f"# cells of {count} corners, and what energies they have, stand in {shown(others[name].name)}"
         for count, name in CELL_ARRAYS.items()
         if others[name] in tables
     ]
-    said += [f"# {line}" for line in json.dumps(net.header, indent=1, ensure_ascii=False).splitlines()]
+    said += [f"# {json_line(line)}" for line in json.dumps(net.header, indent=1, ensure_ascii=False).split("\n")]
     texts = {other: _csv_text(table) for other, table in tables.items()}
     texts[path] = "\n".join([*said, ""]) + _csv_text(_table(arrays, SPRING_COLUMNS))
     _write_all(texts)
@@ -254,7 +255,7 @@ def _csv_text(table: Mapping[str, np.ndarray]) -> str:
 
 
 def _read_csv(path: Path) -> Read:
-    lines = path.read_text(encoding="utf-8").splitlines()
+    lines = path.read_text(encoding="utf-8").split("\n")  # not at line breaks within names
     comments = [line[2:] for line in lines if line.startswith("#")]
     header = json.loads("\n".join(comments[comments.index("{") :]))
     others = companions(path)
@@ -262,7 +263,7 @@ def _read_csv(path: Path) -> Read:
         if length and said in others and not others[said].is_file():
             raise ValueError(f"{others[said].name}, which has its {length} {said}, is not beside it")
     tables = {"": _csv_table(lines)} | {
-        name: _csv_table(other.read_text(encoding="utf-8").splitlines())
+        name: _csv_table(other.read_text(encoding="utf-8").split("\n"))
         for name, other in others.items()
         if other.is_file()
     }
@@ -282,7 +283,7 @@ def _read_csv(path: Path) -> Read:
 
 def _csv_table(lines: Iterable[str]) -> dict[str, tuple[str, ...]]:
     """Columns of a table, without their units."""
-    titles, *rows = csv.reader(line for line in lines if not line.startswith("#"))
+    titles, *rows = csv.reader(line for line in lines if line and not line.startswith("#"))
     columns = list(zip(*rows)) if rows else [()] * len(titles)
     return {title.partition(" [")[0]: column for title, column in zip(titles, columns, strict=True)}
 
@@ -410,7 +411,7 @@ def _write_h5(path: Path, net: Net) -> None:
     import h5py
 
     with replacing(path) as unfinished, h5py.File(unfinished, "w", track_order=True) as file:
-        _put_header(file.create_group("header", track_order=True), net.header)
+        file["header"] = json.dumps(net.header, indent=1)  # names of HDF5 have no slash, and its texts no zero
         for name, array in arrays_of(net).items():
             made = file.create_dataset(name, data=array)
             if ARRAYS[name].unit:
@@ -424,30 +425,6 @@ def _write_h5(path: Path, net: Net) -> None:
                 group.create_dataset(name, data=values).attrs["units"] = terms.units[name]
 
 
-def _put_header(group: Any, header: Mapping[str, Any]) -> None:
-    """Header as attributes of groups: HDF5 has no None, and an empty attribute is one."""
-    import h5py
-
-    for key, value in header.items():
-        if isinstance(value, dict):
-            _put_header(group.create_group(key, track_order=True), value)
-        else:
-            group.attrs[key] = h5py.Empty("f8") if value is None else value
-    # Attributes and groups have orders of their own.
-    group.attrs["keys"] = json.dumps(list(header))
-
-
-def _header_in(group: Any) -> dict[str, Any]:
-    import h5py
-
-    header = {}
-    for key in json.loads(group.attrs["keys"]):
-        value = _header_in(group[key]) if key in group else group.attrs[key]
-        value = value.item() if isinstance(value, np.generic) else value
-        header[key] = None if isinstance(value, h5py.Empty) else value
-    return header
-
-
 def _read_h5(path: Path) -> Read:
     import h5py
 
@@ -456,7 +433,7 @@ def _read_h5(path: Path) -> Read:
         arrays = {name: file[name][()] for name in ARRAYS if name in file}
         groups = [file["energies"][str(number)] for number in range(len(file.get("energies", ())))]
         energies = [_terms_of(one.attrs["kind"], arrays[one.attrs["cells"][1:]], one) for one in groups]
-        return arrays, energies, _header_in(file["header"])
+        return arrays, energies, json.loads(file["header"].asstr()[()])
 
 
 # -- simulators ----------------------------------------------------------------------------------------------------
@@ -468,7 +445,21 @@ def _for_simulator(program: str, write: Callable[[Path, Net], list[Path] | None]
     def refuse(path: Path) -> Read:
         raise ValueError(f"it is for {program}; read the springs from .json, .h5, .csv or .vtu")
 
-    return _Format(write, refuse)
+    def checked(path: Path, net: Net) -> list[Path] | None:
+        made_for = net.header.get("calibrated")
+        if made_for and not path.name.endswith(AT_SETTING.get(made_for["engine"], "/")):
+            kept = " or ".join(filter(None, [AT_SETTING.get(made_for["engine"]), ".csv, .json, .vtu or .h5"]))
+            raise ValueError(
+                f"{path}: runs {program} at a step of its own, and the stiffness is that for {made_for['engine']} at "
+                f"{made_for['setting']} alone; give a name ending in {kept}"
+            )
+        return write(path, net)
+
+    return _Format(checked, refuse)
+
+
+AT_SETTING = {"newton-vbd": ".newton.py", "xpbd": ".xpbd.json"}
+"""Endings of files that run a calibrated stiffness at the setting that it is for, by engine."""
 
 
 def _as_text(text: Callable[[Net], str]) -> Callable[[Path, Net], None]:

@@ -21,10 +21,10 @@ file for version 3 that has such bodies is refused there.
 
 from collections.abc import Sequence
 from typing import Any
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
+from ..safe_io.escapes import printable
 from .simulation import Simulation, about, filled, lame, load_in_words, numbers, simulate
 from .terms import Net, Terms
 
@@ -78,7 +78,7 @@ def model(net: Net, simulation: Simulation, version: int, integrator: str = "Eul
     masses, dampers = simulation.masses, simulation.mass_damping * simulation.masses
     return filled(
         "mujoco.xml",
-        title=quoteattr(title),
+        title=printable(title),
         about=[*about(net, simulation, said), f"Written {for_versions(net.energies, version)}."],
         simulation=simulation,
         integrator=integrator,

@@ -94,13 +94,20 @@ def _values(net: Net) -> dict[str, Any]:
     # Of the slowest mode that the load excites.
     rate = damping / 2 - max(damping**2 / 4 - simulation.frequency**2, 0.0) ** 0.5
     said = f"the one here is {step / largest:.2g} times that, in which {iterations} iterations converge"
+    seconds = DECAYS / rate if rate else 100 * simulation.step
+    if calibrated := net.header.get("calibrated"):
+        step, damping, seconds = (float(calibrated[one]) for one in ("step", "damping", "seconds"))
+        iterations = int(calibrated["iterations"])
+        said = f"the one here is that of {calibrated['setting']}, for which the stiffness is made"
     return {
         "net": net,
         "simulation": simulation,
+        "promised": float(calibrated["displacement"]) if calibrated else None,
+        "damping": damping,
         "about": [*about(net, simulation, said), *(LAW if net.energies else ())],
         "tri_ke": shear,
         "tri_ka": first,
         "step": step,
         "iterations": iterations,
-        "seconds": DECAYS / rate if rate else 100 * simulation.step,
+        "seconds": seconds,
     }

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..mesh.formats import library
 from ..safe_io.atomic import UNFINISHED, replacing
+from ..safe_io.escapes import shown
 
 CELL_NAMES = {2: "line", 3: "triangle", 4: "quad"}
 """meshio's names of cells by their corners."""
@@ -52,8 +53,8 @@ def write_vtu(
     with replacing(path) as unfinished:
         grid.write(unfinished, file_format="vtu")
         added = "".join(
-            f'<DataArray type="Float64" Name={quoteattr(name)} NumberOfTuples="1" format="ascii">{value!r}</DataArray>'
-            for name, value in numbers.items()
+            f'<DataArray type="Float64" Name={name} NumberOfTuples="1" format="ascii">{value!r}</DataArray>'
+            for name, value in ((quoteattr(shown(key)), number) for key, number in numbers.items())
         )
         # A comment must not have two hyphens in a row; as JSON has them they are the same.
         said = comment.replace("--", "-\\u002d")

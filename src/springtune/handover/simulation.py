@@ -16,6 +16,7 @@ from ..mechanics.network import Network
 from ..mechanics.statics import SingularError, StaticProblem
 from ..mesh import Mesh, corner_angles, signed_areas
 from ..problem.status import Status
+from ..safe_io.escapes import printable, xml_comment
 from .terms import Net, Terms, energies_of
 
 STEP_SHARE = 0.8
@@ -199,12 +200,13 @@ def lame(net: Net, terms: Terms, program: str) -> tuple[float, float]:
     (total, twice), *_ = np.linalg.lstsq(np.column_stack([factors, signs]), given, rcond=None)
     first = float(total - twice)
     away = np.abs(factors * total + signs * twice - given).max() / np.abs(given).max()
-    if away <= 1e-9 and twice > 0 and first <= -1e-9 * twice:
+    lawful, below = away <= 1e-9 and twice > 0, first <= -1e-9 * twice
+    if lawful and below and net.header["definition"] == "delingette":
         raise ValueError(
             f"material: has a Poisson's ratio below 0, and {program} takes none; take a definition of springs alone, "
             "such as 'patch'"
         )
-    if away > 1e-9 or not twice > 0:
+    if not lawful or below:
         raise ValueError(
             f"definition '{net.header['definition']}': its springs of squared lengths are those of no material, and "
             f"{program} has the law of a material alone; take 'delingette', or a definition of springs alone, such as "
@@ -214,7 +216,7 @@ def lame(net: Net, terms: Terms, program: str) -> tuple[float, float]:
 
 
 def about(net: Net, simulation: Simulation, integrator: str) -> list[str]:
-    """Lines of comment: definition, material, load, expected errors and step."""
+    """Lines of comment: definition, material, load, expected errors and step; each is one line, whatever a name has."""
     header = net.header
     material, load, errors = header["material"], header.get("load"), header.get("expected_error")
     constants = ""
@@ -251,7 +253,7 @@ def about(net: Net, simulation: Simulation, integrator: str) -> list[str]:
         )
     if simulation.force and simulation.why:
         lines.append(f"No equilibrium was found: {simulation.why}.")
-    return lines
+    return [printable(line) for line in lines]
 
 
 def filled(name: str, **values: Any) -> str:
@@ -262,14 +264,18 @@ def filled(name: str, **values: Any) -> str:
 @cache
 def _templates() -> Any:
     import jinja2
+    from markupsafe import Markup
 
-    return jinja2.Environment(
+    made = jinja2.Environment(
         loader=jinja2.PackageLoader(__package__, "templates"),
+        autoescape=lambda name: str(name).endswith((".xml.jinja", ".scn.jinja")),
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
+    made.filters["comment"] = lambda line: Markup(f"<!-- {xml_comment(line)} -->")  # the one text without entities
+    return made
 
 
 def numbers(values: np.ndarray) -> str:

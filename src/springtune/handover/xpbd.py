@@ -122,6 +122,7 @@ def xpbd(net: Net) -> str:
         net=net,
         simulation=simulation,
         sweeps=max(10, int((2 * simulation.implicit_step / simulation.largest_step) ** 2)),
+        calibrated=net.header.get("calibrated"),
         there=there,
         inverse_masses=np.where(whole, 0.0, 1 / simulation.masses),
         held_directions=np.argwhere(net.held & ~whole[:, None]),

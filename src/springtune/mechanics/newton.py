@@ -33,7 +33,7 @@ WATCHED = 4
 LONGEST_STEP = 0.5
 """Largest change of a spring's vector over its length in a watched step."""
 
-MODES = 24
+MOST_MODES = 24
 """Eigenvalues nearest to zero that tell whether an equilibrium under a follower pressure is stable."""
 
 MERGED = 1e-6
@@ -143,18 +143,18 @@ class LoadedNetwork:
         This tangent is not symmetric: an eigenvalue may pass zero (buckling), or two may merge and leave the real
         axis (flutter; Beck's column: M. Beck, Z. angew. Math. Phys. 3:225, 1952). Masses are those of a uniform
         sheet, without damping, which can lower the critical load. The complex values are squared frequencies over
-        stiffness and mass of the whole sheet; at most `MODES`.
+        stiffness and mass of the whole sheet; at most `MOST_MODES`.
         """
         network = self.network
         mass = network.reduce(np.repeat(network.mesh.particle_areas[:, None], 2, axis=1)) / network.mesh.area
-        if len(mass) <= 4 * MODES:
+        if len(mass) <= 4 * MOST_MODES:
             tangent = network.tangent(displacements, self._follower_at(s))
             values = np.linalg.eigvals(tangent.toarray() / mass[:, None])
-            return values[np.argsort(abs(values))][:MODES]
+            return values[np.argsort(abs(values))][:MOST_MODES]
         # The largest eigenvalues of the inverse.
         inverse = LinearOperator((len(mass),) * 2, lambda right: factor.solve(mass * right.ravel()), dtype=float)
         start = np.random.default_rng(0).standard_normal(len(mass))
-        return 1.0 / eigs(inverse, MODES, v0=start, return_eigenvectors=False)
+        return 1.0 / eigs(inverse, MOST_MODES, v0=start, return_eigenvectors=False)
 
     def holds(self, s: float, displacements: np.ndarray) -> bool:
         """Return whether no cell is inverted and the symmetric part of the tangent is positive definite."""

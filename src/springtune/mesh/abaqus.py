@@ -58,7 +58,7 @@ def _sections(text: str) -> Iterator[_Section]:
 
 def read(raw: bytes) -> Content:
     """Read a file of Abaqus: one part, which an instance may move."""
-    sections = list(_sections(raw.decode("utf-8", "replace")))
+    sections = list(_sections(raw.decode("utf-8-sig", "replace")))
     for one in sections:
         if MAKERS.fullmatch(one.keyword):
             raise one.refused("is not supported; mesh the part in the program and write all nodes and elements")

@@ -16,7 +16,7 @@ OTHER_ELEMENTS = {4: "tetra", 5: "hexahedron", 8: "line3", 9: "triangle6", 10: "
 """Names of elements that are refused."""
 
 
-REFUSED = {b"ParametricNodes": "Mesh.SaveParametric = 0", b"PartitionedEntities": "the mesh before it is partitioned"}
+NOT_READ = {b"ParametricNodes": "Mesh.SaveParametric = 0", b"PartitionedEntities": "the mesh before it is partitioned"}
 """Sections that are not read, with the remedy."""
 
 
@@ -56,7 +56,7 @@ def read(raw: bytes, by_meshio: Callable[[], Any]) -> Content:
     version, binary, size, *rest = sections.get(b"MeshFormat", b"1 0 8").split(maxsplit=3)
     if version not in (b"2", b"2.0", b"2.1", b"2.2", b"4.1"):
         raise MeshError(f"is MSH of version {version.decode()}; write 4.1 or 2.2: Mesh.MshFileVersion = 4.1")
-    for name, remedy in REFUSED.items():
+    for name, remedy in NOT_READ.items():
         if name in sections:
             raise MeshError(f"has ${name.decode()}, which are not read; write {remedy}")
     named = re.findall(rb'(\d+)\s+(\d+)\s+"([^"\n]*)"', sections.get(b"PhysicalNames", b""))

@@ -49,7 +49,7 @@ def read(raw: bytes) -> Content:
     """Read a file of Nastran, with or without ``BEGIN BULK``."""
     points: dict[int, list[float]] = {}
     cells: dict[str, list[list[int]]] = defaultdict(list)
-    for name, *fields in _cards(raw.decode("utf-8", "replace")):
+    for name, *fields in _cards(raw.decode("utf-8-sig", "replace")):
         if name in ("GRID", "GRDSET") and fields[1].strip("0"):
             raise MeshError(
                 f"{name} {fields[0]} is in coordinate system {fields[1]}; write all in the basic one, CP = 0"

@@ -32,7 +32,7 @@ STRETCHES, STRESSES = (0.01, 50.0), (0.1, 1e12)
 """Stretches [1] and largest stresses [Pa] that are read."""
 
 _WORDS = r"engineering|eng\.?|nominal|tensile|uniaxial|equibiaxial|biaxial|(?:first|1st) piola.kirchhoff|pk1|[λεσ]"
-_NAME = re.compile(
+_HEAD = re.compile(
     rf"((?:[\s_]*(?:{_WORDS}|stretch[\s_]ratio|stretch|strain|stress(?:[\s_]p)?)(?![^\W_]))*)(.*)", re.I | re.DOTALL
 )
 _UNIT = re.compile(r"[\s_]*(?:in |[/,])?\s*[\[(]?\s*(.*?)\s*[\])]?\s*", re.DOTALL)
@@ -117,7 +117,7 @@ class TensileTest:
 
 def _column(head: str, where: str) -> tuple[str, float, str]:
     """Return whether a head is of stretch, strain or stress, the size of its unit, and the unit as written."""
-    name, rest = cast("re.Match[str]", _NAME.fullmatch(head)).groups()
+    name, rest = cast("re.Match[str]", _HEAD.fullmatch(head)).groups()
     kinds = re.findall("stretch|strain|stress", name.lower())
     if len(kinds) != 1 or len(head) > LONGEST_WORD:
         raise TestDataError(f"{where}is neither stretch, engineering strain nor nominal stress; {TWO_COLUMNS}")

@@ -18,7 +18,7 @@ from ..problem.shapes import LoadCase, Shape
 from .shapes import VOIGT, solve_shape
 from .triangles import shape_functions
 
-ACCURACY = 1e-3
+ACCURACY = 1e-4
 """Largest relative error estimate of the energy at which a level of finite elements is taken."""
 
 ENTRIES = ((0, 0), (1, 1), (0, 1), (2, 2), (0, 2), (1, 2))

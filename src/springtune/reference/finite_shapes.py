@@ -15,7 +15,7 @@ from scipy.sparse import csr_array
 from ..mesh.groups import GroupedMesh
 from ..problem.materials import AnyMaterial, Material
 from ..problem.shapes import LoadCase, Shape
-from .finite_strain import Body, Law, Response, StVenant, law_of, matrix_of, strain_of
+from .finite_strain import Body, FiniteStrainError, Law, Response, StVenant, law_of, matrix_of, strain_of
 from .shapes import Level, Problem, ShapeReference, inverse_of, solve_shape
 from .triangles import side_fit, side_functions, tabulated
 
@@ -112,12 +112,29 @@ class _FiniteLevel(Level, Body):
         self.load, self.extent = forces, float(np.ptp(space.mesh.points, axis=0).max())
         moved = self._continued()
         if moved is None:
-            moved, _ = self.moved(1.0, f"shape {problem.shape.name!r}, load {problem.load.name!r}")
+            try:
+                moved, _ = self.moved(1.0, f"shape {problem.shape.name!r}, load {problem.load.name!r}")
+            except FiniteStrainError as error:
+                raise FiniteStrainError(f"{error}{self._where_it_gives_way()}") from None
         gradient = self._gradient(moved)
         strain = strain_of(gradient)
         external = self.load + (self.turning @ moved.ravel()).reshape(-1, 2)
         residual = self._forces(gradient, self.law.response(strain).stress) - external
         return moved, residual, float((self.law.energy(strain) * self.weights).sum())
+
+    def _where_it_gives_way(self) -> str:
+        """Say that coarser triangles carried the whole load, and where these were pressed most."""
+        last = self.levels.last
+        if last is None:
+            return ""
+        growth = np.linalg.det(last._gradient(last.field) + np.eye(2)).min(axis=1)
+        most = int(growth.argmin())
+        x, y = 1e3 * last.space.mesh.points[last.space.corners[most]].mean(axis=0)
+        return (
+            f" on triangles of degree {self.space.degree}; those of degree {last.space.degree} carry it all, and are "
+            f"pressed to {growth[most]:.2f} of their area near ({x:.4g}, {y:.4g}) mm: the law gives way there as "
+            "triangles get finer, and the answer need not have a limit. Round that corner, hold it less or load it less"
+        )
 
     def _laws(self, parts: np.ndarray) -> _PartLaws:
         return _PartLaws(np.array(self.space.mesh.names)[parts], self.levels.laws)

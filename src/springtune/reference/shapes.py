@@ -399,13 +399,13 @@ def _unfolded(mesh: CoarseMesh) -> bool:
     try:
         for degree in (2, 4):
             gradients = tabulated(degree, 10)[3], shape_functions(degree, corners)[1]
-            _Space(mesh, degree).jacobians(np.concatenate(gradients))
+            Space(mesh, degree).jacobians(np.concatenate(gradients))
     except MeshError:
         return False
     return True
 
 
-class _Space:
+class Space:
     """Polynomials of one degree on the triangles of a mesh."""
 
     def __init__(self, mesh: CoarseMesh, degree: int) -> None:
@@ -491,7 +491,7 @@ class Level:
     def __init__(self, problem: Problem, degree: int) -> None:
         self.problem = problem
         mesh = problem.graded(min(degree, self.most_layers))
-        self.space = _Space(mesh, degree)
+        self.space = Space(mesh, degree)
         self.outlines = mesh.part_sides()
         thickness = problem.shape.thickness
         # Stiffness by axes: of strain d u_c / d x_a on stress along d, b.

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.linalg import qr
 from scipy.optimize import least_squares
-from scipy.stats import t
+from scipy.stats import f, t
 
 from ..mesh.groups import parts_of
 from ..problem.materials import AnisotropicMaterial, AnyMaterial, Material, rotated
@@ -25,6 +25,7 @@ from ..registry import hook
 from ..safe_io.inputs import number_of
 from ..safe_io.tables import Tabled
 from .measured import Block, MeasuredTest, blocks, stated
+from .residuals import FEWEST_POINTS, Noise, correlated, excess, measured
 from .sheet import chosen
 
 if TYPE_CHECKING:
@@ -49,11 +50,23 @@ REMEDIES |= dict.fromkeys(ASSUMED, "add a transverse displacement or a field, or
 NULL = 1e-7
 """Derivative by a constant besides those by others, over the largest, below which tests do not tell the constant."""
 
+RATIO = 0.1
+"""Change of a Poisson's ratio that is as likely as one of a modulus by a factor e."""
+
 POOR = 0.5
 """Half of an interval from which on a constant is poorly determined: of a ratio, or relative."""
 
 MISFIT = 1.5
-"""Residuals over the noise that is given, and correlation of neighbours times three, from which on a model misfits."""
+"""Residuals over the noise that is given from which on a model misfits."""
+
+CHANCE = 0.01
+"""Probability of residuals by chance below which a law misfits."""
+
+EXPLAINED = 0.5
+"""Share of a field's squares below which, with residuals that are not random, it is not of its load."""
+
+MODEL = 3e-4
+"""Error of the reference over the values' root mean square, below which residuals tell nothing."""
 
 LEAST_NOISE = 1e-9
 """Noise over the values' root mean square that is rounding."""
@@ -69,6 +82,29 @@ def varied(constants: dict[str, Any], names: Iterable[str], steps: Iterable[comp
     return changed
 
 
+def assumed(constants: dict[str, Any], names: Iterable[str]) -> dict[str, Any]:
+    """Replace named constants by what is usual beside the others."""
+    found = constants | {name: ratio for name, ratio in ASSUMED.items() if name in names}
+    if "G12" in found:
+        if ("E1" in names) != ("E2" in names):
+            found["E1"] = found["E2"] = found["E2" if "E1" in names else "E1"]
+        if "nu12" in names and found["E2"] > 1.5 * found["E1"]:  # the ratio of the stiffer direction
+            found["nu12"] *= found["E1"] / found["E2"]
+        if "G12" in names:
+            found["G12"] = np.sqrt(found["E1"] * found["E2"]) / (2 + 2 * ASSUMED["nu12"])
+    return found
+
+
+def moderate(constants: dict[str, Any]) -> dict[str, Any]:
+    """Constants of a material that elements can follow, where those of an orthotropic one are extreme."""
+    if "G12" not in constants:
+        return constants
+    middle = sorted([constants["E1"], constants["E2"], 2.6 * constants["G12"]])[1]
+    found = {name: min(max(constants[name], middle / 100), 100 * middle) for name in ("E1", "E2", "G12")}
+    most = 0.9 * np.sqrt(found["E1"] / found["E2"])
+    return {name: found.get(name, min(max(value, -most), most)) for name, value in constants.items()}
+
+
 def entries(constants: dict[str, Any], angle: float) -> np.ndarray:
     """`ENTRIES` of each part, turned by an angle [rad], shape (n_parts, 6); coefficients of rubber, shape (n,)."""
     if "c1" in constants:
@@ -82,6 +118,17 @@ def entries(constants: dict[str, Any], angle: float) -> np.ndarray:
         stiffness = rotated(np.linalg.inv(compliance), angle)
         found.append([stiffness[place] for place in ENTRIES])
     return np.array(found)
+
+
+def inverse(slopes: np.ndarray) -> np.ndarray:
+    """Return steps by the coefficients of the left singular vectors of slopes, however large."""
+    _, sizes, right = np.linalg.svd(slopes, full_matrices=False)
+    return np.asarray(right.T / sizes.clip(1e-100))
+
+
+def squares(tables: list[np.ndarray], noise: np.ndarray) -> np.ndarray:
+    """Sums of the squares of residuals of each block."""
+    return np.array([(one * table[:, 0]) @ (one * table[:, 0]) for table, one in zip(tables, noise)])
 
 
 class Model:
@@ -110,9 +157,48 @@ class Model:
                 found.append(table / next(scales))
         return found
 
+    def general(self, constants: dict[str, Any]) -> list[np.ndarray]:
+        """Values of each block and their derivatives by all constants of elasticity; of rubber nothing."""
+        found = []
+        for family, own, angle in self.tests:
+            stiffness = entries(constants, angle)
+            if family is None:
+                return [np.zeros((len(block.values), 1)) for block in own]
+            steps = np.zeros((len(ENTRIES), 3, 3))  # along the material's axes
+            for step, (row, column) in zip(steps, ENTRIES):
+                step[row, column] = step[column, row] = 1
+            turned = [[rotated(step, angle)[place] for step in steps] for place in ENTRIES]
+            every = np.kron(np.diag(np.abs(stiffness).max(axis=1)), turned)
+            moved = family.solve(np.column_stack([stiffness.ravel(), every]))
+            found += [block.factors[:, None] * (block.rows @ moved) for block in own]
+        return found
+
+    def replaced(self, new: Iterable[Block]) -> "Model":
+        """Model with other blocks."""
+        each = iter(new)
+        return Model([(family, [next(each) for _ in own], angle) for family, own, angle in self.tests])
+
+    def cleaned(self, constants: dict[str, Any]) -> tuple["Model", list[str]]:
+        """Model without values that are no measurements, and notes on these."""
+        notes, kept = [], []
+        for block, table in zip(self.blocks, self.general(constants)):
+            floor = 10 * MODEL * np.sqrt(np.mean(table[:, 0] ** 2))
+            columns = block.by_place(np.hstack([table, block.shifts]))
+            stay = measured(block.by_place(block.values), columns, block.places, floor)
+            kept.append(block.only(stay))
+            if not stay.all():
+                where = ", ".join(f"{1e3 * one:.4g} mm" for one in np.atleast_2d(block.places[~stay])[0])
+                where = f"x, y = {where}" if block.places.ndim > 1 else f"a load of {block.places[~stay][0]:g} N"
+                notes.append(
+                    f"{block.label}: {(~stay).sum()} of {len(stay)} points are left out, the first at {where}: they "
+                    "repeat one value that does not fit, such as 0, or are far from all others"
+                )
+        return self.replaced(kept), notes
+
     def undetermined(self, constants: dict[str, Any], names: Sequence[str]) -> list[str]:
         """Named constants whose derivatives are combinations of those by the others."""
         slopes = np.concatenate(self.residuals(constants, names, self.sizes))[:, 1:]
+        slopes *= [RATIO if name in ASSUMED else 1 for name in names]
         triangle, order = qr(slopes, mode="r", pivoting=True)
         own = np.abs(np.diag(triangle))
         rank = int(np.count_nonzero(own > NULL * own[0]))
@@ -143,7 +229,14 @@ class Model:
         bounds = np.array([(-1.0, 0.5) if name == "nu" else (-30.0, 30.0) for name in names])
         bounds -= [[constants[name] if name == "nu" else 0.0] for name in names]
 
+        last: list[Any] = [b"", []]  # values and slopes are asked for in turn
+
         def tables(steps: np.ndarray) -> list[np.ndarray]:
+            if last[0] != (asked := (steps.tobytes(), noise.tobytes())):
+                last[:] = asked, new(steps)
+            return list(last[1])
+
+        def new(steps: np.ndarray) -> list[np.ndarray]:
             tried = varied(constants, names, steps)
             if "G12" in tried and tried["nu12"] ** 2 > tried["E1"] / tried["E2"]:  # not positive definite
                 return [np.full((len(block.values), 1), np.inf) for block in self.blocks]  # a shorter step follows
@@ -157,13 +250,13 @@ class Model:
 
         steps = np.zeros(len(names))
         for _ in range(20):  # until the noise that is estimated settles
-            steps = least_squares(misfit, steps, slopes, bounds.T, xtol=1e-12, ftol=1e-12).x
+            steps = least_squares(misfit, steps, slopes, bounds.T, xtol=1e-10, ftol=1e-10).x
             sums = np.array([table[:, 0] @ table[:, 0] for table in tables(steps)])
             settled = np.maximum(noise * np.sqrt(sums / freedom), LEAST_NOISE * self.sizes)
             before, noise = noise, np.where(given, given, settled)
             if np.allclose(noise, before, rtol=1e-3, atol=0):
                 break
-        deviations = np.sqrt(np.diag(np.linalg.inv(slopes(steps).T @ slopes(steps))))
+        deviations = np.linalg.norm(inverse(slopes(steps)), axis=1)
         half = t.ppf(0.975, freedom[given == 0].sum() or np.inf) * deviations
         return varied(constants, names, steps), tables(steps), noise, half.clip(max=600)  # exp(700) is infinite
 
@@ -309,26 +402,35 @@ def _sheet(tests: Sequence[MeasuredTest], law: str, known: Mapping[str, Number])
         raise ValueError(f"law: {law!r} is of one material, and the body has the parts {parts}; take 'regions'")
     constants, free = _start([*regions, *SHEET_LAWS[law]], known)
     moduli = [name for name in free if name not in ASSUMED]
-    for _ in range(2):  # elements for a usual material, then for what was found
-        solved, notes = [], []
+    for turn in range(5):  # elements for a usual material, then for what was found, until what is assumed settles
+        solved = []
         for test, body in zip(tests, bodies):
-            own = dict(zip(parts, entries(constants, test.angle).tolist()))
+            own = dict(zip(parts, entries(moderate(constants), test.angle).tolist()))
             family = Family(*body, {part: AnisotropicMaterial(*one) for part, one in own.items()})
             solved.append((family, blocks(test, family, body[1]), test.angle))
-            most = max(np.abs(block.factors).max() for block in solved[-1][1])
-            if why := beyond_linear(most * family.reference.rotation, most * family.reference.strain):
-                notes.append(f"'{test.file}': {why}; leave out large loads")
         model = Model(solved)
+        model, notes = model.cleaned(constants)
         constants = varied(constants, moduli, [_scale(model, constants)] * len(moduli))
-        found = _identified(law, model, constants, free, notes)
-        constants = found.values
+        lacking, found, *_ = _fitted(model, constants, free)
+        settled = all(np.isclose(constants[name], found[name], rtol=0.01) for name in lacking)
+        constants = found
+        if turn and settled:
+            break
+    for test, (family, own_blocks, _) in zip(tests, model.tests):
+        if test._missing:
+            notes.append(f"'{test.file}': {test._missing} points have no numbers and are left out")
+        most = max(np.abs(block.factors).max() for block in own_blocks)
+        if why := beyond_linear(most * family.reference.rotation, most * family.reference.strain):
+            notes.append(f"'{test.file}': {why}; leave out large loads")
+    result = _identified(law, model, constants, free, notes)
+    constants = result.values
     if law == "orthotropic":
         along, across, nu, shear = constants.values()
         ply = AnisotropicMaterial.orthotropic(along, across, nu, shear, name="measured")
-        return replace(found, materials={"": ply})
+        return replace(result, materials={"": ply})
     names = [f"measured-{part}".rstrip("-") for part in parts]
     each = [Material(modulus, constants["nu"], name=name) for modulus, name in zip(constants.values(), names)]
-    return replace(found, materials=dict(zip(parts, each)))
+    return replace(result, materials=dict(zip(parts, each)))
 
 
 def _start(names: Sequence[str], known: Mapping[str, Number]) -> tuple[dict[str, Any], list[str]]:
@@ -340,6 +442,7 @@ def _start(names: Sequence[str], known: Mapping[str, Number]) -> tuple[dict[str,
         if name in ASSUMED and not -1 < number_of(value) <= 0.5:
             raise ValueError(f"known: {name} is {value!r}; give a number above -1, at most 0.5")
         constants[name] = number_of(value) if name in ASSUMED else positive(value, "stress", f"known: {name}")
+    constants = assumed(constants, [name for name in {"nu12": 0, "G12": 0} if name in names and name not in known])
     if len(known) == len(names):
         raise ValueError(f"known: {', '.join(known)} are all constants of this law; leave out what is to be found")
     return constants, [name for name in names if name not in known]
@@ -349,18 +452,43 @@ def _scale(model: Model, constants: dict[str, Any]) -> float:
     """Logarithm of the factor by which all moduli are larger than those that are given."""
     found = [0.0]
     for block, table in zip(model.blocks, model.residuals(constants, (), np.ones(len(model.blocks)))):
-        measured = block.unshifted(block.values)
-        predicted = table[:, 0] + measured
-        if predicted @ measured > 0:
-            found.append(np.log(predicted @ predicted / (predicted @ measured)))
+        own = block.unshifted(block.values)
+        predicted = table[:, 0] + own
+        share = predicted @ own / (np.linalg.norm(predicted) * np.linalg.norm(own) or 1)
+        if block.places.ndim > 1 and share * np.sqrt(len(own)) < -4:
+            raise TestDataError(
+                f"{block.label}: runs against the load; change the sign of its displacements, or give the load that it "
+                "is of"
+            )
+        if predicted @ own > 0:
+            found.append(np.log(predicted @ predicted / (predicted @ own)))
     return float(np.sum(found) / max(len(found) - 1, 1))
+
+
+def _fitted(
+    model: Model, constants: dict[str, Any], free: Sequence[str]
+) -> tuple[list[str], dict[str, Any], list[np.ndarray], np.ndarray, np.ndarray]:
+    """What tests do not tell, and `Model.fit` of the others; refuses fields of other loads."""
+    lacking = model.undetermined(constants, free)
+    names = [name for name in free if name not in lacking]
+    constants, tables, noise, half = model.fit(assumed(constants, lacking), names)
+    for block, table, left in zip(model.blocks, tables, squares(tables, noise)):
+        own = block.unshifted(block.values)
+        share = left / (own @ own or 1)
+        if block.places.ndim > 1 and share > 1 - EXPLAINED and excess(block.by_place(table[:, 0]), block.places) > 0:
+            raise TestDataError(
+                f"{block.label}: the load explains {100 * max(1 - share, 0):.0f} % of it, and the rest is not random; "
+                "give the load and the body that it is of, and check columns and signs"
+            )
+    return lacking, constants, tables, noise, half
 
 
 def _identified(law: str, model: Model, constants: dict[str, Any], free: Sequence[str], notes: list[str]) -> Identified:
     """Result of a fit, with notes on what tests do not tell, and where the model does not fit; without materials."""
-    lacking = model.undetermined(constants, free)
+    lacking, constants, tables, noise, half = _fitted(model, constants, free)
     names = [name for name in free if name not in lacking]
-    constants, tables, noise, half = model.fit(constants, names)
+    wider, odd = _checked(model, constants, tables, noise)
+    half = (half * wider).clip(max=600)
     notes = [f"{name}: not determined by these data; {REMEDIES.get(name, 'add a force')}" for name in lacking] + notes
     for name in np.array(names)[half > POOR]:
         notes.append(f"{name}: poorly determined by these data; {REMEDIES.get(name, 'add a test')}")
@@ -368,20 +496,91 @@ def _identified(law: str, model: Model, constants: dict[str, Any], free: Sequenc
     for block, one in zip(model.blocks, residuals.values()):
         size = np.sqrt((one @ one) / len(one))
         if block.noise is not None and size > MISFIT:
-            notes.append(f"{block.label}: residuals are {size:.2g} times the given noise; the model does not fit")
-        ordered = one[np.argsort(block.places, kind="stable")] if block.places.ndim == 1 else one[:1]
-        if len(ordered) > 9 and ordered[1:] @ ordered[:-1] > MISFIT / 3 * (one @ one):
-            notes.append(
-                f"{block.label}: residuals are not random, so the intervals are too narrow; leave out where the law "
-                "does not hold"
-            )
+            odd.append(f"{block.label}: residuals are {size:.2g} times the given noise; the model does not fit")
     fitted = {name: value if name in names else np.nan for name, value in constants.items()}
     low, high = (varied(fitted, names, one) for one in (-half, half))
+    negative = [name for name in ASSUMED if high.get(name, 0) < 0]
+    if odd or negative:
+        odd += _reversed(model, constants, names, squares(tables, noise))
+    for name in negative:
+        odd.append(
+            f"{name}: is below zero, as of few materials; if this is none of them, change the sign of v or of the "
+            "transverse displacement, or let y run upwards"
+        )
     values = {name: float(value) for name, value in constants.items()}
     intervals = {name: (float(low[name]), float(high[name])) for name in constants}
     noises = dict(zip(residuals, noise.tolist()))
     places = {block.label: block.places for block in model.blocks}
-    return Identified(law, values, intervals, tuple(lacking), tuple(notes), noises, residuals, {}, places)
+    return Identified(law, values, intervals, tuple(lacking), (*notes, *odd), noises, residuals, {}, places)
+
+
+def _checked(
+    model: Model, constants: dict[str, Any], tables: list[np.ndarray], noise: np.ndarray
+) -> tuple[np.ndarray, list[str]]:
+    """Factors by which intervals widen, and notes: residuals are not random, or follow a more general law."""
+    residual, slopes = np.concatenate(tables)[:, 0], np.concatenate(tables)[:, 1:]
+    left, sizes, _ = np.linalg.svd(slopes, full_matrices=False)
+    tested = zip(model.blocks, model.general(constants), noise)
+    beyond = np.concatenate([block.unshifted(table[:, 1:]) / one for block, table, one in tested])
+    others, strong, _ = np.linalg.svd(beyond - left @ (left.T @ beyond), full_matrices=False)
+    basis = np.hstack([left, others[:, strong > 1e-6 * sizes[0]]])
+    along, known, elastic = basis.T @ residual, len(sizes), model.tests[0][0] is not None
+    freedom = float(model.counts.sum() - basis.shape[1])
+    if freedom < FEWEST_POINTS:
+        return np.ones(known), []
+    rest, law = residual - basis @ along, basis[:, known:] @ along[known:]
+    notes, least, misfit = [], freedom, False
+    errors, covariance = np.zeros((known, known)), np.zeros((basis.shape[1], basis.shape[1]))
+    ends = np.cumsum([len(table) for table in tables])[:-1]
+    each = zip(model.blocks, model.counts, noise, *(np.split(one, ends) for one in (rest, law, basis)))
+    for block, count, one, own, follows, table in each:
+        error = elastic * MODEL * np.sqrt(np.mean(block.values**2)) / one
+        misfit |= bool(np.sqrt(np.mean(follows**2)) > error)
+        found = Noise(max(float(own @ own) * model.counts.sum() / count / freedom, LEAST_NOISE))
+        white = found.variance
+        if excess(block.by_place(own), block.places) > error**2:
+            if block.places.ndim > 1:
+                columns = block.by_place(np.hstack([table, block.shifts]))
+                found, white = correlated(block.by_place(own), columns, block.places), 1.0
+                least = min(least, found.freedom)
+                notes.append(
+                    f"{block.label}: residuals are not random, but correlated over some {1e3 * found.reach:.2g} mm; "
+                    "intervals are widened as for overlapping subsets, and do not hold if the law, the load or the "
+                    "supports are others"
+                )
+            else:
+                notes.append(
+                    f"{block.label}: residuals are not random, so the intervals are too narrow; leave out where the "
+                    "law does not hold"
+                )
+        own_part = found.sums(block.by_place(table), block.places)
+        covariance, errors = covariance + own_part, errors + own_part[:known, :known] / white
+    steps, extra = inverse(slopes), basis.shape[1] - known
+    wider = np.sqrt(np.diag(steps @ errors @ steps.T) / (steps**2).sum(axis=1))
+    if extra and misfit:
+        shares = np.linalg.solve(covariance[known:, known:], along[known:])
+        if f.sf(along[known:] @ shares / extra, extra, least) < CHANCE:
+            notes.append(
+                "the law does not fit: residuals follow other constants of elasticity, so the intervals do not hold; "
+                "check the law, the angle, known constants, and the signs of columns"
+            )
+    return wider.clip(1) * t.ppf(0.975, least) / t.ppf(0.975, freedom), notes
+
+
+def _reversed(model: Model, constants: dict[str, Any], names: Sequence[str], sums: np.ndarray) -> list[str]:
+    """Notes on components of fields that fit better if they are reversed, than by squares `sums` of each block."""
+    notes, begin = [], assumed(constants, [name for name in names if name in ASSUMED])
+    fields = any(block.places.ndim > 1 for block in model.blocks)
+    for component, signs in (("v", (1, -1)), ("u", (-1, 1))) if fields else ():
+        turned = model.replaced(
+            replace(block, values=(block.by_place(block.values) * signs).ravel()) if block.places.ndim > 1 else block
+            for block in model.blocks
+        )
+        found, tables, noise, _ = turned.fit(begin, names)
+        gain = 0.5 * np.log(sums / squares(tables, noise))
+        if model.counts @ gain > max(10, 0.03 * model.counts.sum()) and min(found.get(one, 0) for one in ASSUMED) >= 0:
+            notes.append(f"fields fit better with {component} reversed; change its sign, or let y run upwards")
+    return notes
 
 
 def _rubber(file: str | Path, law: str) -> Identified:

@@ -5,6 +5,8 @@ gives them; its other columns are ignored. A curve has the columns ``force`` and
 Units stand in the heads, as in ``force [N],displacement [mm]``.
 """
 
+import math
+import re
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -19,7 +21,7 @@ from ..problem.quantities import Number, nearest, positive, put, quantity
 from ..problem.rubber import TestDataError
 from ..problem.shapes import LoadCase, Segment, Shape
 from ..reference.by_constants import Family
-from ..safe_io.inputs import csv_rows, numbers
+from ..safe_io.inputs import csv_rows, number_of, numbers
 from .meshes import A_BEAM, is_a
 from .sheet import chosen
 
@@ -30,6 +32,9 @@ HEADS = "give columns such as 'force [N],displacement [mm]' or 'x [mm],y [mm],u 
 
 GAUGES = ("gauge-1", "gauge-2")
 """Points of a beam between which ``transverse`` is measured: the middles of the sides beside the load."""
+
+LARGEST_NUMBER = 1e30
+"""Number beyond which a cell has no measurement, but the largest number of a program."""
 
 OFF_BODY = 1e-3
 """Distance from the body, over its extent, up to which a point counts as on its outline."""
@@ -55,6 +60,19 @@ class Block:
     def unshifted(self, columns: np.ndarray) -> np.ndarray:
         """Columns (n, ...) without what shifts explain."""
         return np.asarray(columns - self.shifts @ (self.shifts.T @ columns))
+
+    def by_place(self, columns: np.ndarray) -> np.ndarray:
+        """Columns (n, ...) as (n_places, n_components, ...)."""
+        return columns.reshape(len(self.places), -1, *columns.shape[1:])
+
+    def only(self, stay: np.ndarray) -> "Block":
+        """The block of some places, marked (n_places,)."""
+        own = np.repeat(stay, len(self.values) // len(stay))
+        rows = self.rows[own] if self.rows.shape[0] == len(own) else self.rows
+        shifts, _ = np.linalg.qr(self.shifts[own])
+        return replace(
+            self, values=self.values[own], factors=self.factors[own], rows=rows, shifts=shifts, places=self.places[stay]
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,12 +125,13 @@ class MeasuredTest:
     shift: bool = True
     columns: dict[str, np.ndarray] = field(init=False, repr=False)
     _lines: list[int] = field(init=False, repr=False)
+    _missing: int = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         is_a(self.body, (Beam, Shape), "body", A_BEAM)
         chosen(self.body.loads if isinstance(self.body, Shape) else LOADS, self.load, "load")
-        columns, lines = _read(self.file)
-        put(self, angle=quantity(self.angle, "angle", "angle"), columns=columns, _lines=lines)
+        columns, lines, missing = _read(self.file)
+        put(self, angle=quantity(self.angle, "angle", "angle"), columns=columns, _lines=lines, _missing=missing)
         if (self.force is None) == (isinstance(self.body, Beam) and "u" in columns):
             raise ValueError(
                 f"force: {self.force!r}; give the force at which '{self.file}' was measured, as '400 N', if it is the "
@@ -153,6 +172,11 @@ def _field(test: MeasuredTest, family: Family) -> list[Block]:
         raise TestDataError(
             f"'{test.file}', line {test._lines[worst]}: the point x = {x:.6g} mm, y = {y:.6g} mm is outside of the "
             "body; remove it, or correct the unit or the origin"
+        )
+    if len(points) > 1 and not np.ptp(values, axis=0).any():
+        raise TestDataError(
+            f"'{test.file}': all {len(points)} points have the same displacement, so nothing was measured; give the "
+            "field under the load"
         )
     turned = (points - points.mean(axis=0))[:, ::-1] * [-1, 1] / (np.ptp(points) or 1.0)
     rigid, _ = np.linalg.qr(np.column_stack([np.tile(np.eye(2), (len(points), 1)), turned.ravel()]))
@@ -201,8 +225,8 @@ def _row(test: MeasuredTest, name: str, family: Family, load: LoadCase) -> np.nd
     return family.forces / np.hypot(*pull.force)  # the mean along the force
 
 
-def _read(path: str | Path) -> tuple[dict[str, np.ndarray], list[int]]:
-    """Columns of a file by name, in SI units, and the number of each line."""
+def _read(path: str | Path) -> tuple[dict[str, np.ndarray], list[int], int]:
+    """Columns of a file by name, in SI units, the number of each line, and how many points have no numbers."""
     (line, heads), *rows = csv_rows(path, TestDataError, HEADS)
     parts = [head.rstrip("] ").partition("[") for head in heads]
     names = [name.strip() for name, _, _ in parts]
@@ -212,6 +236,9 @@ def _read(path: str | Path) -> tuple[dict[str, np.ndarray], list[int]]:
             why = "is missing" if name not in names else "is there twice"
             raise TestDataError(f"'{path}', line {line}: column {name!r} {why} in {names}; {HEADS}")
     used = [name if name in FIELD_COLUMNS or not of_field else "" for name in names]
+    every = len(rows)
+    if of_field:
+        rows = [row for row in rows if len(row[1]) != len(used) or not any(map(_absent, used, row[1]))]
     table = np.array(numbers(path, rows, used, TestDataError)).reshape(-1, len(used))
     columns = {}
     for name, (_, _, unit), values in zip(used, parts, table.T):
@@ -221,7 +248,20 @@ def _read(path: str | Path) -> tuple[dict[str, np.ndarray], list[int]]:
             scale = positive(f"1 {unit}", "force" if name == "force" else "length", f"column {name!r}")
         except ValueError as error:
             raise TestDataError(f"'{path}', line {line}: {error} in '[ ]'") from None
+        if (far := np.abs(values) > LARGEST_NUMBER / scale).any():
+            worst = int(np.argmax(far))
+            raise TestDataError(
+                f"'{path}', line {rows[worst][0]}, column {name!r}: {values[worst]:g} {unit} is beyond all measure; "
+                "correct the line, or remove it"
+            )
         columns[name] = scale * values
     if not rows:
         raise TestDataError(f"'{path}': has no rows of numbers below its head; {HEADS}")
-    return columns, [number for number, _ in rows]
+    return columns, [number for number, _ in rows], every - len(rows)
+
+
+def _absent(name: str, text: str) -> bool:
+    """Whether a cell of a field says that nothing was measured: empty, NaN, a word, or the largest number."""
+    if not name or not re.search("[0-9]", text) or "#" in text:
+        return bool(name) and not math.isfinite(number_of(text))
+    return LARGEST_NUMBER < abs(number_of(text)) < math.inf

@@ -31,7 +31,7 @@ def _variables(cell):
         "last_displacement": (cell, "m", "displacement that a run ends with that is not at rest, mean where it swings",
                               np.nan),
         "error": (cell, "1", "error in the engine, (displacement - reference) / |reference|", np.nan),
-        "solver_error": (cell, "1", "what the engine adds to the definition's error", np.nan),
+        "solver_error": (cell, "1", "what the engine's solver adds to the errors of definition and law", np.nan),
         "residual": (cell, "1", "out-of-balance force of the network at rest in the engine, over the load", np.nan),
         "frame_seconds": (cell, "s", "time of a frame, without the first ones", np.nan),
         "frames": (cell, "1", "frames that were taken", np.nan),

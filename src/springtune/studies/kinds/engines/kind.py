@@ -121,6 +121,10 @@ def _check(config, problems):
         place = "engines", "runs", name
         for engine in runs.engine:
             checks.check_known(problems, (*place, "engine"), "engine", engine, _engines(), None)
+        try:
+            imported("engines.base:Setting")(max(runs.dt))
+        except ValueError as error:
+            problems.add((*place, "dt"), str(error).removeprefix("dt: "))
         for one in runs.scene or section.scenes:
             checks.check_known(problems, (*place, "scene"), "scene", one, section.scenes, "engines.scenes")
             if one in section.scenes:

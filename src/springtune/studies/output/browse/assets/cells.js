@@ -393,18 +393,18 @@ class Cells {
   }
 
   python(places) {
-    const root = this.root, attributes = root.attributes;
-    const labels = this.dims.map((name) => `    ${name}=${literal(root.label(name, places[name]))},`).join("\n");
+    const root = this.root, study = String(root.attributes.study);
+    const named = /^[\w-][\w.-]{0,59}$/.test(study) ? study : "study";  // of a stranger's dataset it may be any path
+    const labels = (dims) => dims.map((name) => `    ${literal(name)}: ${literal(root.label(name, places[name]))},`);
     const lines = [
       "import xarray as xr", "",
-      `tree = xr.open_datatree(${literal(`results/${attributes.study || "study"}/dataset.nc`)}, engine="h5netcdf")`,
-      "cell = tree.to_dataset().sel(", labels, ")",
+      `tree = xr.open_datatree(${literal(`results/${named}/dataset.nc`)}, engine="h5netcdf")`,
+      "cell = tree.to_dataset().sel({", ...labels(this.dims), "})",
     ];
     if (this.has.error) lines.push(`print(float(cell.${SCENE_ERROR}))`);
     if (this.has.curve && this.inGroup(this.has.curve)) {
       const curve = this.dims.filter((name) => name in this.has.curve.dims);
-      lines.push("", "curve = tree[\"sensitivity\"].to_dataset().sel(",
-        curve.map((name) => `    ${name}=${literal(root.label(name, places[name]))},`).join("\n"), ")");
+      lines.push("", "curve = tree[\"sensitivity\"].to_dataset().sel({", ...labels(curve), "})");
     }
     return lines.join("\n") + "\n";
   }
@@ -434,8 +434,10 @@ class Cells {
   }
 }
 
+// In Python, on one line of characters that are seen.
 function literal(value) {
-  return typeof value === "string" ? JSON.stringify(value) : value === null ? "float(\"nan\")" : String(value);
+  if (typeof value !== "string") return value === null ? "float(\"nan\")" : String(value);
+  return JSON.stringify(value).replace(/(?! )[\p{C}\p{Z}]/gu, (one) => `\\U${one.codePointAt(0).toString(16).padStart(8, "0")}`);
 }
 
 function stiffnessUnit(values) {

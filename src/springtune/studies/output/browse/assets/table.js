@@ -81,7 +81,7 @@ class Table {
   update() {
     const wrong = [];
     const tests = this.columns.map((column) => {
-      const test = this.test(column), field = this.table.tHead.querySelector(`[data-column="${column.name}"]`);
+      const test = this.test(column), field = this.table.tHead.querySelector(`[data-column="${CSS.escape(column.name)}"]`);
       if (typeof test === "string") wrong.push(`${column.title}: ${test}`);
       field.toggleAttribute("aria-invalid", typeof test === "string");
       return test;

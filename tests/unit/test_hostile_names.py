@@ -1,0 +1,106 @@
+"""Foreign names in files that springtune writes: data give them back, programs have them as one line of comment."""
+
+import ast
+import json
+import xml.etree.ElementTree as ET
+from dataclasses import replace
+
+import pytest
+
+import springtune as st
+from springtune.handover import formats
+
+NAMES = {
+    "newline": "a\nimport os; raise SystemExit(7)\n",
+    "return": "a\rraise SystemExit(7)\rb",
+    "other lines": "a\x85raise SystemExit(7)\u2028b\u2029c\x0b\x0c\x1cd",
+    "zero": "a\0b",
+    "surrogate": "a\ud800b",
+    "no character": "a\ufffe\uffff\U000e0001b",
+    "direction": "a\u202eb\u2066c\u200fd\u200e\u200b\ufeff",
+    "comment": "x---><include file='/etc/passwd'/><!--",
+    "hyphens": "a---b--",
+    "cdata": "]]><![CDATA[<a>&b;&lt;</mujoco>",
+    "quotes": "\"'\"\"\"'''\\\"\\'`\\",
+    "templates": "{{ 7*7 }}{% raw %}{# x #}${x} %s",
+    "codec": "coding: utf-7 +AAo-raise SystemExit(7)+AAo-",
+    "lammps": "$(shell) &",
+    "long": "x" * 100_000,
+    "letters": "Stahl äß 中 \U0001f600 a\u00a0b",
+    "paths": "../../x/y.",
+    "empty": "",
+    "blank": " ",
+}
+
+PROGRAMS = (".xml", ".mjcf", ".scn", ".py", ".newton.py", ".xpbd.json")
+
+
+def renamed(tree, name):
+    """A header whose texts, and keys of what a user names, all have a name in them."""
+    if isinstance(tree, str):
+        return tree + name
+    if not isinstance(tree, dict):
+        return tree
+    own = {f"{key}{name}" if key == "bending" else key: renamed(value, name) for key, value in tree.items()}
+    return own | ({name: "a key"} if "bending" in tree else {})
+
+
+@pytest.fixture(scope="module", params=["delingette", "lattice"])
+def plain(request):
+    beam, rubber = st.Beam("40 mm", "20 mm"), st.Material("1 MPa", 0.3, density="1000 kg/m^3")
+    scene = st.Scene(beam, st.make_mesh(beam, "right", "20 mm"), rubber, "traction", "1 N", definition=request.param)
+    net = st.SpringNet.from_scene(scene)
+    return replace(net, header=net.header | {"other_materials": {"other": dict(net.header["material"])}})
+
+
+def skeleton(path, ending):
+    """What a program reads of a file: all but comments, titles and the header of JSON."""
+    content = path.read_bytes()
+    if ending.endswith(".py"):
+        return ast.dump(ast.parse(content))
+    if ending == ".xpbd.json":
+        return json.loads(content) | {"header": None}
+    root = ET.fromstring(content)
+    root.attrib.pop("model", None)
+    return ET.tostring(root)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("ending", PROGRAMS)
+def test_no_name_is_read_by_a_program(ending, name, plain, tmp_path):
+    if plain.energies and ending in (".scn", ".py"):  # SOFA has springs alone
+        return
+    before, after = tmp_path / f"before{ending}", tmp_path / f"after{ending}"
+    plain.write(before)
+    net = replace(plain, header=renamed(plain.header, NAMES[name]))
+    net.write(after)
+    lines = after.read_text(encoding="utf-8").split("\n")
+    assert all(one.isprintable() for one in lines) and len(lines) == len(before.read_text().split("\n"))
+    assert skeleton(before, ending) == skeleton(after, ending)
+    if ending == ".xpbd.json":
+        assert json.loads(after.read_bytes())["header"].items() >= net.header.items()
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("ending", formats.ENDINGS)
+def test_data_give_a_name_back(ending, name, plain, tmp_path):
+    net = replace(plain, header=renamed(plain.header, NAMES[name]))
+    net.write(tmp_path / f"net{ending}")
+    back = st.SpringNet.read(tmp_path / f"net{ending}")
+    assert back.header == net.header and (back.stiffness == net.stiffness).all()
+    assert print(back) is None and back._repr_html_()  # as a notebook has it
+
+
+@pytest.mark.parametrize("ending", formats.ENDINGS)
+def test_a_file_may_have_any_name(ending, plain, tmp_path):
+    path = tmp_path / f"a\nb\r\u2028c # {ending}"
+    plain.write(path)
+    assert st.SpringNet.read(path).header == plain.header
+
+
+def test_a_table_with_names_as_they_are_reads_back(plain, tmp_path):
+    path = tmp_path / "net.csv"
+    net = replace(plain, header=renamed(plain.header, "a\u2028b\x85c"))
+    net.write(path)
+    path.write_text(path.read_text().replace("\\u2028", "\u2028").replace("\\u0085", "\x85"))
+    assert st.SpringNet.read(path).header == net.header
