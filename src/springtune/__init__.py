@@ -21,12 +21,7 @@ _NAMES = {
     "engines.run": ("EngineResult", "in_engine"),
     "handover.net": ("SpringNet",),
     "studies.kinds": ("load_study",),
-    "studies.kinds.benchmark.figures": (
-        "plot_benchmark",
-        "plot_benchmark_costs",
-        "plot_benchmark_curve",
-        "plot_benchmark_rates",
-    ),
+    "studies.kinds.benchmark.figures": ("plot_benchmark",),
     "studies.kinds.engines.figures": (
         "plot_engine_curves",
         "plot_engine_errors",

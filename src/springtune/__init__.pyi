@@ -68,9 +68,6 @@ from .springs import definition as definition
 from .studies.config.messages import StudyError as StudyError
 from .studies.kinds import load_study as load_study
 from .studies.kinds.benchmark.figures import plot_benchmark as plot_benchmark
-from .studies.kinds.benchmark.figures import plot_benchmark_costs as plot_benchmark_costs
-from .studies.kinds.benchmark.figures import plot_benchmark_curve as plot_benchmark_curve
-from .studies.kinds.benchmark.figures import plot_benchmark_rates as plot_benchmark_rates
 from .studies.kinds.engines.figures import plot_engine_curves as plot_engine_curves
 from .studies.kinds.engines.figures import plot_engine_errors as plot_engine_errors
 from .studies.kinds.engines.figures import plot_engine_factors as plot_engine_factors

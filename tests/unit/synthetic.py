@@ -138,10 +138,10 @@ def benchmark():
         "scene": ["traction", "bending"], "approach": ["delingette/structured", "relaxation", "calculix-cps3"],
         "mesh_size": SIZES, "curve_count": [1, 11],
     }  # fmt: skip
-    cell, fit = ("scene", "approach", "mesh_size"), ("scene", "approach")
+    cell = ("scene", "approach", "mesh_size")
     parts = dict.fromkeys([f"{name}_seconds" for name in ("meshing", "assembling", "factorizing", "solving")], cell)
     return variables(
-        labels, error=cell, assured_error=cell, seconds=cell, unknowns=cell, **parts, cost_exponent=fit, error_rate=fit,
+        labels, error=cell, assured_error=cell, seconds=cell, unknowns=cell, **parts,
         reference_error_estimate=("scene",), reference_seconds=("scene",), separate_seconds=("curve_count",),
         curve_seconds=("curve_count",),
     )  # fmt: skip

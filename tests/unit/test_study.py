@@ -477,11 +477,6 @@ class TestPressureAndLaying:
 
 
 class TestBenchmark:
-    def test_second_beam_goes_with_every_scene(self, load):
-        case = load(STUDIES["benchmark"]).parts["benchmark"][0]
-        assert (case.beam.name, case.second_beam.name, case.second_beam.height) == ("long", "short", 0.02)
-        assert load(study_text("benchmark", ("  second_beam: short\n", ""))).parts["benchmark"][0].second_beam is None
-
     def test_sizes_are_those_of_the_study(self, load):
         text = study_text("benchmark", ("\ngrids", "\n  finest: 5 mm\n  finest_of: {relaxation: 2 mm}\ngrids"))
         case = load(text).parts["benchmark"][0]

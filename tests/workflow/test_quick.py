@@ -109,13 +109,13 @@ def test_stability_has_the_names_of_the_contract(tree):
 def test_benchmark_has_the_names_of_the_contract(tree):
     """That seconds are there; how many, and their ratios, depend on what else the machine does."""
     data = tree["benchmark"].to_dataset()
-    for name in ("error", "seconds", "peak_memory"):
+    for name in ("error", "seconds", "unknowns"):
         assert data[name].dims == ("scene", "approach", "mesh_size"), name
     traction = data.sel(scene="traction", mesh_size=5e-3)
     ours, theirs = (traction.error.sel({"approach": name}) for name in ("delingette/structured", "linear-triangles"))
     assert abs(ours - theirs).max() <= 1e-9
     assert (traction.solving_seconds.sel({"approach": "condensation"}) > 0).all()
-    assert (traction.pareto.max() == 1).all() and (data.reference_error_estimate < 1e-4).all()
+    assert (data.reference_error_estimate < 1e-4).all()
     assert (data.curve_seconds > 0).all()
     assert data.separate_seconds.values == pytest.approx(data.curve_count * data.nonlinear_seconds)
 

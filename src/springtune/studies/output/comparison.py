@@ -22,13 +22,9 @@ RELATIVE = 1e-6
 """Default relative tolerance."""
 
 MEASURED: tuple[str, ...] = (
-    "seconds", "*_seconds", "seconds_*", "solver", "peak_memory", "machine_load", "pareto", "cost_exponent",
-    "explicit_steps", "spring_updates", "*_bandwidth",
+    "seconds", "*_seconds", "seconds_*", "solver", "spring_updates",
 )  # fmt: skip
 """Variables that depend on the machine."""
-
-NOT_MEASURED = "not measured"
-"""How messages of times begin that a busy machine did not give."""
 
 TOLD_ATTRIBUTES = ("title", "study", "springtune_version", "git_commit", "study_commit")
 
@@ -340,8 +336,6 @@ class _Group:
         for part in _blocks(pair[0], cells, self.how.block):
             here = [one.isel(part) for one in pair]
             values = [one.values.astype(str) if one.dtype == object else one.values for one in here]
-            if name.endswith("message") and all(one.dtype.kind == "U" for one in values):
-                values = [np.where(np.char.startswith(one, NOT_MEASURED), "", one) for one in values]
             excess, there = kind.excess(
                 values,
                 [_over(mask, here[0], True) for mask in asked],

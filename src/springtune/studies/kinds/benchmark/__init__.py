@@ -23,9 +23,6 @@ OTHER_APPROACHES = (
 PARTS = ("meshing", "assembling", "factorizing", "solving")
 """Parts of the seconds of a case."""
 
-BUSY = "not measured: the machine was busy"
-"""Message of cases whose runs differ too much in their time, or had to wait for the processor."""
-
 CURVE_COUNTS = (1, 11, 61, 201)
 """Numbers of stiffnesses of the benchmark's sensitivity curves."""
 

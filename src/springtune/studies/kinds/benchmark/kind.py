@@ -6,7 +6,6 @@ from typing import Annotated
 
 from pydantic import Field
 
-from springtune.linalg import SOLVERS
 from springtune.mechanics.integrators import PRECISIONS
 from springtune.mesh import MESH_TYPES
 from springtune.problem.geometry import Beam
@@ -57,11 +56,6 @@ class BenchmarkConfig(Section):
     """Run time against error: every definition on every mesh type, and other approaches; one at a time."""
 
     scenes: Annotated[dict[str, BenchmarkSceneConfig], Named("scene")] = Field(description="Scenes.")
-    second_beam: BeamName | None = Field(
-        None,
-        description="Beam on which every case is solved once more: an approach is the quickest to an error only where "
-        "it keeps that on both. None is called the quickest without.",
-    )
     definition: DefinitionNames = Field(description="Definitions that derive a stiffness and need no reference.")
     mesh_type: Annotated[list[MeshType], OneOrMore()] = Field(description="Mesh types of the definitions.")
     approach: Annotated[list[OtherApproach], OneOrMore()] = Field(
@@ -77,8 +71,7 @@ class BenchmarkConfig(Section):
     )
     most_seconds: Seconds = default(
         "30",
-        description="Seconds of the processor that a run may take; what takes more is a hole that says so, and so are "
-        "finer sizes of it.",
+        description="Seconds after which an approach is not run on finer sizes, which are holes that say so.",
     )
 
 
@@ -95,7 +88,6 @@ class Case:
     mesh_sizes: tuple[float, ...]
     finest: tuple[float, ...]
     most_seconds: float
-    second_beam: Beam | None
 
 
 def in_benchmark(load: str) -> bool:
@@ -110,9 +102,7 @@ def _check(config, problems):
     section = config.benchmark
     labels = ("scenes", "definition", "mesh_type", "approach", "mesh_size")
     check_product(problems, section, ("benchmark",), labels, MOST_RUNS)
-    if section.second_beam:
-        check_known(problems, ("benchmark", "second_beam"), "beam", section.second_beam, config.beams)
-    for beam in dict.fromkeys([*(scene.beam for scene in section.scenes.values()), section.second_beam]):
+    for beam in dict.fromkeys(scene.beam for scene in section.scenes.values()):
         if beam in config.beams:
             extent, largest = (config.beams[beam].length, config.beams[beam].height), max(section.mesh_size)
             check_particles(problems, ("benchmark", "mesh_size"), section.mesh_size, *extent)
@@ -159,7 +149,6 @@ def _expand(config, declared):
             tuple(sorted(section.mesh_size)),
             tuple(section.finest_of.get(name, finest) for name in approaches),
             section.most_seconds,
-            declared.beams[section.second_beam] if section.second_beam else None,
         )
         for name, scene in section.scenes.items()
     )
@@ -173,16 +162,15 @@ def _axes(cases):
         "curve_count": CURVE_COUNTS,
         "thread_count": THREAD_COUNTS,
         "precision": PRECISIONS,
-        "linear_solver": SOLVERS,
     }
 
 
 def _tasks(study):
-    """Scenes; curves, steps and solvers are timed on the first one."""
+    """Scenes; curves and explicit steps are timed on the first one."""
     for place, case in enumerate(study.parts["benchmark"]):
         values = asdict(case) | {"beam": beam_key(case.beam), "material": material_key(case.material, density=True)}
         del values["name"]
-        values |= {"second_beam": case.second_beam and beam_key(case.second_beam), "curves": place == 0}
+        values["curves"] = place == 0
         labels = {"scene": case.name, "mesh_size": list(case.mesh_sizes)}
         yield Task(values, _code(case), labels, case, [("benchmark", 0)], case.name)
 
@@ -199,66 +187,32 @@ def _code(case):
 
 
 CASE = ("scene", "approach", "mesh_size")
-SOLVER_AXES = ("linear_solver", "mesh_size")
-EXPLICIT_AXES = ("mesh_size", "thread_count", "precision")
 
 VARIABLES = {
     "displacement": (CASE, "m", "displacement of the loaded side along the force", nan),
     "error": (CASE, "1", "signed error of the displacement, over the reference's", nan),
-    "second_error": (CASE, "1", "signed error of the displacement on the second beam", nan),
-    "second_status": (CASE, "1", "what became of the case on the second beam", 0),
-    "second_message": (CASE, "1", "why there is no error on the second beam", ""),
-    "assured_error": (
-        CASE,
-        "1",
-        "largest absolute error of this and all finer mesh sizes that were run, on both beams",
-        nan,
-    ),
+    "assured_error": (CASE, "1", "largest absolute error of this and all finer mesh sizes that were run", nan),
     "seconds": (CASE, "s", "time from nothing to the displacement, median of warm runs", nan),
-    "seconds_spread": (CASE, "s", "longest less shortest of the warm runs", nan),
-    "cold_seconds": (CASE, "s", "time of the first run, imports included", nan),
     "meshing_seconds": (CASE, "s", "time to make the mesh", nan),
     "assembling_seconds": (CASE, "s", "time to derive parameters and assemble", nan),
     "factorizing_seconds": (CASE, "s", "time to factorize, or of what is paid once", nan),
     "solving_seconds": (CASE, "s", "time to solve", nan),
-    "peak_memory": (CASE, "byte", "largest memory of the process above that at its start", nan),
     "unknowns": (CASE, "1", "number of unknowns", nan),
-    "pareto": (CASE, "1", "1 where no approach of the scene is both more accurate and faster", 0),
     "status": (CASE, "1", "what became of the case", 0),
     "message": (CASE, "1", "why there are no numbers", ""),
-    "error_rate": (
-        ("scene", "approach"),
-        "1",
-        "exponent of the error in the mesh size, where it falls with that and keeps its sign",
-        nan,
-    ),
-    "cost_exponent": (("scene", "approach"), "1", "exponent of the seconds in the unknowns, from 3000 on", nan),
     "reference_displacement": (("scene",), "m", "displacement of the converged reference", nan),
     "reference_error_estimate": (("scene",), "1", "estimated relative error of the reference", nan),
     "reference_seconds": (("scene",), "s", "time of the reference", nan),
-    "machine_load": (("scene",), "1", "load of the machine at the start, processes", nan),
-    "solver_seconds": (SOLVER_AXES, "s", "time from a matrix to a solution, its sparsity analysed", nan),
-    "solver_again_seconds": (SOLVER_AXES, "s", "time of the next matrix of that sparsity", nan),
-    "solver_status": (SOLVER_AXES, "1", "what became of the linear system", 0),
-    "solver_message": (SOLVER_AXES, "1", "why there are no seconds", ""),
     "curve_seconds": (("curve_count",), "s", "time of a sensitivity curve as one path, 9470 particles", nan),
     "separate_seconds": (("curve_count",), "s", "time of as many nonlinear solves", nan),
     "nonlinear_seconds": ((), "s", "time of one nonlinear solve there", nan),
     "linear_seconds": ((), "s", "time of one linear solve there", nan),
-    "curve_status": ((), "1", "what became of the curves", 0),
-    "curve_message": ((), "1", "why there are no seconds of curves", ""),
-    "explicit_steps": (EXPLICIT_AXES, "s-1", "explicit steps a second of nonlinear springs", nan),
-    "spring_updates": (EXPLICIT_AXES, "s-1", "springs that these steps advance, each step counted anew", nan),
-    "explicit_bandwidth": (EXPLICIT_AXES, "byte s-1", "what these steps read and write, be it in a cache", nan),
-    "explicit_error": (
-        ("mesh_size", "precision"),
-        "1",
-        "largest difference of their displacements from those in double precision, over the largest of these",
+    "spring_updates": (
+        ("mesh_size", "thread_count", "precision"),
+        "s-1",
+        "nonlinear springs a second that explicit steps advance, each step counted anew",
         nan,
     ),
-    "explicit_status": (("mesh_size",), "1", "what became of the explicit steps", 0),
-    "explicit_message": (("mesh_size",), "1", "why there are no explicit steps", ""),
-    "copy_bandwidth": (("thread_count",), "byte s-1", "memory that a plain copy reads and writes", nan),
 }
 
 KIND = Kind(
@@ -272,12 +226,10 @@ KIND = Kind(
     dimensions={
         "scene": "scene of the benchmark",
         "approach": "definition / mesh type, or another approach",
-        "linear_solver": "solver of linear systems",
         "curve_count": "number of stiffnesses of a sensitivity curve",
         "thread_count": "number of threads of explicit steps",
         "precision": "floating-point numbers of explicit steps",
     },
-    attributes=lambda cases: {"second_beam": cases[-1].second_beam.name if cases[-1].second_beam else ""},
     stages=(stage("benchmark", "studies.kinds.benchmark.solve", "Timing approaches", _tasks, alone=True),),
     outputs=OUTPUTS,
 )
