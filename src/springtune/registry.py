@@ -2,8 +2,8 @@
 
 A decorator adds a function to a mapping. On first use the mapping imports all modules of a package to find what they
 declare. Code outside the package uses the same decorator. Other packages declare more by entry points of the groups
-``springtune.definitions``, ``springtune.engines``, ``springtune.loads``, ``springtune.mesh_types`` and
-``springtune.kinds``. They are imported when their name is asked for, or all names.
+``springtune.definitions``, ``springtune.engines``, ``springtune.loads`` and ``springtune.mesh_types``. They are
+imported when their name is asked for, or all names.
 """
 
 import inspect
@@ -33,7 +33,7 @@ class PluginWarning(UserWarning):
     """What another package declares is left out; the message says why."""
 
 
-GROUPS = ("definitions", "engines", "loads", "mesh_types", "kinds")
+GROUPS = ("definitions", "engines", "loads", "mesh_types")
 """Groups of entry points, after ``springtune.``."""
 
 

@@ -6,11 +6,9 @@ import sys
 import warnings
 from contextlib import redirect_stderr, redirect_stdout
 from itertools import groupby
-from pathlib import Path
 from typing import Any, NamedTuple, TextIO
 
 import click
-from click.shell_completion import CompletionItem
 
 from .. import __version__
 from ..registry import imported
@@ -26,21 +24,6 @@ def examples(*lines: str) -> str:
     '\x08\nExamples:\n  springtune definitions'
     """
     return "\n".join(["\b", "Examples:", *(f"  {line}" for line in lines)])
-
-
-def studies_here(context: click.Context, parameter: click.Parameter, begun: str) -> list[CompletionItem]:
-    """Complete studies in ``config/``, or other files."""
-    found = [path.as_posix() for path in sorted(Path("config").glob("*.yaml"))]
-    chosen = [CompletionItem(path) for path in found if path.startswith(begun)]
-    return chosen or [CompletionItem(begun, type="file")]
-
-
-def mesh_types(context: click.Context, parameter: click.Parameter, begun: str) -> list[CompletionItem]:
-    """Complete mesh types, or files."""
-    from ..mesh import MESH_TYPES  # here: only completion needs it
-
-    chosen = [CompletionItem(name) for name in MESH_TYPES if name.startswith(begun)]
-    return chosen or [CompletionItem(begun, type="file")]
 
 
 WRONG, FAILED = 2, 1

@@ -10,7 +10,7 @@ import click
 from .. import __version__
 from ..problem.compare import error_text
 from ..safe_io.tables import aligned
-from .options import AnyCommand, SheetOptions, Unmet, asked_quantity, names_from
+from .options import AnyCommand, SheetOptions, Unmet, asked_quantity
 from .recommendation import json_text
 
 if TYPE_CHECKING:
@@ -20,14 +20,14 @@ if TYPE_CHECKING:
     from ..handover.net import SpringNet
 
 ENGINE_OPTIONS: dict[str, dict[str, Any]] = {
-    "engine": {"shell_complete": names_from("engines.base:ENGINES"), "help": "Engine to calibrate to, such as xpbd."},
+    "engine": {"help": "Engine to calibrate to, such as xpbd."},
     "dt": {"help": "Time that a frame advances, such as 1/60 or '5 ms'.  [default: 1/60]"},
     "substeps": {"type": int, "help": "Steps of a frame.  [default: 1]"},
     "iterations": {"type": int, "help": "Iterations of the engine's solver in a step.  [default: 10]"},
     "precision": {"help": "float64 or float32.  [default: the engine's own]"},
     "force": {"help": "Size of the force of --load on a beam, such as '0.2 N'."},
     "scale": {"type": float, "help": "Factor on the load of a shape.  [default: 1]"},
-    "definition": {"shell_complete": names_from("springs:DEFINITIONS"), "help": "Rule for stiffness.  [default: best]"},
+    "definition": {"help": "Rule for stiffness.  [default: best]"},
     "within": {"help": "Error for which ranges of loads are printed.  [default: 5 %]"},
     "budget": {"help": "Time of a frame here, such as '2 ms': find the mesh, definition, substeps and iterations."},
 }

@@ -14,9 +14,8 @@ import click
 from click.core import ParameterSource
 
 from ..problem.parameters import MOST_SCENES, MOST_SCENES_VARIABLE, PLANES
-from ..registry import imported
 from ..studies.runs.source import CONFIG_FOLDER
-from . import FAILED, WRONG, mesh_types
+from . import FAILED, WRONG
 
 if TYPE_CHECKING:
     from ..mesh import Mesh
@@ -273,11 +272,6 @@ def _materials(
     return {one: replace(other, density=heavy) if other.density is None else other for one, other in found.items()}
 
 
-def names_from(known: str) -> Callable[[click.Context, click.Parameter, str], list[str]]:
-    """Completion of a name; the names are imported when a shell asks."""
-    return lambda context, parameter, begun: [name for name in imported(known) if name.startswith(begun)]
-
-
 AnyCommand = Callable[..., None]
 
 
@@ -392,14 +386,11 @@ def sheet_options(
             "there is one.",
         ),
         click.option("--thickness", default="1 mm", show_default=True, help="Thickness of the sheet."),
-        click.option(
-            "--mesh", "mesh_type", default=mesh_type, show_default=True, shell_complete=mesh_types, help=mesh_help
-        ),
+        click.option("--mesh", "mesh_type", default=mesh_type, show_default=True, help=mesh_help),
         click.option("--size", help="Length of an edge, such as '2 mm'; of mesh files only if a shape has several."),
         click.option("--unit", default="1 m", show_default=True, help="Unit of the coordinates in a mesh file."),
         click.option(
             "--material",
-            shell_complete=names_from("cli.options:MATERIALS"),
             help=f"One of {', '.join(MATERIALS)}; or give --young and --poisson; of a shape one of its study.",
         ),
         click.option("--young", help="Young's modulus, such as '210 GPa'."),
@@ -480,10 +471,6 @@ def dataset_path(given: str) -> Path:
 
     path = Path(given)
     if path.suffix in (".yaml", ".yml"):
-        from ..studies.output.expected import is_expected
-
-        if is_expected(path):
-            return path
         config, path = path, RESULTS_FOLDER / path.stem
         check_claim(path, config)
     for file in (path, path / DATASET, RESULTS_FOLDER / path / DATASET):

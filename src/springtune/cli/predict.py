@@ -19,7 +19,6 @@ from .options import (
     Unmet,
     check_kind,
     check_target,
-    names_from,
     refusals,
     sheet_options,
 )
@@ -326,13 +325,11 @@ OPTIONS = re.compile(r"^(?=(load|force|scale|definition|stiffness|density|mujoco
     "--definition",
     default="patch",
     show_default=True,
-    shell_complete=names_from("springs:DEFINITIONS"),
     help="Rule for the stiffness; `springtune definitions` lists them, `springtune predict` recommends one.",
 )
 @click.option("--stiffness", help="Uniform stiffness, such as '170e6 N/m', for definitions that are told one.")
 @click.option(
     "--load",
-    shell_complete=names_from("problem.loads:LOADS"),
     help="What holds and pulls the beam, nothing without; or a shape, its only load without.",
 )
 @click.option("--force", help="Size of the force on a beam, such as '400 kN'.")

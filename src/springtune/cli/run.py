@@ -13,7 +13,7 @@ import click
 
 from ..registry import how_to_install
 from ..studies.runs.source import USUAL_STUDY, config_file, workflow_folder
-from . import examples, studies_here
+from . import examples
 from .options import allow, max_scenes
 
 if TYPE_CHECKING:
@@ -39,9 +39,7 @@ NOT_SOLVED = 3
     "--results", type=click.Path(file_okay=False, path_type=Path), help="Folder in which results/ is, made if missing."
 )
 @click.option("--strict", is_flag=True, help="Exit with 3 if scenes are not solved; they are data otherwise.")
-@click.argument(
-    "arguments", nargs=-1, type=click.UNPROCESSED, metavar="[STUDY] [OPTIONS OF SNAKEMAKE]", shell_complete=studies_here
-)
+@click.argument("arguments", nargs=-1, type=click.UNPROCESSED, metavar="[STUDY] [OPTIONS OF SNAKEMAKE]")
 def run(most: int | None, results: Path | None, strict: bool, arguments: tuple[str, ...]) -> None:
     """Run a study, the paper's where none is named.
 

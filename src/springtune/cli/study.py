@@ -10,7 +10,7 @@ from ..registry import NAME, NAME_RULE
 from ..safe_io.atomic import write_text
 from ..safe_io.tables import aligned
 from ..studies.runs.source import CONFIG_FOLDER, config_file, is_source_tree
-from . import WrongCall, examples, studies_here
+from . import WrongCall, examples
 from .options import allow, max_scenes
 
 
@@ -78,7 +78,7 @@ def template_text(path: Path, body: str) -> str:
     )
 )
 @max_scenes
-@click.argument("config", type=click.Path(path_type=Path), shell_complete=studies_here)
+@click.argument("config", type=click.Path(path_type=Path))
 def scenes(config: Path, most: int | None) -> None:
     """Say what a study asks for, before anything runs.
 

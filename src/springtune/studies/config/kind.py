@@ -9,7 +9,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from springtune.registry import Extended, imported, plugins
+from springtune.registry import imported
 
 if TYPE_CHECKING:
     from .messages import Problems
@@ -21,10 +21,6 @@ _FIRST = ("scenes", "moduli", "laying", "stability", "benchmark", "samples", "sh
 
 KINDS = _FIRST + tuple(sorted({path.parent.name for path in _PACKAGES.glob("*/kind.py")} - {*_FIRST}))
 """Packages of the study kinds, in the order of the dataset's groups; other kinds come last."""
-
-RESERVED: set[str] = set()
-"""Keys of studies and grids that no kind adds; `springtune.studies.config.sections` enters them."""
-
 
 FORMATS = ("png", "pdf")
 """Endings of a figure's files."""
@@ -147,8 +143,6 @@ class Kind:
     ----------
     name : str
         Name of its package and of its part of a study in `Study.parts`.
-    package : str
-        Package of its modules, for kinds of other packages; modules of stages and outputs then have full names.
     study_fields, grid_fields : dict of str to tuple
         Keys that it adds to a study and to grids, with type and pydantic field.
     alone : dict of str to tuple
@@ -178,7 +172,6 @@ class Kind:
     """
 
     name: str
-    package: str = field(default="", kw_only=True)
     study_fields: dict[str, tuple[Any, Any]] = field(default_factory=dict)
     grid_fields: dict[str, tuple[Any, Any]] = field(default_factory=dict)
     alone: dict[str, tuple[str, ...]] = field(default_factory=dict)
@@ -202,19 +195,12 @@ class Kind:
 
     def place(self, name: str) -> str:
         """Name of a module of its package."""
-        return f"{self.package or f'studies.kinds.{self.name}'}.{name}"
+        return f"studies.kinds.{self.name}.{name}"
 
     def module(self, name: str) -> ModuleType:
         """A module of its package."""
         found: ModuleType = imported(self.place(name))
         return found
-
-    @property
-    def names(self) -> set[tuple[str, str]]:
-        """What it names, each with what it is; of these no other kind has one."""
-        keys = {("key", key) for key in (*self.study_fields, *self.grid_fields)}
-        made = {("output", one.name) for one in self.outputs} | {("stage", one.name) for one in self.stages}
-        return {("name", self.name)} | keys | made
 
 
 def stem(name: str, selection: Mapping[str, str]) -> str:
@@ -235,36 +221,10 @@ def modules(*names: str) -> list[str]:
     ]
 
 
-def _own_kinds() -> tuple[Kind, ...]:
-    return tuple(imported(f"studies.kinds.{name}.kind:KIND") for name in KINDS)
-
-
-def _adopted(name: str, kind: Any) -> Kind:
-    """Study kind of another package, which shares no name with others."""
-    if not isinstance(kind, Kind) or kind.name != name:
-        raise ValueError(f"{kind!r} is not a springtune.studies.config.kind.Kind of that name")
-    known = {about: other.name for other in (*_own_kinds(), *OTHER_KINDS._entries.values()) for about in other.names}
-    known |= {("key", key): "springtune" for key in RESERVED}
-    for about in sorted(kind.names & known.keys()):
-        raise ValueError(f"{about[0]} '{about[1]}' is of '{known[about]}' already; it needs another")
-    return kind
-
-
-OTHER_KINDS = Extended[Kind]("study kind", "kinds", {}, _adopted)
-"""Study kinds of other packages, by name."""
-
-
 @cache
 def kinds() -> tuple[Kind, ...]:
     """All study kinds."""
-    return (*_own_kinds(), *OTHER_KINDS.values())
-
-
-def further_modules(study: Study) -> list[str]:
-    """Modules that declare and collect the kinds of other packages that a study uses."""
-    used = [kind for kind in OTHER_KINDS.values() if study.parts[kind.name]]
-    found = [one.module for one in plugins()["kinds"] if one.name in {kind.name for kind in used}]
-    return found + [kind.place("collect") for kind in used if not kind.variables]
+    return tuple(imported(f"studies.kinds.{name}.kind:KIND") for name in KINDS)
 
 
 @cache
@@ -272,5 +232,4 @@ def outputs() -> dict[str, Output]:
     """Outputs of all study kinds, by name."""
     apart = {name.split(".")[2]: imported(f"{name}:OUTPUTS") for name in modules("outputs")}
     found = [apart[name] if name in apart else imported(f"studies.kinds.{name}.kind:KIND").outputs for name in KINDS]
-    found += [kind.outputs for kind in OTHER_KINDS.values()]
     return {output.name: output for outputs in found for output in outputs}

@@ -50,7 +50,7 @@ from .fields import (
     Text,
     one_of,
 )
-from .kind import RESERVED, Kind, Output, kinds
+from .kind import Kind, Output, kinds
 from .messages import refuse, show
 
 MOST_PARTS = 1000
@@ -480,8 +480,6 @@ class StudyConfig(Section):
             found |= dict.fromkeys(("beams", "grids"), f", or {', '.join(ways)}") | {"materials": ""}
         return {name: found[name] for name in cls.model_fields if name in found}
 
-
-RESERVED.update(StudyConfig.model_fields, GridConfig.model_fields)
 
 GRIDS_NEED = ("beams", "materials")
 

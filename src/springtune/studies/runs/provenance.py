@@ -14,7 +14,7 @@ from springtune.problem.loads import LOADS
 from springtune.registry import Extended
 from springtune.springs import DEFINITIONS
 
-from ..config.kind import OTHER_KINDS, kinds
+from ..config.kind import kinds
 from ..config.model import Study
 from .keys import installed
 from .source import COMMIT_FILE, PACKAGE, checksum, clone
@@ -71,11 +71,9 @@ def attributes(study: Study, config: str | Path, package: Path = PACKAGE) -> dic
 
 
 def _plugins(study: Study) -> set[str]:
-    """Distributions of the definitions, mesh types, loads and study kinds of other packages that a study uses."""
-    used = {label for labels in study.axes.values() for label in labels} | {
-        name for name, part in study.parts.items() if part
-    }
-    tables: tuple[Extended[Any], ...] = (DEFINITIONS, MESH_TYPES, LOADS, OTHER_KINDS)
+    """Distributions of the definitions, mesh types and loads of other packages that a study uses."""
+    used = {label for labels in study.axes.values() for label in labels}
+    tables: tuple[Extended[Any], ...] = (DEFINITIONS, MESH_TYPES, LOADS)
     return {package for table in tables for name, package in table.packages.items() if name in used}
 
 

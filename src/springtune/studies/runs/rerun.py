@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..config.kind import FORMATS, further_modules, kinds, modules, outputs
+from ..config.kind import FORMATS, kinds, modules, outputs
 from .job import RECORDS, TASKS
 from .keys import CODE_FILE, OURS, stage_key
 from .plan import Plan, digest_in, plan, table_files
@@ -86,7 +86,7 @@ def jobs(study: "Study", plan: Plan) -> dict[str, Job]:
 
 def _collect_digest(study: "Study", plan: Plan) -> str:
     """Digest of a study's dataset: of the study's files, the jobs of its stages and the code."""
-    code = [stage_key(name) for name in ("studies.kinds.collect", *modules("kind", "collect"), *further_modules(study))]
+    code = [stage_key(name) for name in ("studies.kinds.collect", *modules("kind", "collect"))]
     code += [stage_key(made.collect) for made in outputs().values() if made.collect and made.name in study.outputs]
     # Whatever bundles they are in.
     results = sorted(set(results_of([job.content for job in plan.jobs.values()])))
