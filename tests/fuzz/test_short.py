@@ -1,4 +1,4 @@
-"""The short form of `make test-fuzz`: some inputs of each target."""
+"""The short form of `make slow`: some inputs of each target."""
 
 import os
 import subprocess

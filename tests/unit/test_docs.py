@@ -112,7 +112,7 @@ def catalogue():
 
 
 def test_catalogue_has_every_definition(catalogue):
-    """Sources as docstrings have them, moduli of all, errors of those that support a mesh: else `make catalogue`."""
+    """Sources as docstrings have them, moduli of all, errors of those that support a mesh: else `make docs`."""
     tool, tables = catalogue
     (_, sources), (_, moduli), (_, others), (_, free), (_, squares) = tables.items()
     assert list(tables) == list(tool["PARTS"]) and sources == tool["sources"]()

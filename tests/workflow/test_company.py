@@ -6,11 +6,11 @@ import random
 import h5py
 import pytest
 import xarray as xr
+from springtune.studies.runs.task_costs import TaskCosts
 
 from springtune.studies.kinds import load_study
 from springtune.studies.runs import checked_json, driver, store
 from springtune.studies.runs.plan import plan
-from springtune.studies.runs.task_costs import TaskCosts
 
 from tables import STUDIES
 

@@ -37,7 +37,7 @@ def loaded_study():
 # Keys of results have the versions of the packages that Snakemake sees, so jobs must run on these.
 # Snakemake takes braces in a path of it for wildcards.
 ENVIRONMENT = None if DEPLOYED or "{" in str(SOURCE) else "../envs/springtune.yaml"
-"""What rules need, for readers and for `--lint`; see docs/how-to/use-conda.md."""
+"""What rules need, for readers and for `--lint`; see docs/how-to/use-conda-or-a-container.md."""
 
 if DEPLOYED and not IS_CHILD:
     print("note: jobs run in the environment of Snakemake; --software-deployment-method is not used", file=sys.stderr)

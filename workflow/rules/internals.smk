@@ -1,6 +1,6 @@
 """Undocumented parts of Snakemake, all in this file. A run works without each of them.
 
-`make test-versions` runs this file with the oldest and the newest Snakemake.
+`make slow` runs this file with the oldest and the newest Snakemake.
 """
 
 import sys
