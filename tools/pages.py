@@ -33,6 +33,10 @@ LONG, KEPT = 30, 15
 """Rows above which a table is shortened, and rows that it keeps on its page."""
 
 
+LEFT_OUT = r"^### Mesh type `(?:alternating|right|isosceles-0\.[35])`\n.*?(?=^###|\Z)"
+"""Tables that stay in the file of the study: mesh types that no springs alone suit."""
+
+
 def put(page: Path, tables: str) -> None:
     """Put tables between the marks of a page."""
     before, begin, rest = page.read_text().partition(BEGIN)
@@ -51,7 +55,8 @@ def shorten(tables: str, file: str) -> str:
             return table[0]
         return "".join([head, rule, *rows[:KEPT], f"\n{len(rows) - KEPT} more rows are in `results/{file}`.\n"])
 
-    numbers = re.sub(r"^### [^\n]*: what has no numbers\n.*?(?=^###|\Z)", "", tables, flags=re.MULTILINE | re.DOTALL)
+    apart = rf"^### [^\n]*: what has no numbers\n.*?(?=^###|\Z)|{LEFT_OUT}"
+    numbers = re.sub(apart, "", tables, flags=re.MULTILINE | re.DOTALL)
     return re.sub(r"(?:^\|.*\n)+", first, numbers, flags=re.MULTILINE)
 
 

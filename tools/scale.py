@@ -107,7 +107,8 @@ def plan_and_note(config: str) -> None:
 
 def do_stages(config: str, invent: str) -> None:
     """Do the jobs of a study's stages; results of scenes are invented where that is said."""
-    from springtune.studies.runs import checked_json, records, run_tasks
+    from springtune.safe_io import atomic
+    from springtune.studies.runs import job
 
     folder = Path("results") / Path(config).stem
     spent = 0.0
@@ -115,12 +116,12 @@ def do_stages(config: str, invent: str) -> None:
         tasks, done = folder / f"tasks/{name}.json", folder / f"done/{name}.json"
         begin = sum(os.times()[:4])  # of this process and of those that do a job's tasks
         if invent == "invent" and stage == "solve":
-            note = checked_json.read(tasks)
+            note = json.loads(tasks.read_bytes())
             for family in note["content"]["files"]:
                 write_invented(Path(note["content"]["folder"]) / f"{family['name']}.h5", family["tasks"])
-            records.write(done, digest, note["products"])
+            atomic.write_json(done, {"digest": digest, "computed": len(note["content"]["files"])})
         else:
-            run_tasks.main(str(tasks), str(done), digest)
+            job.main(str(tasks), str(done), digest)
         spent += sum(os.times()[:4]) - begin if stage == "solve" else 0.0
     Path("solve.json").write_text(json.dumps(spent))
 
