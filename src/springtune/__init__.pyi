@@ -86,12 +86,7 @@ from .studies.kinds.scenes.figures import plot_sensitivity as plot_sensitivity
 from .studies.kinds.shapes.figures import plot_shape as plot_shape
 from .studies.kinds.shapes.figures import plot_shape_errors as plot_shape_errors
 from .studies.kinds.shapes.figures import plot_shapes as plot_shapes
-from .studies.kinds.stability.figures import plot_stability_buckling as plot_stability_buckling
-from .studies.kinds.stability.figures import plot_stability_energy as plot_stability_energy
-from .studies.kinds.stability.figures import plot_stability_limits as plot_stability_limits
 from .studies.kinds.stability.figures import plot_stability_maps as plot_stability_maps
-from .studies.kinds.stability.figures import plot_stability_meshes as plot_stability_meshes
-from .studies.kinds.stability.figures import plot_stability_rest as plot_stability_rest
 from .studies.kinds.stability.figures import plot_stability_strains as plot_stability_strains
 from .studies.output.reading import field as field
 from .studies.output.reading import open as open

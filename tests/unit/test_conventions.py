@@ -170,7 +170,7 @@ def test_stages_say_what_is_lost_to_limits(stage):
 
 
 OWN = {"MAX_EVALUATIONS", "MAX_HALVINGS", "MAX_ITERATIONS", "SMALLEST_STEP", "TOLERANCE"}
-OWN |= {"KIND", "OUTPUTS", "PAGE", "PLOTS", "STAGE", "STAGES", "VIEWS"}
+OWN |= {"KIND", "OUTPUTS", "PAGE", "STAGE", "STAGES", "VIEWS"}
 """Constants that say the same of each solver or each study kind, and that each has its own value of."""
 
 

@@ -21,7 +21,6 @@ from springtune.studies.config.kind import FORMATS, Output, outputs
 from springtune.studies.kinds.moduli.figures import definitions
 from springtune.studies.kinds.scenes import errors, figures
 from springtune.studies.kinds.scenes.figures import NETWORK_LINE, draw_curve
-from springtune.studies.kinds.stability.figures import PLOTS
 from springtune.studies.output import labels, present, style
 from springtune.studies.output.style import png_and_pdf
 from springtune.studies.runs.keys import modules
@@ -64,13 +63,8 @@ EVERY_PLOT = {
     st.plot_shape_errors: ({"shape": "cook", "load": "traction"}, (2, 2)),
     st.plot_shape: ({"shape": "hole"}, 2),
     st.plot_benchmark: ({"scene": "bending"}, None),
-    st.plot_stability_limits: ({}, 2),
     st.plot_stability_maps: ({}, 2),
-    st.plot_stability_energy: ({}, None),
-    st.plot_stability_rest: ({}, 2),
-    st.plot_stability_meshes: ({}, 2),
     st.plot_stability_strains: ({}, 2),
-    st.plot_stability_buckling: ({}, 2),
 }
 """Every function that plots: a selection, and how many axes it returns; None where it returns one by itself."""
 
@@ -282,14 +276,6 @@ def test_an_engine_carries_its_least_errors_over_the_time_of_a_frame(tree):
     assert line.get_xdata() == pytest.approx([1e3 * here.frame_seconds[best].item()])
 
 
-def test_the_stable_step_carries_the_predicted_limit(tree):
-    _, right = st.plot_stability_limits(tree)
-    limit = tree["stability"].dt_limit_predicted.sel(
-        definition="area", integrator="central-difference", damper="mass", damping_ratio=0.0
-    )
-    assert drawn(right, "area").get_ydata() == pytest.approx(1e9 * limit.values)
-
-
 # -- what is refused ---------------------------------------------------------------------------------------------------
 
 
@@ -354,7 +340,6 @@ def test_a_heat_map_of_a_mesh_type_of_which_nothing_was_solved_says_so_in_each_c
 
 def test_outputs_are_those_that_a_study_may_name():
     assert all(isinstance(output, Output) and output.meaning for output in outputs().values())
-    assert {f"plot_{stem}" for stem in PLOTS} == {plot.__name__ for plot in PLOTS.values()}
 
 
 def test_the_stage_draws_what_it_is_told(tree, tmp_path):

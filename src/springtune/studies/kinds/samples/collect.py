@@ -17,7 +17,7 @@ from ...runs import store
 from ..scenes import any_reference
 from .designs import PARAMETERS, SOBOL_INDICES, blocks, roles
 from .interpolate import problem_key
-from .kind import DROP, MOST_SOLVED, UNIFORM, block_key, reference_key, result_key, solved_definitions
+from .kind import MOST_SOLVED, UNIFORM, block_key, reference_key, result_key, solved_definitions
 from .outputs import QUANTITIES
 from .solve import DRAWN
 
@@ -204,15 +204,12 @@ def _with_coordinates(data, sample, drawn, dimensions):
         coordinates["role"] = ("sample", np.tile(flags, sample.size), about)
     data = data.assign_coords(coordinates)
     data.attrs = {name: getattr(sample, name) for name in ("design", "size", "seed", "mesh_type", "kinematics")}
-    data.attrs |= {"failures": _policy(sample), "varied": " ".join(sample.varied)}
+    lacking = LEFT_OUT if sample.design == SOBOL_INDICES else "scenes without a value are left out of main effects"
+    data.attrs |= {"failures": lacking, "varied": " ".join(sample.varied)}
     return data
 
 
-def _policy(sample):
-    if sample.design != SOBOL_INDICES:
-        return "scenes without a value are left out of main effects"
-    what = "the whole base sample is left out" if sample.failures == DROP else "there are no indices"
-    return f"where a scene has no value {what}; base_samples_without counts them"
+LEFT_OUT = "where a scene has no value the whole base sample is left out; base_samples_without counts them"
 
 
 def _values(sample, data):
@@ -246,21 +243,17 @@ def _indices(sample, data, axes):
     found.data.attrs = {
         "estimators": "first order: Saltelli et al. 2010; total order: Jansen 1999",
         "bands": f"between percentiles of {RESAMPLES} bootstrap samples, {100 * LEVEL:g} %",
-        "failures": _policy(sample),
+        "failures": LEFT_OUT,
     }
     for labels, values in _values(sample, data):
         rows = values.reshape(sample.size, -1).T
         there = np.isfinite(rows).all(axis=0)
-        lacking = int((~there).sum())
-        found.put_arrays({"base_samples_without": lacking}, labels)
-        if lacking and sample.failures != DROP:
-            continue
         kept = rows[:, there]
         # A variation below the reference's own error is no variation of the networks' errors.
         known = data.reference_error_estimate.sel(load=labels["load"]).values
         least = float(np.nanmax(known, initial=0.0)) if labels["quantity"] == "deformation_error" else 0.0
         indices = sobol_indices(kept[0], kept[1], kept[2:], least)
-        found.put_arrays({"base_samples": indices.rows}, labels)
+        found.put_arrays({"base_samples": there.sum(), "base_samples_without": (~there).sum()}, labels)
         for order in ORDERS:
             low, high = getattr(indices, f"{order}_band")
             values = {"order": getattr(indices, order), "order_low": low, "order_high": high}
@@ -288,7 +281,6 @@ class Indices:
     total: np.ndarray
     first_band: np.ndarray
     total_band: np.ndarray
-    rows: int
 
 
 def sobol_indices(at_a: np.ndarray, at_b: np.ndarray, at_ab: np.ndarray, least: float = 0.0) -> Indices:
@@ -316,7 +308,7 @@ def sobol_indices(at_a: np.ndarray, at_b: np.ndarray, at_ab: np.ndarray, least: 
     largest = np.abs(both).max(initial=0.0)
     if rows < 2 or not largest > 0 or not np.std(both / largest) > max(NEGLIGIBLE, least / largest):
         none = np.full(count, np.nan)
-        return Indices(none, none, np.stack([none, none]), np.stack([none, none]), rows)
+        return Indices(none, none, np.stack([none, none]), np.stack([none, none]))
     # Standardized: else sums would lose digits, and squares might overflow.
     mean, size = (both / largest).mean(), (both / largest).std()
     at_a, at_b, at_ab = ((values / largest - mean) / size for values in (at_a, at_b, at_ab))
@@ -332,7 +324,7 @@ def sobol_indices(at_a: np.ndarray, at_b: np.ndarray, at_ab: np.ndarray, least: 
     means = np.concatenate(parts)
     found = means[:, : 2 * count] / (means[:, -1] - means[:, -2] ** 2)[:, None]
     ends = np.quantile(found[1:], [(1 - LEVEL) / 2, (1 + LEVEL) / 2], axis=0)
-    return Indices(found[0, :count], found[0, count:], ends[:, :count], ends[:, count:], rows)
+    return Indices(found[0, :count], found[0, count:], ends[:, :count], ends[:, count:])
 
 
 def main_effect(parameter: np.ndarray, values: np.ndarray, bins: int) -> np.ndarray:

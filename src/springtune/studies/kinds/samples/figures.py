@@ -136,19 +136,17 @@ def plot_sobol(data, ax=None, *, load=None):
         panel.set_xlim(limits)
         panel.set_yticks(range(len(names)), words if number % columns == 0 else [""] * len(names))
         if not np.isfinite(one.first_order.values).any():
-            labels.say(panel, _why(found, one), bare=False)
+            labels.say(panel, _why(one), bare=False)
     for panel in flat[-columns:]:
         panel.set_xlabel("share of the variance")
     _note_below(figure, note, 0.06)
     return flat
 
 
-def _why(found, one):
+def _why(one):
     """Why there are no indices of a quantity."""
     if int(one.base_samples):
         return "does not vary"
-    if "no indices" in found.attrs["failures"]:
-        return "withheld: there are scenes without a value"
     return "no base sample of which all scenes have a value"
 
 

@@ -160,11 +160,6 @@ UNIFORM = "uniform"
 
 SOLVE, INTERPOLATE = "studies.kinds.samples.solve", "studies.kinds.samples.interpolate"
 
-DROP = "drop"
-
-FAILURES = (DROP, "withhold")
-"""What becomes of indices where scenes have no value."""
-
 Drawn = dict[str, Any]
 
 
@@ -219,7 +214,6 @@ Size = Annotated[int, Scalar(_read_size, {"type": "integer", "minimum": SMALLEST
 Seed = Annotated[int, number("a whole number from 0, such as 1", 0, 2**31, whole=True)]
 Design = Annotated[str, one_of("design", DESIGNS)]
 MadeType = Annotated[str, one_of("mesh type", MESH_TYPES)]
-FailurePolicy = Annotated[str, one_of("policy", FAILURES)]
 
 
 class SamplesConfig(Section):
@@ -231,7 +225,7 @@ class SamplesConfig(Section):
     design: Design = Field(
         SOBOL_INDICES,
         description="`sobol-indices`: Saltelli's design for first- and total-order Sobol indices, with `size` x "
-        "(varied parameters + 2) points; `sobol`: scrambled Sobol points; `latin-hypercube`.",
+        "(varied parameters + 2) points; `sobol`: scrambled Sobol points.",
     )
     size: Size = Field(description="Number of points: a power of two. For `sobol-indices`, of base samples.")
     seed: Seed = default("1", description="Seed of the random numbers.")
@@ -245,11 +239,6 @@ class SamplesConfig(Section):
     )
     best_stiffness: Flag = default(
         "true", description="Whether to find the uniform stiffness without an error, too; with linear kinematics only."
-    )
-    failures: FailurePolicy = Field(
-        DROP,
-        description="If scenes have no value, `drop` leaves their whole base samples out of indices, and `withhold` "
-        "gives no indices. Both count them.",
     )
     parameters: ParametersConfig = Field(description="Parameters of the scenes.")
 
@@ -266,7 +255,6 @@ class Sample:
     definitions: tuple[str, ...]
     kinematics: str
     best_stiffness: bool
-    failures: str
     parameters: dict[str, dict[str, Any]]
 
     @property
@@ -346,7 +334,7 @@ def _check_sizes(sample, problems):
 
 def _sample(section):
     given = {name: getattr(section.parameters, name) for name in PARAMETERS}
-    same = ("design", "size", "seed", "mesh_type", "kinematics", "failures")
+    same = ("design", "size", "seed", "mesh_type", "kinematics")
     return Sample(
         **{name: getattr(section, name) for name in same},
         loads=tuple(name for name in LOADS if name in section.load),
@@ -366,7 +354,7 @@ def _expand(config, declared):
 
 
 def _summary(sample):
-    design = {SOBOL_INDICES: "for Sobol indices", "sobol": "Sobol points"}.get(sample.design, "Latin hypercube")
+    design = "for Sobol indices" if sample.design == SOBOL_INDICES else "Sobol points"
     each = f"{sample.size} x {sample.rows // sample.size} points" if sample.design == SOBOL_INDICES else "points"
     times = [f"{len(names)} {what}s" for names, what in ((sample.loads, "load"), (sample.definitions, "definition"))
              if len(names) > 1]  # fmt: skip

@@ -5,7 +5,6 @@ result: rows that differ in these alone are solved once. Meshes with as many cel
 share numbering, sparsity and symbolic factorization.
 """
 
-import time
 from functools import partial
 from pathlib import Path
 
@@ -34,7 +33,7 @@ SCALES = 1e-7
 """Largest relative difference of a scaled result from a solved one: rounding."""
 
 
-def run(content, attempts, kept_back=store.KEPT_BACK):
+def run(content, attempts):
     """Solve the scenes of a bundle that are not stored yet."""
     waiting = []
     for file in content["files"]:
@@ -44,7 +43,7 @@ def run(content, attempts, kept_back=store.KEPT_BACK):
             waiting.append(_Block(file, path, present))
     count = TOGETHER[content["files"][0]["kinematics"]]
     for begin in range(0, len(waiting), count):
-        _solve_together(waiting[begin : begin + count], attempts, kept_back)
+        _solve_together(waiting[begin : begin + count], attempts)
 
 
 def crashed(content, key, why):
@@ -58,7 +57,7 @@ class _Block:
 
     def __init__(self, file, path, present):
         (task,) = file["tasks"]
-        self.file, self.path, self.part = file, path, path.with_stem(f"{path.stem}_part")
+        self.file, self.path = file, path
         self.missing = {key: scene for key, scene in file["results"].items() if key not in present}
         self.is_new = DRAWN not in present
         lost = {name for name in present if name.startswith(GONE_NETWORK)}
@@ -74,31 +73,13 @@ class _Block:
             }
             for key in self.missing
         }
-        self.done = np.zeros(rows, dtype=bool)
-        self.is_kept = True
-        if set(self.missing) <= store.stored(self.part):  # a process ended before the block was done
-            fields = ("displacement", "status", "particles", "done")
-            self.found = store.read(self.part, self.missing, fields)
-            self.done = np.all([one.pop("done") for one in self.found.values()], axis=0)
-
-    def keep_part(self):
-        """Store the results of a block so far."""
-        if not self.is_kept:
-            store.add(self.part, {key: one | {"done": self.done} for key, one in self.found.items()})
-            self.is_kept = True
-
-    def keep_whole(self):
-        """Store the results of a block."""
-        store.add(self.path, self.found | ({DRAWN: self.drawn} if self.is_new else {}))
-        self.part.unlink(missing_ok=True)
 
     def meshes(self):
-        """Rows of each distinct mesh that are not done, by its length, height and mesh size [m]."""
+        """Rows of each distinct mesh, by its length, height and mesh size [m]."""
         found = {}
         boxes = zip(*(self.drawn[name].tolist() for name in ("length", "height", "mesh_size")))
         for row, box in enumerate(boxes):
-            if not self.done[row]:
-                found.setdefault(box, []).append(row)
+            found.setdefault(box, []).append(row)
         return found
 
     def keep(self, key, rows, scale, result):
@@ -110,24 +91,16 @@ class _Block:
             found["messages"] |= dict.fromkeys(map(str, rows), result["message"])
 
 
-def _solve_together(blocks, attempts, kept_back):
+def _solve_together(blocks, attempts):
     """Solve blocks mesh by mesh; meshes with as many cells follow each other."""
     meshes = [(box, block, rows) for block in blocks for box, rows in block.meshes().items()]
     meshes.sort(key=lambda one: [round(side / one[0][2]) for side in one[0][:2]])
-    like, scaling, since = None, {}, time.perf_counter()
+    like, scaling = None, {}
     for box, block, rows in meshes:
         like = _solve_mesh(block, box, np.array(rows), like, scaling, attempts) or like
-        if attempts.broken:
-            continue
-        block.done[rows], block.is_kept = True, False
-        if time.perf_counter() > since + kept_back:
-            for one in blocks:
-                one.keep_part()
-            since = time.perf_counter()
-    for block in blocks:
-        if not attempts.broken:
-            block.keep_whole()
-            attempts.computed += 1
+    for block in () if attempts.broken else blocks:
+        store.add(block.path, block.found | ({DRAWN: block.drawn} if block.is_new else {}))
+        attempts.computed += 1
 
 
 def _solve_mesh(block, box, rows, like, scaling, attempts):

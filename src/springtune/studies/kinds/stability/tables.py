@@ -10,7 +10,7 @@ from springtune.safe_io.atomic import write_text
 from springtune.safe_io.escapes import markdown
 
 from ...output.dataset import STATUS
-from ...output.selection import cells, labels_of, records
+from ...output.selection import cells, labels_of
 from ...output.text import cell_number, markdown_section, markdown_table
 from .outputs import PAGE
 
@@ -38,7 +38,7 @@ def page(tree: xr.DataTree) -> str:
     }
     done = [name for name in sections if name in data.experiment.values]
     parts = [line for name in done for line in (*sections[name](data), "")]
-    return "\n".join(parts + _scenes(tree.to_dataset()))
+    return "\n".join(parts)
 
 
 def _by_definition(data, variable, heads, texts):
@@ -186,16 +186,3 @@ def _buckling(data):
     notes = ["", *(f"\\* {markdown(one)}" for one in why)] if why else []
     title = "Buckling load of a slender column over Euler's"
     return markdown_section(title) + _by_definition(data, "buckling_load", heads, texts) + notes
-
-
-def _scenes(root):
-    """Static scenes of the study that are not solved, and why; and how many are."""
-    flags, rows = root.status.values, []
-    for one in records(root, root.status > 1, ("status", "message")):
-        labels = {str(name): one[name] for name in root.status.dims} | {"mesh_size": f"{1e3 * one['mesh_size']:g} mm"}
-        words = ", ".join(map(str, labels.values()))
-        rows.append([words, STATUS[int(one["status"])], markdown(one["message"])])
-    if not rows:
-        return []
-    said = f"{int((flags == 1).sum())} of {int((flags != 0).sum())} scenes are solved; the others:"
-    return [*markdown_section("Scenes of the study", said), *markdown_table(["scene", "status", "message"], rows), ""]
