@@ -56,7 +56,7 @@ ROUNDING = 1e-12
 """Imaginary part over the largest eigenvalue that rounding may give."""
 
 LOW = 24
-"""Modes below this number, from the lowest, are those that tell of flutter: `springtune.mechanics.newton.MOST_MODES`."""
+"""Modes below this number, from the lowest, tell of flutter: `springtune.mechanics.newton.MOST_MODES`."""
 
 WAYS = ("moderate", "critical", "large")
 """How far a scene is loaded: within the linear range, next to the loss of stability, or far beyond the linear range."""
