@@ -217,6 +217,18 @@ def validator():
     return jsonschema.Draft202012Validator(schema)
 
 
+def test_a_home_that_cannot_be_written_is_one_note(tmp_path, monkeypatch, capsys):
+    from springtune.cli.run import set_cache
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    for home, said in ((tmp_path, ""), ("/dev/null", "note: /dev/null/.cache cannot be written; .snakemake/cache")):
+        monkeypatch.setenv("HOME", str(home))
+        set_cache()
+        assert capsys.readouterr().err.startswith(said)
+    assert os.environ["XDG_CACHE_HOME"] == str(tmp_path / ".snakemake/cache")
+
+
 class TestSchema:
     def test_printed_and_kept_in_step(self):
         assert run("schema").stdout == schema_text()

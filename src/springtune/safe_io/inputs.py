@@ -208,7 +208,7 @@ def _timed(seconds: float) -> Iterator[None]:
 MOST_OBJECTS = 20_000
 """Most groups and arrays of an HDF5 file."""
 
-DEEPEST = 16
+DEEPEST_GROUP = 16
 """Most groups of an HDF5 file within each other."""
 
 
@@ -248,8 +248,8 @@ def check_alone(path: str | Path, look: "Callable[[bytes, h5py.h5g.ObjectID], No
                         raise ValueError(f"{_text(name)!r} is linked twice, or in a circle")
                     seen.add(address)
                     if isinstance(one, h5py.h5g.GroupID):
-                        if depth == DEEPEST:
-                            raise ValueError(f"{_text(name)[:40]!r} is more than {DEEPEST} groups deep")
+                        if depth == DEEPEST_GROUP:
+                            raise ValueError(f"{_text(name)[:40]!r} is more than {DEEPEST_GROUP} groups deep")
                         groups.append((name + b"/", depth + 1, one))
                     if isinstance(one, h5py.h5d.DatasetID):
                         stored = one.get_create_plist()

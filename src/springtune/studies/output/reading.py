@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from springtune.safe_io.escapes import clipped
-from springtune.safe_io.inputs import BeyondBound, bounded, check_alone
+from springtune.safe_io.inputs import MOST_OBJECTS, BeyondBound, bounded, check_alone
 
 if TYPE_CHECKING:
     import h5py
@@ -37,6 +37,12 @@ BARE_DIMENSION = b"This is a netCDF dimension but not a netCDF variable"
 MOST_ATTRIBUTES = 100_000
 LARGEST_ATTRIBUTE = 2**20
 """Limits of attributes of a dataset, and of the bytes of each."""
+
+MOST_CHUNKS = 1_000_000
+"""Most chunks of an array."""
+
+PACKING = {"scale_factor", "add_offset"}
+"""Attributes by which numbers are computed from those in a file."""
 
 LINKS = {"DIMENSION_LIST", "REFERENCE_LIST", "_Netcdf4Coordinates", "_Netcdf4Dimid", "CLASS"}
 """Attributes by which netCDF-4 links arrays and dimensions."""
@@ -171,6 +177,8 @@ def check_links(path: Path) -> set[str]:
                 raise ValueError(f"{of} is too large")
             if label not in LINKS:
                 _check_type(of, kind)
+                if label in PACKING and kind.get_class() == h5py.h5t.STRING:
+                    raise ValueError(f"{of} is a text instead of a number")
             elif not _links(one, label, kind, found.shape):
                 wrong.append(f"{label} of {shown}")
         if not isinstance(one, h5py.h5d.DatasetID):
@@ -190,6 +198,9 @@ def check_links(path: Path) -> set[str]:
         if not h5py.Dataset(one).attrs.get("NAME", b"").startswith(BARE_DIMENSION):
             chunk = stored.get_chunk() if stored.get_layout() == h5py.h5d.CHUNKED else ()
             held += max(size, math.prod(chunk) * int(kind.get_size()))
+            pieces = math.prod(-(-length // part) for length, part in zip(one.shape, chunk))
+            if chunk and pieces > MOST_CHUNKS and held <= most_of(path):
+                raise ValueError(f"'{shown}' is in {pieces} pieces, which take too long to read; write larger ones")
 
     try:
         with guarded(path), bounded(MOST_HELD):
@@ -234,10 +245,12 @@ def _links(one: "h5py.h5g.ObjectID", label: str, kind: "h5py.h5t.TypeID", shape:
         if not kind.equal(t.vlen_create(t.STD_REF_OBJ)) or shape != (rank,):
             return False
         array = h5py.Dataset(one)
-        scales = [array.file[found] for (found,) in array.attrs[label]]
-        return all(isinstance(scale, h5py.Dataset) and "CLASS" in scale.attrs for scale in scales)
+        scales = [array.file[found] for every in array.attrs[label] for found in every]
+        return len(scales) == rank and all(isinstance(one, h5py.Dataset) and "CLASS" in one.attrs for one in scales)
     expected = t.STRING if label == "CLASS" else t.INTEGER
-    return bool(kind.get_class() == expected and shape == ((rank,) if label == "_Netcdf4Coordinates" else ()))
+    if kind.get_class() != expected or shape != ((rank,) if label == "_Netcdf4Coordinates" else ()):
+        return False
+    return label == "CLASS" or bool((abs(h5py.Dataset(one).attrs[label]) <= MOST_OBJECTS).all())
 
 
 def attributes(path: Path) -> dict[str, str]:
