@@ -152,7 +152,7 @@ class Extended(Mapping[str, Entry]):
             try:
                 self._enter(one.name, one.load())
                 self.packages[one.name] = _package(one)
-            except Exception as error:  # whatever a package does, others work
+            except (Exception, SystemExit) as error:  # whatever a package does, others work
                 self._entries = before
                 self._tried[one] = (
                     f"{self._what} '{one.name}' of the package '{_package(one)}' is left out: "

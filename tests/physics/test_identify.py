@@ -213,7 +213,7 @@ NOT_AS_STATED = {
 }
 
 
-@pytest.mark.parametrize("kind", NOT_AS_STATED)
+@pytest.mark.parametrize("kind", [*list(NOT_AS_STATED)[:-1], pytest.param("angle", marks=pytest.mark.slow)])
 def test_what_does_not_fit_is_noted(tmp_path, kind):
     material, load, spoil, note = NOT_AS_STATED[kind]
     file = beam_field(tmp_path / "f.csv", material, load, spoil)
@@ -234,7 +234,14 @@ def test_a_field_of_another_load_is_refused(tmp_path, load, sign, why):
         st.identify(st.MeasuredTest(BEAM, "traction", file, force=500))
 
 
-@pytest.mark.parametrize(("along", "across", "ratio"), [(14, 5, 0.3), (5, 14, 0.3 * 5 / 14), (1, 30, 0.01)])
+@pytest.mark.parametrize(
+    ("along", "across", "ratio"),
+    [
+        (14, 5, 0.3),
+        pytest.param(5, 14, 0.3 * 5 / 14, marks=pytest.mark.slow),
+        pytest.param(1, 30, 0.01, marks=pytest.mark.slow),
+    ],
+)
 def test_three_curves_tell_three_constants_and_a_usual_ratio_is_assumed(tmp_path, along, across, ratio):
     ply, tests = st.AnisotropicMaterial.orthotropic(along * 1e9, across * 1e9, ratio, "2 GPa", name="ply"), []
     for n, angle in enumerate((0.0, np.pi / 2, np.pi / 4)):

@@ -634,6 +634,44 @@ class TestDatasets:
         with pytest.raises(MeshError, match="own.xdmf: parts of it are in other files"):
             read_beam_mesh(path, 0.1, 0.02)
 
+    @pytest.mark.parametrize(
+        "spoil, says",
+        {
+            "half": ("file['odd'] = np.zeros(3, 'f2')", "'odd' has the type float16"),
+            "long": ("file['odd'] = np.zeros(3, 'g')", "'odd' has the type float128"),
+            "compound": ("file['odd'] = np.zeros(3, [('a', 'f8')])", "'odd' has the type"),
+            "vlen": ("file.create_dataset('odd', 3, h5py.vlen_dtype('f8'))", "'odd' has the type"),
+            "reference": ("file.create_dataset('odd', 3, h5py.ref_dtype)", "'odd' has the type"),
+            "opaque": ("file['odd'] = np.zeros(3, 'V7')", "'odd' has the type"),
+            "enumeration": ("file['odd'] = np.zeros(3, bool)", "'odd' has the type"),
+            "named type": ("file['odd'] = np.dtype('f8')", "'odd' is a type"),
+            "attribute": ("file.attrs['odd'] = np.float16(1)", "attribute 'odd' of '/' has the type float16"),
+            "no shape": ("file['odd'] = h5py.Empty('f8')", "'odd' has no shape"),
+            "filter": ("file.create_dataset('odd', data=np.zeros(9), compression='lzf')", "filter 32000"),
+            "itself": ("odd = file.create_group('odd'); odd['odd'] = odd", "'odd/odd' is linked twice"),
+            "the root": ("file['odd'] = file['/']", "is linked twice"),
+            "two names": ("file['odd'] = file['status']", "is linked twice"),
+            "soft": ("file['odd'] = h5py.SoftLink('/')", "'odd' is a soft link"),
+            "deep": ("file.create_group('/a' * 500)", "groups deep"),
+            "many": ("[file.create_group(f'a{n}') for n in range(20_001)]", "over 20,000 groups"),
+            "dimension": ("file['beam'].attrs['_Netcdf4Dimid'] = np.int32(2**31 - 1)", "_Netcdf4Dimid of beam is none"),
+            "pieces": (
+                "file.create_dataset('odd', (2000, 2000), 'i1', chunks=(1, 1), compression='gzip')",
+                "'odd' is in 4000000 pieces",
+            ),
+            "factor": ("file['status'].attrs['scale_factor'] = 'much'", "is a text instead of a number"),
+            "list": ("file['status'].attrs['REFERENCE_LIST'] = 1", "REFERENCE_LIST of status is none"),
+        }.values(),
+    )
+    def test_what_netcdf_crashes_or_hangs_on_is_refused_before(self, path, spoil, says):
+        """A process of its own, so that a crash is one."""
+        h5py = pytest.importorskip("h5py")
+        with h5py.File(path, "r+") as file:
+            exec(spoil, {"file": file, "h5py": h5py, "np": np})
+        code = "import sys, springtune as st\ntry: st.open(sys.argv[1])\nexcept ValueError as error: print(error)"
+        told = subprocess.run([sys.executable, "-c", code, path], capture_output=True, text=True, timeout=60)
+        assert told.returncode == 0 and says in told.stdout, told
+
     def test_a_gigabyte_is_the_most_that_a_small_dataset_says_it_holds(self, path):
         """A chunk is read as one, so that a single number of it took a gigabyte and more."""
         netCDF4 = pytest.importorskip("netCDF4")

@@ -2,6 +2,7 @@
 
 import json
 import re
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -290,6 +291,25 @@ class TestChanges:
         found = compare(made(), other)
         assert found.alone == (["/sensitivity"], ["/block"]) and found.groups[0].variables == (["stiffness"], [])
         assert not compare(made(), other, groups=["/"], ignored=["stiff*"]).different
+
+
+def test_labels_of_one_side_alone_take_no_union_of_all():
+    """Of seven dimensions without a common label: six labels each, and twelve in all."""
+
+    def made(name):
+        labels = {f"d{n}": [f"{name}{one}" for one in range(6)] for n in range(7)}
+        status = xr.DataArray(np.ones((6,) * 7, np.int8), labels, list(labels))
+        status.attrs = {"flag_values": np.array([0, 1], np.int8), "flag_meanings": "not_requested solved"}
+        return xr.DataTree(xr.Dataset({"status": status, "displacement": status.astype(float)}))
+
+    one, other = made("a"), made("b")
+    tracemalloc.start()
+    try:
+        [group] = compare(one, other, most=3).groups
+        assert tracemalloc.get_traced_memory()[1] < 40e6
+    finally:
+        tracemalloc.stop()
+    assert [alone.count for alone in group.cells] == [6**7, 6**7] and group.both == 0
 
 
 class TestCommand:

@@ -110,12 +110,13 @@ def test_changes_of_a_package_compute_again_what_uses_it(run, site, tmp_path, fi
 BAD = {
     "definitions": {"lattice": "bad.springs:lattice", "lost": "bad.missing:what", "other": "bad.springs:undeclared"},
     "loads": {"traction": "springtune.problem.loads:AXIAL", "kind": "springtune.problem.loads:AXIAL"},
-    "mesh_types": {"broken": "bad.broken:left"},
+    "mesh_types": {"broken": "bad.broken:left", "ending": "bad.ending:left"},
 }
 MODULES = {
     "__init__": "",
     "springs": "from springtune.springs import definition\ndef undeclared(*_):\n    pass\ndef lattice(*_):\n    pass\n",
     "broken": "1 / 0\n",
+    "ending": "import sys\nsys.exit('away')\n",
 }
 
 
@@ -145,6 +146,7 @@ def test_what_is_broken_is_left_out_by_name_and_nothing_else(bad):
         "load 'traction' of the package 'bad' is left out: 'springtune' has one of that name",
         "load 'kind' of the package 'bad' is left out: LoadKind(",
         "mesh type 'broken' of the package 'bad' is left out: division by zero",
+        "mesh type 'ending' of the package 'bad' is left out: away",
     ):
         assert why in told, told
 

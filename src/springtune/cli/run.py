@@ -88,6 +88,7 @@ def run(most: int | None, results: Path | None, strict: bool, arguments: tuple[s
     except OSError as error:
         why = f"{error.strerror}; name a folder that can be written"
         raise click.ClickException(f"--results {folder}: {why}") from None
+    set_cache()
     if _computes(options) or _plans(options):
         study = study if path == shown else load_study(path)  # its files are seen from here
         others = [name for name in PAPER_STUDIES if name != study.name] if "paper" in options else []
@@ -112,6 +113,19 @@ def run(most: int | None, results: Path | None, strict: bool, arguments: tuple[s
     if not strict or not _computes(options):
         os.execv(command[0], command)
     raise SystemExit(_called(command) or _strictly(strict, study))
+
+
+def set_cache() -> None:
+    """Give Snakemake a cache folder here, where that of the user cannot be written."""
+    usual = Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser())
+    try:
+        usual.mkdir(parents=True, exist_ok=True)
+        written = os.access(usual, os.W_OK)
+    except OSError:
+        written = False
+    if not written:
+        os.environ["XDG_CACHE_HOME"] = str(Path(".snakemake/cache").absolute())
+        click.echo(f"note: {usual} cannot be written; .snakemake/cache stands in for it", err=True)
 
 
 LOOKING = {

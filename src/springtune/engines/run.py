@@ -106,8 +106,10 @@ class EngineResult(Tabled, Ended):
     >>> parts = found.definition_error, found.law_error, found.solver_error
     >>> f"{found.error:.2f} = {' + '.join(f'{one:.2f}' for one in parts)}", f"{found.residual:.2f}"
     ('0.78 = 0.00 + 0.00 + 0.78', '0.65')
-    >>> found.network.status, f"{1e3 * found.reference:.3f} mm"
-    (<Status.SOLVED: 1>, '0.998 mm')
+    >>> found.network.status, f"{1e3 * found.reference:.3f} mm", found.by_law == found.exact
+    (<Status.SOLVED: 1>, '0.998 mm', True)
+    >>> f"{found.drift:.2f}", found.drifts[:12]
+    ('0.47', 'moves across')
     """
 
     scene: Scene

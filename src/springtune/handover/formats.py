@@ -16,7 +16,7 @@ import numpy as np
 from ..mesh.formats import LONGEST_SAID, library
 from ..safe_io.atomic import check_folder, replacing, write_text
 from ..safe_io.escapes import json_line, shown
-from ..safe_io.inputs import DataElsewhere, check_alone
+from ..safe_io.inputs import DataElsewhere, bounded, check_alone
 from .mujoco import mjcf
 from .newton import newton_script
 from .paraview import comment_of, write_vtu
@@ -77,6 +77,10 @@ def write(path: str | Path, net: Net, mujoco: int | None = None) -> list[Path]:
     return form.write(path, replace(net, header=net.header | {"thickness": float(net.thickness)})) or [path]
 
 
+NET_MEMORY, MEMORY_SHARE = 3e8, 60.0
+"""Bytes that reading a net may take, and for each byte of its files."""
+
+
 def read(path: str | Path) -> Net:
     """Read a net."""
     path = Path(path)
@@ -86,7 +90,9 @@ def read(path: str | Path) -> Net:
     told = io.StringIO()
     try:
         # meshio prints its errors, and exits.
-        with redirect_stdout(told), redirect_stderr(told), warnings.catch_warnings():
+        files = [one for one in (path, *companions(path).values()) if one.is_file()]
+        most = NET_MEMORY + MEMORY_SHARE * sum(one.stat().st_size for one in files)
+        with redirect_stdout(told), redirect_stderr(told), warnings.catch_warnings(), bounded(most):
             warnings.simplefilter("ignore")
             return _checked(*form.read(path))
     except (Exception, SystemExit) as error:  # libraries raise many kinds of errors for a damaged file

@@ -205,40 +205,67 @@ def _timed(seconds: float) -> Iterator[None]:
         signal.signal(signal.SIGVTALRM, before)
 
 
-def check_alone(path: str | Path, look: "Callable[[bytes, h5py.h5d.DatasetID], None] | None" = None) -> None:
-    """Refuse an HDF5 file whose data are elsewhere: in another file of the machine, whatever that is.
+MOST_OBJECTS = 20_000
+"""Most groups and arrays of an HDF5 file."""
 
-    `look` is called with each array and its name.
+DEEPEST_GROUP = 16
+"""Most groups of an HDF5 file within each other."""
+
+
+def check_alone(path: str | Path, look: "Callable[[bytes, h5py.h5g.ObjectID], None] | None" = None) -> None:
+    """Refuse an HDF5 file whose data are in other files, or whose groups are no tree of limited size.
+
+    `look` is called with the name of each group, array and type, and with itself.
     """
     import h5py
 
+    found: list[tuple[bytes, int]] = []
     names: dict[str, str] = {}
-    links: list[bytes] = []
 
-    def visit(name: bytes, info: "h5py.h5l.LinkInfo") -> None:
-        if info.type == h5py.h5l.TYPE_HARD:
-            links.append(name)
-        elif info.type != h5py.h5l.TYPE_SOFT:
-            names[_text(name)] = "an external link"
+    def note(name: bytes, info: "h5py.h5l.LinkInfo") -> bool:
+        found.append((name, info.type))
+        return len(found) > MOST_OBJECTS
 
     try:
         with h5py.File(path) as file:
-            file.id.links.visit(visit, info=True)
-            for link in links:  # afterwards: what is raised within a visit is not always passed on
-                one = h5py.h5o.open(file.id, link)
-                if isinstance(one, h5py.h5d.DatasetID):
-                    stored = one.get_create_plist()
-                    if stored.get_external_count():
-                        outside = _text(stored.get_external(0)[0])
-                        names[_text(link)] = f"stored outside of the file, in {outside!r}"
-                    if stored.get_layout() == h5py.h5d.VIRTUAL:
-                        names[_text(link)] = "a virtual dataset"
+            root = file["/"].id
+            seen, groups = {h5py.h5o.get_info(root).addr}, [(b"", 0, root)]
+            while groups:
+                above, depth, group = groups.pop()
+                start = len(found)
+                group.links.iterate(note, info=True)  # what is raised within is not always passed on
+                if len(found) > MOST_OBJECTS:
+                    raise ValueError(f"it has over {MOST_OBJECTS:,} groups and arrays")
+                for link, kind in found[start:]:
+                    name = above + link
+                    if kind != h5py.h5l.TYPE_HARD:
+                        soft = kind == h5py.h5l.TYPE_SOFT
+                        names[_text(name)] = "a soft link" if soft else "an external link"
+                        continue
+                    one = h5py.h5o.open(group, link)
+                    address = h5py.h5o.get_info(one).addr
+                    if address in seen:
+                        raise ValueError(f"{_text(name)!r} is linked twice, or in a circle")
+                    seen.add(address)
+                    if isinstance(one, h5py.h5g.GroupID):
+                        if depth == DEEPEST_GROUP:
+                            raise ValueError(f"{_text(name)[:40]!r} is more than {DEEPEST_GROUP} groups deep")
+                        groups.append((name + b"/", depth + 1, one))
+                    if isinstance(one, h5py.h5d.DatasetID):
+                        stored = one.get_create_plist()
+                        if stored.get_external_count():
+                            outside = _text(stored.get_external(0)[0])
+                            names[_text(name)] = f"stored outside of the file, in {outside!r}"
+                        if stored.get_layout() == h5py.h5d.VIRTUAL:
+                            names[_text(name)] = "a virtual dataset"
                     if look:
-                        look(link, one)
+                        look(name, one)
+            if look:
+                look(b"/", root)
     except (LookupError, RuntimeError, SystemError, TypeError, ValueError) as error:
         raise OSError(f"damaged: {error}") from None
-    for name, what in names.items():
-        raise DataElsewhere(f"{path}: {name!r} is {what}; data of other files are not read: write them into this one")
+    for place, what in names.items():
+        raise DataElsewhere(f"{path}: {place!r} is {what}; data of other files are not read: write them into this one")
 
 
 def _text(name: bytes) -> str:

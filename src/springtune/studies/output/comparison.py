@@ -307,16 +307,17 @@ class _Group:
         """Cells requested by one side only, and the number requested by both."""
         masks = [mask for mask in self.asked if mask is not None]
         names = [str(name) for name in masks[0].dims if name in self.cell_dimensions]
-        axes = {name: self.axes[name] for name in names}
-        asked = [
-            mask.any(set(mask.dims) - set(names)).reindex(axes, fill_value=False).transpose(*names) for mask in masks
-        ]
+        asked = [mask.any(set(mask.dims) - set(names)).transpose(*names) for mask in masks]
+
+        # On the labels of one side: the union of all may be the square of either.
+        def there(other: xr.DataArray, one: xr.DataArray) -> xr.DataArray:
+            return other.reindex({name: one.indexes[name] for name in names}, fill_value=False)
 
         def alone(one: xr.DataArray, other: xr.DataArray) -> Alone:
-            places = np.argwhere((one & ~other).values)
+            places = np.argwhere((one & ~there(other, one)).values)
             return Alone(len(places), [_labels(one, names, place) for place in places[: self.how.most]])
 
-        return (alone(*asked), alone(*reversed(asked))), int((asked[0] & asked[1]).sum())
+        return (alone(*asked), alone(*reversed(asked))), int((asked[0] & there(asked[1], asked[0])).sum())
 
     def _arrays(self, name: str) -> tuple[xr.DataArray, xr.DataArray]:
         return self.pair[0][name], self.pair[1][name]

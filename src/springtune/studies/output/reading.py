@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from springtune.safe_io.escapes import clipped
-from springtune.safe_io.inputs import BeyondBound, bounded, check_alone
+from springtune.safe_io.inputs import MOST_OBJECTS, BeyondBound, bounded, check_alone
 
 if TYPE_CHECKING:
     import h5py
@@ -33,6 +33,19 @@ DEFLATED = 30.0
 
 BARE_DIMENSION = b"This is a netCDF dimension but not a netCDF variable"
 """Start of the name of a dimension without labels, which is never read."""
+
+MOST_ATTRIBUTES = 100_000
+LARGEST_ATTRIBUTE = 2**20
+"""Limits of attributes of a dataset, and of the bytes of each."""
+
+MOST_CHUNKS = 1_000_000
+"""Most chunks of an array."""
+
+PACKING = {"scale_factor", "add_offset"}
+"""Attributes by which numbers are computed from those in a file."""
+
+LINKS = {"DIMENSION_LIST", "REFERENCE_LIST", "_Netcdf4Coordinates", "_Netcdf4Dimid", "CLASS"}
+"""Attributes by which netCDF-4 links arrays and dimensions."""
 
 OPENED_WITHIN = 4
 """Processor seconds within which a file must open."""
@@ -144,31 +157,50 @@ def check_links(path: Path) -> set[str]:
     """
     import h5py
 
-    linked = {
-        b"DIMENSION_LIST": (h5py.h5t.VLEN, True),
-        b"_Netcdf4Coordinates": (h5py.h5t.INTEGER, True),
-        b"_Netcdf4Dimid": (h5py.h5t.INTEGER, False),
-        b"CLASS": (h5py.h5t.STRING, False),
-    }
     wrong: list[str] = []
     texts: set[str] = set()
-    held = 0
+    held = attributes = 0
 
-    def look(name: bytes, one: "h5py.h5d.DatasetID") -> None:
-        nonlocal held
+    def look(name: bytes, one: "h5py.h5g.ObjectID") -> None:
+        nonlocal held, attributes
+        shown = clipped(name.decode(errors="replace"))
+        if isinstance(one, h5py.h5t.TypeID):
+            raise ValueError(f"'{shown}' is a type")
+        attributes += h5py.h5a.get_num_attrs(one)
+        if attributes > MOST_ATTRIBUTES:
+            raise ValueError(f"it has over {MOST_ATTRIBUTES:,} attributes")
+        for number in range(h5py.h5a.get_num_attrs(one)):
+            found = h5py.h5a.open(one, index=number)
+            label, kind = found.name.decode(errors="replace"), found.get_type()
+            of = f"attribute '{clipped(label)}' of '{shown}'"
+            if math.prod(found.shape or ()) * kind.get_size() > LARGEST_ATTRIBUTE:
+                raise ValueError(f"{of} is too large")
+            if label not in LINKS:
+                _check_type(of, kind)
+                if label in PACKING and kind.get_class() == h5py.h5t.STRING:
+                    raise ValueError(f"{of} is a text instead of a number")
+            elif not _links(one, label, kind, found.shape):
+                wrong.append(f"{label} of {shown}")
+        if not isinstance(one, h5py.h5d.DatasetID):
+            return
         kind, stored = one.get_type(), one.get_create_plist()
+        _check_type(f"'{shown}'", kind)
+        if one.get_space().get_simple_extent_type() == h5py.h5s.NULL:
+            raise ValueError(f"'{shown}' has no shape")
+        for number in range(stored.get_nfilters()):
+            code, _, _, filter_name = stored.get_filter(number)
+            if code not in {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32}:
+                called = clipped(filter_name.decode(errors="replace"))
+                raise ValueError(f"'{shown}' has the filter {code} ({called}); write it with zlib")
         size = math.prod(one.shape) * int(kind.get_size())
         if kind.get_class() == h5py.h5t.STRING and size > LARGE_ARRAY:
             texts.add(name.decode().rpartition("/")[2])
         if not h5py.Dataset(one).attrs.get("NAME", b"").startswith(BARE_DIMENSION):
             chunk = stored.get_chunk() if stored.get_layout() == h5py.h5d.CHUNKED else ()
             held += max(size, math.prod(chunk) * int(kind.get_size()))
-        for attribute, (expected, of_dimensions) in linked.items():
-            if h5py.h5a.exists(one, attribute):
-                found = h5py.h5a.open(one, attribute)
-                shape = (one.rank,) if of_dimensions else ()
-                if found.get_type().get_class() != expected or found.shape != shape:
-                    wrong.append(f"{attribute.decode()} of {name.decode(errors='replace')}")
+            pieces = math.prod(-(-length // part) for length, part in zip(one.shape, chunk))
+            if chunk and pieces > MOST_CHUNKS and held <= most_of(path):
+                raise ValueError(f"'{shown}' is in {pieces} pieces, which take too long to read; write larger ones")
 
     try:
         with guarded(path), bounded(MOST_HELD):
@@ -183,6 +215,42 @@ def check_links(path: Path) -> set[str]:
         said = f"it says that it holds {held / 1e9:.3g} GB in {path.stat().st_size / 1e6:.3g} MB"
         raise ValueError(f"{path}: is damaged ({said}); {REMEDY}")
     return texts
+
+
+def _check_type(of: str, kind: "h5py.h5t.TypeID") -> None:
+    """Refuse types that a dataset of springtune does not have; netCDF ends the process on some of them."""
+    import h5py
+
+    t = h5py.h5t
+    if kind.get_class() == t.INTEGER:
+        known = kind.get_size() in (1, 2, 4, 8) and kind.get_precision() == 8 * kind.get_size()
+    else:
+        floats = (t.IEEE_F32LE, t.IEEE_F32BE, t.IEEE_F64LE, t.IEEE_F64BE)
+        known = kind.get_class() == t.STRING or any(kind.equal(one) for one in floats)
+    if not known:
+        raise ValueError(f"{of} has the type {kind.dtype}, and numbers of 8 to 64 bits and texts are read; convert it")
+
+
+def _links(one: "h5py.h5g.ObjectID", label: str, kind: "h5py.h5t.TypeID", shape: tuple[int, ...]) -> bool:
+    """Return whether an attribute of `LINKS` is as netCDF-4 writes it."""
+    import h5py
+
+    t, rank = h5py.h5t, one.rank if isinstance(one, h5py.h5d.DatasetID) else -1
+    if label == "REFERENCE_LIST":
+        members = (
+            [kind.get_member_type(n) for n in range(kind.get_nmembers())] if kind.get_class() == t.COMPOUND else []
+        )
+        return [found.get_class() for found in members] == [t.REFERENCE, t.INTEGER]
+    if label == "DIMENSION_LIST":
+        if not kind.equal(t.vlen_create(t.STD_REF_OBJ)) or shape != (rank,):
+            return False
+        array = h5py.Dataset(one)
+        scales = [array.file[found] for every in array.attrs[label] for found in every]
+        return len(scales) == rank and all(isinstance(one, h5py.Dataset) and "CLASS" in one.attrs for one in scales)
+    expected = t.STRING if label == "CLASS" else t.INTEGER
+    if kind.get_class() != expected or shape != ((rank,) if label == "_Netcdf4Coordinates" else ()):
+        return False
+    return label == "CLASS" or bool((abs(h5py.Dataset(one).attrs[label]) <= MOST_OBJECTS).all())
 
 
 def attributes(path: Path) -> dict[str, str]:
