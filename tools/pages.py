@@ -33,8 +33,8 @@ LONG, KEPT = 30, 15
 """Rows above which a table is shortened, and rows that it keeps on its page."""
 
 
-LEFT_OUT = r"^### Mesh type `(?:alternating|right|isosceles-0\.[35])`\n.*?(?=^###|\Z)"
-"""Tables that stay in the file of the study: mesh types that no springs alone suit."""
+LEFT_OUT = r"^### (?:Mesh type `(?:alternating|right|isosceles-0\.[35])`|Scenes of the study)\n.*?(?=^###|\Z)"
+"""Tables that stay in the file of the study: mesh types that no springs alone suit, and messages of scenes."""
 
 
 def put(page: Path, tables: str) -> None:

@@ -5,7 +5,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -53,7 +53,6 @@ def tolerance(context: click.Context, parameter: click.Parameter, given: str | N
         "springtune diff results/before results/mine",
         "springtune diff before.nc mine --relative 1e-3 --group sensitivity",
         "springtune diff before.nc after.nc --json > changes.json",
-        "springtune diff before mine --definitions",
     )
 )
 @click.argument("before")
@@ -68,7 +67,6 @@ def tolerance(context: click.Context, parameter: click.Parameter, given: str | N
 @click.option("--all", "every", is_flag=True, help="All rows.")
 @click.option("--config", is_flag=True, help="Show the diff of the studies' files, too.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
-@click.option("--definitions", "by_definition", is_flag=True, help="Compare the errors of definitions side by side.")
 def diff(
     before: str,
     after: str,
@@ -80,7 +78,6 @@ def diff(
     every: bool,
     config: bool,
     as_json: bool,
-    by_definition: bool,
 ) -> None:
     """Say what changed from one dataset to another beyond a tolerance, scene by scene.
 
@@ -89,22 +86,13 @@ def diff(
     --relative is of its largest number. Seconds, what is measured of the machine, when and where a dataset was made are
     not compared; versions and the studies' files are told and make no difference.
 
-    With --definitions it says instead how many scenes of each definition have an error, and the median and the largest
-    of these without their sign, in both. Scenes of one dataset alone count, too.
-
     Exits with 0 if nothing changed, 1 if something did, and 2 if nothing could be compared.
     """
     from ..studies.output import comparison, reading
 
-    if by_definition and (ignored or every or config or relative is not None or absolute is not None):
-        raise click.UsageError("--definitions goes with --group and --json alone")
     try:
         paths = [dataset_path(before), dataset_path(after)]
         with opened(paths[0]) as one, opened(paths[1]) as other, reading.guarded(f"{paths[0]}, {paths[1]}"):
-            if by_definition:
-                errors = comparison.compare_definitions(one, other, groups)
-                click.echo(json.dumps(errors, indent=1) if as_json else definitions_text(errors, paths))
-                return
             given = comparison.Tolerance(comparison.RELATIVE if relative is None else relative, absolute)
             found = comparison.compare(one, other, given, groups, ignored, None if every else rows)
             if as_json:
@@ -143,23 +131,6 @@ def comparison_text(found: "Comparison", paths: Sequence[Path], most: int | None
     if found.attributes or found.config:
         parts.append(_told(found, config))
     return paragraphs(parts)
-
-
-def definitions_text(errors: "Sequence[Mapping[str, Any]]", paths: Sequence[Path]) -> str:
-    """Errors of definitions in two datasets, side by side."""
-    parts = [[f"before: {paths[0]}", f"after:  {paths[1]}"]]
-    for group in dict.fromkeys(row["group"] for row in errors):
-        rows = [["  definition", "scenes", "after", "median", "after", "change", "worst", "after", "change"]]
-        for row in (one for one in errors if one["group"] == group):
-            texts = [f"  {row['definition']}", *(str(count or 0) for count in row["scenes"].values())]
-            for pair in (row["median"].values(), row["worst"].values()):
-                texts += ["none" if share is None else f"{100 * share:.3g} %" for share in pair]
-                old, new = pair
-                texts.append("" if None in pair else f"{100 * (new - old):+.2g}")
-            rows.append(texts)
-        what = "scenes" if group == "/" else group
-        parts.append([f"errors of {what} without their sign", *aligned(rows, 0, range(1, 9)).splitlines()])
-    return paragraphs([*parts, *([] if errors else [["neither has errors of definitions"]])])
 
 
 def _summary(found: "Comparison") -> str:

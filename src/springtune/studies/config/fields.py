@@ -1,7 +1,6 @@
 """Types of the values of a study: parsing, and the expected form in words."""
 
 import math
-import re
 from collections.abc import Callable, Collection
 from typing import Annotated, Any
 
@@ -88,17 +87,6 @@ def number(words: str, low: float, high: float, *, above: bool = False, whole: b
     return Scalar(read, schema, words)
 
 
-_MEMORY = re.compile(r"\+?([0-9]+(?:\.[0-9]*)?)\s*([MGT])B")
-
-
-def _read_memory(value: str) -> float:
-    found = _MEMORY.fullmatch(value.strip())
-    size = float(found[1]) * {"M": 1e6, "G": 1e9, "T": 1e12}[found[2]] if found else 0.0
-    if not 1e8 <= size <= 1e15:
-        raise refuse(f"{show(value)} is no memory that a scene could take; give at least '100 MB', such as '8 GB'")
-    return size
-
-
 def one_of(what: str, names: Collection[str]) -> Scalar:
     """Annotation of a name from a fixed list."""
 
@@ -141,13 +129,6 @@ Plane = Annotated[str, one_of("plane", PLANES)]
 FurtherReference = Annotated[str, one_of("reference", FURTHER_REFERENCES)]
 Kinematics = Annotated[str, one_of("kinematics", KINEMATICS)]
 DefinitionName = Annotated[str, one_of("definition", DEFINITIONS)]
-LimitSeconds = Annotated[float, number("a number of seconds from 1, such as 600", 1, 1e9)]
-Memory = Annotated[
-    float,
-    Scalar(
-        _read_memory, {"type": "string", "pattern": _MEMORY.pattern, "examples": ["8 GB"]}, "a memory such as '8 GB'"
-    ),
-]
 _COUNT = number(f"a whole number from 2 to {MOST_LISTED}, such as 9", 2, MOST_LISTED, whole=True)
 Flag = Annotated[bool, Scalar(_read_flag, {"type": "boolean"}, "true or false")]
 Text = Annotated[str, Scalar(str, {"type": "string", "minLength": 1}, "a text")]

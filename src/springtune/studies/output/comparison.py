@@ -6,7 +6,7 @@ import difflib
 from collections.abc import Collection, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
-from typing import Any, SupportsInt
+from typing import SupportsInt
 
 import numpy as np
 import xarray as xr
@@ -15,7 +15,6 @@ from springtune.problem.quantities import nearest
 
 from .alignment import joined, on_common_axes
 from .dataset import NOT_REQUESTED, flag_words, is_flagged
-from .selection import judged
 from .text import NUMBER, from_json, without_numbers
 
 RELATIVE = 1e-6
@@ -184,49 +183,6 @@ def compare(
     found = [_Group(path, (nodes[0][path], nodes[1][path]), roots, how).compared() for path in shared]
     attributes, config = _attributes(before.attrs, after.attrs)
     return Comparison(found, alone, attributes, config)
-
-
-def compare_definitions(before: xr.DataTree, after: xr.DataTree, groups: Collection[str] = ()) -> list[dict[str, Any]]:
-    """Compare the errors of definitions in two datasets, each over all its solved cells whose reference applies.
-
-    A row has a group, a definition, and before and after the number of absolute errors, their median and the largest.
-    """
-    sides = {"before": _of_definitions(before), "after": _of_definitions(after)}
-    known = dict.fromkeys(key for side in sides.values() for key in side)
-    wanted = {"/" + name.strip("/") for name in groups} or {group for group, _ in known}
-    for name in sorted(wanted - {group for group, _ in known}):
-        raise ValueError(f"--group {name.strip('/')}: neither has errors of definitions there; leave --group out")
-    return [
-        {"group": key[0], "definition": key[1]}
-        | {what: {name: of(side[key]) if key in side else None for name, side in sides.items()} for what, of in JUDGED}
-        for key in known
-        if key[0] in wanted
-    ]
-
-
-JUDGED = (
-    ("scenes", len),
-    ("median", lambda errors: float(np.median(errors))),
-    ("worst", lambda errors: float(errors.max())),
-)
-"""Numbers of the errors of a definition."""
-
-
-def _of_definitions(tree: xr.DataTree) -> dict[tuple[str, str], np.ndarray]:
-    """Absolute errors by group and definition."""
-    finite = tree["finite_strain"].to_dataset() if "finite_strain" in tree.children else None
-    found = {}
-    for node in tree.subtree:
-        data = node.to_dataset()
-        for name in {"deformation_error", "error"} & {*data} if "status" in data else ():
-            if "definition" not in data[name].dims:
-                continue
-            errors = abs(judged(data, finite if node.path == "/" else None, name))
-            for definition in data.definition.values.tolist():
-                values = errors.sel(definition=definition).values
-                if np.isfinite(values).any():
-                    found[node.path, definition] = values[np.isfinite(values)]
-    return found
 
 
 @dataclass(frozen=True)

@@ -155,15 +155,11 @@ def _provenance(tree: xr.DataTree) -> list[str]:
     attributes = {str(name): str(value) for name, value in tree.attrs.items()}
     lines = ["made with", f"  springtune {attributes.get('springtune_version', 'unknown')}"]
     if attributes.get("git_commit"):
-        changed = f"\n{attributes.get('git_diff', '')}".count("\ndiff --git ")
-        files = f", {changed} changed files in git_diff" if changed else ""
-        lines.append(f"  commit {attributes['git_commit']}{files}")
+        lines.append(f"  commit {attributes['git_commit']}")
     if attributes.get("study_commit"):
         lines.append(f"  study: commit {attributes['study_commit']}")
     software = from_json(attributes.get("software"))
     if software:
         lines.append("  " + ", ".join(f"{name} {version}" for name, version in software.items() if version != "none"))
-    if attributes.get("host"):
-        lines.append(f"  on {attributes['host']}")
     lines += [f"  sha256 {digest}  {name}" for name, digest in from_json(attributes.get("inputs")).items()]
     return lines
