@@ -5,9 +5,6 @@ import sys
 import time
 from contextlib import redirect_stderr, redirect_stdout
 from multiprocessing import get_context
-from pathlib import Path
-
-sys.path.append(str(Path(__file__).parents[1] / "unit"))  # for `synthetic`
 
 import harness  # noqa: E402
 import targets  # noqa: E402
