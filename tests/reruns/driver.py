@@ -13,11 +13,12 @@ import numpy as np
 
 sys.path.append(str(Path(__file__).parents[1] / "unit"))  # for `campaigns`, where this is a program
 
+from springtune.studies.runs.task_costs import TaskCosts
+
 from springtune.mesh import MESH_TYPES
 from springtune.springs import DEFINITIONS
 from springtune.studies.runs import checked_json, driver, records, rerun, run_tasks
 from springtune.studies.runs.keys import CODE_FILE, OURS
-from springtune.studies.runs.task_costs import TaskCosts
 
 from campaigns import Campaign
 

@@ -16,11 +16,11 @@ import numpy as np
 import pytest
 import xarray as xr
 from click.testing import CliRunner
+from springtune.studies.output.browse.server import Server
 
 import springtune
 from springtune.cli import main
 from springtune.studies.output.browse.page import packed, page
-from springtune.studies.output.browse.server import Server
 
 from synthetic import dataset
 

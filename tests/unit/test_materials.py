@@ -9,13 +9,13 @@ import pytest
 import yaml
 from hypothesis import given
 from hypothesis import strategies as st
+from springtune.studies.runs.checked_json import hash_of
 
 from springtune.problem.geometry import Beam
 from springtune.problem.materials import CONSTANTS, AnisotropicMaterial, Material, material_of
 from springtune.studies.config.expand import declared
 from springtune.studies.config.kind import kinds
 from springtune.studies.config.sections import study_model
-from springtune.studies.runs.checked_json import hash_of
 from springtune.studies.runs.keys import beam_key, material_key
 
 from tables import STUDIES

@@ -16,9 +16,9 @@ from springtune.studies.kinds import load_study
 from springtune.studies.kinds.scenes import stored
 from springtune.studies.kinds.scenes.solve import stored_key
 from springtune.studies.kinds.scenes.stored import fields_key, unpacked
-from springtune.studies.runs import checked_json, driver, store
+from springtune.studies.runs import job as jobs
+from springtune.studies.runs import store
 from springtune.studies.runs.plan import plan
-from springtune.studies.runs.task_costs import TaskCosts
 
 PACKAGES = ("numpy", "scipy", "numba", "cvxopt", "netgen-mesher", "pyamg", "scikit-fem", "h5py", "meshio")
 
@@ -45,12 +45,13 @@ def computed(study, folder):
     """Results by stage, place and name: numbers, texts and arrays; and the meshes' points."""
     found = {}
     for job in plan(study, folder, 1).jobs.values():
-        driver.run(job.stage.module, job.content, TaskCosts())
+        jobs.do(job.stage.module, job.content)
         if job.stage.name in ("mesh", "shape_mesh"):
             for one in job.content["files"]:
                 found["mesh", one["name"], "points"] = stored.read(job.content["folder"], one["name"]).mesh.points
             continue
-        calibration = checked_json.read(folder / "calibration.json")
+        path = folder / "calibration.h5"
+        calibration = store.everything(path) if path.exists() else None
         results = {key: one for path in job.products if path.endswith(".h5") for key, one in results_in(path).items()}
         for place, key in enumerate(keys(job.content, calibration)):
             one = results[key] | unpacked(results.get(fields_key(key), {}))
@@ -73,7 +74,7 @@ def collected(study, output):
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch) / "results"
         for job in plan(load_study(study), folder, 1).jobs.values():
-            driver.run(job.stage.module, job.content, TaskCosts())
+            jobs.do(job.stage.module, job.content)
         collect.run(load_study(study), study, folder, Path(output))
 
 
