@@ -15,6 +15,7 @@ from ..runs import job, provenance, rerun
 from ..runs.keys import CODE_FILE, OURS
 from ..runs.plan import plan
 from ..runs.stages import results
+from ..runs.store import DamagedError
 from . import load_study
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ def run(study: "Study", config: str | Path, folder: Path, output: Path) -> None:
     try:
         groups = gathered(study, folder)
         dataset.write(output, groups, provenance.attributes(study, config))
-    except job.DamagedError as error:
+    except DamagedError as error:
         job.forget_job_of(error.path, folder)
         raise SystemExit(str(error)) from None
     except OSError as error:  # the message says it all

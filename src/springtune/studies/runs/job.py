@@ -131,7 +131,7 @@ class Attempts:
     def __init__(self, under_way: int | None = None) -> None:
         self.under_way, self.computed, self.broken = under_way, 0, list[Exception]()
 
-    def attempt(self, key: str, function: Callable[[], Any], failed: Callable[[str], Result]) -> Any:
+    def attempt(self, key: str, function: Callable[[], Any], failed: Callable[[str], Any]) -> Any:
         """Return the result of a task, a failed result for a reason of the task, or None if the program is broken."""
         self._note(key)
         try:
