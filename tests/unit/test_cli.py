@@ -78,7 +78,6 @@ class TestThickBodies:
         assert sorted(begins) == [
             "beam 'block', thickness: 1e+06 mm",
             "beam 'sheet', thickness: 15 mm",
-            "refine.thicker, thickness: 30 mm",
             "samples, thickness: 13 mm",
             "shape 'plate', thickness: 20 mm",
         ]
@@ -124,7 +123,7 @@ class TestSizesOfAnotherUnit:
 def test_shells_complete_commands_and_values(monkeypatch):
     monkeypatch.chdir(CONFIG.parent)
     assert completed("springtune ", 1) == [f"plain,{name}" for name in COMMANDS]
-    assert completed("springtune scenes config/p", 2) == ["plain,config/paper.yaml"]
+    assert completed("springtune scenes config/p", 2) == ["file,config/p"]
     assert completed("springtune scenes elsewhere/", 2) == ["file,elsewhere/"]
     assert completed("springtune predict --mesh f", 3) == ["plain,free"]
     assert completed("springtune predict --mesh my.m", 3) == ["file,my.m"]

@@ -161,12 +161,12 @@ def test_tests_use_what_everybody_may_use(path):
 
 
 @pytest.mark.parametrize("stage", [one for kind in kinds() for one in kind.stages], ids=lambda one: one.name)
-def test_stages_say_what_is_lost_to_limits(stage):
-    """The driver does for those whose tasks it asks for; of others with a loop of their own calibrate loses none."""
+def test_stages_store_what_a_crash_loses(stage):
+    """The job does for those whose tasks it knows; of others with a loop of their own calibrate loses none."""
     module = imported(stage.module)
     own = hasattr(module, "run") and not hasattr(module, "tasks")
     assert own or callable(module.solve)
-    assert hasattr(module, "gone") == (own and stage.name != "calibrate")
+    assert hasattr(module, "crashed") == (own and stage.name != "calibrate")
 
 
 OWN = {"MAX_EVALUATIONS", "MAX_HALVINGS", "MAX_ITERATIONS", "SMALLEST_STEP", "TOLERANCE"}

@@ -325,7 +325,7 @@ def test_no_other_file_writes_lines_of_a_message(refusal, tmp_path):
     assert r"a\nb/none.yaml: cannot be read" in str(caught.value)
 
 
-@pytest.mark.parametrize("key", ["laying", "stability", "benchmark", "refine", "samples"])
+@pytest.mark.parametrize("key", ["laying", "stability", "benchmark", "samples"])
 def test_a_section_that_computes_needs_no_grid(load, refusal, key):
     quick = yaml.safe_load((CONFIG / "quick.yaml").read_text())
     content = {"title": "One section", "outputs": "tables", key: quick[key]}

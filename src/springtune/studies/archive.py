@@ -14,7 +14,7 @@ from .output import reading
 from .runs.provenance import input_files
 from .runs.source import checksum
 
-SUMS, VERSIONS, README = "SHA256SUMS", "versions.json", "README.md"
+SUMS, INSTALLED, README = "SHA256SUMS", "versions.json", "README.md"
 
 PRODUCTS = ("dataset.nc", "index.html", "summary.txt", "figures/*", "tables/*")
 """Files of `results/<study>` that are packed; what the stages stored is not, since the study makes it again."""
@@ -62,7 +62,7 @@ def pack(study: Study, folder: Path, target: Path) -> list[str]:
     files |= _inputs(study)
     texts = {
         README: AGAIN.format(title=about["title"], version=about["springtune_version"], study=study.path.name),
-        VERSIONS: f"{versions}\n",
+        INSTALLED: f"{versions}\n",
     }
     with tempfile.TemporaryDirectory() as made:
         for name, text in texts.items():

@@ -16,9 +16,9 @@ from springtune.safe_io.atomic import check_folder, replacing
 from ...registry import how_to_install
 from .dataset import flag_words, is_flagged
 
-ENDINGS = (".csv", ".parquet")
+TABLE_ENDINGS = (".csv", ".parquet")
 
-MOST_CELLS = 50_000_000
+MOST_NUMBERS = 50_000_000
 """Most rows times columns: a table repeats the labels of all dimensions in each row."""
 
 
@@ -41,9 +41,9 @@ def table(tree: xr.DataTree, group: str = "/") -> pd.DataFrame:
     rows = 1
     for size in data.sizes.values():
         rows *= size
-    if rows * len(data.variables) > MOST_CELLS:
+    if rows * len(data.variables) > MOST_NUMBERS:
         raise ValueError(
-            f"group '{group}': {rows} rows of {len(data.variables)} columns, and at most {MOST_CELLS} values are "
+            f"group '{group}': {rows} rows of {len(data.variables)} columns, and at most {MOST_NUMBERS} values are "
             "written; select in Python: springtune.open(path)['group'].sel(...).to_dataframe()"
         )
     asked = data.status != Status.NOT_REQUESTED if "status" in data else None
@@ -66,8 +66,8 @@ def table(tree: xr.DataTree, group: str = "/") -> pd.DataFrame:
 
 def export(tree: xr.DataTree, path: Path, group: str = "/", force: bool = False) -> str:
     """Write a group as CSV or Parquet, by the ending of a path; return what was written in words."""
-    if path.suffix.lower() not in ENDINGS:
-        raise RequestError(f"{path}: '{path.suffix}' is no format to export to; give a file in {' or '.join(ENDINGS)}")
+    if path.suffix.lower() not in TABLE_ENDINGS:
+        raise RequestError(f"{path}: '{path.suffix}' is no format to export to; give a file in {' or '.join(TABLE_ENDINGS)}")
     check_folder(path)
     if path.exists() and not force:
         raise ValueError(f"{path}: is there already; give another name, or --force to replace it")

@@ -18,7 +18,7 @@ from .text import cell_text
 
 MESH = ("beam", "mesh_type", "mesh_size")
 
-INDEX = "scenes.csv"
+LIST = "scenes.csv"
 """Table of the files, with the labels of each."""
 
 
@@ -36,8 +36,8 @@ def write(tree: xr.DataTree, folder: Path) -> list[Path]:
         name = cell_text(labels, units).replace(", ", "_").replace(" ", "") + ".vtu"
         _write(folder / name, reading.field(tree, **labels), {"title": tree.attrs.get("title", "")} | labels)
         rows.append({"file": name} | labels)
-    write_text(folder / INDEX, pd.DataFrame(rows, columns=["file", *units]).to_csv(index=False))
-    return [Path(INDEX)]
+    write_text(folder / LIST, pd.DataFrame(rows, columns=["file", *units]).to_csv(index=False))
+    return [Path(LIST)]
 
 
 def _write(path: Path, network: xr.Dataset, labels: Mapping[str, object]) -> None:

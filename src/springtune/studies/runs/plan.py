@@ -29,7 +29,7 @@ CLUSTER_JOBS = 64
 LEAST_SECONDS, LEAST_ON_CLUSTER = 1.0, 120.0
 """Expected seconds that a job takes at least, against its start-up; on a cluster it also waits."""
 
-MANY = 10
+MANY_SECONDS = 10
 """Multiple of these seconds for each job from which a stage gets four times as many, so that all cores end together."""
 
 
@@ -60,7 +60,7 @@ def share_out(seconds: Mapping[str, float], cores: int, least: float = LEAST_SEC
     {'0': ['fine'], '1': ['middle', 'coarse']}
     """
     total = sum(seconds.values())
-    count = 4 * cores if total > MANY * least * cores else min(cores, ceil(total / least))
+    count = 4 * cores if total > MANY_SECONDS * least * cores else min(cores, ceil(total / least))
     load = dict.fromkeys(map(str, range(max(1, min(count, len(seconds))))), 0.0)
     bundles: dict[str, list[str]] = {}
     for name in sorted(seconds, key=lambda name: (-seconds[name], name)):
