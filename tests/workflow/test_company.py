@@ -1,15 +1,15 @@
 """A result depends on its own key alone: not on what is computed along with it, before it, or was stored already."""
 
 import copy
+import json
 import random
 
 import h5py
 import pytest
 import xarray as xr
-from springtune.studies.runs.task_costs import TaskCosts
 
 from springtune.studies.kinds import load_study
-from springtune.studies.runs import checked_json, driver, store
+from springtune.studies.runs import job, store
 from springtune.studies.runs.plan import plan
 
 from tables import STUDIES
@@ -22,12 +22,12 @@ TIMES = ("seconds",)
 
 def stages(study, folder, cores=1):
     """Modules of the jobs of a study and what they are to do, in an order in which they can run."""
-    return [(job.stage.module, job.content) for job in plan(study, folder, cores).jobs.values()]
+    return [(one.stage.module, one.content) for one in plan(study, folder, cores).jobs.values()]
 
 
 def compute(module, content):
     """Do a job."""
-    driver.run(module, content, TaskCosts())
+    job.do(module, content)
 
 
 def keys(content):
@@ -72,7 +72,7 @@ def results(folder):
             for key in set(file) - {store.SCALARS}:
                 of_key = found[path.parent.name, path.stem, key]
                 of_key |= {name: (array.shape, array[()].tobytes()) for name, array in file[key].items()}
-    found["calibration"] = checked_json.demand(folder / "calibration.json")
+    found["calibration"] = json.loads((folder / "calibration.json").read_text())
     return found
 
 
@@ -135,7 +135,6 @@ def test_company_does_not_matter(study, usual, tmp_path):
 @pytest.mark.parametrize("cores", [8, pytest.param(2, marks=pytest.mark.slow)])
 def test_bundles_do_not_matter(study, usual, tmp_path, cores):
     folder = tmp_path / "results/many"
-    checked_json.write(tmp_path / "results/costs.json", {"kinds": {"nonlinear": [1.0, 100.0]}, "start_up": 0.1})
     jobs = stages(study, folder, cores)
     assert len(jobs) > len(stages(study, tmp_path / "elsewhere", 1))
     for module, content in jobs:

@@ -20,9 +20,7 @@ from nbclient import NotebookClient
 import springtune as st
 from cf import complaints
 from springtune.cli import main
-from springtune.studies.kinds import load_study
 from springtune.studies.output import dataset
-from springtune.studies.runs.rerun import orphans
 
 from campaigns import Campaign
 
@@ -181,13 +179,9 @@ def test_paraview_gets_what_each_particle_is_off_its_reference(run, tree, tmp_pa
     assert mean == pytest.approx(float(cell.displacement) - expected, abs=2e-5 * expected)
 
 
-def test_nothing_lies_there_that_the_study_does_not_ask_for(run, tree):
-    assert orphans(load_study(run.folder / "quick.yaml"), run.folder / "results/quick") == []
-
-
 def test_root_attributes_tell_where_the_data_come_from(tree, run):
     for name in ("title", "Conventions", "study", "config", "springtune_version", "git_commit", "created", "software",
-                 "host", "history", "source", "references", "git_diff"):  # fmt: skip
+                 "history", "source", "references"):  # fmt: skip
         assert name in tree.attrs
     text = (run.folder / "quick.yaml").read_bytes()
     assert json.loads(tree.attrs["inputs"]) == {
@@ -275,7 +269,8 @@ def test_tables_and_figures_are_there(run, tree):
 def test_paraview_has_the_scenes_whose_fields_are_kept(run, tree):
     """Numbers of one are those of the same scene, solved by the library."""
     folder = run.folder / "results/quick/paraview"
-    pieces = re.findall(r'file="(.*?)"', (folder / "scenes.pvd").read_text())
+    rows = list(csv.DictReader((folder / "scenes.csv").read_text().splitlines()))
+    pieces = [row["file"] for row in rows]
     assert len(pieces) == int(tree["fields"].displacement_x.isel(particle=0).notnull().sum())
     assert sorted(pieces) == sorted(path.relative_to(folder).as_posix() for path in folder.glob("*/*"))
     grid = meshio.read(folder / "scenes/100x20_structured_5mm_steel_traction_lattice_nonlinear.vtu")
@@ -343,10 +338,10 @@ def test_snakemake_runs_the_same_jobs(run, tree):
     code, output = run.snakemake("quick.yaml", "-n", "-p", "--forceall")
     assert code == 0, output
     with contextlib.chdir(run.folder):
-        here = Campaign("quick.yaml", cores=2)
+        here = Campaign("quick.yaml", cores=None)
     jobs = {(str(here.plan.tasks(one)), str(here.jobs[one].record), here.jobs[one].digest) for one in here.plan.jobs}
     assert set(re.findall(r"kinds\.collect|present|browse", output)) == {"kinds.collect", "present", "browse"}
-    assert len(jobs) > 10 and set(re.findall(r"run_tasks (\S+) (\S+) (\S+) > ", output)) == jobs
+    assert len(jobs) > 10 and set(re.findall(r"runs\.job (\S+) (\S+) (\S+) > ", output)) == jobs
 
 
 def test_the_linter_has_no_remark(run, tree):

@@ -1,4 +1,4 @@
-"""What a run survives, and what it says: other runs, kills, broken programs, scenes beyond limits."""
+"""What a run survives, and what it says: other runs, kills, broken programs."""
 
 import contextlib
 import os
@@ -15,8 +15,9 @@ import pytest
 import xarray as xr
 
 import springtune
+from springtune.safe_io import atomic
 from springtune.safe_io.atomic import this_host
-from springtune.studies.runs import checked_json, store
+from springtune.studies.runs import store
 
 from campaigns import Campaign
 from tables import STUDIES
@@ -62,7 +63,7 @@ def test_the_lock_of_a_run_that_was_killed_is_removed_with_a_word(finished):
     (finished.folder / "results/survival/index.html").unlink()
     note = {"host": this_host(), "pid": 2**22 + 1, "start": 1.0, "command": "snakemake",
             "folders": ["results/survival"]}  # fmt: skip
-    checked_json.write(finished.folder / ".snakemake/springtune/of_a_test.json", note)
+    atomic.write_json(finished.folder / ".snakemake/springtune/of_a_test.json", note)
     code, output = finished.springtune("survival.yaml")
     assert code == 0 and "was killed and left its lock; the lock is removed" in output, output
     assert (finished.folder / "results/survival/index.html").exists()
@@ -73,7 +74,7 @@ def test_a_study_that_another_process_computes_is_left_to_it(finished):
     note = {"host": this_host(), "pid": process.pid, "start": process.create_time(), "command": "snakemake",
             "folders": ["results/survival"]}  # fmt: skip
     path = finished.folder / ".snakemake/springtune/of_a_test.json"
-    checked_json.write(path, note)
+    atomic.write_json(path, note)
     code, output = finished.springtune("survival.yaml")
     path.unlink()
     assert code == 1 and "Traceback" not in output
@@ -120,35 +121,6 @@ def test_a_broken_program_ends_the_run_when_the_other_scenes_are_stored(run, tmp
     assert "Traceback" in (run.folder / "results/broken/logs/solve_0.log").read_text()
     assert not (run.folder / "results/broken/dataset.nc").exists()
     assert len(store.stored(run.folder / "results/broken/solutions/50x20_structured_5mm.h5")) == 2
-
-
-@pytest.fixture
-def endless():
-    """A definition without an end."""
-
-    @springtune.definition("endless")
-    def springs(mesh, material, thickness):
-        while True:
-            pass
-
-    yield
-    springtune.DEFINITIONS.discard("endless")
-
-
-def test_a_scene_beyond_limits_is_a_hole_and_tried_again_with_others(run, endless, monkeypatch):
-    monkeypatch.chdir(run.folder)
-    text = STUDY.replace("[10 mm, 5 mm]", "10 mm").replace("[traction, compression]", "traction")
-    text = text.replace("delingette", "endless")
-    # Again with another limit: the other scene is stored.
-    for seconds, done in ((1, {"linear": 1, "beyond limits": 1}), (2, {"beyond limits": 1})):
-        run.write("limits.yaml", text.replace("grids:", f"limits: {{seconds: {seconds}, memory: 1 GB}}\ngrids:"))
-        campaign = Campaign("limits.yaml")
-        campaign.finish("collect")
-        summary = (campaign.folder / "summary.txt").read_text()
-        why = "scenes, failed: 1 of 2\n  small, structured, 10 mm, steel, traction, endless, linear: not done"
-        assert why in summary and f"at most {seconds} s and 1 GB for each (`limits` of the study)" in summary
-        work = checked_json.read(campaign.jobs["solve_0"].record)["work"]
-        assert {name: work[name][0] for name in work.keys() - {"lattice"}} == done
 
 
 def test_a_study_that_is_edited_during_its_run_makes_no_dataset_of_another_one(run):

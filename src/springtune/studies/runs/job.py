@@ -268,4 +268,6 @@ def _one_part(task: Task, result: Result) -> dict[str, Result]:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    from springtune.studies.runs import job  # by its name, as stages import `RefusedError`
+
+    job.main(*sys.argv[1:])
