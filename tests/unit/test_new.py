@@ -5,8 +5,6 @@ import shutil
 from importlib.util import find_spec
 from pathlib import Path
 
-import meshio
-import numpy as np
 import pytest
 from click.testing import CliRunner
 
@@ -93,33 +91,6 @@ class TestNew:
             assert float(abs(scenes.error.sel(quantity="stretch")).max()) < 0.1
         for product in ("figures", "tables/index.html", "index.html"):
             assert (campaign.folder / product).exists()
-        # And what it drew goes to ParaView.
-        said = run("export", "results/my-plate", "--to", "plate.pvd")
-        assert said.exit_code == 0 and "2 networks, in the folder plate" in said.stdout, said.output
-        found = meshio.read("plate/plate_pull_patch.vtu")
-        with st.open("results/my-plate") as tree:
-            one = tree["shape_fields"].to_dataset().isel(case=0).sel(definition="patch")
-            count = int(np.isfinite(one.x).sum())
-            assert np.array_equal(found.points[:, 0], one.x.values[:count])
-            assert np.array_equal(found.point_data["displacement"][:, 1], one.displacement_y.values[:count])
-            scene = tree["shapes"].to_dataset().sel(definition="patch", quantity="stretch", mesh_size=4e-3)
-            number = re.search(r'Name="error_of_stretch"[^>]*>([^<]*)<', Path("plate/plate_pull_patch.vtu").read_text())
-            assert float(number[1]) == float(scene.error.squeeze())
-        assert {block.type for block in found.cells} == {"line", "triangle"}
-        asked = ("export", "results/my-plate", "--to", "one.vtu")
-        assert run(*asked, "--select", "shape=plate,definition=lattice").stdout == "one.vtu: plate, pull, lattice\n"
-        Path("one.vtu").unlink()
-        for options, message in (
-            (
-                (),
-                "one.vtu: 2 networks, and a .vtu file has one; --select one definition, or give a name ending in .pvd",
-            ),
-            (("--select", "definition=latice"), "no such label; did you mean 'lattice'?"),
-            (("--select", "beam=200x40"), "networks of shapes are told apart by shape, load, definition"),
-            (("--group", "fields"), "the dataset has no group '/fields'"),
-        ):
-            result = run(*asked, *options)
-            assert result.exit_code in (1, 2) and message in result.stderr and not Path("one.vtu").exists()
 
     def test_it_runs_as_it_is(self, checkout):
         run("new", "my-study")

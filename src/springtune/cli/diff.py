@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 ROWS = 20
 """Rows of a table."""
 
-BOTH = ("before", "after")
+COMPARED = ("before", "after")
 
 DIFFERENT, TROUBLE = 1, 2
 """Exit codes, as those of diff."""
@@ -120,8 +120,8 @@ def opened(path: Path) -> "Iterator[xr.DataTree]":
 
 def comparison_text(found: "Comparison", paths: Sequence[Path], most: int | None = ROWS, config: bool = False) -> str:
     """Comparison as text."""
-    width = max(map(len, BOTH)) + 1
-    head = [f"{f'{side}:':{width}} {path}" for side, path in zip(BOTH, paths)]
+    width = max(map(len, COMPARED)) + 1
+    head = [f"{f'{side}:':{width}} {path}" for side, path in zip(COMPARED, paths)]
     parts = [[*head, _summary(found)]]
     for group in found.groups:
         parts += _of_group(group, most)
@@ -135,8 +135,8 @@ def comparison_text(found: "Comparison", paths: Sequence[Path], most: int | None
 
 def _summary(found: "Comparison") -> str:
     """Summary in one line."""
-    said = [f"group {path} only {side}" for side, own in zip(BOTH, found.alone) for path in own]
-    for number, side in enumerate(BOTH):
+    said = [f"group {path} only {side}" for side, own in zip(COMPARED, found.alone) for path in own]
+    for number, side in enumerate(COMPARED):
         for group in found.groups:
             count, what = group.cells[number].count, "scenes" if group.name == "/" else f"cells of {group.name}"
             said += [f"{count} {what} only {side}"] if count else []
@@ -159,7 +159,7 @@ def _of_group(group: "GroupChanges", most: int | None) -> Iterator[list[str]]:
     what = "scenes" if group.name == "/" else f"cells of {group.name}"
     lines = []
     for name, both in group.labels.items():
-        for side, own in zip(BOTH, both):
+        for side, own in zip(COMPARED, both):
             shown = own[:most]
             if own:
                 said = ", ".join(_place(group, {name: label}) for label in shown)
@@ -167,11 +167,11 @@ def _of_group(group: "GroupChanges", most: int | None) -> Iterator[list[str]]:
                 lines.append(f"  {name} only {side}: {said}{more}")
     if lines:
         yield [f"labels of {group.name}", *lines]
-    for side, alone in zip(BOTH, group.cells):
+    for side, alone in zip(COMPARED, group.cells):
         if alone.count:
             lines = [f"  {_place(group, labels)}" for labels in alone.rows]
             yield [f"{what} only {side}: {alone.count}", *lines, *_more(alone.count - len(lines))]
-    lines = [f"  {name} only {side}" for side, own in zip(BOTH, group.variables) for name in own]
+    lines = [f"  {name} only {side}" for side, own in zip(COMPARED, group.variables) for name in own]
     lines += [f"  {name} {why}" for name, why in group.unlike.items()]
     if lines:
         yield [f"variables of {group.name}", *lines]
@@ -206,7 +206,7 @@ def _changes(found: "Comparison", changes: "list[Change]", most: int | None) -> 
         if one.changed
     ]
     axes = {group.name: group for group in found.groups}
-    rows = [["  variable", *BOTH, "change", "at"]]
+    rows = [["  variable", *COMPARED, "change", "at"]]
     for row in changes[:most]:
         group = axes[row.group]
         at = _place(group, row.labels | row.point)
@@ -284,11 +284,11 @@ def as_dict(found: "Comparison", paths: Sequence[Path], config: bool = False) ->
 def _group_dict(group: "GroupChanges") -> dict[str, object]:
     made: dict[str, object] = {
         "labels": {
-            name: {f"only_{side}": own for side, own in zip(BOTH, both)} for name, both in group.labels.items()
+            name: {f"only_{side}": own for side, own in zip(COMPARED, both)} for name, both in group.labels.items()
         },
         "cells_in_both": group.both,
     }
-    for side, alone, names in zip(BOTH, group.cells, group.variables):
+    for side, alone, names in zip(COMPARED, group.cells, group.variables):
         made[f"cells_only_{side}"] = {"count": alone.count, "rows": alone.rows}
         made[f"variables_only_{side}"] = names
     made["not_comparable"] = group.unlike
