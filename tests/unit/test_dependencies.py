@@ -3,6 +3,7 @@
 import ast
 import importlib.metadata
 import inspect
+import json
 import sys
 from pathlib import Path
 
@@ -12,10 +13,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from springtune.mesh import MESH_TYPES
+from springtune.safe_io.atomic import write_json
 from springtune.springs import DEFINITIONS, Springs, definition
-from springtune.studies.runs import checked_json, keys
+from springtune.studies.runs import keys
 from springtune.studies.runs.keys import read
 from springtune.studies.runs.plan import stages
+from springtune.studies.runs.source import hash_of
 
 TABLES = yaml.safe_load(Path(__file__).with_name("code_changes.yaml").read_text())
 MODULE, TREE = TABLES["module"], TABLES["package"]
@@ -124,12 +127,12 @@ def test_what_was_read_is_taken_from_a_note_where_it_is_the_same(tmp_path):
     time = note.stat().st_mtime_ns
     assert closure() == fresh and note.stat().st_mtime_ns == time
     # Another digest in the note shows that it is taken, and only for the content that it was made of.
-    content = checked_json.read(note)
-    for source in content["sources"].values():
+    _, sources = json.loads(note.read_text())
+    for source in sources.values():
         source[0] = "taken"
-    checked_json.write(note, content)
+    write_json(note, [hash_of(keys.READER, sources), sources])
     assert closure().digest != fresh.digest
-    checked_json.write(note, content | {"reader": "another one"})
+    write_json(note, [hash_of("another reader", sources), sources])
     assert closure() == fresh
     note.write_text("{")
     assert closure() == fresh

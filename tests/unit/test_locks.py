@@ -10,8 +10,8 @@ import pytest
 from click.testing import CliRunner
 
 from springtune.cli import main
-from springtune.safe_io.atomic import this_host
-from springtune.studies.runs import checked_json, locks
+from springtune.safe_io.atomic import this_host, write_json
+from springtune.studies.runs import locks
 
 from tables import STUDIES
 
@@ -31,7 +31,7 @@ def note(**changed):
     process = psutil.Process()
     known = {"host": this_host(), "pid": process.pid, "start": process.create_time(), "command": "snakemake",
              "folders": [str(STUDY)]}  # fmt: skip
-    checked_json.write(locks.RUNS / "of_a_test.json", known | changed)
+    write_json(locks.RUNS / "of_a_test.json", known | changed)
 
 
 def test_without_notes_nobody_computes():
@@ -80,6 +80,12 @@ def test_a_run_notes_itself_until_its_end():
         locks.check_idle(STUDY)
     locks.end()
     assert not locks.check_idle(STUDY) and not list(locks.RUNS.iterdir())
+
+
+def test_notes_of_runs_that_are_gone_do_not_pile_up():
+    note(pid=2**22 + 1, start=1.0)
+    locks.begin([STUDY])
+    assert len(list(locks.RUNS.iterdir())) == 1 and not (locks.RUNS / "of_a_test.json").exists()
 
 
 def test_processes_of_two_machines_with_one_number_have_notes_of_their_own(monkeypatch):
@@ -149,11 +155,10 @@ class TestClaims:
         Path("config/mine.yaml").write_text(SMALL)
         refusal = "results/mine: holds the results of w/mine.yaml, another study of the same name; rename"
         for command in (
-            ["clean", "config/mine.yaml", "--remove"],
-            ["merge", "config/mine.yaml", "results/mine"],
+            ["archive", "config/mine.yaml"],
             ["diff", "config/mine.yaml", "results/mine"],
         ):
             told = CliRunner().invoke(main, command)
             assert told.exit_code and refusal in told.output, told.output
-        told = CliRunner().invoke(main, ["clean", "results/mine"])
+        told = CliRunner().invoke(main, ["archive", "results/mine"])
         assert told.exit_code == 1 and "w/mine.yaml: beams: 'beams' is missing" in told.output

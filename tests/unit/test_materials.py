@@ -9,7 +9,6 @@ import pytest
 import yaml
 from hypothesis import given
 from hypothesis import strategies as st
-from springtune.studies.runs.checked_json import hash_of
 
 from springtune.problem.geometry import Beam
 from springtune.problem.materials import CONSTANTS, AnisotropicMaterial, Material, material_of
@@ -17,6 +16,7 @@ from springtune.studies.config.expand import declared
 from springtune.studies.config.kind import kinds
 from springtune.studies.config.sections import study_model
 from springtune.studies.runs.keys import beam_key, material_key
+from springtune.studies.runs.source import hash_of
 
 from tables import STUDIES
 
@@ -179,20 +179,12 @@ def test_a_study_declares_all_three_forms(load):
     assert found["board"] == AnisotropicMaterial(9e9, 4e9, -1.5e9, 2e9, density=600.0, name="board")
 
 
-REFINE = """
-refine:
-  one: {beam: bar, mesh_type: right, mesh_size: 5 mm, material: ply, load: traction, definition: lattice,
-        parameter: force, from: 1 kN, to: 2 kN}
-"""
-
-
 def sections():
     """Studies that have a section with a material, and where it stands."""
     yield (REPOSITORY / "config/laying.yaml").read_text(), "laying", "material"
     yield (REPOSITORY / "config/laying.yaml").read_text(), "laying", "support"
     yield (REPOSITORY / "config/stability.yaml").read_text(), "stability", "material"
     yield (REPOSITORY / "config/benchmark.yaml").read_text(), "benchmark", "scenes"
-    yield STUDY + REFINE, "refine", "one"
 
 
 @pytest.mark.parametrize(("text", "section", "key"), list(sections()))
@@ -202,8 +194,6 @@ def test_sections_of_beams_take_isotropic_materials_alone(refusal, text, section
     inside = study[section]
     if section == "benchmark":
         inside, key = next(iter(inside["scenes"].values())), "material"
-    elif section == "refine":
-        inside, key = inside[key], "material"
     inside[key] = "ply"
     message = refusal(yaml.safe_dump(study))
     assert section in message and "'ply' is anisotropic, and beams are of isotropic materials" in message
