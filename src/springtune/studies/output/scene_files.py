@@ -46,7 +46,7 @@ def _write(path: Path, network: xr.Dataset, labels: Mapping[str, object]) -> Non
     def vectors(names: str) -> np.ndarray:
         return np.stack([network[names.format(axis)].values for axis in "xy"], axis=1)
 
-    network = network.squeeze()
+    network = network.squeeze([name for name in labels if name in network.dims])  # a mesh may be of one cell
     corners = network[reading.CELL_NODES].transpose("cell", ...).values
     cells = {2: network[reading.SPRING_NODES].transpose("spring", ...).values}
     cells |= {count: corners[(corners >= 0).sum(axis=1) == count][:, :count] for count in (3, 4)}
