@@ -20,6 +20,14 @@ JOBS = {
 }
 SCENES = {"linear": 24, "nonlinear": 25}
 RESULTS = {"SCENES": SCENES, "NETWORKS": {"curve": 16, "moduli": 2, "laying": 4, "contrast": 1} | SCENES}
+STAGES = {
+    "curve": "sensitivity",
+    "linear": "solve",
+    "nonlinear": "solve",
+    "contrast": "stability",
+    "slivers": "stability",
+}
+"""Stages that compute results of a kind."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +41,7 @@ class Row:
     jobs : set of str
         Names of the jobs that run then, and no others.
     solved : dict
-        Results that are computed then, by kind of task, and no others.
+        Results that are computed then, by stage, and no others.
     cores : int
         Cores of the run.
     """
@@ -53,7 +61,8 @@ def row(change, jobs="", solved=None, cores=1):
     """Row of the table, its capitals written out."""
     counts = {}
     for name, count in (solved or {}).items():
-        counts |= RESULTS.get(name) or {name: count}
+        for kind, one in (RESULTS.get(name) or {name: count}).items():
+            counts[STAGES.get(kind, kind)] = counts.get(STAGES.get(kind, kind), 0) + one
     return Row(change, {job for name in jobs.split() for job in JOBS.get(name, name).split()}, counts, cores)
 
 
@@ -127,7 +136,7 @@ TABLE = yaml.safe_load(Path(__file__).with_name("rows.yaml").read_text())
 STUDY = {name: row(**one | {"change": change_of(one["change"])}) for name, one in TABLE["study"].items()}
 DAMAGE = {"deleted": Path.unlink, "with a bit flipped": flip, "cut": cut}
 EMPTY = {"empty": lambda path: path.write_bytes(b"")}
-NOTES = {"task file": "tasks/solve_0.json", "bundles": "tasks/bundles.json", "costs": "../costs.json"}
+NOTES = {"task file": "tasks/solve_0.json"}
 STORED = (
     {
         f"{what} {called}": row(partial(first, how, one["path"]), one["jobs"], one.get("solved"))

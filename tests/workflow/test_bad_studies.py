@@ -101,7 +101,7 @@ def test_a_bad_mesh_file_costs_its_own_scenes_alone(run):
             assert (scenes.status.sel(mesh_type=mesh_type) == st.Status.SOLVED).all()
             assert scenes.particles.sel(mesh_type=mesh_type) > 0
         for mesh_type, why in (
-            ("cut", "cut.vtu: meshio cannot read it"),
+            ("cut", "cut.vtu: cannot be read: it is damaged"),
             ("lost", "points with coordinates that are no"),
         ):
             lost = scenes.sel(mesh_type=mesh_type)

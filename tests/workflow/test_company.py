@@ -1,7 +1,6 @@
 """A result depends on its own key alone: not on what is computed along with it, before it, or was stored already."""
 
 import copy
-import json
 import random
 
 import h5py
@@ -65,14 +64,13 @@ def results(folder):
     found = {}
     for path in sorted(folder.rglob("*.h5")):
         for key, result in store.read(path, store.stored(path)).items():
-            found[path.parent.name, path.stem, key] = {
+            found[path.parent.relative_to(folder).name, path.stem, key] = {
                 name: repr(value) for name, value in result.items() if not name.endswith(TIMES)
             }
         with h5py.File(path) as file:
             for key in set(file) - {store.SCALARS}:
-                of_key = found[path.parent.name, path.stem, key]
+                of_key = found[path.parent.relative_to(folder).name, path.stem, key]
                 of_key |= {name: (array.shape, array[()].tobytes()) for name, array in file[key].items()}
-    found["calibration"] = json.loads((folder / "calibration.json").read_text())
     return found
 
 
