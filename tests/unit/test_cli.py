@@ -120,14 +120,11 @@ class TestSizesOfAnotherUnit:
         assert found.stderr.count("warning: beam '200000x40000': its longer side is 200 m, more than 100 m") == 1
 
 
-def test_shells_complete_commands_and_values(monkeypatch):
+def test_shells_complete_commands_and_options(monkeypatch):
     monkeypatch.chdir(CONFIG.parent)
     assert completed("springtune ", 1) == [f"plain,{name}" for name in COMMANDS]
     assert completed("springtune scenes config/p", 2) == ["file,config/p"]
     assert completed("springtune scenes elsewhere/", 2) == ["file,elsewhere/"]
-    assert completed("springtune predict --mesh f", 3) == ["plain,free"]
-    assert completed("springtune predict --mesh my.m", 3) == ["file,my.m"]
-    assert completed("springtune predict --material s", 3) == ["plain,steel"]
     assert "plain,--beam" in completed("springtune predict --", 2)
 
 
