@@ -9,16 +9,15 @@ import pytest
 import xarray as xr
 import yaml
 from click.testing import CliRunner
-from springtune.studies.runs.task_costs import TaskCosts
 
 import springtune as st
 from springtune.cli import main
 from springtune.mesh import write_mesh
-from springtune.studies.archive import verify
 from springtune.studies.config.kind import outputs
 from springtune.studies.kinds import collect
 from springtune.studies.kinds.moduli.figures import definitions
 from springtune.studies.kinds.scenes import stored
+from springtune.studies.kinds.shapes import mesh
 from springtune.studies.kinds.shapes.expand import READ_AT_ONCE
 from springtune.studies.kinds.shapes.kind import mesh_key, reference_task, scene_task
 from springtune.studies.kinds.shapes.task_values import ONE_LOAD, geometry, named, shape_of
@@ -26,7 +25,6 @@ from springtune.studies.kinds.shapes.task_values import load as values_of
 from springtune.studies.output import page
 from springtune.studies.output.dataset import STATUS
 from springtune.studies.output.export import export
-from springtune.studies.runs import driver, store
 from springtune.studies.runs.plan import plan, table_files
 from springtune.studies.runs.workload import results_of
 
@@ -40,10 +38,10 @@ COOK = STUDIES["shapes"]
 def done(study, folder):
     """Tree of the dataset of a study, its groups and its folder; all stages run in this process."""
     do_stages(study, folder)
-    made, told = collect.run(study, study.path, folder, folder / "dataset.nc")
-    with xr.open_datatree(made, engine="netcdf4") as tree:
+    collect.run(study, study.path, folder, folder / "dataset.nc")
+    with xr.open_datatree(folder / "dataset.nc", engine="netcdf4") as tree:
         tree.load()
-    return tree, told.read_text()
+    return tree, (folder / "summary.txt").read_text()
 
 
 # -- what a study may hold ---------------------------------------------------------------------------------------------
@@ -51,7 +49,7 @@ def done(study, folder):
 
 def test_a_study_of_nothing_is_told_what_it_may_have(refusal):
     text = "title: nothing\nmaterials: {one: {young_modulus: 1 MPa, poisson_ratio: 0.3}}\n"
-    others = "or 'laying', 'stability', 'benchmark', 'samples', 'refine', 'shapes' and 'shape_grids'"
+    others = "or 'laying', 'stability', 'benchmark', 'samples', 'shapes' and 'shape_grids'"
     assert f"'beams' is missing; give a section for each beam, by name; see below, {others}" in refusal(text)
     shapes = COOK.partition("shape_grids:")[0]
     assert "'shape_grids' is missing; give a section" in refusal(shapes)
@@ -178,21 +176,6 @@ def test_a_study_of_shapes_alone_has_all_its_pages(cook, tmp_path):
     rows = (tmp_path / "shapes.csv").read_text().splitlines()
     assert len(rows) == 1 + 2 * len(study.parts["shapes"].scenes)
     assert "Sources: cook, tip: somebody." in (tmp_path / "index.html").read_text()
-
-
-def test_scenes_of_shapes_are_made_again(cook, tmp_path):
-    """The same numbers, whichever are drawn; a number that is not what its scene gives is found."""
-    study, tree, _ = cook
-    beside = study.path.parent
-    made = list(verify.again(beside / "results/study", beside, 1, 0))
-    assert len(made) == 1 and made[0].agrees and made[0].before == "solved"
-    names = {one.name for one in study.parts["shapes"].scenes}
-    assert made[0].labels in names and "cook_free_8mm_third_shear_lattice_linear" in names
-    other = tree.copy(deep=True)
-    other["shapes"].value.loc[{"mesh_size": 8e-3, "definition": "lattice", "quantity": "tip"}] *= 1 + 1e-5
-    other.to_netcdf(tmp_path / "dataset.nc")
-    wrong = [one.labels for one in verify.again(tmp_path, beside, 9, 0) if not one.agrees]
-    assert wrong == ["cook_free_8mm_third_shear_lattice_linear"]
 
 
 def test_networks_that_are_drawn_are_stored(cook):
@@ -454,19 +437,12 @@ def test_twins_are_counted_as_often_as_they_are_computed(load, tmp_path):
     assert asked == {"shape_reference": 1, "shape_mesh": 2, "shape_solve": 4}
 
 
-def test_scenes_whose_mesh_was_beyond_limits_are_solved_once_these_are_raised(load, tmp_path):
-    class Limited(TaskCosts):
-        limits = "1 s"
-
+def test_scenes_whose_mesh_could_not_be_made_are_holes_that_say_why(load, tmp_path):
     study = load(COOK.replace("[16 mm, 8 mm]", "16 mm").replace("linear}", "linear, reference: false}"))
     jobs = {job.stage.name: job for job in plan(study, tmp_path / "results/study", 1).jobs.values()}
-    mesh, solve = jobs["shape_mesh"], jobs["shape_solve"]
-    driver.gone(mesh.stage.module, mesh.content, "shape_cook_free_16mm", "not done", "1 s")
-    driver.run(solve.stage.module, solve.content, Limited())
-    (path,) = (tmp_path / "results/study/solutions").iterdir()
-    assert store.stored(path, "1 s") and not store.stored(path, "1 min")
+    mesh.crashed(jobs["shape_mesh"].content, "shape_cook_free_16mm", "it died")
     tree, told = done(study, tmp_path / "results/study")
-    assert "2 solved" in told
+    assert "2 failed" in told and set(tree["shapes"].message.values.ravel()) == {"mesh: it died"}
 
 
 def test_a_scene_that_cannot_be_stated_is_a_hole(load, tmp_path):
@@ -520,7 +496,7 @@ def test_errors_of_rubber_are_against_its_law_at_finite_strain(load, tmp_path):
 def test_datasets_without_beams_say_where_their_networks_and_tables_are(load, tmp_path):
     study = load(COOK.replace("kinematics: linear", "kinematics: linear, reference: false").replace(", 8 mm]", "]"))
     tree, _ = done(study, tmp_path / "results/study")
-    with pytest.raises(ValueError, match="group '/': it has no variables; give one of shapes, shape_fields"):
+    with pytest.raises(ValueError, match="--group /: the group has no variables; give one of shapes, shape_fields"):
         export(tree, tmp_path / "table.csv")
     with pytest.raises(ValueError, match="nor has its study beams; 'shape_fields' has those of shapes: take"):
         st.field(tree, shape="cook")

@@ -38,6 +38,9 @@ def table(tree: xr.DataTree, group: str = "/") -> pd.DataFrame:
     if name not in known:
         raise RequestError(f"--group {group}: the dataset has no such group; {nearest(name, known)}")
     data = tree[name].to_dataset().reset_coords()
+    if not data.variables:
+        others = ", ".join(node.path.strip("/") for node in tree.subtree if node.data_vars)
+        raise RequestError(f"--group {group}: the group has no variables; give one of {others}")
     rows = 1
     for size in data.sizes.values():
         rows *= size
