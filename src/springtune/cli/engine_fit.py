@@ -1,21 +1,19 @@
 """`springtune predict --engine`: what to type into an engine at its setting, or within a frame's time."""
 
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import replace
 from functools import partial, reduce, wraps
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from .. import __version__
 from ..problem.compare import error_text
 from ..safe_io.tables import aligned
 from .options import AnyCommand, SheetOptions, Unmet, asked_quantity
-from .recommendation import json_text
 
 if TYPE_CHECKING:
     from ..engines.base import Setting
-    from ..engines.budget import BudgetChoice, BudgetSearch
+    from ..engines.budget import BudgetSearch
     from ..engines.calibration import EngineFit
     from ..handover.net import SpringNet
 
@@ -83,8 +81,8 @@ def engine_options(command: AnyCommand) -> AnyCommand:
 
 def fitted(
     sheet: SheetOptions, asked: EngineOptions, load: str | None, loads: str | None, springs_alone: bool
-) -> "tuple[str, str, EngineFit | None]":
-    """Text and JSON of a calibration, or of a search within a budget, and what is found."""
+) -> "tuple[str, EngineFit | None]":
+    """Text of a calibration, or of a search within a budget, and what is found."""
     from ..engines.base import ENGINES
     from ..engines.budget import fit_budget, graded_meshes, runnable
     from ..engines.calibration import WITHIN, fit_engine
@@ -117,8 +115,7 @@ def fitted(
         limit = asked_quantity("--budget", asked["budget"], "time")
         how |= {"budget": limit, "dt": setting.dt, "precision": setting.precision, "scale": scale}
         search = fit_budget(*case, engine=engine, springs_alone=springs_alone, **how)
-        found = {"budget": limit, "chosen": 0 if search.best else None, "tried": [choice_json(one) for one in search]}
-        return budget_text(search), json_text(found), best.fit if (best := search.best) else None
+        return budget_text(search), search.best.fit if search.best else None
     body, *others = case
     make = partial(Scene, body, make_mesh(), *others, scale=scale)
     tried: tuple[str, ...] = ()
@@ -130,7 +127,7 @@ def fitted(
         raise Unmet(refused)
     fit = fit_engine(scenes[0], engine, setting, **how)
     text = fit_text(fit, mesh_name) + (f"\n\nTried: {', '.join(tried)}." if tried else "")
-    return text, json_text(fit_json(fit) | {"tried": list(tried)}), fit
+    return text, fit
 
 
 def net_of_fit(fit: "EngineFit | None", _: str) -> "SpringNet":
@@ -168,29 +165,3 @@ def budget_text(search: "BudgetSearch") -> str:
         least = error_text(search[0].worst).lstrip("+")
         return f"No stiffness makes any of them right; the nearest is off by {least}. Take a larger budget."
     return f"{search!r}\n\nchosen, the least error at worst:\n{fit_text(search.best.fit, search.best.mesh)}"
-
-
-def choice_json(one: "BudgetChoice") -> dict[str, Any]:
-    """Content of a choice of a search in SI units."""
-    return fit_json(one.fit) | {"mesh": one.mesh, "frame_seconds": one.frame_seconds, "worst": one.worst}
-
-
-def fit_json(fit: "EngineFit") -> dict[str, Any]:
-    """Content of a calibration in SI units."""
-    found, about = fit.result, fit.scene.statement
-    result = "engine", "displacement", "reference", "error", "status", "frame_seconds"
-    rows = fit.typed_rows()
-    return {
-        "springtune": __version__,
-        "body": about.body,
-        "load": fit.scene.load,
-        "size": about.size,
-        "definition": fit.scene.definition.name,
-        "setting": asdict(found.setting),
-        "factor": fit.factor,
-        "typed": {name: {"value": value, "unit": unit, "formula": formula} for name, value, unit, formula in rows},
-        "error_without_factor": fit.untuned.error,
-        "message": fit.message,
-        "loads": [asdict(one) | {"sizes": [*one.sizes], "errors": [*one.errors]} for one in fit.bands],
-        "needed": [asdict(one) for one in fit.needed],
-    } | {name: getattr(found, name) for name in result}

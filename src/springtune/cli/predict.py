@@ -48,7 +48,7 @@ ASKED = re.compile(
         'springtune predict --beam 200x40 --error "1 %" --loads traction,bending --material steel',
         'springtune predict --beam 200x40 --error "2 %" --material steel --mesh structured,free --springs-alone '
         "--write net.csv",
-        'springtune predict --beam 80x10 --mesh free --size "1 mm" --young "3 GPa" --poisson 0.4 --json',
+        'springtune predict --beam 80x10 --mesh free --size "1 mm" --young "3 GPa" --poisson 0.4',
         'springtune predict --beam 80x10 --mesh graded.msh --unit "1 mm" --material rubber',
         'springtune predict --shape config/shapes.yaml:cook --load shear --size "2 mm" --material third',
         'springtune predict --shape config/shapes.yaml:cook --material third --error "2 %"',
@@ -73,7 +73,6 @@ ASKED = re.compile(
 @click.option("--springs-alone", is_flag=True, help="Recommend what needs springs alone, no energies besides them.")
 @click.option("--best-springs", is_flag=True, help="Also search for the best springs on the mesh, for some seconds.")
 @engine_options
-@click.option("--json", "as_json", is_flag=True, help="Print everything as JSON, in SI units.")
 @click.option(
     "--write",
     "target",
@@ -88,7 +87,6 @@ def predict(
     loads: str | None,
     springs_alone: bool,
     best_springs: bool,
-    as_json: bool,
     target: Path | None,
 ) -> None:
     """Recommend a definition and its stiffness for one mesh, with its error under some loads; or find the mesh.
@@ -110,8 +108,8 @@ def predict(
         if target is not None:
             check_target("--write", target)
         if engine["engine"] is not None:
-            text, json, fit = fitted(sheet, engine, load, loads, springs_alone)
-            answer = _Answer(lambda: text, lambda: json, "", partial(net_of_fit, fit))
+            text, fit = fitted(sheet, engine, load, loads, springs_alone)
+            answer = _Answer(text, "", partial(net_of_fit, fit))
         elif sheet.shape is not None:
             asked = sheet.asked_shape(load, sized=error is None)
             answer = (
@@ -121,7 +119,7 @@ def predict(
             answer = _on_beam(sheet, loads, springs_alone, also)
         else:
             answer = _find_on_beam(sheet, loads, error, springs_alone)
-        click.echo(answer.json() if as_json else answer.text())
+        click.echo(answer.text)
         if target is None:
             return
         if answer.definition is None:
@@ -130,8 +128,7 @@ def predict(
                 nothing = f"no mesh keeps {error}, so nothing is written; allow a larger error"
             raise Unmet(f"--write: {nothing}")
         net = answer.net(answer.definition)
-        written = written_text(net, net.write(target))
-        click.echo(written if as_json else f"\n{written}", err=as_json)
+        click.echo(f"\n{written_text(net, net.write(target))}")
 
 
 def _in_options(message: str) -> str:
@@ -142,20 +139,18 @@ def _in_options(message: str) -> str:
 class _Answer(NamedTuple):
     """What is printed, the definition that is recommended, and how its springs are made."""
 
-    text: Callable[[], str]
-    json: Callable[[], str]
+    text: str
     definition: str | None
     net: "Callable[[str], SpringNet]"
 
 
 def _found(subject: "Subject", search: "MeshSearch", springs_alone: bool, net: "Callable[[str], SpringNet]") -> _Answer:
     """Answer of a search for a mesh."""
-    from .recommendation import search_json, search_text
+    from .recommendation import search_text
 
     best = search.best_springs if springs_alone else search.best
     return _Answer(
-        lambda: search_text(subject, search, springs_alone),
-        lambda: search_json(subject, search, springs_alone),
+        search_text(subject, search, springs_alone),
         best.choice.definition if best else None,
         net,
     )
@@ -181,7 +176,7 @@ def _on_beam(sheet: SheetOptions, given: str | None, springs_alone: bool, also: 
     from ..mesh import MESH_TYPES
     from ..prediction.bands import extrapolate
     from ..prediction.choices import SOLVED, SOLVED_FROM_FILE, predict, references
-    from .recommendation import beam_subject, prediction_json, prediction_text, recommended
+    from .recommendation import beam_subject, prediction_text, recommended
 
     beam, material, loads = _asked_beam(sheet, given)
     mesh_type, edge = sheet.mesh_or_file, sheet.edge(beam)
@@ -210,12 +205,9 @@ def _on_beam(sheet: SheetOptions, given: str | None, springs_alone: bool, also: 
         about = {"particles": len(solved.points), "springs": len(solved.edges)}
         found = predict(beam, solved, material, known, loads=loads, also=also)
     found = _kept(found, springs_alone)
-    file = mesh_type if edge is None else None
-    mesh_json = {"type": None if file else mesh_type, "file": file, "size": edge} | about
     subject = beam_subject(beam, material, known)
     return _Answer(
-        lambda: prediction_text(subject, name, about, found, sizes),
-        lambda: prediction_json(subject, mesh_json, found, sizes),
+        prediction_text(subject, name, about, found, sizes),
         recommended(found)[0],
         lambda definition: SpringNet.from_mesh(
             solved or make(), material, definition, beam=beam, mesh_name=name, loads=loads
@@ -227,7 +219,7 @@ def _on_shape(asked: "AskedShape", springs_alone: bool, also: tuple[str, ...]) -
     """Recommend a definition for a mesh of a shape."""
     from ..prediction.choices import SOLVED_FROM_FILE, predict, shape_references
     from ..scene.statements import ShapeStatement
-    from .recommendation import prediction_json, prediction_text, recommended, shape_subject
+    from .recommendation import prediction_text, recommended, shape_subject
 
     grouped = asked.mesh()
     about = {"particles": len(grouped.mesh.points), "springs": len(grouped.mesh.edges)}
@@ -240,12 +232,9 @@ def _on_shape(asked: "AskedShape", springs_alone: bool, also: tuple[str, ...]) -
     statement = ShapeStatement(asked.shape, grouped, asked.materials, asked.load, 1.0, "linear")
     known = shape_references(statement)
     found = _kept(predict(asked.shape, grouped, asked.materials, known, load=asked.load, also=also), springs_alone)
-    file = asked.shape.file if asked.size is None else None
-    mesh_json = {"type": None if file else "free", "file": file, "size": asked.size} | about
     subject = shape_subject(statement, known)
     return _Answer(
-        lambda: prediction_text(subject, asked.mesh_name, about, found),
-        lambda: prediction_json(subject, mesh_json, found),
+        prediction_text(subject, asked.mesh_name, about, found),
         recommended(found)[0],
         partial(net_of_shape, asked),
     )

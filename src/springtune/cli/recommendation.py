@@ -1,14 +1,12 @@
-"""Text and JSON of `springtune predict`."""
+"""Text of `springtune predict`."""
 
-import json
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .. import __version__
 from ..problem.compare import error_text, sign_sentence, sign_word
 from ..problem.geometry import size_text
 from ..problem.shapes import QUANTITY_UNITS
@@ -16,7 +14,7 @@ from ..safe_io.tables import TabledList, aligned
 
 if TYPE_CHECKING:
     from ..prediction.choices import Choice, References, ShapeReferences
-    from ..prediction.search import MeshChoice, MeshSearch
+    from ..prediction.search import MeshSearch
     from ..problem.geometry import Beam
     from ..problem.materials import Material
     from ..scene.statements import ShapeStatement
@@ -28,7 +26,7 @@ MEANT = "Errors are (network - reference) / |reference| of"
 class Subject:
     """A beam under loads, or a shape under a load case, as a prediction names it.
 
-    `name` and `made_of` (material, thickness) are texts, `about` is the same as JSON. `known` are references by load,
+    `name` and `made_of` (material, thickness) are texts. `known` are references by load,
     of a shape by quantity, `compared` their values and kinds; `meaning` says what an error is of, `sign` what its sign
     means. `dense`: all materials have a density, so that there are largest time steps. Only shapes have a `load`, only
     beams rows of a table of `references`.
@@ -36,7 +34,6 @@ class Subject:
 
     name: str
     made_of: str
-    about: dict[str, Any]
     known: "References | ShapeReferences"
     compared: dict[str, tuple[float, str]]
     load: str
@@ -44,6 +41,7 @@ class Subject:
     sign: list[str]
     dense: bool
     references: list[list[str]]
+    plane_strain: bool = False
 
     @property
     def estimate(self) -> str:
@@ -65,18 +63,12 @@ def beam_subject(beam: "Beam", material: "Material", known: "References") -> Sub
     if material.plane == "strain":
         sheet = material.in_plane
         made_of += f", plane strain: in the plane {constants(sheet)}, nu = {sheet.poisson_ratio:.4g}"
-    references = {
-        load: {"message": found}
-        if isinstance(found, str)
-        else {"displacement_per_newton": float(found.displacement), "error_estimate": found.error_estimate}
-        for load, found in known.items()
-    }
-    about = {"beam": asdict(beam), "material": asdict(material), "loads": list(known), "references": references}
     signs = {load: LOADS[load].sign for load in known}
     meaning = f"{MEANT} the displacement of the loaded side"
     compared = {load: (sign, "displacement") for load, sign in signs.items()}
     sign = [f"Of errors, {sign_sentence(signs)}."]
-    return Subject(beam.label, made_of, about, known, compared, "", meaning, sign, material.density is not None, [])
+    dense, strain = material.density is not None, material.plane == "strain"
+    return Subject(beam.label, made_of, known, compared, "", meaning, sign, dense, [], strain)
 
 
 def shape_subject(statement: "ShapeStatement", known: "ShapeReferences") -> Subject:
@@ -87,16 +79,6 @@ def shape_subject(statement: "ShapeStatement", known: "ShapeReferences") -> Subj
     of = "errors" if len(moved) == len(compared) else "errors of displacements"
     sign = [f"Of {of}, {sign_sentence(moved, 'of')}."] if moved else []
     sides = np.ptp(statement.mesh.points, axis=0).tolist()
-    about = {
-        "shape": statement.shape.name,
-        "extent": sides,
-        "load": statement.load,
-        "thickness": statement.thickness,
-        "materials": {part: asdict(one) for part, one in statement.by_part.items()},
-        "references": {
-            name: {"message": found} if isinstance(found, str) else found._asdict() for name, found in known.items()
-        },
-    }
     references = [
         [name, f"{found.value:.6g} {QUANTITY_UNITS[kind[name]]}", f"{100 * found.error_estimate:.1g} %"]
         for name, found in known.items()
@@ -105,7 +87,6 @@ def shape_subject(statement: "ShapeStatement", known: "ShapeReferences") -> Subj
     return Subject(
         f"{statement.shape.name}, load {statement.load}",
         f"{size_text(*sides)}, {statement.named_materials}, t = {1e3 * statement.thickness:g} mm",
-        about,
         known,
         compared,
         statement.load,
@@ -128,7 +109,7 @@ def prediction_text(
     heads, *rows = TabledList(choices).table()
     kept = [place for place, head in enumerate(heads) if of_beam or head not in ("E", "nu")]
     rows = [[row[place] for place in kept] for row in (heads, *rows)]
-    if of_beam and subject.about["material"]["plane"] == "strain":
+    if subject.plane_strain:
         rows[0] = ["nu in plane" if head == "nu" else head for head in rows[0]]
     notes = [f"{name}: no reference; {found}" for name, found in subject.known.items() if isinstance(found, str)]
     for choice in choices:
@@ -210,44 +191,6 @@ def search_text(subject: Subject, search: "MeshSearch", springs_alone: bool = Fa
     return "\n".join([*lines, *explained, *notes])
 
 
-def prediction_json(
-    subject: Subject, mesh: dict[str, Any], choices: "Sequence[Choice]", sizes: Sequence[float] = ()
-) -> str:
-    """A prediction as JSON; numbers that are missing are null, and those of a band are lists of two."""
-    first, plain = recommended(choices)
-    return json_text(
-        {"springtune": __version__}
-        | subject.about
-        | {"mesh": mesh}
-        | ({} if subject.load else {"extrapolated_from": list(sizes)})
-        | {
-            "recommended": first,
-            "recommended_springs_alone": plain,
-            "tried": list(choices[0].tried) if choices else [],
-            "choices": [_choice_json(choice) for choice in choices],
-        }
-    )
-
-
-def search_json(subject: Subject, search: "MeshSearch", springs_alone: bool = False) -> str:
-    """A search for a mesh as JSON; numbers that are missing are null."""
-
-    def one_json(one: "MeshChoice | None") -> dict[str, Any] | None:
-        if one is None:
-            return None
-        own = {name: getattr(one, name) for name in ("mesh_type", "size", "cells", "particles", "springs", "confirmed")}
-        kept = {"finer_sizes": [finer.size for finer in one.finer]}
-        return own | kept | {"seconds": one.seconds, "step_limit": one.step_limit, "choice": _choice_json(one.choice)}
-
-    found = {"springtune": __version__} | subject.about | {"error": search.error, "most": search.most}
-    if not springs_alone:
-        found["recommended"] = one_json(search.best)
-        found["by_type"] = {name: one_json(one) for name, one in search.by_type.items()}
-    found["recommended_springs_alone"] = one_json(search.best_springs)
-    found["springs_by_type"] = {name: one_json(one) for name, one in search.springs_by_type.items()}
-    return json_text(found | {"tried": [asdict(one) for one in search.tried]})
-
-
 def recommended(choices: "Sequence[Choice]") -> tuple[str | None, str | None]:
     """The best definition, and the best with springs alone; None if there is none."""
     solved = [choice for choice in choices if choice.worst < math.inf]
@@ -312,24 +255,3 @@ def _nearest(search: "MeshSearch", mesh_type: str, springs_alone: bool) -> str:
             f"none up to {most:,} particles; {where} keeps it, {100 * worst:.3g} % off at worst, but finer ones do not"
         )
     return f"none up to {most:,} particles; nearest is {where}, {100 * worst:.3g} % off at worst"
-
-
-def _choice_json(choice: "Choice") -> dict[str, Any]:
-    found = asdict(choice) | {"worst": choice.worst}
-    del found["tried"]  # of all choices together
-    return found
-
-
-def json_text(content: dict[str, Any]) -> str:
-    """Content as JSON; numbers that are missing are null."""
-
-    def plain(value: Any) -> Any:
-        if isinstance(value, dict):
-            return {name: plain(one) for name, one in value.items()}
-        if isinstance(value, list | tuple):
-            # A band with a missing bound is missing.
-            numbers = [plain(one) for one in value]
-            return None if isinstance(value, tuple) and None in numbers else numbers
-        return None if isinstance(value, float) and not math.isfinite(value) else value
-
-    return json.dumps(plain(content), indent=2, ensure_ascii=False)
