@@ -135,7 +135,7 @@ def stability():
 
 def benchmark():
     labels = {
-        "scene": ["traction", "bending"], "approach": ["delingette/structured", "relaxation", "calculix-cps3"],
+        "scene": ["traction", "bending"], "approach": ["delingette/structured", "condensation", "calculix-cps3"],
         "mesh_size": SIZES, "curve_count": [1, 11],
     }  # fmt: skip
     cell = ("scene", "approach", "mesh_size")

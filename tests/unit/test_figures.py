@@ -261,8 +261,8 @@ def test_a_heat_map_shows_the_finest_mesh_that_was_solved(tree):
 
 def test_an_approach_carries_its_errors_and_seconds(tree):
     panel = st.plot_benchmark(tree, scene="bending")
-    here = tree["benchmark"].to_dataset().sel(scene="bending", approach="relaxation")
-    line = drawn(panel, "in motion")
+    here = tree["benchmark"].to_dataset().sel(scene="bending", approach="condensation")
+    line = drawn(panel, "other")
     assert line.get_xdata() == pytest.approx(here.seconds.values)
     assert line.get_ydata() == pytest.approx(100 * here.error.values)
 

@@ -14,7 +14,7 @@ from ..output import dataset, summary
 from ..runs import job, provenance, rerun
 from ..runs.keys import CODE_FILE, OURS
 from ..runs.plan import plan
-from ..runs.stages import results
+from ..runs.stages import rows
 from ..runs.store import DamagedError
 from . import load_study
 
@@ -54,20 +54,10 @@ def group_of(kind: "Kind") -> dataset.Group:
 
 def _of_tasks(kind: "Kind", study: "Study", folder: Path) -> dict[str, xr.Dataset]:
     """Group of a kind whose tasks have cells of it."""
-    group = group_of(kind)
-    found = dataset.Filler(group.empty(study.axes))
-    found.data.attrs = dict(kind.attributes(study.parts[kind.name]))
-    used = {dimension for dimensions, *_ in kind.variables.values() for dimension in dimensions}
-    for stage in kind.stages:
-        assert stage.tasks
-        labels = next(iter(stage.tasks(study))).labels
-        if used <= {name for name, label in labels.items() if not isinstance(label, list)}:  # a cell a task
-            for task, result in results(stage, study, folder):
-                found.put(result, **task.labels)
-        else:
-            for task, result in results(stage, study, folder, kind.variables):
-                found.put_arrays(result, task.labels)
-    return {group.name: found.data}
+    group, stages = group_of(kind), kind.stages
+    found = group.of_rows(study.axes, (row for stage in stages for row in rows(stage, study, folder)))
+    found.attrs = dict(kind.attributes(study.parts[kind.name]))
+    return {group.name: found}
 
 
 def gathered(study: "Study", folder: Path) -> dict[str, xr.Dataset]:

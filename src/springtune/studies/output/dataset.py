@@ -2,7 +2,7 @@
 
 import os
 import shutil
-from collections.abc import Collection, Hashable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
@@ -11,6 +11,7 @@ from typing import Any
 import h5netcdf
 import h5py
 import numpy as np
+import pandas as pd
 import xarray as xr
 from xarray.backends import BackendArray
 from xarray.core import indexing
@@ -79,6 +80,21 @@ class Group:
                 values = values.astype(object)
             coordinates[dimension] = (dimension, values, {"long_name": long_name, "units": units})
         return xr.Dataset(data, coordinates)
+
+    def of_rows(
+        self,
+        axes: Mapping[str, Sequence[Label]],
+        rows: Iterable[Mapping[str, object]],
+        names: Collection[str] | None = None,
+    ) -> xr.Dataset:
+        """Create the dataset of rows of labels and values; each value goes to the labels that its variable has."""
+        frame, data = pd.DataFrame([*rows]), self.empty(axes, names)
+        for name in frame.columns.intersection([*data]):
+            dimensions = [str(one) for one in data[name].dims]
+            cells = frame[[*dimensions, name]].dropna()
+            places = {one: xr.DataArray(cells[one].array, dims="row") for one in dimensions}
+            data[name].loc[places] = cells[name].array if dimensions else cells[name].iloc[-1]
+        return data
 
     def over(self, further: Mapping[str, Sequence[str]], without: Collection[str] = ()) -> "Group":
         """Copy with further dimensions."""

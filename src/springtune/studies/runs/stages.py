@@ -110,3 +110,10 @@ def results(
     found = {name: store.read(folder / stage.folder / f"{name}.h5", held, fields) for name, held in files.items()}
     for task, key in zip(tasks, keys):
         yield task, dict(found[task.file or key][key])
+
+
+def rows(stage: Stage, study: "Study", folder: Path) -> Iterator[dict[str, Any]]:
+    """Rows of the stored results of a stage, each with the labels of its task."""
+    for task, result in results(stage, study, folder):
+        for row in result.get("rows", [result]):
+            yield {**task.labels, **row}

@@ -6,9 +6,6 @@ from springtune.mesh import MESH_TYPES
 from springtune.springs import DEFINITIONS
 
 OTHER_APPROACHES = (
-    "relaxation",
-    "backward-euler",
-    "truncated-backward-euler",
     "linear-triangles",
     "quadratic-triangles",
     "tensor-mass",

@@ -10,12 +10,9 @@ from functools import partial
 import numpy as np
 
 from springtune.linalg.factors import factorize
-from springtune.mechanics.dynamics import relax
-from springtune.mechanics.integrators import BackwardEuler
 from springtune.mesh import structured
 from springtune.problem.boundary import held, measured, weights
 from springtune.reference import calculix
-from springtune.scene.motion import motion_of
 from springtune.scene.sheet import Sheet
 
 
@@ -39,38 +36,6 @@ def _problem(scene, mesh, definition):
     springs = replace(sheet.derive(definition, scene.material)[0], lateral=0.0)
     sheet.measured(scene.kind)
     return sheet, springs, sheet.problem(scene.kind, springs)
-
-
-def _delingette(scene, size, clock):
-    """Sheet, springs and static problem of `delingette`."""
-    mesh = _mesh(scene, size, clock)
-    with clock("assembling"):
-        return _problem(scene, mesh, "delingette")
-
-
-def _at_rest(found):
-    if found.status != "rest":
-        raise ArithmeticError(found.message)
-    return found.displacements
-
-
-def relaxation(scene, size, clock):
-    """`delingette` by dynamic relaxation to 1e-8."""
-    sheet, springs, problem = _delingette(scene, size, clock)
-    with clock("solving"):
-        load = scene.force / springs.reference * sheet.weights(scene.kind)
-        found = relax(problem.network, load, linear=True, tolerance=1e-8)
-    return sheet.displacement(scene.kind, _at_rest(found)), problem.network.unknowns
-
-
-def backward_euler(scene, size, clock, iterations=None):
-    """`delingette` in time by backward Euler, steps of 10 ms, to rest; with iterations by conjugate gradients."""
-    sheet, springs, problem = _delingette(scene, size, clock)
-    with clock("assembling"):
-        motion = motion_of(sheet, scene.kind, springs, scene.material.density, scene.force, linear=True)
-    with clock("solving"):
-        found = motion.run(BackwardEuler(iterations=iterations), 0.01, 500, rest=1e-6)
-    return sheet.displacement(scene.kind, _at_rest(found)), problem.network.unknowns
 
 
 def _mesh(scene, size, clock):
@@ -183,8 +148,9 @@ def tensor_mass(scene, size, clock):
 
 def condensation(scene, size, clock):
     """Responses of the loaded side to unit loads, computed once (``factorizing``); a load then costs a product."""
-    sheet, springs, problem = _delingette(scene, size, clock)
+    mesh = _mesh(scene, size, clock)
     with clock("assembling"):
+        sheet, springs, problem = _problem(scene, mesh, "delingette")
         problem.network.tangent()
     with clock("factorizing"):
         net, factor = problem.network, problem.network.rest_factor
@@ -320,9 +286,6 @@ def calculix_cps8(scene, size, clock):
 
 
 APPROACHES = {
-    "relaxation": relaxation,
-    "backward-euler": backward_euler,
-    "truncated-backward-euler": partial(backward_euler, iterations=25),
     "linear-triangles": partial(triangles, degree=1),
     "quadratic-triangles": partial(triangles, degree=2),
     "tensor-mass": tensor_mass,

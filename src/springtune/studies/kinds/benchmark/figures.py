@@ -14,7 +14,6 @@ APPROACH_FAMILIES = {
     "springs and energies": style.line(0) | {"linestyle": "-"},
     "finite elements": style.line(3) | {"linestyle": "-"},
     "CalculiX": style.line(4) | {"linestyle": "-"},
-    "in motion": style.line(2) | {"linestyle": "-"},
     "other": style.line(5) | {"linestyle": "-"},
 }
 """Colour and marker of each family of approaches."""
@@ -22,7 +21,7 @@ APPROACH_FAMILIES = {
 WITH_ENERGIES = ("area", "angular", "delingette", "delingette-tensile", "ielsm", "many-body", "neo-hooke",
                  "normal-shear", "patch-area")  # fmt: skip
 SHOWN = ("delingette/structured", "van-gelder/structured", "area/braced", "linear-triangles", "quadratic-triangles",
-         "boundary-elements", "tensor-mass", "relaxation", "calculix-cps3", "calculix-cps8")  # fmt: skip
+         "boundary-elements", "tensor-mass", "calculix-cps3", "calculix-cps8")  # fmt: skip
 """Approaches with names before others."""
 
 RING = {"markersize": 7, "markerfacecolor": "none", "markeredgecolor": "black", "markeredgewidth": 0.8}
@@ -47,7 +46,7 @@ def family(approach):
         return "CalculiX"
     if approach.endswith("triangles"):
         return "finite elements"
-    return "in motion" if approach in ("relaxation", "backward-euler", "truncated-backward-euler") else "other"
+    return "other"
 
 
 def benchmark(tree):

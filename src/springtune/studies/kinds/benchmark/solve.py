@@ -5,9 +5,11 @@ The first run of a case imports and reads what the approach needs, and does not 
 
 import time
 import traceback
+from collections import defaultdict
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
-from itertools import product
+from functools import partial
+from itertools import chain, product
 
 import numpy as np
 
@@ -16,7 +18,7 @@ from springtune.mechanics.series import trace
 from springtune.mechanics.stepping import make_stepper
 from springtune.mesh import MESH_TYPES
 from springtune.problem.boundary import weights
-from springtune.problem.compare import assured
+from springtune.problem.compare import assured, deformation_error
 from springtune.problem.geometry import Beam
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import Material, material_of
@@ -49,21 +51,24 @@ CURVE_SIZE = 1e-3
 
 def failed(task, why):
     """Result of a scene of which nothing is measured."""
-    shape = len(task["approaches"]), len(task["mesh_sizes"])
-    return {
-        "status": np.full(shape, Status.FAILED, dtype=np.int8),
-        "message": np.full(shape, why, dtype=object).tolist(),
-    }
+    return {"rows": [labels | _failed(why) for labels in cases(**task)]}
 
 
 def solve(task):
     """Errors and seconds of a scene."""
     scene = LoadedBeam(Beam(**task["beam"]), material_of(task["material"]), task["load"], task["force"])
-    sizes = task["mesh_sizes"]
-    found = measure(scene, task["approaches"], sizes, task["finest"], task["most_seconds"])
+    rows = measure(scene, list(cases(**task)), task["most_seconds"])
     if task["curves"]:
-        found |= curves(scene, max(CURVE_SIZE, min(sizes))) | explicit(scene, sizes)
-    return found | {"message": found["message"].tolist()}
+        rows += [*curves(scene, max(CURVE_SIZE, min(task["mesh_sizes"]))), *explicit(scene, task["mesh_sizes"])]
+    return {"rows": rows}
+
+
+def cases(approaches, mesh_sizes, finest, **_):
+    """Labels of the cases of a scene, from coarse to fine; an approach goes down to its ``finest`` size [m]."""
+    for size in sorted(mesh_sizes, reverse=True):
+        for approach, least in zip(approaches, finest):
+            if size >= least:
+                yield {"approach": approach, "mesh_size": size}
 
 
 @dataclass(frozen=True)
@@ -117,42 +122,40 @@ class Clock:
         self.seconds[part] += time.perf_counter() - begin
 
 
-def measure(scene, approaches, sizes, finest, most_seconds):
-    """All approaches on their sizes [m], from coarse to fine, each down to its ``finest`` [m].
+def measure(scene, cases, most_seconds):
+    """Rows of all cases, which go from coarse to fine, and of the reference.
 
     Where an approach fails it has a status and a message; where it exceeds its seconds finer sizes have.
     """
     seconds, reference = timed(lambda: solve_small_strain(scene.beam, scene.material, scene.force, kind=scene.kind))
-    shape = len(approaches), len(sizes)
-    names = ("displacement", "unknowns", "seconds", *(f"{part}_seconds" for part in PARTS))
-    result = {name: np.full(shape, np.nan) for name in names}
-    result |= {"status": np.zeros(shape, dtype=np.int8), "message": np.full(shape, "", dtype=object)}
-    meshes, beyond = {}, {}
-    for mesh_type in {approach.partition("/")[2] for approach in approaches if "/" in approach}:
+    meshes, beyond, rows = {}, {}, defaultdict(list)
+    for mesh_type in {case["approach"].partition("/")[2] for case in cases if "/" in case["approach"]}:
         MESH_TYPES[mesh_type](1.0, 0.5, 0.25)  # libraries are read
-    for j in reversed(range(len(sizes))):
-        for i, approach in enumerate(approaches):
-            if sizes[j] < finest[i]:
-                continue
-            begin = time.perf_counter()
-            why = beyond.get(approach)
-            found = _failed(why) if why else _case(scene, approach, sizes[j], meshes)
-            if not why and time.perf_counter() - begin > most_seconds:
-                why = f"not run: at {1e3 * sizes[j]:g} mm it took longer than the {most_seconds:g} s of `most_seconds`"
-                beyond[approach] = why
-            for name, value in found.items():
-                result[name][i, j] = value
-    result["error"] = (result["displacement"] - reference.displacement) / abs(reference.displacement)
-    return result | {
-        "assured_error": assured(result["error"]),
+    for case in cases:
+        approach, size = case["approach"], case["mesh_size"]
+        if approach in beyond:
+            found = _failed(beyond[approach])
+        else:
+            taken, found = timed(partial(_case, scene, approach, size, meshes))
+            if taken > most_seconds:
+                limit = f"it took longer than the {most_seconds:g} s of `most_seconds`"
+                beyond[approach] = f"not run: at {1e3 * size:g} mm {limit}"
+        found["error"] = float(deformation_error(found.get("displacement", np.nan), reference.displacement))
+        rows[approach].append(case | found)
+    for own in rows.values():
+        errors = np.array([[row["error"] for row in reversed(own)]])
+        for row, error in zip(reversed(own), assured(errors)[0].tolist()):
+            row["assured_error"] = error
+    about = {
         "reference_displacement": reference.displacement,
         "reference_error_estimate": reference.error_estimate,
         "reference_seconds": seconds,
     }
+    return [about, *chain.from_iterable(rows.values())]
 
 
 def _failed(message, status=Status.FAILED):
-    return {"status": status, "message": message}
+    return {"status": int(status), "message": message}
 
 
 def _case(scene, approach, size, meshes):
@@ -196,15 +199,14 @@ def _repeat(scene, approach, size, meshes):
     if runs[0][0] <= LONG:
         runs = [timed(run) for _ in range(REPETITIONS)]
     displacement, unknowns, _ = runs[0][1]
-    parts = {part: np.median([seconds[part] for _, (*_, seconds) in runs]) for part in PARTS}
-    parts["meshing"] += meshing
-    found = {"displacement": displacement, "unknowns": unknowns, "status": Status.SOLVED}
-    found["seconds"] = np.median([seconds for seconds, _ in runs]) + meshing
-    return found | {f"{part}_seconds": seconds for part, seconds in parts.items()}
+    parts = {f"{part}_seconds": np.median([seconds[part] for _, (*_, seconds) in runs]) for part in PARTS}
+    parts["meshing_seconds"] += meshing
+    found = {"displacement": displacement, "unknowns": unknowns, "status": int(Status.SOLVED), "message": ""}
+    return found | parts | {"seconds": np.median([seconds for seconds, _ in runs]) + meshing}
 
 
 def curves(scene, size):
-    """Seconds of sensitivity curves, shape (n_counts,): as one path, and solve by solve."""
+    """Rows of seconds of sensitivity curves: as one path, and solve by solve."""
     mesh = MESH_TYPES["structured"](scene.beam.length, scene.beam.height, size)
     pattern = weights(mesh, scene.kind)
     membrane = scene.sheet.young_modulus * scene.beam.thickness
@@ -212,36 +214,29 @@ def curves(scene, size):
     def problem():
         return Sheet(mesh, scene.beam.thickness).problem(scene.kind, Springs(1.0, uniform(mesh)))
 
-    together, force = np.zeros(len(CURVE_COUNTS)), scene.force / (COEFFICIENT * membrane)
-    for number, count in enumerate(CURVE_COUNTS):
-        loads = scene.force / (COEFFICIENT * membrane * np.linspace(0.4, 1.6, count))
-        together[number] = median(lambda loads=loads: trace(problem(), pattern, loads))
+    force = scene.force / (COEFFICIENT * membrane)
     one = median(lambda: problem().nonlinear(force))
-    linear = median(lambda: problem().linear(force))
-    apart = one * np.array(CURVE_COUNTS)
-    return {
-        "curve_seconds": together,
-        "separate_seconds": apart,
-        "nonlinear_seconds": one,
-        "linear_seconds": linear,
-    }
+    yield {"nonlinear_seconds": one, "linear_seconds": median(lambda: problem().linear(force))}
+    for count in CURVE_COUNTS:
+        loads = force / np.linspace(0.4, 1.6, count)
+        together = median(lambda loads=loads: trace(problem(), pattern, loads))
+        yield {"curve_count": count, "curve_seconds": together, "separate_seconds": one * count}
 
 
 def explicit(scene, sizes, updates=UPDATES):
-    """Nonlinear springs a second that explicit steps advance, shape (n_sizes, n_threads, n_precisions)."""
-    rates = np.full((len(sizes), len(THREAD_COUNTS), len(PRECISIONS)), np.nan)
-    for j, size in enumerate(sizes):
+    """Rows of the nonlinear springs a second that explicit steps advance."""
+    for size in sizes:
         mesh = MESH_TYPES["structured"](scene.beam.length, scene.beam.height, size)
         sheet = Sheet(mesh, scene.beam.thickness)
         springs, _ = sheet.derive("lattice", scene.material)
         motion = motion_of(sheet, scene.kind, springs, scene.material.density, scene.force)
         step = 0.9 * motion.step_bound("central-difference")
         steps = max(FEWEST_STEPS, round(updates / len(mesh.edges)))
-        for (t, threads), (k, precision) in product(enumerate(THREAD_COUNTS), enumerate(PRECISIONS)):
+        for threads, precision in product(THREAD_COUNTS, PRECISIONS):
             # The steps alone: what a run prepares once is soon less than they are.
             with closing(make_stepper(motion, "central-difference", step, precision, threads)) as stepper:
                 stepper.begin(*np.zeros((2, *motion.load.shape)))
                 stepper.advance(steps)  # with the first ones threads begin
                 seconds = median(lambda stepper=stepper, steps=steps: stepper.advance(steps))
-            rates[j, t, k] = steps * len(mesh.edges) / seconds
-    return {"spring_updates": rates}
+            labels = {"mesh_size": size, "thread_count": threads, "precision": precision}
+            yield labels | {"spring_updates": steps * len(mesh.edges) / seconds}

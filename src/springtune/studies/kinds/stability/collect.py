@@ -4,8 +4,8 @@ import numpy as np
 
 from springtune.mechanics.integrators import BEHAVIOURS
 
-from ...output.dataset import Filler, Group
-from ...runs.stages import results
+from ...output.dataset import Group
+from ...runs.stages import rows
 from .kind import STAGE
 
 SCHEME = ("definition", "mesh_size", "integrator", "damper", "damping_ratio")
@@ -121,9 +121,6 @@ STABILITY = Group(
 
 def groups(study, folder):
     """Groups of a dataset, see `springtune.studies.kinds.scenes.collect.groups`."""
-    found = list(results(STAGE, study, folder, STABILITY.variables))
-    names = {name for _, result in found for name in result} | {"experiment_seconds", "experiment_message"}
-    filler = Filler(STABILITY.empty(study.axes, names))
-    for task, result in found:
-        filler.put_arrays(result, task.labels)
-    return {STABILITY.name: filler.data}
+    found = list(rows(STAGE, study, folder))
+    names = {name for row in found for name in row} | {"experiment_seconds", "experiment_message"}
+    return {STABILITY.name: STABILITY.of_rows(study.axes, found, names)}

@@ -83,7 +83,7 @@ def _tasks(study):
     for one in study.parts["stability"]:
         own = {"beam": beam_key(one.beam), "material": material_key(one.material, density=True)}
         also = mesh_type_key(one.mesh_type), definition_key(one.definition)
-        labels = {"experiment": one.name, "definition": one.definition, "mesh_size": list(one.mesh_sizes)}
+        labels = {"experiment": one.name, "definition": one.definition}
         yield Task(asdict(one) | own, also, labels, one, [(one.name, 0)])
 
 
