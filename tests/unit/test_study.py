@@ -481,7 +481,7 @@ class TestBenchmark:
         text = study_text("benchmark", ("\ngrids", "\n  finest: 5 mm\n  finest_of: {condensation: 2 mm}\ngrids"))
         case = load(text).parts["benchmark"][0]
         assert dict(zip(case.approaches, case.finest))["condensation"] == 2e-3
-        assert {size for name, size in zip(case.approaches, case.finest) if name != "relaxation"} == {5e-3}
+        assert {size for name, size in zip(case.approaches, case.finest) if name != "condensation"} == {5e-3}
         assert set(load(STUDIES["benchmark"]).parts["benchmark"][0].finest) == {2e-3}
 
 
