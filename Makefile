@@ -26,12 +26,10 @@ report: study
 paper: $(VENV)/.run
 	snakemake paper
 
-# Files in this order, those that take longest first: at the end no core waits for the other. The inputs of tests/fuzz are
-# others each day: the line that is printed has their seed, by which `make test FUZZ_SEED=...` makes them again.
+# Files in this order, those that take longest first: at the end no core waits for the other.
 # A process that crashes ends the run: pytest-xdist 3.8 hangs if it starts another one.
-FUZZ_SEED := $(shell date -u +%Y%m%d)
 test: $(VENV)/.test
-	FUZZ_SEED=$(FUZZ_SEED) pytest -n 2 --max-worker-restart 0 --dist loadfile --no-loadscope-reorder -m "not slow" tests/workflow tests/fuzz tests/reruns tests/faults tests/physics tests/unit src
+	pytest -n 2 --max-worker-restart 0 --dist loadfile --no-loadscope-reorder -m "not slow" tests/workflow tests/fuzz tests/reruns tests/faults tests/physics tests/unit src
 	SPRINGTUNE_SOLVER=superlu pytest -q -n 2 -m "not slow" tests/physics/test_statics.py tests/physics/test_path.py tests/physics/test_continuation.py
 
 # The page to browse, in a headless Chromium: apt-get install chromium chromium-driver.
@@ -83,7 +81,7 @@ slow: $(VENV)/.test $(ENGINES)/.done
 	HYPOTHESIS_PROFILE=anew pytest -n 2 -m "not slow" tests/unit tests/physics
 	$(WITH_ENGINES) pytest -n 2 --max-worker-restart 0 --dist loadfile -rs -m slow tests/engines
 	pytest -n 2 tests/faults tests/reruns
-	OPENBLAS_NUM_THREADS=1 python tests/fuzz $(INPUTS) $(SEED)
+	OPENBLAS_NUM_THREADS=1 python tests/fuzz/fuzz.py $(INPUTS) $(SEED)
 	pytest -rs tests/versions tests/release
 
 # Format, lint, types and spelling, as before each commit: .pre-commit-config.yaml. What can be mended is.
