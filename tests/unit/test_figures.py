@@ -21,7 +21,7 @@ from springtune.studies.config.kind import FORMATS, Output, outputs
 from springtune.studies.kinds.moduli.figures import definitions
 from springtune.studies.kinds.scenes import errors, figures
 from springtune.studies.kinds.scenes.figures import NETWORK_LINE, draw_curve
-from springtune.studies.output import labels, present, style
+from springtune.studies.output import present, style
 from springtune.studies.output.style import png_and_pdf
 from springtune.studies.runs.keys import modules
 
@@ -262,7 +262,7 @@ def test_a_heat_map_shows_the_finest_mesh_that_was_solved(tree):
 def test_an_approach_carries_its_errors_and_seconds(tree):
     panel = st.plot_benchmark(tree, scene="bending")
     here = tree["benchmark"].to_dataset().sel(scene="bending", approach="condensation")
-    line = drawn(panel, "other")
+    line = drawn(panel, "condensation")
     assert line.get_xdata() == pytest.approx(here.seconds.values)
     assert line.get_ydata() == pytest.approx(100 * here.error.values)
 
@@ -413,14 +413,6 @@ def said(panel):
     return [text.get_text() for text in panel.figure.findobj(Text)]
 
 
-def test_the_key_of_a_sensitivity_figure_hides_no_line(tree):
-    stem, plot, selection = next(iter(figures.sensitivity(tree)))
-    panel = plot(tree, **selection)
-    panel.figure.draw_without_rendering()
-    key, label = panel.get_legend().get_window_extent(), panel.xaxis.label.get_window_extent()
-    assert panel.figure.bbox.y0 <= key.y0 and key.y1 <= label.y0 < panel.bbox.y0
-
-
 @pytest.fixture
 def beyond():
     """A dataset none of whose references applies."""
@@ -475,10 +467,6 @@ def test_counts_and_shares_of_large_strains_look_different(tree):
     assert all(text.isdecimal() or text in ("", "f", "path") or text.endswith(" %") for text in texts), texts
 
 
-def test_a_number_keeps_its_unit():
-    assert labels.wrapped("100x20, mesh 5 mm, rubber", labels.width("100x20, mesh 5 ")) == "100x20, mesh\n5 mm, rubber"
-
-
 @pytest.mark.parametrize(("predicted", "shown"), [(150e6, True), (50e6, False), (300e6, False)])
 def test_a_prediction_beyond_the_axes_has_no_mark_and_no_word(predicted, shown):
     stiffness = np.array([100e6, 150e6, 200e6])
@@ -492,6 +480,6 @@ def test_a_prediction_beyond_the_axes_has_no_mark_and_no_word(predicted, shown):
         }
     )
     panel = Figure().add_subplot()
-    _, seen = draw_curve(panel, curve, 1e6, "5 mm", style.line(0), stiffness / 1e6)
+    seen = draw_curve(panel, curve, 1e6, "5 mm", style.line(0), stiffness / 1e6)
     assert ("predicted" in seen) == shown
     assert any(line.get_marker() == "|" for line in panel.lines) == shown

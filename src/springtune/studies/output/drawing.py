@@ -39,7 +39,7 @@ def draw_springs(ax: Axes | None, mesh: "Mesh", displacements: np.ndarray, force
 
     `displacements` has shape (n_points, 2) [m], `forces` (n_edges,) [N].
     """
-    _, ((panel,),) = style.panels(ax, figsize=(style.COLUMN, 2.2), layout="constrained")
+    _, ((panel,),) = style.panels(ax, figsize=(style.COLUMN, 2.2))
     largest = float(np.abs(forces).max()) or 1.0
     outline = mesh.points[mesh.edges[mesh.on_outline]]
     panel.add_collection(LineCollection(1e3 * outline, colors="0.6", linewidths=0.7))
@@ -57,40 +57,35 @@ def draw_springs(ax: Axes | None, mesh: "Mesh", displacements: np.ndarray, force
 @style.styled
 def draw_curve(ax: Axes | None, curve: "Curve") -> Axes:
     """Draw the deformation error over uniform stiffness, and its zero."""
-    with labels.arranged(ax, figsize=(style.COLUMN, 2.5), bottom=0.66) as (axes, _):
-        panel, error = axes[0, 0], 100 * curve.error
-        unit, written = labels.power_of_ten(float(curve.stiffness.max()))
-        panel.axhline(0.0, color="0.6", linewidth=0.7)
-        colour, stiffness = style.line(0)["color"], curve.stiffness / unit
-        panel.plot(stiffness, np.where(curve.stable, error, np.nan), color=colour, label="network")
-        unstable, said = np.where(curve.stable, np.nan, error), []
-        if np.isfinite(unstable).any():
-            panel.plot(stiffness, unstable, color=colour, linewidth=0.5, label="not stable")
-            said.append("thin: not stable")
-        marks = (("dashes", "best", curve.best_stiffness), ("dash-dots", "closed form", curve.predicted_stiffness))
-        for number, (dashes, name, value) in enumerate(marks):
-            if np.isfinite(value):
-                look = style.line(1 + number)
-                panel.axvline(value / unit, color=look["color"], linestyle=look["linestyle"], linewidth=0.9, label=name)
-                said.append(f"{dashes}: {name}, {value / unit:.4g} {written}N/m")
-        panel.set(xlabel=f"Stiffness [{written}N/m]", ylabel="Deformation error [%]", title=curve.title)
-        known = error[np.isfinite(error)]
-        if len(known):  # a beam that buckled errs by thousands
-            panel.set_ylim(
-                max(min(1.1 * known.min(), 0.0), -LARGEST_SHOWN), min(max(1.1 * known.max(), 1.0), LARGEST_SHOWN)
-            )
-    if not len(known):
+    _, ((panel,),) = style.panels(ax, figsize=(style.COLUMN, 2.5))
+    error, said = 100 * curve.error, []
+    unit, written = labels.power_of_ten(float(curve.stiffness.max()))
+    panel.axhline(0.0, color="0.6", linewidth=0.7)
+    colour, stiffness = style.line(0)["color"], curve.stiffness / unit
+    panel.plot(stiffness, np.where(curve.stable, error, np.nan), color=colour, label="network")
+    panel.plot(stiffness, np.where(curve.stable, np.nan, error), color=colour, linewidth=0.5, label="not stable")
+    marks = {"best": curve.best_stiffness, "closed form": curve.predicted_stiffness}
+    for number, (name, value) in enumerate(marks.items(), start=1):
+        if np.isfinite(value):
+            look = style.line(number) | {"marker": "", "linewidth": 0.9}
+            panel.axvline(value / unit, label=f"{name}, {value / unit:.4g} {written}N/m", **look)
+    panel.set(xlabel=f"Stiffness [{written}N/m]", ylabel="Deformation error [%]", title=curve.title)
+    known = error[np.isfinite(error)]
+    if len(known):  # a beam that buckled errs by thousands
+        panel.set_ylim(
+            max(min(1.1 * known.min(), 0.0), -LARGEST_SHOWN), min(max(1.1 * known.max(), 1.0), LARGEST_SHOWN)
+        )
+        said = [sign_sentence({"": float(np.nansum(curve.displacement))})]
+    else:
         labels.say(panel, curve.message or "There is no reference, and so no error.", bare=False)
-    elif np.isfinite(error).any():
-        said.append(sign_sentence({"": float(np.nansum(curve.displacement))}))
-    labels.note(panel, "; ".join(said))
+    labels.finish(panel, said)
     return panel
 
 
 @style.styled
 def draw_residuals(ax: Axes | None, residuals: Mapping[str, np.ndarray], places: Mapping[str, np.ndarray]) -> Axes:
     """Draw residuals over the noise of each column or field, over the largest load or coordinate."""
-    _, ((panel,),) = style.panels(ax, figsize=(style.COLUMN, 2.5), layout="constrained")
+    _, ((panel,),) = style.panels(ax, figsize=(style.COLUMN, 2.5))
     for number, (label, values) in enumerate(residuals.items()):
         where = places[label]
         along = where if where.ndim == 1 else np.repeat(where[:, 0], 2)
@@ -107,12 +102,6 @@ def draw_residuals(ax: Axes | None, residuals: Mapping[str, np.ndarray], places:
 def in_words(flags: "int | Iterable[int] | np.ndarray") -> str:
     """Statuses of cells that were asked for in words, each once."""
     return ", ".join(str(Status(int(flag))).replace("_", " ") for flag in np.unique(np.asarray(flags)) if flag)
-
-
-def fitted(panel: Axes, texts: Iterable[str], size: float = style.SMALL) -> str:
-    """Texts, one a line, wrapped to the width of a panel."""
-    room = panel.get_window_extent().width / panel.figure.dpi
-    return "\n".join(labels.wrapped(text, room, size) for text in texts)
 
 
 def heat_map(panel: Axes, errors: np.ndarray, texts: np.ndarray) -> AxesImage:

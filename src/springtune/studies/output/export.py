@@ -70,7 +70,9 @@ def table(tree: xr.DataTree, group: str = "/") -> pd.DataFrame:
 def export(tree: xr.DataTree, path: Path, group: str = "/", force: bool = False) -> str:
     """Write a group as CSV or Parquet, by the ending of a path; return what was written in words."""
     if path.suffix.lower() not in TABLE_ENDINGS:
-        raise RequestError(f"{path}: '{path.suffix}' is no format to export to; give a file in {' or '.join(TABLE_ENDINGS)}")
+        raise RequestError(
+            f"{path}: '{path.suffix}' is no format to export to; give a file in {' or '.join(TABLE_ENDINGS)}"
+        )
     check_folder(path)
     if path.exists() and not force:
         raise ValueError(f"{path}: is there already; give another name, or --force to replace it")

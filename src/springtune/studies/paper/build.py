@@ -207,7 +207,7 @@ def _pdf(drawing: Drawing, datasets: Mapping[str, Dataset], name: str, examples:
         elif drawing.size is None:
             raise PaperError(f"{name}: several panels; give the figure a size, its width and height in inches")
         else:
-            figure = plt.figure(figsize=drawing.size)
+            figure = plt.figure(figsize=drawing.size, layout="constrained")
             rows = -(-len(drawing.panels) // drawing.columns)
             for panel, part in zip(drawing.panels, np.ravel(figure.subfigures(rows, drawing.columns, squeeze=False))):
                 plotted(panel, part)

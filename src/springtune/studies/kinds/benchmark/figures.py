@@ -9,20 +9,9 @@ from ...output import labels, style
 from ...output.selection import choose, group
 from .outputs import figures
 
-APPROACH_FAMILIES = {
-    "springs alone": style.line(1) | {"linestyle": "-"},
-    "springs and energies": style.line(0) | {"linestyle": "-"},
-    "finite elements": style.line(3) | {"linestyle": "-"},
-    "CalculiX": style.line(4) | {"linestyle": "-"},
-    "other": style.line(5) | {"linestyle": "-"},
-}
-"""Colour and marker of each family of approaches."""
-
-WITH_ENERGIES = ("area", "angular", "delingette", "delingette-tensile", "ielsm", "many-body", "neo-hooke",
-                 "normal-shear", "patch-area")  # fmt: skip
 SHOWN = ("delingette/structured", "van-gelder/structured", "area/braced", "linear-triangles", "quadratic-triangles",
          "boundary-elements", "tensor-mass", "calculix-cps3", "calculix-cps8")  # fmt: skip
-"""Approaches with names before others."""
+"""Approaches with names before others, which are grey."""
 
 RING = {"markersize": 7, "markerfacecolor": "none", "markeredgecolor": "black", "markeredgewidth": 0.8}
 
@@ -35,18 +24,6 @@ def named(data):
     there = data.approach.values[order[np.isfinite(smallest.values[order])]].tolist()
     chosen = [name for name in SHOWN if name in there]
     return chosen + [name for name in there if name not in chosen][: len(SHOWN) - len(chosen)]
-
-
-def family(approach):
-    """Family of an approach."""
-    definition, slash, _ = approach.partition("/")
-    if slash:
-        return "springs and energies" if definition in WITH_ENERGIES else "springs alone"
-    if approach.startswith("calculix"):
-        return "CalculiX"
-    if approach.endswith("triangles"):
-        return "finite elements"
-    return "other"
 
 
 def benchmark(tree):
@@ -92,40 +69,27 @@ def plot_benchmark(data, ax=None, *, scene=None):
     rings = unbeaten(case.assured_error.values, case.seconds.values)
     ringed = "○: no other confirmed approach is both faster and more accurate" if rings.any() else ""
     lost = "; ".join(filter(None, (ringed, _lost(case) and f"not drawn: {_lost(case)}")))
-    figure, axes = style.panels(ax, figsize=(style.PAGE, 4.0))
-    place = dict(left=0.62, right=0.08, bottom=0.8 if lost else 0.62, top=0.3)
-    style.arrange(figure, axes, **place)
-    panel, shown, there, ends = axes[0, 0], named(case), set(), []
+    _, ((panel,),) = style.panels(ax, figsize=(style.PAGE, 4.0))
+    shown = named(case)
     for ring, approach in zip(rings, map(str, case.approach.values)):
-        here, kind = case.sel(approach=approach), family(approach)
+        here = case.sel(approach=approach)
         errors, seconds = 100 * np.abs(here.error.values), here.seconds.values
-        good, look = np.isfinite(errors * seconds) & (errors > 0), APPROACH_FAMILIES[kind]
-        if not good.any():
-            continue
-        thin = {} if approach in shown else {"linewidth": 0.3, "markersize": 1.5, "alpha": 0.4}
-        panel.plot(seconds[good], errors[good], label="_" if kind in there else kind, **look | thin)
-        there.add(kind)
+        good = np.isfinite(errors * seconds) & (errors > 0)
+        look = {"color": "0.7", "linewidth": 0.4, "marker": ".", "markersize": 1.5}
         if approach in shown:
-            finest = np.flatnonzero(good)[0]
-            ends.append((seconds[finest], errors[finest], approach, look["color"]))
+            look = style.line(shown.index(approach)) | {"label": approach}
+        panel.plot(seconds[good], errors[good], **look)
         panel.plot(seconds[ring], errors[ring], "o", **RING)
-    panel.set(**style.LOGARITHMIC, xlabel="Seconds, from nothing to the displacement", ylabel="|Error| [%]")
-    panel.set_title(case.scene.item())
-    if not there:
+    panel.set(xlabel="Seconds, from nothing to the displacement", ylabel="|Error| [%]", title=case.scene.item())
+    if not shown:
         labels.say(panel, f"No approach has an error and a time: {_lost(case) or 'none was asked for'}.")
         return panel
-    labels.note(panel, lost, below=0.64)
     estimate, seconds = 100 * float(case.reference_error_estimate), float(case.reference_seconds)
     if estimate > 0 and seconds > 0:
-        panel.plot([seconds], [estimate], "*", color="black", markersize=7)
-        ends.append((seconds, estimate, "the reference", "black"))
+        panel.plot([seconds], [estimate], "*", color="black", markersize=7, label="the reference")
+    panel.set(**style.LOGARITHMIC)
     style.plain(panel, "x", "y")
-    labels.settle(figure, axes, place)
-    labels.name_lines(panel, ends)
-    kinds = [kind for kind in APPROACH_FAMILIES if kind in there]
-    handles = [panel.plot([], [], label="_", **APPROACH_FAMILIES[kind])[0] for kind in kinds]
-    panel.legend(handles, kinds, loc="upper left", bbox_to_anchor=(-0.02, -0.1), ncols=len(kinds), columnspacing=1.2,
-                 handlelength=1.6)  # fmt: skip
+    labels.finish(panel, [lost])
     return panel
 
 

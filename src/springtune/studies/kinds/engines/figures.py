@@ -7,7 +7,7 @@ import numpy as np
 from springtune.problem.compare import unbeaten
 
 from ...output import labels, style
-from ...output.drawing import NOT_ASKED, error_text, fitted, heat_map
+from ...output.drawing import NOT_ASKED, error_text, heat_map
 from ...output.selection import choose, group, labels_of, records
 from ...output.text import cell_text
 from . import RUN_ENDS, SETTING, WITHOUT_RUN
@@ -19,8 +19,8 @@ FRAME = 1 / 60
 END_SIGNS, NO_RUN = {"swings": "~", "moving": "→", "diverged": "!", "inverted": "↺"}, "∅"
 """On the map of settings: of runs that moved and have no error, and of those that did not begin or end."""
 
-PLACE = {"left": 0.5, "right": 0.08, "bottom": 0.4, "top": 0.3}
-"""Margins of a figure of one panel [inch]."""
+UNITY = {"color": "0.45", "linewidth": 0.8, "zorder": 0}
+"""Look of the line at one."""
 
 
 def engines(tree):
@@ -60,19 +60,11 @@ def _setting(row, names):
 
 
 def _lines(panel, points):
-    """Draw a line a name: the ends of the lines."""
-    ends = []
+    """Draw a line a name; return whether any has a point."""
     for number, (name, one) in enumerate(points.items()):
         x, y = np.array(sorted(one.items())).T
-        ends += labels.line(panel, x, y, style.line(number), name)
-    return ends
-
-
-def _across(panel, value, **look):
-    """Draw a line at a value, as far as the panel goes by now: names of lines stand right of it."""
-    limits = panel.get_xlim()
-    panel.hlines(value, *limits, color="0.45", linewidth=0.8, zorder=0, **look)
-    panel.set_xlim(limits)
+        panel.plot(x, y, label=name, **style.line(number))
+    return any(np.isfinite([*one.values()]).any() for one in points.values())
 
 
 @style.styled
@@ -107,8 +99,8 @@ def plot_engine_errors(data, ax=None, *, scene=None):
     ('sheet', 'Time for 1/60 s of motion [ms]')
     """
     case, runs, lost = _runs(data, "engines", scene)
-    figure, axes = style.panels(ax, figsize=(style.PAGE, 3.6))
-    panel, ends = axes[0, 0], []
+    _, ((panel,),) = style.panels(ax, figsize=(style.PAGE, 3.8))
+    there = False
     for number, (name, rows) in enumerate(runs.items()):
         errors = 100 * np.abs([row["error"] or np.nan for row in rows])
         times = 1e3 * FRAME * np.array([row["frame_seconds"] / row["dt"] for row in rows])
@@ -116,11 +108,12 @@ def plot_engine_errors(data, ax=None, *, scene=None):
         panel.plot(times, errors, **look | {"linestyle": "", "markersize": 2, "alpha": 0.5}, label="_")
         best = np.flatnonzero(unbeaten(errors, times))
         best = best[np.argsort(times[best], kind="stable")]
-        ends += labels.line(panel, times[best], errors[best], look, name)
+        panel.plot(times[best], errors[best], label=name, **look)
+        there |= bool(len(best))
     panel.set(xlabel="Time for 1/60 s of motion [ms]", ylabel="|Error| [%]")
     panel.set_title(case.scene.item())
     said = [f"not drawn: {lost}"] if lost else []
-    if ends:
+    if there:
         panel.set(**style.LOGARITHMIC)
         low, high = panel.get_xlim()
         if low < 1e3 * FRAME < high:
@@ -129,14 +122,12 @@ def plot_engine_errors(data, ax=None, *, scene=None):
         errors = 100 * np.abs(case.definition_error.sel(definition=labels_of(case.status != 0, "definition")))
         known = {name: error for name, error in errors.to_series().items() if error > 0}  # NaN is not
         for error in known.values():
-            _across(panel, error, linestyle=(0, (1, 1.5)))
+            panel.axhline(error, color="0.45", linewidth=0.8, zorder=0, linestyle=(0, (1, 1.5)))
         if known:
             texts = ", ".join(f"{name} {error:.2g} %" for name, error in known.items())
             said.insert(0, f"dotted: error of the definition in equilibrium, {texts}")
         style.plain(panel, "x", "y")
-    why = "" if ends else f"No run is at rest beside a reference: {lost}."
-    drawn = {panel: (ends, fitted(panel, ["; ".join(said)]), why)}
-    labels.finish(figure, axes, PLACE, drawn, 3.6 if ax is None else 0.0)
+    labels.finish(panel, ["; ".join(said)], f"No run is at rest beside a reference: {lost}.")
     return panel
 
 
@@ -186,7 +177,7 @@ def plot_engine_maps(data, ax=None, *, scene=None):
     def draw(panel, rows):
         if rows:
             _map(panel, rows)
-        return [], "", why
+        return [], why
 
     return labels.small_multiples(ax, shown or {"": []}, 3, height, title, draw)
 
@@ -259,12 +250,11 @@ def plot_engine_curves(data, ax=None, *, scene=None):
             ratio = 1 + row["error"]
             points[_setting(row, names)][row["stiffness_factor"]] = ratio if ratio > 0 else np.nan
             panel.plot(1, 1 + case.definition_error.sel(definition=row["definition"]), "k+", markersize=7, zorder=4)
-        ends = _lines(panel, points)
-        if ends:
+        if _lines(panel, points):
             panel.set(**style.LOGARITHMIC)
             style.plain(panel, "x", "y")
-            _across(panel, 1)
-        return ends, "", why
+            panel.axhline(1, **UNITY)
+        return [], why
 
     title = f"{case.scene.item()}, +: the network in equilibrium{'; not drawn: ' + lost if lost else ''}"
     return labels.small_multiples(ax, shown or {"": []}, 3, 2.1, title, draw, sharey=True)
@@ -306,16 +296,13 @@ def plot_engine_factors(data, ax=None, *, scene=None):
             line = ", ".join(filter(None, (name, _setting(row, _varying(every, SETTING[:3])))))
             points[line][row["iterations"]] = row["best_factor"]
     factors = [factor for one in points.values() for factor in one.values()]
-    figure, axes = style.panels(ax, figsize=(style.COLUMN, 2.6))
-    panel = axes[0, 0]
-    ends = _lines(panel, points)
+    _, ((panel,),) = style.panels(ax, figsize=(style.COLUMN, 2.6))
     panel.set(xlabel="Iterations", ylabel="Best factor on what is typed", title=case.scene.item())
-    if ends:
+    if _lines(panel, points):
         wide = np.nanmax([1.0, *factors]) > 5 * np.nanmin([1.0, *factors])  # on a logarithmic axis
         panel.set(xscale="log", yscale="log" if wide else "linear")
         style.plain(panel, "x", *(["y"] if wide else []))
-        _across(panel, 1)
+        panel.axhline(1, **UNITY)
     none = f"{np.isnan(factors).sum()} of {len(factors)} curves have no such factor"
-    why = "" if ends else f"{none}{lost and ': '}{lost}."
-    labels.finish(figure, axes, PLACE, {panel: (ends, fitted(panel, [none]), why)}, 2.6 if ax is None else 0.0)
+    labels.finish(panel, [none], f"{none}{lost and ': '}{lost}.")
     return panel

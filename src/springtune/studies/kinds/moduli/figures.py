@@ -6,7 +6,7 @@ from springtune.safe_io.escapes import no_mathematics
 
 from ...output import labels, style
 from ...output.dataset import most_requested
-from ...output.drawing import BEYOND_SMALL_STRAIN, NO_RESULT, NOT_ASKED, error_text, fitted, heat_map
+from ...output.drawing import BEYOND_SMALL_STRAIN, NO_RESULT, NOT_ASKED, error_text, heat_map
 from ...output.selection import choose, group, labelled_beam, labels_of, sign_of_errors, unswept
 from .outputs import figures
 
@@ -46,7 +46,7 @@ def _main(root, names, selection):
 
 
 def _by_mesh_type(ax, present, title, draw):
-    """A panel a mesh type; `draw` returns ends of lines for their names, a note, and what to say without lines."""
+    """A panel a mesh type; `draw` returns notes, and what to say without lines."""
     names = {name: name for name in labels_of(present, "mesh_type")}
     return labels.small_multiples(ax, names, 2, 1.95, title, draw)
 
@@ -109,9 +109,10 @@ def _moduli(panel, here):
     values = np.concatenate([[low, high], *curves.values()])
     bottom, top = np.clip([np.nanmin(values) - 0.03, np.nanmax(values) + 0.03], -0.45, 0.75)
     panel.set_ylim(min(bottom, low - 0.03), max(top, high + 0.03))
-    ends = labels.lines(panel, wanted, curves, 0.012)
-    said = fitted(panel, [f"no moduli: {', '.join(lacking)}"]) if lacking and ends else ""
-    return ends, said, "" if ends else f"No definition has moduli here: {_statuses(here.status.values)}."
+    for number, names in enumerate(labels.alike(curves, 0.012)):
+        panel.plot(wanted, curves[names[0]], label=", ".join(names), **style.line(number))
+    said = [f"no moduli: {', '.join(lacking)}"] if lacking else []
+    return said, f"No definition has moduli here: {_statuses(here.status.values)}."
 
 
 @style.styled
@@ -178,7 +179,7 @@ def _field_errors(panel, error, status):
     panel.set(yscale="log")
     places = dict(zip(curves, labels.sizes_axis(panel, sizes, len(curves))))
     if not curves:
-        return [], "", f"No definition has a field error here: {_statuses(flags)}."
+        return [], f"No definition has a field error here: {_statuses(flags)}."
     together = labels.alike({name: np.log(values) for name, values in curves.items()}, 0.01)
     together.sort(key=lambda one: np.nanmean(np.log(curves[one[0]])))
     base, named = next((one for one in together if BASELINE in one), None), together[:MOST_NAMED]
@@ -187,7 +188,7 @@ def _field_errors(panel, error, status):
     others = [name for one in together if one not in named for name in one]
     for name in others:
         panel.plot(places[name], curves[name], color="0.75", linewidth=0.6, marker=".", markersize=2, zorder=1)
-    ends, order = [], names.tolist()
+    order = names.tolist()
     for one in named:
         values, look = curves[one[0]], style.line(order.index(one[0]))
         there = np.flatnonzero(np.isfinite(values))
@@ -195,7 +196,7 @@ def _field_errors(panel, error, status):
         if len(there) > 1:
             rate = np.polyfit(np.log(sizes[there]), np.log(values[there]), 1)[0]
             label += f" ({rate:.1f})".replace("-0.0", "0.0").replace("-", "−")
-        ends += labels.line(panel, places[one[0]], values, look, label)
+        panel.plot(places[one[0]], values, label=label, **look)
     said = [f"grey: {', '.join(others)}"] if others else []
     lacking = [str(name) for name, there, flag in zip(names, known, flags) if not there.any() and (flag > 0).any()]
     said += [f"no error: {', '.join(lacking)}"] if lacking else []
@@ -203,7 +204,7 @@ def _field_errors(panel, error, status):
         without = sizes[~there & (flag > 0)]
         if there.any() and len(without):
             said.append(f"no error: {name} at {', '.join(f'{size:g}' for size in without)} mm")
-    return ends, fitted(panel, said), ""
+    return said, ""
 
 
 @style.styled
@@ -252,15 +253,8 @@ def plot_definitions_loads(data, ax=None, *, beam=None, mesh_type=None, material
         root = root.sel(definition=labels_of(solved, "definition"))
     root = root.sel(load=labels_of(root.status != 0, "load"))
     names, loads = root.definition.values.tolist(), root["load"].values.tolist()
-    left, bottom = 0.12 + max(map(labels.width, names)), 0.32 + max(map(labels.width, loads))
-    room = style.COLUMN - left - 0.62 - 0.08 * (len(materials) - 1)
-    wide = style.COLUMN if room >= CELL_WIDTH * len(loads) * len(materials) else style.PAGE
-    size = wide, 0.62 + bottom + 0.165 * len(names)
-    figure, axes = style.panels(ax, ncols=len(materials), sharey=True, figsize=size)
-    title = f"{labelled_beam(root, chosen['beam'])}, {chosen['mesh_type']}"
-    lines = labels.wrapped(f"{title}: deformation error [%] on the finest mesh solved", wide - 0.1, 8.5)
-    style.arrange(figure, axes, left=left, right=0.62, bottom=bottom, top=0.35 + 0.14 * labels.lines_of(lines),
-                  across=0.08, title=lines)  # fmt: skip
+    wide = style.COLUMN if len(loads) * len(materials) < MOST_IN_COLUMN else style.PAGE
+    figure, axes = style.panels(ax, ncols=len(materials), sharey=True, figsize=(wide, 1.5 + 0.165 * len(names)))
     doubted = False
     for panel, material in zip(axes[0], materials):
         cells = root.sel(material=material)
@@ -274,21 +268,18 @@ def plot_definitions_loads(data, ax=None, *, beam=None, mesh_type=None, material
         panel.set_yticks(range(len(names)), map(no_mathematics, names))
         ratio = f"ν = {float(cells.material_poisson_ratio):g}"
         panel.set_title(ratio if material == ratio.replace("ν = ", "nu-") else f"{material}, {ratio}")
+    flags = root.status.values
+    said = [sign_of_errors(root), f"{NO_RESULT}: no result" * bool((flags > 1).any())]
+    said += [f"{NOT_ASKED}: not asked for" * bool((flags == 0).any()), f"*: {BEYOND_SMALL_STRAIN}" * doubted]
+    title = f"{labelled_beam(root, chosen['beam'])}, {chosen['mesh_type']}"
+    labels.entitle(figure, f"{title}: deformation error [%] on the finest mesh solved", "; ".join(filter(None, said)))
     if figure is not None:
-        width, height = style.size(figure)
-        bar = figure.add_axes([1 - 0.52 / width, bottom / height, 0.1 / width, 1 - (bottom + 0.63) / height])
-        figure.colorbar(image, cax=bar, ticks=[-1, 0, 1, 2]).set_ticklabels(["0.1", "1", "10", "100"])
-        flags = root.status.values
-        said = [f"{NO_RESULT}: no result"] * bool((flags > 1).any())
-        said += [f"{NOT_ASKED}: not asked for"] * bool((flags == 0).any())
-        said += [f"*: {BEYOND_SMALL_STRAIN}"] * doubted
-        words = labels.wrapped("; ".join(filter(None, [sign_of_errors(root), *said])), width - 0.1)
-        figure.text(0.05 / width, 0.05 / height, words, fontsize=style.SMALL, color="0.25")
+        figure.colorbar(image, ax=axes[0].tolist(), ticks=[-1, 0, 1, 2]).set_ticklabels(["0.1", "1", "10", "100"])
     return axes[0]
 
 
-CELL_WIDTH = 0.3
-"""Width of the number in a cell [inch]."""
+MOST_IN_COLUMN = 6
+"""Columns of cells from which a figure is a page wide."""
 
 
 def _heat(panel, errors, flags, beyond):

@@ -54,18 +54,10 @@ def _axis(text, unit):
     return f"{text} [{unit}]" if unit else text
 
 
-def _titled(samples, load, what, columns):
-    """Title of a figure of so many columns of panels, wrapped."""
+def _titled(samples, load, what):
+    """Title of a figure."""
     words = f"{load.capitalize()}, {samples.attrs['mesh_type']} meshes, {samples.attrs['kinematics']} kinematics"
-    return labels.wrapped(f"{words}: {what}", (style.PAGE if columns > 1 else style.COLUMN) - 0.1, 8.5)
-
-
-def _note_below(figure, text, above):
-    """Write a note at a height above the lower end of a figure [inch]."""
-    if figure is not None:
-        width, height = style.size(figure)
-        text = labels.wrapped(text, width - 0.2)
-        figure.text(0.1 / width, above / height, text, fontsize=style.SMALL, color="0.25")
+    return f"{words}: {what}"
 
 
 def _panels_of_indices(data, load):
@@ -118,29 +110,26 @@ def plot_sobol(data, ax=None, *, load=None):
     words = [PARAMETER_AXES[name][0] for name in names]
     columns = min(COLUMNS, max(1, sum(quantity == shown[0][0] for quantity, _ in shown)))
     limits, farther = _limits(found, shown, load)
-    note, title = _note(found.sel(load=load), samples.attrs["size"]), _titled(samples, load, "Sobol indices", columns)
-    note += "; arrows: bands go farther" if farther else ""
-    room = style.PAGE if columns > 1 else style.COLUMN
-    under, over = (0.14 * labels.lines_of(text) for text in (labels.wrapped(note, room - 0.2), title))
-    figure, axes, flat, _ = style.multiples(
-        ax, len(shown), columns, 0.21 * len(names) + 0.52, further=0.11 + under + over
-    )
-    style.arrange(figure, axes, left=0.15 + max(map(labels.width, words)), right=0.15, bottom=0.42 + under,
-                  top=0.35 + over, across=0.18, down=0.42 if axes.shape[0] > 1 else 0.0, title=title)  # fmt: skip
+    note = _note(found.sel(load=load), samples.attrs["size"]) + ("; arrows: bands go farther" if farther else "")
     order = found["definition"].values.tolist()
-    for number, (panel, (quantity, definition)) in enumerate(zip(flat, shown)):
-        one = found.sel(quantity=quantity, load=load, definition=definition)
-        best = quantity == "best_stiffness"
-        panel.set_title(QUANTITY_AXES[quantity][0] + ("" if best else f", {definition}"))
-        _bars(panel, one, "0.35" if best else style.line(order.index(definition))["color"], limits)
-        panel.set_xlim(limits)
-        panel.set_yticks(range(len(names)), words if number % columns == 0 else [""] * len(names))
-        if not np.isfinite(one.first_order.values).any():
-            labels.say(panel, _why(one), bare=False)
-    for panel in flat[-columns:]:
-        panel.set_xlabel("share of the variance")
-    _note_below(figure, note, 0.06)
-    return flat
+
+    def draw(panel, one):
+        quantity, definition = one
+        indices = found.sel(quantity=quantity, load=load, definition=definition)
+        colour = "0.35" if quantity == "best_stiffness" else style.line(order.index(definition))["color"]
+        _bars(panel, indices, colour, limits)
+        panel.set(xlim=limits, xlabel="share of the variance")
+        panel.set_yticks(range(len(names)), words)
+        if not np.isfinite(indices.first_order.values).any():
+            labels.say(panel, _why(indices), bare=False)
+        return [], ""
+
+    def titled(quantity, definition):
+        return QUANTITY_AXES[quantity][0] + ("" if quantity == "best_stiffness" else f", {definition}")
+
+    panels = {titled(*one): one for one in shown}
+    title = _titled(samples, load, "Sobol indices")
+    return labels.small_multiples(ax, panels, columns, 0.21 * len(names) + 0.8, title, draw, sharey=True, said=note)
 
 
 def _why(one):
@@ -167,7 +156,9 @@ def _bars(panel, indices, colour, limits):
         panel.barh(places, np.maximum(np.nan_to_num(values), 0), wide, color=colour, alpha=alpha, linewidth=0)
         panel.hlines(places + shift, low, high, color="k", linewidth=0.8)
         for marker, end, cut in (("<", limits[0], low < limits[0]), (">", limits[1], high > limits[1])):
-            panel.plot(np.full(cut.sum(), end), (places + shift)[cut], marker, color="k", markersize=3, clip_on=False)
+            if cut.any():  # a layout makes no room for a line of no points
+                ends = np.full(cut.sum(), end)
+                panel.plot(ends, (places + shift)[cut], marker, color="k", markersize=3, clip_on=False)
     panel.set_ylim(len(places) - 0.45, -0.55)
     panel.tick_params(axis="y", length=0)
     panel.grid(False, axis="y")
@@ -223,41 +214,32 @@ def plot_effects(data, ax=None, *, load=None, quantity="deformation_error"):
     effects = effects.sel(load=load, quantity=quantity)
     definitions = labels_of(asked.sel(load=[load]), "definition")
     definitions = definitions[:1] if quantity == "best_stiffness" else definitions
-    names, every = effects.parameter.values.tolist(), effects["definition"].values.tolist()
-    columns = min(COLUMNS, len(names))
-    lines = [style.line(every.index(name)) for name in definitions]
+    every = effects["definition"].values.tolist()
     text, factor, unit = QUANTITY_AXES[quantity]
-    title = _titled(samples, load, f"mean {text} over each parameter alone", columns)
-    over = 0.14 * labels.lines_of(title)
-    figure, axes, flat, _ = style.multiples(ax, len(names), columns, 1.75, sharey=True, further=0.45 + over)
-    style.arrange(figure, axes, left=0.62, right=0.14, bottom=0.86, top=0.16 + over, across=0.2, down=0.5, title=title)
-    for number, (panel, name) in enumerate(zip(flat, names)):
+
+    def draw(panel, name):
         values = effects.parameter_value.sel(parameter=name).values
         by, of = _unit(name, values)
         x = by * values
-        for definition, line in zip(definitions, lines):
-            one = effects.sel(parameter=name, definition=definition)
+        for definition in definitions:
+            one, look = effects.sel(parameter=name, definition=definition), style.line(every.index(definition))
             mean, error = (factor * one[which].values for which in ("main_effect", "main_effect_error"))
             label = "uniform springs" if quantity == "best_stiffness" else definition
-            panel.plot(x, mean, label=label, **line | {"marker": ""})
-            panel.fill_between(x, mean - 2 * error, mean + 2 * error, color=line["color"], alpha=0.15, linewidth=0)
-        ends = np.array([x.min(), x.max()])
+            panel.plot(x, mean, label=label, **look | {"marker": ""})
+            panel.fill_between(x, mean - 2 * error, mean + 2 * error, color=look["color"], alpha=0.15, linewidth=0)
+        panel.margins(x=0.05)
         if _is_logarithmic(values):
-            panel.set(xscale="log", xlim=ends * (ends[1] / ends[0]) ** np.array([-0.05, 0.05]))
+            panel.set(xscale="log")
             style.plain(panel, "x")
         else:
-            panel.set_xlim(*(ends + 0.05 * np.ptp(ends) * np.array([-1, 1])))
             panel.locator_params(axis="x", nbins=4)
-        panel.set_xlabel(_axis(PARAMETER_AXES[name][0], of))
-        if number % columns == 0:
-            panel.set_ylabel(_axis(text, unit))
-        if not effects.main_effect.sel(definition=definitions).notnull().any():
-            labels.say(panel, "no scene has a value", bare=False)
-    if figure is not None:
-        handles, texts = flat[0].get_legend_handles_labels()
-        figure.legend(handles, texts, loc="lower center", ncols=len(texts), borderaxespad=0.2)
-    _note_below(figure, _lacking(samples, load, definitions, quantity), 0.3)
-    return flat
+        panel.set(xlabel=_axis(PARAMETER_AXES[name][0], of), ylabel=_axis(text, unit))
+        return [], "no scene has a value"
+
+    shown = {PARAMETER_AXES[name][0]: name for name in effects.parameter.values.tolist()}
+    title = _titled(samples, load, f"mean {text} over each parameter alone")
+    note = _lacking(samples, load, definitions, quantity)
+    return labels.small_multiples(ax, shown, 3, 1.9, title, draw, sharey=True, said=note)
 
 
 def _lacking(samples, load, definitions, quantity):

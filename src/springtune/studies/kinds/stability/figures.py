@@ -68,9 +68,7 @@ def plot_stability_maps(data, ax=None):
     data = _experiment(data, "maps")
     names = data.integrator.values
     figure, axes = style.panels(ax, ncols=len(names), sharey=True, figsize=(style.PAGE, 2.2))
-    place = dict(left=0.45, right=0.08, bottom=0.42, top=0.55, across=0.1)
-    style.arrange(figure, axes, **place)
-    grid, axes, x, y = axes, axes[0], data.map_damping_ratio.values, data.step_ratio.values
+    axes, x, y = axes[0], data.map_damping_ratio.values, data.step_ratio.values
     for panel, name in zip(axes, names):
         found = data.behaviour.sel(integrator=name).values
         panel.pcolormesh(x, y, found, cmap=ListedColormap(MAP_COLOURS), vmin=-0.5, vmax=3.5, shading="nearest")
@@ -84,17 +82,16 @@ def plot_stability_maps(data, ax=None):
         style.plain(panel, "x", "y")
         if not np.isfinite(found).any():
             labels.say(panel, "nothing was run", bare=False)
-    text = "Damping ratio of the highest mode, damping in proportion to mass"
     axes[0].set_ylabel("Step over 2/ωₘₐₓ")
-    labels.settle(figure, grid, place | {"across": 0.04})
     keys = labels.swatches(dict(zip(("stable", "decaying", "growing", "NaN"), MAP_COLOURS)))
     keys.append(axes[0].plot([], [], color="black", label="predicted limit")[0])
+    text = "Damping ratio of the highest mode, damping in proportion to mass"
     if figure is None:
         axes[0].set_xlabel(text)
         axes[-1].legend(handles=keys)
     else:
-        figure.supxlabel(text, fontsize=8, y=0.05 / style.size(figure)[1], va="bottom")
-        figure.legend(handles=keys, loc="upper center", ncols=5, borderaxespad=0.2)
+        figure.supxlabel(text, fontsize=8)
+        figure.legend(handles=keys, loc="outside upper center", ncols=5)
     return axes
 
 
@@ -134,8 +131,6 @@ def plot_stability_strains(data, ax=None):
     figure, axes = style.panels(
         ax, nrows=len(loads), sharex=True, figsize=(style.PAGE, 0.75 + len(loads) * (0.3 + 0.19 * max(len(names), 2)))
     )
-    left = 0.15 + max(map(labels.width, names), default=0.3)
-    style.arrange(figure, axes, left=left, right=0.08, bottom=0.68, top=0.25, down=0.28)
     axes, seen = axes[:, 0], set()
     for panel, load in zip(axes, loads):
         panel.set_title(STRAIN_LOADS.get(load, load))
@@ -165,5 +160,5 @@ def plot_stability_strains(data, ax=None):
     if figure is None:
         axes[0].legend(handles=keys)
     elif keys:
-        figure.legend(handles=keys, loc="lower center", ncols=len(keys), borderaxespad=0.2, columnspacing=1.2)
+        figure.legend(handles=keys, loc="outside lower center", ncols=len(keys), columnspacing=1.2)
     return axes
