@@ -321,7 +321,7 @@ def test_figures_of_a_load_without_the_main_kinematics_are_of_its_own(tree):
     assert all(set(DEFINITIONS) <= names for names in named)
     nothing = data.to_dataset().assign(field_error=np.nan * tree.field_error)
     panels = st.plot_definitions_size(nothing, **chosen["pressure"])
-    assert [[text.get_text() for text in panel.texts] for panel in panels] == [
+    assert [[text.get_text().replace("\n", " ") for text in panel.texts] for panel in panels] == [
         ["No definition has a field error here: solved (6)."]
     ] * 2
 
