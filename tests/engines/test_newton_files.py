@@ -1,4 +1,4 @@
-"""Files for Newton, read and run by it: the script of its ModelBuilder, and OpenUSD by its importer."""
+"""Files for Newton, read and run by it: the script of its ModelBuilder."""
 
 import importlib.util
 import runpy

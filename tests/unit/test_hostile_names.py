@@ -5,7 +5,6 @@ import json
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 
-import h5py
 import pytest
 
 import springtune as st
@@ -105,14 +104,3 @@ def test_a_table_with_names_as_they_are_reads_back(plain, tmp_path):
     net.write(path)
     path.write_text(path.read_text().replace("\\u2028", "\u2028").replace("\\u0085", "\x85"))
     assert st.SpringNet.read(path).header == net.header
-
-
-def test_a_small_file_that_says_it_holds_much_is_refused(plain, tmp_path):
-    """Two hundred million points, packed into kilobytes: before they are made."""
-    path = tmp_path / "net.h5"
-    plain.write(path)
-    with h5py.File(path, "r+") as file:
-        del file["points"]
-        file.create_dataset("points", (200_000_000, 2), "f8", chunks=(10_000, 2), compression="gzip")
-    with pytest.raises(ValueError, match=r"net\.h5: is damaged, or no net of springtune \(it takes more than 0.3"):
-        st.SpringNet.read(path)

@@ -12,6 +12,7 @@ from springtune.problem.materials import Material
 from springtune.problem.status import Status
 from springtune.scene.sheet import Sheet
 from springtune.studies.kinds.scenes.solve import solved
+from springtune.studies.output.dataset import STATUS
 
 BEAM, STEEL = st.Beam("100 mm", "20 mm"), st.Material("210 GPa", 0.3, density="7850 kg/m^3", name="steel")
 
@@ -55,15 +56,6 @@ class TestSixLines:
         forces = (10e3, 20e3)
         moved = [scene(force=force, kinematics=kinematics).solve().displacement for force in forces]
         assert (moved[1] == pytest.approx(2 * moved[0], rel=1e-9)) == (kinematics == "linear")
-
-    def test_a_mesh_file(self, tmp_path):
-        mesh = st.make_mesh(BEAM, "free", "5 mm")
-        from springtune.mesh import Mesh, write_mesh
-
-        write_mesh(tmp_path / "own.vtu", Mesh(1e3 * mesh.points + [7.0, -3.0], mesh.triangles))
-        read = st.read_mesh(tmp_path / "own.vtu", BEAM, unit="1 mm")
-        ours, theirs = (st.Scene(BEAM, one, STEEL, "bending", "200 N").solve() for one in (mesh, read))
-        assert theirs.displacement == pytest.approx(ours.displacement, rel=1e-9)
 
     def test_a_function_of_ones_own(self):
         def halved(mesh, material, thickness):
@@ -229,31 +221,9 @@ class TestErrors:
             st.open(tmp_path / "other.nc")
 
 
-def test_plots_are_drawn_where_they_are_wanted():
-    import matplotlib
-
-    matplotlib.use("agg")
-    from matplotlib import pyplot
-
-    figure, ax = pyplot.subplots()
-    assert scene().solve().plot(ax) is ax and ax.collections
-    assert st.sensitivity(scene(), [0.5, 0.8, 1.1]).plot().lines
-    pyplot.close("all")
-
-
-class TestNames:
-    def test_every_name_is_there(self):
-        assert set(dir(st)) == set(st.__all__)
-        for name in st.__all__:
-            assert getattr(st, name) is not None
-        with pytest.raises(AttributeError, match="no attribute 'scenes'"):
-            st.scenes  # noqa: B018
-
-    def test_a_status_reads_as_in_a_dataset(self):
-        from springtune.studies.output.dataset import STATUS
-
-        assert [str(flag) for flag in st.Status] == list(STATUS) and f"{st.Status.SOLVED}" == "solved"
-        assert [int(flag) for flag in st.Status] == list(range(len(STATUS)))
+def test_a_status_reads_as_in_a_dataset():
+    assert [str(flag) for flag in Status] == list(STATUS) and f"{Status.SOLVED}" == "solved"
+    assert [int(flag) for flag in Status] == list(range(len(STATUS)))
 
 
 MATERIAL = asdict(Material(210e9, 0.3, name="steel"))

@@ -235,32 +235,6 @@ def squares():
     return GroupedMesh(mixed, {"left": left}, {"between": np.array([0.033, 0.021])}, {"below": parts})
 
 
-def msh4(grouped):
-    """Text of Gmsh's format 4.1, which meshio reads and does not write with groups; cells of no part in a group."""
-    kinds = (grouped.points, grouped.sides, grouped.parts)
-    names = {name: (kind, tag) for kind, found in enumerate(kinds) for tag, name in enumerate(found, start=1)}
-    lines = ["$MeshFormat", "4.1 0 8", "$EndMeshFormat", "$PhysicalNames", str(len(names))]
-    lines += [f'{kind} {tag} "{name}"' for name, (kind, tag) in names.items()]
-    lines += ["$EndPhysicalNames", "$Entities", f"{len(kinds[0])} {len(kinds[1])} {len(kinds[2]) + 1} 0"]
-    for kind, tag in [*names.values(), (2, 99)]:
-        lines.append(f"{tag} {'0 ' * (6 if kind else 3)}1 {tag}{' 0' if kind else ''}")
-    count, points = len(grouped.mesh.points), grouped.mesh.points
-    lines += ["$EndEntities", "$Nodes", f"1 {count} 1 {count}", f"2 99 0 {count}"]
-    lines += [*map(str, range(1, count + 1)), *(f"{x!r} {y!r} 0" for x, y in points.tolist()), "$EndNodes", "$Elements"]
-    triangles = grouped.mesh.triangles
-    rest = ~np.any([np.zeros(len(triangles), dtype=bool), *(masks[3] for masks in grouped.parts.values())], axis=0)
-    blocks = [(*names[name], 15, np.array([[grouped.particle(name)]])) for name in grouped.points]
-    blocks += [(*names[name], 1, edges) for name, edges in grouped.sides.items()]
-    blocks += [(*names[name], 2, triangles[masks[3]]) for name, masks in grouped.parts.items()]
-    blocks.append((2, 99, 2, triangles[rest]))
-    total = sum(len(cells) for *_, cells in blocks)
-    lines.append(f"{len(blocks)} {total} 1 {total}")
-    for kind, tag, code, cells in blocks:
-        lines.append(f"{kind} {tag} {code} {len(cells)}")
-        lines += [" ".join(map(str, [1, *(row + 1)])) for row in cells]
-    return "\n".join([*lines, "$EndElements", ""])
-
-
 def by_meshio(grouped, **sets):
     mesh = grouped.mesh
     return meshio.Mesh(mesh.points, [("triangle", mesh.triangles)], **sets)
@@ -292,7 +266,6 @@ FILES = {
     "own.msh": write_mesh,
     "marks.vtu": write_vtu,
     "sets.inp": write_abaqus,
-    "gmsh4.msh": lambda path, grouped: path.write_text(msh4(grouped)),
 }
 
 
@@ -303,9 +276,6 @@ def test_groups_come_back_from_files(tmp_path, name, shape):
     grouped = mesh_shape(shape, 0.1 * shape.extent[1][1])
     FILES[name](tmp_path / name, grouped)
     found = read_shape(tmp_path / name)
-    if name == "gmsh4.msh" and shape.parts:
-        assert found.parts.keys() == {*shape.parts, "99"}
-        found = GroupedMesh(found.mesh, found.sides, found.points, {part: found.parts[part] for part in shape.parts})
     assert same(grouped, found) and not found.unusable
 
 

@@ -200,7 +200,10 @@ REFUSED = {
         "load 'pull', support: no group is named 'lfet'; did you mean 'left'? known: lower, right, upper, left",
     ),
     "no support": (lambda: LoadCase("a", ()), "load 'a': has no supports"),
-    "nothing done": (lambda: LoadCase("a", st.Support("left", 0, 0)), "load 'a': does nothing; give tractions"),
+    "nothing done": (
+        lambda: LoadCase("a", st.Support("left", 0, 0)),
+        "load 'a': neither moves nor pulls the body",
+    ),
     "held twice": (lambda: LoadCase("a", [Support("left", 0), Support("left", 0.001)]), "hold 'left' along x twice"),
     "holds nothing": (lambda: Support("left"), "support on 'left': holds neither x nor y"),
     "no force": (lambda: Traction("left", ("1 mm", 0)), "traction on 'left', force, x: '1 mm' is a length"),

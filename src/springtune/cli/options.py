@@ -65,7 +65,7 @@ def check_target(option: str, target: Path) -> None:
 
 
 SPRING_FILES = (
-    ".csv, .json, .vtu (ParaView), .h5, .xml or .mjcf (MuJoCo), .scn or .py (SOFA), .newton.py (Newton), "
+    ".csv, .json, .vtu (ParaView), .xml or .mjcf (MuJoCo), .scn or .py (SOFA), .newton.py (Newton), "
     "or .xpbd.json (XPBD)"
 )
 """Endings of files of springs, for the help."""

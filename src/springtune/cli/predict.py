@@ -424,7 +424,7 @@ def net_of_shape(asked: "AskedShape", definition: str, scale: float = 1.0, stiff
 
 def written_text(net: "SpringNet", written: "Iterable[Path]", mujoco: int | None = None) -> str:
     """Written files and their expected errors, as text."""
-    from ..handover.formats import for_mujoco
+    from ..handover.formats import FOR_MUJOCO, ending_of
     from ..handover.mujoco import for_versions
     from ..problem.geometry import size_text
 
@@ -436,7 +436,7 @@ def written_text(net: "SpringNet", written: "Iterable[Path]", mujoco: int | None
     counts = [*extent, f"{len(net.points)} particles", springs, *besides]
     lines = [f"{first}: {', '.join(counts)} of definition {header['definition']}"]
     lines += [f"beside it: {', '.join(str(other) for other in others)}"] if others else []
-    lines += [for_versions(net.energies, mujoco)] if for_mujoco(first) else []
+    lines += [for_versions(net.energies, mujoco)] if ending_of(first) in FOR_MUJOCO else []
     errors = header["expected_error"]
     if isinstance(errors, dict):
         known = [f"{load} {100 * error:+.3g} %" for load, error in errors.items() if isinstance(error, float)]

@@ -1,4 +1,4 @@
-"""Files of nets: CSV, JSON, VTU and HDF5, each of which gives back what was written, number by number."""
+"""Files of nets: CSV, JSON and VTU, each of which gives back what was written, number by number."""
 
 import csv
 import io
@@ -7,7 +7,6 @@ import warnings
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack, redirect_stderr, redirect_stdout
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,7 +15,7 @@ import numpy as np
 from ..mesh.formats import LONGEST_SAID, library
 from ..safe_io.atomic import check_folder, replacing, write_text
 from ..safe_io.escapes import json_line, shown
-from ..safe_io.inputs import DataElsewhere, bounded, check_alone
+from ..safe_io.inputs import bounded
 from .mujoco import mjcf
 from .newton import newton_script
 from .paraview import comment_of, write_vtu
@@ -65,16 +64,24 @@ Read = tuple[dict[str, np.ndarray], Iterable[Terms], dict[str, Any]]
 
 def write(path: str | Path, net: Net, mujoco: int | None = None) -> list[Path]:
     """Write a net in the format of a name's ending; files appear whole or not at all."""
-    path = Path(path)
-    check_target(path)
-    form = _format_of(path)
-    if mujoco is not None:
-        if not for_mujoco(path):
-            raise ValueError(
-                f"mujoco: {mujoco!r} is of no use to {path.name}; leave it out, or give a name ending in .xml or .mjcf"
-            )
-        form = _for_simulator("MuJoCo", _as_text(partial(mjcf, version=mujoco)))
-    return form.write(path, replace(net, header=net.header | {"thickness": float(net.thickness)})) or [path]
+    path, ending = Path(path), check_target(path)
+    net = replace(net, header=net.header | {"thickness": float(net.thickness)})
+    if mujoco is not None and ending not in FOR_MUJOCO:
+        raise ValueError(
+            f"mujoco: {mujoco!r} is of no use to {path.name}; leave it out, or give a name ending in .xml or .mjcf"
+        )
+    if ending in FORMATS:
+        return FORMATS[ending][0](path, net) or [path]
+    program, text = SIMULATORS[ending]
+    calibrated = net.header.get("calibrated")
+    if calibrated and ending != AT_SETTING.get(calibrated["engine"]):
+        kept = " or ".join(filter(None, [AT_SETTING.get(calibrated["engine"]), ".csv, .json or .vtu"]))
+        raise ValueError(
+            f"{path}: runs {program} at a step of its own, and the stiffness is that for {calibrated['engine']} at "
+            f"{calibrated['setting']} alone; give a name ending in {kept}"
+        )
+    write_text(path, text(net) if mujoco is None else mjcf(net, mujoco))
+    return [path]
 
 
 NET_MEMORY, MEMORY_SHARE = 3e8, 60.0
@@ -84,9 +91,11 @@ NET_MEMORY, MEMORY_SHARE = 3e8, 60.0
 def read(path: str | Path) -> Net:
     """Read a net."""
     path = Path(path)
-    form = _format_of(path)
+    ending = ending_of(path)
     if not path.is_file():
         raise ValueError(f"{path}: there is no such file; give one that was written by springtune")
+    if ending in SIMULATORS:
+        raise ValueError(f"{path}: it is for {SIMULATORS[ending][0]}; read the springs from {', '.join(ENDINGS)}")
     told = io.StringIO()
     try:
         # meshio prints its errors, and exits.
@@ -94,23 +103,12 @@ def read(path: str | Path) -> Net:
         most = NET_MEMORY + MEMORY_SHARE * sum(one.stat().st_size for one in files)
         with redirect_stdout(told), redirect_stderr(told), warnings.catch_warnings(), bounded(most):
             warnings.simplefilter("ignore")
-            return _checked(*form.read(path))
+            return _checked(*FORMATS[ending][1](path))
     except (Exception, SystemExit) as error:  # libraries raise many kinds of errors for a damaged file
-        if isinstance(error, DataElsewhere) or (isinstance(error, OSError) and error.errno is not None):
+        if isinstance(error, OSError) and error.errno is not None:
             raise
         said = " ".join(str(error).split())[:LONGEST_SAID] or type(error).__name__
         raise ValueError(f"{path}: is damaged, or no net of springtune ({said}); write it again") from None
-
-
-def check_target(path: str | Path) -> None:
-    """Refuse a name whose ending is no format of a net, or whose folder is not there."""
-    _format_of(Path(path))
-    check_folder(path)
-
-
-def for_mujoco(path: Path) -> bool:
-    """Whether the ending of a name is one for MuJoCo."""
-    return _format_of(path) is _MUJOCO
 
 
 def _checked(arrays: dict[str, np.ndarray], energies: Iterable[Terms], header: dict[str, Any]) -> Net:
@@ -410,104 +408,49 @@ def _read_vtu(path: Path) -> Read:
     return arrays, energies, json.loads(comment_of(path))
 
 
-# -- HDF5 ----------------------------------------------------------------------------------------------------------
+# -- formats -------------------------------------------------------------------------------------------------------
 
+FORMATS: dict[str, tuple[Callable[[Path, Net], list[Path] | None], Callable[[Path], Read]]] = {
+    ".csv": (_write_csv, _read_csv),
+    ".json": (_write_json, _read_json),
+    ".vtu": (lambda path, net: write_vtu_with(path, net, {}, {}), _read_vtu),
+}
+"""Functions that write and read a net, by the ending of the name of its file."""
 
-def _write_h5(path: Path, net: Net) -> None:
-    import h5py
+ENDINGS = tuple(FORMATS)
+"""Endings of the names of files that are read."""
 
-    with replacing(path) as unfinished, h5py.File(unfinished, "w", track_order=True) as file:
-        file["header"] = json.dumps(net.header, indent=1)  # names of HDF5 have no slash, and its texts no zero
-        for name, array in arrays_of(net).items():
-            made = file.create_dataset(name, data=array)
-            if ARRAYS[name].unit:
-                made.attrs["units"] = ARRAYS[name].unit
-        for number, terms in enumerate(net.energies):
-            group = file.create_group(f"energies/{number}", track_order=True)
-            group.attrs.update(
-                {"kind": terms.kind, "formula": terms.formula, "cells": f"/{CELL_ARRAYS[terms.cells.shape[1]]}"}
-            )
-            for name, values in terms.values.items():
-                group.create_dataset(name, data=values).attrs["units"] = terms.units[name]
+FOR_MUJOCO = (".xml", ".mjcf")
+"""Endings of files for MuJoCo."""
 
-
-def _read_h5(path: Path) -> Read:
-    import h5py
-
-    check_alone(path)
-    with h5py.File(path) as file:
-        arrays = {name: file[name][()] for name in ARRAYS if name in file}
-        groups = [file["energies"][str(number)] for number in range(len(file.get("energies", ())))]
-        energies = [_terms_of(one.attrs["kind"], arrays[one.attrs["cells"][1:]], one) for one in groups]
-        return arrays, energies, json.loads(file["header"].asstr()[()])
-
-
-# -- simulators ----------------------------------------------------------------------------------------------------
-
-
-def _for_simulator(program: str, write: Callable[[Path, Net], list[Path] | None]) -> "_Format":
-    """Format of a simulator, which is not read."""
-
-    def refuse(path: Path) -> Read:
-        raise ValueError(f"it is for {program}; read the springs from .json, .h5, .csv or .vtu")
-
-    def checked(path: Path, net: Net) -> list[Path] | None:
-        made_for = net.header.get("calibrated")
-        if made_for and not path.name.endswith(AT_SETTING.get(made_for["engine"], "/")):
-            kept = " or ".join(filter(None, [AT_SETTING.get(made_for["engine"]), ".csv, .json, .vtu or .h5"]))
-            raise ValueError(
-                f"{path}: runs {program} at a step of its own, and the stiffness is that for {made_for['engine']} at "
-                f"{made_for['setting']} alone; give a name ending in {kept}"
-            )
-        return write(path, net)
-
-    return _Format(checked, refuse)
-
+SIMULATORS: dict[str, tuple[str, Callable[[Net], str]]] = {
+    **dict.fromkeys(FOR_MUJOCO, ("MuJoCo", mjcf)),
+    ".scn": ("SOFA", sofa_xml),
+    ".py": ("SOFA", sofa_python),
+    ".xpbd.json": ("XPBD", xpbd),
+    ".newton.py": ("Newton", newton_script),
+}
+"""Programs, and the text of a net for them, by the ending of the name of its file."""
 
 AT_SETTING = {"newton-vbd": ".newton.py", "xpbd": ".xpbd.json"}
 """Endings of files that run a calibrated stiffness at the setting that it is for, by engine."""
 
 
-def _as_text(text: Callable[[Net], str]) -> Callable[[Path, Net], None]:
-    """How a net is written that is one text."""
-    return lambda path, net: write_text(path, text(net))
+def check_target(path: str | Path) -> str:
+    """Return the ending of a name to write to, which is refused if it is no format or its folder is not there."""
+    ending = ending_of(path)
+    check_folder(path)
+    return ending
 
 
-class _Format(NamedTuple):
-    """How a net is written in a format, and read."""
-
-    write: Callable[[Path, Net], list[Path] | None]
-    read: Callable[[Path], Read]
-
-
-_FORMATS = {
-    ".csv": _Format(_write_csv, _read_csv),
-    ".json": _Format(_write_json, _read_json),
-    ".vtu": _Format(lambda path, net: write_vtu_with(path, net, {}, {}), _read_vtu),
-    ".h5": _Format(_write_h5, _read_h5),
-}
-
-ENDINGS = tuple(_FORMATS)
-"""Endings of the names of files of nets."""
-
-_MUJOCO = _for_simulator("MuJoCo", _as_text(mjcf))
-
-_SIMULATORS = {
-    ".xml": _MUJOCO,
-    ".mjcf": _MUJOCO,
-    ".scn": _for_simulator("SOFA", _as_text(sofa_xml)),
-    ".py": _for_simulator("SOFA", _as_text(sofa_python)),
-    ".xpbd.json": _for_simulator("XPBD", _as_text(xpbd)),
-    ".newton.py": _for_simulator("Newton", _as_text(newton_script)),
-}
-
-
-def _format_of(path: Path) -> _Format:
+def ending_of(path: str | Path) -> str:
+    """Ending of a name that is a format of springs; others are refused."""
+    path = Path(path)
+    known = {**FORMATS, **SIMULATORS}
     # The longest ending that fits: .xpbd.json is not .json.
-    known = _FORMATS | _SIMULATORS
     ending = max((one for one in known if path.name.lower().endswith(one)), key=len, default="")
     if not ending:
         raise ValueError(f"{path}: '{path.suffix}' is no format of springs; give a name ending in {', '.join(known)}")
     if path.name.lower() == ending:
         raise ValueError(f"'{path}' is an ending alone; give a name before it, such as net{ending}")
-    return known[ending]
+    return ending

@@ -274,7 +274,7 @@ class SpringNet(Tabled, Net):
         ----------
         path : str or Path
             ``.csv`` has the springs as a table, with the header ahead as comments, and particles and cells in tables
-            beside it, such as ``net.particles.csv``; ``.json`` and ``.h5`` (HDF5) have the arrays by their names here;
+            beside it, such as ``net.particles.csv``; ``.json`` has the arrays by their names here;
             ``.vtu`` has springs as lines, for ParaView and meshio. Models that run, and are not read again: ``.xml`` or
             ``.mjcf`` for MuJoCo, ``.scn`` or ``.py`` for SOFA, ``.newton.py`` for Newton, ``.xpbd.json`` for XPBD.
         mujoco : int, optional

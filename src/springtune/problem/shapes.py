@@ -461,9 +461,11 @@ class LoadCase:
             if twice:
                 raise ValueError(f"{what}: supports hold {twice[0]!r} along {axis} twice; remove one of them")
         moved = any(support.x or support.y for support in self.supports)
-        if not (self.tractions or self.pressures or any(gravity) or moved):
+        pulled = any(any(one.force) for one in self.tractions) or any(one.pressure for one in self.pressures)
+        if not (moved or pulled or any(gravity)):
             raise ValueError(
-                f"{what}: does nothing; give tractions, pressures, gravity, or a support with a displacement"
+                f"{what}: neither moves nor pulls the body; give forces, pressures, gravity, or a support that is "
+                "moved, such as {end: {x: 1 mm}}"
             )
         names = [one.name for one in self.quantities]
         twice = [name for name in names if names.count(name) > 1]
