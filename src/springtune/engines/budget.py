@@ -297,8 +297,8 @@ def runnable(
             try:
                 if abs(aside := drift(taken[name], taken[name].solve().displacements)) > DRIFT:
                     raise EngineError(
-                        f"definition '{name}' moves across by {error_text(aside)} of what finite elements move along "
-                        "on this mesh; take a finer one, or another type such as 'structured'"
+                        f"definition '{name}' moves across by {error_text(aside)}; take a finer mesh, or another "
+                        "type such as 'structured'"
                     )
                 engine.start(net_of(taken[name]), setting, 1.0)
             except EngineError as error:

@@ -91,8 +91,7 @@ def pulling(net: SpringNet, why: str) -> None:
     """Refuse springs of negative stiffness."""
     if np.any(net.stiffness < 0):
         raise EngineError(
-            f"definition '{net.header['definition']}': has springs of negative stiffness, and {why}; take 'patch' or "
-            "'lattice', whose springs all pull, or engine 'implicit-cg'"
+            f"definition '{net.header['definition']}': negative stiffness, and {why}; take 'patch' or 'lattice'"
         )
 
 

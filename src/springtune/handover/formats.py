@@ -77,8 +77,8 @@ def write(path: str | Path, net: Net, mujoco: int | None = None) -> list[Path]:
     if calibrated and ending != AT_SETTING.get(calibrated["engine"]):
         kept = " or ".join(filter(None, [AT_SETTING.get(calibrated["engine"]), ".csv, .json or .vtu"]))
         raise ValueError(
-            f"{path}: runs {program} at a step of its own, and the stiffness is that for {calibrated['engine']} at "
-            f"{calibrated['setting']} alone; give a name ending in {kept}"
+            f"{path}: runs {program} at a step of its own, and the stiffness is for {calibrated['engine']} at "
+            f"{calibrated['setting']}; give a name ending in {kept}"
         )
     write_text(path, text(net) if mujoco is None else mjcf(net, mujoco))
     return [path]

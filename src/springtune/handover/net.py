@@ -295,8 +295,7 @@ class SpringNet(Tabled, Net):
         load = self.header.get("load")
         if load and load.get("prescribed"):
             raise ValueError(
-                f"load {load['name']!r}: prescribes displacements, and a file of springs has forces and directions "
-                "that are held; take a load of forces, or give SpringNet.from_mesh the mesh and the scene's springs"
+                f"load {load['name']!r}: prescribes displacements, which no file of springs has; take a load of forces"
             )
         written: list[Path] = hook("files").write(path, self, mujoco)
         return written

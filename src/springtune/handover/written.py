@@ -32,9 +32,7 @@ def write_result(path: str | Path, result: Result, steps: int = 10) -> list[Path
     """Write a deformed network, or the path to it, for ParaView; see `springtune.Result.write`."""
     path, scene = Path(path), result.scene
     if path.suffix.lower() not in (".vtu", ".pvd"):
-        raise ValueError(
-            f"{path}: '{path.suffix}' is no format of a result; give a name ending in .vtu, or, for its path, .pvd"
-        )
+        raise ValueError(f"{path}: '{path.suffix}' is no format of a result; give a name ending in .vtu or .pvd")
     check_folder(path)
     if not np.isfinite(result.displacement):
         raise ValueError(f"there is no equilibrium to write: {result.message}")

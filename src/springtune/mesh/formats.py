@@ -301,10 +301,7 @@ def _read_points(path: str | Path, points: np.ndarray, used: np.ndarray) -> np.n
     if points.shape[1] > 2 and extent[2] > 1e-9 * extent[:2].max():
         away = np.abs(points[:, 2] - points[0, 2])
         first = f"point {used[np.argmax(away > 1e-9 * extent[:2].max())]}"
-        raise MeshError(
-            f"{path}: points leave the plane of x and y, the first one {first}, by up to {1e3 * away.max():.3g} mm; "
-            "give a plane mesh"
-        )
+        raise MeshError(f"{path}: points leave the plane of x and y, the first one {first}; give a plane mesh")
     return points[:, :2].copy()
 
 
@@ -384,7 +381,6 @@ class _Groups:
         self.outline, _ = outline_of(mesh)
         count = len(mesh.points)
         self.codes = self.outline @ [count, 1]
-        self.inner = np.unique(np.sort(mesh.edges[~mesh.on_outline], axis=1) @ [count, 1])
 
     def grouped(self) -> GroupedMesh:
         """The mesh with what can be groups of it."""
@@ -501,19 +497,16 @@ class _Groups:
         ends = self.numbers[lines]
         count = len(self.mesh.points)
         forth, back = np.isin(ends @ [count, 1], self.codes), np.isin(ends @ [1, count], self.codes)
-        known = (ends >= 0).all(axis=1)
-        wrong = ~(known & (forth | back))
+        wrong = (ends < 0).any(axis=1) | ~(forth | back)
         if wrong.any():
-            inside = known & np.isin(np.sort(ends, axis=1) @ [count, 1], self.inner)
-            nowhere = wrong & ~inside
-            where = in_words(self.places[lines[wrong][0]])
-            counts = {"inside the body": inside.sum(), "no edges of cells": nowhere.sum()}
-            what = " and ".join(f"{count} are {place}" for place, count in counts.items() if count)
-            self.unusable[name] = (
-                f"is not on the outline: of its {len(lines)} lines, {what}, the first one at {where}; take these out"
+            self._refuse(
+                name, f"is not on the outline: of its {len(lines)} lines {wrong.sum()} are no sides", lines[wrong]
             )
             return
         self.sides[name] = np.unique(np.where(forth[:, None], ends, ends[:, ::-1]), axis=0)
+
+    def _refuse(self, name: str, why: str, nodes: np.ndarray) -> None:
+        self.unusable[name] = f"{why}, the first one at {in_words(self.places[nodes[0]])}; take these out"
 
     def _add_points(self, name: str, nodes: np.ndarray) -> None:
         """A point, or sides of points, by points of the file."""
@@ -521,18 +514,11 @@ class _Groups:
             self.points[name] = self.places[nodes[0]]
             return
         particles = self.numbers[nodes]
-        lost = int((particles < 0).sum())
         edges = self.outline[np.isin(self.outline, particles).all(axis=1)]
-        alone = np.setdiff1d(particles[particles >= 0], edges)
-        if lost or len(alone):
-            at_outline = np.isin(alone, self.outline)
-            counts = {
-                "are inside the body": (~at_outline).sum(),
-                "have no neighbour on the outline that is one": at_outline.sum(),
-                "belong to no cell": lost,
-            }
-            what = " and ".join(f"{count} {reason}" for reason, count in counts.items() if count)
-            self.unusable[name] = f"is neither one point nor sides: of its {len(nodes)} points, {what}; take these out"
+        alone = ~np.isin(particles, edges)
+        if alone.any():
+            what = f"of its {len(nodes)} points {alone.sum()} are at the end of no side"
+            self._refuse(name, f"is neither one point nor sides: {what}", nodes[alone])
             return
         if name in self.sides and {*map(tuple, edges.tolist())} != {*map(tuple, self.sides[name].tolist())}:
             del self.sides[name]

@@ -52,22 +52,18 @@ class _Stretch:
         return [replace(self, low=low, high=high) for low, high in zip(parameters, parameters[1:])]
 
 
-def mesh_shape(
-    shape: Outlined, size: float, mesh_type: str = "free", refined: Mapping[str, float] | None = None
-) -> GroupedMesh:
+def mesh_shape(shape: Outlined, size: float, refined: Mapping[str, float] | None = None) -> GroupedMesh:
     """Mesh a shape.
 
     Each side is divided into equal edges no longer than `size`, an arc into at least six edges a full turn with
     particles on the arc; edges are divided further near much shorter ones. Named points are particles. Inside, netgen
     makes near-equilateral triangles. Same input, same mesh.
 
-    Lengths are in m. Only "free" meshes an outline; `refined` has shorter edges at named groups, which grow from there.
+    Lengths are in m. `refined` has shorter edges at named groups, which grow from there.
     """
     what = f"shape '{shape.name}'"
     if not shape.rounds:
         raise MeshError(f"{what}: its mesh is that of the file {shape.file}; read it with springtune.read_shape")
-    if mesh_type != "free":
-        raise MeshError(f"mesh type: {mesh_type!r} fills rectangles, and {what} has an outline of its own; give 'free'")
     sizes = _sizes(shape, size, dict(refined or {}), what)
     stretches, lines, fine = _divided(shape, sizes)
     (left, low), _ = shape.extent

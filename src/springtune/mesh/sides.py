@@ -81,7 +81,7 @@ class OutlineSide:
             if not min(shares) > 1e-12:
                 raise ValueError(
                     f"{about}: the ends are {1e3 * first:.9g} and {1e3 * second:.9g} mm from it, and no ellipse with "
-                    "axes along x and y about it goes through both; correct the centre or an end"
+                    "axes along x and y about it goes through both; correct the centre"
                 )
             across, along = (large / math.sqrt(share) for share in shares)
         begin, finish = math.atan2(y / along, x / across), math.atan2(v / along, u / across)

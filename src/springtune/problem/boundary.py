@@ -23,6 +23,9 @@ ON_POINT = 1e-9
 OUTSIDE = 0.25
 """How far outside the nearest cell a point may lie, over its size [1], as next to an arc."""
 
+IN_CELL = 1e-6
+"""How far outside a cell a point counts as in it, over the cell's size [1]: coordinates are rounded."""
+
 MAX_ITERATIONS = 50
 """Newton steps that look for a point in a quadrilateral."""
 
@@ -178,8 +181,8 @@ def reaction_weights(grouped: GroupedMesh, case: LoadCase, quantity: Quantity) -
     if quantity.of not in [one.group for one in holding]:
         known = ", ".join(dict.fromkeys(one.group for one in holding)) or "none"
         raise ValueError(
-            f"load {case.name!r}: quantity {quantity.name!r} is the reaction of {quantity.of!r} along "
-            f"{quantity.component}, and no support holds it so; held along {quantity.component}: {known}"
+            f"load {case.name!r}: quantity {quantity.name!r} is a reaction, and no support holds it so; "
+            f"held along {quantity.component}: {known}"
         )
     shares = {group: _lengths(grouped, group) for group in dict.fromkeys(one.group for one in holding)}
     by_sides = sum((share for group, share in shares.items() if group in grouped.sides), np.zeros(1))
@@ -288,18 +291,14 @@ def check_case(grouped: GroupedMesh, case: LoadCase) -> None:
         if name in grouped.points and grouped.particle(name) is None:
             raise ValueError(f"{where}, {what}: point {name!r} is no particle of the mesh; move it to one")
     for quantity in case.quantities:
-        if quantity.of in grouped.points and not _in_body(grouped.mesh, grouped.points[quantity.of]):
+        if quantity.of in grouped.points and not _in_body(grouped, quantity.of):
             raise ValueError(f"{where}, quantity {quantity.name!r}: point {quantity.of!r} is not in the body; move it")
     check_held(grouped.mesh.points, grouped.mesh.edges, supported(grouped, case)[0], where)
 
 
-def _in_body(mesh: Mesh, point: np.ndarray) -> bool:
-    """Whether a point is in a cell, or within rounding of one."""
-    small = 1e-9 * np.ptp(mesh.points, axis=0).max()
-    for corners in mesh.cells.values():
-        here = mesh.points[corners] - point
-        after = np.roll(here, -1, axis=1)
-        lengths = np.linalg.norm(after - here, axis=2)
-        if ((here[..., 0] * after[..., 1] - here[..., 1] * after[..., 0]) >= -small * lengths).all(axis=1).any():
-            return True
-    return False
+def _in_body(grouped: GroupedMesh, name: str) -> bool:
+    """Whether a named point is in a cell, or within rounding of one."""
+    try:
+        return bool(cell_at(grouped, name)[2].min() > -IN_CELL)
+    except ValueError:
+        return False

@@ -659,8 +659,7 @@ def _strained(
     coupled = nu / along + by_x * by_y * modulus / (along * across)
     if not (left_x > 0 and left_y > 0 and coupled**2 * along * across < left_x * left_y):
         raise ValueError(
-            f"material {name!r}: across_the_plane is {third!r}, and with the other constants some strain takes no "
-            "work; give smaller Poisson's ratios"
+            f"material {name!r}: across_the_plane is {third!r}: some strain takes no work; give smaller ratios"
         )
     return along / left_x, across / left_y, coupled * along / left_x
 
@@ -721,9 +720,8 @@ as {'': ..., 'core': ...}; a study has them under 'parts', in Python `study.mate
     if len(parts) > 1 and not any(given):
         example = next(filter(None, parts))
         raise ValueError(
-            f"material: one is given, and the body has the parts {names}; name those of other materials, such as "
-            f"{{'': ..., {example!r}: ...}}; a study has them under 'parts', in Python "
-            "`study.materials_of(shape, material)`"
+            f"material: one is given, and the body has the parts {names}; name those of others, such as "
+            f"{{'': ..., {example!r}: ...}}, as `study.materials_of` does"
         )
     found = {part: given.get(part, given.get("")) for part in parts}
     for part, one in found.items():
@@ -744,10 +742,7 @@ def only_isotropic(material: AnyMaterial, remedy: str) -> Material:
     ValueError: material: 'board' is anisotropic, and beams are of isotropic ones, as their references; take another
     """
     if not isinstance(material, Material):
-        raise ValueError(
-            f"material: {material.name!r} is anisotropic, and beams are of isotropic ones, as their references; "
-            f"{remedy}"
-        )
+        raise ValueError(f"material: {material.name!r} is anisotropic, and beams are of isotropic ones; {remedy}")
     return material
 
 

@@ -76,8 +76,7 @@ class TensileTest:
             place = int(np.argmax(wrong))
             raise TestDataError(
                 f"{self.name}: a stretch of {stretch[place]:g} with a stress of {stress[place]:g} Pa: tension is "
-                "positive, above a stretch of 1; give nominal stress over stretch (1 plus strain), or name the column "
-                "'strain'"
+                "positive; give nominal stress over stretch, or name the column 'strain'"
             )
         if len(np.unique(stretch[told])) < 3:
             raise TestDataError(f"{self.name}: has fewer than three stretches besides 1; give more points")
@@ -98,8 +97,7 @@ class TensileTest:
         x, y = np.array(numbers(path, rows, heads, TestDataError)).reshape(-1, 2).T[order]
         if kind == "strain" and not unit and _may_be_percent(x, y):
             raise TestDataError(
-                f"{where[order[0]]}its values may be fractions, percent or stretches; name it 'strain [-]', "
-                "'strain [%]' or 'stretch'"
+                f"{where[order[0]]}may be fractions or percent; name it 'strain [-]', 'strain [%]' or 'stretch'"
             )
         with np.errstate(over="ignore"):
             stretch, stress = scale * x + (kind == "strain"), factor * y
@@ -271,6 +269,6 @@ def _check(law: Rubber, name: str) -> None:
         falls = np.flatnonzero(np.diff(q * law.stress(test, q)) <= 0)
         if len(falls):
             raise TestDataError(
-                f"{name}: the fit of {len(law.coefficients)} terms is unstable: its stress falls in {test} at a "
-                f"stretch of {q[falls[0]]:.3g}; give fewer terms, or more data"
+                f"{name}: the fit of {len(law.coefficients)} terms is unstable in {test} at a stretch of "
+                f"{q[falls[0]]:.3g}; give fewer terms, or more data"
             )

@@ -149,10 +149,7 @@ class Hole:
         _round(self.outline, what)
         groups = [segment.group for segment in self.outline if segment.group]
         if self.part and groups:
-            raise ValueError(
-                f"{what}: a side has the group {groups[0]!r}, but is inside the body, and groups are of its outline; "
-                "leave the group out"
-            )
+            raise ValueError(f"{what}: a side has the group {groups[0]!r}, but is inside the body; leave the group out")
 
     @classmethod
     def circle(cls, centre: Place, radius: Number, group: str | None = None, part: str = "") -> "Hole":
@@ -464,8 +461,7 @@ class LoadCase:
         pulled = any(any(one.force) for one in self.tractions) or any(one.pressure for one in self.pressures)
         if not (moved or pulled or any(gravity)):
             raise ValueError(
-                f"{what}: neither moves nor pulls the body; give forces, pressures, gravity, or a support that is "
-                "moved, such as {end: {x: 1 mm}}"
+                f"{what}: neither moves nor pulls the body; give forces, or a support such as {{end: {{x: 1 mm}}}}"
             )
         names = [one.name for one in self.quantities]
         twice = [name for name in names if names.count(name) > 1]

@@ -189,8 +189,7 @@ def sensitivity(scene: "Scene", stiffness_ratios: ArrayLike | None = None) -> Cu
         raise ValueError(f"scene: {scene!r} is not a Scene; give one such as springtune.Scene(beam, mesh, ...)")
     if scene.follower:
         raise ValueError(
-            f"load: {scene.load!r} turns with its side, and stiffness enters as force over stiffness only where forces "
-            "keep their direction; take 'pressure' or linear kinematics"
+            f"load: {scene.load!r} turns with its side, and has no curve; take 'pressure' or linear kinematics"
         )
     try:
         ratios = np.sort(np.asarray(RATIOS if stiffness_ratios is None else stiffness_ratios, dtype=float).ravel())

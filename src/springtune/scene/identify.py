@@ -206,12 +206,12 @@ class Model:
         estimated = any(block.noise is None for block in self.blocks)
         if self.counts.sum() < max(rank, 1) + estimated or self.counts.min() < 1:
             raise TestDataError(
-                f"{labels}: {max(self.counts.sum(), 0)} numbers besides the shift, for the unknowns {unknowns} and the "
-                "noise; give more rows, or known constants and noise"
+                f"{labels}: {max(self.counts.sum(), 0)} numbers besides the shift, for the unknowns {unknowns} and "
+                "the noise; give more rows"
             )
         if not rank:
             raise TestDataError(
-                f"{unknowns}: not determined by these data, which have no force; add one, as of a curve or the load"
+                f"{unknowns}: not determined by these data, which have no force; add one, as of a curve"
             )
         return [names[place] for place in np.sort(order[rank:])]
 
@@ -457,8 +457,7 @@ def _scale(model: Model, constants: dict[str, Any]) -> float:
         share = predicted @ own / (np.linalg.norm(predicted) * np.linalg.norm(own) or 1)
         if block.places.ndim > 1 and share * np.sqrt(len(own)) < -4:
             raise TestDataError(
-                f"{block.label}: runs against the load; change the sign of its displacements, or give the load that it "
-                "is of"
+                f"{block.label}: runs against the load; change the sign of its displacements, or give its load"
             )
         if predicted @ own > 0:
             found.append(np.log(predicted @ predicted / (predicted @ own)))
@@ -477,8 +476,7 @@ def _fitted(
         share = left / (own @ own or 1)
         if block.places.ndim > 1 and share > 1 - EXPLAINED and excess(block.by_place(table[:, 0]), block.places) > 0:
             raise TestDataError(
-                f"{block.label}: the load explains {100 * max(1 - share, 0):.0f} % of it, and the rest is not random; "
-                "give the load and the body that it is of, and check columns and signs"
+                f"{block.label}: the load explains {100 * max(1 - share, 0):.0f} % of it; check load, columns and signs"
             )
     return lacking, constants, tables, noise, half
 

@@ -134,8 +134,7 @@ class MeasuredTest:
         put(self, angle=quantity(self.angle, "angle", "angle"), columns=columns, _lines=lines, _missing=missing)
         if (self.force is None) == (isinstance(self.body, Beam) and "u" in columns):
             raise ValueError(
-                f"force: {self.force!r}; give the force at which '{self.file}' was measured, as '400 N', if it is the "
-                "field of a beam, else none"
+                f"force: {self.force!r}; give that of the field of a beam in '{self.file}', such as '400 N', else none"
             )
         for name, value, kind in (("force", self.force, "force"), ("noise", self.noise, "length")):
             put(self, **{name: None if value is None else positive(value, kind, name)})
@@ -170,13 +169,11 @@ def _field(test: MeasuredTest, family: Family) -> list[Block]:
     if apart[worst] > OFF_BODY:
         x, y = 1e3 * points[worst]
         raise TestDataError(
-            f"'{test.file}', line {test._lines[worst]}: the point x = {x:.6g} mm, y = {y:.6g} mm is outside of the "
-            "body; remove it, or correct the unit or the origin"
+            f"'{test.file}', line {test._lines[worst]}: ({x:.6g}, {y:.6g}) mm is outside of the body; correct the point"
         )
     if len(points) > 1 and not np.ptp(values, axis=0).any():
         raise TestDataError(
-            f"'{test.file}': all {len(points)} points have the same displacement, so nothing was measured; give the "
-            "field under the load"
+            f"'{test.file}': all {len(points)} points have the same displacement; give the field under the load"
         )
     turned = (points - points.mean(axis=0))[:, ::-1] * [-1, 1] / (np.ptp(points) or 1.0)
     rigid, _ = np.linalg.qr(np.column_stack([np.tile(np.eye(2), (len(points), 1)), turned.ravel()]))
@@ -191,14 +188,10 @@ def _curve(test: MeasuredTest, family: Family, load: LoadCase) -> list[Block]:
         raise TestDataError(f"{where}: load {test.load!r} is not one force; give a field of points")
     if not np.ptp(loads) > 1e-9 * np.abs(loads).max() and (test.shift or not loads.any()):
         raise TestDataError(
-            f"{where}, column 'force': all {len(loads)} values are {loads[0]:g} in SI units, so there is no slope; "
-            "give other loads, or switch the shift off if the zero is known"
+            f"{where}, column 'force': all {len(loads)} values are {loads[0]:g}; give other loads, or no shift"
         )
     if (loads - loads.mean()) @ test.columns["displacement"] < 0:
-        raise TestDataError(
-            f"displacement of {where}: runs against the load; both are positive along the load, so change a column's "
-            "sign"
-        )
+        raise TestDataError(f"displacement of {where}: runs against the load; change a column's sign")
     factors = loads / np.hypot(*load.tractions[0].force)
     shifts = np.full((len(loads), int(test.shift)), len(loads) ** -0.5)
     return [
@@ -251,8 +244,8 @@ def _read(path: str | Path) -> tuple[dict[str, np.ndarray], list[int], int]:
         if (far := np.abs(values) > LARGEST_NUMBER / scale).any():
             worst = int(np.argmax(far))
             raise TestDataError(
-                f"'{path}', line {rows[worst][0]}, column {name!r}: {values[worst]:g} {unit} is beyond all measure; "
-                "correct the line, or remove it"
+                f"'{path}', line {rows[worst][0]}, column {name!r}: {values[worst]:g} {unit} is beyond all "
+                "measure; correct it"
             )
         columns[name] = scale * values
     if not rows:

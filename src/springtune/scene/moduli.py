@@ -172,8 +172,7 @@ def moduli(mesh: Mesh, material: AnyMaterial, definition: AnyDefinition) -> Modu
     definition = definition_of(definition)
     if definition.needs == "stiffness":
         raise DefinitionError(
-            f"definition {definition.name!r} is told its stiffness and derives none from a material; choose one that "
-            "does, such as 'uniform'"
+            f"definition {definition.name!r} is told its stiffness; choose one that derives it, such as 'uniform'"
         )
     with named(definition):
         return MeshModuli(mesh)(material, definition)

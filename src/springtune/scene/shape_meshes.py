@@ -24,9 +24,7 @@ LEAST_COVERED = 0.9
 """Least length of a group's edges over the length of its sides: six chords are 5 % shorter than a circle."""
 
 
-def mesh_shape(
-    shape: Shape, size: float | str, mesh_type: str = "free", refined: Mapping[str, float | str] | None = None
-) -> GroupedMesh:
+def mesh_shape(shape: Shape, size: float | str, refined: Mapping[str, float | str] | None = None) -> GroupedMesh:
     """Mesh a shape, with the groups of its sides, its points and parts.
 
     Each side is divided into equal edges no longer than the size, an arc into at least six edges a full turn with its
@@ -37,8 +35,6 @@ def mesh_shape(
     shape : Shape
     size : float or str
         Length of an edge [m], or a text with its unit.
-    mesh_type : str, optional
-        ``"free"``: no other one meshes an outline.
     refined : mapping of str to float or str, optional
         Shorter edges at groups of sides, at points and in parts, by their name [m]; from there on they grow.
 
@@ -49,7 +45,7 @@ def mesh_shape(
     Raises
     ------
     ValueError
-        If the shape has the mesh of a file, the mesh type is another one, or a size is not above zero, larger than the
+        If the shape has the mesh of a file, or a size is not above zero, larger than the
         shape or absurdly small.
 
     Examples
@@ -62,7 +58,7 @@ def mesh_shape(
     """
     is_a(shape, Shape, "shape", A_SHAPE)
     sizes = {name: positive(value, "length", f"refined {name!r}") for name, value in (refined or {}).items()}
-    return mesh_outlined(shape, positive(size, "length", "mesh size"), mesh_type, sizes)
+    return mesh_outlined(shape, positive(size, "length", "mesh size"), sizes)
 
 
 def read_shape(path: str | Path, unit: float | str = "1 m") -> GroupedMesh:

@@ -61,8 +61,7 @@ def check_stiffness(definition: Definition, stiffness: object) -> None:
             f"stiffness: definition {definition.name!r} needs a uniform one; give a stiffness such as '170e6 N/m'"
         )
     raise ValueError(
-        f"stiffness: {stiffness!r} is not used, since definition {definition.name!r} derives its own; leave it out, or "
-        "choose 'paper'"
+        f"stiffness: {stiffness!r} is not used, definition {definition.name!r} derives its own; leave it out"
     )
 
 
@@ -154,7 +153,6 @@ class Sheet:
 
     def __init__(self, mesh: Mesh, thickness: float, networks: int = NETWORKS, like: "Sheet | None" = None) -> None:
         self.mesh, self.thickness, self.deriving = mesh, thickness, 0.0
-        self.held = cache(lambda kind: held(mesh, kind))
         self.weights = cache(lambda kind: weights(mesh, kind))
         self.measured = cache(lambda kind: measured(mesh, kind))
         self.loading = cache(lambda kind, follower=False: box_loading(mesh, kind, follower))

@@ -476,13 +476,11 @@ class Scene(Tabled):
             name = self.statement.named_materials
             raise ValueError(f"density: material {name!r} has none; give a density such as '7850 kg/m^3'")
         if self.problem.given is not None:
-            raise ValueError(
-                f"load: {self.load!r} prescribes displacements, and a motion is under forces; take another load"
-            )
+            raise ValueError(f"load: {self.load!r} prescribes displacements, and motions have forces; take another")
         if self.problem.follower is not None and not released:
             raise ValueError(
-                f"load: {self.load!r} turns with the side that it acts on, and forces of a motion do not; take one "
-                "that does not follow, or let go of it by released=True"
+                f"load: {self.load!r} turns with the side that it acts on, and forces of a motion do not; take "
+                "another, or let go of it by released=True"
             )
         from ..mechanics.dynamics import Motion
 

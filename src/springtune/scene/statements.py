@@ -218,9 +218,7 @@ class BeamStatement(Statement):
     def check(self, definition: Definition) -> None:
         """Refuse a definition that is not for the load."""
         if definition.uniaxial and not self.kind.uniaxial:
-            raise ValueError(
-                f"definition: {definition.name!r} is not for {self.load!r}; take it for traction or compression"
-            )
+            raise ValueError(f"definition: {definition.name!r} is not for {self.load!r}; take it for traction")
 
     def masses(self) -> np.ndarray | None:
         """Masses of the particles [kg], shape (n_points,); None without a density."""
@@ -262,8 +260,7 @@ class ShapeStatement(Statement):
         is_a(shape, Shape, "shape", A_SHAPE)
         if isinstance(grouped, Mesh):
             raise ValueError(
-                "mesh: is of no groups, and supports and loads of a shape are on groups; give a GroupedMesh such as "
-                f"{A_GROUPED_MESH}"
+                f"mesh: is of no groups, which supports and loads are on; give one such as {A_GROUPED_MESH}"
             )
         is_a(grouped, GroupedMesh, "mesh", A_GROUPED_MESH)
         self.shape, self.grouped, self.thickness = shape, grouped, shape.thickness
@@ -279,9 +276,7 @@ class ShapeStatement(Statement):
         self.size = abs(self.scale)
         self.case = scaled(chosen(shape.loads, load, "load"), self.scale)
         if not self.case.quantities:
-            raise ValueError(
-                f"load {load!r}: asks for nothing; give it quantities, of which the first one stands for all"
-            )
+            raise ValueError(f"load {load!r}: asks for nothing; give it quantities, the main one first")
         self.kinematics = kinematics
         factor = "" if self.scale == 1 else f" times {self.scale:g}"
         self.body, self.label = shape.name, f"{load}{factor}"
@@ -297,8 +292,7 @@ class ShapeStatement(Statement):
         pattern = all_forces()
         if not (pattern[~held].any() or given.any()):
             raise ValueError(
-                f"load {self.load!r}: neither pulls what is free nor moves a support; give it a traction, a pressure, "
-                "gravity or a prescribed displacement"
+                f"load {self.load!r}: neither pulls what is free nor moves a support; give a force, or move one"
             )
         edges, pressure = followed(self.grouped, self.case, self.thickness)
         turning = self.kinematics == "nonlinear" and len(edges) > 0
@@ -327,30 +321,27 @@ class ShapeStatement(Statement):
             }
             if particle is not None and len({self.by_part[name] for name in names}) > 1:
                 raise ValueError(
-                    f"load {self.load!r}, quantity {one.name!r}: {one.of!r} is where different materials meet, and the "
-                    "stress has a jump there; ask for it on one side"
+                    f"load {self.load!r}, quantity {one.name!r}: {one.of!r} is where different materials meet; "
+                    "ask for the stress on one side"
                 )
 
     def check(self, definition: Definition) -> None:
         """Refuse a definition that is for beams alone."""
         if definition.uniaxial:
             raise ValueError(
-                f"definition: {definition.name!r} is for loads that stretch a beam along its length, and "
-                f"{self.shape.name!r} is a shape; choose one for any load, such as 'delingette'"
+                f"definition: {definition.name!r} is for loads that stretch a beam; choose one such as 'delingette'"
             )
         if definition.needs == "cases" and self.loading.given is not None:
             raise ValueError(
-                f"definition: {definition.name!r} is fitted to displacements under forces, and load {self.load!r} "
-                "prescribes displacements; choose another definition, or a load of forces"
+                f"definition: {definition.name!r} is for forces, and load {self.load!r} prescribes displacements; "
+                "choose another definition"
             )
 
     def springs(self, sheet: Sheet, definition: Definition, stiffness: float | None) -> tuple[Springs, float]:
         """Springs of a definition, and the seconds that deriving them took."""
         springs, seconds = super().springs(sheet, definition, stiffness)
         if springs.lateral:
-            raise DefinitionError(
-                "needs a stress on the long faces of a beam, and a shape has none; choose another definition"
-            )
+            raise DefinitionError("needs a stress on the long faces of a beam; choose another definition")
         return springs, seconds
 
     def reference(self, sheet: Sheet, law: str = "") -> "ShapeReference":

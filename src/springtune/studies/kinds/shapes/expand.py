@@ -21,8 +21,7 @@ from springtune.springs import DEFINITIONS
 
 from ...config.checks import FEWER, check_density, check_for_triangles, check_known, check_particles
 from ...config.expand import file_fault
-from .outputs import OWN_FILE, mesh_name
-from .sections import OUTLINED
+from .outputs import MADE, OWN_FILE, mesh_name
 
 
 @dataclass(frozen=True)
@@ -121,8 +120,8 @@ def _scenes(config):
         for name in grid.shape:
             shape = config.shapes[name]
             own = [(OWN_FILE, one.mesh_size) for one in shape.file or ()]
-            meshes = own or product(grid.mesh_type or OUTLINED, grid.mesh_size)
-            for mesh, material, load in product(list(meshes), grid.material, grid.load or shape.loads):
+            meshes = own or [(MADE, size) for size in grid.mesh_size]
+            for mesh, material, load in product(meshes, grid.material, grid.load or shape.loads):
                 if grid.reference:
                     referred[name, material, load] = None
                 for definition, kinematics in product(grid.definition, grid.kinematics):
@@ -148,7 +147,7 @@ def expand(config, declared):
     found, referred, finite = _scenes(config)
     known = {
         "shape": [*config.shapes],
-        "mesh_type": [*OUTLINED, OWN_FILE],
+        "mesh_type": [MADE, OWN_FILE],
         "material": [*config.materials],
         "definition": [*DEFINITIONS],
         "kinematics": [*KINEMATICS],
@@ -358,10 +357,9 @@ def _check_grid(config, grid, path, problems):
                 most = f"{1e3 * min(wide, high):.4g} mm"
                 problems.add((*path, "mesh_size"), f"is larger than shape '{name}'; give at most {most}")
             check_particles(problems, (*path, "mesh_size"), grid.mesh_size, wide, high)
-    for name in shapes.keys() - made.keys() if grid.mesh_size or grid.mesh_type else ():
-        key = "mesh_size" if grid.mesh_size else "mesh_type"
-        problems.add((*path, key), f"shape '{name}' is a mesh file, which has its own; remove it, or give '{name}' a "
-                     "grid of its own")  # fmt: skip
+    for name in shapes.keys() - made.keys() if grid.mesh_size else ():
+        message = f"shape '{name}' is a mesh file, which has its own; remove it, or give '{name}' a grid of its own"
+        problems.add((*path, "mesh_size"), message)
     count = len(grid.definition) * len(grid.kinematics) * len(grid.material) * len(grid.mesh_size or "1")
     count *= sum(len(grid.load or shape.loads) for shape in shapes.values())
     if count > MOST_SHAPE_SCENES:

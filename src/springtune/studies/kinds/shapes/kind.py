@@ -57,7 +57,7 @@ def mesh_source(part, one):
     if "file" in source:
         return source
     refined = {name: share * one.mesh_size for name, share in part.refined[one.shape].items()}
-    return source | {"mesh_type": one.mesh_type, "mesh_size": one.mesh_size, "refined": refined}
+    return source | {"mesh_size": one.mesh_size, "refined": refined}
 
 
 def mesh_key(part, one):

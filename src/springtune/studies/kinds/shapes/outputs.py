@@ -15,6 +15,9 @@ CASE_AXES = ("shape", "material", "load")
 SCENE_AXES = (*MESH_AXES, "material", "load", "definition", "kinematics")
 """Dimensions of the group ``/shapes``."""
 
+MADE = "free"
+"""Mesh type of shapes with an outline: Delaunay triangles inside it."""
+
 OWN_FILE = "file"
 """Mesh type of a shape whose mesh is that of its file."""
 

@@ -1,6 +1,6 @@
 """Sections of a study that describe shapes, and how their values are read."""
 
-from typing import Annotated, Any, NamedTuple, Self
+from typing import Annotated, Any, Self
 
 from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, model_validator
 from pydantic_core import CoreSchema, core_schema
@@ -26,26 +26,18 @@ from ...config.fields import (
 from ...config.messages import refuse, show
 from ...config.sections import Section, default
 
-OUTLINED = {"free": "Delaunay triangles inside of the outline"}
-"""Mesh types of outlines, and what they are."""
-
-
-class QuantityKind(NamedTuple):
-    """A kind of quantity of interest: ``places`` are ``at`` a point or ``of`` a group."""
-
-    unit_kind: str
-    places: tuple[str, ...] = ()
-    example: str = ""
-
-
 KINDS_OF_QUANTITY = {
-    "displacement": QuantityKind("length", ("at", "of"), "at: a point, or of: a group"),
-    "stress": QuantityKind("stress", ("at",), "at: a point"),
-    "reaction": QuantityKind("force", ("of",), "of: a group that is held"),
-    "area": QuantityKind("area"),
-    "energy": QuantityKind("energy"),
+    "displacement": "length",
+    "stress": "stress",
+    "reaction": "force",
+    "area": "area",
+    "energy": "energy",
 }
-"""Kinds of quantity by name, as `springtune.problem.shapes.QUANTITY_KINDS` has them."""
+"""Kinds of units by kind of quantity."""
+
+PLACES = {"displacement": {"at": "a point", "of": "a group"}, "stress": {"at": "a point"}}
+PLACES |= {"reaction": {"of": "a group that is held"}, "area": {}, "energy": {}}
+"""Keys for the place of a quantity, and what they name, by kind of quantity."""
 
 BEYOND_MEASURE = 1e30
 """Size of a coordinate, force or pressure from which it is beyond all measure [SI units]."""
@@ -109,7 +101,6 @@ PointName = Annotated[str, Scalar(str, {"type": "string", "minLength": 1}, "the 
 PartName = Annotated[str, Scalar(str, {"type": "string", "minLength": 1}, "the name of a part")]
 ShapeName = Annotated[str, Scalar(str, {"type": "string"}, "the name of a shape")]
 LoadName = Annotated[str, Scalar(str, {"type": "string"}, "the name of a load of the shape")]
-MadeType = Annotated[str, one_of("mesh type", OUTLINED)]
 Axis = Annotated[str, one_of("component", ("x", "y"))]
 StressComponent = Annotated[str, one_of("component", ("xx", "yy", "xy"))]
 Anything = Annotated[str, Scalar(str, {"type": ["string", "number"]}, "a value with its unit")]
@@ -246,20 +237,21 @@ class QuantityConfig(Section):
         if len(given) != 1:
             what = f"{' and '.join(given)} at once" if given else "no quantity"
             raise refuse(f"{what}; give one of {', '.join(KINDS_OF_QUANTITY)}, such as {{displacement: y, at: tip}}")
-        kind = KINDS_OF_QUANTITY[given[0]]
+        [kind] = given
         places = [name for name in ("at", "of") if getattr(self, name) is not None]
         if len(places) > 1:
             raise refuse("both a point and a group; give 'at' or 'of'", "of")
-        if not places and kind.places:
-            raise refuse(f"a {given[0]} of nothing; give {kind.example}", given[0])
-        for name in places:
-            if name not in kind.places:
-                raise refuse(f"a {given[0]} has no '{name}'; give {kind.example}", name)
+        known = ", or ".join(f"{name}: {what}" for name, what in PLACES[kind].items())
+        if known and not places:
+            raise refuse(f"a {kind} of nothing; give {known}", kind)
+        if set(places) - set(PLACES[kind]):
+            remedy = f"give {known}" if known else "remove it"
+            raise refuse(f"a {kind} has no '{places[0]}'; {remedy}", places[0])
         if self.source and self.expected is None:
             raise refuse("a source of no value; give 'expected', too, or remove it", "source")
         if self.expected is not None:
             try:
-                _signed(self.expected, kind.unit_kind)
+                _signed(self.expected, KINDS_OF_QUANTITY[kind])
             except Exception as error:
                 raise refuse(str(error), "expected") from None
         return self
@@ -278,7 +270,7 @@ class QuantityConfig(Section):
     @property
     def expected_value(self) -> float | None:
         """In SI units."""
-        return None if self.expected is None else _signed(self.expected, KINDS_OF_QUANTITY[self.kind].unit_kind)
+        return None if self.expected is None else _signed(self.expected, KINDS_OF_QUANTITY[self.kind])
 
 
 class ShapeLoadConfig(Section):
@@ -378,11 +370,7 @@ class ShapeGridConfig(Section):
 
     shape: Annotated[list[ShapeName], OneOrMore()] = Field(description="Shapes, by name.")
     mesh_size: Lengths | None = Field(
-        None, description="Lengths of an edge; not of shapes from files, whose mesh is that of the file."
-    )
-    mesh_type: Annotated[list[MadeType], OneOrMore()] | None = Field(
-        None,
-        description="`free`: " + OUTLINED["free"] + ", which it is without. Shapes from files have the type `file`.",
+        None, description="Lengths of an edge of triangles; not of shapes from files, whose mesh is that of the file."
     )
     material: Annotated[list[MaterialName], OneOrMore()] = Field(description="Materials, by name.")
     load: Annotated[list[LoadName], OneOrMore()] | None = Field(
