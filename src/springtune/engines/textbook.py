@@ -91,7 +91,8 @@ def pulling(net: SpringNet, why: str) -> None:
     """Refuse springs of negative stiffness."""
     if np.any(net.stiffness < 0):
         raise EngineError(
-            f"definition '{net.header['definition']}': negative stiffness, and {why}; take 'patch' or 'lattice'"
+            f"definition '{net.header['definition']}': has springs of negative stiffness, and {why}; take 'patch' or "
+            "'lattice', or engine 'implicit-cg'"
         )
 
 

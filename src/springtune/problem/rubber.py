@@ -76,7 +76,7 @@ class TensileTest:
             place = int(np.argmax(wrong))
             raise TestDataError(
                 f"{self.name}: a stretch of {stretch[place]:g} with a stress of {stress[place]:g} Pa: tension is "
-                "positive; give nominal stress over stretch, or name the column 'strain'"
+                "positive; give nominal stress over stretch (1 plus strain), or name the column 'strain'"
             )
         if len(np.unique(stretch[told])) < 3:
             raise TestDataError(f"{self.name}: has fewer than three stretches besides 1; give more points")

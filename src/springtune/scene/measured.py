@@ -169,7 +169,8 @@ def _field(test: MeasuredTest, family: Family) -> list[Block]:
     if apart[worst] > OFF_BODY:
         x, y = 1e3 * points[worst]
         raise TestDataError(
-            f"'{test.file}', line {test._lines[worst]}: ({x:.6g}, {y:.6g}) mm is outside of the body; correct the point"
+            f"'{test.file}', line {test._lines[worst]}: the point x = {x:.6g} mm, y = {y:.6g} mm is outside of "
+            "the body; correct it"
         )
     if len(points) > 1 and not np.ptp(values, axis=0).any():
         raise TestDataError(
@@ -188,7 +189,7 @@ def _curve(test: MeasuredTest, family: Family, load: LoadCase) -> list[Block]:
         raise TestDataError(f"{where}: load {test.load!r} is not one force; give a field of points")
     if not np.ptp(loads) > 1e-9 * np.abs(loads).max() and (test.shift or not loads.any()):
         raise TestDataError(
-            f"{where}, column 'force': all {len(loads)} values are {loads[0]:g}; give other loads, or no shift"
+            f"{where}, column 'force': all {len(loads)} values are {loads[0]:g} in SI units; give others, or no shift"
         )
     if (loads - loads.mean()) @ test.columns["displacement"] < 0:
         raise TestDataError(f"displacement of {where}: runs against the load; change a column's sign")

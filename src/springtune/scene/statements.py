@@ -90,17 +90,17 @@ class Statement(ABC):
     def reference(self, sheet: Sheet, law: str = "") -> "AnyReference":
         """Converged finite-element solution, in small strain or of a law at finite strain."""
 
-    @abstractmethod
     def reference_values(self, sheet: Sheet, law: str = "") -> dict[str, float]:
         """Quantities of interest of the reference."""
+        return dict(cast("ShapeReference", self.reference(sheet, law)).values)
 
     def law(self, sheet: Sheet, definition: Definition) -> str:
         """Law at finite strain of the reference of a definition's network; none of small strain."""
         return definition.law if self.kinematics == "nonlinear" else ""
 
-    @abstractmethod
     def _unit_field(self, sheet: Sheet) -> np.ndarray:
         """Displacements of the reference at the particles for a factor of 1, shape (n_points, 2)."""
+        return self.reference(sheet).at(self.mesh.points)
 
     def objection(self, sheet: Sheet) -> str:
         """Why the small-strain reference does not apply to networks of nonlinear kinematics; empty if it does."""
@@ -366,17 +366,10 @@ class ShapeStatement(Statement):
         found: ShapeReference = sheet.references[key, scale][1]
         return found
 
-    def reference_values(self, sheet: Sheet, law: str = "") -> dict[str, float]:
-        """Quantities of interest of the reference."""
-        return dict(self.reference(sheet, law).values)
-
     def law(self, sheet: Sheet, definition: Definition) -> str:
         """Law of the reference; St. Venant and Kirchhoff's only where small strain does not apply."""
         law = super().law(sheet, definition)
         return "" if law == "st-venant" and not self.objection(sheet) else law
-
-    def _unit_field(self, sheet: Sheet) -> np.ndarray:
-        return self.reference(sheet).at(self.mesh.points)
 
 
 def scaled(case: LoadCase, scale: float) -> LoadCase:
