@@ -294,13 +294,6 @@ class TestSlits:
         finally:
             resource.setrlimit(resource.RLIMIT_AS, before)
 
-    @pytest.mark.parametrize("name", ["own.xdmf", "own.inp"])
-    def test_parts_in_other_files_are_refused(self, tmp_path, name):
-        path = tmp_path / name
-        path.write_text("*NODE\n*INCLUDE, INPUT=points.inp\n")
-        with pytest.raises(MeshError, match="in other files, whose changes would not be seen; write it as one"):
-            read_beam_mesh(path, 0.1, 0.02)
-
     def test_parts_of_different_edges(self, tmp_path):
         left, right_ = MESH_TYPES["right"](0.05, 0.02, 5e-3), MESH_TYPES["right"](0.05, 0.02, 4e-3)
         # Both parts have points in the joint's corners; those of the finer one between them hang on the coarser.
