@@ -132,7 +132,7 @@ class TestError:
     )
     def test_refusals(self, options, code, message):
         result = run(*self.ASKED, *options)
-        assert result.exit_code == code and result.stderr.startswith(message), result.output
+        assert result.exit_code == code and result.stderr.startswith(f"Error: {message}"), result.output
 
     def test_what_has_no_mesh_or_no_reference_is_refused(self, here):
         result = run("predict", *OWN, "--error", "1 %")
@@ -140,8 +140,8 @@ class TestError:
         result = run("predict", *PLATE[:-2], "--error", "1 %")
         assert result.exit_code == 2
         assert result.stderr == (
-            "--load 'pull': 'corner' has no reference, so no error of it can be kept: it is zero; take it out of the "
-            "quantities\n"
+            "Error: --load 'pull': 'corner' has no reference, so no error of it can be kept: it is zero; take it out of "
+            "the quantities\n"
         )
         study = st.load_study("study.yaml")
         with pytest.raises(ValueError, match="of beams alone"):

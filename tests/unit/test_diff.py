@@ -283,19 +283,6 @@ class TestCommand:
         said = [" ".join(line.split()) for line in result.stdout.splitlines()]
         assert {"springtune_version 0 -> 1", "numpy none -> 3.0", "-beams: 1", "+beams: 2"} <= set(said)
 
-    def test_json_has_what_the_text_says(self, tmp_path):
-        other = made()
-        other["displacement"].loc[SCENE] = np.nan
-        other["status"].loc[SCENE] = st.Status.NOT_CONVERGED
-        result = run("diff", written(made(), tmp_path / "a.nc"), written(other, tmp_path / "b.nc"), "--json")
-        assert result.exit_code == 1
-        found = json.loads(result.stdout)
-        assert found["different"] and found["groups"]["/"]["cells_in_both"] == 32
-        (row,) = found["groups"]["/"]["values"]["displacement"]["rows"]
-        assert row["at"] == SCENE and row["after"] is None and row["over_tolerance"] is None
-        (row,) = found["groups"]["/"]["status"]["status"]["rows"]
-        assert (row["before"], row["after"]) == ("solved", "not_converged")
-
     def test_studies_are_named(self, tmp_path, monkeypatch):
         monkeypatch.chdir(tmp_path)
         for name in ("one", "other"):

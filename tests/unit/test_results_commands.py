@@ -107,7 +107,6 @@ def forged(tmp_path_factory):
         ["info", "{named}"],
         ["diff", "{forged}", "{named}"],
         ["diff", "{path}", "{forged}"],
-        ["diff", "{forged}", "{path}", "--json"],
         ["diff", "{forged}", "{other}"],
         ["export", "{forged}", "--to", "{out}.csv"],
         ["export", "{forged}", "--to", "{out}.csv", "--group", "nothing"],

@@ -1,9 +1,7 @@
 """Command diff: compare two datasets."""
 
-import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,8 +14,6 @@ from . import examples
 from .options import dataset_path
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from ..studies.output.comparison import Change, Comparison, GroupChanges
 
 ROWS = 20
@@ -52,7 +48,6 @@ def tolerance(context: click.Context, parameter: click.Parameter, given: str | N
     epilog=examples(
         "springtune diff results/before results/mine",
         "springtune diff before.nc mine --relative 1e-3 --group sensitivity",
-        "springtune diff before.nc after.nc --json > changes.json",
     )
 )
 @click.argument("before")
@@ -66,7 +61,6 @@ def tolerance(context: click.Context, parameter: click.Parameter, given: str | N
 @click.option("--rows", type=click.IntRange(1), default=ROWS, show_default=True, help="Rows of each table.")
 @click.option("--all", "every", is_flag=True, help="All rows.")
 @click.option("--config", is_flag=True, help="Show the diff of the studies' files, too.")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def diff(
     before: str,
     after: str,
@@ -77,7 +71,6 @@ def diff(
     rows: int,
     every: bool,
     config: bool,
-    as_json: bool,
 ) -> None:
     """Say what changed from one dataset to another beyond a tolerance, scene by scene.
 
@@ -88,34 +81,25 @@ def diff(
 
     Exits with 0 if nothing changed, 1 if something did, and 2 if nothing could be compared.
     """
-    from ..studies.output import comparison, reading
+    from ..studies.output import reading
+    from ..studies.output.comparison import RELATIVE, Tolerance, compare
 
     try:
         paths = [dataset_path(before), dataset_path(after)]
-        with opened(paths[0]) as one, opened(paths[1]) as other, reading.guarded(f"{paths[0]}, {paths[1]}"):
-            given = comparison.Tolerance(comparison.RELATIVE if relative is None else relative, absolute)
-            found = comparison.compare(one, other, given, groups, ignored, None if every else rows)
-            if as_json:
-                click.echo(json.dumps(as_dict(found, paths, config), indent=1))
-            else:
-                click.echo(comparison_text(found, paths, None if every else rows, config))
+        for path in paths:
+            reading.check_opens(path)
+        with (
+            reading.open(paths[0]) as one,
+            reading.open(paths[1]) as other,
+            reading.guarded(f"{paths[0]}, {paths[1]}"),
+        ):
+            given, most = Tolerance(RELATIVE if relative is None else relative, absolute), None if every else rows
+            found = compare(one, other, given, groups, ignored, most)
+            click.echo(comparison_text(found, paths, most, config))
     except (OSError, ValueError) as error:
         raise Trouble(shown(error)) from None
     if found.different:
         raise click.exceptions.Exit(DIFFERENT)
-
-
-@contextmanager
-def opened(path: Path) -> "Iterator[xr.DataTree]":
-    """Context of an open dataset."""
-    from ..studies.output import reading
-
-    reading.check_opens(path)
-    with reading.open(path) as tree:
-        yield tree
-
-
-# -- text --------------------------------------------------------------------------------------------------------------
 
 
 def comparison_text(found: "Comparison", paths: Sequence[Path], most: int | None = ROWS, config: bool = False) -> str:
@@ -125,8 +109,7 @@ def comparison_text(found: "Comparison", paths: Sequence[Path], most: int | None
     parts = [[*head, _summary(found)]]
     for group in found.groups:
         parts += _of_group(group, most)
-    changes = found.changes
-    if changes:
+    if changes := found.changes:
         parts.append(_changes(found, changes, most))
     if found.attributes or found.config:
         parts.append(_told(found, config))
@@ -135,42 +118,43 @@ def comparison_text(found: "Comparison", paths: Sequence[Path], most: int | None
 
 def _summary(found: "Comparison") -> str:
     """Summary in one line."""
+    groups = found.groups
     said = [f"group {path} only {side}" for side, own in zip(COMPARED, found.alone) for path in own]
     for number, side in enumerate(COMPARED):
-        for group in found.groups:
-            count, what = group.cells[number].count, "scenes" if group.name == "/" else f"cells of {group.name}"
-            said += [f"{count} {what} only {side}"] if count else []
-    statuses = sum(one.changed for group in found.groups for one in group.flags)
-    values = sum(one.changed for group in found.groups for one in group.values)
-    unlike = sum(len(group.unlike) + sum(map(len, group.variables)) for group in found.groups)
-    said += [f"{statuses} statuses changed"] if statuses else []
-    said += [f"{values} values changed"] if values else []
-    said += [f"{unlike} variables are not in both, or cannot be compared"] if unlike else []
-    compared = sum(one.compared for group in found.groups for one in (*group.flags, *group.values))
-    if said:
-        return f"different: {', '.join(said)}; {compared} values compared"
-    if found.different:
-        return f"different: labels; {compared} values compared"
-    return f"the same: {compared} values compared"
+        alone = [(group.cells[number].count, group.name) for group in groups]
+        said += [f"{count} {_cells(name)} only {side}" for count, name in alone if count]
+    counts = {
+        "statuses changed": sum(one.changed for group in groups for one in group.flags),
+        "values changed": sum(one.changed for group in groups for one in group.values),
+        "variables are not in both, or cannot be compared": sum(
+            len(group.unlike) + sum(map(len, group.variables)) for group in groups
+        ),
+    }
+    said += [f"{count} {what}" for what, count in counts.items() if count]
+    result = f"different: {', '.join(said) or 'labels'}" if found.different else "the same"
+    compared = sum(one.compared for group in groups for one in (*group.flags, *group.values))
+    return f"{result}{';' if found.different else ':'} {compared} values compared"
+
+
+def _cells(group: str) -> str:
+    return "scenes" if group == "/" else f"cells of {group}"
 
 
 def _of_group(group: "GroupChanges", most: int | None) -> Iterator[list[str]]:
     """Paragraphs on the labels, cells, variables and statuses of a group."""
-    what = "scenes" if group.name == "/" else f"cells of {group.name}"
     lines = []
     for name, both in group.labels.items():
         for side, own in zip(COMPARED, both):
-            shown = own[:most]
             if own:
-                said = ", ".join(_place(group, {name: label}) for label in shown)
-                more = f", and {len(own) - len(shown)} more" if len(own) > len(shown) else ""
+                said = ", ".join(_place(group, {name: label}) for label in own[:most])
+                more = f", and {len(own) - most} more" if most and len(own) > most else ""
                 lines.append(f"  {name} only {side}: {said}{more}")
     if lines:
         yield [f"labels of {group.name}", *lines]
     for side, alone in zip(COMPARED, group.cells):
         if alone.count:
             lines = [f"  {_place(group, labels)}" for labels in alone.rows]
-            yield [f"{what} only {side}: {alone.count}", *lines, *_more(alone.count - len(lines))]
+            yield [f"{_cells(group.name)} only {side}: {alone.count}", *lines, *_more(alone.count - len(lines))]
     lines = [f"  {name} only {side}" for side, own in zip(COMPARED, group.variables) for name in own]
     lines += [f"  {name} {why}" for name, why in group.unlike.items()]
     if lines:
@@ -178,10 +162,7 @@ def _of_group(group: "GroupChanges", most: int | None) -> Iterator[list[str]]:
     for one in group.flags:
         if one.changed:
             rows = [
-                [
-                    f"  {_place(group, row.labels | row.point) or 'all'}",
-                    f"{row.before or 'nothing'} -> {row.after or 'nothing'}",
-                ]
+                (f"  {_place(group, row.labels | row.point) or 'all'}", f"{_value(row.before)} -> {_value(row.after)}")
                 for row in one.rows
             ]
             yield [
@@ -198,32 +179,31 @@ def _place(group: "GroupChanges", labels: "Mapping[str, str | float]") -> str:
 
 def _changes(found: "Comparison", changes: "list[Change]", most: int | None) -> list[str]:
     """Number of changes by variable, and the largest changes."""
-    head = ["  variable", "cells", "changed", "largest change"]
-    counts = [
-        [f"  {variable_name(group.name, one.name)}", one.compared, one.changed, _largest(one.rows)]
-        for group in found.groups
-        for one in group.values
-        if one.changed
-    ]
+    counts = [["  variable", "cells", "changed", "largest change"]]
+    for group in found.groups:
+        for one in group.values:
+            if one.changed:
+                largest = next((row for row in one.rows if math.isfinite(row.difference)), one.rows[0])
+                counted = [str(one.compared), str(one.changed), _difference(largest)]
+                counts.append([f"  {variable_name(group.name, one.name)}", *counted])
     axes = {group.name: group for group in found.groups}
-    rows = [["  variable", *COMPARED, "change", "at"]]
-    for row in changes[:most]:
-        group = axes[row.group]
-        at = _place(group, row.labels | row.point)
-        rows.append(
-            [f"  {variable_name(row.group, row.variable)}", _value(row.before), _value(row.after), _difference(row), at]
-        )
+    rows = [
+        [
+            f"  {variable_name(row.group, row.variable)}",
+            *(_value(row.before), _value(row.after), _difference(row)),
+            _place(axes[row.group], row.labels | row.point),
+        ]
+        for row in changes[:most]
+    ]
     total = sum(one.changed for group in found.groups for one in group.values)
     return [
-        "values that changed", *aligned([head, *counts], 0, (1, 2)).splitlines(), "",
-        "the largest changes, measured by the tolerance", *aligned(rows, 0, (1, 2, 3)).splitlines(),
-        *_more(total - len(rows) + 1),
-    ]  # fmt: skip
-
-
-def _largest(rows: "list[Change]") -> str:
-    """Largest change, preferably a number."""
-    return _difference(next((row for row in rows if math.isfinite(row.difference)), rows[0]))
+        "values that changed",
+        *aligned(counts, 0, (1, 2)).splitlines(),
+        "",
+        "the largest changes, measured by the tolerance",
+        *aligned([["  variable", *COMPARED, "change", "at"], *rows], 0, (1, 2, 3)).splitlines(),
+        *_more(total - len(rows)),
+    ]
 
 
 def _told(found: "Comparison", config: bool) -> list[str]:
@@ -263,50 +243,3 @@ def _difference(row: "Change") -> str:
     before = float(row.before)
     share = f" ({100 * number / abs(before):+.2g} %)" if before and units else ""
     return f"{number:+.3g}{units}{share}"
-
-
-# -- JSON --------------------------------------------------------------------------------------------------------------
-
-
-def as_dict(found: "Comparison", paths: Sequence[Path], config: bool = False) -> dict[str, object]:
-    """Comparison as a dict for JSON."""
-    return {
-        "different": found.different,
-        "before": str(paths[0]),
-        "after": str(paths[1]),
-        "groups_only_before": found.alone[0],
-        "groups_only_after": found.alone[1],
-        "groups": {group.name: _group_dict(group) for group in found.groups},
-        "attributes": {name: {"before": old, "after": new} for name, (old, new) in found.attributes.items()},
-    } | ({"config": found.config} if config else {})
-
-
-def _group_dict(group: "GroupChanges") -> dict[str, object]:
-    made: dict[str, object] = {
-        "labels": {
-            name: {f"only_{side}": own for side, own in zip(COMPARED, both)} for name, both in group.labels.items()
-        },
-        "cells_in_both": group.both,
-    }
-    for side, alone, names in zip(COMPARED, group.cells, group.variables):
-        made[f"cells_only_{side}"] = {"count": alone.count, "rows": alone.rows}
-        made[f"variables_only_{side}"] = names
-    made["not_comparable"] = group.unlike
-    for part, found in (("status", group.flags), ("values", group.values)):
-        made[part] = {
-            one.name: {"compared": one.compared, "changed": one.changed, "rows": [_row_dict(row) for row in one.rows]}
-            for one in found
-            if one.changed
-        }
-    return made
-
-
-def _row_dict(row: "Change") -> dict[str, object]:
-    def plain(value: float | str) -> float | str | None:
-        return value if isinstance(value, str) or math.isfinite(value) else None
-
-    found: dict[str, object] = {**row.labels, **row.point}
-    return {
-        "at": found, "before": plain(row.before), "after": plain(row.after), "difference": plain(row.difference),
-        "over_tolerance": plain(row.excess), "units": row.units,
-    }  # fmt: skip

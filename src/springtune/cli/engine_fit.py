@@ -1,7 +1,5 @@
 """`springtune predict --engine`: what to type into an engine at its setting, or within a frame's time."""
 
-from collections.abc import Callable
-from dataclasses import replace
 from functools import partial, reduce, wraps
 from typing import TYPE_CHECKING, Any
 
@@ -80,7 +78,7 @@ def engine_options(command: AnyCommand) -> AnyCommand:
 
 
 def fitted(
-    sheet: SheetOptions, asked: EngineOptions, load: str | None, loads: str | None, springs_alone: bool
+    sheet: SheetOptions, options: EngineOptions, load: str | None, loads: list[str] | None, springs_alone: bool
 ) -> "tuple[str, EngineFit | None]":
     """Text of a calibration, or of a search within a budget, and what is found."""
     from ..engines.base import ENGINES
@@ -89,48 +87,40 @@ def fitted(
     from ..prediction.choices import CASES
     from ..scene.single import Scene
 
-    setting, engine, searched = asked.setting(), asked["engine"], asked["budget"] is not None
-    names = None if loads is None else [name.strip() for name in loads.split(",") if name.strip()]
-    how: dict[str, Any] = {"loads": names, "within": asked["within"] or WITHIN}
-    scale = 1.0 if asked["scale"] is None else asked["scale"]
-    case: tuple[Any, ...]
-    make_mesh: Callable[[], Any]
-    if sheet.shape is not None:
-        of = sheet.asked_shape(load, sized=not searched)
-        case, make_mesh, mesh_name = (of.shape, of.materials, of.load, None), of.mesh, of.mesh_name
-        if searched and of.shape.file:
-            how["meshes"] = {mesh_name: of.mesh()}
-        elif searched:
-            how["meshes"] = graded_meshes(of.shape, "free", lambda size: replace(of, size=size).mesh())
-    else:
-        beam, material = sheet.asked_beam()
-        if load is None:
-            raise ValueError("--load: missing; an engine is calibrated to a load; give one such as 'traction'")
-        if searched and sheet.mesh_type is not None:
-            how["mesh_types"] = sheet.mesh_type.split(",")
-        edge = None if searched else sheet.edge(beam)
-        case, make_mesh = (beam, material, load, asked["force"]), partial(sheet.mesh, beam, edge)
-        mesh_name = sheet.mesh_name(edge)
+    setting, engine, searched = options.setting(), options["engine"], options["budget"] is not None
+    how: dict[str, Any] = {"loads": loads, "within": options["within"] or WITHIN}
+    scale = 1.0 if options["scale"] is None else options["scale"]
+    asked = sheet.asked(load, sized=not searched)
+    if asked.load is None:
+        raise ValueError("--load: missing; an engine is calibrated to a load; give one such as 'traction'")
+    case = asked.body, asked.material, asked.load, options["force"]
+    if searched and asked.is_beam and sheet.mesh_type is not None:
+        how["mesh_types"] = sheet.mesh_type.split(",")
+    elif searched and not asked.is_beam:
+        made = not asked.body.file
+        how["meshes"] = (
+            graded_meshes(asked.body, "free", partial(asked.make, "free")) if made else {asked.mesh_name: asked.mesh}
+        )
     if searched:
-        limit = asked_quantity("--budget", asked["budget"], "time")
+        limit = asked_quantity("--budget", options["budget"], "time")
         how |= {"budget": limit, "dt": setting.dt, "precision": setting.precision, "scale": scale}
         search = fit_budget(*case, engine=engine, springs_alone=springs_alone, **how)
         return budget_text(search), search.best.fit if search.best else None
     body, *others = case
-    make = partial(Scene, body, make_mesh(), *others, scale=scale)
+    make = partial(Scene, body, asked.mesh, *others, scale=scale)
     tried: tuple[str, ...] = ()
-    if asked["definition"] is not None:
-        scenes, refused = [make(definition=asked["definition"])], ""
+    if options["definition"] is not None:
+        scenes, refused = [make(definition=options["definition"])], ""
     else:
         scenes, refused, tried = runnable(make, CASES, ENGINES[engine], setting, springs_alone)
     if not scenes:
         raise Unmet(refused)
     fit = fit_engine(scenes[0], engine, setting, **how)
-    text = fit_text(fit, mesh_name) + (f"\n\nTried: {', '.join(tried)}." if tried else "")
+    text = fit_text(fit, asked.mesh_name) + (f"\n\nTried: {', '.join(tried)}." if tried else "")
     return text, fit
 
 
-def net_of_fit(fit: "EngineFit | None", _: str) -> "SpringNet":
+def net_of_fit(fit: "EngineFit | None") -> "SpringNet":
     """Springs of a calibration."""
     if fit is None or fit.factor != fit.factor:
         raise Unmet(

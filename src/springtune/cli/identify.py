@@ -1,23 +1,18 @@
 """Find a material's constants from measured tests."""
 
 import os
-import re
 from collections.abc import Mapping
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from . import examples
-from .options import asked_beam, refusals, shape_of_study
+from .options import asked_beam, shape_of_study, writing
 
 if TYPE_CHECKING:
     from ..scene.identify import Identified
     from ..scene.measured import MeasuredTest
-
-ARGUMENT = re.compile("^(?=(law|known|load|force|angle|noise):)")
-"""Begin of messages with the name of an argument, which is an option here."""
 
 KEYS = ("beam", "thickness", "shape", "load", "force", "angle", "noise", "shift", "file")
 """Keys of a test in a list of tests; all but the file are options, too."""
@@ -56,30 +51,29 @@ def identify(
     from ..scene.identify import SHEET_LAWS
     from ..scene.identify import identify as identified
 
-    endings = {"--plot": (".png", ".svg", ".pdf"), "--write": (".yaml", ".yml")}
-    with refusals("--plot" if plot else "--write", plot or write, partial(ARGUMENT.sub, "--")):
-        for option, path in (("--plot", plot), ("--write", write)):
-            if path and path.suffix not in endings[option]:
-                raise ValueError(f"{option}: '{path}' has another ending than {', '.join(endings[option])}; give one")
-            if path:
-                check_folder(path)
-        rows = [options | row for path in files for row in _rows(path)]
-        if SHEET_LAWS.get(law) == ():
-            found = identified(files[0] if len(files) == 1 else [], law)
-        else:
-            given = {name: value for name, _, value in (one.partition("=") for one in known)}
-            found = identified([_test(**row) for row in rows], law, known=given)
-        text = _study(found, rows[0], write) if write else ""
-        if write:
-            _check(text, write)
-        if plot:
-            import matplotlib.pyplot as plt
+    for option, path, endings in (("--plot", plot, (".png", ".svg", ".pdf")), ("--write", write, (".yaml", ".yml"))):
+        if path and path.suffix not in endings:
+            raise ValueError(f"{option}: '{path}' has another ending than {', '.join(endings)}; give one")
+        if path:
+            check_folder(path)
+    rows = [options | row for path in files for row in _rows(path)]
+    if SHEET_LAWS.get(law) == ():
+        found = identified(files[0] if len(files) == 1 else [], law)
+    else:
+        given = {name: value for name, _, value in (one.partition("=") for one in known)}
+        found = identified([_test(**row) for row in rows], law, known=given)
+    text = _study(found, rows[0], write) if write else ""
+    if write:
+        _check(text, write)
+    if plot:
+        import matplotlib.pyplot as plt
 
-            found.plot()
-            with replacing(plot) as unfinished:
-                plt.savefig(unfinished, format=plot.suffix[1:])
-            plt.close()
-        if write:
+        found.plot()
+        with writing("--plot", plot), replacing(plot) as unfinished:
+            plt.savefig(unfinished, format=plot.suffix[1:])
+        plt.close()
+    if write:
+        with writing("--write", write):
             write_text(write, text)
     click.echo(found)
 

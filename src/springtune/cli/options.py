@@ -1,12 +1,11 @@
-"""Options that commands share: beams, shapes, meshes, materials, folders of studies, limits."""
+"""Options that commands share: beams, shapes, meshes, materials, datasets, limits."""
 
 import math
 import os
-import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
-from functools import reduce, wraps
+from functools import cached_property, partial, reduce, wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,8 +13,6 @@ import click
 from click.core import ParameterSource
 
 from ..problem.parameters import MOST_SCENES, MOST_SCENES_VARIABLE, PLANES
-from ..studies.runs.source import CONFIG_FOLDER
-from . import FAILED, WRONG
 
 if TYPE_CHECKING:
     from ..mesh import Mesh
@@ -33,25 +30,17 @@ SAID_FROM = 1_000_000
 class Unmet(ValueError):
     """The options are right, but the request cannot be met."""
 
+    wrong_call = False
+
 
 @contextmanager
-def refusals(option: str, target: Path | None, named: Callable[[str], str] = str) -> Iterator[None]:
-    """Context that prints an error in one line; the exit code is 2 if the line begins with an option.
-
-    `option` is the one of the written file, `target`. `named` replaces arguments in messages by options.
-    """
+def writing(option: str, target: Path) -> Iterator[None]:
+    """Context of writing the file of an option, whose errors name both."""
     try:
         yield
-    except click.UsageError:
-        raise
     except OSError as error:
         why = os.strerror(error.errno) if error.errno else error
-        click.echo(f"{option}: {target}: {why}; give a file that can be written", err=True)
-        raise SystemExit(FAILED) from None
-    except (click.ClickException, ValueError) as error:
-        said = named(error.message if isinstance(error, click.ClickException) else str(error))
-        click.echo(said, err=True)
-        raise SystemExit(WRONG if said.startswith("--") and not isinstance(error, Unmet) else FAILED) from None
+        raise Unmet(f"{option}: {target}: {why}; give a file that can be written") from None
 
 
 def check_target(option: str, target: Path) -> None:
@@ -88,9 +77,8 @@ def asked_beam(text: str, thickness: str) -> "Beam":
     """Beam of a text such as ``200x40``; ValueError names the option."""
     from ..problem.geometry import Beam
 
-    sides = text.lower().split("x")
     try:
-        length, height = (1e-3 * float(side) for side in sides)
+        length, height = (1e-3 * float(side) for side in text.lower().split("x"))
     except ValueError:
         raise ValueError(f"--beam: '{text}' is not length x height; give millimetres such as 200x40") from None
     if not (length > 0 and height > 0):
@@ -118,100 +106,28 @@ def asked_material(
             f"{other}: '{young or poisson}' is beside --material {name}, which has its own; leave --material out, and "
             "give --young and --poisson"
         )
-    defaults = (None, None) if name is None else MATERIALS[name]
-    young, poisson = young or defaults[0], poisson or defaults[1]
+    young, poisson = (young, poisson) if name is None else MATERIALS[name]
     if young is None or poisson is None:
         raise ValueError(f"--material: none; give one of {', '.join(MATERIALS)}, or --young and --poisson")
     try:
         ratio = float(poisson)
     except ValueError:
-        ratio = float("nan")
+        ratio = math.nan
     if not -1 < ratio <= 0.5:
         raise ValueError(f"--poisson: '{poisson}' is out of range; give a number above -1 and at most 0.5")
     heavy = None if density is None else asked_quantity("--density", density, "density")
     if plane == "strain" and ratio == 0.5:
-        option, given = ("--poisson", f"'{poisson}'") if name is None else ("--material", f"nu of '{name}'")
-        raise ValueError(f"{option}: {given} is 0.5, and plane strain needs less; give less, or --plane stress")
+        given = "--poisson: '0.5'" if name is None else f"--material: nu of '{name}'"
+        raise ValueError(f"{given} is 0.5, and plane strain needs less; give less, or --plane stress")
     return Material(asked_quantity("--young", young, "stress"), ratio, heavy, name or "material", plane or "stress")
 
 
 NAMED_SHAPE = "config/shapes.yaml:cook"
 """Example of a shape's name, for messages."""
 
-MESH_SIZE = re.compile("^mesh size: [^ ]+ ")
-"""Begin of messages on a mesh size."""
-
-OF_BEAMS = {
-    "beam": "give one of the two",
-    "thickness": "which has the one of its study; leave it out",
-    "mesh_type": "whose mesh is made at --size, or that of the file that the study names; leave it out",
-    "unit": "which has the one of its study; leave it out",
-    "young": "whose materials are those of its study; give one of them by --material",
-    "poisson": "whose materials are those of its study; give one of them by --material",
-    "plane": "whose materials are those of its study, where 'plane' is a key of each; leave it out",
-    "loads": "whose loads are those of its study; give one of them by --load",
-    "force": "whose loads have their sizes; give --scale, such as 0.5, or leave it out",
-}
-"""Options of beams alone, by parameter, and the remedy if they are given beside a shape."""
-
-
-def check_kind(shape: str | None, beam: str | None, of_shapes: tuple[str, ...]) -> None:
-    """Refuse a call without beam and shape, or with options of the other one; `of_shapes` are parameters of shapes."""
-    context = click.get_current_context()
-    if shape is None and beam is None:
-        raise click.UsageError(f"Missing option '--beam' such as 200x40, or '--shape' such as {NAMED_SHAPE}.", context)
-    options = {one.name: one.opts[0] for one in context.command.params if isinstance(one, click.Option)}
-    given = {
-        name: option
-        for name, option in options.items()
-        if name and context.get_parameter_source(name) is ParameterSource.COMMANDLINE
-    }
-    if shape is not None:
-        for name, why in OF_BEAMS.items():
-            if name in given:
-                raise ValueError(f"{given[name]}: '{context.params[name]}' is beside --shape {shape}, {why}")
-        return
-    for name in of_shapes:
-        if name in given:
-            raise ValueError(
-                f"{given[name]}: '{context.params[name]}' is of shapes alone; give --shape, or leave it out"
-            )
-
-
-@dataclass(frozen=True)
-class AskedShape:
-    """A shape of a study with a load, materials and a length of an edge [m], None for a mesh file."""
-
-    part: "Shapes"
-    shape: "Shape"
-    load: str
-    materials: "Mapping[str, AnyMaterial]"
-    size: float | None
-
-    @property
-    def size_text(self) -> str:
-        """Size as the option takes it."""
-        return f"{1e3 * (self.size or 0.0):.12g} mm"
-
-    @property
-    def mesh_name(self) -> str:
-        """Name of the mesh."""
-        return Path(self.shape.file).name if self.size is None else f"free {self.size_text}"
-
-    def mesh(self) -> "GroupedMesh":
-        """Mesh, refined as the study says."""
-        from ..mesh.formats import read_shape  # here, since studies are read without scipy
-        from ..mesh.outlines import mesh_shape
-
-        if self.size is None:
-            return read_shape(self.shape.file, self.shape.unit)
-        refined = {where: share * self.size for where, share in self.part.refined[self.shape.name].items()}
-        try:
-            return mesh_shape(self.shape, self.size, refined=refined)
-        except ValueError as error:
-            said = MESH_SIZE.sub("", str(error))
-            between = " " if said != str(error) else ": "
-            raise ValueError(f"--size: '{self.size_text}'{between}{said}") from None
+OF_BEAMS = ("beam", "thickness", "mesh_type", "unit", "young", "poisson", "plane", "loads", "force")
+OF_SHAPES = ("scale",)
+"""Options of beams alone and of shapes alone, by parameter."""
 
 
 def shape_of_study(text: str) -> "tuple[Study, Shapes, Shape]":
@@ -251,28 +167,82 @@ def _materials(
             known = ", ".join(one for one in study.materials if one in used)
             raise ValueError(f"--material: missing; the study has {known} for shape '{shape.name}'; give one")
         (name,) = used
-    try:
-        found = study.materials_of(shape.name, name)
-    except ValueError as error:
-        raise ValueError(f"--{error}") from None
+    found = study.materials_of(shape.name, name)
     if density is None:
         return found
     heavy = asked_quantity("--density", density, "density")
     lacking = {one.name for one in found.values() if one.density is None}
-    if not lacking:
+    if len(lacking) != 1:
         have = ", ".join(f"'{one}'" for one in dict.fromkeys(one.name for one in found.values()))
-        raise ValueError(
-            f"--density: '{density}' is beside material {have}, which has its own in the study; leave it out"
-        )
-    if len(lacking) > 1:
-        raise ValueError(
-            f"--density: '{density}' is of one material, and {', '.join(sorted(lacking))} have none; give them theirs "
-            "in the study"
-        )
+        why = f"beside material {have}, which has its own in the study; leave it out"
+        if lacking:
+            why = f"of one material, and {', '.join(sorted(lacking))} have none; give them theirs in the study"
+        raise ValueError(f"--density: '{density}' is {why}")
     return {one: replace(other, density=heavy) if other.density is None else other for one, other in found.items()}
 
 
-AnyCommand = Callable[..., None]
+@dataclass(frozen=True)
+class Asked:
+    """Body of the options, its material and load, and the mesh of a type and size [m]; a mesh file has no size.
+
+    `body` is a Beam or a Shape, whose `material` is a mapping of parts; `make` makes a mesh of a type and a size.
+    """
+
+    body: Any
+    material: Any
+    load: str | None
+    mesh_type: str
+    size: float | None
+    make: Callable[..., Any]
+
+    @property
+    def is_beam(self) -> bool:
+        """Whether the body is a beam."""
+        from ..problem.geometry import Beam
+
+        return isinstance(self.body, Beam)
+
+    @property
+    def mesh_name(self) -> str:
+        """Name of the mesh."""
+        return Path(self.mesh_type).name if self.size is None else f"{self.mesh_type} {size_text(self.size)}"
+
+    @cached_property
+    def mesh(self) -> Any:
+        """Mesh of a beam, or of a shape with its groups."""
+        return self.make(self.mesh_type, self.size)
+
+
+def size_text(size: float) -> str:
+    """Mesh size [m] as the option takes it."""
+    return f"{1e3 * size:.12g} mm"
+
+
+def _beam_mesh(beam: "Beam", unit: str, mesh_type: str, size: float | None) -> "Mesh":
+    from ..mesh import MESH_TYPES, read_beam_mesh
+
+    if size is None:
+        scale = asked_quantity("--unit", unit if unit[:1].isdigit() else f"1 {unit}", "length")
+        return read_beam_mesh(mesh_type, beam.length, beam.height, scale)
+    made = MESH_TYPES[mesh_type]
+    count = made.particles(beam.length, beam.height, size)
+    if count > SAID_FROM:
+        click.echo(f"making a {made.name} mesh of some {count / 1e6:.1f} million particles ...", err=True)
+    return made(beam.length, beam.height, size)
+
+
+def _shape_mesh(part: "Shapes", shape: "Shape", _: str, size: float | None) -> "GroupedMesh":
+    """Mesh, refined as the study says."""
+    from ..mesh.formats import read_shape  # here, since studies are read without scipy
+    from ..mesh.outlines import mesh_shape
+
+    if size is None:
+        return read_shape(shape.file, shape.unit)
+    refined = {where: share * size for where, share in part.refined[shape.name].items()}
+    try:
+        return mesh_shape(shape, size, refined=refined)
+    except ValueError as error:
+        raise ValueError(f"--size: '{size_text(size)}': {str(error).removeprefix('mesh size: ')}") from None
 
 
 @dataclass(frozen=True)
@@ -291,87 +261,78 @@ class SheetOptions:
     plane: str | None
     density: str | None
 
-    def asked_beam(self) -> "tuple[Beam, Material]":
-        """Beam and its material; ValueError names the option."""
+    def check(self) -> None:
+        """Refuse a call without beam and shape, or with options of the other one."""
+        context = click.get_current_context()
+        if self.shape is None and self.beam is None:
+            missing = f"Missing option '--beam' such as 200x40, or '--shape' such as {NAMED_SHAPE}."
+            raise click.UsageError(missing, context)
+        why = "is of shapes alone; give --shape, or leave it out"
+        if self.shape is not None:
+            why = f"is beside --shape {self.shape}, which has its own in the study; leave one of the two out"
+        for one in context.command.params:
+            name = one.name or ""
+            if (
+                name in (OF_SHAPES if self.shape is None else OF_BEAMS)
+                and context.get_parameter_source(name) is ParameterSource.COMMANDLINE
+            ):
+                raise ValueError(f"{one.opts[0]}: '{context.params[name]}' {why}")
+
+    def asked(self, load: str | None, sized: bool = True) -> Asked:
+        """Body, material, load and mesh; ValueError names the option. `sized`: a mesh that is made needs a size."""
+        return self._asked_beam(load, sized) if self.shape is None else self._asked_shape(load, sized)
+
+    def _edge(self, sized: bool) -> float | None:
+        if self.size is None and sized:
+            raise ValueError("--size: missing; give the length of an edge such as '2 mm'")
+        return None if self.size is None else asked_quantity("--size", self.size, "length")
+
+    def _asked_beam(self, load: str | None, sized: bool) -> Asked:
+        from ..mesh import MESH_TYPES
+
         material = asked_material(self.material, self.young, self.poisson, self.density, self.plane)
-        return asked_beam(self.beam or "", self.thickness), material
+        beam, mesh_type, edge = asked_beam(self.beam or "", self.thickness), self.mesh_type or "structured", None
+        if sized and mesh_type in MESH_TYPES:
+            edge = self._edge(sized=True)
+            assert edge is not None
+            if refusal := MESH_TYPES[mesh_type].refusal(beam.length, beam.height, edge, f"beam '{beam.name}'"):
+                raise ValueError(f"--size: '{self.size}' {refusal}")
+        elif sized and not Path(mesh_type).is_file():
+            raise ValueError(f"--mesh: '{mesh_type}' is neither a mesh type nor a file; known: {', '.join(MESH_TYPES)}")
+        return Asked(beam, material, load, mesh_type, edge, partial(_beam_mesh, beam, self.unit))
 
-    def asked_shape(self, load: str | None, sized: bool = True) -> "AskedShape":
-        """Shape of an option such as ``config/shapes.yaml:cook``; ValueError names the option.
+    def _asked_shape(self, load: str | None, sized: bool) -> Asked:
+        """Shape of an option such as ``config/shapes.yaml:cook``.
 
-        Load and material may be None if the study has only one for the shape. `sized`: an outline needs a size.
+        Load and material may be None if the study has only one for the shape.
         """
+        from ..problem.quantities import nearest
+
         study, part, shape = shape_of_study(self.shape or "")
         if load is None and len(shape.loads) > 1:
             raise ValueError(f"--load: missing; shape '{shape.name}' has {', '.join(shape.loads)}; give one")
-        from ..problem.quantities import nearest
-
         load = next(iter(shape.loads)) if load is None else load
         if load not in shape.loads:
             raise ValueError(f"--load: shape '{shape.name}' has no load '{load}'; {nearest(load, shape.loads)}")
         materials = _materials(study, part, shape, self.material, self.density)
+        edge = self._edge(sized and not shape.file)
         if shape.file:
             files = part.files[shape.name]
-            asked = None if self.size is None else asked_quantity("--size", self.size, "length")
-            file = next((one for size, one in files.items() if asked is not None and math.isclose(size, asked)), None)
-            if len(files) < 2 and asked is not None:
+            chosen = [file for size, file in files.items() if edge is not None and math.isclose(size, edge)]
+            if len(files) < 2 and edge is not None:
                 raise ValueError(
                     f"--size: '{self.size}' is beside the mesh of {Path(shape.file).name}; leave --size out"
                 )
-            if len(files) > 1 and file is None and (sized or asked is not None):
-                known = ", ".join(f"{1e3 * size:.12g} mm" for size in files)
-                what = "missing" if asked is None else f"there is no file of '{self.size}'"
+            if len(files) > 1 and not chosen and (sized or edge is not None):
+                known = ", ".join(map(size_text, files))
+                what = "missing" if edge is None else f"there is no file of '{self.size}'"
                 raise ValueError(f"--size: {what}; '{shape.name}' has files of {known}; give one")
-            return AskedShape(part, replace(shape, file=file or shape.file), load, materials, None)
-        if self.size is None and sized:
-            raise ValueError("--size: missing; give the length of an edge such as '2 mm'")
-        edge = None if self.size is None else asked_quantity("--size", self.size, "length")
-        (left, low), (right, top) = shape.extent
-        most = min(right - left, top - low)
-        if edge is not None and edge > most:
-            raise ValueError(
-                f"--size: '{self.size}' is larger than shape '{shape.name}'; give at most {1e3 * most:.4g} mm"
-            )
-        return AskedShape(part, shape, load, materials, edge)
+            shape, edge = replace(shape, file=chosen[0] if chosen else shape.file), None
+        mesh_type = shape.file or "free"
+        return Asked(shape, materials, load, mesh_type, edge, partial(_shape_mesh, part, shape))
 
-    @property
-    def mesh_or_file(self) -> str:
-        """Mesh type, or mesh file."""
-        return self.mesh_type or "structured"
 
-    def edge(self, beam: "Beam") -> float | None:
-        """Length of an edge [m], None for a mesh file; ValueError if the mesh would be too large."""
-        from ..mesh import MESH_TYPES
-
-        made = MESH_TYPES.get(self.mesh_or_file)
-        if made is None:
-            if not Path(self.mesh_or_file).is_file():
-                known = ", ".join(MESH_TYPES)
-                raise ValueError(f"--mesh: '{self.mesh_or_file}' is neither a mesh type nor a file; known: {known}")
-            return None
-        if self.size is None:
-            raise ValueError("--size: missing; give the length of an edge such as '2 mm'")
-        edge = asked_quantity("--size", self.size, "length")
-        if refusal := made.refusal(beam.length, beam.height, edge, f"beam '{beam.name}'"):
-            raise ValueError(f"--size: '{self.size}' {refusal}")
-        return edge
-
-    def mesh_name(self, edge: float | None) -> str:
-        """Name of the mesh of a beam."""
-        return Path(self.mesh_or_file).name if edge is None else f"{self.mesh_or_file} {self.size}"
-
-    def mesh(self, beam: "Beam", edge: float | None) -> "Mesh":
-        """Mesh with edges of a length [m]; without length the mesh of the file."""
-        from ..mesh import MESH_TYPES, read_beam_mesh
-
-        if edge is None:
-            unit = self.unit if self.unit[:1].isdigit() else f"1 {self.unit}"
-            return read_beam_mesh(self.mesh_or_file, beam.length, beam.height, asked_quantity("--unit", unit, "length"))
-        made = MESH_TYPES[self.mesh_or_file]
-        count = made.particles(beam.length, beam.height, edge)
-        if count > SAID_FROM:
-            click.echo(f"making a {made.name} mesh of some {count / 1e6:.1f} million particles ...", err=True)
-        return made(beam.length, beam.height, edge)
+AnyCommand = Callable[..., None]
 
 
 def sheet_options(
@@ -407,6 +368,7 @@ def sheet_options(
         @wraps(command)
         def call(**given: Any) -> None:
             sheet = SheetOptions(**{one.name: given.pop(one.name) for one in fields(SheetOptions)})
+            sheet.check()
             command(sheet, **given)
 
         return reduce(lambda made, option: option(made), reversed(each), call)
@@ -414,55 +376,7 @@ def sheet_options(
     return decorate
 
 
-RESULTS_FOLDER = Path("results")
-
-DATASET = "dataset.nc"
-
-
-def loaded(path: Path, consequence: str = "") -> "Study":
-    """Load a study; `consequence` follows the message on its mistakes."""
-    from ..studies.config.messages import StudyError
-    from ..studies.kinds import load_study
-
-    try:
-        return load_study(path)
-    except StudyError as error:
-        raise StudyError(*f"{error}{consequence}".splitlines()) from None
-
-
-def studies(given: Path | None, consequence: str = "") -> "Iterator[tuple[Study, Path]]":
-    """Studies and the folders of their results."""
-    from ..studies.runs.locks import check_claim, claimed
-
-    if given is not None and not given.is_dir():
-        study = loaded(given, consequence)
-        folder = RESULTS_FOLDER / study.name
-        if not folder.is_dir():
-            raise click.ClickException(f"{folder}: there is no such folder; run the study, or go to where it was run")
-        check_claim(folder, given)
-        yield study, folder
-        return
-    if given is None and not RESULTS_FOLDER.is_dir():
-        raise click.ClickException(f"{RESULTS_FOLDER}: there is no such folder; go to where studies were run")
-    folders = [given] if given else sorted(path for path in RESULTS_FOLDER.iterdir() if path.is_dir())
-    for folder in folders:
-        config = claimed(folder) or folder.parent.parent / CONFIG_FOLDER / f"{folder.name}.yaml"
-        if config.is_file():
-            yield loaded(config, consequence), folder
-        elif given:
-            raise click.ClickException(f"{folder}: there is no {config}; give the study's YAML file instead")
-        else:
-            click.echo(f"{folder}: left alone, there is no {config}; give the study's YAML file, or remove it by hand")
-
-
-def idle(folder: Path) -> None:
-    """Refuse a folder that a run uses."""
-    from ..studies.runs.locks import LockedError, check_idle
-
-    try:
-        check_idle(folder)
-    except LockedError as error:
-        raise click.ClickException(f"{error}; nothing is removed") from None
+RESULTS_FOLDER, DATASET = Path("results"), "dataset.nc"
 
 
 def dataset_path(given: str) -> Path:

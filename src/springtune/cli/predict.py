@@ -1,45 +1,22 @@
 """Recommend a definition for one mesh, or a mesh for one error, and write springs for other programs."""
 
-import re
 import warnings
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from . import examples
 from .engine_fit import EngineOptions, engine_options, fitted, net_of_fit
-from .options import (
-    SPRING_FILES,
-    SheetOptions,
-    Unmet,
-    check_kind,
-    check_target,
-    refusals,
-    sheet_options,
-)
+from .options import SPRING_FILES, Asked, SheetOptions, Unmet, check_target, sheet_options, writing
 
 if TYPE_CHECKING:
     from ..handover.net import SpringNet
-    from ..mesh import Mesh
-    from ..mesh.groups import GroupedMesh
-    from ..prediction.choices import Choice
-    from ..prediction.search import MeshSearch
-    from ..problem.geometry import Beam
-    from ..problem.materials import Material
-    from .options import AskedShape
+    from ..scene.statements import ShapeStatement
     from .recommendation import Subject
-
-
-ASKED = re.compile(
-    "^(?=(beam |error:|load |load:|loads:|force:|scale:|density:|definition:|dt:|substeps:|iterations:|precision:|"
-    "within:|budget:))|^mesh types?(?=:)"
-)
-"""Begin of messages with the name of an argument, which is an option of `predict`."""
 
 
 @click.command(
@@ -99,204 +76,128 @@ def predict(
     With --engine: what to type into an engine at a setting, so that the displacement under --load is that of finite
     elements; over which loads that holds; and which settings converge. With --budget the setting is found, too.
     """
-    with refusals("--write", target, _in_options):
-        check_kind(sheet.shape, sheet.beam, () if engine["engine"] is None else ("scale",))
-        engine.check(sheet, error, load)
-        if best_springs and (error is not None or engine["engine"] is not None):
-            raise ValueError("--best-springs: are of one mesh; leave out --error and --engine")
-        also = ("best-springs",) * best_springs
-        if target is not None:
-            check_target("--write", target)
-        if engine["engine"] is not None:
-            text, fit = fitted(sheet, engine, load, loads, springs_alone)
-            answer = _Answer(text, "", partial(net_of_fit, fit))
-        elif sheet.shape is not None:
-            asked = sheet.asked_shape(load, sized=error is None)
-            answer = (
-                _on_shape(asked, springs_alone, also) if error is None else _find_on_shape(asked, error, springs_alone)
-            )
-        elif error is None:
-            answer = _on_beam(sheet, loads, springs_alone, also)
+    engine.check(sheet, error, load)
+    if best_springs and (error is not None or engine["engine"] is not None):
+        raise ValueError("--best-springs: are of one mesh; leave out --error and --engine")
+    if error is not None and sheet.size is not None:
+        raise ValueError(f"--size: '{sheet.size}' is what --error finds; leave one of them out")
+    if target is not None:
+        check_target("--write", target)
+    names = None if loads is None else [name.strip() for name in loads.split(",") if name.strip()]
+    if engine["engine"] is not None:
+        text, fit = fitted(sheet, engine, load, names, springs_alone)
+        make = partial(net_of_fit, fit)
+    else:
+        asked = sheet.asked(load, sized=error is None)
+        under = _under(asked, names)
+        if error is None:
+            text, definition = _on_mesh(asked, under, springs_alone, ("best-springs",) * best_springs)
         else:
-            answer = _find_on_beam(sheet, loads, error, springs_alone)
-        click.echo(answer.text)
-        if target is None:
-            return
-        if answer.definition is None:
-            nothing = "nothing is recommended for this mesh, so nothing is written; take another mesh"
-            if error is not None:
-                nothing = f"no mesh keeps {error}, so nothing is written; allow a larger error"
-            raise Unmet(f"--write: {nothing}")
-        net = answer.net(answer.definition)
-        click.echo(f"\n{written_text(net, net.write(target))}")
+            text, definition, asked = _found(asked, under, error, springs_alone, sheet.mesh_type)
+        make = partial(_recommended_net, asked, under, definition, error)
+    click.echo(text)
+    if target is not None:
+        net = make()
+        with writing("--write", target):
+            click.echo(f"\n{written_text(net, net.write(target))}")
 
 
-def _in_options(message: str) -> str:
-    """Message with options in the place of arguments."""
-    return ASKED.sub(lambda found: "--mesh" if found[0] else "--", message)
-
-
-class _Answer(NamedTuple):
-    """What is printed, the definition that is recommended, and how its springs are made."""
-
-    text: str
-    definition: str | None
-    net: "Callable[[str], SpringNet]"
-
-
-def _found(subject: "Subject", search: "MeshSearch", springs_alone: bool, net: "Callable[[str], SpringNet]") -> _Answer:
-    """Answer of a search for a mesh."""
-    from .recommendation import search_text
-
-    best = search.best_springs if springs_alone else search.best
-    return _Answer(
-        search_text(subject, search, springs_alone),
-        best.choice.definition if best else None,
-        net,
-    )
-
-
-def _asked_beam(sheet: SheetOptions, loads: str | None) -> "tuple[Beam, Material, tuple[str, ...]]":
-    """Beam, material and loads of the options."""
+def _under(asked: Asked, names: list[str] | None) -> dict[str, Any]:
+    """Loads that count, as arguments of the library: loads of a beam, or the load case of a shape."""
     from ..prediction.choices import CASES, check_beam, check_loads
 
-    beam, material = sheet.asked_beam()
-    check_beam(beam)
-    names = CASES if loads is None else [name.strip() for name in loads.split(",") if name.strip()]
-    return beam, material, check_loads(names)
+    if not asked.is_beam:
+        return {"load": asked.load}
+    check_beam(asked.body)
+    return {"loads": check_loads(CASES if names is None else names)}
 
 
-def _kept(choices: "list[Choice]", springs_alone: bool) -> "list[Choice]":
-    return [choice for choice in choices if not (springs_alone and choice.energies)]
+def _statement(asked: Asked) -> "ShapeStatement":
+    from ..scene.statements import ShapeStatement
+
+    return ShapeStatement(asked.body, asked.mesh, asked.material, str(asked.load), 1.0, "linear")
 
 
-def _on_beam(sheet: SheetOptions, given: str | None, springs_alone: bool, also: tuple[str, ...]) -> _Answer:
-    """Recommend a definition for a mesh of a beam."""
-    from ..handover.net import SpringNet
+def _subject(asked: Asked, known: Any) -> "Subject":
+    from .recommendation import beam_subject, shape_subject
+
+    return beam_subject(asked.body, asked.material, known) if asked.is_beam else shape_subject(_statement(asked), known)
+
+
+def _on_mesh(asked: Asked, under: dict[str, Any], springs_alone: bool, also: tuple[str, ...]) -> tuple[str, str | None]:
+    """Text for one mesh, and the definition that is recommended."""
     from ..mesh import MESH_TYPES
     from ..prediction.bands import extrapolate
-    from ..prediction.choices import SOLVED, SOLVED_FROM_FILE, predict, references
-    from .recommendation import beam_subject, prediction_text, recommended
+    from ..prediction.choices import SOLVED, SOLVED_FROM_FILE, predict, references, shape_references
+    from .recommendation import prediction_text, recommended
 
-    beam, material, loads = _asked_beam(sheet, given)
-    mesh_type, edge = sheet.mesh_or_file, sheet.edge(beam)
-    name = sheet.mesh_name(edge)
-
-    def make() -> "Mesh":
-        mesh = sheet.mesh(beam, edge)
-        if edge is None and len(mesh.points) > SOLVED_FROM_FILE:
-            raise Unmet(
-                f"--mesh: '{mesh_type}' has {len(mesh.points)} particles, more than the {SOLVED_FROM_FILE} that are "
-                "solved here; give a coarser mesh, or make it a mesh file of a study"
-            )
-        return mesh
-
-    count = 0.0 if edge is None else MESH_TYPES[mesh_type].particles(beam.length, beam.height, edge)
-    solved = None if count > SOLVED else make()
-    known = references(beam, material, loads)
+    body, material, size = asked.body, asked.material, asked.size
     sizes: list[float] = []
-    if solved is None:
-        assert edge is not None
+    about = 0.0
+    if asked.is_beam and size is not None:
+        about = MESH_TYPES[asked.mesh_type].particles(body.length, body.height, size)
+    if about > SOLVED and size is not None:
         if also:
             raise ValueError(f"--best-springs: the mesh has more than {SOLVED} particles; give a larger --size")
-        about: dict[str, object] = {"particles": float(f"{count:.2g}"), "springs": None}
-        found, sizes = extrapolate(mesh_type, edge, beam, material, known, loads=loads)
+        known: Any = references(body, material, **under)
+        found, sizes = extrapolate(asked.mesh_type, size, body, material, known, **under)
+        counts = f"about {about:.2g} particles"
     else:
-        about = {"particles": len(solved.points), "springs": len(solved.edges)}
-        found = predict(beam, solved, material, known, loads=loads, also=also)
-    found = _kept(found, springs_alone)
-    subject = beam_subject(beam, material, known)
-    return _Answer(
-        prediction_text(subject, name, about, found, sizes),
-        recommended(found)[0],
-        lambda definition: SpringNet.from_mesh(
-            solved or make(), material, definition, beam=beam, mesh_name=name, loads=loads
-        ),
-    )
+        mesh = asked.mesh if asked.is_beam else asked.mesh.mesh
+        if len(mesh.points) > SOLVED_FROM_FILE:
+            option = "--size" if size is not None else "--mesh" if asked.is_beam else "--shape"
+            raise Unmet(
+                f"{option}: '{asked.mesh_name}' has {len(mesh.points)} particles, more than the {SOLVED_FROM_FILE} "
+                "that are solved here; give a coarser mesh, or make it a mesh of a study"
+            )
+        known = references(body, material, **under) if asked.is_beam else shape_references(_statement(asked))
+        found = predict(body, asked.mesh, material, known, **under, also=also)
+        counts = f"{len(mesh.points)} particles, {len(mesh.edges)} springs"
+    found = [choice for choice in found if not (springs_alone and choice.energies)]
+    return prediction_text(_subject(asked, known), asked.mesh_name, counts, found, sizes), recommended(found)[0]
 
 
-def _on_shape(asked: "AskedShape", springs_alone: bool, also: tuple[str, ...]) -> _Answer:
-    """Recommend a definition for a mesh of a shape."""
-    from ..prediction.choices import SOLVED_FROM_FILE, predict, shape_references
-    from ..scene.statements import ShapeStatement
-    from .recommendation import prediction_text, recommended, shape_subject
-
-    grouped = asked.mesh()
-    about = {"particles": len(grouped.mesh.points), "springs": len(grouped.mesh.edges)}
-    if about["particles"] > SOLVED_FROM_FILE:
-        option = "--shape" if asked.size is None else "--size"
-        raise Unmet(
-            f"{option}: {about['particles']} particles, more than the {SOLVED_FROM_FILE} that are solved here; give a "
-            "coarser mesh, or run its study"
-        )
-    statement = ShapeStatement(asked.shape, grouped, asked.materials, asked.load, 1.0, "linear")
-    known = shape_references(statement)
-    found = _kept(predict(asked.shape, grouped, asked.materials, known, load=asked.load, also=also), springs_alone)
-    subject = shape_subject(statement, known)
-    return _Answer(
-        prediction_text(subject, asked.mesh_name, about, found),
-        recommended(found)[0],
-        partial(net_of_shape, asked),
-    )
-
-
-def _find_on_beam(sheet: SheetOptions, given: str | None, error: str, springs_alone: bool) -> _Answer:
-    """Find the mesh of a beam that keeps an error."""
-    from ..handover.net import SpringNet
+def _found(
+    asked: Asked, under: dict[str, Any], error: str, springs_alone: bool, mesh_types: str | None
+) -> tuple[str, str | None, Asked]:
+    """Text of a search for a mesh, the definition that is recommended, and the body with the mesh."""
     from ..mesh import MESH_TYPES
-    from ..prediction.search import find_mesh, size_text
-    from .recommendation import beam_subject
+    from ..prediction.search import find_mesh, find_shape_mesh
+    from .recommendation import search_text
 
-    beam, material, loads = _asked_beam(sheet, given)
-    if sheet.size is not None:
-        raise ValueError(f"--size: '{sheet.size}' is what --error finds; leave one of them out")
-    names = None if sheet.mesh_type is None else [name.strip() for name in sheet.mesh_type.split(",")]
-    for name in names or ():
-        if name not in MESH_TYPES:
-            why = "is a file, and --error finds sizes of mesh types" if Path(name).is_file() else "is no mesh type"
-            raise ValueError(f"--mesh: '{name}' {why}; known: {', '.join(MESH_TYPES)}")
-    search = find_mesh(beam, material, error, loads=loads, mesh_types=names)
-    best = search.best_springs if springs_alone else search.best
-    subject = beam_subject(beam, material, search.known)  # type: ignore[arg-type]  # of loads
-
-    def net(definition: str) -> "SpringNet":
-        assert best is not None
-        mesh = MESH_TYPES[best.mesh_type](beam.length, beam.height, best.size)
-        name = f"{best.mesh_type} {size_text(best.size)}"
-        return SpringNet.from_mesh(mesh, material, definition, beam=beam, mesh_name=name, loads=loads)
-
-    return _found(subject, search, springs_alone, net)
-
-
-def _find_on_shape(asked: "AskedShape", error: str, springs_alone: bool) -> _Answer:
-    """Find the mesh of a shape that keeps an error."""
-    from ..prediction.search import find_shape_mesh
-    from ..scene.statements import ShapeStatement
-    from .recommendation import shape_subject
-
-    if asked.shape.file:
+    body = asked.body
+    if asked.is_beam:
+        names = None if mesh_types is None else [name.strip() for name in mesh_types.split(",")]
+        for name in names or ():
+            if name not in MESH_TYPES:
+                why = "is a file, and --error finds sizes of mesh types" if Path(name).is_file() else "is no mesh type"
+                raise ValueError(f"--mesh: '{name}' {why}; known: {', '.join(MESH_TYPES)}")
+        search = find_mesh(body, asked.material, error, mesh_types=names, **under)
+    elif body.file:
         raise Unmet(
-            f"--error: '{error}' finds sizes of meshes that are made, and '{asked.shape.name}' has the mesh of its "
-            "file; give it an outline, or leave --error out"
+            f"--error: '{error}' finds sizes of meshes that are made, and '{body.name}' has the mesh of its file; give "
+            "it an outline, or leave --error out"
         )
-    if asked.size is not None:
-        raise ValueError(f"--size: '{asked.size_text}' is what --error finds; leave one of them out")
-
-    def make(size: float) -> "GroupedMesh":
-        return replace(asked, size=size).mesh()
-
-    search = find_shape_mesh(asked.shape, asked.materials, error, load=asked.load, make=make)
+    else:
+        search = find_shape_mesh(body, asked.material, error, **under, make=partial(asked.make, asked.mesh_type))
     best = search.best_springs if springs_alone else search.best
-    size = best.size if best else search.tried[-1].size
-    statement = ShapeStatement(asked.shape, make(size), asked.materials, asked.load, 1.0, "linear")
-    subject = shape_subject(statement, search.known)  # type: ignore[arg-type]  # of quantities
-    return _found(subject, search, springs_alone, partial(net_of_shape, replace(asked, size=size)))
+    if mesh := best or next(reversed(search.tried), None):
+        asked = replace(asked, mesh_type=mesh.mesh_type, size=mesh.size)
+    text = search_text(_subject(asked, search.known), search, springs_alone)
+    return text, best.choice.definition if best else None, asked
+
+
+def _recommended_net(asked: Asked, under: dict[str, Any], definition: str | None, error: str | None) -> "SpringNet":
+    """Springs of the definition that is recommended."""
+    if definition is None:
+        nothing = "nothing is recommended for this mesh, so nothing is written; take another mesh"
+        if error is not None:
+            nothing = f"no mesh keeps {error}, so nothing is written; allow a larger error"
+        raise Unmet(f"--write: {nothing}")
+    return _net(asked, definition, loads=under.get("loads"))
 
 
 # -- springs for other programs ---------------------------------------------------------------------------------------
-
-OPTIONS = re.compile(r"^(?=(load|force|scale|definition|stiffness|density|mujoco)\b)")
-"""Begin of messages with the name of an argument, which is an option here."""
 
 
 @click.command(
@@ -353,73 +254,47 @@ def springs(
     """
     from ..handover.simulation import EquilibriumWarning
 
-    with refusals("--out", target, partial(OPTIONS.sub, "--", count=1)):
-        check_kind(sheet.shape, sheet.beam, ("scale",))
-        check_target("--out", target)
-        if sheet.shape is not None:
-            net = net_of_shape(sheet.asked_shape(load), definition, scale, stiffness)
-        else:
-            net = _net_of_beam(sheet, definition, stiffness, load, force)
-        with warnings.catch_warnings(record=True) as heard:
-            warnings.simplefilter("always", EquilibriumWarning)
-            written = net.write(target, mujoco=mujoco)
+    check_target("--out", target)
+    if sheet.shape is None and (load is None) != (force is None):
+        if load is None:
+            raise ValueError(f"--force: '{force}' is of no load; give --load such as traction, or leave --force out")
+        raise ValueError(f"--force: missing; give the size of the force of --load {load}, such as '400 kN'")
+    net = _net(sheet.asked(load), definition, stiffness=stiffness, force=force, scale=scale)
+    with writing("--out", target), warnings.catch_warnings(record=True) as heard:
+        warnings.simplefilter("always", EquilibriumWarning)
+        written = net.write(target, mujoco=mujoco)
     click.echo(written_text(net, written, mujoco))
     for one in heard:
         click.echo(str(one.message))
 
 
-@contextmanager
-def _derived(definition: str) -> Iterator[None]:
-    """Context in which springs are derived; a patch test that scales them may be singular."""
-    from ..mechanics.statics import SingularError
-
-    try:
-        yield
-    except SingularError as error:
-        raise Unmet(f"--definition: '{definition}' has no springs on this mesh: {error}; take another") from None
-
-
-def _net_of_beam(
-    sheet: SheetOptions, definition: str, stiffness: str | None, load: str | None, force: str | None
+def _net(
+    asked: Asked,
+    definition: str,
+    *,
+    loads: "Iterable[str] | None" = None,
+    stiffness: str | None = None,
+    force: str | None = None,
+    scale: float = 1.0,
 ) -> "SpringNet":
+    """Springs of a mesh, under a load if there is one; `scale` [1] is a factor on that of a shape."""
     from ..handover.net import SpringNet
+    from ..mechanics.statics import SingularError
     from ..scene.single import Scene
 
-    beam, material = sheet.asked_beam()
-    edge = sheet.edge(beam)
-    mesh, name = sheet.mesh(beam, edge), sheet.mesh_name(edge)
-    if (load is None) != (force is None):
-        if load is None:
-            raise ValueError(f"--force: '{force}' is of no load; give --load such as traction, or leave --force out")
-        raise ValueError(f"--force: missing; give the size of the force of --load {load}, such as '400 kN'")
-    with _derived(definition):
-        if load is None or force is None:
-            return SpringNet.from_mesh(mesh, material, definition, beam=beam, stiffness=stiffness, mesh_name=name)
-        scene = Scene(beam, mesh, material, load, force, definition=definition, stiffness=stiffness)
-        return SpringNet.from_scene(scene, name)
-
-
-def net_of_shape(asked: "AskedShape", definition: str, scale: float = 1.0, stiffness: str | None = None) -> "SpringNet":
-    """Springs of a shape under its load case; `scale` [1] is a factor on the load."""
-    from ..handover.net import SpringNet
-    from ..scene.single import Scene
-
-    if any(one.x or one.y for one in asked.shape.loads[asked.load].supports):
+    body, load, name = asked.body, asked.load, asked.mesh_name
+    if not asked.is_beam and any(one.x or one.y for one in body.loads[load].supports):
         raise ValueError(
-            f"--load: '{asked.load}' of shape '{asked.shape.name}' moves a support, and files of springs have forces "
-            "and directions that are held; give a load of forces"
+            f"--load: '{load}' of shape '{body.name}' moves a support, and files of springs have forces and directions "
+            "that are held; give a load of forces"
         )
-    scene = Scene(
-        asked.shape,
-        asked.mesh(),
-        asked.materials,
-        asked.load,
-        definition=definition,
-        stiffness=stiffness,
-        scale=scale,
-    )
-    with _derived(definition):
-        return SpringNet.from_scene(scene, asked.mesh_name)
+    how: dict[str, Any] = {"definition": definition, "stiffness": stiffness}
+    try:
+        if load is None:
+            return SpringNet.from_mesh(asked.mesh, asked.material, beam=body, mesh_name=name, loads=loads, **how)
+        return SpringNet.from_scene(Scene(body, asked.mesh, asked.material, load, force, scale=scale, **how), name)
+    except SingularError as error:  # of the patch test that scales them
+        raise Unmet(f"--definition: '{definition}' has no springs on this mesh: {error}; take another") from None
 
 
 def written_text(net: "SpringNet", written: "Iterable[Path]", mujoco: int | None = None) -> str:

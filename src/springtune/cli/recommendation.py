@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,28 +19,21 @@ if TYPE_CHECKING:
     from ..problem.materials import Material
     from ..scene.statements import ShapeStatement
 
-MEANT = "Errors are (network - reference) / |reference| of"
-
 
 @dataclass(frozen=True)
 class Subject:
     """A beam under loads, or a shape under a load case, as a prediction names it.
 
-    `name` and `made_of` (material, thickness) are texts. `known` are references by load,
-    of a shape by quantity, `compared` their values and kinds; `meaning` says what an error is of, `sign` what its sign
-    means. `dense`: all materials have a density, so that there are largest time steps. Only shapes have a `load`, only
-    beams rows of a table of `references`.
+    `name` and `made_of` (material, thickness) are texts, `known` the references by load, of a shape by quantity.
+    `compared` has the values and kinds of those that were found, `sign` the meaning of an error's sign.
     """
 
     name: str
     made_of: str
     known: "References | ShapeReferences"
     compared: dict[str, tuple[float, str]]
-    load: str
-    meaning: str
     sign: list[str]
-    dense: bool
-    references: list[list[str]]
+    of_beam: bool
     plane_strain: bool = False
 
     @property
@@ -48,6 +41,12 @@ class Subject:
         """Largest error estimate of the references."""
         estimates = [found.error_estimate for found in self.known.values() if not isinstance(found, str)]
         return f"{100 * max(estimates, default=0):.1g} %"
+
+    @property
+    def meaning(self) -> str:
+        """What an error is of."""
+        what = "the displacement of the loaded side" if self.of_beam else "each quantity"
+        return f"Errors are (network - reference) / |reference| of {what}"
 
 
 def beam_subject(beam: "Beam", material: "Material", known: "References") -> Subject:
@@ -60,15 +59,13 @@ def beam_subject(beam: "Beam", material: "Material", known: "References") -> Sub
 
     made_of = f"{material.name}, {constants(material)}, nu = {material.poisson_ratio:g}, "
     made_of += f"t = {1e3 * beam.thickness:g} mm"
-    if material.plane == "strain":
+    strain = material.plane == "strain"
+    if strain:
         sheet = material.in_plane
         made_of += f", plane strain: in the plane {constants(sheet)}, nu = {sheet.poisson_ratio:.4g}"
     signs = {load: LOADS[load].sign for load in known}
-    meaning = f"{MEANT} the displacement of the loaded side"
     compared = {load: (sign, "displacement") for load, sign in signs.items()}
-    sign = [f"Of errors, {sign_sentence(signs)}."]
-    dense, strain = material.density is not None, material.plane == "strain"
-    return Subject(beam.label, made_of, known, compared, "", meaning, sign, dense, [], strain)
+    return Subject(beam.label, made_of, known, compared, [f"Of errors, {sign_sentence(signs)}."], True, strain)
 
 
 def shape_subject(statement: "ShapeStatement", known: "ShapeReferences") -> Subject:
@@ -79,33 +76,15 @@ def shape_subject(statement: "ShapeStatement", known: "ShapeReferences") -> Subj
     of = "errors" if len(moved) == len(compared) else "errors of displacements"
     sign = [f"Of {of}, {sign_sentence(moved, 'of')}."] if moved else []
     sides = np.ptp(statement.mesh.points, axis=0).tolist()
-    references = [
-        [name, f"{found.value:.6g} {QUANTITY_UNITS[kind[name]]}", f"{100 * found.error_estimate:.1g} %"]
-        for name, found in known.items()
-        if not isinstance(found, str)
-    ]
-    return Subject(
-        f"{statement.shape.name}, load {statement.load}",
-        f"{size_text(*sides)}, {statement.named_materials}, t = {1e3 * statement.thickness:g} mm",
-        known,
-        compared,
-        statement.load,
-        f"{MEANT} each quantity",
-        sign,
-        all(one.density is not None for one in statement.materials),
-        references,
-    )
+    made_of = f"{size_text(*sides)}, {statement.named_materials}, t = {1e3 * statement.thickness:g} mm"
+    return Subject(f"{statement.shape.name}, load {statement.load}", made_of, known, compared, sign, False)
 
 
 def prediction_text(
-    subject: Subject,
-    mesh_name: str,
-    about: dict[str, Any],
-    choices: "Sequence[Choice]",
-    sizes: Sequence[float] = (),
+    subject: Subject, mesh_name: str, counts: str, choices: "Sequence[Choice]", sizes: Sequence[float] = ()
 ) -> str:
     """Text of a prediction; `sizes` [m] are of the meshes that bands are extrapolated from."""
-    columns, of_beam = list(subject.known), not subject.load
+    of_beam = subject.of_beam
     heads, *rows = TabledList(choices).table()
     kept = [place for place, head in enumerate(heads) if of_beam or head not in ("E", "nu")]
     rows = [[row[place] for place in kept] for row in (heads, *rows)]
@@ -116,31 +95,33 @@ def prediction_text(
         notes += [f"{choice.definition}, {part}: {reason}" for part, reason in choice.failures.items()]
     first, plain = (name or "none" for name in recommended(choices))
     by_rule = recommended([choice for choice in choices if choice.definition != "best-springs"])
-    particles, springs = about["particles"], about["springs"]
-    counts = f"{particles} particles, {springs} springs" if springs else f"about {particles:.2g} particles"
     how = "solved on this mesh"
     if sizes:
         low, high = 1e3 * min(sizes), 1e3 * max(sizes)
         mesh_type = mesh_name.partition(" ")[0]
         how = f"bands, extrapolated from solutions on {len(sizes)} {mesh_type} meshes of {low:.3g} to {high:.3g} mm"
-    ranked = "The first row is the best one by its worst error."
+    estimate = f" (error estimate {subject.estimate})" if of_beam else ""
+    tests = " E, its error, and nu are of a patch test between rollers." if of_beam else ""
     lines = [
         f"{subject.name}, {mesh_name}: {counts}; {subject.made_of}",
         "",
         f"recommended: {first}; with springs alone: {plain}",
         *_at_worst(subject, choices, (first, plain, *map(str, by_rule))),
         "",
-        aligned(rows, left=2, right=range(3, 3 + len(columns) + 2 * of_beam)),
+        aligned(rows, left=2, right=range(3, 3 + len(subject.known) + 2 * of_beam)),
         "",
         f"{subject.meaning}{': ' if of_beam else ', '}{how},",
-        f"{KINEMATICS_TEXT} (error estimate {subject.estimate})." if of_beam else f"{KINEMATICS_TEXT}.",
+        f"{KINEMATICS_TEXT}{estimate}.",
         *subject.sign,
-        f"{ranked} E, its error, and nu are of a patch test between rollers." if of_beam else ranked,
+        f"The first row is the best one by its worst error.{tests}",
         *_also_tried(choices),
     ]
-    if subject.references:
-        heads = ["quantity", "reference", "error estimate"]
-        lines += ["", aligned([heads, *subject.references], left=1, right=(1, 2))]
+    if not of_beam and subject.compared:
+        table = [["quantity", "reference", "error estimate"]]
+        for name, (value, kind) in subject.compared.items():
+            estimate = f"{100 * subject.known[name].error_estimate:.1g} %"  # type: ignore[union-attr]
+            table.append([name, f"{value:.6g} {QUANTITY_UNITS[kind]}", estimate])
+        lines += ["", aligned(table, left=1, right=(1, 2))]
     return "\n".join([*lines, *([""] if notes and not of_beam else []), *notes])
 
 
@@ -148,7 +129,7 @@ def search_text(subject: Subject, search: "MeshSearch", springs_alone: bool = Fa
     """Text of a search for a mesh."""
     from ..prediction.search import answer_text, tried_names
 
-    where, steps = "in" if subject.load else "under", subject.dense
+    where = "under" if subject.of_beam else "in"
     wanted = f"{100 * search.error:.6g} %"
     lines = [
         f"{subject.name}; {subject.made_of}; an error of at most {wanted} {where} {_listed(search.loads)}",
@@ -156,15 +137,16 @@ def search_text(subject: Subject, search: "MeshSearch", springs_alone: bool = Fa
         *([] if springs_alone else [f"recommended: {answer_text(search.best)}"]),
         f"with springs alone: {answer_text(search.best_springs)}",
     ]
-    right = (3, *range(5, 9 + len(search.loads) + steps))
-    notes = []
+    notes, steps = [], False
     tables = [] if springs_alone else [("with any definition", search.by_type, False)]
     tables.append(("with springs alone", search.springs_by_type, True))
     for what, found, alone in tables:
         chosen = sorted((one for one in found.values() if one), key=lambda one: (not one.confirmed, one.particles))
         notes += [f"{name}, {what}: {_nearest(search, name, alone)}" for name, one in found.items() if one is None]
         if chosen:
-            lines += ["", f"{what}:", aligned(TabledList(chosen).table(), left=2, right=right)]
+            table = TabledList(chosen).table()
+            steps |= "largest step" in table[0]
+            lines += ["", f"{what}:", aligned(table, left=2, right=range(3, len(table[0])))]
     answers = [one for _, found, _ in tables for one in found.values()]
     explained = []
     if any(one and not one.confirmed for one in answers):

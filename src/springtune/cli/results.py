@@ -2,13 +2,18 @@
 
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from ..registry import how_to_install
 from ..studies.output.text import bytes_text
+from ..studies.runs.source import CONFIG_FOLDER
 from . import examples
-from .options import studies
+from .options import RESULTS_FOLDER
+
+if TYPE_CHECKING:
+    from ..studies.config.model import Study
 
 
 @click.command(epilog=examples("springtune info results/paper", "springtune info dataset.nc --study > again.yaml"))
@@ -80,7 +85,7 @@ def archive(study: Path, out: Path | None, force: bool) -> None:
     STUDY is its YAML file, or results/<study>. The file is an RO-Crate: the study and the files that it names, dataset,
     page, figures, tables, the versions of all packages, and the SHA-256 of every file.
     """
-    [(found, folder)] = studies(study)
+    found, folder = _study_and_folder(study)
     if find_spec("rocrate") is None:
         raise click.ClickException(f"the library rocrate is missing; {how_to_install('archive')}")
     from ..studies.archive import pack
@@ -92,3 +97,21 @@ def archive(study: Path, out: Path | None, force: bool) -> None:
         raise click.ClickException(f"{target}: is there already; give --force, or another name by --out")
     names = pack(found, folder, target)
     click.echo(f"{target}: {len(names)} files, {bytes_text(target.stat().st_size)}")
+
+
+def _study_and_folder(given: Path) -> "tuple[Study, Path]":
+    """Study of a YAML file or of a folder of results, and that folder."""
+    from ..studies.kinds import load_study
+    from ..studies.runs.locks import check_claim, claimed
+
+    if given.is_dir():
+        config = claimed(given) or given.parent.parent / CONFIG_FOLDER / f"{given.name}.yaml"
+        if not config.is_file():
+            raise click.ClickException(f"{given}: there is no {config}; give the study's YAML file instead")
+        return load_study(config), given
+    study = load_study(given)
+    folder = RESULTS_FOLDER / study.name
+    if not folder.is_dir():
+        raise click.ClickException(f"{folder}: there is no such folder; run the study, or go to where it was run")
+    check_claim(folder, given)
+    return study, folder
