@@ -140,8 +140,8 @@ class TestError:
         result = run("predict", *PLATE[:-2], "--error", "1 %")
         assert result.exit_code == 2
         assert result.stderr == (
-            "Error: --load 'pull': 'corner' has no reference, so no error of it can be kept: it is zero; take it out of "
-            "the quantities\n"
+            "Error: --load 'pull': 'corner' has no reference, so no error of it can be kept: it is zero; take it out "
+            "of the quantities\n"
         )
         study = st.load_study("study.yaml")
         with pytest.raises(ValueError, match="of beams alone"):
