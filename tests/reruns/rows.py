@@ -82,22 +82,9 @@ def replace_twice(first, second):
     replace(second)
 
 
-def flip(path):
-    """Change one bit in the middle of a file; size and time stay."""
-    state, content = path.stat(), bytearray(path.read_bytes())
-    content[len(content) // 2] ^= 1
-    path.write_bytes(content)
-    os.utime(path, ns=(state.st_atime_ns, state.st_mtime_ns + 1))
-
-
-def cut(path):
-    """Leave half of a file."""
-    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
-
-
-def first(how, pattern):
-    """Do something to the first of some files."""
-    how(sorted(driver.FOLDER.glob(pattern))[0])
+def delete_first(pattern):
+    """Delete the first of some files."""
+    sorted(driver.FOLDER.glob(pattern))[0].unlink()
 
 
 def touch_everything():
@@ -134,22 +121,10 @@ def change_of(told):
 
 TABLE = yaml.safe_load(Path(__file__).with_name("rows.yaml").read_text())
 STUDY = {name: row(**one | {"change": change_of(one["change"])}) for name, one in TABLE["study"].items()}
-DAMAGE = {"deleted": Path.unlink, "with a bit flipped": flip, "cut": cut}
-EMPTY = {"empty": lambda path: path.write_bytes(b"")}
-NOTES = {"task file": "tasks/solve_0.json"}
-STORED = (
-    {
-        f"{what} {called}": row(partial(first, how, one["path"]), one["jobs"], one.get("solved"))
-        for what, one in TABLE["files"].items()
-        for called, how in (DAMAGE | EMPTY).items()
-    }
-    | {
-        f"{what} {called}": row(partial(first, how, path))
-        for what, path in (NOTES | {"code": "../code.json"}).items()
-        for called, how in DAMAGE.items()
-    }
-    | {"everything touched": row(touch_everything)}
-)
+STORED = {
+    f"{what} deleted": row(partial(delete_first, one["path"]), one.get("jobs", ""), one.get("solved"))
+    for what, one in TABLE["files"].items()
+} | {"everything touched": row(touch_everything)}
 CODE = {
     name: (one["module"], one.get("edit"), row(None, one.get("jobs", ""), one.get("solved")))
     for name, one in TABLE["code"].items()

@@ -89,7 +89,7 @@ def test_a_run_that_is_killed_goes_on_by_the_same_command(finished):
     command = ["snakemake", "--snakefile", repository / "Snakefile", "--cores", "2", "--configfile", "killed.yaml",
                "--workflow-profile", repository / "workflow/profiles/default", "--until", "collect"]  # fmt: skip
     job = subprocess.Popen(list(map(str, command)), cwd=run.folder, start_new_session=True, stderr=subprocess.DEVNULL)
-    while not list(run.folder.glob("results/killed/meshes/*.json")):
+    while not list(run.folder.glob("results/killed/meshes/*.h5")):
         assert job.poll() is None
         time.sleep(0.01)
     children = psutil.Process(job.pid).children(recursive=True)
