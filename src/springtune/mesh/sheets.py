@@ -41,8 +41,7 @@ def sheet_fault(mesh: Mesh) -> str:
     if len(again):
         where = in_words(points[again[0]])
         return f"cells hang together in a point alone, at {where}; join them by an edge, or part them"
-    rounds = _rounds(outline)
-    for one in rounds:
+    for one in rounds(outline):
         others = outline[~np.isin(outline[:, 0], one)]
         x, y = (points[one] - points[one[0]]).T
         outer = (x * np.roll(y, -1) - np.roll(x, -1) * y).sum() > 0
@@ -163,18 +162,18 @@ def _apart(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> np.nda
     return np.where(crossing, 0.0, distance)
 
 
-def _rounds(edges: np.ndarray) -> list[np.ndarray]:
-    """Closed rounds of edges, by the points on each in order; each point has one edge that leaves it."""
+def rounds(edges: np.ndarray) -> list[np.ndarray]:
+    """Return closed rounds of edges, by the points on each in order; each point has one edge that leaves it."""
     following = dict(edges.tolist())
-    rounds = []
+    closed = []
     while following:
         point, after = following.popitem()
         found = [point]
         while after != point:
             found.append(after)
             after = following.pop(after)
-        rounds.append(np.array(found))
-    return rounds
+        closed.append(np.array(found))
+    return closed
 
 
 def _winding(points: np.ndarray, edges: np.ndarray, point: np.ndarray) -> int:

@@ -7,7 +7,6 @@ are imported where one has.
 from collections import Counter, defaultdict
 from operator import attrgetter
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from pydantic import Field
 
@@ -19,9 +18,6 @@ from ...runs.source import hash_of
 from ...runs.stages import Task, stage
 from ..scenes.plan import file_source, mesh_stage, on_meshes, parameters, particles_in, stage_on_meshes
 from .outputs import DRAWING, OUTPUTS, OWN_FILE, mesh_name, stems
-
-if TYPE_CHECKING:
-    pass
 
 MOST_DRAWN = 1500
 """Particles, about, of the largest mesh that is drawn where a coarser one is there."""
