@@ -4,7 +4,7 @@ from collections import defaultdict
 
 import numpy as np
 
-from ...output.dataset import Filler, Group
+from ...output.dataset import Group
 from ...runs.stages import results
 from . import RUN_ENDS, SETTING
 from .kind import STAGE
@@ -83,14 +83,13 @@ def groups(study, folder):
 def _gathered(group, study, found):
     axes = {name: tuple(dict.fromkeys(run.labels[name] for run, _ in found)) for name in ENGINE_DIMENSIONS}
     axes |= {name: tuple(sorted(axes[name])) for name in ("dt", "substeps", "iterations", "stiffness_factor")}
-    filler, curves = Filler(group.empty(study.axes | axes)), defaultdict(list)
+    rows, curves = [], defaultdict(list)
     for run, result in found:
         about = {f"scene_{name}": value for name, value in run.stated} | {"program": run.program}
-        filler.put({name: value for name, value in (result | about).items() if name in group.variables}, **run.labels)
+        rows.append(run.labels | result | about)
         curves[tuple(run.labels[name] for name in OF_A_RUN)].append((run.labels["stiffness_factor"], result))
-    for setting, points in curves.items() if group is ENGINE_CURVES else ():
-        filler.put(_best(points), **dict(zip(OF_A_RUN, setting)))
-    return filler.data.set_coords([*RUN_COORDINATES])
+    rows += [dict(zip(OF_A_RUN, setting)) | _best(points) for setting, points in curves.items()]
+    return group.of_rows(study.axes | axes, rows).set_coords([*RUN_COORDINATES])
 
 
 def _best(points):

@@ -1,18 +1,16 @@
 """Laid strips, gathered in the group ``/laying``."""
 
 from collections import defaultdict
+from types import MappingProxyType
 
 import numpy as np
 
 from springtune.problem.compare import band
 from springtune.problem.status import Status
 
-from ...output.dataset import Filler, Group
+from ...output.dataset import Group
 from ...runs.stages import results
-from .kind import STAGE
-
-LAYING_WAY = ("loading", "friction")
-LAID = ("definition", "mesh_size", *LAYING_WAY)
+from .kind import LAID, LAYING_WAY, STAGE
 
 BAND = "twice its spread over three meshes of finite elements"
 
@@ -51,48 +49,32 @@ LAYING = Group(
     dimensions={"loading": "what lays the strip", "friction": "Coulomb's coefficient of friction"},
 )  # fmt: skip
 
-OF_ALL = ("status", "message", "load_share", "iterations", "laying_seconds", "skipped", "penetration")
-OF_SOLVED = ("area_under_strip", "elongation", "contact_force_error")
-"""Results that the dataset takes as they are."""
-
 
 def groups(study, folder):
     """Groups of a dataset, see `springtune.studies.kinds.scenes.collect.groups`."""
-    part = study.parts["laying"]
-    found = {task.of: result for task, result in results(STAGE, study, folder, ["outline"])}
-    points = max(len(result.get("outline", ())) for result in found.values())
+    rows, meshes, points = [], defaultdict(list), 0
+    for task, result in results(STAGE, study, folder, ["outline"]):
+        points = max(points, len(result.get("outline", ())))
+        if "definition" in task.labels:
+            rows += [task.labels | result, *_points("strip", result.get("outline", ()), "outline_point", task.labels)]
+        else:
+            meshes[tuple(task.labels.items())].append(result)
+    for labels, found in meshes.items():
+        rows += _reference(dict(labels), found) if found[0]["status"] == Status.SOLVED else []
+    rows += _points("trapezoid", study.parts["laying"].strips[0].trapezoid.corners, "corner")
     axes = study.axes | {"outline_point": tuple(range(points)), "corner": tuple(range(4))}
-    laid = Filler(LAYING.empty(axes))
-    for one in part.strips:
-        _strip(one, found[one], laid)
-    meshes = defaultdict(list)
-    for one in part.references:
-        meshes[one.loading, one.friction].append(found[one])
-    for labels, solved in meshes.items():
-        _reference(solved, dict(zip(LAYING_WAY, labels)), laid)
-    laid.put(dict(zip(("trapezoid_x", "trapezoid_y"), np.transpose(part.strips[0].trapezoid.corners))))
-    return {LAYING.name: laid.data}
+    return {LAYING.name: LAYING.of_rows(axes, rows)}
 
 
-def _strip(one, result, laid):
-    """Put the result of a strip of springs."""
-    labels, solved = {name: getattr(one, name) for name in LAID}, result["status"] == Status.SOLVED
-    values = {name: result[name] for name in OF_ALL + OF_SOLVED * solved if name in result}
-    if solved:
-        values["area_error"] = result["area_under_strip"] / one.trapezoid.area - 1
-    laid.put(values, **labels)
-    if "outline" in result:
-        laid.put(dict(zip(("strip_x", "strip_y"), result["outline"].T)), **labels)
+def _points(name, points, dimension, labels=MappingProxyType({})):
+    """Rows of points along an outline."""
+    return [{**labels, dimension: place, f"{name}_x": x, f"{name}_y": y} for place, (x, y) in enumerate(points)]
 
 
-def _reference(meshes, labels, laid):
-    """Put the result of finite elements on the first of several meshes, with a band of all."""
-    result = meshes[0]
-    if result["status"] != Status.SOLVED:
-        return
+def _reference(labels, meshes):
+    """Rows of finite elements on the first of several meshes, with a band of all."""
     values = {}
     for variable, name in (("reference_area", "area_under_strip"), ("reference_elongation", "elongation")):
-        all_values = [mesh[name] if mesh["status"] == Status.SOLVED else np.nan for mesh in meshes]
-        values |= {variable: result[name], f"{variable}_error_estimate": band(all_values)}
-    laid.put(values, **labels)
-    laid.put(dict(zip(("reference_x", "reference_y"), result["outline"].T)), **labels)
+        values[variable] = meshes[0][name]
+        values[f"{variable}_error_estimate"] = band([mesh.get(name, np.nan) for mesh in meshes])
+    return [labels | values, *_points("reference", meshes[0]["outline"], "outline_point", labels)]

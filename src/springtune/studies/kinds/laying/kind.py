@@ -24,6 +24,10 @@ LOADINGS = ("pressure", "gravity", "ends")
 REFERENCE_SIZES = (1.0, 1.25, 1.6)
 """Mesh sizes of a reference over the given one; the first gives the answer, all of them its band."""
 
+LAYING_WAY = ("loading", "friction")
+LAID = ("definition", "mesh_size", *LAYING_WAY)
+"""Labels of a reference and of a strip of springs."""
+
 MOST_STRIPS = 10_000
 """Most strips that a study lays; each takes seconds."""
 
@@ -92,7 +96,7 @@ def _check(config, problems):
     for key in ("material", "support"):
         check_beam_material(problems, ("laying", key), getattr(config.laying, key), config)
     check_for_triangles(config.laying.definition, ("laying", "definition"), problems)
-    check_product(problems, config.laying, ("laying",), ("definition", "mesh_size", "loading", "friction"), MOST_STRIPS)
+    check_product(problems, config.laying, ("laying",), LAID, MOST_STRIPS)
     if config.laying.strip in config.beams:
         beam = config.beams[config.laying.strip]
         check_particles(problems, ("laying", "mesh_size"), config.laying.mesh_size, beam.length, beam.height)
@@ -135,11 +139,12 @@ def _axes(laying):
 
 def _tasks(study):
     laying = study.parts["laying"]
-    for one in (*laying.strips, *laying.references):
+    for one, names in [(one, LAID) for one in laying.strips] + [(one, LAYING_WAY) for one in laying.references]:
         values = asdict(one) | {"material": material_key(one.material), "support": material_key(one.support)}
         # The trapezoid is of Delingette's springs.
         also = mesh_type_key("structured"), definition_key(one.definition), definition_key("delingette")
-        yield Task(values, also, of=one, costs=[("laying", (1e-3 / one.mesh_size) ** 3)])
+        labels = {name: getattr(one, name) for name in names}
+        yield Task(values, also, labels, one, costs=[("laying", (1e-3 / one.mesh_size) ** 3)])
 
 
 STAGE = stage("laying", "studies.kinds.laying.solve", "Laying the strips", _tasks)

@@ -44,7 +44,10 @@ def solve(task):
         found = lay(**made, **{name: task[name] for name in ("definition", "loading", "pressure", "friction")})
     except DefinitionError as error:
         return {"status": Status.FAILED, "message": f"{task['definition']}: {error}"}
-    return vars(found) | {"status": Status.NOT_CONVERGED if found.message else Status.SOLVED}
+    if found.message:
+        del found.area_under_strip, found.elongation, found.contact_force_error
+        return vars(found) | {"status": Status.NOT_CONVERGED}
+    return vars(found) | {"status": Status.SOLVED, "area_error": found.area_under_strip / made["trapezoid"].area - 1}
 
 
 def lay(strip, trapezoid, material, support, definition, size, *, loading="pressure", pressure=0.02e6, friction=0.0,
