@@ -1,11 +1,12 @@
 """Samples: a study's section ``samples``."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Annotated, Any
 
-from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic import Field, GetCoreSchemaHandler, create_model
 from pydantic_core import CoreSchema, core_schema
 
 from springtune.mesh import MESH_TYPES
@@ -13,7 +14,8 @@ from springtune.mesh.types import MOST_MESHED
 from springtune.problem.geometry import warn_of_size, warn_of_thickness
 from springtune.problem.loads import LOADS
 from springtune.problem.parameters import MOST_SCENES
-from springtune.problem.quantities import LEAST, nearest
+from springtune.problem.quantities import LEAST
+from springtune.safe_io.tables import number_text
 from springtune.springs import DEFINITIONS
 
 from ...config.checks import MORE_SCENES, check_able, in_mm, most_scenes
@@ -61,95 +63,76 @@ _NUMBERS = {
 }
 
 
+class DistributionConfig(Section):
+    """The distribution to draw a parameter from; `Distributed` adds its numbers."""
+
+    distribution: Annotated[str, one_of("distribution", DISTRIBUTION_KEYS)] = "uniform"
+
+    @classmethod
+    def _needed(cls, given: Mapping[str, object]) -> dict[str, str]:
+        name = given.get("distribution", "uniform")
+        keys = DISTRIBUTION_KEYS.get(name, ()) if isinstance(name, str) else ()
+        return {key: f": a {name} distribution needs {' and '.join(keys)}" for key in keys}
+
+
 class Distributed:
     """Annotation of a parameter: a value, or the distribution to draw it from."""
 
     def __init__(self, name: str, example: str) -> None:
-        scalar = _NUMBERS.get(name) or quantity(PARAMETERS[name][0])
-        self.name, self.scalar, self.example = name, scalar, example
-        self.words = f"{scalar.words}, or a range such as `{example}`"
+        self.name, self.scalar = name, _NUMBERS.get(name) or quantity(PARAMETERS[name][0])
+        self.words = f"{self.scalar.words}, or a range such as `{example}`"
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        single = handler.generate_schema(Annotated[float, self.scalar])
+        number = Annotated[float, self.scalar]
+        keys: dict[str, Any] = {key: (number | None, None) for key in ("mode", "mean", "deviation")}
+        keys |= {name: (number | None, Field(None, alias=key)) for name, key in (("low", "from"), ("high", "to"))}
+        section = create_model(f"{self.name}_distribution", __base__=DistributionConfig, **keys)
         fixed = core_schema.no_info_after_validator_function(
-            lambda value: {"distribution": "fixed", "low": value, "high": value}, single
+            lambda value: {"distribution": "fixed", "low": value, "high": value}, handler.generate_schema(number)
         )
-        choices: dict[Any, CoreSchema] = {
-            "fixed": fixed,
-            "drawn": core_schema.no_info_plain_validator_function(self._read),
-        }
+        drawn = core_schema.no_info_after_validator_function(self._checked, handler.generate_schema(section))
+        choices: dict[Any, CoreSchema] = {"fixed": fixed, "drawn": drawn}
         return core_schema.tagged_union_schema(
             choices, lambda value: "drawn" if isinstance(value, dict | list) else "fixed"
         )
 
-    def __get_pydantic_json_schema__(self, schema: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        value = dict(self.scalar.schema)
-        keys = dict.fromkeys((key for needed in DISTRIBUTION_KEYS.values() for key in needed), value)
-        drawn = {
-            "type": "object",
-            "properties": {"distribution": {"enum": list(DISTRIBUTION_KEYS)}} | keys,
-            "additionalProperties": False,
-        }
-        return {"anyOf": [value, drawn]}
-
-    def _read(self, value: object) -> dict[str, Any]:
-        if not isinstance(value, dict):
-            raise refuse(f"{show(value)}, as in a grid; a sample has a value or a range: give {self.example}")
-        name = value.get("distribution") or "uniform"
-        if not isinstance(name, str) or name not in DISTRIBUTION_KEYS:
-            raise refuse(f"unknown distribution {show(name)}; {nearest(str(name), DISTRIBUTION_KEYS)}", "distribution")
-        needed = DISTRIBUTION_KEYS[name]
-        known = [*dict.fromkeys([*needed, "from", "to"]), "distribution"]
-        for key in value:
-            if key not in known:
-                raise refuse(f"unknown key {show(key)} of a {name} distribution; {nearest(str(key), known)}", key)
-        for key in needed:
-            if value.get(key) is None:
-                raise refuse(f"'{key}' is missing: a {name} distribution needs {' and '.join(needed)}; give them, such "
-                             f"as {self.example}")  # fmt: skip
-        read = {key: self._number(key, one) for key, one in value.items() if key != "distribution" and one is not None}
+    def _checked(self, section: DistributionConfig) -> dict[str, Any]:
+        read = {key: value for key, value in section if value is not None}
+        name = read["distribution"]
+        for key in read.keys() - {"distribution", "low", "high", *DISTRIBUTION_KEYS[name]}:
+            raise refuse(f"a {name} distribution has no '{key}'; remove it", key)
         if name == "normal":
             read = self._ended(read)
-        low, high = read.pop("from"), read.pop("to")
+        low, high = read["low"], read["high"]
         if not low < high:
-            ends = f"{show(value.get('from', low))} is not below 'to', {show(value.get('to', high))}"
+            ends = f"{self._shown(low)} is not below 'to', {self._shown(high)}"
             raise refuse(f"{ends}; exchange them, or give one value for a parameter that does not vary", "from")
         if name == "log-uniform" and not low > 0:
-            raise refuse(f"{show(value['from'])} has no logarithm; give a 'from' above zero, or a uniform one", "from")
+            raise refuse(f"{self._shown(low)} has no logarithm; give a 'from' above zero, or a uniform one", "from")
         if name == "triangular" and not low <= read["mode"] <= high:
-            raise refuse(f"{show(value['mode'])} is not between 'from' and 'to'; give a mode between them", "mode")
-        if name == "normal":
-            most = MOST_DEVIATIONS * read["deviation"]
-            where = (
-                "below 'from'" if read["mean"] + most <= low else "above 'to'" if read["mean"] - most >= high else ""
-            )
-            if where:
-                raise refuse(f"{show(value['mean'])} is far {where}; give ends near the mean", "mean")
-        return {"distribution": name, "low": low, "high": high} | read
-
-    def _number(self, key: str, value: object) -> float:
-        """Read a number of the parameter's own kind; what is wrong with it goes under its key."""
-        if not isinstance(value, str):
-            raise refuse(f"{show(value)} instead of {self.scalar.words}; give {self.scalar.words}", key)
-        try:
-            return float(self.scalar.read(value.strip()))
-        except Exception as error:
-            message = getattr(error, "context", None) or {"message": str(error)}
-            raise refuse(message["message"], key) from None
-
-    def _ended(self, read: dict[str, float]) -> dict[str, float]:
-        """Add the ends of a normal distribution: by default some deviations from the mean, within its legal range."""
-        if not read["deviation"] > 0:
-            raise refuse("'0' is no deviation; give one above zero, or one value", "deviation")
-        least, most = LEGAL.get(self.name, (0.0, float("inf")))
-        below, above = (read["mean"] + sign * DEVIATIONS * read["deviation"] for sign in (-1, 1))
-        if "from" not in read and below <= least and self.name != "poisson_ratio":
             raise refuse(
-                f"{DEVIATIONS:g} deviations below the mean are not above zero; give where the distribution ends, "
-                "from: <smallest value>",
-                "deviation",
+                f"{self._shown(read['mode'])} is not between 'from' and 'to'; give a mode between them", "mode"
             )
-        return {"from": max(least, below), "to": min(most, above)} | read
+        return read
+
+    def _shown(self, value: float) -> str:
+        return show(number_text(value, PARAMETERS[self.name][2]))
+
+    def _ended(self, read: dict[str, Any]) -> dict[str, Any]:
+        """Add the ends of a normal distribution: by default some deviations from the mean, within its legal range."""
+        mean, deviation = read["mean"], read["deviation"]
+        if not deviation > 0:
+            raise refuse("'0' is no deviation; give one above zero, or one value", "deviation")
+        least, most = LEGAL.get(self.name, (0.0, math.inf))
+        below, above = mean - DEVIATIONS * deviation, mean + DEVIATIONS * deviation
+        if "low" not in read and below <= least and self.name != "poisson_ratio":
+            why = f"{DEVIATIONS:g} deviations below the mean are not above zero"
+            raise refuse(f"{why}; give where the distribution ends, from: <smallest value>", "deviation")
+        read = {"low": max(least, below), "high": min(most, above)} | read
+        far = MOST_DEVIATIONS * deviation
+        if where := "below 'from'" if mean + far <= read["low"] else "above 'to'" if mean - far >= read["high"] else "":
+            raise refuse(f"{self._shown(mean)} is far {where}; give ends near the mean", "mean")
+        return read
 
 
 MOST_SOLVED = 1024
