@@ -84,15 +84,16 @@ class Group:
     def of_rows(
         self,
         axes: Mapping[str, Sequence[Label]],
-        rows: Iterable[Mapping[str, object]],
+        rows: Iterable[Mapping[str, object]] | pd.DataFrame,
         names: Collection[str] | None = None,
     ) -> xr.Dataset:
         """Create the dataset of rows of labels and values; each value goes to the labels that its variable has."""
-        frame, data = pd.DataFrame([*rows]), self.empty(axes, names)
+        frame = rows if isinstance(rows, pd.DataFrame) else pd.DataFrame([*rows])
+        data = self.empty(axes, names)
         for name in frame.columns.intersection([*data]):
             dimensions = [str(one) for one in data[name].dims]
             cells = frame[[*dimensions, name]].dropna()
-            places = {one: xr.DataArray(cells[one].array, dims="row") for one in dimensions}
+            places = {one: xr.DataArray(cells[one].astype(data[one].dtype).array, dims="row") for one in dimensions}
             data[name].loc[places] = cells[name].array if dimensions else cells[name].iloc[-1]
         return data
 

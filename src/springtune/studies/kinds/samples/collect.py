@@ -1,10 +1,10 @@
 """Samples, gathered in the groups ``/samples``, ``/effects`` and ``/sobol``."""
 
-from dataclasses import dataclass
-from itertools import product
+from itertools import chain, product
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 
 from springtune.problem.compare import deformation_error
 from springtune.problem.loads import LOADS
@@ -12,7 +12,7 @@ from springtune.problem.status import Status
 from springtune.reference.answers import beyond_linear, unit_scales
 from springtune.springs.lattice import COEFFICIENT
 
-from ...output.dataset import Filler, Group
+from ...output.dataset import Group
 from ...runs import store
 from ..scenes import any_reference
 from .designs import PARAMETERS, SOBOL_INDICES, blocks, roles
@@ -70,16 +70,14 @@ ORDERS = {
     "total": "total-order Sobol index: share that the parameter takes part in",
 }
 
+ENDS = ("", "_low", "_high")
+
 SOBOL = Group(
     "/sobol",
     {
         f"{order}_order{end}": (INDEX, "1", meaning, np.nan)
         for order, about in ORDERS.items()
-        for end, meaning in (
-            ("", about),
-            ("_low", "lower end of its bootstrap band"),
-            ("_high", "upper end of its bootstrap band"),
-        )
+        for end, meaning in zip(ENDS, (about, "lower end of its bootstrap band", "upper end of its bootstrap band"))
     }
     | {
         "base_samples": (OF_BASE, "1", "base samples that the indices are of", 0),
@@ -103,15 +101,14 @@ def groups(study, folder):
         "quantity": tuple(name for name in QUANTITIES if name != "best_stiffness" or sample.best_stiffness),
         "bin": tuple(range(min(MOST_BINS, max(4, points // BIN_POINTS)))),
     }
-    filler = Filler(SAMPLES.empty(axes))
     # Without a mesh, as beyond limits, a network has no particles; other definitions may have a mesh.
-    filler.put_arrays({"particles": np.max([found["particles"] for found in results.values()], axis=0)}, {})
-    for load in sample.loads:
-        _put_load(load, sample, filler, drawn, results, folder / "samples")
-    data = _with_coordinates(filler.data, sample, drawn, study.axes)
-    found = {SAMPLES.name: data, EFFECTS.name: _effects(sample, data, drawn, axes)}
+    particles = np.max([found["particles"] for found in results.values()], axis=0)
+    frames = [pd.DataFrame({"sample": axes["sample"], "particles": particles})]
+    frames += chain.from_iterable(_of_load(load, sample, drawn, results, folder / "samples") for load in sample.loads)
+    data = _with_coordinates(SAMPLES.of_rows(axes, pd.concat(frames)), sample, drawn, study.axes)
+    found = {SAMPLES.name: data, EFFECTS.name: EFFECTS.of_rows(axes, pd.concat(_effects(sample, data, drawn, axes)))}
     if sample.design == SOBOL_INDICES:
-        found[SOBOL.name] = _indices(sample, data, axes)
+        found[SOBOL.name] = SOBOL.of_rows(axes, pd.concat(_indices(sample, data))).assign_attrs(OF_INDICES)
     return found
 
 
@@ -136,8 +133,8 @@ def _stored(sample, folder):
     return joined.pop(DRAWN), {key: found | {"messages": messages[key]} for key, found in joined.items()}
 
 
-def _put_load(load, sample, filler, drawn, results, folder):
-    """Put references, networks, their errors, and the uniform stiffness without an error under a load."""
+def _of_load(load, sample, drawn, results, folder):
+    """References, networks, their errors, and the uniform stiffness without an error under a load."""
     kind, sign, is_linear = LOADS[load].kind, LOADS[load].sign, sample.kinematics == "linear"
     body, softness = SimpleNamespace(**drawn), COEFFICIENT * (drawn["young_modulus"] * drawn["thickness"])
     body.in_plane = body  # sheets of samples are in plane stress
@@ -155,7 +152,8 @@ def _put_load(load, sample, filler, drawn, results, folder):
         found = results[result_key(sample, load, UNIFORM)]
         solved = np.where(found["status"] == Status.SOLVED, sign * found["displacement"], np.nan)
         values["best_stiffness"] = softness * (solved / reference)
-    filler.put_arrays(values, {"load": load})
+    rows = {"sample": range(sample.rows), "load": load}
+    yield pd.DataFrame(rows | values)
     for name in sample.definitions:
         found = results[result_key(sample, load, name)]
         there = np.isin(found["status"], (Status.SOLVED, Status.LINEAR_ONLY, Status.UNSTABLE))
@@ -164,7 +162,7 @@ def _put_load(load, sample, filler, drawn, results, folder):
         values = {"displacement": displacement, "deformation_error": deformation_error(displacement, reference)}
         values |= {"status": found["status"], "stiffness": softness if name == UNIFORM else np.nan}
         values["message"] = [found["messages"].get(row, "") for row in range(sample.rows)]
-        filler.put_arrays(values, {"load": load, "definition": name})
+        yield pd.DataFrame(rows | {"definition": name} | values)
 
 
 def _answers(sample, drawn, folder, kind, aspects):
@@ -225,26 +223,18 @@ def _values(sample, data):
 
 def _effects(sample, data, drawn, axes):
     """Means over each parameter alone, of rows that are independent of each other."""
-    effects = Filler(EFFECTS.empty(axes))
     each, bins = sample.rows // sample.size, len(axes["bin"])
     alone = np.flatnonzero(np.arange(sample.rows) % each < 2)  # A and B
     for parameter in sample.varied:
-        of, at = {"parameter": parameter}, drawn[parameter][alone]
-        effects.put_arrays({"parameter_value": main_effect(at, at, bins)[0]}, of)
+        of, at = {"parameter": parameter, "bin": axes["bin"]}, drawn[parameter][alone]
+        yield pd.DataFrame(of | {"parameter_value": main_effect(at, at, bins)[0]})
         for labels, values in _values(sample, data):
             _, mean, error = main_effect(at, values[alone], bins)
-            effects.put_arrays({"main_effect": mean, "main_effect_error": error}, labels | of)
-    return effects.data
+            yield pd.DataFrame(labels | of | {"main_effect": mean, "main_effect_error": error})
 
 
-def _indices(sample, data, axes):
+def _indices(sample, data):
     """Sobol indices of each quantity, load and definition."""
-    found = Filler(SOBOL.empty(axes))
-    found.data.attrs = {
-        "estimators": "first order: Saltelli et al. 2010; total order: Jansen 1999",
-        "bands": f"between percentiles of {RESAMPLES} bootstrap samples, {100 * LEVEL:g} %",
-        "failures": LEFT_OUT,
-    }
     for labels, values in _values(sample, data):
         rows = values.reshape(sample.size, -1).T
         there = np.isfinite(rows).all(axis=0)
@@ -252,13 +242,9 @@ def _indices(sample, data, axes):
         # A variation below the reference's own error is no variation of the networks' errors.
         known = data.reference_error_estimate.sel(load=labels["load"]).values
         least = float(np.nanmax(known, initial=0.0)) if labels["quantity"] == "deformation_error" else 0.0
-        indices = sobol_indices(kept[0], kept[1], kept[2:], least)
-        found.put_arrays({"base_samples": there.sum(), "base_samples_without": (~there).sum()}, labels)
-        for order in ORDERS:
-            low, high = getattr(indices, f"{order}_band")
-            values = {"order": getattr(indices, order), "order_low": low, "order_high": high}
-            found.put_arrays({f"{order}_{name}": value for name, value in values.items()}, labels)
-    return found.data
+        counts = {"base_samples": there.sum(), "base_samples_without": (~there).sum()}
+        yield pd.DataFrame([labels | counts])
+        yield pd.DataFrame(labels | {"parameter": sample.varied} | sobol_indices(kept[0], kept[1], kept[2:], least))
 
 
 RESAMPLES = 1000
@@ -273,24 +259,23 @@ NEGLIGIBLE = 1e-12
 """Smallest standard deviation over the largest value that is more than rounding."""
 
 
-@dataclass(frozen=True)
-class Indices:
-    """First- and total-order Sobol indices, shape (n_parameters,), and their bands, shape (2, n_parameters)."""
-
-    first: np.ndarray
-    total: np.ndarray
-    first_band: np.ndarray
-    total_band: np.ndarray
+OF_INDICES = {
+    "estimators": "first order: Saltelli et al. 2010; total order: Jansen 1999",
+    "bands": f"between percentiles of {RESAMPLES} bootstrap samples, {100 * LEVEL:g} %",
+    "failures": LEFT_OUT,
+}
+"""Attributes of the group."""
 
 
-def sobol_indices(at_a: np.ndarray, at_b: np.ndarray, at_ab: np.ndarray, least: float = 0.0) -> Indices:
-    r"""Return Sobol indices from values at the rows of Saltelli's design; NaN without variation above `least`.
+def sobol_indices(at_a: np.ndarray, at_b: np.ndarray, at_ab: np.ndarray, least: float = 0.0) -> dict[str, np.ndarray]:
+    r"""Return Sobol indices and their bands, from values at the rows of Saltelli's design; NaN without variation.
 
     `at_a` and `at_b` are values at the rows A and B, shape (n,); `at_ab` those at A with each parameter of B in turn,
     shape (n_parameters, n). With the variance V of A and B together, first-order indices are
     :math:`\overline{f_B (f_{AB} - f_A)} / V`, total ones :math:`\tfrac12 \overline{(f_A - f_{AB})^2} / V`: table 2,
     (b) and (f), of Saltelli et al., Comput. Phys. Commun. 181:259 (2010). Bands are percentiles of bootstrap samples of
-    base samples. scipy's ``sobol_indices`` takes only powers of two, and its bootstrap has no seed.
+    base samples. A standard deviation up to `least` is no variation. scipy's ``sobol_indices`` takes only powers of two,
+    and its bootstrap has no seed.
 
     Examples
     --------
@@ -300,15 +285,14 @@ def sobol_indices(at_a: np.ndarray, at_b: np.ndarray, at_ab: np.ndarray, least: 
     >>> a, b = np.split(qmc.Sobol(4, seed=0).random(256), 2, axis=1)
     >>> of = lambda x, y: x + 2 * y
     >>> found = sobol_indices(of(*a.T), of(*b.T), np.array([of(b[:, 0], a[:, 1]), of(a[:, 0], b[:, 1])]))
-    >>> found.first.round(2).tolist(), found.total.round(2).tolist()
+    >>> found["first_order"].round(2).tolist(), found["total_order"].round(2).tolist()
     ([0.2, 0.8], [0.2, 0.8])
     """
     count, rows = at_ab.shape
     both = np.concatenate([at_a, at_b])
     largest = np.abs(both).max(initial=0.0)
     if rows < 2 or not largest > 0 or not np.std(both / largest) > max(NEGLIGIBLE, least / largest):
-        none = np.full(count, np.nan)
-        return Indices(none, none, np.stack([none, none]), np.stack([none, none]))
+        return {f"{order}_order{end}": np.full(count, np.nan) for order in ORDERS for end in ENDS}
     # Standardized: else sums would lose digits, and squares might overflow.
     mean, size = (both / largest).mean(), (both / largest).std()
     at_a, at_b, at_ab = ((values / largest - mean) / size for values in (at_a, at_b, at_ab))
@@ -323,8 +307,9 @@ def sobol_indices(at_a: np.ndarray, at_b: np.ndarray, at_ab: np.ndarray, least: 
         parts.append(np.array(drawn, dtype=float) @ terms.T / rows)
     means = np.concatenate(parts)
     found = means[:, : 2 * count] / (means[:, -1] - means[:, -2] ** 2)[:, None]
-    ends = np.quantile(found[1:], [(1 - LEVEL) / 2, (1 + LEVEL) / 2], axis=0)
-    return Indices(found[0, :count], found[0, count:], ends[:, :count], ends[:, count:])
+    values = found[0], *np.quantile(found[1:], [(1 - LEVEL) / 2, (1 + LEVEL) / 2], axis=0)
+    halves = zip(ORDERS, (slice(count), slice(count, None)))
+    return {f"{order}_order{end}": one[half] for order, half in halves for end, one in zip(ENDS, values)}
 
 
 def main_effect(parameter: np.ndarray, values: np.ndarray, bins: int) -> np.ndarray:
