@@ -274,8 +274,8 @@ def sobol_indices(at_a: np.ndarray, at_b: np.ndarray, at_ab: np.ndarray, least: 
     shape (n_parameters, n). With the variance V of A and B together, first-order indices are
     :math:`\overline{f_B (f_{AB} - f_A)} / V`, total ones :math:`\tfrac12 \overline{(f_A - f_{AB})^2} / V`: table 2,
     (b) and (f), of Saltelli et al., Comput. Phys. Commun. 181:259 (2010). Bands are percentiles of bootstrap samples of
-    base samples. A standard deviation up to `least` is no variation. scipy's ``sobol_indices`` takes only powers of two,
-    and its bootstrap has no seed.
+    base samples. A standard deviation up to `least` is no variation. scipy's ``sobol_indices`` takes only powers of
+    two, and its bootstrap has no seed.
 
     Examples
     --------
