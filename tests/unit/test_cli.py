@@ -295,12 +295,12 @@ def choices():
 COUNTS = "105 particles, 268 springs"
 
 
-class TestPredict:
-    STEEL = ("--beam", "100x20", "--material", "steel")
-    OWN = ("--beam", "100x20", "--size", "5 mm")
+STEEL, RUBBER = ("--beam", "100x20", "--material", "steel"), ("--beam", "200x40", "--material", "rubber")
 
+
+class TestPredict:
     def test_recommends_with_numbers(self):
-        result = run("predict", *self.STEEL, "--size", "5 mm")
+        result = run("predict", *STEEL, "--size", "5 mm")
         assert result.exit_code == 0
         rows = {line.split()[0]: line for line in result.stdout.splitlines() if line.startswith("  ")}
         names = {"van-gelder-general", "element-fit", "patch-area", "patch", "energy-fit"}
@@ -349,13 +349,13 @@ class TestPredict:
         """Rectangles three times as long as high: springs along them would be negative."""
         square = braced(0.1, 0.06, 5e-3)
         write_mesh(tmp_path / "flat.vtu", Mesh(square.points * [1.0, 1 / 3], square.triangles, square.quads))
-        result = run("predict", *self.STEEL, "--mesh", tmp_path / "flat.vtu")
+        result = run("predict", *STEEL, "--mesh", tmp_path / "flat.vtu")
         assert result.exit_code == 0 and "recommended: element-fit; with springs alone: element-fit" in result.stdout
         assert not re.search(r"\b(patch|baudet)\b[^-]", result.stdout.replace("patch test", ""))
 
     @pytest.mark.slow
     def test_large_meshes_have_bands(self):
-        result = run("predict", *self.STEEL, "--size", "0.25 mm")
+        result = run("predict", *STEEL, "--size", "0.25 mm")
         assert result.exit_code == 0
         assert "about 3.7e+04 particles" in result.stdout
         assert "bands, extrapolated from solutions on 6 structured meshes of 0." in result.stdout
@@ -364,7 +364,7 @@ class TestPredict:
 
     def test_large_files_are_refused(self, tmp_path):
         write_mesh(tmp_path / "own.vtu", MESH_TYPES["braced"](0.1, 0.02, 0.14e-3))
-        result = run("predict", *self.STEEL, "--mesh", tmp_path / "own.vtu")
+        result = run("predict", *STEEL, "--mesh", tmp_path / "own.vtu")
         assert result.exit_code == 1
         assert (
             "own.vtu' has 102960 particles, more than the 100000 that are solved here; give a coarser" in result.stderr
@@ -373,7 +373,7 @@ class TestPredict:
     @pytest.mark.parametrize("mesh_type", ["structured", "free", "right"])
     def test_absurd_sizes_are_refused_before_a_mesh_is_made(self, mesh_type):
         for size in ("1e-9 mm", "0.005 mm"):  # 2,000 mm2 over 5e6 particles: .02 mm, rows of triangles .0215
-            result = run("predict", *self.STEEL, "--mesh", mesh_type, "--size", size)
+            result = run("predict", *STEEL, "--mesh", mesh_type, "--size", size)
             assert result.exit_code == 2 and len(result.stderr.splitlines()) == 1
             assert f"--size: '{size}' makes some " in result.stderr
             assert "of beam '100x20', more than can be meshed (5,000,000); give at least 0.02" in result.stderr
@@ -394,31 +394,28 @@ class TestPredict:
         assert "  nu in plane  besides" in strained.stdout and "  nu  besides" in result.stdout.replace("nu   ", "nu  ")
         assert "K_A = 8276 MPa" in strained.stdout  # lambda - G, of three dimensions
 
-    @pytest.mark.parametrize(("arguments", "message"), refused_calls("predict"))
-    def test_refusals_are_one_line(self, arguments, message):
-        result = run("predict", *arguments)
-        assert result.exit_code == 2
-        assert message in result.stderr
-        assert len(result.stderr.splitlines()) == 1
+
+@pytest.mark.parametrize(
+    ("table", "arguments", "message"),
+    [
+        pytest.param(table, *one.values, id=one.id)
+        for table in ("predict", "predict, a mesh", "predict, an engine")
+        for one in refused_calls(table)
+    ],
+)
+def test_refused_predictions_are_one_line(table, arguments, message, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "own.msh").write_text("")
+    body = {"predict": (), "predict, a mesh": STEEL, "predict, an engine": RUBBER}[table]
+    result = run("predict", *body, *arguments)
+    assert result.exit_code == 2 and message in result.stderr and len(result.stderr.splitlines()) == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["own.msh"]
 
 
 class TestPredictAMesh:
     """`predict --error`, and what predictions are written as."""
 
-    STEEL = ("--beam", "100x20", "--material", "steel")
     FIND = (*STEEL, "--error", "8 %", "--mesh", "right,braced")
-    NONE = (
-        "--beam",
-        "100x20",
-        "--material",
-        "rubber",
-        "--error",
-        "3 %",
-        "--mesh",
-        "right",
-        "--loads",
-        "traction,shear",
-    )
 
     def test_an_error_is_answered_by_meshes(self):
         result = run("predict", *self.FIND, "--density", "7850 kg/m^3")
@@ -440,14 +437,18 @@ class TestPredictAMesh:
         assert "all finer meshes tried, up to twice as fine" in result.stdout and "linear kinematics" in result.stdout
         assert "None: a definition is given up if its error, extrapolated by its change" in result.stdout
 
-    def test_none_is_said(self):
-        result = run("predict", *self.NONE, "--springs-alone")
-        assert result.exit_code == 0 and "\nwith springs alone: none\n" in result.stdout
+    def test_none_is_said_and_nothing_written(self, tmp_path):
+        asked = ["--beam", "100x20", "--material", "rubber", "--error", "3 %", "--mesh", "right"]
+        target = tmp_path / "net.json"
+        result = run("predict", *asked, "--loads", "traction,shear", "--springs-alone", "--write", target)
+        assert "\nwith springs alone: none\n" in result.stdout
         assert "right, with springs alone: none up to" in result.stdout and "nearest is" in result.stdout
         assert "recommended" not in result.stdout and "with any definition" not in result.stdout
+        assert result.exit_code == 1 and not target.exists()
+        assert result.stderr == "Error: --write: no mesh keeps 3 %, so nothing is written; allow a larger error\n"
 
     def test_signs_are_told(self):
-        size = (*self.STEEL, "--size", "5 mm", "--mesh", "right")
+        size = (*STEEL, "--size", "5 mm", "--mesh", "right")
         text = run("predict", *size, "--loads", "compression,traction").stdout
         assert (
             "Of errors, positive: too soft; under compression, where displacements are negative, negative is too soft."
@@ -456,15 +457,6 @@ class TestPredictAMesh:
         assert "at worst: delingette" in text and "% (compression, too " in text
         text = run("predict", *size, "--loads", "pressure").stdout
         assert "\nOf errors, negative: too soft.\n" in text and "% (pressure, too stiff)" in text
-
-    @pytest.mark.parametrize("ending", ["csv", "json", "vtu", "h5"])
-    def test_the_springs_of_what_is_recommended_are_written(self, tmp_path, ending):
-        target = tmp_path / f"net.{ending}"
-        result = run(
-            "predict", *self.STEEL, "--size", "10 mm", "--springs-alone", "--loads", "bending", "--write", target
-        )
-        assert result.exit_code == 0 and target.is_file()
-        assert f"{target}: " in result.stdout and "springs of definition " in result.stdout
 
     def test_what_is_written_is_what_is_said(self, tmp_path):
         target = tmp_path / "net.json"
@@ -475,34 +467,15 @@ class TestPredictAMesh:
         assert "net.json: " in said
 
         target.unlink()
-        said = run("predict", *self.STEEL, "--size", "5 mm", "--write", target, "--springs-alone")
+        said = run("predict", *STEEL, "--size", "5 mm", "--write", target, "--springs-alone")
         header = json.loads(target.read_text())["header"]
         assert f"recommended: {header['definition']}; with springs alone: {header['definition']}" in said.stdout
 
-        run("predict", *self.STEEL, "--size", "5 mm", "--loads", "pressure", "--write", target)
+        run("predict", *STEEL, "--size", "5 mm", "--loads", "pressure", "--write", target)
         header, mesh = json.loads(target.read_text())["header"], MESH_TYPES["structured"](0.1, 0.02, 5e-3)
         best = of_one_mesh.predict(Beam(0.1, 0.02), mesh, Material(210e9, 0.3), loads=["pressure"])[0]
         assert header["definition"] == best.definition
         assert header["expected_error"] == pytest.approx(best.errors, rel=1e-9)
-
-    def test_nothing_is_written_where_nothing_is_recommended(self, tmp_path):
-        target = tmp_path / "net.json"
-        result = run("predict", *self.NONE, "--springs-alone", "--write", target)
-        assert result.exit_code == 1 and not target.exists()
-        assert result.stderr == "Error: --write: no mesh keeps 3 %, so nothing is written; allow a larger error\n"
-
-    @pytest.mark.parametrize(("arguments", "message"), refused_calls("predict, a mesh"))
-    def test_refusals_are_one_line(self, arguments, message, tmp_path, monkeypatch):
-        monkeypatch.chdir(tmp_path)
-        (tmp_path / "own.msh").write_text("")
-        result = run("predict", *self.STEEL, *arguments)
-        assert result.exit_code == 2 and message in result.stderr and len(result.stderr.splitlines()) == 1
-        assert [path.name for path in tmp_path.iterdir()] == ["own.msh"]
-
-    @pytest.mark.parametrize(("arguments", "message"), refused_calls("predict, an engine"))
-    def test_wrong_options_of_engines_are_refused_in_a_line(self, arguments, message):
-        result = run("predict", "--beam", "200x40", "--material", "rubber", *arguments)
-        assert result.exit_code == 2 and message in result.stderr and len(result.stderr.splitlines()) == 1
 
     def test_an_engine_is_calibrated_to(self, tmp_path):
         """The text and the springs that are written say the same."""
@@ -567,7 +540,7 @@ class TestPredictAMesh:
 
     def test_work_is_counted(self):
         with counted(MeshType.__call__, solve_small_strain, Sheet.__init__) as calls:
-            run("predict", *self.STEEL, "--size", "10 mm", "--loads", "shear")
+            run("predict", *STEEL, "--size", "10 mm", "--loads", "shear")
         assert calls == {"MeshType.__call__": 1, "solve_small_strain": 1, "Sheet.__init__": 1}
 
     @pytest.mark.filterwarnings("default::springtune.problem.geometry.AssumptionWarning")

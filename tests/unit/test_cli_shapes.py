@@ -150,17 +150,15 @@ class TestError:
             st.find_mesh(st.Beam("40 mm", "20 mm"), study.material("steel"), "1 %", load="pull")
 
 
-@pytest.mark.parametrize("command", [("predict",), ("springs", "--out", "net.csv")], ids=lambda one: one[0])
-@pytest.mark.parametrize(("arguments", "message"), refused_calls("shapes"))
-def test_refusals_are_one_line(command, arguments, message, here):
-    before = sorted(here.iterdir())
-    result = run(*command, *arguments)
-    assert result.exit_code == 2 and message in result.stderr, result.output
-    assert len(result.stderr.splitlines()) == 1 and sorted(here.iterdir()) == before
+BOTH = [
+    pytest.param([*command, *one.values[0]], one.values[1], id=f"{command[0]} {one.id}")
+    for command in (("predict",), ("springs", "--out", "net.csv"))
+    for one in refused_calls("shapes")
+]
 
 
-@pytest.mark.parametrize(("arguments", "message"), refused_calls("shapes, one command"))
-def test_refusals_of_one_command(arguments, message, here):
+@pytest.mark.parametrize(("arguments", "message"), [*BOTH, *refused_calls("shapes, one command")])
+def test_refusals_are_one_line(arguments, message, here):
     before = sorted(here.iterdir())
     result = run(*arguments)
     assert result.exit_code == 2 and message in result.stderr, result.output

@@ -42,6 +42,16 @@ def checkout(tmp_path, monkeypatch):
     return tmp_path
 
 
+def ran(config):
+    """Run all jobs of a study, and look for what they make."""
+    campaign = Campaign(config)
+    campaign.plan.write()
+    for name in campaign.jobs:
+        campaign.do(name)
+    for product in ("figures", "tables/index.html", "index.html"):
+        assert (campaign.folder / product).exists()
+
+
 class TestNew:
     def test_it_is_written_beside_the_others_and_says_what_is_next(self, checkout):
         result = run("new", "my-study")
@@ -81,29 +91,19 @@ class TestNew:
         assert load_study("config/pressed.yaml").shape("plate").loads["pull"].pressures[0].pressure == 1e6
         Path("config/rollers.yaml").write_text(text.replace("left: fixed", "left: {x: 0 mm}, top: {y: 0}"))
         assert load_study("config/rollers.yaml").shape("plate").loads["pull"].supports[0].y is None
-        campaign = Campaign("config/my-plate.yaml")
-        campaign.plan.write()
-        for name in campaign.jobs:
-            campaign.do(name)
+        ran("config/my-plate.yaml")
         with st.open("results/my-plate") as tree:
             scenes = tree["shapes"].to_dataset().squeeze(drop=True)
             assert (scenes.status == st.Status.SOLVED).all()
             assert float(abs(scenes.error.sel(quantity="stretch")).max()) < 0.1
-        for product in ("figures", "tables/index.html", "index.html"):
-            assert (campaign.folder / product).exists()
 
     def test_it_runs_as_it_is(self, checkout):
         run("new", "my-study")
-        campaign = Campaign("config/my-study.yaml")
-        campaign.plan.write()
-        for name in campaign.jobs:
-            campaign.do(name)
+        ran("config/my-study.yaml")
         with st.open("results/my-study") as tree:
             scenes = tree.to_dataset().squeeze(drop=True)
             assert (scenes.status == st.Status.SOLVED).all()
             assert float(abs(scenes.deformation_error).max()) < 0.1
-        for product in ("figures", "tables/index.html", "index.html"):
-            assert (campaign.folder / product).exists()
 
     @pytest.mark.parametrize("given", ["elsewhere/mine", "elsewhere/mine.yaml", "elsewhere/mine.yml"])
     def test_a_path_is_taken_as_it_is(self, checkout, given):

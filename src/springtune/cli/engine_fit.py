@@ -1,6 +1,6 @@
 """`springtune predict --engine`: what to type into an engine at its setting, or within a frame's time."""
 
-from functools import partial, reduce, wraps
+from functools import partial, reduce
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -10,7 +10,6 @@ from ..safe_io.tables import aligned
 from .options import AnyCommand, SheetOptions, Unmet, asked_quantity
 
 if TYPE_CHECKING:
-    from ..engines.base import Setting
     from ..engines.budget import BudgetSearch
     from ..engines.calibration import EngineFit
     from ..handover.net import SpringNet
@@ -33,61 +32,43 @@ FOUND = ("substeps", "iterations", "size", "definition")
 """Options of what a budget finds."""
 
 
-class EngineOptions(dict[str, Any]):
-    """Values of `ENGINE_OPTIONS`, None where not given."""
-
-    def check(self, sheet: SheetOptions, error: str | None, load: str | None) -> None:
-        """Refuse options that are not for each other."""
-        given = {name: value for name, value in self.items() if value is not None}
-        if "engine" not in given:
-            if load is not None and sheet.shape is None:
-                raise ValueError(
-                    f"--load: '{load}' is of engines and shapes; give --engine or --shape, or leave it out"
-                )
-            for name, value in given.items():
-                raise ValueError(f"--{name}: '{value}' is of engines; give --engine, such as xpbd, or leave it out")
-        elif error is not None:
-            raise ValueError(f"--error: '{error}' is of equilibria; give --budget such as '2 ms', or no --engine")
-        for name in FOUND if "budget" in given else ():
-            value = self.get(name, sheet.size)
-            if value is not None:
-                raise ValueError(f"--{name}: '{value}' is what --budget finds; leave one of them out")
-
-    def setting(self) -> "Setting":
-        """Setting of the options."""
-        from ..engines.base import ENGINES, Setting
-        from ..scene.sheet import chosen
-
-        engine = chosen(ENGINES, self["engine"], "--engine")
-        names = ("dt", "substeps", "iterations", "precision")
-        setting = Setting(**{name: self[name] for name in names if self[name] is not None})
-        engine.check(setting)
-        return setting
-
-
 def engine_options(command: AnyCommand) -> AnyCommand:
-    """Decorator that adds these options to a command, which gets them as `EngineOptions`."""
-
-    @wraps(command)
-    def call(*args: Any, **given: Any) -> None:
-        command(*args, engine=EngineOptions({name: given.pop(name) for name in ENGINE_OPTIONS}), **given)
-
+    """Decorator that adds these options to a command."""
     return reduce(
-        lambda made, name: click.option(f"--{name}", **ENGINE_OPTIONS[name])(made), reversed(ENGINE_OPTIONS), call
+        lambda made, name: click.option(f"--{name}", **ENGINE_OPTIONS[name])(made), reversed(ENGINE_OPTIONS), command
     )
 
 
+def check_engine(options: dict[str, Any], sheet: SheetOptions, error: str | None, load: str | None) -> None:
+    """Refuse options that are not for each other."""
+    given = {name: value for name, value in options.items() if value is not None}
+    if "engine" not in given:
+        if load is not None and sheet.shape is None:
+            raise ValueError(f"--load: '{load}' is of engines and shapes; give --engine or --shape, or leave it out")
+        for name, value in given.items():
+            raise ValueError(f"--{name}: '{value}' is of engines; give --engine, such as xpbd, or leave it out")
+    elif error is not None:
+        raise ValueError(f"--error: '{error}' is of equilibria; give --budget such as '2 ms', or no --engine")
+    for name in FOUND if "budget" in given else ():
+        if (value := options.get(name, sheet.size)) is not None:
+            raise ValueError(f"--{name}: '{value}' is what --budget finds; leave one of them out")
+
+
 def fitted(
-    sheet: SheetOptions, options: EngineOptions, load: str | None, loads: list[str] | None, springs_alone: bool
+    sheet: SheetOptions, options: dict[str, Any], load: str | None, loads: list[str] | None, springs_alone: bool
 ) -> "tuple[str, EngineFit | None]":
     """Text of a calibration, or of a search within a budget, and what is found."""
-    from ..engines.base import ENGINES
+    from ..engines.base import ENGINES, Setting
     from ..engines.budget import fit_budget, graded_meshes, runnable
     from ..engines.calibration import WITHIN, fit_engine
     from ..prediction.choices import CASES
+    from ..scene.sheet import chosen
     from ..scene.single import Scene
 
-    setting, engine, searched = options.setting(), options["engine"], options["budget"] is not None
+    engine, searched = chosen(ENGINES, options["engine"], "--engine"), options["budget"] is not None
+    names = ("dt", "substeps", "iterations", "precision")
+    setting = Setting(**{name: options[name] for name in names if options[name] is not None})
+    engine.check(setting)
     how: dict[str, Any] = {"loads": loads, "within": options["within"] or WITHIN}
     scale = 1.0 if options["scale"] is None else options["scale"]
     asked = sheet.asked(load, sized=not searched)
@@ -104,7 +85,7 @@ def fitted(
     if searched:
         limit = asked_quantity("--budget", options["budget"], "time")
         how |= {"budget": limit, "dt": setting.dt, "precision": setting.precision, "scale": scale}
-        search = fit_budget(*case, engine=engine, springs_alone=springs_alone, **how)
+        search = fit_budget(*case, engine=engine.name, springs_alone=springs_alone, **how)
         return budget_text(search), search.best.fit if search.best else None
     body, *others = case
     make = partial(Scene, body, asked.mesh, *others, scale=scale)
@@ -112,10 +93,10 @@ def fitted(
     if options["definition"] is not None:
         scenes, refused = [make(definition=options["definition"])], ""
     else:
-        scenes, refused, tried = runnable(make, CASES, ENGINES[engine], setting, springs_alone)
+        scenes, refused, tried = runnable(make, CASES, engine, setting, springs_alone)
     if not scenes:
         raise Unmet(refused)
-    fit = fit_engine(scenes[0], engine, setting, **how)
+    fit = fit_engine(scenes[0], engine.name, setting, **how)
     text = fit_text(fit, asked.mesh_name) + (f"\n\nTried: {', '.join(tried)}." if tried else "")
     return text, fit
 

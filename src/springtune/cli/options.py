@@ -13,6 +13,7 @@ import click
 from click.core import ParameterSource
 
 from ..problem.parameters import MOST_SCENES, MOST_SCENES_VARIABLE, PLANES
+from ..safe_io.tables import mesh_size_text
 
 if TYPE_CHECKING:
     from ..mesh import Mesh
@@ -205,17 +206,12 @@ class Asked:
     @property
     def mesh_name(self) -> str:
         """Name of the mesh."""
-        return Path(self.mesh_type).name if self.size is None else f"{self.mesh_type} {size_text(self.size)}"
+        return Path(self.mesh_type).name if self.size is None else f"{self.mesh_type} {mesh_size_text(self.size)}"
 
     @cached_property
     def mesh(self) -> Any:
         """Mesh of a beam, or of a shape with its groups."""
         return self.make(self.mesh_type, self.size)
-
-
-def size_text(size: float) -> str:
-    """Mesh size [m] as the option takes it."""
-    return f"{1e3 * size:.12g} mm"
 
 
 def _beam_mesh(beam: "Beam", unit: str, mesh_type: str, size: float | None) -> "Mesh":
@@ -242,7 +238,7 @@ def _shape_mesh(part: "Shapes", shape: "Shape", _: str, size: float | None) -> "
     try:
         return mesh_shape(shape, size, refined=refined)
     except ValueError as error:
-        raise ValueError(f"--size: '{size_text(size)}': {str(error).removeprefix('mesh size: ')}") from None
+        raise ValueError(f"--size: '{mesh_size_text(size)}': {str(error).removeprefix('mesh size: ')}") from None
 
 
 @dataclass(frozen=True)
@@ -324,7 +320,7 @@ class SheetOptions:
                     f"--size: '{self.size}' is beside the mesh of {Path(shape.file).name}; leave --size out"
                 )
             if len(files) > 1 and not chosen and (sized or edge is not None):
-                known = ", ".join(map(size_text, files))
+                known = ", ".join(map(mesh_size_text, files))
                 what = "missing" if edge is None else f"there is no file of '{self.size}'"
                 raise ValueError(f"--size: {what}; '{shape.name}' has files of {known}; give one")
             shape, edge = replace(shape, file=chosen[0] if chosen else shape.file), None

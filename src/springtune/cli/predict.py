@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from . import examples
-from .engine_fit import EngineOptions, engine_options, fitted, net_of_fit
+from .engine_fit import check_engine, engine_options, fitted, net_of_fit
 from .options import SPRING_FILES, Asked, SheetOptions, Unmet, check_target, sheet_options, writing
 
 if TYPE_CHECKING:
@@ -58,13 +58,13 @@ if TYPE_CHECKING:
 )
 def predict(
     sheet: SheetOptions,
-    engine: EngineOptions,
     error: str | None,
     load: str | None,
     loads: str | None,
     springs_alone: bool,
     best_springs: bool,
     target: Path | None,
+    **engine: Any,
 ) -> None:
     """Recommend a definition and its stiffness for one mesh, with its error under some loads; or find the mesh.
 
@@ -76,7 +76,7 @@ def predict(
     With --engine: what to type into an engine at a setting, so that the displacement under --load is that of finite
     elements; over which loads that holds; and which settings converge. With --budget the setting is found, too.
     """
-    engine.check(sheet, error, load)
+    check_engine(engine, sheet, error, load)
     if best_springs and (error is not None or engine["engine"] is not None):
         raise ValueError("--best-springs: are of one mesh; leave out --error and --engine")
     if error is not None and sheet.size is not None:

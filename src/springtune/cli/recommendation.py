@@ -10,7 +10,7 @@ import numpy as np
 from ..problem.compare import error_text, sign_sentence, sign_word
 from ..problem.geometry import size_text
 from ..problem.shapes import QUANTITY_UNITS
-from ..safe_io.tables import TabledList, aligned
+from ..safe_io.tables import TabledList, aligned, mesh_size_text
 
 if TYPE_CHECKING:
     from ..prediction.choices import Choice, References, ShapeReferences
@@ -214,26 +214,21 @@ def _listed(words: Sequence[str]) -> str:
 
 def _nearest(search: "MeshSearch", mesh_type: str, springs_alone: bool) -> str:
     """Reason why no mesh was found, and the nearest one."""
-    from ..prediction.choices import as_sure_as, in_order
-    from ..prediction.search import size_text, tried_names
+    from ..prediction.search import tried_names
 
     tried = [one for one in search.tried if one.mesh_type == mesh_type]
     allowed = tried_names(tried, springs_alone)
-    names = [(one, name) for one in tried for name in one.errors if name in allowed]
-    near = [(one.worst(name), one, name) for one, name in names if one.worst(name) < math.inf]
-    if not near:
+    near = [
+        (round(one.worst(name), 9), name in one.energies, one.particles, name, one.size)
+        for one in tried
+        for name in one.errors
+        if name in allowed
+    ]
+    worst, _, particles, name, size = min(near, default=(math.inf, False, 0, "", 0.0))
+    if worst == math.inf:
         return f"none; of at most {search.most:,} particles there is no mesh, or no network on it is stable"
-    ordered = in_order(
-        near,
-        lambda found: found[0],
-        lambda found: (found[2] in found[1].energies, found[1].particles, found[2], found[1].size),
-        as_sure_as(search.known),
-    )
-    worst, one, name = ordered[0]
-    most = max(other.particles for other, _ in names)
-    where = f"{name} at {size_text(one.size)} ({one.particles:,} particles)"
+    none = f"none up to {max(count for _, _, count, *_ in near):,} particles;"
+    where, off = f"{name} at {mesh_size_text(size)} ({particles:,} particles)", f"{100 * worst:.3g} % off at worst"
     if worst <= search.error:
-        return (
-            f"none up to {most:,} particles; {where} keeps it, {100 * worst:.3g} % off at worst, but finer ones do not"
-        )
-    return f"none up to {most:,} particles; nearest is {where}, {100 * worst:.3g} % off at worst"
+        return f"{none} {where} keeps it, {off}, but finer ones do not"
+    return f"{none} nearest is {where}, {off}"

@@ -61,7 +61,8 @@ def run(most: int | None, results: Path | None, strict: bool, arguments: tuple[s
     if late:
         first = f"./{late[0]}" if late[0].startswith("-") else f"{late[0]} {options[0]}"
         raise click.UsageError(f"name the study first: springtune run {first}")
-    second = [one for before, one in zip([""] + options, options) if _is_study(one) and before in NO_VALUE]
+    words = zip(["", *options], options)
+    second = [one for before, one in words if one.endswith((".yaml", ".yml")) and before in NO_VALUE and one[0] != "-"]
     if named and second:
         raise click.UsageError(f"one study at a time: springtune run {arguments[0]}, then springtune run {second[0]}")
     if _wants_slurm(options) and not find_spec(SLURM):
@@ -215,10 +216,6 @@ def _wants_slurm(options: list[str]) -> bool:
 
 NO_VALUE = {"", "-n", "--dry-run", "--dryrun", "-F", "--forceall", "-f", "--force", "-p", "--printshellcmds", "-k"}
 """Words after which an argument is not the value of an option: options without value, or none."""
-
-
-def _is_study(argument: str) -> bool:
-    return argument.endswith((".yaml", ".yml")) and not argument.startswith("-")
 
 
 def _meant(path: Path) -> str:

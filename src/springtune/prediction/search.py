@@ -13,6 +13,8 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import count, takewhile
+from operator import attrgetter
+from typing import Any
 
 import numpy as np
 
@@ -24,7 +26,7 @@ from ..problem.geometry import Beam
 from ..problem.materials import AnyMaterial, Material
 from ..problem.quantities import quantity
 from ..problem.shapes import Shape
-from ..safe_io.tables import Tabled
+from ..safe_io.tables import Tabled, mesh_size_text
 from ..scene.meshes import A_MATERIAL, A_SHAPE, is_a
 from ..scene.statements import ShapeStatement, Statement
 from .bands import FEWEST_CELLS
@@ -179,7 +181,7 @@ class MeshChoice(Tabled):
 
     def _rows(self) -> Iterator[tuple[str, str]]:
         yield "mesh", self.mesh_type
-        yield "size", size_text(self.size)
+        yield "size", mesh_size_text(self.size)
         yield "definition", self.choice.definition + ("" if self.confirmed else " *")
         for name in ("cells", "particles", "springs"):
             yield name, f"{getattr(self, name):,}"
@@ -190,23 +192,12 @@ class MeshChoice(Tabled):
             yield "largest step", f"{self.step_limit:.3g} s"
 
 
-def size_text(size: float) -> str:
-    """Mesh size [m] as the option takes it.
-
-    Examples
-    --------
-    >>> size_text(0.00308)
-    '3.08 mm'
-    """
-    return f"{1e3 * size:.12g} mm"
-
-
 def answer_text(one: MeshChoice | None) -> str:
     """Mesh and definition of an answer in words."""
     if one is None:
         return "none"
     sure = "" if one.confirmed else ", not confirmed by finer meshes"
-    return f"{one.mesh_type} {size_text(one.size)} with {one.choice.definition}, {one.particles:,} particles{sure}"
+    return f"{one.mesh_type} {mesh_size_text(one.size)} with {one.choice.definition}, {one.particles:,} particles{sure}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -271,15 +262,13 @@ class MeshSearch(Tabled):
         yield "solved", f"{len(self.tried)} meshes, of at most {self.most:,} particles"
 
     def _least(self, found: dict[str, MeshChoice | None]) -> MeshChoice | None:
-        ranks = {name: (not one.confirmed, one.particles, one.springs) for name, one in found.items() if one}
-        least = [one for name, one in found.items() if one and ranks[name] == min(ranks.values())]
-        order = in_order(
-            least,
-            lambda one: one.choice.worst,
-            lambda one: (one.choice.energies, one.choice.definition, one.mesh_type),
-            as_sure_as(self.known),
-        )
-        return order[0] if order else None
+        ranked: dict[tuple[Any, ...], list[MeshChoice]] = {}
+        for one in filter(None, found.values()):
+            ranked.setdefault((not one.confirmed, one.particles, one.springs), []).append(one)
+        if not ranked:
+            return None
+        tie = attrgetter("choice.energies", "choice.definition", "mesh_type")
+        return in_order(ranked[min(ranked)], attrgetter("choice.worst"), tie, as_sure_as(self.known))[0]
 
 
 def asked_error(value: float | str, name: str = "error") -> float:
@@ -520,16 +509,12 @@ class _Search:
         """Try meshes from coarse to fine until both questions are answered, or no larger one may be."""
         for rung in count():
             # Where the first question is answered, the other one is of springs alone.
-            asked = self._names(springs_alone=self._settled(springs_alone=False))
+            asked = tried_names(self._tried.values(), self._settled(springs_alone=False))
             if self._settled(springs_alone=True):
                 break
             names, cells = [name for name in asked if self._promising(name)], _cells(rung)
             if self._tried and not names or cells not in self._tried and not self._try(cells, names):
                 break
-
-    def _names(self, springs_alone: bool) -> list[str]:
-        """Definitions that were tried; all of them, or those that need no more than springs."""
-        return tried_names(self._tried.values(), springs_alone)
 
     def _settled(self, springs_alone: bool) -> bool:
         """Look for an answer among all meshes up to those that were tried; whether there is one."""
@@ -551,21 +536,15 @@ class _Search:
 
     def _between(self, cells: int) -> list[float]:
         """Cells across the meshes between whole divisions that an answer is tried on."""
-        size = self.size(cells)
+        size, stretch = self.size(cells), self.family.stretch
         # Errors are irregular on few cells.
-        parts = BETWEEN_DIVISIONS + (FINER[4::5] if cells < FEWEST_CELLS else ())
-        sizes = (*(size * part for part in parts), *self._stretched(size))
-        found = (round(self.family.one_cell / one, ACROSS_DECIMALS) for one in sizes)
+        parts = [*BETWEEN_DIVISIONS, *(FINER[4::5] if cells < FEWEST_CELLS else ())]
+        if stretch is not None:
+            # Stretches that differ by rounding are one.
+            stretches = np.round([stretch(size * part) for part in FINER], 9)
+            parts += [FINER[np.argmin(stretches)], FINER[np.argmax(stretches)]]
+        found = (round(self.family.one_cell / (size * part), ACROSS_DECIMALS) for part in parts)
         return [int(one) if one == int(one) else one for one in found]
-
-    def _stretched(self, size: float) -> list[float]:
-        """Sizes down to half of one whose cells are stretched most."""
-        if self.family.stretch is None:
-            return []
-        sizes = [size * part for part in FINER]
-        # Stretches that differ by rounding are one.
-        stretch = np.round([self.family.stretch(one) for one in sizes], 9)
-        return [sizes[np.argmin(stretch)], sizes[np.argmax(stretch)]]
 
     def size(self, cells: float) -> float:
         """Mesh size [m] of so many cells across the smaller side, rounded up."""
@@ -594,7 +573,7 @@ class _Search:
                 self.name,
                 one.size,
                 cells,
-                replace(tried.choice(name), tried=tuple(self._names(springs_alone))),
+                replace(tried.choice(name), tried=tuple(tried_names(self._tried.values(), springs_alone))),
                 one.particles,
                 one.springs,
                 *tried.cost(name),
@@ -688,7 +667,7 @@ class _Search:
     def _start(self, springs_alone: bool, confirmed: bool = True) -> tuple[int, list[str]] | None:
         """Coarsest mesh from which on a definition keeps the error, and the definitions that do; None without any."""
         starts: dict[int, list[str]] = {}
-        for name in self._names(springs_alone):
+        for name in tried_names(self._tried.values(), springs_alone):
             tried = (cells for cells, one in self._tried.items() if name in one.errors)
             failing = max((cells for cells in tried if not self._keeps(name, cells)), default=0)
             kept = [cells for cells in self._on(name) if cells > failing]
