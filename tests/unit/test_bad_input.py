@@ -85,9 +85,9 @@ STUDIES = {
     "a long value": (SMALL.replace("5 mm", "5" * 2000 + " mm"), "5...', 2003 characters; give a length such as"),
     "a large file": (SMALL + "#" * 500_000, "larger than 500 kB, which no study is"),
     "deep": (SMALL.replace("5 mm", "[" * 30 + "5 mm" + "]" * 30), "not a study: nested too deeply"),
-    "no date": (SMALL.replace("small", "2001-99-99"), ":2: not YAML: '2001-99-99' is no timestamp; put it in quotes"),
-    "a tag": (SMALL.replace("small", "!own small"), ":2: a study has no tags such as '!own'; remove it"),
-    "a sign": (SMALL.replace("small", "="), ":2: not YAML: '=' means nothing by itself; put it in quotes"),
+    "no date": (SMALL.replace("small", "2001-99-99"), ":2: not YAML: '2001-99-99' is no !!timestamp; put it in quotes"),
+    "a tag": (SMALL.replace("small", "!own small"), ":2: not YAML: 'small' has the unknown tag '!own'; remove it"),
+    "a sign": (SMALL.replace("small", "="), ":2: not YAML: '=' has the unknown tag '!!value'; remove it, or put"),
     "a power of powers": (SMALL.replace("5 mm", "5 mm^9^9^9^9"), "unknown unit 'mm^9^9^9^9'"),
     "beyond measure": (SMALL.replace("30 mm", "1e300 mm"), "'1e300 mm' is beyond all measure; give a length"),
 }

@@ -418,17 +418,21 @@ class TestPrinted:
     @pytest.mark.parametrize(
         ("lines", "says"),
         [
-            ([], "printed.csv: no printed values; give a line table,beam,"),
-            ([HEADER], "printed.csv: no printed values; give"),
-            (["a,b", CELL], "printed.csv:1: has columns 'a,b'; give table,beam,"),
+            ([], "study.yaml:14: printed: 'printed.csv' is empty; give"),
+            ([HEADER], "printed.csv: no rows below the head; give the head table,beam,"),
+            (["a,b", "1,long"], "printed.csv:2: a: unknown key 'a'; known: table, beam,"),
+            (
+                [HEADER.replace(",load", ""), CELL.replace(",traction", "")],
+                "csv:2: load: 'load' is missing; give",
+            ),
             (["# x", HEADER, CELL, CELL], "printed.csv:4: is the cell of line 3 again; remove one"),
-            ([HEADER, "1,long"], "printed.csv:2: 2 values for 12 columns; add or remove some"),
+            ([HEADER, "1,long"], "printed.csv:2: 2 values in 12 columns; give one for each"),
             (
                 [HEADER, CELL.replace("free", "fre")],
                 "printed.csv:2: mesh_type: unknown mesh type 'fre'; did you mean 'free'?",
             ),
             ([HEADER, CELL.replace("traction", "pull")], "printed.csv:2: load: unknown load 'pull'; known:"),
-            ([HEADER, CELL.replace("8.13", "8,13")], "printed.csv:2: 13 values for 12 columns;"),
+            ([HEADER, CELL.replace("8.13", "8,13")], "printed.csv:2: 13 values in 12 columns;"),
             (
                 [HEADER, CELL.replace("8.13", "x")],
                 "printed.csv:2: displacement_mm: 'x' is not a number of 0 or more; give",

@@ -22,7 +22,7 @@ BAD = {
     "empty": (b"", "study.yaml: the file is empty; give the keys title"),
     "alias bomb": (
         BOMB.encode(),
-        "study.yaml:11: more than 100000 values, aliases (*name) as what they stand for; give",
+        "study.yaml:1: more than 100000 values, aliases (*name) as what they stand for; give",
     ),
     "missing": (None, "study.yaml: cannot be read: No such file or directory; give the path of a study"),
     "wrong": (b"title: x\nbeems: {}\n", "study.yaml:2: beems: unknown key 'beems'; did you mean 'beams'?"),

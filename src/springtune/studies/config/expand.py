@@ -17,7 +17,7 @@ from springtune.safe_io.escapes import clipped
 from springtune.springs import DEFINITIONS
 from springtune.springs.lattice import COEFFICIENT
 
-from .checks import check_cells, check_files, check_numbers, mesh_type_names, stated_rows
+from .checks import check_cells, check_files, mesh_type_names, stated_rows
 from .combinations import combinations, read_printed
 from .fields import RANGE_DIGITS
 from .kind import Kind
@@ -132,10 +132,10 @@ def _order(ranks: Ranks) -> Callable[[MeshSpec | SceneSpec | CurveSpec | Referen
 def swept(config: StudyConfig) -> tuple[str, ...]:
     """Parameters that are dimensions: the ones given in a grid, and a force with several values."""
     found = {name for grid in config.grids.values() for name in SWEPT if name != "force" and getattr(grid, name)}
-    several = [values for grid in config.grids.values() for values in (grid.force or {}).values()]
-    several += [grid.pressure for grid in config.grids.values() if grid.pressure]
-    if any(len(set(values)) > 1 for values in several):
-        found.add("force")
+    for grid in config.grids.values():
+        forces = grid.force.values() if isinstance(grid.force, dict) else [grid.force or [], grid.pressure or []]
+        if any(len(set(values)) > 1 for values in forces):
+            found.add("force")
     return tuple(name for name in SWEPT if name in found)
 
 
@@ -284,11 +284,10 @@ def build(
     # By their places: hashing a beam and a material for each of 100,000 scenes is slow.
     found = {(id(one.mesh.beam), id(one.material), one.load, one.force): one for one in scenes}
     references = in_order(Reference(one.mesh.beam, one.material, one.load, one.force) for one in found.values())
-    check_files(meshes, scenes, references, problems)
+    check_files(meshes, scenes, problems)
     problems.stop()
     names = swept(config)
     used = _used(meshes, scenes, references, names)
-    check_numbers(used, problems)
     check_cells(config, used, bool(curves), problems)
     problems.stop()
     bodies = declared(config, problems.folder)

@@ -114,24 +114,6 @@ class Grid:
 
 
 @dataclass(frozen=True)
-class PrintedCell:
-    """A printed table cell in SI units; magnitudes only. `remark` names contradictions in the print."""
-
-    table: int
-    beam: str
-    mesh_type: str
-    mesh_size: float
-    material: str
-    load: str
-    force: float
-    stiffness: float
-    reference_displacement: float
-    displacement: float
-    deformation_error: float
-    remark: str
-
-
-@dataclass(frozen=True)
 class Study:
     """A study, ready to run.
 
@@ -146,7 +128,8 @@ class Study:
     ``calibrated``.
 
     `axes` has the labels of each dimension of the dataset: texts, for ``mesh_size`` numbers [m]. `swept` are parameters
-    of `springtune.problem.parameters.SWEPT` that are dimensions. `test_files` are tests of rubber.
+    of `springtune.problem.parameters.SWEPT` that are dimensions. `printed` cells are of
+    `springtune.studies.config.combinations.PrintedCell`, `test_files` tests of rubber.
     """
 
     name: str
@@ -166,7 +149,7 @@ class Study:
     stiffness_ratios: tuple[float, ...]
     stiffness_table: dict[tuple[str, str], float]
     calibration: tuple[str, str] | None
-    printed: tuple[PrintedCell, ...]
+    printed: tuple[Any, ...]
     printed_path: Path | None
     axes: dict[str, tuple[str | float, ...]]
     swept: tuple[str, ...] = ()

@@ -4,19 +4,18 @@ import json
 from collections.abc import Container, Mapping, Sequence
 from pathlib import Path
 from types import NoneType
-from typing import Annotated, Any, ClassVar, NamedTuple, Self, get_args, get_origin
+from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
-from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
-from pydantic.fields import FieldInfo
+from pydantic import BeforeValidator, ConfigDict, Field, create_model, model_validator
 
 from springtune.mesh import MESH_TYPES
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import INCOMPRESSIBLE, MOST_TERMS, AnisotropicMaterial, AnyMaterial, Material
-from springtune.problem.quantities import nearest
 from springtune.registry import imported
 
 from .fields import (
     Angle,
+    BeamForces,
     BeamName,
     DefinitionName,
     Density,
@@ -24,7 +23,6 @@ from .fields import (
     Flag,
     Forces,
     FurtherReference,
-    Groups,
     Kinematics,
     Length,
     Lengths,
@@ -34,20 +32,23 @@ from .fields import (
     Named,
     OneOrMore,
     OrthotropicRatio,
-    PerBeam,
     Plane,
     Points,
     PoissonRatio,
     PoissonRatios,
     Ratio,
     Ratios,
-    Sections,
+    Section,
     SignedStress,
     Stiffness,
     Stress,
     Stresses,
     Terms,
     Text,
+    Words,
+    default,
+    expected_value,
+    once,
     one_of,
 )
 from .kind import Kind, Output, kinds
@@ -57,64 +58,6 @@ MOST_PARTS = 1000
 
 PLAUSIBLE = 20.0
 """Factor on sqrt(3)/2 E t beyond which a stated stiffness counts as an error of units."""
-
-
-def expected_value(field: FieldInfo) -> str:
-    """Expected value of a field in words, such as ``a length such as '200 mm'``."""
-    # A field that may be absent has its notes one level deeper.
-    for annotation, notes in ((field.annotation, field.metadata), *map(_parts, get_args(field.annotation))):
-        for note in notes:
-            if hasattr(note, "words"):
-                return str(note.words)
-            if isinstance(note, OneOrMore):
-                item = get_args(annotation)[0]
-                return f"{get_args(item)[1].words}, or a list"
-    listed = get_origin(field.annotation) is list
-    return "a list of sections; see below" if listed else "a section; see below"
-
-
-def _parts(annotation: Any) -> tuple[Any, tuple[Any, ...]]:
-    """Type and notes of an `Annotated`; any other annotation has no notes."""
-    if get_origin(annotation) is not Annotated:
-        return annotation, ()
-    inside, *notes = get_args(annotation)
-    return inside, tuple(notes)
-
-
-class Section(BaseModel):
-    """A mapping of known keys in a study."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _known_keys(cls, value: object) -> dict[str, object]:
-        names = {field.alias or name: field for name, field in cls.model_fields.items()}
-        if not isinstance(value, dict):
-            raise refuse(f"{show(value)} instead of keys and values; give the keys {', '.join(names)}")
-        for key in value:
-            if key not in names:
-                raise refuse(f"unknown key {show(key)}; {nearest(key, names)}", key)
-        given = {key: content for key, content in value.items() if content is not None}
-        for name, remedy in cls._needed(given).items():
-            if name not in given:
-                raise refuse(f"'{name}' is missing; give {expected_value(names[name])}{remedy}", name)
-        return given
-
-    @classmethod
-    def _needed(cls, given: Mapping[str, object]) -> dict[str, str]:
-        """Required keys, each with a remedy besides giving it."""
-        return {field.alias or name: "" for name, field in cls.model_fields.items() if field.is_required()}
-
-
-def default(value: Any, description: str, **options: Any) -> Any:
-    """Field with a default, written as in a study."""
-    return Field(value, validate_default=True, description=description, **options)
-
-
-def optional(section: Any, description: str) -> tuple[Any, Any]:
-    """Type and field of a section that a study may leave out."""
-    return section | None, Field(None, description=description)
 
 
 class BeamConfig(Section):
@@ -306,6 +249,12 @@ class SensitivityConfig(Section):
     stop: Ratio = default("1.6", alias="to", description="Largest stiffness.")
     points: Points = default("61", description="Number of stiffnesses, both ends included.")
 
+    @model_validator(mode="after")
+    def _ascending(self) -> Self:
+        if not self.start < self.stop:
+            raise refuse(f"{self.start:g} is not below 'to', {self.stop:g}; give a smaller 'from'", "from")
+        return self
+
 
 class MeshFileConfig(Section):
     """A mesh from a file that meshio reads. It fills its beam; its lower left corner may be anywhere."""
@@ -344,6 +293,13 @@ GRID_PARAMETERS = tuple(ExcludeConfig.model_fields)
 """Keys of a grid whose values are combined."""
 
 
+Parameter = Annotated[str, one_of("parameter", GRID_PARAMETERS)]
+
+
+def _one_group(value: Any) -> Any:
+    return [value] if isinstance(value, list) and value and isinstance(value[0], str) else value
+
+
 def _rows_may_give(schema: dict[str, Any]) -> None:
     """Required keys may come from a file of rows, and zipped values may repeat."""
     schema["anyOf"] = [{"required": schema.pop("required")}, {"required": ["rows"]}]
@@ -376,7 +332,7 @@ class GridConfig(Section):
         "along y. With the lower side clamped, `shear` acts along x on the upper side, which stays level, and "
         "`pressure` and `follower-pressure` act down on it. All are spread evenly."
     )
-    force: Annotated[dict[str, Forces], PerBeam()] | None = Field(
+    force: BeamForces | None = Field(
         None,
         description="Magnitude of the force, for all beams or for each; the load gives its sign. Several values make "
         "the force a dimension. Otherwise a beam, material and load have the same force in all grids.",
@@ -412,14 +368,23 @@ class GridConfig(Section):
         "nonlinear",
         description="`nonlinear`: springs keep their length law. `linear`: they keep their tangent at rest.",
     )
-    zip: Annotated[list[list[str]], Groups(GRID_PARAMETERS)] = Field(
+    zip: Annotated[
+        list[Annotated[list[Parameter], Field(min_length=2)]],
+        BeforeValidator(_one_group, json_schema_input_type=list[Parameter] | list[list[Parameter]]),
+        Words("a list of two parameters or more such as [mesh_size, force], or several such lists"),
+    ] = Field(
         [],
         description="Parameters whose values are paired instead of combined, such as `[mesh_size, force]`: the first "
         "with the first, and so on. Give a list of such lists for several groups.",
     )
-    exclude: Annotated[list[ExcludeConfig], Sections()] = Field(
-        [], description="Combinations to leave out, such as `{mesh_type: free, mesh_size: 1 mm}`; a list for several."
-    )
+    exclude: Annotated[
+        list[ExcludeConfig],
+        BeforeValidator(
+            lambda value: [value] if isinstance(value, dict) else value,
+            json_schema_input_type=ExcludeConfig | list[ExcludeConfig],
+        ),
+        Words("keys and values to leave out such as {mesh_size: 1 mm}, or a list of several"),
+    ] = Field([], description="Combinations to leave out, such as `{mesh_type: free, mesh_size: 1 mm}`.")
     rows: FileName | None = Field(
         None,
         description="CSV file of combinations, relative to the study's folder: one column for each parameter, named as "
@@ -431,6 +396,34 @@ class GridConfig(Section):
         description="Whether each mesh, material, load and kinematics gets a sensitivity curve. "
         "Curves that `calibrated` needs are always computed.",
     )
+
+    @property
+    def groups(self) -> list[tuple[str, ...]]:
+        """Groups of zipped parameters, and the others each alone, in the order of `GRID_PARAMETERS`."""
+        zipped = {name: tuple(group) for group in self.zip for name in group}
+        return list(dict.fromkeys(zipped.get(name, (name,)) for name in GRID_PARAMETERS if getattr(self, name)))
+
+    @model_validator(mode="after")
+    def _as_many(self) -> Self:
+        """Zipped lists are of equal lengths; in others no value stands twice."""
+        zipped = [name for group in self.zip for name in group]
+        for name in zipped:
+            if zipped.count(name) > 1:
+                raise refuse(f"'{name}' is zipped twice; name it once", "zip")
+        for group in self.groups:
+            lists = {name: getattr(self, name) for name in group}
+            if len(group) == 1 and isinstance(lists[group[0]], list):
+                once(lists[group[0]], *group)
+            elif None in lists.values():
+                absent = next(name for name, values in lists.items() if values is None)
+                remedy = "give it some, or leave it out of 'zip'"
+                raise refuse(f"'{absent}' is zipped and has no values; {remedy}", "zip")
+            elif len(group) > 1 and isinstance(self.force, dict) and "force" in group:
+                raise refuse("'force' is zipped and has values for each beam; give one list, or zip neither", "zip")
+            elif len(set(map(len, lists.values()))) > 1:
+                shown = ", ".join(f"{len(values)} of '{name}'" for name, values in lists.items())
+                raise refuse(f"{shown} cannot go together; give each as many values", "zip")
+        return self
 
 
 class StudyConfig(Section):

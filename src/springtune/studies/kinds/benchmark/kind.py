@@ -26,11 +26,13 @@ from ...config.fields import (
     MeshType,
     Named,
     OneOrMore,
+    Section,
+    default,
     number,
     one_of,
+    optional,
 )
 from ...config.kind import Kind
-from ...config.sections import Section, default, optional
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key
 from ...runs.stages import Task, stage
 from . import CURVE_COUNTS, OTHER_APPROACHES, THREAD_COUNTS, approach_names

@@ -16,9 +16,8 @@ from springtune.springs import DEFINITIONS
 from springtune.springs.lattice import COEFFICIENT
 
 from ...config import checks, fields
-from ...config.fields import OneOrMore, Scalar, number, one_of
+from ...config.fields import OneOrMore, Scalar, Section, default, number, one_of, optional
 from ...config.kind import Kind
-from ...config.sections import Section, default, optional
 from ...runs.keys import beam_key, declared_key, definition_key, distribution, installed, material_key, mesh_type_key
 from ...runs.stages import Task, stage
 from . import SETTING
@@ -116,7 +115,10 @@ def _check(config, problems):
     for name, scene in section.scenes.items():
         place, why = ("engines", "scenes", name), "turns with its side, and forces in engines do not"
         checks.check_scene(problems, place, scene, config, lambda load: not LOADS[load].follower, why)
-        checks.check_made(problems, (*place, "mesh_size"), scene.mesh_type, scene.mesh_size, scene.beam, config)
+        if beam := config.beams.get(scene.beam):
+            made, size = MESH_TYPES[scene.mesh_type], scene.mesh_size
+            if refusal := made.refusal(beam.length, beam.height, size, f"beam '{scene.beam}'"):
+                problems.add((*place, "mesh_size"), f"{checks.in_mm(size)} {refusal}")
     for name, runs in section.runs.items():
         place = "engines", "runs", name
         for engine in runs.engine:
@@ -134,7 +136,8 @@ def _check(config, problems):
                 checks.check_able(problems, (*place, "definition"), runs.definition, why, corners, uniaxial)
         checks.check_product(problems, runs, place, OF_RUNS, MOST_ENGINE_RUNS)
     lists = {name: {value for runs in section.runs.values() for value in getattr(runs, name)} for name in OF_RUNS}
-    checks.check_labels(problems, ("engines", "runs"), lists | {"scene": {*section.scenes}})
+    lists["scene"] = {*section.scenes}
+    checks.check_count(problems, ("engines", "runs"), lists, checks.MOST_CELLS, "cells of all labels together")
 
 
 def _expand(config, declared):

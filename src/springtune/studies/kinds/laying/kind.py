@@ -11,9 +11,20 @@ from springtune.problem.materials import Material
 from springtune.springs import DEFINITIONS
 
 from ...config.checks import check_beam_material, check_for_triangles, check_known, check_particles, check_product
-from ...config.fields import BeamName, DefinitionNames, Length, MaterialName, OneOrMore, Stress, number, one_of
+from ...config.fields import (
+    BeamName,
+    DefinitionNames,
+    Length,
+    MaterialName,
+    OneOrMore,
+    Section,
+    Stress,
+    default,
+    number,
+    one_of,
+    optional,
+)
 from ...config.kind import Kind
-from ...config.sections import Section, default, optional
 from ...runs.keys import definition_key, material_key, mesh_type_key
 from ...runs.stages import Task, stage
 from .outputs import OUTPUTS

@@ -11,10 +11,9 @@ from springtune.problem.geometry import Beam
 from springtune.springs import DEFINITIONS
 
 from ...config.checks import check_particles
-from ...config.fields import Flag, Length
+from ...config.fields import Flag, Length, Section, default
 from ...config.kind import Kind
 from ...config.model import MeshSpec
-from ...config.sections import Section, default
 from ...runs.keys import definition_key, mesh_type_key
 from ...runs.stages import Task, stage
 from ..scenes.plan import mesh_key, mesh_parameters, mesh_source, particles

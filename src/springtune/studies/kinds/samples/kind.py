@@ -27,13 +27,15 @@ from ...config.fields import (
     Load,
     OneOrMore,
     Scalar,
+    Section,
+    default,
     number,
     one_of,
+    optional,
     quantity,
 )
 from ...config.kind import Kind
 from ...config.messages import refuse, show
-from ...config.sections import Section, default, optional
 from ...runs.keys import definition_key, mesh_type_key, stage_key
 from ...runs.source import hash_of
 from ...runs.stages import Task, stage

@@ -19,12 +19,13 @@ from ...config.fields import (
     OneOrMore,
     Ratio,
     Scalar,
+    Section,
     Text,
     Wrapped,
+    default,
     one_of,
 )
 from ...config.messages import refuse, show
-from ...config.sections import Section, default
 
 KINDS_OF_QUANTITY = {
     "displacement": "length",

@@ -8,9 +8,20 @@ from pydantic import Field
 from springtune.mesh import MESH_TYPES
 
 from ...config.checks import check_beam_material, check_density, check_for_triangles, check_known, check_particles
-from ...config.fields import BeamName, DefinitionNames, Force, Length, MaterialName, MeshType, OneOrMore, one_of
+from ...config.fields import (
+    BeamName,
+    DefinitionNames,
+    Force,
+    Length,
+    MaterialName,
+    MeshType,
+    OneOrMore,
+    Section,
+    default,
+    one_of,
+    optional,
+)
 from ...config.kind import Kind
-from ...config.sections import Section, default, optional
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key
 from ...runs.stages import Task, stage
 from . import AXES, EXPERIMENTS, ONCE, Experiment
