@@ -280,7 +280,8 @@ class TestSchema:
 
     def test_every_section_is_in_the_manual(self):
         models = {model.__name__ for model in sections(study_model(kinds())).values()}
-        assert models == {*json.loads(schema_text())["$defs"], "StudyConfig"}
+        defined = {name for name in json.loads(schema_text())["$defs"] if not name.endswith("_distribution")}
+        assert models == defined | {"StudyConfig"}
 
 
 @pytest.fixture(scope="module")
