@@ -10,6 +10,8 @@ from springtune.prediction.search import asked_error, find_mesh
 from springtune.problem.status import Status
 from springtune.scene.sheet import Sheet
 
+from problems import pulled
+
 BEAM, STEEL = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3, density="7850 kg/m^3")
 
 
@@ -192,9 +194,7 @@ class TestBetweenWholeDivisions:
             assert any(finer.cells != int(finer.cells) for finer in one.finer)
 
     def test_shapes_are_tried_there_too(self):
-        pull = st.LoadCase("pull", [st.Support("left", x=0, y=0)], [st.Traction("right", ("4 kN", 0))],
-                           quantities=[st.Quantity("end", "displacement", "right", "x")])  # fmt: skip
-        plate = st.Shape.rectangle("100 mm", "40 mm", loads={"pull": pull})
+        plate = st.Shape.rectangle("100 mm", "40 mm", loads={"pull": pulled("4 kN", 0)})
         search = find_mesh(plate, STEEL, "2 %")
         one, known = search.best, search.known["end"].value
         assert one.confirmed and any(finer.cells != int(finer.cells) for finer in one.finer)

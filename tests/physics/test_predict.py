@@ -25,6 +25,8 @@ from springtune.scene.sheet import Sheet
 from springtune.springs import DEFINITIONS, DefinitionError
 from springtune.studies.kinds.scenes.solve import solved as solve_scene
 
+from problems import pulled
+
 # Random beams may be thicker than they are high: thickness is a factor.
 pytestmark = pytest.mark.filterwarnings("ignore::springtune.problem.geometry.AssumptionWarning")
 
@@ -475,10 +477,8 @@ def seeded(seed):
     material = list(materials_of(random).values())[seed % (4 if seed % 3 == 2 else 3)]
     size = height / random.uniform(2, 9)
     if seed % 3 == 2:
-        pull = st.LoadCase("pull", [st.Support("left", x=0, y=0)], [st.Traction("right", ("10 N", "5 N"))],
-                           quantities=[st.Quantity(one, "displacement", "right", one) for one in "xy"])  # fmt: skip
         hole = st.Hole.circle((length / 2, height / 2), height / 6)
-        shape = st.Shape.rectangle(length, height, holes=[hole], loads={"pull": pull})
+        shape = st.Shape.rectangle(length, height, holes=[hole], loads={"pull": pulled("10 N", "5 N", components="xy")})
         return shape, st.mesh_shape(shape, size), material, {"load": "pull"}
     beam, mesh_type = Beam(length, height, 1e-3), list(MESH_TYPES)[seed % len(MESH_TYPES)]
     loads = [str(one) for one in random.choice(predicted(), random.integers(1, 4), replace=False)]

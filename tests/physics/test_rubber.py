@@ -21,6 +21,8 @@ from springtune.reference.small_strain import ReferenceNotConvergedError
 from springtune.springs import DEFINITIONS
 from springtune.springs.rubber import FLAT, SpringLaw
 
+from problems import pulled
+
 TRELOAR = Path(__file__).parents[2] / "config/treloar"
 
 
@@ -591,11 +593,7 @@ class TestScenes:
 
 def test_a_shape_has_an_error_at_finite_strain():
     """Its reference has the law of the rubber, far from rest and near it."""
-    pull = springtune.LoadCase(
-        "pull", [springtune.Support("left", x=0, y=0)], [springtune.Traction("right", ("10 N", 0))],
-        quantities=[springtune.Quantity("end", "displacement", "right", "x")],
-    )  # fmt: skip
-    sheet = springtune.Shape.rectangle("20 mm", "10 mm", loads={"pull": pull})
+    sheet = springtune.Shape.rectangle("20 mm", "10 mm", loads={"pull": pulled("10 N", 0)})
     grouped = springtune.mesh_shape(sheet, "2 mm")
     far, near = (
         springtune.Scene(sheet, grouped, RUBBER, "pull", definition="yeoh", scale=scale) for scale in (1.0, 0.01)

@@ -18,6 +18,8 @@ from springtune.reference.shapes import Level, solve_each, solve_shape
 from springtune.reference.small_strain import ReferenceNotConvergedError, solve_small_strain
 from springtune.reference.triangles import side_fit, side_functions, tabulated
 
+from problems import pulled
+
 STEEL = Material(210e9, 0.3, density=7850.0, name="steel")
 PLASTIC = Material(1e9, 0.3, name="plastic")
 FOLDED = [6, 62, 118, 197]
@@ -334,12 +336,8 @@ def test_two_materials_one_behind_the_other():
     mesh = Mesh(points, np.zeros((0, 3), dtype=int), quads)
     sides = {"left": np.array([[1, 0]]), "right": np.array([[6, 7]]), "lower": np.array([[0, 2], [2, 4], [4, 6]])}
     grouped = GroupedMesh(mesh, sides, {}, {"soft": {4: np.array([False, True, False])}})
-    load = LoadCase(
-        "pull",
-        (Support("left", x=0.0), Support("lower", y=0.0)),
-        (Traction("right", (3.0, 0.0)),),
-        quantities=(Quantity("end", "displacement", "right", "x"), Quantity("held", "reaction", "left", "x")),
-    )
+    rollers = (Support("left", x=0.0), Support("lower", y=0.0))
+    load = pulled(3.0, 0.0, supports=rollers, others=[Quantity("held", "reaction", "left", "x")])
     shape = Shape("bar", 0.5, file="bar.msh")
     materials = {"": Material(100.0, 0.0), "soft": Material(10.0, 0.0)}
     found = solve_shape(shape, load, materials, grouped)

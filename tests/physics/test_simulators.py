@@ -20,6 +20,8 @@ from springtune.mesh import Mesh, signed_areas
 from springtune.problem.geometry import AssumptionWarning
 from springtune.springs import DEFINITIONS
 
+from problems import pulled
+
 STEEL = st.Material("210 GPa", 0.3, density="7850 kg/m^3", name="steel")
 BEAM = st.Beam("60 mm", "20 mm")
 FORCES = {"traction": "20 kN", "compression": "20 kN", "bending": "500 N", "shear": "20 kN", "pressure": "40 kN"}
@@ -702,14 +704,8 @@ def test_equilibria_of_shapes_are_those_of_mujoco(load, definition, tmp_path):
 def test_parts_of_shapes_keep_their_masses_in_mujoco(tmp_path):
     """A core of another material: the file's masses are those of both, and its springs balance."""
     light = st.Material("70 GPa", 0.3, density="2700 kg/m^3", name="light")
-    pull = st.LoadCase(
-        "pull",
-        (st.Support("left", x=0, y=0),),
-        (st.Traction("right", ("1 kN", 0)),),
-        quantities=(st.Quantity("end", "displacement", "right", "x"),),
-    )
     core = st.Hole.circle(("30 mm", "10 mm"), "5 mm", part="core")
-    plate = st.Shape.rectangle("60 mm", "20 mm", holes=[core], loads={"pull": pull})
+    plate = st.Shape.rectangle("60 mm", "20 mm", holes=[core], loads={"pull": pulled("1 kN", 0)})
     grouped = st.mesh_shape(plate, "2 mm")
     one = st.Scene(plate, grouped, {"": STEEL, "core": light}, "pull", definition="lattice")
     model, data = loaded(one, tmp_path)

@@ -458,8 +458,7 @@ class LoadCase:
             if twice:
                 raise ValueError(f"{what}: supports hold {twice[0]!r} along {axis} twice; remove one of them")
         moved = any(support.x or support.y for support in self.supports)
-        pulled = any(any(one.force) for one in self.tractions) or any(one.pressure for one in self.pressures)
-        if not (moved or pulled or any(gravity)):
+        if not (moved or self.tractions or self.pressures or any(gravity)):
             raise ValueError(
                 f"{what}: neither moves nor pulls the body; give forces, or a support such as {{end: {{x: 1 mm}}}}"
             )

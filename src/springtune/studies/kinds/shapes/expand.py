@@ -242,10 +242,16 @@ def _check_outline(name, shape, path, problems):
 def _made(name, shape, path, problems):
     """Shape of a section; None where it is refused."""
     try:
-        return shape_of_config(name, shape, problems.folder)
+        made = shape_of_config(name, shape, problems.folder)
     except ValueError as error:
         _add_fault(problems, path, str(error).removeprefix(f"shape '{name}': "))
         return None
+    for load, case in made.loads.items():
+        moved = any(one.x or one.y for one in case.supports) or any(case.gravity)
+        if not (moved or any(any(one.force) for one in case.tractions) or any(one.pressure for one in case.pressures)):
+            message = "neither moves nor pulls the body; give a force, or a support such as {end: {x: 1 mm}}"
+            problems.add((*path, "loads", load), message)
+    return made
 
 
 ABOUT_A_LOAD = re.compile(r"load '([^']+)'(?:, (support|traction|pressure|quantity)(?: '([^']+)')?)?: (.*)", re.DOTALL)
