@@ -8,8 +8,8 @@ import sys
 from pathlib import Path
 
 import meshio
-import netCDF4
 import numpy as np
+import xarray as xr
 
 sys.path.append(str(Path(__file__).parents[1] / "unit"))  # for `campaigns`, where this is a program
 
@@ -91,18 +91,17 @@ def write_mesh(path, shift=0.0):
 
 def dataset(folder):
     """What the dataset of a study holds, without times."""
-    with netCDF4.Dataset(folder / FOLDER / rerun.DATASET) as file:
-        return _group(file)
+    with xr.open_datatree(folder / FOLDER / rerun.DATASET, engine="h5netcdf", decode_cf=False) as tree:
+        nodes = {node.path: node.to_dataset(inherit=False).load() for node in tree.subtree}
+    return {path: _without_times(data) for path, data in nodes.items()}
 
 
-def _group(group):
-    group.set_auto_maskandscale(False)
-    found = {name: str(group.getncattr(name)) for name in group.ncattrs() if not TIMES.search(name)}
-    for name, variable in group.variables.items():
+def _without_times(data):
+    found = {name: str(one) for name, one in data.attrs.items() if not TIMES.search(name)}
+    for name, array in data.variables.items():
         if not TIMES.search(name):
-            values = np.asarray(variable[...])
-            found[name] = (variable.dimensions, values.tolist() if values.dtype == object else values.tobytes())
-    return found | {f"{name}/": _group(below) for name, below in group.groups.items()}
+            found[name] = (array.dims, array.values.tolist() if array.dtype.kind in "OU" else array.values.tobytes())
+    return found
 
 
 if __name__ == "__main__":  # with the package of another folder

@@ -47,7 +47,6 @@ def test_modules_are_imported_by_text_in_one_place():
 
 REPLACEABLE = {
     "meshio": {"mesh/formats.py: meshio"},
-    "netCDF4": {"studies/output/dataset.py: netCDF4"},
     "pyamg": {"linalg/multigrid.py: pyamg.relaxation.relaxation"},
 }
 """Packages that one module imports, so that another one can take their place, and what of them: their public names."""
@@ -87,7 +86,7 @@ def test_packages_that_may_be_replaced_are_imported_in_one_module():
             "scene = st.Scene(beam, mesh, steel, 'traction', '1 kN'); str(scene.solve()); scene.solve().plot();"
             "st.sensitivity(scene, [0.5, 0.9]).plot(); st.predict(beam, mesh, steel); scene.motion();"
             "st.moduli(mesh, steel, 'patch'); st.SpringNet.from_scene(scene)",
-            "snakemake pydantic xarray bokeh h5netcdf netCDF4 h5py click rich psutil jinja2 yaml meshio",
+            "snakemake pydantic xarray bokeh h5netcdf h5py click rich psutil jinja2 yaml meshio",
         ),
         (
             "from springtune.studies.kinds.scenes import mesh, sensitivity, solve, reference",

@@ -120,7 +120,7 @@ def test_texts_that_are_mostly_holes_take_no_room_and_read_the_same(tmp_path):
     dataset.write(tmp_path / "dataset.nc", {"/": root}, {"springtune_version": "0"})
     # Of 18 arrays; two of texts alone took 96 B a cell.
     assert (tmp_path / "dataset.nc").stat().st_size < 10 * root.message.size
-    for engine in ("netcdf4", "h5netcdf"):
+    for engine in ("netcdf4", "h5netcdf"):  # CF's checker brings the first, as many users have it
         with xr.open_datatree(tmp_path / "dataset.nc", engine=engine) as tree:
             found = tree.to_dataset()
             assert list(found.data_vars) == list(root.data_vars)
@@ -131,15 +131,7 @@ def test_texts_that_are_mostly_holes_take_no_room_and_read_the_same(tmp_path):
         assert str(tree.message[{"beam": -1, "mesh_size": -1}].values.ravel()[0]).endswith("\u03bb < 1")
 
 
-def test_a_file_may_be_opened_while_it_is_open(tmp_path):
-    """As in a notebook. The library of netCDF crashed, if it had written the texts."""
-    dataset.write(tmp_path / "dataset.nc", {"/": ROOT.empty(AXES)}, {"springtune_version": "0"})
-    program = "import springtune as st\nheld = st.open('.')\nfor _ in range(60): st.open('.').close()"
-    assert subprocess.run([sys.executable, "-c", program], cwd=tmp_path).returncode == 0
-
-
 def test_a_dataset_with_large_texts_is_closed(tmp_path):
-    """It stayed open, and HDF5 2.2 crashed in a program that opened it again."""
     dataset.write(
         tmp_path / "dataset.nc",
         {"/": ROOT.empty(AXES | {"mesh_size": tuple(1e-3 * (1 + np.arange(80000)))})},
@@ -154,14 +146,6 @@ def test_a_dataset_with_large_texts_is_closed(tmp_path):
         assert "values with dtype" in repr(tree.message.variable) and is_open()
         assert not (tree.message[{"mesh_size": slice(10)}] != "").any()
     assert not is_open()
-
-
-@pytest.mark.parametrize("order", [("h5py", "netCDF4"), ("netCDF4", "h5py")], ids=" first, ".join)
-def test_two_copies_of_hdf5_share_a_file(tmp_path, order):
-    """Each library brings one. `tests/versions` does the same with the oldest and newest of both."""
-    program = Path(__file__).parents[1] / "versions/two_hdf5.py"
-    done = subprocess.run([sys.executable, program, *order, tmp_path / "two.nc"], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
 
 
 def test_texts_of_most_cells_are_stored_as_ever(tmp_path):
@@ -190,7 +174,7 @@ class TestConventions:
 
     def test_what_is_wrong_is_found(self, tmp_path):
         wrong = xr.Dataset({"a": ("x", [1.0], {"units": "fathom per banana"})}, {"x": ("x", [0.5])})
-        wrong.to_netcdf(tmp_path / "dataset.nc", engine="netcdf4")  # with _FillValue on a coordinate
+        wrong.to_netcdf(tmp_path / "dataset.nc", engine="h5netcdf")  # with _FillValue on a coordinate
         said = " ".join(complaints(tmp_path / "dataset.nc"))
         assert "_FillValue" in said and "fathom" in said and "history" in said
 

@@ -153,11 +153,11 @@ class TestInfo:
 
         tree = every()
         tree.attrs = {"springtune_version": "0"}
-        tree.to_netcdf(tmp_path / "dataset.nc", engine="netcdf4")
+        tree.to_netcdf(tmp_path / "dataset.nc", engine="h5netcdf")
         result = run("info", tmp_path)
         assert result.exit_code == 0 and "  /benchmark " in result.stdout
         tree.attrs["title"] = "<i>"
-        tree.to_netcdf(tmp_path / "other.nc", engine="netcdf4")
+        tree.to_netcdf(tmp_path / "other.nc", engine="h5netcdf")
         found = st.info(tmp_path / "other.nc")
         assert repr(found) == str(found) and str(found).startswith("<i>\nstudy unknown")
         assert found._repr_html_().startswith("<pre>&lt;i&gt;\nstudy unknown")

@@ -38,7 +38,7 @@ def done(study, folder):
     """Tree of the dataset of a study, its groups and its folder; all stages run in this process."""
     do_stages(study, folder)
     collect.run(study, study.path, folder, folder / "dataset.nc")
-    with xr.open_datatree(folder / "dataset.nc", engine="netcdf4") as tree:
+    with xr.open_datatree(folder / "dataset.nc", engine="h5netcdf") as tree:
         tree.load()
     return tree, (folder / "summary.txt").read_text()
 

@@ -250,30 +250,6 @@ def test_files_for_mujoco_3_hold_in_it(version, tmp_path):
         physics(python, tests)
 
 
-def share_a_file(python, folder):
-    """Assert that netCDF4 and h5py, each with an HDF5 of its own, write and read one dataset in either order."""
-    for order in (("h5py", "netCDF4"), ("netCDF4", "h5py")):
-        call = [str(python), str(PROGRAM.with_name("two_hdf5.py")), *order, str(folder / "two.nc")]
-        here = os.environ | {"PYTHONPATH": str(REPOSITORY / "src")}
-        done = subprocess.run(call, capture_output=True, text=True, env=here)
-        print(done.stdout)
-        assert done.returncode == 0, done.stderr
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("h5py", ["h5py==3.15.*", "h5py"])
-@pytest.mark.parametrize("netcdf4", ["netcdf4==1.7.0", "netcdf4"])
-def test_two_copies_of_hdf5_share_a_file(netcdf4, h5py, tmp_path):
-    """The oldest and newest wheels of both bring HDF5 1.10 to 2.2."""
-    share_a_file(environment(tmp_path / "venv", sys.executable, [*NEEDED, netcdf4, h5py]), tmp_path)
-
-
-@pytest.mark.slow
-def test_datasets_are_written_with_the_oldest_packages(oldest, tmp_path):
-    """Before xarray 2025.8, none with pandas 3."""
-    share_a_file(oldest, tmp_path)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "packages",

@@ -148,7 +148,7 @@ def test_cores_do_not_matter(run):
         run.write(f"on{cores}.yaml", STUDY)
         code, output = run.snakemake(f"on{cores}.yaml", "--cores", cores, "--until", "collect")
         assert code == 0, output
-        with xr.open_datatree(run.folder / f"results/on{cores}/dataset.nc", engine="netcdf4", decode_cf=False) as tree:
+        with xr.open_datatree(run.folder / f"results/on{cores}/dataset.nc", engine="h5netcdf", decode_cf=False) as tree:
             groups = {node.path: node.to_dataset(inherit=False).load() for node in tree.subtree}
         return {path: group.drop_vars([name for name in group if "seconds" in name]) for path, group in groups.items()}
 

@@ -86,8 +86,6 @@ def diff(
 
     try:
         paths = [dataset_path(before), dataset_path(after)]
-        for path in paths:
-            reading.check_opens(path)
         with (
             reading.open(paths[0]) as one,
             reading.open(paths[1]) as other,

@@ -26,7 +26,6 @@ def info(path: Path, study: bool) -> None:
     """
     from ..studies.output import reading, summing_up
 
-    reading.check_opens(path)
     if study:
         with reading.open(path) as tree:
             if "config" not in tree.attrs:
@@ -54,7 +53,6 @@ def export(path: Path, target: Path, group: str, force: bool) -> None:
     from ..studies.output import reading
     from ..studies.output.export import export as write
 
-    reading.check_opens(path)
     with reading.open(path) as tree, reading.guarded(path):
         click.echo(write(tree, target, group, force))
 

@@ -50,7 +50,6 @@ def pack(study: Study, folder: Path, target: Path) -> list[str]:
     """
     from rocrate.rocrate import ROCrate  # here: an extra
 
-    reading.check_opens(folder)
     with reading.open(folder) as tree:
         about = {name: shown(str(tree.attrs.get(name, ""))) for name in ("title", "springtune_version", "created")}
         if tree.attrs.get("config") != study.text:

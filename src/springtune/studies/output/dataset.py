@@ -2,10 +2,10 @@
 
 import os
 import shutil
-from collections.abc import Collection, Hashable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path, PurePosixPath
+from io import BytesIO
+from pathlib import Path
 from typing import Any
 
 import h5netcdf
@@ -13,13 +13,11 @@ import h5py
 import numpy as np
 import pandas as pd
 import xarray as xr
-from xarray.backends import BackendArray
-from xarray.core import indexing
+from xarray.conventions import cf_encoder, encode_dataset_coordinates
 
 from springtune.problem.parameters import SWEPT
 from springtune.problem.status import Status
 from springtune.safe_io.atomic import replacing
-from springtune.safe_io.inputs import BeyondBound, bounded
 
 STATUS = tuple(map(str, Status))
 """Meanings of `status` flags in order of value."""
@@ -187,10 +185,10 @@ UNCOMPRESSED = 2**13
 """Most bytes of an uncompressed array; compressing less costs more than it saves."""
 
 
-MOSTLY = 0.75
+MOSTLY_EMPTY = 0.75
 """Share of empty cells above which a large array of texts stores none of them."""
 
-TEXTS = 128
+TEXTS_IN_CHUNK = 128
 """Cells in a chunk of such an array."""
 
 
@@ -198,104 +196,62 @@ def write(path: str | os.PathLike[str], groups: Mapping[str, xr.Dataset], attrib
     """Write a dataset atomically."""
     tree = xr.DataTree.from_dict(groups)
     tree.attrs = dict(attributes)
-    # What groups share with the root is written there alone.
-    own = {node.path: node.to_dataset(inherit=False) for node in tree.subtree}
-    sparse = {group: [name for name in data.data_vars if _mostly_holes(data[name])] for group, data in own.items()}
-    others = xr.DataTree.from_dict({group: data.drop_vars(sparse[group]) for group, data in own.items()})
-    encoding = {
-        group: {name: _encoding(data, name) for name in data.variables if name not in sparse[group]}
-        for group, data in own.items()
-    }
+    content = BytesIO()  # whole, so that HDF5 meets no full disk
+    with h5netcdf.File(content, "w") as file:
+        for node in tree.subtree:
+            above = node.parent.sizes if node.parent else {}  # what groups share with the root is written there
+            _write_group(file.create_group(node.path) if node.parent else file, node.to_dataset(False), above)
     path = Path(path)
     try:
-        with replacing(path, synced=True) as unfinished, _small_cache():
-            _make_texts(unfinished, own, sparse)
-            others.to_netcdf(unfinished, mode="a", engine="netcdf4", encoding=encoding)
-            _order(unfinished, own)
-    except (OSError, RuntimeError) as error:  # HDF5 says of a full disk that there is an error, at times of its own
+        with replacing(path, synced=True) as unfinished:
+            unfinished.write_bytes(content.getbuffer())
+    except OSError as error:
         free = shutil.disk_usage(path.parent).free / 1e6 if path.parent.is_dir() else 0.0
-        reason = getattr(error, "strerror", None) or error
         raise OSError(
-            f"{path}: cannot be written ({reason}; {free:.0f} MB are free there); make room, or see to permissions and "
-            "limits, and run the study again: what is solved is stored, and only this file is made anew"
+            f"{path}: cannot be written ({error.strerror}; {free:.0f} MB are free there); make room, or see to "
+            "permissions and limits, and run the study again: what is solved is stored, and only this file is made anew"
         ) from None
 
 
-@contextmanager
-def _small_cache() -> Iterator[None]:
-    """Limit netCDF's cache to four chunks a variable instead of 64 MB: each is written once."""
-    import netCDF4
-
-    before = netCDF4.get_chunk_cache()
-    netCDF4.set_chunk_cache(4 * CHUNK)
-    try:
-        yield
-    finally:
-        netCDF4.set_chunk_cache(*before)
-
-
-def _mostly_holes(array: xr.DataArray) -> bool:
-    """Return whether an array holds few texts in many cells."""
-    if array.dtype != object or array.nbytes <= CHUNK or set(array.coords) - set(array.dims):
-        return False
-    return float(np.mean(array.values == "")) > MOSTLY
-
-
-def _make_texts(
-    path: str | os.PathLike[str], groups: Mapping[str, xr.Dataset], sparse: Mapping[str, Collection[Hashable]]
-) -> None:
-    """Create a file with the variables of texts of all groups, of which it writes those that are sparse.
-
-    netCDF's own library gives each a fill value, by which it crashes when a file is opened while it is open elsewhere
-    (netcdf4-python, issue 1444), and it writes into a file to read texts that were never stored.
-    """
-    with h5netcdf.File(path, "w") as file:
-        for group, data in groups.items():
-            place = file if group == "/" else file.create_group(group)
-            above = {dim for parent in PurePosixPath(group).parents for dim in groups[str(parent)].sizes}
-            place.dimensions = {dim: size for dim, size in data.sizes.items() if dim not in above}
-            for name, array in data.variables.items():
-                if array.dtype.kind not in "OU":
-                    continue
-                chunks = _block(array.shape) if name in sparse[group] else None
-                variable = place.create_variable(name, array.dims, h5py.string_dtype(), chunks=chunks)
-                if chunks is None:
-                    continue
-                variable.attrs.update(array.attrs)
-                # HDF5 stores a chunk when something is written into it, and says of others that there is no text.
-                for start in np.unique(np.argwhere(array.values != "") // chunks, axis=0).tolist():
-                    cells = tuple(slice(number * size, (number + 1) * size) for number, size in zip(start, chunks))
-                    variable[cells] = array.values[cells]
-
-
-def _order(path: str | os.PathLike[str], groups: Mapping[str, xr.Dataset]) -> None:
-    """Put the variables of a file in order by renaming them: HDF5 lists last what was named last."""
-    with h5py.File(path, "a") as file:
-        for group, data in groups.items():
-            for name in map(str, data.variables):
-                file[group].move(name, f"{name} ")
-                file[group].move(f"{name} ", name)
+def _write_group(group: h5netcdf.Group, data: xr.Dataset, above: Mapping[Hashable, int]) -> None:
+    """Write the variables of a group, encoded by the conventions."""
+    variables, attributes = encode_dataset_coordinates(data)
+    for name, array in variables.items():
+        if str(array.attrs.get("cf_role", "")).endswith("connectivity"):
+            array.encoding = {"_FillValue": NO_NODE}
+        elif name in data.coords:
+            array.encoding = {"_FillValue": None}  # CF: coordinates have no holes
+    variables, attributes = cf_encoder(variables, attributes)
+    group.attrs.update(attributes)
+    group.dimensions = {dim: size for dim, size in data.sizes.items() if above.get(dim) != size}
+    for name, array in variables.items():
+        fill, values = array.attrs.pop("_FillValue", None), array.values
+        texts = values.dtype.kind in "OU"
+        sparse = texts and values.nbytes > CHUNK and np.mean(values == "") > MOSTLY_EMPTY
+        options: dict[str, Any] = {}
+        if sparse:
+            options = {"chunks": _block(array.shape)}
+        elif not texts and values.nbytes > UNCOMPRESSED:
+            options = {"chunks": _chunk(array.shape, values.dtype.itemsize), "compression": "gzip", "shuffle": True}
+        dtype = h5py.string_dtype() if texts else values.dtype
+        variable = group.create_variable(name, array.dims, dtype, fillvalue=fill, **options)
+        variable.attrs.update(array.attrs)
+        if not sparse:
+            variable[...] = values
+            continue
+        chunks = options["chunks"]  # of which only those with a text are stored
+        for start in np.unique(np.argwhere(values != "") // chunks, axis=0).tolist():
+            cells = tuple(slice(number * size, (number + 1) * size) for number, size in zip(start, chunks))
+            variable[cells] = values[cells]
 
 
 def _block(shape: Sequence[int]) -> tuple[int, ...]:
     """Chunk shape of texts, about equal in all dimensions."""
     block = [1] * len(shape)
-    while np.prod(block) < TEXTS and block != list(shape):
+    while np.prod(block) < TEXTS_IN_CHUNK and block != list(shape):
         _, number = min((block[n], -n) for n, length in enumerate(shape) if block[n] < length)
         block[-number] = min(2 * block[-number], shape[-number])
     return tuple(block)
-
-
-def _encoding(data: xr.Dataset, name: Hashable) -> dict[str, object]:
-    """Encoding of a variable."""
-    array = data[name]
-    # CF: coordinates have no holes, and so no value that stands for one.
-    found: dict[str, object] = {"_FillValue": None} if name in data.coords else {}
-    if str(array.attrs.get("cf_role", "")).endswith("connectivity"):
-        found = {"_FillValue": NO_NODE}
-    if array.dtype == object or array.nbytes <= UNCOMPRESSED:
-        return found
-    return found | {"zlib": True, "complevel": 4, "chunksizes": _chunk(array.shape, array.dtype.itemsize)}
 
 
 def _chunk(shape: Sequence[int], itemsize: int) -> tuple[int, ...]:
@@ -305,52 +261,6 @@ def _chunk(shape: Sequence[int], itemsize: int) -> tuple[int, ...]:
         chunk.append(max(1, min(length, room)))
         room //= chunk[-1]
     return tuple(reversed(chunk))
-
-
-# -- open --------------------------------------------------------------------------------------------------------------
-
-
-class _Texts(BackendArray):
-    """Texts of a file, read within bounded memory, since their length is unknown before."""
-
-    dtype = np.dtype(object)
-
-    def __init__(self, path: Path, name: str, shape: tuple[int, ...], most: float) -> None:
-        self.path, self.name, self.shape, self.most = path, name, shape, most
-
-    def __getitem__(self, key: indexing.ExplicitIndexer) -> Any:
-        return indexing.explicit_indexing_adapter(key, self.shape, indexing.IndexingSupport.BASIC, self._read)
-
-    def _read(self, key: tuple[Any, ...]) -> Any:
-        try:
-            with bounded(self.most), h5py.File(self.path) as file:
-                return file[self.name].asstr()[key]
-        except (BeyondBound, OSError, RuntimeError, UnicodeError):  # HDF5 says of missing memory only that it failed
-            raise ValueError(
-                f"{self.path}: its texts '{self.name.rpartition('/')[2]}' are damaged, or take more than "
-                f"{self.most / 1e9:.3g} GB; select what is needed first, or run the study again"
-            ) from None
-
-
-def opened(path: Path, most: float, texts: Collection[str] = ()) -> xr.DataTree:
-    """Open a file, and leave the arrays `texts` in it: xarray reads all texts, at the width of the longest."""
-    with _small_cache():
-        source = xr.open_datatree(path, engine="netcdf4", drop_variables=[*texts])
-    if not texts:
-        return source
-    groups = {}
-    with h5netcdf.File(path) as file:
-        for node in source.subtree:
-            variables = (file if node is source else file[node.path]).variables
-            data = node.to_dataset(inherit=False)
-            for name in set(texts) & set(variables):
-                array = _Texts(path, f"{node.path}/{name}", variables[name].shape, most)
-                lazy = indexing.LazilyIndexedArray(array)
-                data[name] = xr.Variable(variables[name].dimensions, lazy, dict(variables[name].attrs))
-            groups[node.path] = data[[name for name in variables if name in data.data_vars]]
-    tree = xr.DataTree.from_dict(groups)
-    tree.set_close(source.close)
-    return tree
 
 
 # -- flags -------------------------------------------------------------------------------------------------------------

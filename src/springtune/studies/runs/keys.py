@@ -175,7 +175,7 @@ NOT_COUNTED = {
     ("handover/simulation.py", "jinja2"): "it puts texts and numbers into files as they are",
     ("studies/runs/store.py", "h5py"): "numbers come out of a file as they went in, or not at all",
     ("studies/output/dataset.py", "h5py"): "texts go into a dataset as they are",
-    ("studies/output/reading.py", "h5py"): "it looks at a dataset's links before netCDF opens it",
+    ("studies/output/reading.py", "h5py"): "it refuses files, and reads none of their numbers",
     ("mesh/exodus.py", "h5py"): "numbers come out of a file as they went in, or not at all",
     ("mesh/formats.py", "meshio"): "as of the store; `mesh_file_closure` counts it where a study's own file is read",
     ("units.py", "pint"): "what a study says with units is in the parameters as numbers",

@@ -24,7 +24,6 @@ SOFTWARE = (
     "h5netcdf",
     "h5py",
     "meshio",
-    "netcdf4",
     "netgen-mesher",
     "numba",
     "numpy",

@@ -30,7 +30,7 @@ from springtune.safe_io.inputs import bounded
 
 from ...config.kind import modules
 from ..colours import ERROR_COLOURS, ERROR_RANGE
-from ..reading import REMEDY, check_links, dataset_file, guarded, most_of
+from ..reading import REMEDY, check, dataset_file, guarded, most_of, reason
 from . import View
 
 SCRIPTS = ("payload", "words", "charts", "table", "cells", "shape", "explorer", "main")
@@ -48,15 +48,13 @@ def views() -> dict[str, View]:
 def page(dataset: str | os.PathLike[str], files: Iterable[str] = ()) -> str:
     """Page of a dataset."""
     path = dataset_file(dataset)
+    check(path)
     try:
-        check_links(path)
         with guarded(path), bounded(most_of(path)), h5py.File(path) as opened:
-            # Read first: if h5netcdf itself fails here, the file that it leaves open raises a warning later.
-            opened.attrs.get("_nc3_strict")
             with h5netcdf.File(opened, decode_vlen_strings=True) as file:
                 groups, contents = packed(file)
-    except OSError as error:
-        raise ValueError(f"{path}: cannot be read ({error}); {REMEDY}") from None
+    except (OSError, ValueError) as error:
+        raise ValueError(f"{path}: cannot be read ({reason(error)}); {REMEDY}") from None
     attributes = groups[0]["attributes"]
     if "springtune_version" not in attributes:
         raise ValueError(f"{path}: is not a dataset of springtune; {REMEDY}")
