@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import nnls
-from springtune.studies.runs.task_costs import TaskCosts
 
 from springtune.mechanics.moduli import PatchTest
 from springtune.mechanics.network import Network
@@ -21,7 +20,7 @@ from springtune.springs.element_fit import least_squares
 from springtune.springs.identification import Misfit, patch_cases
 from springtune.springs.lattice import predicted_stiffness
 from springtune.springs.searched import adjoint
-from springtune.studies.runs import driver, store
+from springtune.studies.runs import job, store
 
 HEIGHT, SIZE = 20e-3, 2e-3
 RATIOS = (0.3, 1 / 3, 0.49)
@@ -580,7 +579,7 @@ def test_stage_measures_the_mesh_that_is_made(tmp_path, mesh_type):
     box = {"length": 0.1, "height": HEIGHT}
     asked = [{"key": "one", "definition": "lattice", "poisson_ratio": 0.3}]
     patch = {"name": "one", "mesh": box | {"mesh_type": mesh_type, "mesh_size": SIZE}, "tasks": asked}
-    driver.run("studies.kinds.moduli.solve", {"folder": str(tmp_path), "files": [patch]}, TaskCosts())
+    job.do("studies.kinds.moduli.solve", {"folder": str(tmp_path), "files": [patch]})
     found = store.read(tmp_path / "one.h5", ["one"])["one"]
     young, ratio, shear = errors("lattice", MESH_TYPES[mesh_type](**box, size=SIZE), 0.3)
     measured = found["young_modulus_error"], found["effective_poisson_ratio"], found["shear_modulus_error"]

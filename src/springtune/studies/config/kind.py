@@ -103,8 +103,7 @@ class Stage:
     products : callable
         From that content to the files that a job makes besides its record.
     members : callable, optional
-        From a study and `springtune.studies.runs.plan.Costs` to expected seconds and a value by name; None for a
-        stage with the bundles of another one.
+        From a study to expected seconds and a value by name; None for a stage with the bundles of another one.
     like : str
         Stage whose bundles it shares, and whose job of the same bundle it needs.
     every : tuple of str
@@ -122,7 +121,7 @@ class Stage:
     message: str
     content: Callable[[Study, Path, list[Any]], dict[str, Any] | None]
     products: Callable[[dict[str, Any]], Iterable[Path]]
-    members: Callable[[Study, Any], Mapping[str, tuple[float, Any]]] | None = None
+    members: Callable[[Study], Mapping[str, tuple[float, Any]]] | None = None
     like: str = ""
     every: tuple[str, ...] = ()
     alone: bool = False
@@ -167,8 +166,6 @@ class Kind:
     outputs : tuple of Output
     tables, tables_by : callable and str, optional
         From a study to the stems of its tables on the page; module whose ``tables(tree)`` makes them.
-    costs : dict of str to tuple
-        Expected seconds of a task by its name, fixed and per unit, for bundles of about equal work.
     """
 
     name: str
@@ -187,7 +184,6 @@ class Kind:
     outputs: tuple[Output, ...] = ()
     tables: Callable[[Study], list[str]] | None = None
     tables_by: str = "tables"
-    costs: dict[str, tuple[float, float]] = field(default_factory=dict)
 
     def wanted(self, config: Any) -> bool:
         """Return whether a config has one of its sections; a kind without any depends on the grids."""

@@ -33,24 +33,6 @@ MANY_SECONDS = 10
 """Multiple of these seconds for each job from which a stage gets four times as many, so that all cores end together."""
 
 
-class Costs:
-    """Expected seconds of tasks by name: fixed, and per unit.
-
-    Examples
-    --------
-    >>> Costs({"linear": (5e-4, 1e-6)}).of("linear", 1000)
-    0.0015
-    """
-
-    def __init__(self, known: Mapping[str, tuple[float, float]]) -> None:
-        self.known = known
-
-    def of(self, kind: str, units: float = 0.0) -> float:
-        """Seconds of a task; 0 for one that is not known, such as most definitions."""
-        fixed, each = self.known.get(kind, (0.0, 0.0))
-        return fixed + each * units
-
-
 def share_out(seconds: Mapping[str, float], cores: int, least: float = LEAST_SECONDS) -> dict[str, list[str]]:
     """Share tasks out in bundles of about equal work.
 
@@ -136,7 +118,6 @@ def digest_in(path: Path) -> str:
 
 def plan(study: "Study", folder: Path, cores: int | None = None, cluster: bool = False) -> Plan:
     """Plan the jobs of a study's stages for this machine, or for a cluster; nothing is written."""
-    costs = Costs({name: cost for kind in kinds() for name, cost in kind.costs.items()})
     cores, least = (CLUSTER_JOBS, LEAST_ON_CLUSTER) if cluster else (cores or os.cpu_count() or 1, LEAST_SECONDS)
     jobs: dict[str, Tasks] = {}
     members: Members = {}
@@ -144,7 +125,7 @@ def plan(study: "Study", folder: Path, cores: int | None = None, cluster: bool =
     for kind in kinds():
         for stage in kind.stages:
             if stage.members:
-                found = dict(stage.members(study, costs)) if study.parts[kind.name] else {}
+                found = dict(stage.members(study)) if study.parts[kind.name] else {}
                 seconds = {name: expected for name, (expected, _) in found.items()}
                 members[stage.name] = found
                 bundles[stage.name] = {n: [n] for n in found} if stage.alone else share_out(seconds, cores, least)

@@ -15,7 +15,6 @@ from .source import hash_of
 
 if TYPE_CHECKING:
     from ..config.model import Study
-    from .plan import Costs
 
 
 @dataclass(frozen=True)
@@ -32,8 +31,8 @@ class Task:
         Labels of its cell of the dataset; a label may be several.
     of : object
         Object of the study that it comes from.
-    costs : sequence of tuple
-        Expected costs: name, units and optional count, see `springtune.studies.config.kind.Kind`.
+    seconds : float
+        Expected seconds, for bundles of about equal work.
     name : str
         Tasks of one name are in one bundle; by default a hash of its values.
     file : str
@@ -48,7 +47,7 @@ class Task:
     also: Sequence[object] = ()
     labels: Mapping[str, Any] = field(default_factory=dict)
     of: Any = None
-    costs: Sequence[tuple[str, float] | tuple[str, float, float]] = ()
+    seconds: float = 0.0
     name: str = ""
     file: str = ""
     shared: Mapping[str, Any] = field(default_factory=dict)
@@ -58,10 +57,6 @@ class Task:
         """Key of its result, computed by a module."""
         return self.key or hash_of(self.values, stage_key(module, JOB), self.also)
 
-    def seconds(self, costs: "Costs") -> float:
-        """Expected seconds."""
-        return sum(costs.of(name, units) * (count[0] if count else 1) for name, units, *count in self.costs)
-
 
 def stage(
     name: str, module: str, message: str, tasks: "Callable[[Study], Iterable[Task]]", folder: str = "", **options: Any
@@ -69,13 +64,13 @@ def stage(
     """Stage whose bundles and jobs follow from its tasks; it stores in the folder of its name, or in another one."""
     folder = folder or name
 
-    def members(study: "Study", costs: "Costs") -> dict[str, tuple[float, list[Task]]]:
+    def members(study: "Study") -> dict[str, tuple[float, list[Task]]]:
         found: dict[str, list[Task]] = {}
         for task in tasks(study):
             called = task.name or hash_of(task.values)
             if task.name or called not in found:  # else it is one task with two labels
                 found.setdefault(called, []).append(task)
-        return {called: (sum(task.seconds(costs) for task in own), own) for called, own in found.items()}
+        return {called: (sum(task.seconds for task in own), own) for called, own in found.items()}
 
     def content(study: "Study", results: Path, members: list[list[Task]]) -> dict[str, Any]:
         files: dict[str, dict[str, Any]] = {}

@@ -173,7 +173,7 @@ def _tasks(study):
         values = asdict(case) | {"beam": beam_key(case.beam), "material": material_key(case.material, density=True)}
         del values["name"]
         values["curves"] = place == 0
-        yield Task(values, _code(case), {"scene": case.name}, case, [("benchmark", 0)], case.name)
+        yield Task(values, _code(case), {"scene": case.name}, case, name=case.name)
 
 
 def _code(case):

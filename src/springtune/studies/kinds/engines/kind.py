@@ -13,7 +13,6 @@ from springtune.problem.loads import LOADS
 from springtune.problem.materials import Material
 from springtune.registry import imported
 from springtune.springs import DEFINITIONS
-from springtune.springs.lattice import COEFFICIENT
 
 from ...config import checks, fields
 from ...config.fields import OneOrMore, Scalar, Section, default, number, one_of, optional
@@ -173,24 +172,12 @@ def _version(engine):
 def _tasks(study):
     """Runs of an engine follow each other in one job, since their seconds are measured."""
     for run in study.parts["engines"]:
-        labels, mesh_size = run.labels, run.stated.mesh_size
-        engine = _engines()[labels["engine"]]
+        labels, engine = run.labels, _engines()[run.labels["engine"]]
         values = {name: value for name, value in labels.items() if name != "scene"} | dict(run.stated)
         values |= {"beam": beam_key(run.beam), "material": material_key(run.material, density=True)}
         values |= {"engine_version": _version(engine), "frames": run.frames, "tolerance": run.tolerance}
         also = mesh_type_key(run.stated.mesh_type), definition_key(labels["definition"]), declared_key(engine)
-        particles = run.beam.length * run.beam.height / (COEFFICIENT * mesh_size**2)
-        name = f"engines {run.program.lower()}"
-        cost = name if name in COSTS else "engines", labels["substeps"] * labels["iterations"] * particles
-        yield Task(values, also, labels, run, [cost], engine.name)
-
-
-COSTS = {
-    "engines": (0.2, 5e-6),
-    "engines springtune": (0.1, 2e-6),
-    "engines newton": (1.0, 2e-5),
-}
-"""Seconds of a run by program, and by particles, substeps and iterations."""
+        yield Task(values, also, labels, run, name=engine.name)
 
 
 STAGE = stage("engines", "studies.kinds.engines.solve", "Running scenes in engines", _tasks, alone=True)
@@ -206,5 +193,4 @@ KIND = Kind(
     outputs=OUTPUTS,
     tables=lambda study: ["engines"] if study.parts["engines"] else [],
     tables_by="outputs",
-    costs=COSTS,
 )

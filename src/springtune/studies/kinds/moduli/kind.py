@@ -16,7 +16,7 @@ from ...config.kind import Kind
 from ...config.model import MeshSpec
 from ...runs.keys import definition_key, mesh_type_key
 from ...runs.stages import Task, stage
-from ..scenes.plan import mesh_key, mesh_parameters, mesh_source, particles
+from ..scenes.plan import mesh_key, mesh_parameters, mesh_source, particles, search_seconds
 from .outputs import OUTPUTS
 
 
@@ -88,7 +88,7 @@ def _tasks(study):
             {"definition": one.definition, "poisson_ratio": one.poisson_ratio},
             (mesh_parameters(mesh), mesh_type_key(one.mesh_type), definition_key(one.definition)),
             labels=asdict(one),
-            costs=[("moduli", particles(mesh)), (one.definition, particles(mesh))],
+            seconds=5e-4 + 2e-6 * particles(mesh) + search_seconds(one.definition, particles(mesh)),
             name=name,
             file=name,
             shared={"mesh": mesh_source(mesh)},
@@ -147,5 +147,4 @@ KIND = Kind(
     attributes=_attributes,
     stages=(stage("moduli", "studies.kinds.moduli.solve", "Measuring effective moduli", _tasks),),
     outputs=OUTPUTS,
-    costs={"moduli": (5e-4, 2e-6)},
 )

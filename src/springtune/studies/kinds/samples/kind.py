@@ -392,13 +392,14 @@ def _references(study):
     """Tasks of the references, one a kind of load."""
     sample = study.parts["samples"]
     drawn, box = None, reference_box(sample)
+    seconds = 3e-2 * expected_solves(box)
     if sample.rows <= MOST_SOLVED:
         drawn = {"design": sample.design, "seed": sample.seed, "parameters": sample.parameters}
         drawn |= {"first": 0, "last": sample.size}
     for kind in dict.fromkeys(LOADS[name].kind for name in sample.loads):
-        key, costs = reference_key(sample, kind), [("interpolant", expected_solves(box))]
+        key = reference_key(sample, kind)
         values = {"kind": kind.name, "box": box}
-        yield Task(values, costs=costs, name=kind.name, file=key, key=key, shared={"sample": drawn})
+        yield Task(values, seconds=seconds, name=kind.name, file=key, key=key, shared={"sample": drawn})
 
 
 def _blocks(study):
@@ -415,9 +416,9 @@ def _blocks(study):
         "results": scenes,
     }
     for first, last in blocks(sample.design, sample.size):
-        key, costs = block_key(sample, first, last), [("sampled", (last - first) * _scenes_each(sample))]
+        key, seconds = block_key(sample, first, last), 0.05 + 6e-4 * (last - first) * _scenes_each(sample)
         values = {"first": first, "last": last}
-        yield Task(values, costs=costs, name=f"{first}-{last}", file=key, key=key, shared=shared)
+        yield Task(values, seconds=seconds, name=f"{first}-{last}", file=key, key=key, shared=shared)
 
 
 def _scenes_each(sample):
@@ -447,5 +448,4 @@ KIND = Kind(
     outputs=OUTPUTS,
     tables=_tables,
     tables_by="outputs",
-    costs={"sampled": (0.05, 6e-4)},
 )

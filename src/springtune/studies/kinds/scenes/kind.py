@@ -22,20 +22,6 @@ KIND = Kind(
     stages=STAGES,
     outputs=OUTPUTS,
     tables=stems,
-    costs={
-        "mesh": (4e-3, 2.5e-5),
-        "linear": (5e-4, 1e-6),
-        "nonlinear": (1.5e-3, 1e-5),
-        "curve": (1.5e-3, 1e-5),
-        "reference": (3e-2, 0.0),
-        "interpolant": (0.0, 3e-2),
-        "finite": (1.0, 0.0),
-        # Definitions that search, on top of their scenes.
-        "adjoint": (0.05, 2e-4),
-        "annealed": (0.05, 1e-3),
-        "evolved": (0.05, 1e-3),
-        "best-springs": (0.05, 5e-3),
-    },
 )
 
 

@@ -337,16 +337,38 @@ def calibration_name(scene):
 # -- stages ------------------------------------------------------------------------------------------------------------
 
 
-def _mesh_members(study, costs):
-    """Meshes, and the cost of each with all its scenes and curves."""
-    seconds = {stem(mesh): costs.of("mesh", particles(mesh)) for mesh in study.meshes}
+SEARCH_SECONDS = {
+    "adjoint": (0.05, 2e-4),
+    "annealed": (0.05, 1e-3),
+    "evolved": (0.05, 1e-3),
+    "best-springs": (0.05, 5e-3),
+}
+"""Seconds of definitions that search, on top of their scenes: fixed, and each particle."""
+
+PATH_SECONDS = 1.5e-3, 1e-5
+"""The same of a nonlinear network, and of a curve."""
+
+
+def search_seconds(definition, particles):
+    """Expected seconds of deriving springs."""
+    fixed, each = SEARCH_SECONDS.get(definition, (0.0, 0.0))
+    return fixed + each * particles
+
+
+def _mesh_members(study):
+    """Meshes, and the expected seconds of each with all its scenes and curves."""
+
+    def path(mesh, fixed, each):
+        return fixed + each * particles(mesh)
+
+    seconds = {stem(mesh): path(mesh, 4e-3, 2.5e-5) for mesh in study.meshes}
     for mesh, scenes in scenes_by_mesh(study).items():
-        name, cost = stem(mesh), cache(partial(costs.of, units=particles(mesh)))
+        count, solving = particles(mesh), {"linear": path(mesh, 5e-4, 1e-6), "nonlinear": path(mesh, *PATH_SECONDS)}
+        searching = cache(partial(search_seconds, particles=count))
         for scene in scenes:
-            seconds[name] += cost(scene.kinematics)
-            seconds[name] += cost(scene.definition)
+            seconds[stem(mesh)] += solving[scene.kinematics] + searching(scene.definition)
     for curve in study.curves:
-        seconds[stem(curve.mesh)] += costs.of("curve", particles(curve.mesh))
+        seconds[stem(curve.mesh)] += path(curve.mesh, *PATH_SECONDS)
     members = defaultdict(list)
     for mesh in study.meshes:
         members[stem(mesh)].append(mesh)
@@ -371,10 +393,10 @@ def _reference_tasks(study):
         if "interpolant" not in reference_of(study, *body):
             problem, key = _unit_problem(*body), solved_reference(*body)["key"]
             name = hash_of(problem[0], problem[2])
-            found[key] = Task({"problem": problem}, costs=[("reference", 0)], name=name, key=key)
+            found[key] = Task({"problem": problem}, seconds=3e-2, name=name, key=key)
         for kind in study.further_references:
             values, key = _finite_problem(one, kind), finite_key(one, kind)
-            found[key] = Task(values, costs=[("finite", 0)], name=hash_of(values), key=key)
+            found[key] = Task(values, seconds=1.0, name=hash_of(values), key=key)
     yield from found.values()
     asked = {(one.beam, one.material, one.load) for one in study.references}
     for kind, (box, problems) in interpolants(study).items():
@@ -382,7 +404,7 @@ def _reference_tasks(study):
             key = interpolant_key(kind, box)
             keys = {solved_reference(*body)["key"]: problem for body, problem in problems.items()}
             values = {"kind": kind, "box": box, "problems": keys}
-            yield Task(values, costs=[("interpolant", expected_solves(box))], name=key, key=key)
+            yield Task(values, seconds=3e-2 * expected_solves(box), name=key, key=key)
 
 
 def _curve(study, curve):
@@ -458,7 +480,7 @@ def calibration_path(folder):
     return folder / "calibration.h5"
 
 
-def _calibrate_members(study, costs):
+def _calibrate_members(study):
     """All groups of scenes that share a calibrated stiffness, in one job."""
     names = {calibration_name(scene) for scene in calibrated(study)}
     return {"all": (0.0, sorted(names))} if names else {}

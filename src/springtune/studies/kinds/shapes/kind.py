@@ -16,7 +16,7 @@ from ...runs.job import JOB
 from ...runs.keys import definition_key, material_key, mesh_type_key, stage_key
 from ...runs.source import hash_of
 from ...runs.stages import Task, stage
-from ..scenes.plan import file_source, mesh_stage, on_meshes, parameters, particles_in, stage_on_meshes
+from ..scenes.plan import file_source, mesh_stage, on_meshes, parameters, particles_in, search_seconds, stage_on_meshes
 from .outputs import DRAWING, OUTPUTS, OWN_FILE, mesh_name, stems
 
 MOST_DRAWN = 1500
@@ -123,19 +123,19 @@ def by_mesh(part):
 # -- stages ------------------------------------------------------------------------------------------------------------
 
 
-def _mesh_members(study, costs):
-    """Meshes with their scenes, and the cost of both."""
+def _mesh_members(study):
+    """Meshes with their scenes, and the expected seconds of both."""
     part = study.parts["shapes"]
     members = {}
     for name, scenes in by_mesh(part).items():
-        seconds = costs.of("shape_mesh", particles(part, scenes[0]))
-        members[name] = seconds + sum(_seconds(part, one, costs) for one in scenes), scenes
+        seconds = 2e-2 + 2.5e-5 * particles(part, scenes[0])
+        members[name] = seconds + sum(_seconds(part, one) for one in scenes), scenes
     return members
 
 
-def _seconds(part, one, costs):
+def _seconds(part, one):
     count = particles(part, one)
-    return costs.of("shape_scene", count) + costs.of(one.definition, count)
+    return 5e-3 + 2e-5 * count + search_seconds(one.definition, count)
 
 
 def _meshes(study, folder, members):
@@ -150,7 +150,7 @@ def _reference_tasks(study):
     part = study.parts["shapes"]
     for one in (*part.referred, *part.finite):
         task = reference_task(part, *one)
-        yield Task(task, costs=[("shape_reference", 0)], name="/".join(one), key=task["key"])
+        yield Task(task, seconds=2.0, name="/".join(one), key=task["key"])
 
 
 def _solve(study, folder, members):
@@ -258,5 +258,4 @@ KIND = Kind(
     outputs=OUTPUTS,
     tables=stems,
     tables_by="outputs",
-    costs={"shape_mesh": (2e-2, 2.5e-5), "shape_reference": (2.0, 0.0), "shape_scene": (5e-3, 2e-5)},
 )
