@@ -339,33 +339,30 @@ def _check_grid(config, grid, path, problems):
     for name in grid.definition:
         if DEFINITIONS[name].uniaxial:
             problems.add((*path, "definition"), f"'{name}' is for beams that are stretched alone; choose another one")
-    shapes = {}
     for name in grid.shape:
         check_known(problems, (*path, "shape"), "shape", name, config.shapes)
-        if name in config.shapes:
-            shapes[name] = config.shapes[name]
+    shapes = {name: config.shapes[name] for name in grid.shape if name in config.shapes}
+    weighs = False
     for name, shape in shapes.items():
-        for load in grid.load or ():
+        for load in grid.load or shape.loads:
             if load not in shape.loads:
                 problems.add((*path, "load"), f"shape '{name}' has no load '{load}'; {nearest(load, shape.loads)}")
-    if any(any(shape.loads[load].gravity) for shape in shapes.values() for load in grid.load or shape.loads
-           if load in shape.loads):  # fmt: skip
-        for material in grid.material:
-            check_density(config, material, (*path, "material"), problems)
+            elif any(shape.loads[load].gravity):
+                weighs = True
+        if shape.file is not None and grid.mesh_size:
+            message = f"shape '{name}' is a mesh file, which has its own; remove it, or give '{name}' a grid of its own"
+            problems.add((*path, "mesh_size"), message)
+    for material in grid.material if weighs else ():
+        check_density(config, material, (*path, "material"), problems)
     made = {name: shape for name, shape in shapes.items() if shape.file is None}
     if made and grid.mesh_size is None:
         problems.add((*path, "mesh_size"), "'mesh_size' is missing; give a length such as '5 mm', a list, or a range")
-    elif made and problems.nothing:
-        for name, shape in made.items():
-            (left, low), (right, top) = shape_of_config(name, shape, Path()).extent
-            wide, high = right - left, top - low
-            if max(grid.mesh_size) > min(wide, high) > 0:
-                most = f"{1e3 * min(wide, high):.4g} mm"
-                problems.add((*path, "mesh_size"), f"is larger than shape '{name}'; give at most {most}")
-            check_particles(problems, (*path, "mesh_size"), grid.mesh_size, wide, high)
-    for name in shapes.keys() - made.keys() if grid.mesh_size else ():
-        message = f"shape '{name}' is a mesh file, which has its own; remove it, or give '{name}' a grid of its own"
-        problems.add((*path, "mesh_size"), message)
+    for name, shape in made.items() if problems.nothing else ():
+        wide, high = np.ptp(shape_of_config(name, shape, Path()).extent, axis=0)
+        if max(grid.mesh_size) > min(wide, high) > 0:
+            most = f"{1e3 * min(wide, high):.4g} mm"
+            problems.add((*path, "mesh_size"), f"is larger than shape '{name}'; give at most {most}")
+        check_particles(problems, (*path, "mesh_size"), grid.mesh_size, wide, high)
     count = len(grid.definition) * len(grid.kinematics) * len(grid.material) * len(grid.mesh_size or "1")
     count *= sum(len(grid.load or shape.loads) for shape in shapes.values())
     if count > MOST_SHAPE_SCENES:
