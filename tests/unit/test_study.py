@@ -364,32 +364,6 @@ def test_several_problems_are_one_message(refusal):
     assert lines[5] == "... and 3 more"
 
 
-LEAVES = (
-    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=9) | st.sampled_from(["1 mm", "1 N"])
-)
-ANYTHING = st.recursive(
-    LEAVES, lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner, max_size=3)
-)
-
-
-@settings(max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(st.data())
-def test_any_value_anywhere_is_read_or_refused(load, data):
-    """No other error than a StudyError, whatever stands in place of one value of a study."""
-    config = yaml.safe_load(SMALL)
-    place = config
-    while True:
-        key = data.draw(st.sampled_from(sorted(place) if isinstance(place, dict) else range(len(place))))
-        if not isinstance(place[key], dict | list) or data.draw(st.booleans()):
-            break
-        place = place[key]
-    place[key] = data.draw(ANYTHING)
-    try:
-        load(yaml.safe_dump(config))
-    except StudyError as error:
-        assert str(error)
-
-
 # -- printed values ----------------------------------------------------------------------------------------------------
 
 HEADER = (

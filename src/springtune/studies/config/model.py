@@ -28,6 +28,10 @@ TESTED_REFERENCE = "yeoh-plane-stress"
 FURTHER_REFERENCES = (FINITE_STRAIN_REFERENCE, STRAINED_REFERENCE, TESTED_REFERENCE)
 
 
+Labels = dict[str, str | float]
+"""Label of a cell of the dataset, by dimension."""
+
+
 @dataclass(frozen=True)
 class MeshSpec:
     """A mesh of a study, with `mesh_size` [m]; `unit` is that of the file's coordinates [m]."""
@@ -52,7 +56,7 @@ class MeshSpec:
         return f"{self.beam.name}_{self.mesh_type}_{1e3 * self.mesh_size:g}mm"
 
     @cached_property
-    def labels(self) -> dict[str, str | float]:
+    def labels(self) -> Labels:
         """Labels of its cell of the dataset."""
         return {"beam": self.beam.name, "mesh_type": self.mesh_type, "mesh_size": self.mesh_size}
 
@@ -71,6 +75,12 @@ class SceneSpec:
     definition: str
     kinematics: str
     stiffness_scale: float = 1.0
+
+    def labels(self, swept: Iterable[str]) -> Labels:
+        """Labels of its cell of the dataset."""
+        own = {"material": self.material.name, "load": self.load, "definition": self.definition}
+        values = {name: swept_value(self, self.mesh.beam, name) for name in swept}
+        return {**self.mesh.labels, **own, "kinematics": self.kinematics, **values}
 
     @cached_property
     def _hash(self) -> int:
@@ -93,6 +103,11 @@ class CurveSpec:
     force: float
     kinematics: str
 
+    def labels(self, swept: Iterable[str]) -> Labels:
+        """Labels of its cell of the dataset."""
+        found = self.mesh.labels | {"material": self.material.name, "load": self.load, "kinematics": self.kinematics}
+        return found | {name: swept_value(self, self.mesh.beam, name) for name in swept if name != "stiffness_scale"}
+
 
 @dataclass(frozen=True)
 class Reference:
@@ -102,6 +117,11 @@ class Reference:
     material: Material
     load: str
     force: float
+
+    def labels(self, swept: Iterable[str]) -> Labels:
+        """Labels of its cell of the dataset."""
+        found: Labels = {"beam": self.beam.name, "material": self.material.name, "load": self.load}
+        return found | {name: swept_value(self, self.beam, name) for name in swept if name != "stiffness_scale"}
 
 
 @dataclass(frozen=True)
@@ -211,20 +231,7 @@ class Study:
 
     def labels(self, one: SceneSpec | CurveSpec | Reference) -> dict[str, str | float]:
         """Labels of the dataset cell of a scene, curve or reference."""
-        found: dict[str, str | float]
-        if isinstance(one, Reference):
-            beam = one.beam
-            found = {"beam": beam.name, "material": one.material.name, "load": one.load}
-        else:
-            beam = one.mesh.beam
-            found = one.mesh.labels | {"material": one.material.name, "load": one.load}
-            if isinstance(one, SceneSpec):
-                found["definition"] = one.definition
-            found["kinematics"] = one.kinematics
-        for name in self.swept:
-            if name != "stiffness_scale" or isinstance(one, SceneSpec):
-                found[name] = swept_value(one, beam, name)
-        return found
+        return one.labels(self.swept)
 
     def name_of(self, scene: SceneSpec) -> str:
         """Readable name of a scene, unique in the study."""
