@@ -287,7 +287,7 @@ class TestCommand:
         monkeypatch.chdir(tmp_path)
         for name in ("one", "other"):
             written(made(), tmp_path / f"results/{name}/dataset.nc")
-        for pair in (("one", "other"), ("results/one", "config/other.yaml"), ("results/one/dataset.nc", "other")):
+        for pair in (("one", "other"), ("results/one/dataset.nc", "results/other")):
             assert run("diff", *pair).exit_code == 0
 
     @pytest.mark.parametrize(("arguments", "said"), refused_calls("diff"))

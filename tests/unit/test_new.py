@@ -153,14 +153,6 @@ class TestNew:
         refused(result, 1 if given == "none/mine" else 2, said)
         assert {path for path in checkout.rglob("*.yaml")} == before
 
-    def test_a_place_outside_of_the_folder_is_told_in_full(self, checkout, monkeypatch):
-        (checkout / "inner").mkdir()
-        monkeypatch.chdir(checkout / "inner")
-        said = run("new", "../mine").stdout.splitlines()
-        assert said[0] == f"written outside of this folder: {(checkout / 'mine.yaml').resolve()}"
-        assert said[1].startswith("../mine.yaml: 2 scenes; ") and (checkout / "mine.yaml").is_file()
-        assert "outside" not in run("new", "here").stdout
-
     def test_a_place_that_takes_no_file_is_told(self):
         refused(run("new", "/proc/self/mine"), 1, "/proc/self/mine.yaml: cannot be written: ", "; name another place")
 

@@ -26,14 +26,10 @@ def examples(*lines: str) -> str:
     return "\n".join(["\b", "Examples:", *(f"  {line}" for line in lines)])
 
 
-WRONG, FAILED = 2, 1
-"""Exit codes: an option is wrong; the request cannot be met."""
-
-
 class WrongCall(click.ClickException):
     """A command was called with wrong options."""
 
-    exit_code = WRONG
+    exit_code = 2
 
 
 COMMANDS = {

@@ -10,7 +10,7 @@ import click
 from ..safe_io.escapes import clipped, shown
 from ..safe_io.tables import aligned
 from ..studies.output.text import cell_text, paragraphs, variable_name
-from . import examples
+from . import WrongCall, examples
 from .options import dataset_path
 
 if TYPE_CHECKING:
@@ -20,15 +20,6 @@ ROWS = 20
 """Rows of a table."""
 
 COMPARED = ("before", "after")
-
-DIFFERENT, TROUBLE = 1, 2
-"""Exit codes, as those of diff."""
-
-
-class Trouble(click.ClickException):
-    """Nothing could be compared."""
-
-    exit_code = TROUBLE
 
 
 def tolerance(context: click.Context, parameter: click.Parameter, given: str | None) -> float | None:
@@ -95,9 +86,9 @@ def diff(
             found = compare(one, other, given, groups, ignored, most)
             click.echo(comparison_text(found, paths, most, config))
     except (OSError, ValueError) as error:
-        raise Trouble(shown(error)) from None
+        raise WrongCall(shown(error)) from None
     if found.different:
-        raise click.exceptions.Exit(DIFFERENT)
+        raise click.exceptions.Exit(1)
 
 
 def comparison_text(found: "Comparison", paths: Sequence[Path], most: int | None = ROWS, config: bool = False) -> str:

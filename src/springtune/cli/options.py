@@ -376,21 +376,14 @@ RESULTS_FOLDER, DATASET = Path("results"), "dataset.nc"
 
 
 def dataset_path(given: str) -> Path:
-    """Path of the dataset of a study, folder or file."""
-    from ..studies.runs.locks import check_claim
-
-    path = Path(given)
-    if path.suffix in (".yaml", ".yml"):
-        config, path = path, RESULTS_FOLDER / path.stem
-        check_claim(path, config)
-    for file in (path, path / DATASET, RESULTS_FOLDER / path / DATASET):
+    """Path of the dataset of a study's name, folder or file."""
+    for file in (Path(given), Path(given, DATASET), RESULTS_FOLDER / given / DATASET):
         if file.is_file():
             return file
-    known = sorted(file.parent.name for file in RESULTS_FOLDER.glob(f"*/{DATASET}"))
-    there = f"here are {', '.join(known)}" if known else "none is in results/ here"
+    known = ", ".join(sorted(file.parent.name for file in RESULTS_FOLDER.glob(f"*/{DATASET}"))) or "none"
     raise ValueError(
         f"{given}: there is no such dataset; run the study, or give a dataset.nc, results/<study> or a study's name; "
-        f"{there}"
+        f"in results/ here: {known}"
     )
 
 

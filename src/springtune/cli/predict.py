@@ -255,10 +255,8 @@ def springs(
     from ..handover.simulation import EquilibriumWarning
 
     check_target("--out", target)
-    if sheet.shape is None and (load is None) != (force is None):
-        if load is None:
-            raise ValueError(f"--force: '{force}' is of no load; give --load such as traction, or leave --force out")
-        raise ValueError(f"--force: missing; give the size of the force of --load {load}, such as '400 kN'")
+    if load is None and force is not None:
+        raise ValueError(f"--force: '{force}' is of no load; give --load such as traction, or leave --force out")
     net = _net(sheet.asked(load), definition, stiffness=stiffness, force=force, scale=scale)
     with writing("--out", target), warnings.catch_warnings(record=True) as heard:
         warnings.simplefilter("always", EquilibriumWarning)

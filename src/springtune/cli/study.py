@@ -39,8 +39,6 @@ def new(study: str, shape: bool) -> None:
     except OSError as error:
         why = error.strerror or error
         raise click.ClickException(f"{path}: cannot be written: {why}; name another place") from None
-    if not path.resolve().is_relative_to(Path.cwd().resolve()):
-        click.echo(f"written outside of this folder: {path.resolve()}")
     scenes = 4 if shape else 2
     click.echo(f"{path}: {scenes} scenes; change it as you like, and run it:\n  springtune run {path}")
 
