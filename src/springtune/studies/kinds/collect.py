@@ -10,7 +10,7 @@ from springtune.registry import imported
 from springtune.safe_io import atomic
 
 from ..config.kind import kinds, outputs
-from ..output import dataset, summary
+from ..output import dataset, summing_up, text
 from ..runs import job, provenance, rerun
 from ..runs.keys import CODE_FILE, OURS
 from ..runs.plan import plan
@@ -33,8 +33,8 @@ def run(study: "Study", config: str | Path, folder: Path, output: Path) -> None:
         raise SystemExit(str(error)) from None
     except OSError as error:  # the message says it all
         raise SystemExit(str(error)) from None
-    told = output.with_name(summary.FILE)
-    atomic.write_text(told, summary.text(groups, study.title))
+    told = output.with_name(text.FILE)
+    atomic.write_text(told, summing_up.text(groups, study.title))
 
 
 def main(config: str, folder: str, output: str, record: str, digest: str) -> None:

@@ -1,164 +1,20 @@
-"""Summary of a run: solved cells, failures with reasons, worst errors, result paths.
-
-The stage `collect` writes `text` beside the dataset; Snakemake's process adds facts of the run (`ending`, `broken`)
-without xarray.
-"""
+"""Summary of a run: what Snakemake's process adds to the stored summary of the dataset, see `summing_up.text`."""
 
 import json
 import os
 import time
-from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from springtune.problem.status import Status
-from springtune.safe_io.escapes import shown
 from springtune.safe_io.tables import aligned
 
 from ..runs import rerun
 from ..runs.plan import Plan
 from ..runs.workload import clock, results_of
-from .selection import judged, of_own_law
-from .text import place_text, sign_text, without_numbers
+from .text import FILE, HOLES
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from ..config.model import Study
-
-FILE = "summary.txt"
-
-NAMED = 3
-"""Cells named for each status; more if fewer than two would remain."""
-
-WORST = 8
-"""Most definitions with a worst error."""
-
-HOLES = "Not everything is solved"
-
-SCENES = "/"
-
-
-FINITE = "/finite_strain"
-"""Group of references for nonlinear kinematics."""
-
-
-REFERRED = {"status", "reference_displacement", "reference_applies", "reference_message"}
-"""Variables of groups that compare scenes with small-strain references."""
-
-
-def text(groups: "Mapping[str, xr.Dataset]", title: str) -> str:
-    """Summarise a study's cells."""
-    states = [state for name, data in groups.items() for state in _states(name, data)]
-    rows = [[what, str(sum(found.values())), _parts(found)] for what, found, _ in states if found]
-    lines = [title, "", aligned(rows, left=2, right=(1,))]
-    lines += _worst(groups[SCENES], groups.get(FINITE)) if SCENES in groups else ()
-    for name, data in groups.items():
-        if REFERRED <= set(data):
-            lines += _unreferenced(data, "scenes" if name == SCENES else name.strip("/"))
-    holes = [(what, found, lost) for what, found, lost in states if lost]
-    for what, found, lost in holes:
-        for status, cells in lost.items():
-            lines += ["", f"{what}, {_words(status)}: {len(cells)} of {sum(found.values())}", *_named(cells)]
-    if holes:
-        told = "; ".join(
-            f"{sum(map(len, lost.values()))} of {sum(found.values())} {what}" for what, found, lost in holes
-        )
-        lines += ["", f"{HOLES}: {told}. dataset.nc names each, and why: `status`, `message`."]
-    return "\n".join(lines) + "\n"
-
-
-Cells = list[tuple[str, str]]
-
-
-def _states(name: str, data: "xr.Dataset") -> Iterator[tuple[str, dict[Status, int], dict[Status, Cells]]]:
-    """For each status variable: its subject, counts by flag, and unsolved cells."""
-    for variable in data.data_vars.values():
-        label = str(variable.name)
-        message = label.removesuffix("status") + "message"
-        if not label.endswith("status") or message not in data or data[message].dims != variable.dims:
-            continue
-        flags = variable.values
-        found = {status: int((flags == status).sum()) for status in Status if status != Status.NOT_REQUESTED}
-        lost: dict[Status, Cells] = {
-            status: [
-                (place_text(data, variable.dims, place), str(data[message].values[tuple(place)]))
-                for place in np.argwhere(flags == status)
-            ]
-            for status, number in found.items()
-            if number and status != Status.SOLVED
-        }
-        part = label.removesuffix("status").strip("_").replace("_", " ")
-        what = "scenes" if name == SCENES else ", ".join(filter(None, (name.strip("/"), part)))
-        yield what, {status: number for status, number in found.items() if number}, lost
-
-
-def _words(status: Status) -> str:
-    return str(status).replace("_", " ")
-
-
-def _parts(found: Mapping[Status, int]) -> str:
-    return ", ".join(f"{number} {_words(status)}" for status, number in found.items())
-
-
-def _named(cells: Cells) -> Iterator[str]:
-    """Some cells, first one for each reason, and the number of others."""
-    reasons: dict[str, Cells] = {}
-    for cell in cells:
-        reasons.setdefault(without_numbers(cell[1]), []).append(cell)
-    order = [*(alike[0] for alike in reasons.values()), *(cell for alike in reasons.values() for cell in alike[1:])]
-    told = order if len(order) <= NAMED + 1 else order[:NAMED]
-    for labels, message in told:
-        yield f"  {shown(': '.join(filter(None, (labels, message))))}"
-    if len(told) < len(order):
-        yield f"  and {len(order) - len(told)} more"
-
-
-def _worst(root: "xr.Dataset", finite: "xr.Dataset | None" = None) -> Iterator[str]:
-    """Largest error of each definition over solved scenes with a valid reference."""
-    errors = judged(root, finite)
-    places = np.argwhere(np.isfinite(errors.values))
-    values, axis = errors.values[tuple(places.T)], errors.dims.index("definition")
-    found = []
-    for number in np.unique(places[:, axis]).tolist():
-        own = np.flatnonzero(places[:, axis] == number)
-        worst = own[np.argmax(abs(values[own]))]
-        others = [dim for dim in errors.dims if dim != "definition"]
-        where = place_text(root, others, np.delete(places[worst], axis).tolist())
-        error = float(values[worst])
-        found.append(
-            (error, sign_text(root, error, errors.dims, places[worst]), str(root.definition.values[number]), where)
-        )
-    found.sort(key=lambda row: -abs(row[0]))
-    if found:
-        scenes = "the one scene that has one" if len(places) == 1 else f"the {len(places)} scenes that have one"
-        head = "worst deformation error, (network - reference) / |reference|, of each definition"
-        yield from ("", f"{head}, of {scenes}")
-        if finite is not None and of_own_law(finite) is not None:
-            yield "  nonlinear networks against finite strain, linear ones against small strain"
-        rows = [[name, f"{100 * error:+.2f} %", word, where] for error, word, name, where in found[:WORST]]
-        yield aligned(rows, 2, right=(1,))
-    if len(found) > WORST:
-        yield f"  and of {len(found) - WORST} more at most {100 * abs(found[WORST][0]):.2f} %"
-
-
-def _unreferenced(root: "xr.Dataset", called: str) -> Iterator[str]:
-    """Missing or inapplicable references with their scenes."""
-    requested, there = root.status != Status.NOT_REQUESTED, root.reference_displacement.notnull()
-    beyond = root.status.isin((Status.SOLVED, Status.UNSTABLE)) & there & (root.reference_applies == 0)
-    for scenes, what in (
-        (requested & ~there, "without a reference, and so without an error"),
-        (beyond, "beyond small strain, so the error is not the network's alone"),
-    ):
-        if not scenes.any():
-            continue
-        few = scenes.any([dim for dim in scenes.dims if dim not in root.reference_message.dims])
-        few = few.transpose(*root.reference_message.dims)
-        messages = root.reference_message.values
-        cells = [(place_text(root, few.dims, place), str(messages[tuple(place)])) for place in np.argwhere(few.values)]
-        yield from ("", f"{called} {what}: {int(scenes.sum())} of {int(requested.sum())}", *_named(cells))
 
 
 def ending(study: "Study", plan: Plan, since: float) -> str:

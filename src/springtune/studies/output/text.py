@@ -14,6 +14,13 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
+FILE = "summary.txt"
+"""Summary of a dataset beside it."""
+
+HOLES = "Not everything is solved"
+"""How its last line begins where scenes are not solved."""
+
+
 def paragraphs(parts: Iterable[Iterable[str]]) -> str:
     """Join paragraphs of lines, escaping line breaks in values."""
     return "\n\n".join("\n".join(map(shown, lines)) for lines in parts)
