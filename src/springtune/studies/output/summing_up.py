@@ -112,7 +112,8 @@ def _errors(root: xr.Dataset, finite: xr.Dataset | None, most: int | None) -> It
     by = [name for name in ("definition", "kinematics") if name in errors.dims]
     found = []
     for labels in product(*(errors[name].values.tolist() for name in by)):
-        own, here = (one.sel(dict(zip(by, labels))) for one in (root, errors))
+        cell = dict(zip(by, labels))
+        own, here = root.sel(cell), errors.sel(cell)
         sizes = np.abs(here.values)
         if np.isfinite(sizes).any():
             place = [int(at) for at in np.unravel_index(np.nanargmax(sizes), sizes.shape)]
