@@ -713,8 +713,8 @@ def of_parts(given: Mapping[str, AnyMaterial], parts: Sequence[str]) -> dict[str
     >>> of_parts({"": steel}, ["core", "rim"])
     Traceback (most recent call last):
     ...
-    ValueError: material: one is given, and the body has the parts 'core', 'rim'; name those of other materials, such \
-as {'': ..., 'core': ...}; a study has them under 'parts', in Python `study.materials_of(shape, material)`
+    ValueError: material: one is given, and the body has the parts 'core', 'rim'; name those of others, such \
+as {'': ..., 'core': ...}, as `study.materials_of` does
     """
     names = ", ".join(map(repr, parts))
     if len(parts) > 1 and not any(given):
@@ -739,7 +739,7 @@ def only_isotropic(material: AnyMaterial, remedy: str) -> Material:
     >>> only_isotropic(AnisotropicMaterial(9e9, 4e9, 1.5e9, 2e9, name="board"), "take another")
     Traceback (most recent call last):
     ...
-    ValueError: material: 'board' is anisotropic, and beams are of isotropic ones, as their references; take another
+    ValueError: material: 'board' is anisotropic, and beams are of isotropic ones; take another
     """
     if not isinstance(material, Material):
         raise ValueError(f"material: {material.name!r} is anisotropic, and beams are of isotropic ones; {remedy}")
