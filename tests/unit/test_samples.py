@@ -93,12 +93,6 @@ class TestDesigns:
     }
 
     @pytest.mark.parametrize("design", DESIGNS)
-    def test_a_doubled_sample_begins_with_the_sample_bit_for_bit(self, design):
-        first, doubled = (designs.draw(design, 3, self.PARAMETERS, 0, size) for size in (64, 128))
-        for name, values in first.items():
-            assert doubled[name][: len(values)].tobytes() == values.tobytes()
-
-    @pytest.mark.parametrize("design", DESIGNS)
     def test_a_task_draws_its_part_of_the_sample(self, design):
         parts = [designs.draw(design, 3, self.PARAMETERS, *ends) for ends in blocks(design, 256)]
         together = designs.draw(design, 3, self.PARAMETERS, 0, 256)

@@ -10,7 +10,6 @@ from pydantic import Field, GetCoreSchemaHandler, create_model
 from pydantic_core import CoreSchema, core_schema
 
 from springtune.mesh import MESH_TYPES
-from springtune.mesh.types import MOST_MESHED
 from springtune.problem.geometry import warn_of_size, warn_of_thickness
 from springtune.problem.loads import LOADS
 from springtune.problem.parameters import MOST_SCENES
@@ -18,7 +17,7 @@ from springtune.problem.quantities import LEAST
 from springtune.safe_io.tables import number_text
 from springtune.springs import DEFINITIONS
 
-from ...config.checks import MORE_SCENES, check_able, in_mm, most_scenes
+from ...config.checks import MORE_SCENES, check_able, check_particles, in_mm, most_scenes
 from ...config.fields import (
     POISSON_RATIO,
     DefinitionNames,
@@ -298,23 +297,14 @@ def _check_sizes(sample, problems):
     name = "relative_mesh_size" if "relative_mesh_size" in sample.parameters else "mesh_size"
     path, relative = ("samples", "parameters", name), name == "relative_mesh_size"
     size, length, height = (sample.parameters[one] for one in (name, "length", "height"))
-    if relative:
-        largest = size["high"] * height["high"]
-        if largest > length["low"]:
-            problems.add(path, f"{size['high']:g} of a height of {in_mm(height['high'])} is {in_mm(largest)}, larger "
-                         f"than a length of {in_mm(length['low'])}; give a smaller 'to', or longer beams")  # fmt: skip
-    else:
-        largest, side = size["high"], min(length["low"], height["low"])
-        if largest > side:
-            problems.add(path, f"up to {in_mm(largest)} is larger than the smallest side of a beam, {in_mm(side)}; "
-                         f"give at most {in_mm(side)}, or a 'relative_mesh_size'")  # fmt: skip
-    box = length["high"], height["low" if relative else "high"]
+    largest = size["high"] * (height["high"] if relative else 1.0)
+    side = length["low"] if relative else min(length["low"], height["low"])
+    if largest > side:
+        remedy = "a smaller 'to', or longer beams" if relative else f"at most {in_mm(side)}, or a 'relative_mesh_size'"
+        what = f"up to {in_mm(largest)} is larger than the smallest side of a beam, {in_mm(side)}"
+        problems.add(path, f"{what}; give {remedy}")
     smallest = size["low"] * (height["low"] if relative else 1.0)
-    particles = MESH_TYPES[sample.mesh_type].particles(*box, smallest) if smallest**2 else float("inf")
-    if particles > MOST_MESHED:
-        low, beam = f"{size['low']:g}" if relative else in_mm(size["low"]), f"{in_mm(box[0])} x {in_mm(box[1])}"
-        most = f"more than {MOST_MESHED:.0e}"
-        problems.add(path, f"{low} makes {particles:.0e} particles of a beam {beam}, {most}; give a larger 'from'")
+    check_particles(problems, path, [smallest], length["high"], height["low" if relative else "high"])
 
 
 def _sample(section):

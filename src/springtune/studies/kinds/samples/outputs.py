@@ -86,22 +86,22 @@ VIEWS = (
 
 def tables(tree: "xr.DataTree") -> list[dict[str, Any]]:
     """Tables of the page, see `springtune.studies.kinds.scenes.tables.tables`."""
-    from ...output.selection import records  # here, since a plan does without xarray
-
     if "sobol" not in tree:
         return []
     found = tree["sobol"].to_dataset()
-    rows: dict[tuple[str, ...], dict[str, Any]] = {}
-    orders = [f"{order}_order{end}" for order in ("first", "total") for end in ("", "_low", "_high")]
-    for one in records(found, (found.base_samples > 0) & (found.parameter != ""), (*orders, "base_samples")):
-        if one["quantity"] == "best_stiffness":  # it is the same for all definitions
-            one["definition"] = ""
-        row = {name: one[name] for name in ("quantity", "load", "definition", "parameter", *orders, "base_samples")}
-        rows.setdefault(tuple(row.values())[:4], row)
+    labels = ["quantity", "load", "definition", "parameter"]
+    columns = [
+        *(f"{order}_order{end}" for order in ("first", "total") for end in ("", "_low", "_high")),
+        "base_samples",
+    ]
+    frame = found[columns].to_dataframe(dim_order=labels).reset_index()[[*labels, *columns]]
+    frame = frame[frame.base_samples > 0]
+    frame["definition"] = frame["definition"].mask(frame["quantity"] == "best_stiffness", "")  # one of all definitions
+    rows = frame.drop_duplicates(labels).to_dict("records")
     first, second, third = QUANTITIES.values()
     note = (
         f"{first.capitalize()}, {second} and {third}: shares of their variance by each parameter alone (first order) "
         f"and in all that it takes part in (total order). Bands: {found.attrs['bands']}. "
         f"Failures: {found.attrs['failures']}."
     )
-    return [{"stem": "sobol", "title": "Sobol indices", "note": note, "rows": list(rows.values())}]
+    return [{"stem": "sobol", "title": "Sobol indices", "note": note, "rows": rows}]

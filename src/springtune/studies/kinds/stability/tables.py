@@ -24,21 +24,9 @@ def write(tree, folder):
 def page(tree: xr.DataTree) -> str:
     """Markdown of the experiments that a dataset has."""
     data = tree["stability"].to_dataset()
-    sections = {
-        "limits": _limits,
-        "drift": _drift,
-        "rest": _rest,
-        "contrast": _contrast,
-        "poisson": _poisson,
-        "sizes": _sizes,
-        "strains": _strains,
-        "perturbation": _perturbation,
-        "slivers": _slivers,
-        "buckling": _buckling,
-    }
-    done = [name for name in sections if name in data.experiment.values]
-    parts = [line for name in done for line in (*sections[name](data), "")]
-    return "\n".join(parts)
+    sections = (_limits, _drift, _rest, _contrast, _poisson, _sizes, _strains, _perturbation, _slivers, _buckling)
+    done = [section for section in sections if section.__name__[1:] in data.experiment.values]
+    return "\n".join(line for section in done for line in (*section(data), ""))
 
 
 def _by_definition(data, variable, heads, texts):
