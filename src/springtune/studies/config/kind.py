@@ -133,8 +133,8 @@ class Stage:
 class Kind:
     """A study kind.
 
-    Its package has a module ``kind`` with ``KIND``, which imports neither scipy, xarray nor matplotlib. If each task
-    has a cell of the group in the dataset, ``variables`` declare the group; otherwise ``groups(study, folder)`` of a
+    Its package has a module ``kind`` with ``KIND``, which imports neither scipy, xarray nor matplotlib. If results
+    are rows of a group of the dataset, ``variables`` declare the group; otherwise ``groups(study, folder)`` of a
     module ``collect`` returns groups by name. A module ``outputs`` with ``OUTPUTS``, without pydantic, makes drawing
     faster.
 

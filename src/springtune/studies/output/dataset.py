@@ -141,12 +141,6 @@ class Filler:
             place = tuple(places[dimension][cells] for dimension in dimensions if dimension in places)
             array[place] = np.array(found, dtype=array.dtype)
 
-    def put_arrays(self, values: Mapping[str, object], labels: Mapping[str, Label | Sequence[Label]]) -> None:
-        """Write arrays into the cells of some labels, one or several of a dimension."""
-        for name, value in values.items():
-            array = self.data[name]
-            array.loc[{dimension: labels[str(dimension)] for dimension in array.dims if dimension in labels}] = value
-
 
 def most_requested(root: xr.Dataset, dimension: str) -> str:
     """Label of a dimension with the most requested scenes."""
