@@ -50,6 +50,18 @@ GROUPS = {
 }
 
 
+def test_rows_fill_the_cells_of_their_labels_and_no_others():
+    variables = {"error": (("load", "mesh_size"), "1", "error", np.nan), "status": (("load",), "1", "status", 0),
+                 "seconds": ((), "s", "time", np.nan)}  # fmt: skip
+    group, axes = Group("/rows", variables), {"load": ("traction", "shear"), "mesh_size": (1e-3, 2e-3)}
+    rows = [{"load": "shear", "status": 3}, {"load": "shear", "mesh_size": 2e-3, "error": 0.5}, {"seconds": 4.0}]
+    found = group.of_rows(axes, rows)
+    np.testing.assert_array_equal(found.error, [[np.nan, np.nan], [np.nan, 0.5]])
+    assert found.status.values.tolist() == [0, 3] and found.status.dtype == np.int8 and found.seconds == 4
+    with pytest.raises(KeyError):
+        group.of_rows(axes, [{"load": "bending", "status": 1}])
+
+
 def test_empty_dataset_is_all_holes_with_units():
     data = ROOT.empty(AXES)
     assert data.sizes["mesh_size"] == 2
