@@ -543,6 +543,21 @@ class TestDatasets:
         told = CliRunner().invoke(main, ["info", str(path)])
         assert told.exit_code == 1 and "is damaged, or not as springtune writes it (AttributeError" in told.stderr
 
+    @pytest.mark.parametrize(
+        "name", ["../x", "/etc/x", "a\nb", "a/b", "", "..", "one + ../x", "x" * 61, "{x}", b"\xff", [7, 8], ["a", "b"]]
+    )
+    def test_a_study_whose_name_is_no_name_is_refused(self, path, name):
+        h5py = pytest.importorskip("h5py")
+        for study in (name, "one + other"):
+            with h5py.File(path, "r+") as file:
+                file.attrs["study"] = study
+            for call in (st.open, reading.attributes):
+                if study is name:
+                    with pytest.raises(ValueError, match="dataset.nc: attribute 'study' is .*use letters, digits"):
+                        call(path)
+                else:
+                    assert getattr(found := call(path), "attrs", found)["study"] == "one + other"
+
     def links(self, name, path):
         """Change a dataset so that data of another file are in it."""
         import h5py
@@ -594,6 +609,11 @@ class TestDatasets:
             file.create_dataset(name, shape, "f8", external=[("/etc/passwd", 0, h5py.h5f.UNLIMITED)])
         with pytest.raises(MeshError, match="'tstt/nodes/coordinates' is stored outside of the file, in '/etc/passwd'"):
             read_beam_mesh(mesh, 0.1, 0.02)
+        with h5py.File(mesh, "r+") as file:
+            file["elsewhere"] = h5py.SoftLink("/tstt/nodes")
+            del file["tstt/nodes/coordinates"]
+        with pytest.raises(MeshError, match="'elsewhere' is a soft link; it is not followed: write the array"):
+            read_beam_mesh(mesh, 0.1, 0.02)
 
     @pytest.mark.parametrize("place", ["/etc/plate.h5", "../plate.h5", "plate.h5"])
     def test_xdmf_is_refused_wherever_its_numbers_are(self, tmp_path, place):
@@ -632,6 +652,16 @@ class TestDatasets:
         told = CliRunner().invoke(main, ["info", str(path)])
         assert told.exit_code == 1 and isinstance(told.exception, SystemExit), told.output
         assert len(told.output.splitlines()) == 1 and str(path) in told.output and says in told.output
+
+    @pytest.mark.parametrize("first, end", [(16, 32), (24, 26), (16, 18)])
+    def test_a_heap_that_never_ends_is_refused(self, path, first, end):
+        """HDF5 reads it for ever."""
+        content = bytearray(path.read_bytes())
+        at = content.index(b"GCOL")
+        content[at + first : at + end] = bytes(end - first)
+        path.write_bytes(content)
+        with pytest.raises(ValueError, match="the heap at byte|cannot be read|damaged"):
+            st.open(path)
 
     def test_a_gigabyte_is_the_most_that_a_small_dataset_says_it_holds(self, path):
         """A chunk is read as one, so that a single number of it took a gigabyte and more."""
