@@ -30,6 +30,7 @@ from springtune.mesh import (
 )
 from springtune.mesh.formats import read_shape
 from springtune.safe_io.inputs import virtual_memory
+from springtune.studies.output import reading
 from springtune.studies.output.browse.page import page
 from springtune.studies.output.dataset import write
 
