@@ -92,13 +92,11 @@ def plan_and_note(config: str) -> None:
     """Plan a study, write its tasks and note what later steps are called with."""
     from springtune.studies.kinds import load_study
     from springtune.studies.runs import rerun
-    from springtune.studies.runs.keys import CODE_FILE, OURS
     from springtune.studies.runs.plan import plan
 
     loaded = load_study(config)
     made = plan(loaded, Path("results") / loaded.name, 2)
     made.write()
-    OURS.remember(Path("results") / CODE_FILE)
     jobs = rerun.jobs(loaded, made)
     found = {"scenes": len(loaded.scenes), "jobs": len(jobs), "digest": jobs[rerun.COLLECT].digest}
     found["stages"] = {name: [job.stage.name, job.digest] for name, job in made.jobs.items()}

@@ -15,7 +15,6 @@ sys.path.append(str(Path(__file__).parents[1] / "unit"))  # for `campaigns`, whe
 
 from springtune.mesh import MESH_TYPES
 from springtune.studies.runs import job, rerun
-from springtune.studies.runs.keys import CODE_FILE, OURS
 
 from campaigns import Campaign
 
@@ -52,7 +51,6 @@ class Run(Campaign):
         names, solved = self.due(), {}
         if names:
             self.plan.write()
-            OURS.remember(FOLDER.parent / CODE_FILE)
         for name in names:
             self.do(name)
             computed = json.loads(self.jobs[name].record.read_text()).get("computed", 0)

@@ -3,7 +3,6 @@
 import ast
 import importlib.metadata
 import inspect
-import json
 import sys
 from pathlib import Path
 
@@ -13,12 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from springtune.mesh import MESH_TYPES
-from springtune.safe_io.atomic import write_json
 from springtune.springs import DEFINITIONS, Springs, definition
 from springtune.studies.runs import keys
 from springtune.studies.runs.keys import read
 from springtune.studies.runs.plan import stages
-from springtune.studies.runs.source import hash_of
 
 TABLES = yaml.safe_load(Path(__file__).with_name("code_changes.yaml").read_text())
 MODULE, TREE = TABLES["module"], TABLES["package"]
@@ -102,43 +99,6 @@ def test_a_template_counts_with_the_module_of_its_name(package, tmp_path):
         files, _, digest = package("a", **texts)
         assert files == {"a.py", "b.py", "templates/b.xml.jinja"} and digest not in digests
         digests.add(digest)
-
-
-def test_what_was_read_is_taken_from_a_note_where_it_is_the_same(tmp_path):
-    folder, note = tmp_path / "springtune", tmp_path / "code.json"
-    folder.mkdir()
-    for name, text in {
-        "a": "from .b import x\nimport numpy",
-        "b": "from .c import *\nfrom .d import y",
-        "c": "",
-        "d": "",
-    }.items():
-        (folder / f"{name}.py").write_text(text)
-
-    def closure(recall=True):
-        code = keys.Code(folder)
-        if recall:
-            code.recall(note)
-        found = code.closure(folder / "a.py")
-        code.remember(note)
-        return found
-
-    fresh = closure(recall=False)
-    time = note.stat().st_mtime_ns
-    assert closure() == fresh and note.stat().st_mtime_ns == time
-    # Another digest in the note shows that it is taken, and only for the content that it was made of.
-    _, sources = json.loads(note.read_text())
-    for source in sources.values():
-        source[0] = "taken"
-    write_json(note, [hash_of(keys.READER, sources), sources])
-    assert closure().digest != fresh.digest
-    write_json(note, [hash_of("another reader", sources), sources])
-    assert closure() == fresh
-    note.write_text("{")
-    assert closure() == fresh
-    for name in "abcd":
-        (folder / f"{name}.py").write_text((folder / f"{name}.py").read_text() + "\nz = 1\n")
-    assert closure() == closure(recall=False) != fresh
 
 
 # -- what springtune runs on -------------------------------------------------------------------------------------------

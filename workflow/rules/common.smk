@@ -12,7 +12,6 @@ from springtune.studies.config.kind import FORMATS
 from springtune.studies.config.messages import StudyError
 from springtune.studies.kinds import load_study
 from springtune.studies.runs import locks, rerun, workload
-from springtune.studies.runs.keys import CODE_FILE, OURS
 from springtune.studies.runs.plan import plan
 
 
@@ -56,7 +55,6 @@ RESULTS = Path("results") / STUDY.name
 if not MODULE:
     config |= {"title": rst(STUDY.title), "results": str(RESULTS)}  # for the report's text
 
-OURS.recall(RESULTS.parent / CODE_FILE)
 PLAN = plan(STUDY, RESULTS, cluster=ON_CLUSTER or IS_CHILD)
 JOBS = rerun.jobs(STUDY, PLAN)
 gc.freeze()

@@ -21,7 +21,6 @@ def begin():
             remove_unfinished(one.folder.parent, below=False)  # of what studies share
             locks.claim(one.folder, study.path)
             one.write()
-        OURS.remember(RESULTS.parent / CODE_FILE)
     except locks.LockedError as error:
         raise WorkflowError(str(error)) from None
     except OSError as error:

@@ -15,12 +15,10 @@ has its name, such as ``templates/mujoco.xml.jinja`` with ``mujoco``.
 import ast
 import hashlib
 import inspect
-import json
 import os
 import sys
 import textwrap
 from collections.abc import Iterable, Mapping
-from contextlib import suppress
 from dataclasses import asdict
 from functools import cache
 from importlib.util import find_spec
@@ -29,7 +27,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from springtune.mesh import MESH_TYPES
 from springtune.registry import Declared, full_name, plugin_packages
-from springtune.safe_io.atomic import write_json
 from springtune.springs import DEFINITIONS
 
 from .source import PACKAGE, hash_of
@@ -65,11 +62,10 @@ def read(text: str | bytes, package: str = "") -> Source:
     frozenset({(0, 'numpy', 'pi')})
     """
     tree = ast.parse(text)
-    reader = _Reader()
-    reader.read(tree)
+    reader = _ForComputing()
+    bare = ast.dump(reader.visit(tree))
     imports = reader.imports | (_attributes(tree, package) if package else set())
-    digest = hashlib.sha256("\n".join(reader.parts).encode()).hexdigest()
-    return Source(digest, frozenset(imports), _face(tree))
+    return Source(_mark(bare.encode()), frozenset(imports), _face(tree))
 
 
 def _face(tree: ast.Module) -> dict[str, Import] | None:
@@ -116,56 +112,24 @@ def _for_type_checkers(node: ast.If) -> bool:
     return "TYPE_CHECKING" in (getattr(test, "id", ""), getattr(test, "attr", ""))
 
 
-class _Reader:
-    """Read a syntax tree as text, and its imports."""
-
-    SKIPPED = ("ctx", "kind", "type_comment")  # follow from the rest, or are said for readers
+class _ForComputing(ast.NodeTransformer):
+    """Remove docstrings, `pass` and type-checking code from a tree; note imports that can run."""
 
     def __init__(self) -> None:
-        self.parts: list[str] = []
         self.imports: set[Import] = set()
-        self.fields: dict[type, tuple[str, ...]] = {}
 
-    def read(self, node: object) -> None:
-        add = self.parts.append
-        kind = node.__class__
-        # The first four are most of what there is.
-        if kind is ast.Name:
-            add(node.id)  # type: ignore[attr-defined]
-        elif kind is ast.Attribute:
-            self.read(node.value)  # type: ignore[attr-defined]
-            add(f".{node.attr}")  # type: ignore[attr-defined]
-        elif kind is ast.Constant:
-            add(f"={node.value!r}")  # type: ignore[attr-defined]
-        elif kind is list:
-            add("[")
-            for one in node:  # type: ignore[attr-defined]
-                self.read(one)
-            add("]")
-        elif isinstance(node, ast.AST):
-            if isinstance(node, ast.stmt):
-                if _says_nothing(node):
-                    return
-                if isinstance(node, ast.If) and _for_type_checkers(node):
-                    for one in node.orelse:
-                        self.read(one)
-                    return
-                if isinstance(node, ast.Import):
-                    self.imports |= {(0, alias.name, "") for alias in node.names}
-                elif isinstance(node, ast.ImportFrom):
-                    self.imports |= {(node.level, node.module or "", alias.name) for alias in node.names}
-            add(f"({kind.__name__}")
-            fields = self.fields.get(kind)
-            if fields is None:
-                fields = self.fields[kind] = tuple(name for name in node._fields if name not in self.SKIPPED)
-            for name in fields:
-                value = getattr(node, name, None)
-                if value is not None and value != []:
-                    add(name)
-                    self.read(value)
-            add(")")
-        else:
-            add(repr(node))
+    def visit(self, node: ast.AST) -> Any:
+        if _says_nothing(node):
+            return None
+        if isinstance(node, ast.If) and _for_type_checkers(node):
+            return [kept for one in node.orelse if (kept := self.visit(one))]
+        if isinstance(node, ast.Import):
+            self.imports |= {(0, alias.name, "") for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            self.imports |= {(node.level, node.module or "", alias.name) for alias in node.names}
+        elif isinstance(node, ast.Constant):
+            node.kind = None  # u"" is ""
+        return self.generic_visit(node)
 
 
 NOT_COUNTED = {
@@ -181,9 +145,6 @@ NOT_COUNTED = {
     ("units.py", "pint"): "what a study says with units is in the parameters as numbers",
 }
 """Packages that do not influence results, and why."""
-
-CODE_FILE = "code.json"
-"""Cache of parsed source, beside the folders of studies."""
 
 DISTRIBUTIONS = {"PIL": "pillow", "netgen": "netgen-mesher", "skfem": "scikit-fem", "yaml": "pyyaml"}
 """Distributions with another name than their package; looking one up takes a third of a second."""
@@ -202,32 +163,9 @@ class Code:
 
     def __init__(self, package: Path = PACKAGE) -> None:
         self.package = package
-        self._known: dict[str, list[Any]] = {}
         self._sources: dict[Path, Source] = {}
         self._closures: dict[tuple[Path, frozenset[Path], str], Closure] = {}
         self._taken: dict[Path, tuple[set[Path], set[tuple[str, str]]]] = {}
-
-    @property
-    def files(self) -> frozenset[Path]:
-        """Files of all closures so far."""
-        return frozenset(self._sources)
-
-    def recall(self, path: Path) -> None:
-        """Reuse cached source with the same content; parsing takes half of planning."""
-        with suppress(OSError, ValueError, LookupError, TypeError):
-            seal, sources = json.loads(path.read_bytes())
-            if seal == hash_of(READER, sources):
-                self._known = sources
-
-    def remember(self, path: Path) -> None:
-        """Write the cache for `recall`."""
-        read_now = {
-            _mark(file.read_bytes()): [source.digest, sorted(source.imports), source.face]
-            for file, source in self._sources.items()
-            if self._has(file)
-        }
-        if not read_now.keys() <= self._known.keys():
-            write_json(path, [hash_of(READER, read_now), read_now])
 
     def closure(self, start: Path, without: frozenset[Path] = frozenset(), counted: str = "") -> Closure:
         """A file and all its direct and indirect imports."""
@@ -272,16 +210,11 @@ class Code:
 
     def _source(self, path: Path) -> Source:
         if path not in self._sources:
-            content, ours = path.read_bytes(), self._has(path)
-            known = self._known.get(_mark(content)) if ours else None
-            if known:
-                digest, imports, face = known
-                names = None if face is None else {name: _import(one) for name, one in face.items()}
-                self._sources[path] = Source(digest, frozenset(map(_import, imports)), names)
-            elif path.suffix == ".jinja":
+            content = path.read_bytes()
+            if path.suffix == ".jinja":
                 self._sources[path] = Source(_mark(content), frozenset(), None)
             else:
-                self._sources[path] = read(content, "" if ours else self.package.name)
+                self._sources[path] = read(content, "" if self._has(path) else self.package.name)
         return self._sources[path]
 
     def _has(self, path: Path) -> bool:
@@ -339,17 +272,9 @@ class Code:
         return root and root.joinpath(*parts[1:])
 
 
-def _import(parts: list[Any]) -> Import:
-    level, module, name = parts
-    return level, module, name
-
-
 def _mark(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
 
-
-READER = _mark(Path(__file__).read_bytes())
-"""Digest of the parser; caches of other parsers are ignored."""
 
 OURS = Code()
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from ..config.kind import FORMATS, kinds, modules, outputs
 from .job import RECORDS, TASKS
-from .keys import CODE_FILE, OURS, stage_key
+from .keys import stage_key
 from .plan import Plan, digest_in, plan, table_files
 from .provenance import inputs
 from .source import PACKAGE, checksum, hash_of
@@ -153,7 +153,6 @@ def outdated(study: "Study", folder: Path, cluster: bool = False) -> dict[Path, 
     """
     if not (folder / TASKS).exists():  # never run: planning 10,000 scenes takes a second
         return None
-    OURS.recall(folder.parent / CODE_FILE)
     found = jobs(study, plan(study, folder, cluster=cluster))
     faults = {job.record: why for job in found.values() if (why := fault(job, found))}
     known = {record: why for record, why in faults.items() if record.exists()}
