@@ -131,7 +131,8 @@ def test_company_does_not_matter(study, usual, tmp_path):
 
 
 @pytest.mark.parametrize("cores", [8, pytest.param(2, marks=pytest.mark.slow)])
-def test_bundles_do_not_matter(study, usual, tmp_path, cores):
+def test_bundles_do_not_matter(study, usual, tmp_path, monkeypatch, cores):
+    monkeypatch.setattr("springtune.studies.runs.plan.LEAST_SECONDS", 1e-3)
     folder = tmp_path / "results/many"
     jobs = stages(study, folder, cores)
     assert len(jobs) > len(stages(study, tmp_path / "elsewhere", 1))

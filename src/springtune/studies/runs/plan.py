@@ -39,7 +39,7 @@ def share_out(seconds: Mapping[str, float], cores: int, least: float = LEAST_SEC
     Examples
     --------
     >>> share_out({"coarse": 1.0, "fine": 4.0, "middle": 2.0}, cores=2)
-    {'0': ['fine'], '1': ['middle', 'coarse']}
+    {'0': ['fine'], '1': ['coarse', 'middle']}
     """
     total = sum(seconds.values())
     count = 4 * cores if total > MANY_SECONDS * least * cores else min(cores, ceil(total / least))
@@ -49,7 +49,7 @@ def share_out(seconds: Mapping[str, float], cores: int, least: float = LEAST_SEC
         label = min(load, key=lambda label: load[label])
         bundles.setdefault(label, []).append(name)
         load[label] += seconds[name]
-    return bundles
+    return {label: sorted(names) for label, names in bundles.items()}
 
 
 def stages() -> "tuple[Stage, ...]":

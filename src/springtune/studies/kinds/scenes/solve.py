@@ -71,11 +71,9 @@ def stored_key(scene, calibration):
 
 
 def solve(scene, shared):
-    """Result of a scene, and the seconds of deriving its springs."""
+    """Result of a scene on what scenes of its bundle share."""
     sheet, field = shared
-    derived = sheet.deriving
-    result = solved(sheet, scene, field)
-    return result | {"deriving": sheet.deriving - derived}
+    return solved(sheet, scene, field)
 
 
 def solved(sheet, scene, reference=None):

@@ -37,7 +37,6 @@ def solve(task, family):
     shape = shape_of(described, task["thickness"], task["load"])
     chosen = {"definition": task["definition"], "kinematics": task["kinematics"]}
     sheet = sheets.get(shape.thickness)
-    derived = sheet.deriving if sheet else 0.0
     try:
         check_case(grouped, shape.loads[ONE_LOAD])
         scene = Scene(shape, grouped, materials_of(task["materials"]), ONE_LOAD, sheet=sheet, **chosen)
@@ -54,7 +53,6 @@ def solve(task, family):
         "message": found.message,
         "seconds": found.seconds,
         "definition_seconds": found.definition_seconds,
-        "deriving": scene.sheet.deriving - derived,
         "negative_pivots": found.negative_pivots,
         "values": by_key(found.values, shape.loads[ONE_LOAD]),
     }
