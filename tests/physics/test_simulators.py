@@ -414,7 +414,7 @@ def test_the_command_writes_for_a_version_and_says_so(tmp_path):
     assert model.nkey == 1 and model.nu == 1
     out.unlink()
     for options, said in (
-        ("--mujoco 5", "--mujoco: 5 is no version of MuJoCo"),
+        ("--mujoco 5", "Error: --mujoco: 5 is no version of MuJoCo"),
         ("--definition area", "--definition 'area': has energies of areas"),
     ):
         done = CliRunner().invoke(main, [*words, *options.split()])

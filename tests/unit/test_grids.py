@@ -363,8 +363,8 @@ def test_tables_have_a_row_of_each_value(swept):
     tree, _, _ = swept
     (table,) = tables(tree)
     assert len(table["rows"]) == 32
-    assert table["swept"] == ["thickness_mm", "young_modulus_MPa", "poisson_ratio", "stiffness_scale"]
     first = table["rows"][0]
+    assert {"thickness_mm", "young_modulus_MPa", "poisson_ratio", "stiffness_scale"} <= first.keys()
     assert (first["force_N"], first["thickness_mm"], first["young_modulus_MPa"]) == (100.0, 1.0, 1e3)
 
 

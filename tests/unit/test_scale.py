@@ -37,8 +37,8 @@ def test_a_study_has_meshes_of_more_particles_than_a_file_of_others(tmp_path):
     }
     study = load_text(tmp_path, yaml.safe_dump(text))
     do_stages(study, tmp_path / "results")
-    made, _ = collect.run(study, study.path, tmp_path / "results", tmp_path / "results/dataset.nc")
-    with xr.open_dataset(made) as data:
+    collect.run(study, study.path, tmp_path / "results", tmp_path / "results/dataset.nc")
+    with xr.open_dataset(tmp_path / "results/dataset.nc") as data:
         assert data.status.item() == 1 and data.particles.item() > 1e6 and abs(data.deformation_error.item()) < 2e-3
 
 
@@ -115,7 +115,7 @@ def test_a_plan_takes_as_many_calls_a_scene_whatever_their_number(study_of):
     counts = [calls(partial(planned, study_of(forces))) for forces in (10, 20, 40)]
     # Twice the scenes added take twice the calls, and some more of a few further bundles.
     assert (counts[2] - counts[1]) / (counts[1] - counts[0]) == pytest.approx(2, rel=0.1)
-    assert (counts[2] - counts[1]) / (16 * 20) < 50
+    assert (counts[2] - counts[1]) / (16 * 20) < 60
 
 
 def test_a_key_is_made_once_a_scene_and_a_file_opened_once_a_mesh(tool, study_of):
@@ -135,7 +135,7 @@ def test_a_key_is_made_once_a_scene_and_a_file_opened_once_a_mesh(tool, study_of
         opened[forces] = count["read"]
         # Of a reference its values, and for each kinematics whether it applies; of a mesh its size.
         assert count["Filler.put"] <= 3 * len(study.references) + 2 * len(study.meshes) + 5
-    assert len(study.meshes) == 2 and opened[2] == opened[6] <= 6
+    assert len(study.meshes) == 2 and opened[2] == opened[6] <= 4 * len(study.meshes)
 
 
 def test_keys_made_together_are_those_made_one_by_one():
@@ -147,7 +147,7 @@ def test_keys_made_together_are_those_made_one_by_one():
 
 def test_the_page_of_tables_shows_so_many_rows_and_says_so():
     rows = [{"name": f"row {number}", "error_percent": 0.5} for number in range(page.MOST_ROWS + 1)]
-    table = page.shown({"stem": "many", "title": "Many", "note": "", "rows": rows})
-    assert len(table["lines"]) == page.MOST_ROWS
-    assert table["beyond"] == "The first 1000 of 1001 rows; the file has all of them: "
-    assert page.shown({"stem": "few", "title": "Few", "note": "", "rows": rows[:-1]})["beyond"] == ""
+    tree = xr.DataTree(xr.Dataset(attrs={"study": "many"}))
+    many, few = (page.html([{"stem": "many", "title": "Many", "rows": found}], tree) for found in (rows, rows[:-1]))
+    assert many.count("<tr") == few.count("<tr") == page.MOST_ROWS + 1
+    assert "The first 1000 of 1001 rows; the file has all of them: " in many and "The first" not in few

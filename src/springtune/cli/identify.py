@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from ..scene.identify import Identified
     from ..scene.measured import MeasuredTest
 
-KEYS = ("beam", "thickness", "shape", "load", "force", "angle", "noise", "shift", "file")
+TEST_KEYS = ("beam", "thickness", "shape", "load", "force", "angle", "noise", "shift", "file")
 """Keys of a test in a list of tests; all but the file are options, too."""
 
 
@@ -107,11 +107,11 @@ def _rows(path: Path) -> list[dict[str, Any]]:
     except (AttributeError, KeyError, TypeError, ValueError, YAMLError) as error:
         raise ValueError(
             f"{path}: is no list of tests ({type(error).__name__}: {error}); give 'tests:' and names, each with some "
-            f"of the keys {', '.join(KEYS)}"
+            f"of the keys {', '.join(TEST_KEYS)}"
         ) from None
     for row in rows:
-        if wrong := [key for key in row if key not in KEYS]:
-            raise ValueError(f"{path}: a test has the key {wrong[0]!r}; known: {', '.join(KEYS)}")
+        if wrong := [key for key in row if key not in TEST_KEYS]:
+            raise ValueError(f"{path}: a test has the key {wrong[0]!r}; known: {', '.join(TEST_KEYS)}")
         row |= {key: path.parent / row[key] for key in ("file", "shape") if row.get(key)}
     return rows
 

@@ -70,8 +70,8 @@ def write(path: str | Path, net: Net, mujoco: int | None = None) -> list[Path]:
         raise ValueError(
             f"mujoco: {mujoco!r} is of no use to {path.name}; leave it out, or give a name ending in .xml or .mjcf"
         )
-    if ending in FORMATS:
-        return FORMATS[ending][0](path, net) or [path]
+    if ending in NET_FORMATS:
+        return NET_FORMATS[ending][0](path, net) or [path]
     program, text = SIMULATORS[ending]
     calibrated = net.header.get("calibrated")
     if calibrated and ending != AT_SETTING.get(calibrated["engine"]):
@@ -103,7 +103,7 @@ def read(path: str | Path) -> Net:
         most = NET_MEMORY + MEMORY_SHARE * sum(one.stat().st_size for one in files)
         with redirect_stdout(told), redirect_stderr(told), warnings.catch_warnings(), bounded(most):
             warnings.simplefilter("ignore")
-            return _checked(*FORMATS[ending][1](path))
+            return _checked(*NET_FORMATS[ending][1](path))
     except (Exception, SystemExit) as error:  # libraries raise many kinds of errors for a damaged file
         if isinstance(error, OSError) and error.errno is not None:
             raise
@@ -410,14 +410,14 @@ def _read_vtu(path: Path) -> Read:
 
 # -- formats -------------------------------------------------------------------------------------------------------
 
-FORMATS: dict[str, tuple[Callable[[Path, Net], list[Path] | None], Callable[[Path], Read]]] = {
+NET_FORMATS: dict[str, tuple[Callable[[Path, Net], list[Path] | None], Callable[[Path], Read]]] = {
     ".csv": (_write_csv, _read_csv),
     ".json": (_write_json, _read_json),
     ".vtu": (lambda path, net: write_vtu_with(path, net, {}, {}), _read_vtu),
 }
 """Functions that write and read a net, by the ending of the name of its file."""
 
-ENDINGS = tuple(FORMATS)
+ENDINGS = tuple(NET_FORMATS)
 """Endings of the names of files that are read."""
 
 FOR_MUJOCO = (".xml", ".mjcf")
@@ -446,7 +446,7 @@ def check_target(path: str | Path) -> str:
 def ending_of(path: str | Path) -> str:
     """Ending of a name that is a format of springs; others are refused."""
     path = Path(path)
-    known = {**FORMATS, **SIMULATORS}
+    known = {**NET_FORMATS, **SIMULATORS}
     # The longest ending that fits: .xpbd.json is not .json.
     ending = max((one for one in known if path.name.lower().endswith(one)), key=len, default="")
     if not ending:

@@ -26,7 +26,7 @@ CHARACTER = 0.54
 BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:m|mm|N|kN|Pa|kPa|MPa|GPa|N/m|%)(?:\W|$))")
 """Space at which a text is not wrapped."""
 
-NAME = 0.55
+WIDEST_NAME = 0.55
 """Largest width of a line's name over that of a panel before its layout."""
 
 POWERS = {0: "", 3: "10³ ", 6: "10⁶ ", 9: "10⁹ "}
@@ -102,7 +102,7 @@ def finish(panel: Axes, said: Iterable[str] = (), why: str = "", key: Iterable[A
     if handles:
         arranged = panel.figure.get_layout_engine() is not None
         place: dict[str, Any] = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)} if arranged else {}
-        texts = [fitted(panel, [str(one.get_label())], share=NAME) for one in handles]
+        texts = [fitted(panel, [str(one.get_label())], share=WIDEST_NAME) for one in handles]
         panel.legend(handles, texts, handlelength=2.2, borderaxespad=0.3, labelspacing=0.35, **place)
     note(panel, said)
 

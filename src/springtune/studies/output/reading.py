@@ -92,19 +92,20 @@ def open(path: str | os.PathLike[str]) -> "xarray.DataTree":
 def _opened(path: Path) -> "xarray.DataTree":
     """Open a file; large arrays of texts stay in it, since xarray would read them at the width of the longest text."""
     import h5netcdf
-    import h5py
     import xarray as xr
-    from xarray.backends import H5NetCDFStore
+    from xarray.backends import CachingFileManager, H5NetCDFStore
 
     groups = {}
     with ExitStack() as stack:
-        file = h5netcdf.File(stack.enter_context(h5py.File(path)), decode_vlen_strings=True)
-        for group in (file, *file.groups.values()):
-            variables, attributes = H5NetCDFStore(group).load()  # type: ignore[no-untyped-call]
+        manager = CachingFileManager(h5netcdf.File, str(path), mode="r", kwargs={"decode_vlen_strings": True})
+        stack.callback(manager.close)
+        for name in ("/", *manager.acquire().groups):
+            store = H5NetCDFStore(manager, group=None if name == "/" else name)  # type: ignore[no-untyped-call]
+            variables, attributes = store.load()  # type: ignore[no-untyped-call]
             for array in variables.values():
                 if array.dtype == object and array.nbytes > LARGE_ARRAY:
                     del array.encoding["dtype"]
-            groups[group.name] = xr.decode_cf(xr.Dataset(variables, attrs=attributes))
+            groups[name] = xr.decode_cf(xr.Dataset(variables, attrs=attributes))
         tree = xr.DataTree.from_dict(groups)
         tree.set_close(stack.pop_all().close)
     return tree
