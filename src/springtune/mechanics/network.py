@@ -324,7 +324,8 @@ class Network:
         """
         sizes = np.abs(self.stiffness)
         none, little = sizes <= NO_STIFFNESS * sizes.max(), NO_STIFFNESS * sizes.max()
-        if self.energies or self._by_multigrid or not none.any():
+        # Rounding has either sign; a contrast that somebody states has one, and is reported as ill-conditioned.
+        if self.energies or self._by_multigrid or not (self.stiffness[none] <= 0).any():
             return ""
         more, less, rest = copy.copy(self), copy.copy(self), np.zeros(self.held.shape)
         more.stiffness, less.stiffness = self.stiffness + little, self.stiffness - little
