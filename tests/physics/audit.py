@@ -379,8 +379,11 @@ def audit_snap(scene, path=True):
     guess = 2 * arch.strip**2 if given is not None else 3 * arch.rise * arch.strip / float(soft)
     force = float(guess * (body.follow(guess, judge=judge)[1] or 1e-3) * scene.level)
     loading = scaled(Loading(("arch",), held, pattern, given, pressure), force)
-    found = solved(Sheet(mesh, arch.thickness).problem(loading, springs), 1 / springs.reference, "nonlinear",
-                   lambda moved: 0.0)  # fmt: skip
+    try:
+        problem = Sheet(mesh, arch.thickness).problem(loading, springs)
+        found = solved(problem, 1 / springs.reference, "nonlinear", lambda moved: 0.0)
+    except SingularError:  # springs of no stiffness leave a mechanism
+        return []
     if str(found.status) != "solved":
         return []
     return list(check_nonlinear(mesh, masses, path, body, force, found.equilibrium.displacements))

@@ -567,6 +567,21 @@ class TestDatasets:
         told = CliRunner().invoke(main, ["info", str(path)])
         assert told.exit_code == 1 and "is damaged, or not as springtune writes it (AttributeError" in told.stderr
 
+    @pytest.mark.parametrize(
+        "name", ["../x", "/etc/x", "a\nb", "a/b", "", "..", "one + ../x", "x" * 61, "{x}", b"\xff", [7, 8], ["a", "b"]]
+    )
+    def test_a_study_whose_name_is_no_name_is_refused(self, path, name):
+        h5py = pytest.importorskip("h5py")
+        for study in (name, "one + other"):
+            with h5py.File(path, "r+") as file:
+                file.attrs["study"] = study
+            for call in (st.open, reading.attributes):
+                if study is name:
+                    with pytest.raises(ValueError, match="dataset.nc: attribute 'study' is .*use letters, digits"):
+                        call(path)
+                else:
+                    assert getattr(found := call(path), "attrs", found)["study"] == "one + other"
+
     def links(self, name, path):
         """Change a dataset so that data of another file are in it."""
         import h5py
@@ -624,6 +639,11 @@ class TestDatasets:
             st.SpringNet.read(net)
         with pytest.raises(MeshError, match="'tstt/nodes/coordinates' is stored outside of the file, in '/etc/passwd'"):
             read_beam_mesh(mesh, 0.1, 0.02)
+        with h5py.File(mesh, "r+") as file:
+            file["elsewhere"] = h5py.SoftLink("/tstt/nodes")
+            del file["tstt/nodes/coordinates"]
+        with pytest.raises(MeshError, match="'elsewhere' is a soft link; it is not followed: write the array"):
+            read_beam_mesh(mesh, 0.1, 0.02)
 
     @pytest.mark.parametrize("place", ["/etc/plate.h5", "../plate.h5", "plate.h5"])
     def test_xdmf_is_refused_wherever_its_numbers_are(self, tmp_path, place):
@@ -651,7 +671,7 @@ class TestDatasets:
             "itself": ("odd = file.create_group('odd'); odd['odd'] = odd", "'odd/odd' is linked twice"),
             "the root": ("file['odd'] = file['/']", "is linked twice"),
             "two names": ("file['odd'] = file['status']", "is linked twice"),
-            "soft": ("file['odd'] = h5py.SoftLink('/')", "'odd' is a soft link"),
+            "soft": ("file['odd'] = h5py.SoftLink('/')", "'odd' is a soft link; it is not followed: write the array"),
             "deep": ("file.create_group('/a' * 500)", "groups deep"),
             "many": ("[file.create_group(f'a{n}') for n in range(20_001)]", "over 20,000 groups"),
             "dimension": ("file['beam'].attrs['_Netcdf4Dimid'] = np.int32(2**31 - 1)", "_Netcdf4Dimid of beam is none"),
@@ -661,13 +681,24 @@ class TestDatasets:
             ),
             "factor": ("file['status'].attrs['scale_factor'] = 'much'", "is a text instead of a number"),
             "list": ("file['status'].attrs['REFERENCE_LIST'] = 1", "REFERENCE_LIST of status is none"),
+            "heap": ("zero(16, 32)", "the heap at byte"),
+            "size in a heap": ("zero(24, 26)", "cannot be read"),
+            "number in a heap": ("zero(16, 18)", "the heap at byte"),
         }.values(),
     )
     def test_what_netcdf_crashes_or_hangs_on_is_refused_before(self, path, spoil, says):
         """A process of its own, so that a crash is one."""
         h5py = pytest.importorskip("h5py")
+
+        def zero(first, end):
+            file.close()
+            content = bytearray(path.read_bytes())
+            at = content.index(b"GCOL")
+            content[at + first : at + end] = bytes(end - first)
+            path.write_bytes(content)
+
         with h5py.File(path, "r+") as file:
-            exec(spoil, {"file": file, "h5py": h5py, "np": np})
+            exec(spoil, {"file": file, "h5py": h5py, "np": np, "zero": zero})
         code = "import sys, springtune as st\ntry: st.open(sys.argv[1])\nexcept ValueError as error: print(error)"
         told = subprocess.run([sys.executable, "-c", code, path], capture_output=True, text=True, timeout=60)
         assert told.returncode == 0 and says in told.stdout, told

@@ -92,7 +92,13 @@ def forged(tmp_path_factory):
     names = {name: [f"{label}{FORGED}" for label in root[name].values] for name in ("beam", "material", "definition")}
     root, curves = root.assign_coords(names), curves.assign_coords({key: names[key] for key in ("beam", "material")})
     root["residual"].attrs["long_name"] = FORGED
-    attributes = {"springtune_version": FORGED, "study": FORGED, "title": FORGED, "git_commit": FORGED, "host": FORGED}
+    attributes = {
+        "springtune_version": FORGED,
+        "study": "forged",
+        "title": FORGED,
+        "git_commit": FORGED,
+        "host": FORGED,
+    }
     attributes |= {"created": FORGED, "software": json.dumps({FORGED: FORGED}), "inputs": json.dumps({FORGED: FORGED})}
     folder = tmp_path_factory.mktemp("datasets")
     for name in ("forged", "other", "named"):

@@ -75,6 +75,11 @@ class SuperLUFactor:
 
     step = estimate = solve
 
+    @property
+    def least_pivot(self) -> float:
+        """Smallest pivot, whatever its sign."""
+        return float(np.abs(self.lu.U.diagonal()).min(initial=np.inf))
+
     @cached_property
     def negative_pivots(self) -> int:
         """Number of negative eigenvalues of the matrix (Sylvester's law of inertia)."""
@@ -138,6 +143,13 @@ class CholeskyFactor:
         return np.array(solution).reshape(right.shape)
 
     step = estimate = solve
+
+    @property
+    def least_pivot(self) -> float:
+        """Smallest pivot."""
+        from cvxopt import cholmod
+
+        return float(min(cholmod.diag(self._factor), default=np.inf)) ** 2
 
     def lower(self, right: np.ndarray) -> np.ndarray:
         """First half of a solution, with the lower triangular factor, in the order of elimination."""

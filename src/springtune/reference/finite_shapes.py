@@ -4,6 +4,9 @@ Unknowns, supports, loads and quantities are those of `springtune.reference.shap
 `springtune.reference.finite_strain`. Tractions and gravity keep their direction, pressures that follow turn and grow
 with their sides. A stress is a force over the length that it acts on now and the thickness at rest, as that of a
 network. The first level goes from rest in steps that are watched for snaps; each finer one begins at the last.
+
+Strain is infinite at a clamped corner, and a free side that is pressed there creases in ever smaller places. From the
+level on that has no stable equilibrium for this, triangles at such corners keep the degree of the last one that has.
 """
 
 from collections.abc import Mapping
@@ -16,11 +19,14 @@ from ..mesh.groups import GroupedMesh
 from ..problem.materials import AnyMaterial, Material
 from ..problem.shapes import LoadCase, Shape
 from .finite_strain import Body, FiniteStrainError, Law, Response, StVenant, law_of, matrix_of, strain_of
-from .shapes import Level, Problem, ShapeReference, inverse_of, solve_shape
-from .triangles import side_fit, side_functions, tabulated
+from .shapes import LOWEST_DEGREE, Level, Problem, ShapeReference, inverse_of, solve_shape
+from .triangles import local_functions, side_functions, tabulated
 
 TOLERANCE = 1e-3
 """Largest accepted relative error estimate."""
+
+FULL_LEVELS = 3
+"""Levels with an equilibrium before triangles at corners may keep their degree."""
 
 
 def solve_finite_shape(
@@ -43,6 +49,7 @@ class _Levels:
 
     def __init__(self, materials: Mapping[str, AnyMaterial], rubber: bool) -> None:
         self.last: _FiniteLevel | None = None
+        self.kept = 0
         self.laws: dict[str, tuple[float, Law]] = {}
         for name, one in materials.items():
             if rubber and isinstance(one, Material):
@@ -53,7 +60,16 @@ class _Levels:
                 self.laws[name] = scale, StVenant(stiffness / scale)
 
     def __call__(self, problem: Problem, degree: int) -> "_FiniteLevel":
-        self.last = _FiniteLevel(problem, degree, self)
+        try:
+            self.last = _FiniteLevel(problem, degree, self)
+        except FiniteStrainError as error:
+            if self.last is None or self.kept or degree - LOWEST_DEGREE < FULL_LEVELS:
+                raise
+            self.kept = degree - 1
+            try:
+                self.last = _FiniteLevel(problem, degree, self)
+            except FiniteStrainError:
+                raise error from None
         return self.last
 
 
@@ -90,7 +106,12 @@ class _FiniteLevel(Level, Body):
     most_layers = 1
 
     def __init__(self, problem: Problem, degree: int, levels: _Levels) -> None:
-        self.levels = levels
+        self.levels, self.kept_degree = levels, levels.kept
+        if levels.kept:
+            self.note = (
+                f"triangles at corners keep degree {levels.kept}, as finer ones have no stable equilibrium there; the "
+                "error estimate counts that"
+            )
         super().__init__(problem, degree)
 
     def _matrices(self) -> np.ndarray:
@@ -108,7 +129,12 @@ class _FiniteLevel(Level, Body):
         self.nodes_of = space.numbers
         self.gradients = np.einsum("qiu,equa->eqai", gradients, inverse_of(jacobian, determinant), optimize=True)
         self.weights = weights * np.abs(determinant) * (problem.shape.thickness * law.scales)[:, None]
-        self.held, self.given, self.turning = held, prescribed, self._turning()
+        kept = np.zeros(space.n_functions, dtype=bool)
+        if self.kept_degree:
+            at_corners = np.isin(space.corners, sorted(problem.rough)).any(axis=1)
+            kept[space.numbers[at_corners]] = True
+            kept[space.numbers[:, local_functions(self.kept_degree, space.degree)]] = False
+        self.held, self.given, self.turning = held | kept[:, None], prescribed, self._turning()
         self.load, self.extent = forces, float(np.ptp(space.mesh.points, axis=0).max())
         moved = self._continued()
         if moved is None:
@@ -120,6 +146,7 @@ class _FiniteLevel(Level, Body):
         strain = strain_of(gradient)
         external = self.load + (self.turning @ moved.ravel()).reshape(-1, 2)
         residual = self._forces(gradient, self.law.response(strain).stress) - external
+        residual[kept] = 0.0
         return moved, residual, float((self.law.energy(strain) * self.weights).sum())
 
     def _where_it_gives_way(self) -> str:
@@ -144,14 +171,8 @@ class _FiniteLevel(Level, Body):
         space, last = self.space, self.levels.last
         if last is None:
             return None
-        start, n_points = np.zeros((space.n_functions, 2)), len(space.mesh.points)
-        start[:n_points] = last.displacements(space.mesh.points)
-        along, inverse = side_fit(space.degree)
-        values, _ = side_functions(space.degree, along)
-        inner = n_points + np.arange(len(space.edges) * len(along)).reshape(-1, len(along))
-        places = values @ space.places[np.concatenate([space.edges, inner], axis=1)]
-        there = last.displacements(places.reshape(-1, 2)).reshape(places.shape)
-        start[inner] = inverse @ (there - values[:, :2] @ start[space.edges])
+        start = np.zeros((space.n_functions, 2))
+        start[space.numbers[:, local_functions(last.space.degree, space.degree)]] = last.field[last.space.numbers]
         found = self.equilibrium(start, 1.0)
         return found[0] if found is not None and found[2] else None
 

@@ -29,6 +29,9 @@ LOWEST_DEGREE, HIGHEST_DEGREE = 2, 10
 #: Error of a stress that is accepted, over that of other quantities.
 STRESS_SHARE = 10.0
 
+#: Largest accepted estimate over the tolerance where corners keep their degree, see `Level.kept_degree`.
+LOOSER = 10.0
+
 #: Quantities below this share of the largest one of their kind are judged by that share.
 SMALLEST_SHARE = 1e-3
 
@@ -60,6 +63,7 @@ class ShapeReference:
     - `rotation`, `strain`: Rotation [rad] and strain [1] that limit its use, see `springtune.reference.answers`.
     - `negligible`: Quantities below a thousandth of the largest of their kind, whose relative errors are
       meaningless.
+    - `note`: Why error estimates are larger than those of other references, or an empty string.
     """
 
     values: dict[str, float]
@@ -71,6 +75,7 @@ class ShapeReference:
     _level: "Level" = field(repr=False)
     _kinds: dict[str, str] = field(repr=False)
     negligible: tuple[str, ...] = ()
+    note: str = ""
     _factor: float = 1.0
 
     def at(self, points: np.ndarray) -> np.ndarray:
@@ -146,8 +151,12 @@ def solve_shape(
             scale = max(abs(values[-1][name]), SMALLEST_SHARE * level.scale(kind)) or 1.0
             before, last = (abs(values[i][name] - values[i - 1][name]) / scale for i in (-2, -1))
             estimates[name] = max(last, before / 4) + level.round_off
-            bounds[name] = estimates[name] * scale
             accepted = tolerance * (STRESS_SHARE if kind == "stress" else 1.0)
+            if kept := level.kept_degree:
+                of_full = [one[name] for one in values[: kept - LOWEST_DEGREE + 1]]
+                estimates[name] += 2 * float(np.abs(np.diff(of_full[-3:])).max()) / scale
+                accepted = max(accepted, LOOSER * tolerance)
+            bounds[name] = estimates[name] * scale
             why = unmet(estimates[name], accepted, before, last)
             if why and not complaint:
                 shown = repr(name) if name else "the energy"
@@ -167,6 +176,7 @@ def solve_shape(
                 rotation=rotation,
                 strain=strain,
                 unknowns=level.unknowns,
+                note=level.note,
                 negligible=tuple(
                     name for name in names if abs(values[-1][name]) < SMALLEST_SHARE * level.scale(problem.kinds[name])
                 ),
@@ -251,7 +261,7 @@ class Problem:
             graded = [self._graded.copy() for _ in range(LAYERS_CHECKED)]
             for layers, mesh in enumerate(graded):
                 for _ in range(layers):
-                    mesh.grade(self._rough)
+                    mesh.grade(self.rough)
             if all(_unfolded(mesh) for mesh in (self.mesh, *graded)):
                 return
         raise MeshError(f"triangles of {shape.name!r} fold along its arcs; look for sides that nearly touch")
@@ -309,7 +319,7 @@ class Problem:
         for name in used:
             what = "a force acts on a point" if name in at_points else "a point is held"
             self.corners[self.mesh.named[name]] = Corner(what)
-        self._rough = rough | {self.mesh.named[name] for name in used | probed}
+        self.rough = rough | {self.mesh.named[name] for name in used | probed}
         self.loaded_points = at_points
         self.infinite_energy = bool(at_points)
         self.reacting: list[str] = []
@@ -318,7 +328,7 @@ class Problem:
         for quantity in load.quantities:
             self._check(quantity)
         self._graded = self.mesh.copy()
-        self._graded.isolate(self._rough)
+        self._graded.isolate(self.rough)
         self._layers = 0
 
     def _check(self, quantity: Quantity) -> None:
@@ -382,7 +392,7 @@ class Problem:
     def graded(self, layers: int) -> CoarseMesh:
         """The mesh with so many layers at its corners; asked for in rising order."""
         while self._layers < layers:
-            self._graded.grade(self._rough)
+            self._graded.grade(self.rough)
             self._layers += 1
         return self._graded.copy()
 
@@ -484,9 +494,16 @@ VOIGT = np.array([[0, 2], [2, 1]])
 
 
 class Level:
-    """A shape solved on one level."""
+    """A shape solved on one level.
+
+    Triangles at corners have no more than `kept_degree`, if it is not zero: the last one of which whole levels have a
+    solution. What their functions of higher degree would change is estimated as twice the larger one of the last two
+    steps of whole levels, and `note` says so.
+    """
 
     most_layers = HIGHEST_DEGREE
+    kept_degree = 0
+    note = ""
 
     def __init__(self, problem: Problem, degree: int) -> None:
         self.problem = problem

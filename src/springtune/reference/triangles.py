@@ -22,6 +22,13 @@ def function_counts(degree: int) -> tuple[int, int]:
     return degree - 1, (degree - 1) * (degree - 2) // 2
 
 
+def local_functions(lower: int, degree: int) -> np.ndarray:
+    """Places of the shape functions of a lower degree among those of a degree, as in `shape_functions`."""
+    (few, few_inside), (per_side, _) = function_counts(lower), function_counts(degree)
+    sides = 3 + np.add.outer(per_side * np.arange(3), np.arange(few)).ravel()
+    return np.concatenate([np.arange(3), sides, 3 + 3 * per_side + np.arange(few_inside)])
+
+
 def _side_kernels(degree: int, along: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Integrated Legendre polynomials over (1 - t^2) / 4, and their derivatives; shape (n, degree - 1)."""
     values, slopes = [], []

@@ -8,6 +8,7 @@ import os
 import re
 import signal
 import stat
+import struct
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -30,7 +31,7 @@ class BeyondSize(ValueError):
 
 
 class DataElsewhere(ValueError):
-    """Data of a file are stored in another one."""
+    """Data of a file are stored in another one, or behind a link."""
 
 
 class BeyondBound(MemoryError):
@@ -211,6 +212,17 @@ MOST_OBJECTS = 20_000
 DEEPEST_GROUP = 16
 """Most groups of an HDF5 file within each other."""
 
+SOFT_LINK = "a soft link"
+
+HEAP = b"GCOL\x01\0\0\0"
+"""Start of a heap of texts and links in an HDF5 file."""
+
+OBJECT = struct.Struct("<H6xQ")
+"""Head of an object of a heap: its number, 0 for free space, and its bytes."""
+
+HEAPS_SEARCHED = 2**28
+"""Bytes of a file that are searched for heaps, from its start."""
+
 
 def check_alone(path: str | Path, look: "Callable[[bytes, h5py.h5g.ObjectID], None] | None" = None) -> None:
     """Refuse an HDF5 file whose data are in other files, or whose groups are no tree of limited size.
@@ -228,6 +240,8 @@ def check_alone(path: str | Path, look: "Callable[[bytes, h5py.h5g.ObjectID], No
 
     try:
         with h5py.File(path) as file:
+            if file.id.get_create_plist().get_sizes() == (8, 8):
+                _check_heaps(path)
             root = file["/"].id
             seen, groups = {h5py.h5o.get_info(root).addr}, [(b"", 0, root)]
             while groups:
@@ -239,8 +253,7 @@ def check_alone(path: str | Path, look: "Callable[[bytes, h5py.h5g.ObjectID], No
                 for link, kind in found[start:]:
                     name = above + link
                     if kind != h5py.h5l.TYPE_HARD:
-                        soft = kind == h5py.h5l.TYPE_SOFT
-                        names[_text(name)] = "a soft link" if soft else "an external link"
+                        names[_text(name)] = SOFT_LINK if kind == h5py.h5l.TYPE_SOFT else "an external link"
                         continue
                     one = h5py.h5o.open(group, link)
                     address = h5py.h5o.get_info(one).addr
@@ -265,7 +278,26 @@ def check_alone(path: str | Path, look: "Callable[[bytes, h5py.h5g.ObjectID], No
     except (LookupError, RuntimeError, SystemError, TypeError, ValueError) as error:
         raise OSError(f"damaged: {error}") from None
     for place, what in names.items():
-        raise DataElsewhere(f"{path}: {place!r} is {what}; data of other files are not read: write them into this one")
+        why = "it is not followed: write the array in its place"
+        if what != SOFT_LINK:
+            why = "data of other files are not read: write them into this one"
+        raise DataElsewhere(f"{path}: {place!r} is {what}; {why}")
+
+
+def _check_heaps(path: str | Path) -> None:
+    """Refuse heaps whose objects do not fill them: HDF5 may never come to the end of one."""
+    with open(path, "rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        most = min(len(data), HEAPS_SEARCHED)
+        start = data.find(HEAP, 0, most)
+        while start >= 0:
+            at, end = start + 16, start + int.from_bytes(data[start + 8 : start + 16], "little")
+            while at + 16 <= min(end, most):
+                index, size = OBJECT.unpack_from(data, at)
+                step = 16 + -(-size // 8) * 8 if index else size
+                if not 16 <= step <= end - at:
+                    raise ValueError(f"the heap at byte {start} has an object of {size} bytes at byte {at}")
+                at += step
+            start = data.find(HEAP, start + 1, most)
 
 
 def _text(name: bytes) -> str:

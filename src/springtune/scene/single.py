@@ -684,6 +684,7 @@ class Result(Tabled):
         for name, error in errors.items():
             yield f"error of {name}", f"{error_text(error)} {self.sign_words[name]}".rstrip()
         yield "but", objection
+        yield "reference", getattr(self.reference(), "note", "")
 
     @property
     def displacements(self) -> np.ndarray:

@@ -258,10 +258,11 @@ class _Group:
         self, path: str, pair: tuple[xr.Dataset, xr.Dataset], roots: tuple[xr.Dataset, xr.Dataset], how: _How
     ) -> None:
         self.path, self.how = path, how
-        self.axes = {name: joined(name, pair) for name in dict.fromkeys(str(one) for own in pair for one in own.sizes)}
+        names = dict.fromkeys(str(one) for own in pair for one in own.sizes)
+        self.sizes = {name: len(joined(name, pair)) for name in names}
         self.cell_dimensions = cell_dimensions(pair, roots)
         self.labels = {}
-        for name in self.axes:
+        for name in self.sizes:
             if all(data.sizes.get(name) and name in data.indexes for data in pair):
                 one, other = (data.indexes[name] for data in pair)
                 self.labels[name] = (
@@ -278,12 +279,11 @@ class _Group:
         units = {
             name: str(data[name].attrs.get("units", "1"))
             for data in reversed(self.pair)
-            for name in self.axes
+            for name in self.sizes
             if name in data.dims
         }
-        sizes = {name: len(labels) for name, labels in self.axes.items()}
         labels = {name: both for name, both in self.labels.items() if any(both)}
-        found = GroupChanges(self.path, sizes, units, labels)
+        found = GroupChanges(self.path, self.sizes, units, labels)
         names = [[str(name) for name in data.variables if name not in data.dims] for data in self.pair]
         left_out = [name for own in names for name in own if any(fnmatchcase(name, one) for one in self.how.ignored)]
         left_out += [OF_CELLS]

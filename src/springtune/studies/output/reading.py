@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from springtune.registry import NAME, NAME_RULE
 from springtune.safe_io.escapes import clipped
 from springtune.safe_io.inputs import MOST_OBJECTS, BeyondBound, bounded, check_alone
 
@@ -97,6 +98,11 @@ def open(path: str | os.PathLike[str]) -> "xarray.DataTree":
     if "springtune_version" not in tree.attrs:
         tree.close()
         raise ValueError(f"{file}: is not a dataset of springtune; {REMEDY}")
+    try:
+        _check_study(file, tree.attrs.get("study", "unknown"))
+    except ValueError:
+        tree.close()
+        raise
     return tree
 
 
@@ -259,7 +265,18 @@ def attributes(path: Path) -> dict[str, str]:
 
     check_links(path)
     with h5py.File(path) as file:  # which gives ASCII as bytes
-        return {str(name): text.decode() if isinstance(text, bytes) else str(text) for name, text in file.attrs.items()}
+        texts = {
+            name: text.decode(errors="replace") if isinstance(text, bytes) else str(text)
+            for name, text in file.attrs.items()
+        }
+    _check_study(path, texts.get("study", "unknown"))
+    return texts
+
+
+def _check_study(path: Path, name: object) -> None:
+    """Refuse a study's name that is no name, since it becomes part of paths; merged studies are joined by ' + '."""
+    if not (isinstance(name, str) and all(map(NAME.fullmatch, name.split(" + ")))):
+        raise ValueError(f"{path}: attribute 'study' is {clipped(repr(name))}; {NAME_RULE}; {REMEDY}")
 
 
 def most_of(path: Path) -> float:
