@@ -107,7 +107,7 @@ def test_springtune_run_makes_missing_what_snakemake_cannot_see(changed):
 def test_a_dataset_has_the_files_that_are_there(changed):
     """Comments, too; nothing is computed for them."""
     jobs, solved = driver.Run().finish()
-    found = driver.dataset(Path())
+    found = driver.dataset(Path())["/"]
     assert found["config"] == driver.CONFIG.read_text()
     files = {name: hashlib.sha256(Path(name).read_bytes()).hexdigest() for name in json.loads(found["inputs"])}
     assert json.loads(found["inputs"]) == files and {"small.yaml", "printed.csv", "own.inp"} <= files.keys()

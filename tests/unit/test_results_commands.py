@@ -17,7 +17,7 @@ from click.testing import CliRunner
 import springtune as st
 from springtune.cli import main
 from springtune.studies.kinds.scenes.variables import FIELDS, ROOT, SENSITIVITY
-from springtune.studies.output import dataset, export, scene_files
+from springtune.studies.output import dataset, scene_files
 
 from tables import refused_calls
 
@@ -249,7 +249,7 @@ class TestExport:
         assert not os.listdir(tmp_path)
 
     def test_what_is_not_installed_is_told_with_the_extra(self, path, tmp_path, monkeypatch):
-        monkeypatch.setattr(export, "find_spec", lambda name: None)
+        monkeypatch.setitem(sys.modules, "pyarrow", None)
         refused(run("export", path, "--to", tmp_path / "x.parquet"), "pyarrow", "in a clone `pip install '.[export]'`")
         assert not os.listdir(tmp_path)
 

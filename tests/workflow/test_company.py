@@ -130,17 +130,6 @@ def test_company_does_not_matter(study, usual, tmp_path):
     same(results(tmp_path), usual)
 
 
-@pytest.mark.parametrize("cores", [8, pytest.param(2, marks=pytest.mark.slow)])
-def test_bundles_do_not_matter(study, usual, tmp_path, monkeypatch, cores):
-    monkeypatch.setattr("springtune.studies.runs.plan.LEAST_SECONDS", 1e-3)
-    folder = tmp_path / "results/many"
-    jobs = stages(study, folder, cores)
-    assert len(jobs) > len(stages(study, tmp_path / "elsewhere", 1))
-    for module, content in jobs:
-        compute(module, content)
-    same(results(folder), usual)
-
-
 @pytest.mark.slow
 def test_cores_do_not_matter(run):
     """Runs of Snakemake: datasets are the same, variable by variable, apart from times."""
