@@ -149,7 +149,7 @@ class CholeskyFactor:
         """Smallest pivot."""
         from cvxopt import cholmod
 
-        return float(min(cholmod.diag(self._factor), default=np.inf)) ** 2
+        return float(np.array(cholmod.diag(self._factor)).min(initial=np.inf)) ** 2
 
     def lower(self, right: np.ndarray) -> np.ndarray:
         """First half of a solution, with the lower triangular factor, in the order of elimination."""

@@ -307,26 +307,34 @@ class Network:
     @cached_property
     def rest_factor(self) -> Factor:
         """Tangent factorized at rest; refused with its place where a part of the network is a mechanism."""
+        slack = self._slack_springs()
         try:
             factor = self.factorize_tangent()
         except SingularError as error:
-            raise SingularError(self._mechanism() or str(error)) from error
-        sound = SMALL_PIVOT * np.abs(self.stiffness).max()
-        if getattr(factor, "least_pivot", sound) < sound and (mechanism := self._mechanism()):
-            raise SingularError(mechanism)
+            raise SingularError(self._mechanism(slack) or str(error)) from error
+        if slack.any() and getattr(factor, "least_pivot", np.inf) < SMALL_PIVOT * np.abs(self.stiffness).max():
+            mechanism = self._mechanism(slack)
+            if mechanism:
+                raise SingularError(mechanism)
         return factor
 
-    def _mechanism(self) -> str:
-        """Where springs without stiffness let a part move without resistance; or an empty string.
+    def _slack_springs(self) -> np.ndarray:
+        """Mask of the springs without stiffness, shape (n_springs,); none where no mechanism is looked for."""
+        sizes = np.abs(self.stiffness)
+        slack = sizes <= NO_STIFFNESS * sizes.max(initial=0.0)
+        # Rounding has either sign; a contrast that somebody states has one, and is reported as ill-conditioned.
+        looked_for = not self.energies and not self._by_multigrid and (self.stiffness[slack] <= 0).any()
+        return slack if looked_for else np.zeros_like(slack)
+
+    def _mechanism(self, slack: np.ndarray) -> str:
+        """Where slack springs let a part move without resistance; or an empty string.
 
         Rounding decides the sign of such a motion's stiffness. It is a mechanism if a little stiffness more in every
         spring makes the network stable, and a little less unstable.
         """
-        sizes = np.abs(self.stiffness)
-        none, little = sizes <= NO_STIFFNESS * sizes.max(), NO_STIFFNESS * sizes.max()
-        # Rounding has either sign; a contrast that somebody states has one, and is reported as ill-conditioned.
-        if self.energies or self._by_multigrid or not (self.stiffness[none] <= 0).any():
+        if not slack.any():
             return ""
+        little = NO_STIFFNESS * np.abs(self.stiffness).max()
         more, less, rest = copy.copy(self), copy.copy(self), np.zeros(self.held.shape)
         more.stiffness, less.stiffness = self.stiffness + little, self.stiffness - little
         if not more.is_stable(rest) or less.is_stable(rest):
@@ -334,8 +342,8 @@ class Network:
         moved = self.expand(more.factorize_tangent().solve(np.random.default_rng(0).standard_normal(self.unknowns)))
         x, y = 1e3 * self.mesh.points[np.square(moved).sum(axis=1).argmax()]
         return (
-            f"near ({x:.4g}, {y:.4g}) mm a part moves without resistance: {none.sum()} of {len(none)} springs have no "
-            "stiffness; take another definition or another mesh"
+            f"near ({x:.4g}, {y:.4g}) mm a part moves without resistance: {slack.sum()} of {len(slack)} springs have "
+            "no stiffness; take another definition or another mesh"
         )
 
     def factorize_tangent(

@@ -78,10 +78,9 @@ def open(path: str | os.PathLike[str]) -> "xarray.DataTree":
             tree = _opened(file)
     except Exception as error:  # of a damaged file the libraries raise whatever they trip over
         raise ValueError(f"{file}: cannot be read ({reason(error)}); {REMEDY}") from None
-    if "springtune_version" not in tree.attrs:
-        tree.close()
-        raise ValueError(f"{file}: is not a dataset of springtune; {REMEDY}")
     try:
+        if "springtune_version" not in tree.attrs:
+            raise ValueError(f"{file}: is not a dataset of springtune; {REMEDY}")
         _check_study(file, tree.attrs.get("study", "unknown"))
     except ValueError:
         tree.close()
