@@ -5,7 +5,6 @@ import faulthandler
 import importlib
 import os
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -299,9 +298,9 @@ def forget():
 
 def test_runs_depend_on_the_module_of_their_own_engine_alone():
     """And on no writer of files for others."""
-    shared = {Path(file).parent.name + "/" + Path(file).name for file in keys.modules("studies.kinds.engines.solve")}
+    shared = {f"{file.parent.name}/{file.name}" for file in keys.closure("studies.kinds.engines.solve").files}
     assert "engines/run.py" in shared and not {"engines/xpbd.py", "engines/vbd.py", "handover/formats.py"} & shared
-    own = {path.name for path in keys.OURS.closure(st.ENGINES["xpbd"].file).files}
+    own = {path.name for path in keys.closure("engines.xpbd").files}
     assert {"xpbd.py", "textbook.py"} <= own and "vbd.py" not in own
     assert keys.declared_key(st.ENGINES["xpbd"]) != keys.declared_key(st.ENGINES["vbd"])
 

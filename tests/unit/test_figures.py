@@ -4,7 +4,6 @@ import io
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import matplotlib
 import matplotlib.pyplot as plt
@@ -23,7 +22,7 @@ from springtune.studies.kinds.scenes import errors, figures
 from springtune.studies.kinds.scenes.figures import NETWORK_LINE, draw_curve
 from springtune.studies.output import present, style
 from springtune.studies.output.style import png_and_pdf
-from springtune.studies.runs.keys import modules
+from springtune.studies.runs.keys import closure
 
 from synthetic import BEAMS, DEFINITIONS, LOADS, SIZES, TYPES, dataset, moduli
 
@@ -385,8 +384,8 @@ def test_both_formats_show_the_same_and_are_the_same_again():
 
 def test_an_edit_of_one_kinds_figures_redraws_no_other_kind():
     def drawers(output):
-        files = {*modules("studies.output.present"), *modules(output.module)}
-        return {Path(path).parent.name for path in files if Path(path).name in ("figures.py", "errors.py")}
+        files = closure("studies.output.present", output.module).files
+        return {path.parent.name for path in files if path.name in ("figures.py", "errors.py")}
 
     kinds = {output.name: drawers(output) for output in outputs().values() if output.plot}
     assert kinds["sensitivity"] == kinds["block"] == {"scenes"} and kinds["definitions"] == {"moduli"}

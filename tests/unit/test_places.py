@@ -160,8 +160,8 @@ found = {
 }
 from springtune.studies.runs import plan
 stages = [one.module for one in plan.stages()]
-found["stages"] = {stage: keys.stage_closure(stage).digest for stage in stages}
-found["modules"] = {stage: keys.modules(stage) for stage in stages}
+found["stages"] = {stage: keys.closure(stage).digest for stage in stages}
+found["modules"] = {stage: sorted(map(str, keys.closure(stage).files)) for stage in stages}
 print(json.dumps(found))
 """
 

@@ -16,7 +16,7 @@ from ..problem.parameters import MOST_SCENES, MOST_SCENES_VARIABLE, PLANES
 from ..safe_io.tables import mesh_size_text
 
 if TYPE_CHECKING:
-    from ..mesh import Mesh
+    from ..mesh.cells import Mesh
     from ..mesh.groups import GroupedMesh
     from ..problem.geometry import Beam
     from ..problem.materials import AnyMaterial, Material
@@ -215,7 +215,8 @@ class Asked:
 
 
 def _beam_mesh(beam: "Beam", unit: str, mesh_type: str, size: float | None) -> "Mesh":
-    from ..mesh import MESH_TYPES, read_beam_mesh
+    from ..mesh.formats import read_beam_mesh
+    from ..mesh.types import MESH_TYPES
 
     if size is None:
         scale = asked_quantity("--unit", unit if unit[:1].isdigit() else f"1 {unit}", "length")
@@ -284,7 +285,7 @@ class SheetOptions:
         return None if self.size is None else asked_quantity("--size", self.size, "length")
 
     def _asked_beam(self, load: str | None, sized: bool) -> Asked:
-        from ..mesh import MESH_TYPES
+        from ..mesh.types import MESH_TYPES
 
         material = asked_material(self.material, self.young, self.poisson, self.density, self.plane)
         beam, mesh_type, edge = asked_beam(self.beam or "", self.thickness), self.mesh_type or "structured", None

@@ -126,7 +126,7 @@ def _subject(asked: Asked, known: Any) -> "Subject":
 
 def _on_mesh(asked: Asked, under: dict[str, Any], springs_alone: bool, also: tuple[str, ...]) -> tuple[str, str | None]:
     """Text for one mesh, and the definition that is recommended."""
-    from ..mesh import MESH_TYPES
+    from ..mesh.types import MESH_TYPES
     from ..prediction.bands import extrapolate
     from ..prediction.choices import SOLVED, SOLVED_FROM_FILE, predict, references, shape_references
     from .recommendation import prediction_text, recommended
@@ -161,7 +161,7 @@ def _found(
     asked: Asked, under: dict[str, Any], error: str, springs_alone: bool, mesh_types: str | None
 ) -> tuple[str, str | None, Asked]:
     """Text of a search for a mesh, the definition that is recommended, and the body with the mesh."""
-    from ..mesh import MESH_TYPES
+    from ..mesh.types import MESH_TYPES
     from ..prediction.search import find_mesh, find_shape_mesh
     from .recommendation import search_text
 

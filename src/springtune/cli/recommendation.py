@@ -198,7 +198,7 @@ def _at_worst(subject: Subject, choices: "Sequence[Choice]", names: Sequence[str
 
 def _also_tried(choices: "Sequence[Choice]") -> list[str]:
     """Line with the definitions that were tried and have no row, and with those that were not."""
-    from ..springs import DEFINITIONS
+    from ..springs.base import DEFINITIONS
 
     if not choices:
         return []

@@ -56,7 +56,7 @@ def _path(given: str) -> Path:
 
 def template_text(path: Path, body: str) -> str:
     """Text of a new study of a beam or of a shape."""
-    from ..mesh import MESH_TYPES
+    from ..mesh.types import MESH_TYPES
 
     schema = Path(os.path.relpath(config_file(SCHEMA), path.parent)).as_posix()
     words = path.stem.replace("-", " ").replace("_", " ").strip() or path.stem

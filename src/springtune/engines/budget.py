@@ -12,9 +12,10 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ..handover.net import SpringNet
-from ..mesh import MESH_TYPES, Mesh
+from ..mesh.cells import Mesh
 from ..mesh.groups import GroupedMesh
 from ..mesh.outlines import mesh_shape
+from ..mesh.types import MESH_TYPES
 from ..prediction.choices import CASES, check_loads, check_names, trial
 from ..problem.compare import error_text
 from ..problem.geometry import Beam

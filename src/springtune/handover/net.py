@@ -24,7 +24,7 @@ import numpy as np
 from .. import __version__
 from ..mechanics.dynamics import masses
 from ..mechanics.integrators import IMPLICIT, INTEGRATORS
-from ..mesh import Mesh
+from ..mesh.cells import Mesh
 from ..problem.compare import error_text, sign_sentence
 from ..problem.geometry import Beam
 from ..problem.loads import LOADS
@@ -37,7 +37,7 @@ from ..scene.motion import stable_steps
 from ..scene.sheet import AnyDefinition, Sheet, check_stiffness, definition_of, named
 from ..scene.single import Scene
 from ..scene.statements import BeamStatement, ShapeStatement
-from ..springs import Definition, DefinitionError, Springs
+from ..springs.base import Definition, DefinitionError, Springs
 from .terms import Net, Terms, terms_of
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from ..mechanics.dynamics import Motion
 from ..mechanics.energies import Energy
 from ..mechanics.network import Network
 from ..mechanics.statics import SingularError, StaticProblem
-from ..mesh import Mesh, corner_angles, signed_areas
+from ..mesh.cells import Mesh, corner_angles, signed_areas
 from ..problem.status import Status
 from ..safe_io.escapes import printable, xml_comment
 from .terms import Net, Terms, energies_of

@@ -11,7 +11,7 @@ from ..mechanics.integrators import BackwardEuler
 from ..reference.small_strain import ReferenceNotConvergedError
 from ..safe_io.atomic import check_folder
 from ..scene.single import Result, Scene
-from ..springs import Springs
+from ..springs.base import Springs
 from .formats import check_target, write_vtu_with
 from .net import NOT_COMPUTED, SpringNet
 from .paraview import MOST_PIECES, pieces_of, series

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..mesh import MESH_TYPES
+from ..mesh.types import MESH_TYPES
 from ..problem.geometry import Beam
 from ..problem.materials import Material
 from ..safe_io.tables import TabledList

@@ -17,7 +17,7 @@ import numpy as np
 from ..mechanics.energies import AngleEnergy, AreaEnergy, BiquadraticEnergy, Energy
 from ..mechanics.moduli import PatchTest
 from ..mechanics.statics import SingularError
-from ..mesh import Mesh
+from ..mesh.cells import Mesh
 from ..mesh.groups import GroupedMesh
 from ..problem.compare import error_text, quantity_errors
 from ..problem.geometry import Beam
@@ -32,7 +32,7 @@ from ..scene.meshes import A_BEAM, A_MATERIAL, A_MESH, is_a
 from ..scene.motion import stable_steps
 from ..scene.sheet import Sheet, chosen
 from ..scene.statements import BeamStatement, ShapeStatement, Statement
-from ..springs import DEFINITIONS, Definition, DefinitionError, Springs
+from ..springs.base import DEFINITIONS, Definition, DefinitionError, Springs
 
 CASES = ("traction", "bending", "shear")
 """Loads that are predicted where none are named."""

@@ -18,9 +18,9 @@ from typing import Any
 
 import numpy as np
 
-from ..mesh import MESH_TYPES
 from ..mesh.groups import GroupedMesh
 from ..mesh.outlines import mesh_shape
+from ..mesh.types import MESH_TYPES
 from ..problem.compare import error_text
 from ..problem.geometry import Beam
 from ..problem.materials import AnyMaterial, Material

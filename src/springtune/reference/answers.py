@@ -110,7 +110,7 @@ def objection(result: dict[str, Any], force: float, kinematics: str) -> str:
 
 
 if TYPE_CHECKING:
-    from ..mesh import Mesh
+    from ..mesh.cells import Mesh
 
 
 def interpolate(x: np.ndarray, y: np.ndarray, displacements: np.ndarray, points: np.ndarray) -> np.ndarray:

@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..mechanics.series import LinearPath, StablePath
-from ..mesh import Mesh
+from ..mesh.cells import Mesh
 from ..problem.compare import Best, best_stiffness, deformation_error, error_text
 from ..problem.loads import LoadKind
 from ..problem.status import Status
 from ..registry import hook
 from ..safe_io.tables import Tabled
-from ..springs import Springs
+from ..springs.base import Springs
 from ..springs.lattice import COEFFICIENT, predicted_stiffness, uniform
 from .sheet import Sheet
 

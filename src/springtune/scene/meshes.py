@@ -4,8 +4,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ..mesh import MESH_TYPES, Mesh, read_beam_mesh
+from ..mesh.cells import Mesh
+from ..mesh.formats import read_beam_mesh
 from ..mesh.sheets import box_fault
+from ..mesh.types import MESH_TYPES
 from ..problem.geometry import Beam
 from ..problem.materials import AnisotropicMaterial, Material, only_isotropic
 from ..problem.quantities import positive

@@ -6,9 +6,9 @@ from functools import cached_property
 import numpy as np
 
 from ..mechanics.moduli import PatchTest
-from ..mesh import Mesh
+from ..mesh.cells import Mesh
 from ..problem.materials import ANY_MATERIAL, AnyMaterial, Material
-from ..springs import DefinitionError, Springs
+from ..springs.base import DefinitionError, Springs
 from .meshes import A_MATERIAL, A_MESH, is_a
 from .sheet import AnyDefinition, Sheet, definition_of, named
 

@@ -15,14 +15,14 @@ from ..mechanics.moduli import lateral_forces
 from ..mechanics.network import FollowerPressure, Network
 from ..mechanics.newton import Equilibrium
 from ..mechanics.statics import StaticProblem
-from ..mesh import Mesh
+from ..mesh.cells import Mesh
 from ..mesh.groups import GroupedMesh
 from ..problem.boundary import held, measured, side_edges, weights
 from ..problem.loads import LoadKind
 from ..problem.materials import AnyMaterial
 from ..problem.quantities import nearest
 from ..problem.status import Status
-from ..springs import DEFINITIONS, Definition, DefinitionError, Springs
+from ..springs.base import DEFINITIONS, Definition, DefinitionError, Springs
 from ..springs.identification import Case, patch_cases
 
 NETWORKS = 6

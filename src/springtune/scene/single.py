@@ -13,7 +13,7 @@ import numpy as np
 from ..mechanics.network import Network
 from ..mechanics.newton import Equilibrium
 from ..mechanics.statics import SingularError, StaticProblem
-from ..mesh import Mesh
+from ..mesh.cells import Mesh
 from ..mesh.groups import GroupedMesh
 from ..problem.compare import error_text, quantity_errors, sign_word
 from ..problem.geometry import AssumptionWarning, Beam
@@ -24,7 +24,7 @@ from ..problem.shapes import QUANTITY_UNITS, Shape
 from ..problem.status import Status
 from ..registry import hook
 from ..safe_io.tables import Tabled, number_text
-from ..springs import Springs
+from ..springs.base import Springs
 from .meshes import is_a
 from .sheet import AnyDefinition, Sheet, check_stiffness, definition_of, named
 from .statements import BeamStatement, ShapeStatement, Statement

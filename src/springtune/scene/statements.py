@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from ..mechanics.network import FollowerPressure, Network
-from ..mesh import Mesh
+from ..mesh.cells import Mesh
 from ..mesh.groups import GroupedMesh, part_names, parts_of
 from ..problem.boundary import (
     cell_at,
@@ -32,7 +32,7 @@ from ..problem.materials import ANY_MATERIAL, AnyMaterial, Material, of_parts
 from ..problem.quantities import positive
 from ..problem.shapes import LoadCase, Quantity, Shape
 from ..reference.answers import beyond_linear
-from ..springs import Definition, DefinitionError, Springs
+from ..springs.base import Definition, DefinitionError, Springs
 from .meshes import A_BEAM, A_MATERIAL, A_MESH, A_SHAPE, check_filled, is_a
 from .shape_meshes import check_meshed
 from .sheet import Loading, Sheet, Solution, box_loading, chosen, solved

@@ -6,13 +6,12 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import Any
 
-from springtune.mesh import MESH_TYPES
-from springtune.mesh.types import MOST_MESHED
+from springtune.mesh.types import MESH_TYPES, MOST_MESHED
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import INCOMPRESSIBLE
 from springtune.problem.parameters import MOST_SCENES, MOST_SCENES_VARIABLE
 from springtune.problem.quantities import nearest
-from springtune.springs import DEFINITIONS
+from springtune.springs.base import DEFINITIONS
 from springtune.springs.lattice import COEFFICIENT
 
 from .combinations import SAME_VALUE, factors

@@ -8,14 +8,14 @@ from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
-from springtune.mesh import MESH_TYPES
 from springtune.mesh.formats import LARGEST_FILE
+from springtune.mesh.types import MESH_TYPES
 from springtune.problem.geometry import Beam
 from springtune.problem.loads import KINEMATICS, LOADS
 from springtune.problem.materials import AnyMaterial, Material, Rubber, only_isotropic
 from springtune.problem.parameters import SWEPT
 from springtune.safe_io.escapes import clipped
-from springtune.springs import DEFINITIONS
+from springtune.springs.base import DEFINITIONS
 from springtune.springs.lattice import COEFFICIENT
 
 from .checks import check_cells, check_files, mesh_type_names, stated_rows

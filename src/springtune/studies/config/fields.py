@@ -21,13 +21,13 @@ from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, core_schema
 
 from springtune import units
-from springtune.mesh import MESH_TYPES
+from springtune.mesh.types import MESH_TYPES
 from springtune.problem.loads import KINEMATICS, LOADS
 from springtune.problem.materials import MOST_TERMS
 from springtune.problem.parameters import PLANES
 from springtune.problem.quantities import beyond, nearest
 from springtune.registry import NAME, NAME_RULE
-from springtune.springs import DEFINITIONS
+from springtune.springs.base import DEFINITIONS
 
 from .messages import Key, refuse, show
 from .model import FURTHER_REFERENCES

@@ -19,7 +19,7 @@ from .colours import ERROR_COLOURS, ERROR_RANGE
 if TYPE_CHECKING:
     import xarray as xr
 
-    from springtune.mesh import Mesh
+    from springtune.mesh.cells import Mesh
     from springtune.scene.curve import Curve
 
 

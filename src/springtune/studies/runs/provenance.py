@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from springtune import __version__
-from springtune.mesh import MESH_TYPES
+from springtune.mesh.types import MESH_TYPES
 from springtune.problem.loads import LOADS
 from springtune.registry import Extended
-from springtune.springs import DEFINITIONS
+from springtune.springs.base import DEFINITIONS
 
 from ..config.kind import kinds
 from ..config.model import Study

@@ -2,8 +2,8 @@
 
 from collections.abc import Iterable, Sequence
 
-from springtune.mesh import MESH_TYPES
-from springtune.springs import DEFINITIONS
+from springtune.mesh.types import MESH_TYPES
+from springtune.springs.base import DEFINITIONS
 
 OTHER_APPROACHES = (
     "linear-triangles",

@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from springtune.linalg.factors import factorize
-from springtune.mesh import structured
+from springtune.mesh.rows import structured
 from springtune.problem.boundary import held, measured, weights
 from springtune.reference import calculix
 from springtune.scene.sheet import Sheet

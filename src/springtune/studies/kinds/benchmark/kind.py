@@ -7,13 +7,13 @@ from typing import Annotated
 from pydantic import Field
 
 from springtune.mechanics.integrators import PRECISIONS
-from springtune.mesh import MESH_TYPES
+from springtune.mesh.types import MESH_TYPES
 from springtune.problem.geometry import Beam
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import Material
 from springtune.problem.quantities import nearest
 from springtune.reference.calculix import program
-from springtune.springs import DEFINITIONS
+from springtune.springs.base import DEFINITIONS
 
 from ...config.checks import check_able, check_known, check_particles, check_product, check_scene
 from ...config.fields import (

@@ -16,7 +16,7 @@ import numpy as np
 from springtune.mechanics.integrators import PRECISIONS
 from springtune.mechanics.series import trace
 from springtune.mechanics.stepping import make_stepper
-from springtune.mesh import MESH_TYPES
+from springtune.mesh.types import MESH_TYPES
 from springtune.problem.boundary import weights
 from springtune.problem.compare import assured, deformation_error
 from springtune.problem.geometry import Beam
@@ -27,7 +27,7 @@ from springtune.reference import calculix
 from springtune.reference.small_strain import solve_small_strain
 from springtune.scene.motion import motion_of
 from springtune.scene.sheet import Sheet
-from springtune.springs import DefinitionError, Springs
+from springtune.springs.base import DefinitionError, Springs
 from springtune.springs.lattice import COEFFICIENT, uniform
 
 from ...runs.job import own_reason

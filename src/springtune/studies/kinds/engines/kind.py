@@ -7,12 +7,12 @@ from typing import Annotated
 from pydantic import Field
 
 from springtune.mechanics.integrators import PRECISIONS
-from springtune.mesh import MESH_TYPES
+from springtune.mesh.types import MESH_TYPES
 from springtune.problem.geometry import Beam
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import Material
 from springtune.registry import imported
-from springtune.springs import DEFINITIONS
+from springtune.springs.base import DEFINITIONS
 
 from ...config import checks, fields
 from ...config.fields import OneOrMore, Scalar, Section, default, number, one_of, optional

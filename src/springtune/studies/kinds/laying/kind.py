@@ -8,7 +8,7 @@ from pydantic import Field
 
 from springtune.problem.geometry import Strip, Trapezoid
 from springtune.problem.materials import Material
-from springtune.springs import DEFINITIONS
+from springtune.springs.base import DEFINITIONS
 
 from ...config.checks import check_beam_material, check_for_triangles, check_known, check_particles, check_product
 from ...config.fields import (

@@ -20,12 +20,13 @@ import numpy as np
 
 from springtune.mechanics.contact import Body, Contact, ContactError, Obstacle
 from springtune.mechanics.network import FollowerPressure
-from springtune.mesh import MESH_TYPES, Mesh
+from springtune.mesh.cells import Mesh
+from springtune.mesh.types import MESH_TYPES
 from springtune.problem.geometry import Strip, Trapezoid
 from springtune.problem.materials import material_of
 from springtune.problem.status import Status
 from springtune.scene.sheet import Sheet
-from springtune.springs import DefinitionError
+from springtune.springs.base import DefinitionError
 
 RIGID = 1e4
 """Ratio of Young's moduli from which the trapezoid counts as rigid."""

@@ -3,7 +3,7 @@
 from springtune.problem.materials import InPlane, Material
 from springtune.problem.status import Status
 from springtune.scene.moduli import MeshModuli
-from springtune.springs import DefinitionError
+from springtune.springs.base import DefinitionError
 
 from ..scenes.mesh import make
 

@@ -9,13 +9,13 @@ from typing import Annotated, Any
 from pydantic import Field, GetCoreSchemaHandler, create_model
 from pydantic_core import CoreSchema, core_schema
 
-from springtune.mesh import MESH_TYPES
+from springtune.mesh.types import MESH_TYPES
 from springtune.problem.geometry import warn_of_size, warn_of_thickness
 from springtune.problem.loads import LOADS
 from springtune.problem.parameters import MOST_SCENES
 from springtune.problem.quantities import LEAST
 from springtune.safe_io.tables import number_text
-from springtune.springs import DEFINITIONS
+from springtune.springs.base import DEFINITIONS
 
 from ...config.checks import MORE_SCENES, check_able, check_particles, in_mm, most_scenes
 from ...config.fields import (

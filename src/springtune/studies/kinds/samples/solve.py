@@ -10,12 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
-from springtune.mesh import MESH_TYPES
+from springtune.mesh.types import MESH_TYPES
 from springtune.problem.loads import LOAD_KINDS
 from springtune.problem.materials import Material
 from springtune.problem.status import Status
 from springtune.scene.sheet import Sheet
-from springtune.springs import DefinitionError
+from springtune.springs.base import DefinitionError
 
 from ...runs import store
 from .designs import draw

@@ -8,7 +8,7 @@ from math import prod
 from springtune.problem.loads import LOADS
 from springtune.reference.answers import unit_problem
 from springtune.safe_io.tables import aligned
-from springtune.springs import DEFINITIONS
+from springtune.springs.base import DEFINITIONS
 
 from ...config.kind import Kind
 from ...config.model import SceneSpec, Study

@@ -5,8 +5,10 @@ import time
 from functools import partial
 from pathlib import Path
 
-from springtune.mesh import MESH_TYPES, quality, read_beam_mesh
+from springtune.mesh.cells import quality
+from springtune.mesh.formats import read_beam_mesh
 from springtune.mesh.groups import GroupedMesh
+from springtune.mesh.types import MESH_TYPES
 
 from . import stored
 

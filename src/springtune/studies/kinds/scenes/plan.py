@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from springtune.problem.loads import LOADS
 from springtune.reference.answers import unit_problem, unit_scales
-from springtune.springs import DEFINITIONS
+from springtune.springs.base import DEFINITIONS
 
 from ...config.kind import Stage
 from ...config.model import keeps_fields, once_a_study, shown

@@ -12,7 +12,7 @@ from springtune.problem.materials import material_of
 from springtune.problem.status import Status
 from springtune.reference.answers import field_error, interpolate
 from springtune.scene.sheet import Sheet, definition_of
-from springtune.springs import DEFINITIONS, DefinitionError
+from springtune.springs.base import DEFINITIONS, DefinitionError
 
 from ...runs import store
 from . import stored

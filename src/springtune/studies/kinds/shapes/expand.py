@@ -10,14 +10,14 @@ from pathlib import Path
 
 import numpy as np
 
-from springtune.mesh import MeshError
+from springtune.mesh.cells import MeshError
 from springtune.mesh.sheets import free_motion
 from springtune.problem.geometry import AssumptionWarning, size_text
 from springtune.problem.loads import KINEMATICS
 from springtune.problem.materials import Material
 from springtune.problem.quantities import nearest
 from springtune.problem.shapes import Hole, LoadCase, Pressure, Quantity, Segment, Shape, Support, Traction
-from springtune.springs import DEFINITIONS
+from springtune.springs.base import DEFINITIONS
 
 from ...config.checks import FEWER, check_density, check_for_triangles, check_known, check_particles
 from ...config.expand import file_fault

@@ -207,7 +207,7 @@ def _size(shape, file):
     """Extents of a shape in words, or of a mesh file of it."""
     import numpy as np  # here, as those below: few studies have files
 
-    from springtune.mesh import MeshError
+    from springtune.mesh.cells import MeshError
     from springtune.mesh.formats import read_shape
     from springtune.problem.geometry import size_text
 

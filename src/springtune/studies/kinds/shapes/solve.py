@@ -7,7 +7,7 @@ import numpy as np
 from springtune.problem.boundary import check_case
 from springtune.problem.status import Status
 from springtune.scene.single import Scene
-from springtune.springs import DefinitionError
+from springtune.springs.base import DefinitionError
 
 from ...runs.source import hash_of
 from ..scenes import stored

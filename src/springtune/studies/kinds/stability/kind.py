@@ -5,7 +5,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from springtune.mesh import MESH_TYPES
+from springtune.mesh.types import MESH_TYPES
 
 from ...config.checks import check_beam_material, check_density, check_for_triangles, check_known, check_particles
 from ...config.fields import (

@@ -18,7 +18,8 @@ from springtune.mechanics.dynamics import Motion, relax
 from springtune.mechanics.integrators import BEHAVIOURS, EXPLICIT, INTEGRATORS, BackwardEuler
 from springtune.mechanics.moduli import PatchTest
 from springtune.mechanics.statics import SingularError, StaticProblem
-from springtune.mesh import MESH_TYPES, Mesh, corner_angles
+from springtune.mesh.cells import Mesh, corner_angles
+from springtune.mesh.types import MESH_TYPES
 from springtune.problem.boundary import weights
 from springtune.problem.geometry import Beam
 from springtune.problem.loads import AXIAL, FACE
@@ -26,7 +27,7 @@ from springtune.problem.materials import Material, material_of
 from springtune.problem.status import Status
 from springtune.scene.motion import motion_of
 from springtune.scene.sheet import Sheet
-from springtune.springs import DefinitionError, Springs
+from springtune.springs.base import DefinitionError, Springs
 
 from . import AXES, Experiment
 
