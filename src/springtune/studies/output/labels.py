@@ -2,7 +2,7 @@
 
 import re
 import textwrap
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -148,15 +148,16 @@ def small_multiples(
     *,
     sharey: bool = False,
     said: str = "",
+    key: Sequence[Artist] = (),
 ) -> np.ndarray:
-    """Draw a panel a title, each of a `height` [inch], shape (n_panels,).
+    """Draw a panel a title, each of a `height` [inch], shape (n_panels,), with a key of all.
 
     `draw` gets a panel and its part; it returns notes, and the reason if it drew no line, see `finish`.
     """
     given = ax is not None and not isinstance(ax, Figure | SubFigure)
+    wide = style.COLUMN if len(shown) == 1 < columns else style.PAGE
     columns = len(shown) if given else min(columns, len(shown))
     rows = -(-len(shown) // columns)
-    wide = style.COLUMN if columns == 1 else style.PAGE
     figure, axes = style.panels(ax, rows, columns, figsize=(wide, height * rows), sharey=sharey)
     flat, lines = axes.ravel()[: len(shown)], 0
     for panel in axes.ravel()[len(shown) :]:
@@ -172,6 +173,10 @@ def small_multiples(
     for panel in axes[:, 1:].flat if sharey else ():
         panel.set_ylabel("")
     entitle(figure, title, said)
+    if key and figure is None:
+        flat[-1].legend(handles=key)
+    elif key:
+        figure.legend(handles=key, loc="outside upper right", ncols=len(key))
     if ax is None and isinstance(figure, Figure):
-        figure.set_size_inches(wide, 0.2 + (height + LINE * lines) * rows + LINE * bool(said))
+        figure.set_size_inches(wide, 0.2 + (height + LINE * lines) * rows + LINE * (bool(said) + bool(key)))
     return flat

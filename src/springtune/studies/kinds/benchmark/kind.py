@@ -15,23 +15,9 @@ from springtune.problem.quantities import nearest
 from springtune.reference.calculix import program
 from springtune.springs.base import DEFINITIONS
 
+from ...config import fields
 from ...config.checks import check_able, check_known, check_particles, check_product, check_scene
-from ...config.fields import (
-    BeamName,
-    DefinitionNames,
-    Force,
-    Length,
-    Load,
-    MaterialName,
-    MeshType,
-    Named,
-    OneOrMore,
-    Section,
-    default,
-    number,
-    one_of,
-    optional,
-)
+from ...config.fields import Named, OneOrMore, Section, default, number, one_of, optional
 from ...config.kind import Kind
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key
 from ...runs.stages import Task, stage
@@ -48,26 +34,28 @@ Seconds = Annotated[float, number("a number of seconds above 0, such as 0.5", 0,
 class BenchmarkSceneConfig(Section):
     """A scene of the benchmark."""
 
-    beam: BeamName = Field(description="Beam.")
-    material: MaterialName = Field(description="Material, with a density.")
-    load: Load = Field(description="`traction`, `compression`, `bending` or `pressure`.")
-    force: Force = Field(description="Magnitude of the force.")
+    beam: fields.BeamName = Field(description="Beam.")
+    material: fields.MaterialName = Field(description="Material, with a density.")
+    load: fields.Load = Field(description="`traction`, `compression`, `bending` or `pressure`.")
+    force: fields.Force = Field(description="Magnitude of the force.")
 
 
 class BenchmarkConfig(Section):
     """Run time against error: every definition on every mesh type, and other approaches; one at a time."""
 
     scenes: Annotated[dict[str, BenchmarkSceneConfig], Named("scene")] = Field(description="Scenes.")
-    definition: DefinitionNames = Field(description="Definitions that derive a stiffness and need no reference.")
-    mesh_type: Annotated[list[MeshType], OneOrMore()] = Field(description="Mesh types of the definitions.")
+    definition: fields.DefinitionNames = Field(description="Definitions that derive a stiffness and need no reference.")
+    mesh_type: Annotated[list[fields.MeshType], OneOrMore()] = Field(description="Mesh types of the definitions.")
     approach: Annotated[list[OtherApproach], OneOrMore()] = Field(
         list(OTHER_APPROACHES),
         description="Other approaches: finite elements, CalculiX where it is on the machine, and what the "
         "paper names: tensor-mass, pre-computed responses, boundary elements, free-form deformation. All without.",
     )
-    mesh_size: Annotated[list[Length], OneOrMore()] = Field(description="Lengths of an edge.")
-    finest: Length | None = Field(None, description="The shortest of them that most approaches have; all without.")
-    finest_of: dict[str, Length] = Field(
+    mesh_size: Annotated[list[fields.Length], OneOrMore()] = Field(description="Lengths of an edge.")
+    finest: fields.Length | None = Field(
+        None, description="The shortest of them that most approaches have; all without."
+    )
+    finest_of: dict[str, fields.Length] = Field(
         default_factory=dict,
         description="The shortest of them that an approach has, by its name, such as `delingette/structured: 0.5 mm`.",
     )

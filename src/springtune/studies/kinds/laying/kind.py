@@ -10,20 +10,9 @@ from springtune.problem.geometry import Strip, Trapezoid
 from springtune.problem.materials import Material
 from springtune.springs.base import DEFINITIONS
 
+from ...config import fields
 from ...config.checks import check_beam_material, check_for_triangles, check_known, check_particles, check_product
-from ...config.fields import (
-    BeamName,
-    DefinitionNames,
-    Length,
-    MaterialName,
-    OneOrMore,
-    Section,
-    Stress,
-    default,
-    number,
-    one_of,
-    optional,
-)
+from ...config.fields import OneOrMore, Section, default, number, one_of, optional
 from ...config.kind import Kind
 from ...runs.keys import definition_key, material_key, mesh_type_key
 from ...runs.stages import Task, stage
@@ -49,9 +38,9 @@ Loading = Annotated[str, one_of("loading", LOADINGS)]
 class TrapezoidConfig(Section):
     """A symmetric trapezoid that stands on its lower base."""
 
-    lower_base: Length = Field(description="Length of the base on the floor.")
-    upper_base: Length = Field(description="Length of the upper base.")
-    height: Length = Field(description="Height.")
+    lower_base: fields.Length = Field(description="Length of the base on the floor.")
+    upper_base: fields.Length = Field(description="Length of the upper base.")
+    height: fields.Length = Field(description="Height.")
 
 
 class LayingConfig(Section):
@@ -61,21 +50,21 @@ class LayingConfig(Section):
     the band of its error.
     """
 
-    strip: BeamName = Field(description="Beam that is the strip.")
+    strip: fields.BeamName = Field(description="Beam that is the strip.")
     trapezoid: TrapezoidConfig = Field(description="Trapezoid below the strip.")
-    material: MaterialName = Field(description="Material of the strip.")
-    support: MaterialName = Field(
+    material: fields.MaterialName = Field(description="Material of the strip.")
+    support: fields.MaterialName = Field(
         description="Material of the trapezoid, which is rigid from 1e4 times the strip's modulus on."
     )
-    definition: DefinitionNames = Field(description="Definitions that derive a stiffness and need no reference.")
-    mesh_size: Annotated[list[Length], OneOrMore()] = Field(description="Lengths of an edge.")
-    reference_size: Length = default("1 mm", description="Length of an edge of the reference's finest mesh.")
+    definition: fields.DefinitionNames = Field(description="Definitions that derive a stiffness and need no reference.")
+    mesh_size: Annotated[list[fields.Length], OneOrMore()] = Field(description="Lengths of an edge.")
+    reference_size: fields.Length = default("1 mm", description="Length of an edge of the reference's finest mesh.")
     loading: Annotated[list[Loading], OneOrMore()] = default(
         "pressure",
         description="`pressure`: on the upper face, following it; `gravity`: the same force as weight; `ends`: draws "
         "the ends down to the floor.",
     )
-    pressure: Stress = Field(description="Pressure, or weight over the upper face.")
+    pressure: fields.Stress = Field(description="Pressure, or weight over the upper face.")
     friction: Annotated[list[Friction], OneOrMore()] = default("0", description="Coulomb's coefficients of friction.")
 
 

@@ -17,8 +17,7 @@ from ...runs import store
 from ..scenes import any_reference
 from .designs import PARAMETERS, SOBOL_INDICES, blocks, roles
 from .interpolate import problem_key
-from .kind import MOST_SOLVED, UNIFORM, block_key, reference_key, result_key, solved_definitions
-from .outputs import QUANTITIES
+from .kind import MOST_SOLVED, UNIFORM, block_key, reference_key, result_key
 from .solve import DRAWN
 
 OF_REFERENCES = ("sample", "load")
@@ -94,11 +93,11 @@ def groups(study, folder):
     """Groups of a dataset, see `springtune.studies.kinds.scenes.collect.groups`."""
     sample = study.parts["samples"]
     drawn, results = _stored(sample, folder / "samples")
-    points = sample.size * min(2, sample.rows // sample.size)
+    points = sample.size * min(2, sample.each)
     axes = study.axes | {
         "sample": tuple(range(sample.rows)),
         "parameter": sample.varied,
-        "quantity": tuple(name for name in QUANTITIES if name != "best_stiffness" or sample.best_stiffness),
+        "quantity": sample.quantities,
         "bin": tuple(range(min(MOST_BINS, max(4, points // BIN_POINTS)))),
     }
     # Without a mesh, as beyond limits, a network has no particles; other definitions may have a mesh.
@@ -114,9 +113,9 @@ def groups(study, folder):
 
 def _stored(sample, folder):
     """Parameters of all rows, and results by key: displacement, status, particles and messages by row."""
-    keys = {result_key(sample, load, name) for load in sample.loads for name in solved_definitions(sample)}
+    keys = {result_key(sample, load, name) for load in sample.loads for name in sample.solved}
     arrays = {key: ("displacement", "status", "particles") for key in keys}
-    arrays[DRAWN] = tuple(dict.fromkeys([*sample.parameters, "mesh_size"]))
+    arrays[DRAWN] = tuple(dict.fromkeys([*sample.drawn, "mesh_size"]))
     parts, messages, before = {key: [] for key in arrays}, {key: {} for key in keys}, 0
     for ends in blocks(sample.design, sample.size):
         path = folder / f"{block_key(sample, *ends)}.h5"
@@ -148,7 +147,7 @@ def _of_load(load, sample, drawn, results, folder):
         applies = [np.isfinite(pair).all() and not beyond_linear(*pair) for pair in pairs]
     values = {"reference_displacement": reference, "reference_error_estimate": answers.error_estimate}
     values |= {"reference_applies": applies, "reference_message": why}
-    if sample.best_stiffness:  # the solved one times its displacement over the reference
+    if "best_stiffness" in sample.quantities:  # the solved one times its displacement over the reference
         found = results[result_key(sample, load, UNIFORM)]
         solved = np.where(found["status"] == Status.SOLVED, sign * found["displacement"], np.nan)
         values["best_stiffness"] = softness * (solved / reference)
@@ -212,8 +211,7 @@ LEFT_OUT = "where a scene has no value the whole base sample is left out; base_s
 
 def _values(sample, data):
     """Labels of each quantity, load and definition, and values by row, NaN where a scene is not solved stably."""
-    quantities = [name for name in QUANTITIES if name != "best_stiffness" or sample.best_stiffness]
-    for quantity, load, name in product(quantities, sample.loads, sample.definitions):
+    for quantity, load, name in product(sample.quantities, sample.loads, sample.definitions):
         one = data[[quantity, "status"]].sel(load=load, definition=name)
         values = one[quantity].values
         if quantity != "best_stiffness":
@@ -223,7 +221,7 @@ def _values(sample, data):
 
 def _effects(sample, data, drawn, axes):
     """Means over each parameter alone, of rows that are independent of each other."""
-    each, bins = sample.rows // sample.size, len(axes["bin"])
+    each, bins = sample.each, len(axes["bin"])
     alone = np.flatnonzero(np.arange(sample.rows) % each < 2)  # A and B
     for parameter in sample.varied:
         of, at = {"parameter": parameter, "bin": axes["bin"]}, drawn[parameter][alone]
@@ -251,9 +249,6 @@ RESAMPLES = 1000
 
 LEVEL = 0.95
 """Share of bootstrap samples within a band."""
-
-DRAWN_TOGETHER = 1 << 21
-"""Most base samples drawn at once for bootstrap samples: 16 MB."""
 
 NEGLIGIBLE = 1e-12
 """Smallest standard deviation over the largest value that is more than rounding."""
@@ -299,13 +294,10 @@ def sobol_indices(at_a: np.ndarray, at_b: np.ndarray, at_ab: np.ndarray, least: 
     # Terms of each base sample whose means are taken: 2 n_parameters for the indices, two for the variance.
     terms = np.concatenate([at_b * (at_ab - at_a), 0.5 * (at_a - at_ab) ** 2, [(at_a + at_b) / 2],
                             [(at_a**2 + at_b**2) / 2]])  # fmt: skip
-    random = np.random.default_rng(0)
-    parts, together = [terms.mean(axis=1)[None]], max(1, DRAWN_TOGETHER // rows)
-    for begin in range(0, RESAMPLES, together):
-        resamples = range(begin, min(begin + together, RESAMPLES))
-        drawn = [np.bincount(random.integers(rows, size=rows), minlength=rows) for _ in resamples]
-        parts.append(np.array(drawn, dtype=float) @ terms.T / rows)
-    means = np.concatenate(parts)
+    random, means = np.random.default_rng(0), [terms.mean(axis=1)]
+    for _ in range(RESAMPLES):
+        means.append(terms @ np.bincount(random.integers(rows, size=rows), minlength=rows) / rows)
+    means = np.array(means)
     found = means[:, : 2 * count] / (means[:, -1] - means[:, -2] ** 2)[:, None]
     values = found[0], *np.quantile(found[1:], [(1 - LEVEL) / 2, (1 + LEVEL) / 2], axis=0)
     halves = zip(ORDERS, (slice(count), slice(count, None)))

@@ -20,14 +20,14 @@ PARAMETER_AXES = {
 """Name of each parameter on an axis, what its values are multiplied with, and the unit then."""
 
 QUANTITY_AXES = {
-    "displacement": ("displacement", 1e3, "mm"),
     "deformation_error": ("deformation error", 100.0, "%"),
+    "displacement": ("displacement", 1e3, "mm"),
     "best_stiffness": ("best stiffness", 1.0, "N/m"),
 }
 """The same of each quantity."""
 
-COLUMNS = 4
-"""Most panels side by side."""
+FARTHEST = -0.3, 1.5
+"""Ends of the axis of Sobol indices at most, whose bands may go farther."""
 
 SMALL_MODULUS = 1e9
 """Young's modulus up to which the unit is MPa [Pa]."""
@@ -58,17 +58,6 @@ def _titled(samples, load, what):
     """Title of a figure."""
     words = f"{load.capitalize()}, {samples.attrs['mesh_type']} meshes, {samples.attrs['kinematics']} kinematics"
     return f"{words}: {what}"
-
-
-def _panels_of_indices(data, load):
-    """Quantity and definition of each panel; the best stiffness has one panel for all definitions."""
-    asked = data.base_samples.sel(load=load) + data.base_samples_without.sel(load=load) > 0
-    found = []
-    for quantity in ("deformation_error", "displacement", "best_stiffness"):
-        if quantity in data["quantity"].values:
-            names = labels_of(asked.sel(quantity=[quantity]), "definition")
-            found += [(quantity, name) for name in (names[:1] if quantity == "best_stiffness" else names)]
-    return found
 
 
 @style.styled
@@ -103,77 +92,44 @@ def plot_sobol(data, ax=None, *, load=None):
     ['height', 'force']
     """
     found, samples = group(data, "sobol", alone=False), group(data, "samples", alone=False)
-    asked = (found.base_samples + found.base_samples_without > 0).any("quantity")
-    load = choose(asked, load=load)["load"]
-    shown = _panels_of_indices(found, load)
-    names = found.parameter.values.tolist()
-    words = [PARAMETER_AXES[name][0] for name in names]
-    columns = min(COLUMNS, max(1, sum(quantity == shown[0][0] for quantity, _ in shown)))
-    limits, farther = _limits(found, shown, load)
-    note = _note(found.sel(load=load), samples.attrs["size"]) + ("; arrows: bands go farther" if farther else "")
-    order = found["definition"].values.tolist()
+    asked = found.base_samples + found.base_samples_without > 0
+    load = choose(asked.any("quantity"), load=load)["load"]
+    found, asked = found.sel(load=load), asked.sel(load=load)
+    names, order, shown = found.parameter.values.tolist(), found["definition"].values.tolist(), {}
+    for quantity in (name for name in QUANTITY_AXES if name in found["quantity"].values):
+        for definition in labels_of(asked.sel(quantity=[quantity]), "definition"):
+            alone = quantity == "best_stiffness"  # of uniform springs alone
+            title = QUANTITY_AXES[quantity][0] + ("" if alone else f", {definition}")
+            look = "0.35" if alone else style.line(order.index(definition))["color"]
+            shown.setdefault(title, (found.sel(quantity=quantity, definition=definition), look))
+    bands = found[[name for name in found if name.endswith(("_low", "_high"))]].to_array()
+    low, high = max(min(0.0, bands.min()), FARTHEST[0]), min(max(1.0, bands.max()), FARTHEST[1])
 
-    def draw(panel, one):
-        quantity, definition = one
-        indices = found.sel(quantity=quantity, load=load, definition=definition)
-        colour = "0.35" if quantity == "best_stiffness" else style.line(order.index(definition))["color"]
-        _bars(panel, indices, colour, limits)
-        panel.set(xlim=limits, xlabel="share of the variance")
-        panel.set_yticks(range(len(names)), words)
+    def draw(panel, part):
+        indices, colour = part
+        # Total order pale and wide, first order full and narrow.
+        for name, wide, alpha, shift in (("total_order", 0.76, 0.3, 0.2), ("first_order", 0.36, 1.0, -0.2)):
+            values, *ends = (indices[f"{name}{end}"].values for end in ("", "_low", "_high"))
+            places = np.arange(len(names))
+            panel.barh(places, np.maximum(np.nan_to_num(values), 0), wide, color=colour, alpha=alpha, linewidth=0)
+            panel.hlines(places + shift, *ends, color="k", linewidth=0.8)
+        panel.set(xlim=(low - 0.02, high + 0.02), ylim=(len(names) - 0.45, -0.55), xlabel="share of the variance")
+        panel.set_yticks(range(len(names)), [PARAMETER_AXES[name][0] for name in names])
+        panel.tick_params(axis="y", length=0)
+        panel.grid(False, axis="y")
         if not np.isfinite(indices.first_order.values).any():
-            labels.say(panel, _why(indices), bare=False)
+            none = "no base sample of which all scenes have a value"
+            labels.say(panel, "does not vary" if int(indices.base_samples) else none, bare=False)
         return [], ""
 
-    def titled(quantity, definition):
-        return QUANTITY_AXES[quantity][0] + ("" if quantity == "best_stiffness" else f", {definition}")
-
-    panels = {titled(*one): one for one in shown}
-    title = _titled(samples, load, "Sobol indices")
-    return labels.small_multiples(ax, panels, columns, 0.21 * len(names) + 0.8, title, draw, sharey=True, said=note)
-
-
-def _why(one):
-    """Why there are no indices of a quantity."""
-    if int(one.base_samples):
-        return "does not vary"
-    return "no base sample of which all scenes have a value"
-
-
-def _limits(found, shown, load):
-    """Ends of the axis of all panels, from zero to one or farther within reason, and whether bands go beyond them."""
-    cells = [found.sel(quantity=quantity, load=load, definition=name) for quantity, name in shown]
-    ends = [np.nan_to_num(cell[f"{order}_order_{end}"].values)
-            for cell in cells for order in ("first", "total") for end in ("low", "high")]  # fmt: skip
-    low, high = min(0.0, *map(np.min, ends)), max(1.0, *map(np.max, ends))
-    return (max(low, -0.3) - 0.02, min(high, 1.5) + 0.02), low < -0.32 or high > 1.52
-
-
-def _bars(panel, indices, colour, limits):
-    """Bars of the indices of one quantity: total order pale and wide, first order full and narrow, with bands."""
-    for order, wide, alpha, shift in (("total_order", 0.76, 0.3, 0.2), ("first_order", 0.36, 1.0, -0.2)):
-        values, low, high = (indices[f"{order}{end}"].values for end in ("", "_low", "_high"))
-        places = np.arange(len(values))
-        panel.barh(places, np.maximum(np.nan_to_num(values), 0), wide, color=colour, alpha=alpha, linewidth=0)
-        panel.hlines(places + shift, low, high, color="k", linewidth=0.8)
-        for marker, end, cut in (("<", limits[0], low < limits[0]), (">", limits[1], high > limits[1])):
-            if cut.any():  # a layout makes no room for a line of no points
-                ends = np.full(cut.sum(), end)
-                panel.plot(ends, (places + shift)[cut], marker, color="k", markersize=3, clip_on=False)
-    panel.set_ylim(len(places) - 0.45, -0.55)
-    panel.tick_params(axis="y", length=0)
-    panel.grid(False, axis="y")
-
-
-def _note(found, size):
-    """What bars and bands show, and the number of their base samples."""
-    used, without = found.base_samples.values, found.base_samples_without.values
-    text = "full: first order, pale: total order; lines: bootstrap bands, 95 %"
-    lost = int(without.max())
-    if not lost:
-        return f"{text}; {size} base samples"
-    some = used[used + without > 0]
-    kept = f"{int(some.min())}" if some.min() == some.max() else f"{int(some.min())} to {int(some.max())}"
-    return f"{text}; of {kept} of {size} base samples: up to {lost} have a scene without a value"
+    note = "full: first order, pale: total order; lines: bootstrap bands, 95 %" + ", cut off" * bool(
+        bands.min() < low or bands.max() > high
+    )
+    size, lost = samples.attrs["size"], int(found.base_samples_without.max())
+    note += f"; {size} base samples" + f", up to {lost} left out: a scene has no value" * bool(lost)
+    columns = max(1, min(4, len(order)))
+    title, height = _titled(samples, load, "Sobol indices"), 0.21 * len(names) + 0.8
+    return labels.small_multiples(ax, shown, columns, height, title, draw, sharey=True, said=note)
 
 
 @style.styled
@@ -220,13 +176,13 @@ def plot_effects(data, ax=None, *, load=None, quantity="deformation_error"):
     def draw(panel, name):
         values = effects.parameter_value.sel(parameter=name).values
         by, of = _unit(name, values)
-        x = by * values
         for definition in definitions:
             one, look = effects.sel(parameter=name, definition=definition), style.line(every.index(definition))
             mean, error = (factor * one[which].values for which in ("main_effect", "main_effect_error"))
             label = "uniform springs" if quantity == "best_stiffness" else definition
-            panel.plot(x, mean, label=label, **look | {"marker": ""})
-            panel.fill_between(x, mean - 2 * error, mean + 2 * error, color=look["color"], alpha=0.15, linewidth=0)
+            panel.plot(by * values, mean, label=label, **look | {"marker": ""})
+            ends = mean - 2 * error, mean + 2 * error
+            panel.fill_between(by * values, *ends, color=look["color"], alpha=0.15, linewidth=0)
         panel.margins(x=0.05)
         if _is_logarithmic(values):
             panel.set(xscale="log")
@@ -238,20 +194,17 @@ def plot_effects(data, ax=None, *, load=None, quantity="deformation_error"):
 
     shown = {PARAMETER_AXES[name][0]: name for name in effects.parameter.values.tolist()}
     title = _titled(samples, load, f"mean {text} over each parameter alone")
-    note = _lacking(samples, load, definitions, quantity)
+    note = _lacking(samples.sel(load=load), definitions, quantity)
     return labels.small_multiples(ax, shown, 3, 1.9, title, draw, sharey=True, said=note)
 
 
-def _lacking(samples, load, definitions, quantity):
+def _lacking(samples, definitions, quantity):
     """How many scenes the means lack, and of how many the reference does not apply; bands."""
-    scenes = samples.sel(load=load, definition=definitions)
-    unsolved, every = int((scenes.status != 1).sum()), scenes.status.size
-    said = ["bands: two standard errors"]
-    if quantity == "deformation_error":
-        said.append(sign_of_errors(samples.sel(load=load)))
+    status = samples.status.sel(definition=definitions)
+    unsolved, beyond = int((status != 1).sum()), int(np.sum(samples.get("reference_applies", 1) == 0))
+    said = ["bands: two standard errors", sign_of_errors(samples) if quantity == "deformation_error" else ""]
     if unsolved:
-        said.append(f"without {unsolved} of {every} scenes, which are not solved")
-    beyond = int((samples.reference_applies.sel(load=load) == 0).sum()) if "reference_applies" in samples else 0
+        said.append(f"without {unsolved} of {status.size} scenes, which are not solved")
     if beyond:
         said.append(f"{beyond} of {samples.sizes['sample']} points are beyond small strain or without a reference, "
                     "so that their error is not the network's alone")  # fmt: skip

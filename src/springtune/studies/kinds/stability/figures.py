@@ -10,13 +10,15 @@ from ...output.dataset import STATUS
 from ...output.selection import group, labels_of
 from .outputs import figures
 
-MAP_COLOURS = ("#f4f4f4", "#b5cfe3", "#d07a1f", "#4a0d1a")
-"""Of stable, decaying, growing and NaN: darker from one to the next."""
+BEHAVIOUR_COLOURS = {"stable": "#f4f4f4", "decaying": "#b5cfe3", "growing": "#d07a1f", "NaN": "#4a0d1a"}
+"""Darker from one to the next, in the order of the flags."""
 
 STATUS_COLOURS = ("white", "#dce9f2", "#a9a9a9", "#4a0d1a", "#e0a458", "#5a5a5a")
 """Of the flags of a status."""
 
+SCHEMES = {"central-difference-lagged": "Central, damping lags"}
 STRAIN_LOADS = {"axial": "Force on the end", "follower-pressure": "Pressure that follows a long face"}
+"""Titles of panels, where they are not the name."""
 
 
 def stability(tree):
@@ -66,33 +68,27 @@ def plot_stability_maps(data, ax=None):
     ('log', 'log')
     """
     data = _experiment(data, "maps")
-    names = data.integrator.values
-    figure, axes = style.panels(ax, ncols=len(names), sharey=True, figsize=(style.PAGE, 2.2))
-    axes, x, y = axes[0], data.map_damping_ratio.values, data.step_ratio.values
-    for panel, name in zip(axes, names):
-        found = data.behaviour.sel(integrator=name).values
-        panel.pcolormesh(x, y, found, cmap=ListedColormap(MAP_COLOURS), vmin=-0.5, vmax=3.5, shading="nearest")
-        predicted = data.step_ratio_predicted.sel(integrator=name).values
+    steps = data.step_ratio.values
+
+    def draw(panel, name):
+        one = data.sel(integrator=name)
+        colours = ListedColormap([*BEHAVIOUR_COLOURS.values()])
+        places = data.map_damping_ratio, steps
+        panel.pcolormesh(*places, one.behaviour, cmap=colours, vmin=-0.5, vmax=3.5, shading="nearest")
         for look in ({"color": "black"}, {"color": "white", "linewidth": 0.5}):
-            panel.plot(x, np.where(predicted < 100, predicted, np.nan), **look)
-        title = name.replace("-", " ").capitalize().replace("euler", "Euler")
-        panel.set(**style.LOGARITHMIC, ylim=(y.min(), y.max()))
-        panel.set_title(title.replace("Central difference lagged", "Central, damping lags"), fontsize=style.SMALL)
+            panel.plot(places[0], one.step_ratio_predicted.where(one.step_ratio_predicted < 100), **look)
+        panel.set(
+            **style.LOGARITHMIC, ylim=(steps.min(), steps.max()), xlabel="Damping ratio", ylabel="Step over 2/ωₘₐₓ"
+        )
         panel.grid(False)
         style.plain(panel, "x", "y")
-        if not np.isfinite(found).any():
-            labels.say(panel, "nothing was run", bare=False)
-    axes[0].set_ylabel("Step over 2/ωₘₐₓ")
-    keys = labels.swatches(dict(zip(("stable", "decaying", "growing", "NaN"), MAP_COLOURS)))
-    keys.append(axes[0].plot([], [], color="black", label="predicted limit")[0])
-    text = "Damping ratio of the highest mode, damping in proportion to mass"
-    if figure is None:
-        axes[0].set_xlabel(text)
-        axes[-1].legend(handles=keys)
-    else:
-        figure.supxlabel(text, fontsize=8)
-        figure.legend(handles=keys, loc="outside upper center", ncols=5)
-    return axes
+        return [], "" if np.isfinite(one.behaviour).any() else "nothing was run"
+
+    shown = {SCHEMES.get(name, name.replace("-", " ").capitalize().replace("euler", "Euler")): name
+             for name in data.integrator.values}  # fmt: skip
+    said = "Damping ratio of the highest mode, damping in proportion to mass; line: predicted limit"
+    title, key = "What noise becomes over step and damping", labels.swatches(BEHAVIOUR_COLOURS)
+    return labels.small_multiples(ax, shown, len(shown), 2.0, title, draw, sharey=True, said=said, key=key)
 
 
 @style.styled
@@ -126,39 +122,31 @@ def plot_stability_strains(data, ax=None):
     'Strain of a linear sheet under the load [%]'
     """
     data = _experiment(data, "strains")
-    names = labels_of(data["strain_load_share"].notnull(), "definition")
-    loads, strains = data.strain_load.values, data.strain.values
-    figure, axes = style.panels(
-        ax, nrows=len(loads), sharex=True, figsize=(style.PAGE, 0.75 + len(loads) * (0.3 + 0.19 * max(len(names), 2)))
-    )
-    axes, seen = axes[:, 0], set()
-    for panel, load in zip(axes, loads):
-        panel.set_title(STRAIN_LOADS.get(load, load))
-        panel.grid(False)
-        if not names:
-            labels.say(panel, "No definition was solved under this load.")
-            continue
-        here = data.sel(strain_load=load, definition=names)
-        flags, pivots, share, messages = (here[name].transpose("definition", "strain").values for name in (
-            "strain_status", "negative_pivots", "strain_load_share", "strain_message"))  # fmt: skip
+    names = labels_of(data.strain_load_share.notnull(), "definition")
+    strains = [f"{100 * strain:g}".replace("-", "−") for strain in data.strain.values]
+
+    def text(flag, pivots, share, message):
+        if pivots > 0 or share < 1:
+            return f"{pivots:.0f}" if pivots > 0 else f"{100 * share:.0f} %"
+        return ("f" if "flutters" in message else "path") if flag == 4 else ""
+
+    def draw(panel, load):
+        names_of = ("strain_status", "negative_pivots", "strain_load_share", "strain_message")
+        here = data[[*names_of]].sel(strain_load=load, definition=names).transpose("definition", "strain")
+        flags, *others = (here[name].values for name in names_of)
         panel.pcolormesh(flags, cmap=ListedColormap(STATUS_COLOURS), vmin=-0.5, vmax=5.5, edgecolor="white")
-        seen |= {round(flag) for flag in np.unique(flags)}
-        for i, j in np.ndindex(flags.shape):
-            text = f"{100 * share[i, j]:.0f} %" if share[i, j] < 1 else ""
-            text = f"{pivots[i, j]:.0f}" if pivots[i, j] > 0 else text
-            if flags[i, j] == 4 and not text:
-                text = "f" if "flutters" in messages[i, j] else "path"
-            colour = "white" if flags[i, j] in (3, 5) else "black"
-            panel.text(j + 0.5, i + 0.5, text, ha="center", va="center", fontsize=style.SMALL, color=colour)
-        panel.set_xticks(np.arange(len(strains)) + 0.5, [f"{100 * x:g}".replace("-", "−") for x in strains])
+        for (i, j), flag in np.ndenumerate(flags):
+            written, colour = text(flag, *(one[i, j] for one in others)), "white" if flag in (3, 5) else "black"
+            panel.text(j + 0.5, i + 0.5, written, ha="center", va="center", fontsize=style.SMALL, color=colour)
+        panel.set_xticks(np.arange(len(strains)) + 0.5, strains)
         panel.set_yticks(np.arange(len(names)) + 0.5, map(no_mathematics, names))
-    axes[-1].set_xlabel("Strain of a linear sheet under the load [%]")
-    kinds = {1: "solved", 3: "none found beyond that %",
-             4: "unstable: negative pivots, limit point at % of the load, f: flutter, path: on the way"}  # fmt: skip
-    kinds |= {flag: STATUS[flag].replace("_", " ") for flag in sorted(seen) if flag not in kinds}
-    keys = labels.swatches({text: STATUS_COLOURS[flag] for flag, text in kinds.items() if flag in seen})
-    if figure is None:
-        axes[0].legend(handles=keys)
-    elif keys:
-        figure.legend(handles=keys, loc="outside lower center", ncols=len(keys), columnspacing=1.2)
-    return axes
+        panel.set(xlabel="Strain of a linear sheet under the load [%]")
+        panel.grid(False)
+        return [], "" if names else "No definition was solved under this load."
+
+    seen = np.unique(data.strain_status.sel(definition=names)).astype(int)
+    key = labels.swatches({STATUS[flag].replace("_", " "): STATUS_COLOURS[flag] for flag in seen})
+    said = "number: negative pivots; %: share of the load that is reached; f: flutter; path: unstable on the way"
+    shown = {STRAIN_LOADS.get(load, load): load for load in data.strain_load.values}
+    height = 0.6 + 0.19 * max(len(names), 2)
+    return labels.small_multiples(ax, shown, 1, height, "What becomes of large strains", draw, said=said, key=key)

@@ -7,20 +7,9 @@ from pydantic import Field
 
 from springtune.mesh.types import MESH_TYPES
 
+from ...config import fields
 from ...config.checks import check_beam_material, check_density, check_for_triangles, check_known, check_particles
-from ...config.fields import (
-    BeamName,
-    DefinitionNames,
-    Force,
-    Length,
-    MaterialName,
-    MeshType,
-    OneOrMore,
-    Section,
-    default,
-    one_of,
-    optional,
-)
+from ...config.fields import OneOrMore, Section, default, one_of, optional
 from ...config.kind import Kind
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key
 from ...runs.stages import Task, stage
@@ -33,15 +22,15 @@ ExperimentName = Annotated[str, one_of("experiment", EXPERIMENTS)]
 class StabilityConfig(Section):
     """Experiments on numerical stability: a beam in traction, in motion and under stress far beyond the study's own."""
 
-    beam: BeamName = Field(description="Beam.")
-    material: MaterialName = Field(description="Material, with a density.")
-    force: Force = Field(description="Traction on the right end.")
-    definition: DefinitionNames = Field(
+    beam: fields.BeamName = Field(description="Beam.")
+    material: fields.MaterialName = Field(description="Material, with a density.")
+    force: fields.Force = Field(description="Traction on the right end.")
+    definition: fields.DefinitionNames = Field(
         description="Definitions that derive a stiffness and need no reference; the first one stands for all where an "
         "experiment is not about definitions."
     )
-    mesh_type: MeshType = default("structured", description="Mesh type of triangles.")
-    mesh_size: Annotated[list[Length], OneOrMore()] = Field(
+    mesh_type: fields.MeshType = default("structured", description="Mesh type of triangles.")
+    mesh_size: Annotated[list[fields.Length], OneOrMore()] = Field(
         description="Lengths of an edge; most experiments take the coarsest."
     )
     experiment: Annotated[list[ExperimentName], OneOrMore()] = Field(
@@ -95,11 +84,8 @@ def _tasks(study):
         own = {"beam": beam_key(one.beam), "material": material_key(one.material, density=True)}
         also = mesh_type_key(one.mesh_type), definition_key(one.definition)
         labels = {"experiment": one.name, "definition": one.definition}
-        yield Task(asdict(one) | own, also, labels, one, SECONDS.get(one.name, 0.5))
+        yield Task(asdict(one) | own, also, labels, one, seconds=3.0)
 
-
-SECONDS = {"limits": 10.0, "maps": 8.0, "drift": 9.0, "rest": 2.0, "sizes": 3.0, "strains": 2.0, "buckling": 5.0}
-"""Expected seconds of experiments."""
 
 STAGE = stage("stability", "studies.kinds.stability.solve", "Experiments on stability", _tasks)
 

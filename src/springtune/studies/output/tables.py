@@ -1,0 +1,55 @@
+"""Tables of a dataset's arrays: in Markdown, and as rows of the page of all tables."""
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import xarray as xr
+
+from .selection import records
+from .text import cell_number, markdown_table
+
+HEADS: dict[str, tuple[str, Any]] = {
+    "definition": ("definition", "`{}`".format),
+    "approach": ("approach", "`{}`".format),
+    "integrator": ("integrator", "`{}`".format),
+    "mesh_size": ("mesh [mm]", lambda size: f"{1e3 * size:g}"),
+}
+"""Head of a column of labels, and their texts."""
+
+
+def numbers(array: xr.DataArray, form: str = ".3g", scale: float = 1.0, unit: str = "") -> xr.DataArray:
+    """Texts of the numbers of an array; empty if missing."""
+    return xr.apply_ufunc(cell_number, array, form, scale, unit, vectorize=True, output_dtypes=[object])
+
+
+def markdown(rows: Iterable[str], columns: Mapping[str, xr.DataArray], heads: Mapping[str, Any] = HEADS) -> list[str]:
+    """Markdown lines: a row for each cell over the dimensions `rows` that has a text, and columns of texts by head.
+
+    Arrays with a further dimension have a column for each label of it, which fills the ``{}`` of their head.
+
+    Examples
+    --------
+    >>> errors = xr.DataArray([[1.0, 2.0]], {"definition": ["area"], "load": ["shear", "traction"]})
+    >>> markdown(["definition"], {"under {}": numbers(errors, ".1f")})
+    ['| definition | under shear | under traction |', '| --- | ---: | ---: |', '| `area` | 1.0 | 2.0 |']
+    """
+    named, found = {name: heads[name] for name in rows}, {}
+    for head, texts in columns.items():
+        (further,) = [name for name in texts.dims if name not in named] or [""]
+        labels = texts[further].values if further else [""]
+        found |= {head.format(label): texts.sel({further: label}) if further else texts for label in labels}
+    frame = xr.Dataset({head: texts.reset_coords(drop=True) for head, texts in found.items()}).to_dataframe([*named])
+    frame = frame[(frame != "").any(axis=1)].reset_index()
+    for name, (_, written) in named.items():
+        frame[name] = frame[name].map(written)
+    return markdown_table([*(head for head, _ in named.values()), *found], frame.values.tolist())
+
+
+def listed(
+    data: xr.Dataset, present: xr.DataArray, labels: Iterable[str], columns: Mapping[str, tuple[str, float]]
+) -> list[dict[str, Any]]:
+    """Rows of the present cells: their labels, and columns by variable, each with its name and a factor."""
+    return [
+        {name: one[name] for name in labels} | {head: factor * one[name] for name, (head, factor) in columns.items()}
+        for one in records(data, present, columns)
+    ]
