@@ -415,7 +415,7 @@ def test_the_command_writes_for_a_version_and_says_so(tmp_path):
     out.unlink()
     for options, said in (
         ("--mujoco 5", "Error: --mujoco: 5 is no version of MuJoCo"),
-        ("--definition area", "--definition 'area': has energies of areas"),
+        ("--definition area", "Error: --definition 'area': has energies of areas"),
     ):
         done = CliRunner().invoke(main, [*words, *options.split()])
         assert done.exit_code == 2 and done.output.startswith(said) and not out.exists()

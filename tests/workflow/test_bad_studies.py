@@ -143,5 +143,7 @@ def test_a_strict_run_tells_holes_by_its_exit_code(tmp_path, repository):
     assert run()[0] == 0
     dataset = tmp_path / "results/hole/dataset.nc"
     dataset.write_bytes(dataset.read_bytes()[:1000])
-    code, text = run("--strict", "-n")
-    assert code == 0 and "dataset.nc is damaged" in text and "Traceback" not in text, text
+    code, text = run("--strict")
+    assert code == 1 and "dataset.nc: cannot be read (" in text and "delete it" in text and "Traceback" not in text, (
+        text
+    )

@@ -109,5 +109,5 @@ def test_commands_and_exports_have_them(results, tmp_path):
         done = CliRunner().invoke(main, ["export", str(results), "--group", "shapes", "--to", str(target)])
         assert done.exit_code == 0, done.output
     with (tmp_path / "shapes.csv").open() as file:
-        assert {row["shapes"] for row in csv.DictReader(file)} == {HOSTILE}
-    assert set(pyarrow.parquet.read_table(tmp_path / "shapes.parquet")["shapes"].to_pylist()) == {HOSTILE}
+        assert {row["source"] for row in csv.DictReader(file)} == {HOSTILE}
+    assert set(pyarrow.parquet.read_table(tmp_path / "shapes.parquet")["source"].to_pylist()) == {HOSTILE}

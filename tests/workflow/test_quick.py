@@ -34,7 +34,7 @@ def tree(run, repository):
     content["benchmark"]["mesh_size"] = "5 mm"
     run.write("quick.yaml", yaml.safe_dump(content, sort_keys=False))
     with contextlib.chdir(run.folder):
-        Campaign("quick.yaml").finish()
+        Campaign("quick.yaml", cores=None).finish()  # the bundles of `snakemake` on this machine
     with xr.open_datatree(run.folder / "results/quick/dataset.nc", engine="h5netcdf") as opened:
         yield opened.load()
 

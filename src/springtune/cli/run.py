@@ -252,4 +252,7 @@ def _unsolved(path: Path) -> int:
             status = file["status"][()]
     except FileNotFoundError:
         return 0
+    except (OSError, KeyError) as error:
+        why = f"cannot be read ({error}); delete it, and the same command makes it again"
+        raise click.ClickException(f"{path}: {why}") from None
     return int(((status != Status.NOT_REQUESTED) & (status != Status.SOLVED)).sum())

@@ -22,7 +22,7 @@ LARGE_ARRAY = 2**20
 
 SPRING_NODES, CELL_NODES = "spring_nodes", "cell_nodes"
 
-REMEDY = "give the dataset.nc of a study, or run the study again"
+REMEDY = "give the dataset.nc of a study; delete a damaged one, and the same run makes it again"
 
 MOST_HELD = 1e9
 """Limit of bytes that opening takes, and of stated content."""
@@ -217,13 +217,15 @@ def guarded(path: str | os.PathLike[str]) -> Iterator[None]:
     >>> with guarded("dataset.nc"):
     ...     {}["status"]
     Traceback (most recent call last):
-    ValueError: dataset.nc: is damaged, or not as springtune writes it (KeyError: 'status'); run the study again
+    ValueError: dataset.nc: is damaged, or not as springtune writes it (KeyError: 'status'); delete it, and the
+    same run makes it again
     """
     try:
         yield
     except (AttributeError, ArithmeticError, LookupError, MemoryError, RuntimeError, TypeError) as error:
         raise ValueError(
-            f"{path}: is damaged, or not as springtune writes it ({reason(error)}); run the study again"
+            f"{path}: is damaged, or not as springtune writes it ({reason(error)}); delete it, "
+            "and the same run makes it again"
         ) from error
 
 
