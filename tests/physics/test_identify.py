@@ -379,9 +379,9 @@ CALLS = {
     ("c.csv", "--beam", "100x20", "--load", "traction", "--known", "mu=1"): (2, "--known: 'mu' is no constant"),
     ("c.csv", "--beam", "100x20", "--load", "traction", "--plot", "r.txt"): (2, "--plot: 'r.txt' has another ending"),
     ("c.csv", "--beam", "100x20", "--load", "traction", "--known", "nu=x"): (2, "--known: nu is 'x'; give a number"),
-    ("c.csv", "--shape", "strain.yaml", "--load", "pull"): (
+    ("c.csv", "--study", "strain.yaml", "--load", "pull"): (
         2,
-        "--shape: strain.yaml: material 'steel' is in plane str",
+        "--study: strain.yaml: material 'steel' is in plane str",
     ),
     ("c.csv", "--beam", "100x20", "--load", "traction", "--plot", "no/r.png"): (1, "folder no does not exist; make it"),
     ("none.yaml",): (1, "none.yaml: is no list of tests"),

@@ -40,8 +40,8 @@ def here(folder, monkeypatch):
     return folder
 
 
-PLATE = ("--shape", "study.yaml:plate", "--load", "pull", "--size", "4 mm")
-OWN = ("--shape", "study.yaml:own", "--material", "steel")
+PLATE = ("--study", "study.yaml:plate", "--load", "pull", "--size", "4 mm")
+OWN = ("--study", "study.yaml:own", "--material", "steel")
 
 
 def test_a_study_gives_its_shapes_and_materials_by_name(here):
@@ -106,7 +106,7 @@ class TestSprings:
             assert net.header["expected_error"]["corner"].startswith("not computed")
 
     def test_a_density_is_for_materials_that_have_none(self, here, tmp_path):
-        asked = ("springs", "--shape", "study.yaml:own", "--definition", "lattice", "--out", tmp_path / "net.json")
+        asked = ("springs", "--study", "study.yaml:own", "--definition", "lattice", "--out", tmp_path / "net.json")
         assert run(*asked, "--material", "third", "--density", "1000 kg/m^3").exit_code == 0
         net = st.SpringNet.read(tmp_path / "net.json")
         assert net.masses.sum() == pytest.approx(1e-3 * 1e3 * 8e-4 * 0.94, rel=0.02)
@@ -115,7 +115,7 @@ class TestSprings:
 class TestError:
     """`predict --error`."""
 
-    ASKED = ("predict", "--shape", f"{SHAPES}:cook", "--material", "third", "--error", "3 %")
+    ASKED = ("predict", "--study", f"{SHAPES}:cook", "--material", "third", "--error", "3 %")
 
     def test_it_says_what_it_found(self):
         said = run(*self.ASKED).stdout
@@ -125,7 +125,7 @@ class TestError:
     @pytest.mark.parametrize(
         ("options", "code", "message"),
         [
-            (("--size", "2 mm"), 2, "--size: '2 mm' is what --error finds; leave one of them out"),
+            (("--size", "2 mm"), 2, "--size: '2 mm' means nothing beside --error 3 %; leave one of the two out"),
             (("--error", "1"), 2, "--error: '1' is no error above 0 and below 100 %; give one such as '1 %'"),
             (("--error", "1e-9 %"), 2, "--error: '1e-9 %' is below the error estimate of the reference; give at least"),
         ],
@@ -136,7 +136,9 @@ class TestError:
 
     def test_what_has_no_mesh_or_no_reference_is_refused(self, here):
         result = run("predict", *OWN, "--error", "1 %")
-        assert result.exit_code == 1 and "'own' has the mesh of its file; give it an outline" in result.stderr
+        assert (
+            result.exit_code == 1 and "'own': has the mesh of its file, so there is none to be found" in result.stderr
+        )
         result = run("predict", *PLATE[:-2], "--error", "1 %")
         assert result.exit_code == 2
         assert result.stderr == (
@@ -167,7 +169,7 @@ def test_refusals_are_one_line(arguments, message, here):
 
 @pytest.mark.parametrize("ending", [".xml", ".scn", ".xpbd.json"])
 def test_follower_pressure_is_refused_by_simulators(ending, here, tmp_path):
-    asked = ("--shape", "study.yaml:plate", "--load", "push", "--size", "4 mm", "--definition", "lattice")
+    asked = ("--study", "study.yaml:plate", "--load", "push", "--size", "4 mm", "--definition", "lattice")
     result = run("springs", *asked, "--out", tmp_path / f"net{ending}")
     assert "load 'push': turns with the side that it acts on" in result.stderr
     assert "give its pressures 'follower: false'" in result.stderr and not [*tmp_path.iterdir()]
@@ -176,9 +178,9 @@ def test_follower_pressure_is_refused_by_simulators(ending, here, tmp_path):
 def test_neither_a_beam_nor_a_shape(here):
     for command in (("predict",), ("springs", "--out", "net.csv")):
         result = run(*command)
-        assert result.exit_code == 2 and "Missing option '--beam' such as 200x40, or '--shape'" in result.stderr
+        assert result.exit_code == 2 and "Missing option '--beam' such as 200x40, or '--study'" in result.stderr
 
 
 def test_a_study_without_shapes_says_so(here):
-    result = run("predict", "--shape", f"{SHAPES.with_name('paper.yaml')}:plate")
-    assert result.exit_code == 2 and "has no shapes; add 'shapes' and 'shape_grids', or give --beam" in result.stderr
+    result = run("predict", "--study", f"{SHAPES.with_name('paper.yaml')}:plate")
+    assert result.exit_code == 2 and "names none of its shapes" in result.stderr

@@ -317,7 +317,7 @@ def test_each_part_of_a_file_has_its_material(load, refusal, tmp_path, monkeypat
     assert found.values["E soft" if whole else "E hard"] == pytest.approx(2e9 if whole else 210e9, rel=1e-4)
 
     monkeypatch.chdir(tmp_path)
-    call = ["--shape", "study.yaml:plate", "--material", material]
+    call = ["--study", "study.yaml:plate", "--material", material]
     (tmp_path / "study.yaml").write_text(text)
     assert st.predict(body, mesh, materials)[0].errors["stretch"] == pytest.approx(0, abs=1e-9)
     said = CliRunner().invoke(main, ["predict", *call])
@@ -353,7 +353,7 @@ def test_files_of_several_sizes_show_convergence(load, refusal, tmp_path, monkey
     np.testing.assert_allclose(line.get_xdata(), data.particles[::-1])
     monkeypatch.chdir(tmp_path)
     (tmp_path / "study.yaml").write_text(text)
-    predict = ["predict", "--shape", "study.yaml", "--material", "steel"]
+    predict = ["predict", "--study", "study.yaml", "--material", "steel"]
     said = CliRunner().invoke(main, predict).output
     assert "--size: missing; 'plate' has files of 5 mm, 10 mm, 20 mm; give one" in said
     assert "100 x 40 mm, steel" in CliRunner().invoke(main, [*predict, "--size", "20 mm"]).output
@@ -371,7 +371,7 @@ def test_extents_are_in_sight(tmp_path, monkeypatch, unit, warned):
     shape = PLATE["shapes"]["plate"] | {"file": "plate.msh"} | unit
     (tmp_path / "study.yaml").write_text(yaml.safe_dump(PLATE | {"shapes": {"plate": shape}}))
     monkeypatch.chdir(tmp_path)
-    asked = ["--shape", "study.yaml", "--material", "steel"]
+    asked = ["--study", "study.yaml", "--material", "steel"]
     for command in (["scenes", "study.yaml"], ["predict", *asked], ["springs", *asked, "--out", "net.csv"]):
         said = CliRunner().invoke(main, command)
         assert ("80 x 60 mm," if unit.get("unit") == "1 mm" else "80 x 60 m,") in said.stdout

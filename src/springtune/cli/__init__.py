@@ -49,8 +49,14 @@ COMMANDS = {
 }
 """Modules and meanings of the commands, in the order of the help; each is imported when it is called."""
 
-ARGUMENT = re.compile("(mesh size|mesh types?|[a-z]+)(?=:| ')")
+ARGUMENT = re.compile("(mesh size|mesh types?|Young's modulus|Poisson's ratio|[a-z]+)(?=:| '| of ')")
 """Begin of messages with the name of an argument."""
+
+OPTIONS = {"mesh size": "size", "mesh type": "mesh", "mesh types": "mesh", "length": "beam", "height": "beam"} | {
+    "Young's modulus": "young",
+    "Poisson's ratio": "poisson",
+}
+"""Options of arguments that have another name."""
 
 
 def in_options(message: str, command: click.Command | None) -> str:
@@ -62,7 +68,7 @@ def in_options(message: str, command: click.Command | None) -> str:
     "--force: '3 mm' is a length; give a force"
     """
     if command and (found := ARGUMENT.match(message)):
-        option = "--" + {"mesh size": "size", "mesh type": "mesh", "mesh types": "mesh"}.get(found[1], found[1])
+        option = "--" + OPTIONS.get(found[1], found[1])
         if any(option in one.opts for one in command.params):
             return option + message[found.end() :]
     return message

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from . import examples
-from .options import asked_beam, shape_of_study, writing
+from .options import STUDY_EXAMPLE, asked_beam, shape_of_study, writing
 
 if TYPE_CHECKING:
     from ..scene.identify import Identified
     from ..scene.measured import MeasuredTest
 
-TEST_KEYS = ("beam", "thickness", "shape", "load", "force", "angle", "noise", "shift", "file")
+TEST_KEYS = ("beam", "thickness", "study", "load", "force", "angle", "noise", "shift", "file")
 """Keys of a test in a list of tests; all but the file are options, too."""
 
 
@@ -30,7 +30,7 @@ TEST_KEYS = ("beam", "thickness", "shape", "load", "force", "angle", "noise", "s
 @click.option("--law", default="isotropic", show_default=True, help="isotropic, orthotropic, regions, yeoh, neo-hooke.")
 @click.option("--known", multiple=True, help="A constant that is known, such as nu=0.3; may be repeated.")
 @click.option("--beam", help="Length x height in mm, such as 100x20.")
-@click.option("--shape", help="A study's shape, such as config/shapes.yaml:cook, in the place of a beam.")
+@click.option("--study", help=f"A study's shape instead of a beam, such as {STUDY_EXAMPLE}.")
 @click.option("--thickness", default="1 mm", show_default=True, help="Thickness of a beam.")
 @click.option("--load", help="Load of the beam, or load case of the shape: what is held and which side is loaded.")
 @click.option("--force", help="Force on a beam at which a field was measured, such as '400 N'.")
@@ -112,24 +112,24 @@ def _rows(path: Path) -> list[dict[str, Any]]:
     for row in rows:
         if wrong := [key for key in row if key not in TEST_KEYS]:
             raise ValueError(f"{path}: a test has the key {wrong[0]!r}; known: {', '.join(TEST_KEYS)}")
-        row |= {key: path.parent / row[key] for key in ("file", "shape") if row.get(key)}
+        row |= {key: path.parent / row[key] for key in ("file", "study") if row.get(key)}
     return rows
 
 
 def _test(
-    beam: str | None, shape: str | None, thickness: str, load: str, file: Path | None = None, **others: Any
+    beam: str | None, study: str | None, thickness: str, load: str, file: Path | None = None, **others: Any
 ) -> "MeasuredTest":
     """Test of its options."""
     from ..scene.measured import MeasuredTest
 
-    if not ((beam or shape) and load and file):
-        raise ValueError("--load: a test needs a body, a load and a file; give such as --beam 100x20 --load traction")
+    if not ((beam or study) and load and file):
+        raise ValueError("load: a test needs a body, a load and a file; give such as --beam 100x20 --load traction")
     if beam:
         return MeasuredTest(asked_beam(str(beam), thickness), load, file, **others)
-    study, _, body = shape_of_study(str(shape))
-    if study.plane_strain:
+    about, _, body = shape_of_study(str(study))
+    if about.plane_strain:
         raise ValueError(
-            f"--shape: {shape}: material {study.plane_strain[0]!r} is in plane strain, and tests are analysed in plane "
+            f"study: {study}: material {about.plane_strain[0]!r} is in plane strain, and tests are analysed in plane "
             "stress; give a study in plane stress"
         )
     return MeasuredTest(body, load, file, **others)
@@ -141,7 +141,7 @@ def _study(found: "Identified", row: Mapping[str, Any], target: Path) -> str:
 
     from .study import template_text
 
-    study = safe_load(template_text(target, "shape" if row["shape"] else "beam"))
+    study = safe_load(template_text(target, "shape" if row["study"] else "beam"))
     (grid,) = (study.get("grids") or study["shape_grids"]).values()
     names = {part: one.name for part, one in found.materials.items()}
     texts = [round(one, 6) if name[:2] == "nu" else f"{one:.6g} Pa" for name, one in found.values.items()]
@@ -154,14 +154,14 @@ def _study(found: "Identified", row: Mapping[str, Any], target: Path) -> str:
         materials = [{"uniaxial_test": os.path.relpath(row["file"], target.parent), "terms": len(texts)}]
     study["materials"] = dict(zip(names.values(), materials))
     grid |= {"material": names.pop("", next(iter(names.values())))} | ({"load": row["load"]} if row["load"] else {})
-    if row["shape"]:
-        source, _, shape = shape_of_study(str(row["shape"]))
+    if row["study"]:
+        source, _, shape = shape_of_study(str(row["study"]))
         study["shapes"] = {"plate": safe_load(source.text)["shapes"][shape.name] | {"parts": names}}
         if shape.file:
             study["shapes"]["plate"]["file"] = os.path.relpath(shape.file, target.parent)
             del grid["mesh_size"]
     elif found.law == "orthotropic":
-        raise ValueError("--write: beams of a study are isotropic; give a --shape, or leave --write out")
+        raise ValueError("--write: beams of a study are isotropic; give a --study, or leave --write out")
     else:
         beam = asked_beam(str(row["beam"] or "100x20"), row["thickness"])
         loads = next(iter(found.places.values())) if "nu" in found.values else [1.0]

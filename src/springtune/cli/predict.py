@@ -1,7 +1,7 @@
 """Recommend a definition for one mesh, or a mesh for one error, and write springs for other programs."""
 
 import warnings
-from collections.abc import Iterable
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -10,13 +10,29 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from . import examples
-from .engine_fit import check_engine, engine_options, fitted, net_of_fit
-from .options import SPRING_FILES, Asked, SheetOptions, Unmet, check_target, sheet_options, writing
+from .options import SPRING_FILES, Asked, Options, add_options, asked, check_target, sheet_options, writing
 
 if TYPE_CHECKING:
     from ..handover.net import SpringNet
     from ..scene.statements import ShapeStatement
     from .recommendation import Subject
+
+ENGINE_OPTIONS: Options = {
+    "engine": {"help": "Engine to calibrate to, such as xpbd."},
+    "dt": {"help": "Time that a frame advances, such as 1/60 or '5 ms'.  [default: 1/60]"},
+    "substeps": {"type": int, "help": "Steps of a frame.  [default: 1]"},
+    "iterations": {"type": int, "help": "Iterations of the engine's solver in a step.  [default: 10]"},
+    "precision": {"help": "float64 or float32.  [default: the engine's own]"},
+    "force": {"help": "Size of the force of --load on a beam, such as '0.2 N'."},
+    "scale": {"type": float, "default": 1.0, "help": "Factor on the load of a shape.  [default: 1]"},
+    "definition": {"help": "Rule for stiffness.  [default: best]"},
+    "within": {"default": "5 %", "help": "Error for which ranges of loads are printed.  [default: 5 %]"},
+    "budget": {"help": "Time of a frame here, such as '2 ms': find the mesh, definition, substeps and iterations."},
+}
+"""Options of `predict` that are of engines, as click takes them."""
+
+Answer = tuple[str, Callable[[], "SpringNet"]]
+"""Text of an answer, and a function that makes the springs that it recommends."""
 
 
 @click.command(
@@ -27,8 +43,8 @@ if TYPE_CHECKING:
         "--write net.csv",
         'springtune predict --beam 80x10 --mesh free --size "1 mm" --young "3 GPa" --poisson 0.4',
         'springtune predict --beam 80x10 --mesh graded.msh --unit "1 mm" --material rubber',
-        'springtune predict --shape config/shapes.yaml:cook --load shear --size "2 mm" --material third',
-        'springtune predict --shape config/shapes.yaml:cook --material third --error "2 %"',
+        'springtune predict --study config/shapes.yaml:cook --load shear --size "2 mm" --material third',
+        'springtune predict --study config/shapes.yaml:cook --material third --error "2 %"',
         'springtune predict --engine xpbd --dt 1/60 --substeps 20 --iterations 10 --beam 200x40 --size "13 mm" '
         '--material rubber --density "1000 kg/m^3" --load traction --force "0.2 N"',
         'springtune predict --engine xpbd --budget "0.2 ms" --beam 200x40 --material rubber --density "1000 kg/m^3" '
@@ -41,7 +57,7 @@ if TYPE_CHECKING:
     "for the largest stable time steps",
 )
 @click.option("--error", help="Find the coarsest mesh that keeps this error, such as '1 %'.")
-@click.option("--load", help="Load case of a shape, by default its only one; with --engine of a beam, too.")
+@click.option("--load", help="Load case of a shape, by default its only one; load of a beam.")
 @click.option(
     "--loads",
     help="Loads that count: some of traction, compression, bending, shear and pressure, such as traction,bending.  "
@@ -49,7 +65,7 @@ if TYPE_CHECKING:
 )
 @click.option("--springs-alone", is_flag=True, help="Recommend what needs springs alone, no energies besides them.")
 @click.option("--best-springs", is_flag=True, help="Also search for the best springs on the mesh, for some seconds.")
-@engine_options
+@add_options(ENGINE_OPTIONS)
 @click.option(
     "--write",
     "target",
@@ -57,7 +73,7 @@ if TYPE_CHECKING:
     help=f"Write the springs of what is recommended to a file: {SPRING_FILES}.",
 )
 def predict(
-    sheet: SheetOptions,
+    sheet: dict[str, Any],
     error: str | None,
     load: str | None,
     loads: str | None,
@@ -76,25 +92,21 @@ def predict(
     With --engine: what to type into an engine at a setting, so that the displacement under --load is that of finite
     elements; over which loads that holds; and which settings converge. With --budget the setting is found, too.
     """
-    check_engine(engine, sheet, error, load)
-    if best_springs and (error is not None or engine["engine"] is not None):
-        raise ValueError("--best-springs: are of one mesh; leave out --error and --engine")
-    if error is not None and sheet.size is not None:
-        raise ValueError(f"--size: '{sheet.size}' is what --error finds; leave one of them out")
+    from .recommendation import written_text
+
     if target is not None:
         check_target("--write", target)
     names = None if loads is None else [name.strip() for name in loads.split(",") if name.strip()]
     if engine["engine"] is not None:
-        text, fit = fitted(sheet, engine, load, names, springs_alone)
-        make = partial(net_of_fit, fit)
+        text, make = _in_engine(sheet, engine, load, names, springs_alone)
     else:
-        asked = sheet.asked(load, sized=error is None)
-        under = _under(asked, names)
+        body = asked(sheet, load, sized=error is None)
+        if body.is_beam and load is not None:
+            names = [*(names or ()), load]
         if error is None:
-            text, definition = _on_mesh(asked, under, springs_alone, ("best-springs",) * best_springs)
+            text, make = _on_mesh(body, _under(body, names), springs_alone, ("best-springs",) * best_springs)
         else:
-            text, definition, asked = _found(asked, under, error, springs_alone, sheet.mesh_type)
-        make = partial(_recommended_net, asked, under, definition, error)
+            text, make = _on_meshes(body, _under(body, names), springs_alone, error, sheet["mesh"])
     click.echo(text)
     if target is not None:
         net = make()
@@ -102,99 +114,137 @@ def predict(
             click.echo(f"\n{written_text(net, net.write(target))}")
 
 
-def _under(asked: Asked, names: list[str] | None) -> dict[str, Any]:
+def _under(body: Asked, names: list[str] | None) -> dict[str, Any]:
     """Loads that count, as arguments of the library: loads of a beam, or the load case of a shape."""
     from ..prediction.choices import CASES, check_beam, check_loads
 
-    if not asked.is_beam:
-        return {"load": asked.load}
-    check_beam(asked.body)
+    if not body.is_beam:
+        return {"load": body.load}
+    check_beam(body.body)
     return {"loads": check_loads(CASES if names is None else names)}
 
 
-def _statement(asked: Asked) -> "ShapeStatement":
+def _statement(body: Asked) -> "ShapeStatement":
     from ..scene.statements import ShapeStatement
 
-    return ShapeStatement(asked.body, asked.mesh, asked.material, str(asked.load), 1.0, "linear")
+    return ShapeStatement(body.body, body.mesh, body.material, str(body.load), 1.0, "linear")
 
 
-def _subject(asked: Asked, known: Any) -> "Subject":
+def _subject(body: Asked, known: Any) -> "Subject":
     from .recommendation import beam_subject, shape_subject
 
-    return beam_subject(asked.body, asked.material, known) if asked.is_beam else shape_subject(_statement(asked), known)
+    return beam_subject(body.body, body.material, known) if body.is_beam else shape_subject(_statement(body), known)
 
 
-def _on_mesh(asked: Asked, under: dict[str, Any], springs_alone: bool, also: tuple[str, ...]) -> tuple[str, str | None]:
-    """Text for one mesh, and the definition that is recommended."""
+def _on_mesh(body: Asked, under: dict[str, Any], springs_alone: bool, also: tuple[str, ...]) -> Answer:
+    """Best definition for one mesh."""
     from ..mesh.types import MESH_TYPES
     from ..prediction.bands import extrapolate
     from ..prediction.choices import SOLVED, SOLVED_FROM_FILE, predict, references, shape_references
     from .recommendation import prediction_text, recommended
 
-    body, material, size = asked.body, asked.material, asked.size
-    sizes: list[float] = []
-    about = 0.0
-    if asked.is_beam and size is not None:
-        about = MESH_TYPES[asked.mesh_type].particles(body.length, body.height, size)
+    about, size, sizes = 0.0, body.size, list[float]()
+    if body.is_beam and size is not None:
+        about = MESH_TYPES[body.mesh_type].particles(body.body.length, body.body.height, size)
     if about > SOLVED and size is not None:
         if also:
             raise ValueError(f"--best-springs: the mesh has more than {SOLVED} particles; give a larger --size")
-        known: Any = references(body, material, **under)
-        found, sizes = extrapolate(asked.mesh_type, size, body, material, known, **under)
+        known: Any = references(body.body, body.material, **under)
+        found, sizes = extrapolate(body.mesh_type, size, body.body, body.material, known, **under)
         counts = f"about {about:.2g} particles"
     else:
-        mesh = asked.mesh if asked.is_beam else asked.mesh.mesh
+        mesh = body.mesh if body.is_beam else body.mesh.mesh
         if len(mesh.points) > SOLVED_FROM_FILE:
-            option = "--size" if size is not None else "--mesh" if asked.is_beam else "--shape"
-            raise Unmet(
-                f"{option}: '{asked.mesh_name}' has {len(mesh.points)} particles, more than the {SOLVED_FROM_FILE} "
-                "that are solved here; give a coarser mesh, or make it a mesh of a study"
+            raise click.ClickException(
+                f"'{body.mesh_name}' has {len(mesh.points)} particles, more than the {SOLVED_FROM_FILE} that are "
+                "solved here; give a coarser mesh, or make it a mesh of a study"
             )
-        known = references(body, material, **under) if asked.is_beam else shape_references(_statement(asked))
-        found = predict(body, asked.mesh, material, known, **under, also=also)
+        known = references(body.body, body.material, **under) if body.is_beam else shape_references(_statement(body))
+        found = predict(body.body, body.mesh, body.material, known, **under, also=also)
         counts = f"{len(mesh.points)} particles, {len(mesh.edges)} springs"
     found = [choice for choice in found if not (springs_alone and choice.energies)]
-    return prediction_text(_subject(asked, known), asked.mesh_name, counts, found, sizes), recommended(found)[0]
+    best, _ = recommended(found)
+    none = "nothing is recommended for this mesh, so nothing is written; take another mesh"
+    make = partial(_recommended_net, body, best.definition if best else None, under.get("loads"), none)
+    return prediction_text(_subject(body, known), body.mesh_name, counts, found, sizes), make
 
 
-def _found(
-    asked: Asked, under: dict[str, Any], error: str, springs_alone: bool, mesh_types: str | None
-) -> tuple[str, str | None, Asked]:
-    """Text of a search for a mesh, the definition that is recommended, and the body with the mesh."""
+def _on_meshes(body: Asked, under: dict[str, Any], springs_alone: bool, error: str, mesh_types: str | None) -> Answer:
+    """Coarsest mesh that keeps an error."""
     from ..mesh.types import MESH_TYPES
-    from ..prediction.search import find_mesh, find_shape_mesh
+    from ..prediction.search import find_mesh
     from .recommendation import search_text
 
-    body = asked.body
-    if asked.is_beam:
-        names = None if mesh_types is None else [name.strip() for name in mesh_types.split(",")]
-        for name in names or ():
-            if name not in MESH_TYPES:
-                why = "is a file, and --error finds sizes of mesh types" if Path(name).is_file() else "is no mesh type"
-                raise ValueError(f"--mesh: '{name}' {why}; known: {', '.join(MESH_TYPES)}")
-        search = find_mesh(body, asked.material, error, mesh_types=names, **under)
-    elif body.file:
-        raise Unmet(
-            f"--error: '{error}' finds sizes of meshes that are made, and '{body.name}' has the mesh of its file; give "
-            "it an outline, or leave --error out"
-        )
-    else:
-        search = find_shape_mesh(body, asked.material, error, **under, make=partial(asked.make, asked.mesh_type))
+    if body.is_beam:
+        under |= {"mesh_types": [name.strip() for name in (mesh_types or ",".join(MESH_TYPES)).split(",")]}
+    elif not body.body.file:
+        under |= {"make": partial(body.make, body.mesh_type)}
+    search = find_mesh(body.body, body.material, error, **under)
     best = search.best_springs if springs_alone else search.best
     if mesh := best or next(reversed(search.tried), None):
-        asked = replace(asked, mesh_type=mesh.mesh_type, size=mesh.size)
-    text = search_text(_subject(asked, search.known), search, springs_alone)
-    return text, best.choice.definition if best else None, asked
+        body = replace(body, mesh_type=mesh.mesh_type, size=mesh.size)
+    none = f"no mesh keeps {error}, so nothing is written; allow a larger error"
+    make = partial(_recommended_net, body, best.choice.definition if best else None, under.get("loads"), none)
+    return search_text(_subject(body, search.known), search, springs_alone), make
 
 
-def _recommended_net(asked: Asked, under: dict[str, Any], definition: str | None, error: str | None) -> "SpringNet":
+def _recommended_net(body: Asked, definition: str | None, loads: Any, none: str) -> "SpringNet":
     """Springs of the definition that is recommended."""
     if definition is None:
-        nothing = "nothing is recommended for this mesh, so nothing is written; take another mesh"
-        if error is not None:
-            nothing = f"no mesh keeps {error}, so nothing is written; allow a larger error"
-        raise Unmet(f"--write: {nothing}")
-    return _net(asked, definition, loads=under.get("loads"))
+        raise click.ClickException(f"--write: {none}")
+    return _net(body, definition, loads=loads)
+
+
+def _in_engine(
+    sheet: dict[str, Any], options: dict[str, Any], load: str | None, loads: list[str] | None, springs_alone: bool
+) -> Answer:
+    """Calibration of an engine, or a search within a budget."""
+    from ..engines.base import ENGINES, Setting
+    from ..engines.budget import fit_budget, graded_meshes, runnable
+    from ..engines.calibration import fit_engine
+    from ..prediction.choices import CASES
+    from ..problem.quantities import positive
+    from ..scene.sheet import chosen
+    from ..scene.single import Scene
+    from .recommendation import budget_text, fit_text
+
+    engine, searched = chosen(ENGINES, options["engine"], "engine"), options["budget"] is not None
+    names = ("dt", "substeps", "iterations", "precision")
+    setting = Setting(**{name: options[name] for name in names if options[name] is not None})
+    engine.check(setting)
+    body = asked(sheet, load, sized=not searched)
+    if body.load is None:
+        raise ValueError("load: missing; an engine is calibrated to a load; give one such as 'traction'")
+    how: dict[str, Any] = {"loads": loads, "within": options["within"]}
+    case, scale = (body.material, body.load, options["force"]), options["scale"]
+    if searched:
+        if body.is_beam and sheet["mesh"] is not None:
+            how["mesh_types"] = sheet["mesh"].split(",")
+        elif not body.is_beam and body.body.file:
+            how["meshes"] = {body.mesh_name: body.mesh}
+        elif not body.is_beam:
+            how["meshes"] = graded_meshes(body.body, "free", partial(body.make, "free"))
+        limit = positive(options["budget"], "time", "budget")
+        how |= {"dt": setting.dt, "precision": setting.precision, "scale": scale, "springs_alone": springs_alone}
+        search = fit_budget(body.body, *case, engine=engine.name, budget=limit, **how)
+        if search.best is None:
+            return budget_text(search), partial(_unfitted, "take a larger budget")
+        return budget_text(search), search.best.fit.net
+    make = partial(Scene, body.body, body.mesh, *case, scale=scale)
+    tried: tuple[str, ...] = ()
+    if options["definition"] is not None:
+        scenes, refused = [make(definition=options["definition"])], ""
+    else:
+        scenes, refused, tried = runnable(make, CASES, engine, setting, springs_alone)
+    if not scenes:
+        raise click.ClickException(refused)
+    fit = fit_engine(scenes[0], engine.name, setting, **how)
+    text = fit_text(fit, body.mesh_name) + (f"\n\nTried: {', '.join(tried)}." if tried else "")
+    return text, fit.net if fit.factor == fit.factor else partial(_unfitted, fit.message)
+
+
+def _unfitted(why: str) -> "SpringNet":
+    raise click.ClickException(f"--write: there is no factor, so nothing is written: {why}")
 
 
 # -- springs for other programs ---------------------------------------------------------------------------------------
@@ -206,7 +256,7 @@ def _recommended_net(asked: Asked, under: dict[str, Any], definition: str | None
         'springtune springs --beam 80x10 --mesh graded.msh --unit "1 mm" --material rubber --out net.vtu',
         'springtune springs --beam 200x40 --size "5 mm" --material steel --density "7850 kg/m^3" --load traction '
         '--force "400 kN" --out net.json',
-        'springtune springs --shape config/shapes.yaml:hole --size "2 mm" --material steel --density "7850 kg/m^3" '
+        'springtune springs --study config/shapes.yaml:hole --size "2 mm" --material steel --density "7850 kg/m^3" '
         "--definition lattice --out hole.xml",
     )
 )
@@ -237,7 +287,7 @@ def _recommended_net(asked: Asked, under: dict[str, Any], definition: str | None
     help=f"File: {SPRING_FILES}; one that is there is replaced.",
 )
 def springs(
-    sheet: SheetOptions,
+    sheet: dict[str, Any],
     definition: str,
     stiffness: str | None,
     load: str | None,
@@ -253,11 +303,10 @@ def springs(
     asks for.
     """
     from ..handover.simulation import EquilibriumWarning
+    from .recommendation import written_text
 
     check_target("--out", target)
-    if load is None and force is not None:
-        raise ValueError(f"--force: '{force}' is of no load; give --load such as traction, or leave --force out")
-    net = _net(sheet.asked(load), definition, stiffness=stiffness, force=force, scale=scale)
+    net = _net(asked(sheet, load), definition, stiffness=stiffness, force=force, scale=scale)
     with writing("--out", target), warnings.catch_warnings(record=True) as heard:
         warnings.simplefilter("always", EquilibriumWarning)
         written = net.write(target, mujoco=mujoco)
@@ -267,10 +316,10 @@ def springs(
 
 
 def _net(
-    asked: Asked,
+    body: Asked,
     definition: str,
     *,
-    loads: "Iterable[str] | None" = None,
+    loads: Any = None,
     stiffness: str | None = None,
     force: str | None = None,
     scale: float = 1.0,
@@ -280,51 +329,13 @@ def _net(
     from ..mechanics.statics import SingularError
     from ..scene.single import Scene
 
-    body, load, name = asked.body, asked.load, asked.mesh_name
-    if not asked.is_beam and any(one.x or one.y for one in body.loads[load].supports):
-        raise ValueError(
-            f"--load: '{load}' of shape '{body.name}' moves a support, and files of springs have forces and directions "
-            "that are held; give a load of forces"
-        )
-    how: dict[str, Any] = {"definition": definition, "stiffness": stiffness}
+    name, how = body.mesh_name, dict[str, Any](definition=definition, stiffness=stiffness)
     try:
-        if load is None:
-            return SpringNet.from_mesh(asked.mesh, asked.material, beam=body, mesh_name=name, loads=loads, **how)
-        return SpringNet.from_scene(Scene(body, asked.mesh, asked.material, load, force, scale=scale, **how), name)
+        if body.load is None or loads:
+            how |= {"beam": body.body, "mesh_name": name, "loads": loads}
+            return SpringNet.from_mesh(body.mesh, body.material, **how)
+        scene = Scene(body.body, body.mesh, body.material, body.load, force, scale=scale, **how)
+        return SpringNet.from_scene(scene, name)
     except SingularError as error:  # of the patch test that scales them
-        raise Unmet(f"--definition: '{definition}' has no springs on this mesh: {error}; take another") from None
-
-
-def written_text(net: "SpringNet", written: "Iterable[Path]", mujoco: int | None = None) -> str:
-    """Written files and their expected errors, as text."""
-    from ..handover.formats import FOR_MUJOCO, ending_of
-    from ..handover.mujoco import for_versions
-    from ..problem.geometry import size_text
-
-    header = net.header
-    first, *others = written
-    besides = [f"{terms.kind} terms of {len(terms.cells)} cells" for terms in net.energies]
-    springs = f"{len(net.springs)} springs" if net.stiffness.any() else f"{len(net.springs)} edges with no own springs"
-    extent = [] if header["beam"] else [size_text(*(max(one) - min(one) for one in zip(*net.points.tolist())))]
-    counts = [*extent, f"{len(net.points)} particles", springs, *besides]
-    lines = [f"{first}: {', '.join(counts)} of definition {header['definition']}"]
-    lines += [f"beside it: {', '.join(str(other) for other in others)}"] if others else []
-    lines += [for_versions(net.energies, mujoco)] if ending_of(first) in FOR_MUJOCO else []
-    errors = header["expected_error"]
-    if isinstance(errors, dict):
-        known = [f"{load} {100 * error:+.3g} %" for load, error in errors.items() if isinstance(error, float)]
-        why: dict[str, list[str]] = {}
-        for load, error in errors.items():
-            if isinstance(error, str):
-                why.setdefault(error, []).append(load)
-        unknown = [f"{', '.join(loads)}: {reason}" for reason, loads in why.items()]
-        what = "error of the displacement" if header["beam"] else "errors"
-        lines += [f"{what}, solved on this mesh: {', '.join(known)}"] if known else []
-        lines += unknown
-    else:
-        lines.append(f"error of the displacement: {errors}")
-    steps = header["largest_stable_step"]
-    if isinstance(steps, dict):
-        step = min(step for step in steps.values() if isinstance(step, float))
-        lines.append(f"largest stable step of explicit integrators, undamped: {step:.4g} s")
-    return "\n".join(lines)
+        why = f"'{definition}' has no springs on this mesh: {error}; take another"
+        raise click.ClickException(f"--definition: {why}") from None

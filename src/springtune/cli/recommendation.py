@@ -1,9 +1,9 @@
-"""Text of `springtune predict`."""
+"""Texts of `springtune predict` and `springtune springs`."""
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -13,149 +13,155 @@ from ..problem.shapes import QUANTITY_UNITS
 from ..safe_io.tables import TabledList, aligned, mesh_size_text
 
 if TYPE_CHECKING:
-    from ..prediction.choices import Choice, References, ShapeReferences
+    from ..engines.budget import BudgetSearch
+    from ..engines.calibration import EngineFit
+    from ..handover.net import SpringNet
+    from ..prediction.choices import Choice
     from ..prediction.search import MeshSearch
     from ..problem.geometry import Beam
     from ..problem.materials import Material
     from ..scene.statements import ShapeStatement
 
 
-@dataclass(frozen=True)
-class Subject:
+class Subject(NamedTuple):
     """A beam under loads, or a shape under a load case, as a prediction names it.
 
-    `name` and `made_of` (material, thickness) are texts, `known` the references by load, of a shape by quantity.
-    `compared` has the values and kinds of those that were found, `sign` the meaning of an error's sign.
+    `known` are references by load, of a shape by quantity; `compared` the value and kind of those that were found.
     """
 
     name: str
     made_of: str
-    known: "References | ShapeReferences"
+    known: Any
     compared: dict[str, tuple[float, str]]
-    sign: list[str]
     of_beam: bool
-    plane_strain: bool = False
 
-    @property
-    def estimate(self) -> str:
-        """Largest error estimate of the references."""
-        estimates = [found.error_estimate for found in self.known.values() if not isinstance(found, str)]
-        return f"{100 * max(estimates, default=0):.1g} %"
-
-    @property
-    def meaning(self) -> str:
-        """What an error is of."""
+    def meaning(self, solved: str) -> list[str]:
+        """Lines on what errors mean, of networks that were solved in some way."""
         what = "the displacement of the loaded side" if self.of_beam else "each quantity"
-        return f"Errors are (network - reference) / |reference| of {what}"
+        found = [self.known[name].error_estimate for name in self.compared]
+        moved = {name: value for name, (value, kind) in self.compared.items() if kind == "displacement"}
+        of = "errors" if len(moved) == len(self.compared) else "errors of displacements"
+        return [
+            f"Errors are (network - reference) / |reference| of {what}: {solved},",
+            "with linear kinematics (small strain), against the converged reference of small strain (error estimate "
+            f"{100 * max(found, default=0):.1g} %).",
+            *([f"Of {of}, {sign_sentence(moved, 'under' if self.of_beam else 'of')}."] if moved else []),
+        ]
 
 
-def beam_subject(beam: "Beam", material: "Material", known: "References") -> Subject:
+def beam_subject(beam: "Beam", material: "Material", known: Any) -> Subject:
     """Beam of a prediction."""
     from ..problem.loads import LOADS
 
     def constants(one: "Material") -> str:
-        young = one.young_modulus
-        return f"E = {young / 1e9:.6g} GPa" if young >= 1e9 else f"E = {young / 1e6:.6g} MPa"
+        size, unit = (1e9, "GPa") if one.young_modulus >= 1e9 else (1e6, "MPa")
+        return f"E = {one.young_modulus / size:.6g} {unit}, nu = {one.poisson_ratio:.4g}"
 
-    made_of = f"{material.name}, {constants(material)}, nu = {material.poisson_ratio:g}, "
-    made_of += f"t = {1e3 * beam.thickness:g} mm"
-    strain = material.plane == "strain"
-    if strain:
-        sheet = material.in_plane
-        made_of += f", plane strain: in the plane {constants(sheet)}, nu = {sheet.poisson_ratio:.4g}"
-    signs = {load: LOADS[load].sign for load in known}
-    compared = {load: (sign, "displacement") for load, sign in signs.items()}
-    return Subject(beam.label, made_of, known, compared, [f"Of errors, {sign_sentence(signs)}."], True, strain)
+    made_of = f"{material.name}, {constants(material)}, t = {1e3 * beam.thickness:g} mm"
+    if material.plane == "strain":
+        made_of += f", plane strain: in the plane {constants(material.in_plane)}"
+    compared = {load: (LOADS[load].sign, "displacement") for load, one in known.items() if not isinstance(one, str)}
+    return Subject(beam.label, made_of, known, compared, True)
 
 
-def shape_subject(statement: "ShapeStatement", known: "ShapeReferences") -> Subject:
+def shape_subject(statement: "ShapeStatement", known: Any) -> Subject:
     """Shape of a prediction."""
-    kind = {one.name: one.kind for one in statement.case.quantities}
-    compared = {name: (found.value, kind[name]) for name, found in known.items() if not isinstance(found, str)}
-    moved = {name: value for name, (value, of) in compared.items() if of == "displacement"}
-    of = "errors" if len(moved) == len(compared) else "errors of displacements"
-    sign = [f"Of {of}, {sign_sentence(moved, 'of')}."] if moved else []
+    kinds = {one.name: one.kind for one in statement.case.quantities}
+    compared = {name: (one.value, kinds[name]) for name, one in known.items() if not isinstance(one, str)}
     sides = np.ptp(statement.mesh.points, axis=0).tolist()
     made_of = f"{size_text(*sides)}, {statement.named_materials}, t = {1e3 * statement.thickness:g} mm"
-    return Subject(f"{statement.shape.name}, load {statement.load}", made_of, known, compared, sign, False)
+    return Subject(f"{statement.shape.name}, load {statement.load}", made_of, known, compared, False)
 
 
 def prediction_text(
     subject: Subject, mesh_name: str, counts: str, choices: "Sequence[Choice]", sizes: Sequence[float] = ()
 ) -> str:
     """Text of a prediction; `sizes` [m] are of the meshes that bands are extrapolated from."""
-    of_beam = subject.of_beam
-    heads, *rows = TabledList(choices).table()
-    kept = [place for place, head in enumerate(heads) if of_beam or head not in ("E", "nu")]
-    rows = [[row[place] for place in kept] for row in (heads, *rows)]
-    if subject.plane_strain:
-        rows[0] = ["nu in plane" if head == "nu" else head for head in rows[0]]
-    notes = [f"{name}: no reference; {found}" for name, found in subject.known.items() if isinstance(found, str)]
-    for choice in choices:
-        notes += [f"{choice.definition}, {part}: {reason}" for part, reason in choice.failures.items()]
-    first, plain = (name or "none" for name in recommended(choices))
-    by_rule = recommended([choice for choice in choices if choice.definition != "best-springs"])
-    how = "solved on this mesh"
+    solved = "solved on this mesh"
     if sizes:
         low, high = 1e3 * min(sizes), 1e3 * max(sizes)
         mesh_type = mesh_name.partition(" ")[0]
-        how = f"bands, extrapolated from solutions on {len(sizes)} {mesh_type} meshes of {low:.3g} to {high:.3g} mm"
-    estimate = f" (error estimate {subject.estimate})" if of_beam else ""
-    tests = " E, its error, and nu are of a patch test between rollers." if of_beam else ""
+        solved = f"bands, extrapolated from solutions on {len(sizes)} {mesh_type} meshes of {low:.3g} to {high:.3g} mm"
+    rows = TabledList(choices).table()
+    best = {one.definition: one for one in recommended(choices) if one}
+    first, plain = (one.definition if one else "none" for one in recommended(choices))
     lines = [
         f"{subject.name}, {mesh_name}: {counts}; {subject.made_of}",
         "",
         f"recommended: {first}; with springs alone: {plain}",
-        *_at_worst(subject, choices, (first, plain, *map(str, by_rule))),
+        *([f"at worst: {', '.join(_worst(subject, one) for one in best.values())}"] if best else []),
         "",
-        aligned(rows, left=2, right=range(3, 3 + len(subject.known) + 2 * of_beam)),
+        aligned(rows, left=2, right=range(3, len(rows[0]) - 1)),
         "",
-        f"{subject.meaning}{': ' if of_beam else ', '}{how},",
-        f"{KINEMATICS_TEXT}{estimate}.",
-        *subject.sign,
-        f"The first row is the best one by its worst error.{tests}",
+        *subject.meaning(solved),
+        "The first row is the best one by its worst error."
+        + (" E, its error, and nu are of a patch test between rollers, in the plane." if subject.of_beam else ""),
         *_also_tried(choices),
     ]
-    if not of_beam and subject.compared:
-        table = [["quantity", "reference", "error estimate"]]
-        for name, (value, kind) in subject.compared.items():
-            estimate = f"{100 * subject.known[name].error_estimate:.1g} %"  # type: ignore[union-attr]
-            table.append([name, f"{value:.6g} {QUANTITY_UNITS[kind]}", estimate])
-        lines += ["", aligned(table, left=1, right=(1, 2))]
-    return "\n".join([*lines, *([""] if notes and not of_beam else []), *notes])
+    if not subject.of_beam and subject.compared:
+        table = [
+            (name, f"{value:.6g} {QUANTITY_UNITS[kind]}", f"{100 * subject.known[name].error_estimate:.1g} %")
+            for name, (value, kind) in subject.compared.items()
+        ]
+        lines += ["", aligned([("quantity", "reference", "error estimate"), *table], left=1, right=(1, 2))]
+    lines += [f"{name}: no reference; {found}" for name, found in subject.known.items() if isinstance(found, str)]
+    return "\n".join(
+        [*lines, *(f"{one.definition}, {part}: {why}" for one in choices for part, why in one.failures.items())]
+    )
+
+
+def recommended(choices: "Sequence[Choice]") -> "tuple[Choice | None, Choice | None]":
+    """The best choice, and the best of springs alone; None if there is none."""
+    solved = [choice for choice in choices if choice.worst < math.inf]
+    return next(iter(solved), None), next((choice for choice in solved if not choice.energies), None)
+
+
+def _worst(subject: Subject, choice: "Choice") -> str:
+    """Largest error of a choice, its load or quantity, and what its sign means."""
+    bounds = [(error, name) for name, value in choice.errors.items() for error in np.ravel(value) if error == error]
+    worst, name = max(bounds, key=lambda one: abs(one[0]))
+    words = [name, sign_word(worst, *subject.compared[name])]
+    return f"{choice.definition} {error_text(worst)} ({', '.join(filter(None, words))})"
+
+
+def _also_tried(choices: "Sequence[Choice]") -> list[str]:
+    """Line with the definitions that were tried and have no row, and with those that were not."""
+    from ..springs.base import DEFINITIONS
+
+    rows = [choice.definition for choice in choices]
+    tried = choices[0].tried if choices else ()
+    slow = [name for name, one in DEFINITIONS.items() if one.cost > 1 and not one.needs and name not in (*tried, *rows)]
+    left = f"; not tried, since they search for seconds: {', '.join(slow)}" if slow else ""
+    return [f"Also tried: {', '.join(name for name in tried if name not in rows) or 'none'}{left}."] if tried else []
 
 
 def search_text(subject: Subject, search: "MeshSearch", springs_alone: bool = False) -> str:
     """Text of a search for a mesh."""
     from ..prediction.search import answer_text, tried_names
 
-    where = "under" if subject.of_beam else "in"
-    wanted = f"{100 * search.error:.6g} %"
-    lines = [
-        f"{subject.name}; {subject.made_of}; an error of at most {wanted} {where} {_listed(search.loads)}",
-        "",
-        *([] if springs_alone else [f"recommended: {answer_text(search.best)}"]),
-        f"with springs alone: {answer_text(search.best_springs)}",
+    wanted, where = f"{100 * search.error:.6g} %", "under" if subject.of_beam else "in"
+    *loads, last = search.loads
+    named = f"{', '.join(loads)} and {last}" if loads else last
+    parts = {} if springs_alone else {"with any definition": (search.best, search.by_type)}
+    parts["with springs alone"] = search.best_springs, search.springs_by_type
+    lines = [f"{subject.name}; {subject.made_of}; an error of at most {wanted} {where} {named}", ""]
+    lines += [
+        f"{what.replace('with any definition', 'recommended')}: {answer_text(one)}" for what, (one, _) in parts.items()
     ]
-    notes, steps = [], False
-    tables = [] if springs_alone else [("with any definition", search.by_type, False)]
-    tables.append(("with springs alone", search.springs_by_type, True))
-    for what, found, alone in tables:
+    notes: dict[str, None] = {}
+    for what, (_, found) in parts.items():
         chosen = sorted((one for one in found.values() if one), key=lambda one: (not one.confirmed, one.particles))
-        notes += [f"{name}, {what}: {_nearest(search, name, alone)}" for name, one in found.items() if one is None]
         if chosen:
             table = TabledList(chosen).table()
-            steps |= "largest step" in table[0]
             lines += ["", f"{what}:", aligned(table, left=2, right=range(3, len(table[0])))]
-    answers = [one for _, found, _ in tables for one in found.values()]
-    explained = []
-    if any(one and not one.confirmed for one in answers):
-        few = f"up to {search.most:,} particles these are too few to be sure"
-        explained.append(f"* kept on all finer meshes tried, but {few}.")
-    if None in answers:
-        change = "extrapolated by its change over the last doubling"
-        explained.append(f"None: a definition is given up if its error, {change},")
-        explained.append(f"is too large at {search.most:,} particles, too.")
+        if any(not one.confirmed for one in chosen):
+            few = f"up to {search.most:,} particles these are too few to be sure"
+            notes[f"* kept on all finer meshes tried, but {few}."] = None
+        notes |= {
+            f"{name}, {what}: {_nearest(search, name, what == 'with springs alone')}": None
+            for name, one in found.items()
+            if one is None
+        }
     counts, names = [one.particles for one in search.tried], tried_names(search.tried, springs_alone)
     lines += [
         "",
@@ -163,53 +169,12 @@ def search_text(subject: Subject, search: "MeshSearch", springs_alone: bool = Fa
         f"Tried: {', '.join(name for name in names if any(one.worst(name) < math.inf for one in search.tried))}.",
         f"A mesh counts if its error and that of all finer meshes tried, up to twice as fine, stay below {wanted},",
         "with a margin: the last change may happen once more. Sizes between whole divisions are tried, too.",
-        "Meshes are ranked by their particles.",
-        f"{subject.meaning}, solved on each mesh,",
-        f"{KINEMATICS_TEXT} (error estimate {subject.estimate}).",
-        *subject.sign,
-        "Static solve: of one load with its network assembled and factorized, measured here once.",
+        *subject.meaning("solved on each mesh"),
+        "Meshes are ranked by their particles. Static solve: of one load, measured here once. Largest step: of",
+        "undamped explicit integrators, about rest, held nowhere; it needs a density.",
+        "A definition is given up if its error, by its change over the last doubling, stays too large on finer meshes.",
     ]
-    lines += ["Largest step: of undamped explicit integrators, about rest, held nowhere."] if steps else []
-    return "\n".join([*lines, *explained, *notes])
-
-
-def recommended(choices: "Sequence[Choice]") -> tuple[str | None, str | None]:
-    """The best definition, and the best with springs alone; None if there is none."""
-    solved = [choice for choice in choices if choice.worst < math.inf]
-    plain = [choice for choice in solved if not choice.energies]
-    return (solved[0].definition if solved else None), (plain[0].definition if plain else None)
-
-
-KINEMATICS_TEXT = "with linear kinematics (small strain), against the converged reference of small strain"
-"""Kinematics and reference of the errors."""
-
-
-def _at_worst(subject: Subject, choices: "Sequence[Choice]", names: Sequence[str]) -> list[str]:
-    """Line with the largest error of each recommended definition, its part and what its sign means."""
-    texts = []
-    for choice in choices:
-        if choice.definition in names:
-            bounds = ((error, name) for name, value in choice.errors.items() for error in np.ravel(value))
-            worst, name = max((one for one in bounds if one[0] == one[0]), key=lambda one: abs(one[0]))
-            word = sign_word(worst, *subject.compared[name])
-            texts.append(f"{choice.definition} {error_text(worst)} ({name}{word and ', '}{word})")
-    return [f"at worst: {', '.join(texts)}"] if texts else []
-
-
-def _also_tried(choices: "Sequence[Choice]") -> list[str]:
-    """Line with the definitions that were tried and have no row, and with those that were not."""
-    from ..springs.base import DEFINITIONS
-
-    if not choices:
-        return []
-    rows, tried = [choice.definition for choice in choices], choices[0].tried
-    slow = [name for name, one in DEFINITIONS.items() if one.cost > 1 and not one.needs and name not in (*tried, *rows)]
-    left = f"; not tried, since they search for seconds: {', '.join(slow)}" if slow else ""
-    return [f"Also tried: {', '.join(name for name in tried if name not in rows) or 'none'}{left}."]
-
-
-def _listed(words: Sequence[str]) -> str:
-    return " and ".join([", ".join(words[:-1]), words[-1]] if words[1:] else words)
+    return "\n".join([*lines, *notes])
 
 
 def _nearest(search: "MeshSearch", mesh_type: str, springs_alone: bool) -> str:
@@ -217,18 +182,71 @@ def _nearest(search: "MeshSearch", mesh_type: str, springs_alone: bool) -> str:
     from ..prediction.search import tried_names
 
     tried = [one for one in search.tried if one.mesh_type == mesh_type]
-    allowed = tried_names(tried, springs_alone)
     near = [
-        (round(one.worst(name), 9), name in one.energies, one.particles, name, one.size)
+        (round(one.worst(name), 9), one.particles, name, one.size)
         for one in tried
-        for name in one.errors
-        if name in allowed
+        for name in tried_names(tried, springs_alone)
+        if name in one.errors
     ]
-    worst, _, particles, name, size = min(near, default=(math.inf, False, 0, "", 0.0))
+    worst, particles, name, size = min(near, default=(math.inf, 0, "", 0.0))
     if worst == math.inf:
         return f"none; of at most {search.most:,} particles there is no mesh, or no network on it is stable"
-    none = f"none up to {max(count for _, _, count, *_ in near):,} particles;"
-    where, off = f"{name} at {mesh_size_text(size)} ({particles:,} particles)", f"{100 * worst:.3g} % off at worst"
-    if worst <= search.error:
-        return f"{none} {where} keeps it, {off}, but finer ones do not"
-    return f"{none} nearest is {where}, {off}"
+    further = "; finer ones do not keep it" if worst <= search.error else ""
+    return (
+        f"none up to {max(count for _, count, *_ in near):,} particles; nearest is {name} at {mesh_size_text(size)} "
+        f"({particles:,} particles), {100 * worst:.3g} % off at worst{further}"
+    )
+
+
+def fit_text(fit: "EngineFit", mesh_name: str) -> str:
+    """Text of a calibration."""
+    about, mesh = fit.scene.statement, fit.scene.mesh
+    lines = [
+        f"{about.body}, {mesh_name}: {len(mesh.points)} particles, {len(mesh.edges)} springs; "
+        f"{about.named_materials}; {about.label}; definition {fit.scene.definition.name}",
+        aligned(fit._table(), left=2),
+    ]
+    if fit.bands:
+        converging = "" if len(fit.bands) == 1 else ": of others than the first, at what moves finite elements as far"
+        lines += ["", f"errors at shares of a load{converging}:", aligned(fit.bands.table(), left=2)]
+        off = [one.load for one in fit.bands[1:] if abs(one.error - one.definition_error) > one.within / 2]
+        hides = f"The factor hides from {fit.scene.load} that the solver has not converged, not from {', '.join(off)}."
+        lines += [hides] if off else []
+    if fit.needed:
+        lines += ["", f"under {fit.scene.load}, solver error below 1 % without a factor:"]
+        lines.append(aligned(fit.needed.table(), left=2))
+    return "\n".join(lines)
+
+
+def budget_text(search: "BudgetSearch") -> str:
+    """Text of a search within a budget."""
+    if search.best is None:
+        least = error_text(search[0].worst).lstrip("+")
+        return f"No stiffness makes any of them right; the nearest is off by {least}. Take a larger budget."
+    return f"{search!r}\n\nchosen, the least error at worst:\n{fit_text(search.best.fit, search.best.mesh)}"
+
+
+def written_text(net: "SpringNet", written: Iterable[Path], mujoco: int | None = None) -> str:
+    """Written files and their expected errors, as text."""
+    from ..handover.formats import FOR_MUJOCO, ending_of
+    from ..handover.mujoco import for_versions
+
+    header, (first, *others) = net.header, written
+    springs = f"{len(net.springs)} springs" if net.stiffness.any() else f"{len(net.springs)} edges with no own springs"
+    extent = [] if header["beam"] else [size_text(*np.ptp(net.points, axis=0).tolist())]
+    besides = [f"{terms.kind} terms of {len(terms.cells)} cells" for terms in net.energies]
+    counts = [*extent, f"{len(net.points)} particles", springs, *besides]
+    lines = [f"{first}: {', '.join(counts)} of definition {header['definition']}"]
+    lines += [f"beside it: {', '.join(map(str, others))}"] if others else []
+    lines += [for_versions(net.energies, mujoco)] if ending_of(first) in FOR_MUJOCO else []
+    errors, what = header["expected_error"], "error of the displacement" if header["beam"] else "errors"
+    if isinstance(errors, dict):
+        known = [f"{load} {100 * error:+.3g} %" for load, error in errors.items() if isinstance(error, float)]
+        lines += [f"{what}, solved on this mesh: {', '.join(known)}"] if known else []
+        lines += [f"{load}: {why}" for load, why in errors.items() if isinstance(why, str)]
+    else:
+        lines.append(f"{what}: {errors}")
+    if isinstance(steps := header["largest_stable_step"], dict):
+        step = min(step for step in steps.values() if isinstance(step, float))
+        lines.append(f"largest stable step of explicit integrators, undamped: {step:.4g} s")
+    return "\n".join(lines)

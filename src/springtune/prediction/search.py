@@ -292,6 +292,7 @@ def find_mesh(
     loads: Iterable[str] = CASES,
     mesh_types: Sequence[str] | None = None,
     load: str | None = None,
+    make: Callable[[float], GroupedMesh] | None = None,
     most: int = SOLVED,
 ) -> MeshSearch:
     """Coarsest mesh of each type on which a definition keeps an error, found by solving.
@@ -310,6 +311,8 @@ def find_mesh(
         Keys of `springtune.MESH_TYPES`, for a beam; all without. Meshes of shapes are free ones.
     load : str, optional
         Load case of a shape; its only one without.
+    make : callable, optional
+        Makes a mesh of a shape of a size [m]; `springtune.mesh_shape` without.
     most : int, optional
         Particles of the largest mesh that may be tried.
 
@@ -353,7 +356,7 @@ def find_mesh(
     if isinstance(beam, Shape):
         if loads is not CASES or mesh_types is not None:
             raise ValueError("loads, mesh types: are of beams alone; leave them out for a shape, and give its load")
-        return find_shape_mesh(beam, material, error, load=load, most=most)
+        return find_shape_mesh(beam, material, error, load=load, make=make, most=most)
     if load is not None:
         raise ValueError(f"load: {load!r} is of shapes alone; give loads for a beam")
     check_beam(beam)
