@@ -151,7 +151,7 @@ def _of_group(group: "GroupChanges", most: int | None) -> Iterator[list[str]]:
     for one in group.flags:
         if one.changed:
             rows = [
-                (f"  {_place(group, row.labels | row.point) or 'all'}", f"{_value(row.before)} -> {_value(row.after)}")
+                (f"  {_place(group, row.labels) or 'all'}", f"{_value(row.before)} -> {_value(row.after)}")
                 for row in one.rows
             ]
             yield [
@@ -180,7 +180,7 @@ def _changes(found: "Comparison", changes: "list[Change]", most: int | None) -> 
         [
             f"  {variable_name(row.group, row.variable)}",
             *(_value(row.before), _value(row.after), _difference(row)),
-            _place(axes[row.group], row.labels | row.point),
+            _place(axes[row.group], row.labels),
         ]
         for row in changes[:most]
     ]
