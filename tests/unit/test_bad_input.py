@@ -30,7 +30,6 @@ from springtune.mesh import (
 )
 from springtune.mesh.formats import read_shape
 from springtune.safe_io.inputs import virtual_memory
-from springtune.studies.output import reading
 from springtune.studies.output.browse.page import page
 from springtune.studies.output.dataset import write
 
@@ -549,15 +548,10 @@ class TestDatasets:
     )
     def test_a_study_whose_name_is_no_name_is_refused(self, path, name):
         h5py = pytest.importorskip("h5py")
-        for study in (name, "one + other"):
-            with h5py.File(path, "r+") as file:
-                file.attrs["study"] = study
-            for call in (st.open, reading.attributes):
-                if study is name:
-                    with pytest.raises(ValueError, match="dataset.nc: attribute 'study' is .*use letters, digits"):
-                        call(path)
-                else:
-                    assert getattr(found := call(path), "attrs", found)["study"] == "one + other"
+        with h5py.File(path, "r+") as file:
+            file.attrs["study"] = name
+        with pytest.raises(ValueError, match="dataset.nc: attribute 'study' is .*use letters, digits"):
+            st.open(path)
 
     def links(self, name, path):
         """Change a dataset so that data of another file are in it."""

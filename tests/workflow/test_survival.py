@@ -1,6 +1,7 @@
 """What a run survives, and what it says: other runs, kills, broken programs."""
 
 import contextlib
+import fcntl
 import os
 import re
 import shutil
@@ -15,8 +16,6 @@ import pytest
 import xarray as xr
 
 import springtune
-from springtune.safe_io import atomic
-from springtune.safe_io.atomic import this_host
 from springtune.studies.runs import store
 
 from campaigns import Campaign
@@ -58,27 +57,21 @@ def test_who_only_looks_changes_nothing(finished, option):
 def test_the_lock_of_a_run_that_was_killed_is_removed_with_a_word(finished):
     """As Snakemake writes locks, of the study's collect; what else becomes of locks: tests/unit/test_locks.py."""
     locks = finished.folder / ".snakemake/locks"
-    locks.mkdir(exist_ok=True)
+    locks.mkdir(parents=True, exist_ok=True)
     (locks / "0.output.lock").write_text(f"{finished.folder}/results/survival/dataset.nc\n")
     (finished.folder / "results/survival/index.html").unlink()
-    note = {"host": this_host(), "pid": 2**22 + 1, "start": 1.0, "command": "snakemake",
-            "folders": ["results/survival"]}  # fmt: skip
-    atomic.write_json(finished.folder / ".snakemake/springtune/of_a_test.json", note)
+    (finished.folder / "results/survival/tasks/run.json").write_text("{}")
     code, output = finished.springtune("survival.yaml")
     assert code == 0 and "was killed and left its lock; the lock is removed" in output, output
     assert (finished.folder / "results/survival/index.html").exists()
 
 
 def test_a_study_that_another_process_computes_is_left_to_it(finished):
-    process = psutil.Process()
-    note = {"host": this_host(), "pid": process.pid, "start": process.create_time(), "command": "snakemake",
-            "folders": ["results/survival"]}  # fmt: skip
-    path = finished.folder / ".snakemake/springtune/of_a_test.json"
-    atomic.write_json(path, note)
-    code, output = finished.springtune("survival.yaml")
-    path.unlink()
+    with (finished.folder / "results/survival/tasks/run.json").open("a+") as note:
+        fcntl.flock(note, fcntl.LOCK_EX)
+        code, output = finished.springtune("survival.yaml")
     assert code == 1 and "Traceback" not in output
-    assert re.search(rf"results/survival: process {os.getpid()} on this machine computes it since .*; wait", output)
+    assert "results/survival: another process computes it" in output
 
 
 def test_a_run_that_is_killed_goes_on_by_the_same_command(finished):

@@ -179,7 +179,6 @@ def _unlock(studies: "list[Study]", command: list[str]) -> None:
     killed = [one.name for one in studies if locks.check_idle(_results(one))]
     if killed:
         subprocess.run(command, check=False, capture_output=True)
-        locks.forget()
         which = ", ".join(str(Path("results", name)) for name in killed)
         click.echo(f"{which}: the run before was killed and left its lock; the lock is removed", err=True)
 

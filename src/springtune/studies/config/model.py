@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
-from functools import cached_property, wraps
+from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from springtune.problem.geometry import Beam
 from springtune.problem.materials import AnyMaterial, Material
@@ -133,9 +133,9 @@ class Grid:
     curves: tuple[CurveSpec, ...]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Study:
-    """A study, ready to run.
+    """A study, ready to run; one is equal to itself alone.
 
     All tuples are free of duplicates and ordered by beam and material as declared, then by mesh type, mesh size, load,
     definition and kinematics, whatever the order of grids and of the lists in them.
@@ -249,31 +249,8 @@ def swept_value(one: SceneSpec | CurveSpec | Reference, beam: Beam, name: str) -
     return float(getattr(one if name == "stiffness_scale" else one.material, name))
 
 
-MOST_STUDIES = 8
-
-Answer = TypeVar("Answer")
-
-
-def once_a_study(*names: str) -> Callable[[Callable[[Study], Answer]], Callable[[Study], Answer]]:
-    """Cache a function of a study while the named parts are the same objects."""
-
-    def decorate(function: Callable[[Study], Answer]) -> Callable[[Study], Answer]:
-        # Cache by id(): hashing 10,000 scenes is slow. The parts are kept, so that no new object gets their id.
-        known: dict[tuple[int, ...], tuple[Answer, list[Any]]] = {}
-
-        @wraps(function)
-        def answer(study: Study) -> Answer:
-            parts = [getattr(study, name) for name in names]
-            key = tuple(map(id, parts))
-            if key not in known:
-                known[key] = function(study), parts
-                if len(known) > MOST_STUDIES:
-                    del known[next(iter(known))]
-            return known[key][0]
-
-        return answer
-
-    return decorate
+once_a_study = lru_cache(maxsize=8)
+"""Decorator of a function of a study whose last answers are kept."""
 
 
 def keeps_fields(study: Study) -> bool:

@@ -1,18 +1,14 @@
-"""Bring several datasets onto the same axes: labels, and parameters that only some of them sweep."""
+"""Bring several datasets onto the same axes."""
 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection, Hashable, Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from functools import reduce
 from typing import Any
 
 import numpy as np
 import xarray as xr
-
-from springtune.problem.parameters import STATED, SWEPT, UNCHANGED
-
-from .dataset import nothing
 
 SAME_NUMBER = 1e-9
 """Relative difference below which two numbers are one label."""
@@ -49,18 +45,17 @@ def _is_numeric(data: xr.Dataset, name: Hashable) -> bool:
 
 
 def on_common_axes(trees: Sequence[xr.DataTree]) -> list[xr.DataTree]:
-    """Spell each number of a dimension alike, and add a dimension for each parameter that any dataset sweeps."""
-    made = _with_swept(trees)
+    """Spell each number of a dimension alike."""
     labels: dict[Hashable, list[float]] = defaultdict(list)
-    for tree in made:
+    for tree in trees:
         for node in tree.subtree:
             data = node.to_dataset(inherit=False)
             for name in data.indexes:
                 labels[name] += data.indexes[name].tolist() if _is_numeric(data, name) else []
     spelling = {name: _spelling(np.array(known, dtype=float)) for name, known in labels.items() if known}
     if all(label == spelt for known in spelling.values() for label, spelt in known.items()):
-        return made
-    return [tree.map_over_datasets(_spelt, kwargs={"spelling": spelling}) for tree in made]
+        return [*trees]
+    return [tree.map_over_datasets(_spelt, kwargs={"spelling": spelling}) for tree in trees]
 
 
 def _spelling(labels: np.ndarray) -> dict[float, float]:
@@ -77,60 +72,3 @@ def _spelt(data: xr.Dataset, spelling: Mapping[Hashable, Mapping[float, float]])
     spelt = {name: [spelling[name][label] for label in labels] for name, labels in known.items()}
     changed = {name: (name, labels, data[name].attrs) for name, labels in spelt.items() if labels != known[name]}
     return data.assign_coords(changed) if changed else data
-
-
-# -- swept parameters --------------------------------------------------------------------------------------------------
-
-
-def _with_swept(trees: Sequence[xr.DataTree]) -> list[xr.DataTree]:
-    """Add a dimension for each parameter that any dataset sweeps."""
-    made = [*trees]
-    for name in SWEPT:
-        sweeping = [tree for tree in trees if name in tree.dims]
-        if not sweeping:
-            continue
-        # No study need have all groups: what a parameter matters to is asked of all.
-        over = {
-            (node.path, str(variable))
-            for tree in sweeping
-            for node in tree.subtree
-            for variable, array in node.data_vars.items()
-            if name in array.dims
-        }
-        for number, tree in enumerate(made):
-            stated = xr.DataArray(UNCHANGED[name]) if name in UNCHANGED else tree.to_dataset().get(STATED[name])
-            if name not in tree.dims and stated is not None:
-                made[number] = _swept(tree, name, abs(stated), sweeping[0][name].attrs, over)
-    return made
-
-
-def _swept(
-    tree: xr.DataTree,
-    name: str,
-    stated: xr.DataArray,
-    attributes: Mapping[Any, Any],
-    over: Collection[tuple[str, str]],
-) -> xr.DataTree:
-    """Add a dimension to the variables `over`, pairs of path and name."""
-    known = np.unique(stated.values[np.isfinite(stated.values)])
-    if not len(known):
-        return tree
-    labels = known[np.concatenate([[True], np.diff(known) > SAME_NUMBER * known[1:]])]
-    axis = xr.DataArray(labels, dims=name, name=name, attrs=dict(attributes))
-    here = xr.concat([abs(stated - label) <= SAME_NUMBER * label for label in labels], name).assign_coords({name: axis})
-    groups = {}
-    for node in tree.subtree:
-        data = node.to_dataset()
-        found = data.drop_vars(name, errors="ignore")
-        for variable in found.data_vars:
-            if (node.path, str(variable)) not in over:
-                continue
-            array = found[variable]
-            empty, dtype = nothing([array])
-            mask = here.any([one for one in here.dims if one not in (*array.dims, name)])
-            spread = array.astype(dtype).where(mask, np.array(empty, dtype)).transpose(*array.dims, name)
-            found[variable] = spread.assign_attrs(array.attrs)
-        groups[node.path] = found
-    made = xr.DataTree.from_dict(groups)
-    made.attrs = tree.attrs
-    return made

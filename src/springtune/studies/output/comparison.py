@@ -137,8 +137,7 @@ def compare(
     """Compare two datasets by label; of each variable so many changes are listed.
 
     Numeric labels match within `alignment.SAME_NUMBER`; NaN equals NaN. Values of cells that one study does not request
-    are not compared. Numbers inside texts are compared as numbers. `MEASURED` is left out. A parameter that only one
-    study sweeps becomes a dimension of both.
+    are not compared. Numbers inside texts are compared as numbers. `MEASURED` is left out.
 
     Examples
     --------

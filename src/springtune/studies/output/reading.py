@@ -81,7 +81,9 @@ def open(path: str | os.PathLike[str]) -> "xarray.DataTree":
     try:
         if "springtune_version" not in tree.attrs:
             raise ValueError(f"{file}: is not a dataset of springtune; {REMEDY}")
-        _check_study(file, tree.attrs.get("study", "unknown"))
+        name = tree.attrs.get("study", "unknown")
+        if not (isinstance(name, str) and NAME.fullmatch(name)):  # it becomes part of paths
+            raise ValueError(f"{file}: attribute 'study' is {clipped(repr(name))}; {NAME_RULE}; {REMEDY}")
     except ValueError:
         tree.close()
         raise
@@ -181,26 +183,6 @@ def _length_of_texts(array: "h5py.Dataset", path: Path) -> int:
             file.seek(array.id.get_offset() or 0)
             content = file.read(array.id.get_storage_size())
     return int(np.frombuffer(content, "<u4")[::4].sum(dtype=int))
-
-
-def attributes(path: Path) -> dict[str, str]:
-    """Texts of the attributes of a dataset, without xarray."""
-    import h5py
-
-    check(path)
-    with h5py.File(path) as file:  # which gives ASCII as bytes
-        texts = {
-            name: text.decode(errors="replace") if isinstance(text, bytes) else str(text)
-            for name, text in file.attrs.items()
-        }
-    _check_study(path, texts.get("study", "unknown"))
-    return texts
-
-
-def _check_study(path: Path, name: object) -> None:
-    """Refuse a study's name that is no name, since it becomes part of paths; merged studies are joined by ' + '."""
-    if not (isinstance(name, str) and all(map(NAME.fullmatch, name.split(" + ")))):
-        raise ValueError(f"{path}: attribute 'study' is {clipped(repr(name))}; {NAME_RULE}; {REMEDY}")
 
 
 def most_of(path: Path) -> float:

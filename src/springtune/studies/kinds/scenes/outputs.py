@@ -38,7 +38,7 @@ def stem(selection: Mapping[str, str], number: int | None = None) -> str:
     return f"table_{number}" if number else "_".join(selection[label] for label in TABLE)
 
 
-@once_a_study("scenes", "printed", "further_references")
+@once_a_study
 def stems(study: "Study") -> list[str]:
     """Stems of the tables of a study's scenes."""
     numbers = {(cell.load, cell.mesh_type, cell.material): cell.table for cell in study.printed}
@@ -49,7 +49,7 @@ def stems(study: "Study") -> list[str]:
     return found
 
 
-@once_a_study("scenes")
+@once_a_study
 def pressed(study: "Study") -> bool:
     """Whether a study has scenes under pressure."""
     return any(LOADS[scene.load].kind.pressed for scene in study.scenes)

@@ -46,13 +46,13 @@ def _by_mesh(items):
     return dict(groups)
 
 
-@once_a_study("scenes")
+@once_a_study
 def scenes_by_mesh(study):
     """Scenes of a study by their mesh."""
     return _by_mesh(study.scenes)
 
 
-@once_a_study("curves")
+@once_a_study
 def curves_by_mesh(study):
     """Sensitivity curves of a study by their mesh."""
     return _by_mesh(study.curves)
@@ -80,7 +80,7 @@ NU_STEP = 0.05
 """Distance of the ends of ranges of Poisson's ratio [1]."""
 
 
-@once_a_study("grids", "outputs")
+@once_a_study
 def interpolants(study: "Study") -> "dict[str, tuple[Box, dict[Body, tuple[float, float]]]]":
     """Interpolants of a study by kind of load: their box, and the unit problem of each body in it."""
     if "block" in study.outputs or "definitions" in study.outputs:  # which show whole fields of all references
@@ -262,7 +262,7 @@ def _own(study, scene):
     return own
 
 
-@once_a_study("scenes", "curves", "grids", "outputs", "stiffness_table", "calibration")
+@once_a_study
 def scene_keys(study):
     """Keys of a study's scenes by their mesh, in the order of `scenes_by_mesh`: for tasks and the dataset."""
     return {mesh: [scene_key(study, scene) for scene in scenes] for mesh, scenes in scenes_by_mesh(study).items()}
@@ -292,12 +292,12 @@ def _common(study, scene):
     return known[place][:2]
 
 
-@once_a_study("grids", "outputs")
+@once_a_study
 def _commons(study):
     return {}
 
 
-@once_a_study("grids")
+@once_a_study
 def shown_scenes(study):
     """Scenes whose whole fields are stored, chosen from the whole study."""
     return shown(study.scenes, study.swept)
@@ -319,7 +319,7 @@ def stiffnesses(study, curve):
     return [ratio * membrane for ratio in study.stiffness_ratios]
 
 
-@once_a_study("curves")
+@once_a_study
 def _calibrating(study):
     """Thickness of the beam that calibrates each group of scenes [m]; a study gives a group one."""
     return {calibration_name(one): one.mesh.beam.thickness for one in _calibrating_curves(study)}
@@ -469,7 +469,7 @@ def _scenes(study, mesh):
     return tasks
 
 
-@once_a_study("scenes")
+@once_a_study
 def calibrated(study):
     """Scenes whose stiffness is calibrated."""
     return [scene for scene in study.scenes if scene.definition == "calibrated"]
