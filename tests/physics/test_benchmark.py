@@ -149,11 +149,9 @@ def test_beyond_its_seconds_an_approach_is_not_run_on_finer_sizes():
     assert found.message.values[0].tolist() == ["not run: at 10 mm it took longer than the 0 s of `most_seconds`", ""]
 
 
-def test_curves_and_explicit_steps_have_seconds():
-    rows = [*benchmark.curves(SCENES["traction"], 5e-3), *benchmark.explicit(SCENES["traction"], (5e-3,), updates=1)]
-    found = group_of(KIND).of_rows(axes((), (5e-3,)), rows)
-    for name in ("curve_seconds", "separate_seconds", "nonlinear_seconds", "linear_seconds", "spring_updates"):
-        assert (found[name] > 0).all(), name
+def test_explicit_steps_have_a_rate():
+    rows = [*benchmark.explicit(SCENES["traction"], (5e-3,), updates=1)]
+    assert (group_of(KIND).of_rows(axes((), (5e-3,)), rows).spring_updates > 0).all()
 
 
 # -- what makes it fast ------------------------------------------------------------------------------------------------

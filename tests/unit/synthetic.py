@@ -136,14 +136,13 @@ def stability():
 def benchmark():
     labels = {
         "scene": ["traction", "bending"], "approach": ["delingette/structured", "condensation", "calculix-cps3"],
-        "mesh_size": SIZES, "curve_count": [1, 11],
+        "mesh_size": SIZES,
     }  # fmt: skip
     cell = ("scene", "approach", "mesh_size")
     parts = dict.fromkeys([f"{name}_seconds" for name in ("meshing", "assembling", "factorizing", "solving")], cell)
     return variables(
         labels, error=cell, assured_error=cell, seconds=cell, unknowns=cell, **parts,
-        reference_error_estimate=("scene",), reference_seconds=("scene",), separate_seconds=("curve_count",),
-        curve_seconds=("curve_count",),
+        reference_error_estimate=("scene",), reference_seconds=("scene",),
     )  # fmt: skip
 
 

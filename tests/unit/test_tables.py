@@ -141,7 +141,7 @@ def test_a_load_that_was_not_asked_on_all_meshes_says_on_how_many():
 def timed():
     """Group of a benchmark with made-up errors, the finest mesh size first."""
     axes = {"scene": ("traction",), "approach": ("steady", "slow"), "mesh_size": (1e-3, 2e-3, 5e-3, 1e-2),
-            "curve_count": (1,), "thread_count": (1, 2), "precision": ("float64", "float32")}  # fmt: skip
+            "thread_count": (1, 2), "precision": ("float64", "float32")}  # fmt: skip
     data = group_of(BENCHMARK).empty(axes)
     data["error"].values[0] = [(0.0002, 0.0008, 0.005, 0.02), (np.nan, np.nan, 0.001, 0.002)]
     data["seconds"].values[:] = np.where(np.isfinite(data.error), (0.08, 0.02, 0.004, 0.001), np.nan)

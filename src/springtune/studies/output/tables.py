@@ -1,6 +1,7 @@
 """Tables of a dataset's arrays: in Markdown, and as rows of the page of all tables."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
+from types import MappingProxyType
 from typing import Any
 
 import xarray as xr
@@ -46,10 +47,14 @@ def markdown(rows: Iterable[str], columns: Mapping[str, xr.DataArray], heads: Ma
 
 
 def listed(
-    data: xr.Dataset, present: xr.DataArray, labels: Iterable[str], columns: Mapping[str, tuple[str, float]]
+    data: xr.Dataset,
+    present: xr.DataArray,
+    names: Collection[str],
+    scaled: Mapping[str, tuple[str, float]] = MappingProxyType({}),
 ) -> list[dict[str, Any]]:
-    """Rows of the present cells: their labels, and columns by variable, each with its name and a factor."""
+    """Rows of the present cells: labels and variables by name, and variables by column times a factor."""
+    variables = [name for name in (*names, *(name for name, _ in scaled.values())) if name in data.data_vars]
     return [
-        {name: one[name] for name in labels} | {head: factor * one[name] for name, (head, factor) in columns.items()}
-        for one in records(data, present, columns)
+        {name: one[name] for name in names} | {head: factor * one[name] for head, (name, factor) in scaled.items()}
+        for one in records(data, present, variables)
     ]

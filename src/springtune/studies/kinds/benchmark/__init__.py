@@ -20,9 +20,6 @@ OTHER_APPROACHES = (
 PARTS = ("meshing", "assembling", "factorizing", "solving")
 """Parts of the seconds of a case."""
 
-CURVE_COUNTS = (1, 11, 61, 201)
-"""Numbers of stiffnesses of the benchmark's sensitivity curves."""
-
 THREAD_COUNTS = (1, 2)
 """Numbers of threads of the benchmark's explicit steps."""
 

@@ -21,7 +21,7 @@ from ...config.fields import Named, OneOrMore, Section, default, number, one_of,
 from ...config.kind import Kind
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key
 from ...runs.stages import Task, stage
-from . import CURVE_COUNTS, OTHER_APPROACHES, THREAD_COUNTS, approach_names
+from . import OTHER_APPROACHES, THREAD_COUNTS, approach_names
 from .outputs import OUTPUTS
 
 MOST_RUNS = 100_000
@@ -149,18 +149,17 @@ def _axes(cases):
         "mesh_size": {size for one in cases for size in one.mesh_sizes},
         "scene": tuple(one.name for one in cases),
         "approach": cases[0].approaches,
-        "curve_count": CURVE_COUNTS,
         "thread_count": THREAD_COUNTS,
         "precision": PRECISIONS,
     }
 
 
 def _tasks(study):
-    """Scenes; curves and explicit steps are timed on the first one."""
+    """Scenes; explicit steps are timed on the first one."""
     for place, case in enumerate(study.parts["benchmark"]):
         values = asdict(case) | {"beam": beam_key(case.beam), "material": material_key(case.material, density=True)}
         del values["name"]
-        values["curves"] = place == 0
+        values["explicit"] = place == 0
         yield Task(values, _code(case), {"scene": case.name}, case, name=case.name)
 
 
@@ -176,6 +175,7 @@ def _code(case):
 
 
 CASE = ("scene", "approach", "mesh_size")
+STEPS = ("mesh_size", "thread_count", "precision")
 
 VARIABLES = {
     "displacement": (CASE, "m", "displacement of the loaded side along the force", nan),
@@ -192,16 +192,7 @@ VARIABLES = {
     "reference_displacement": (("scene",), "m", "displacement of the converged reference", nan),
     "reference_error_estimate": (("scene",), "1", "estimated relative error of the reference", nan),
     "reference_seconds": (("scene",), "s", "time of the reference", nan),
-    "curve_seconds": (("curve_count",), "s", "time of a sensitivity curve as one path, 9470 particles", nan),
-    "separate_seconds": (("curve_count",), "s", "time of as many nonlinear solves", nan),
-    "nonlinear_seconds": ((), "s", "time of one nonlinear solve there", nan),
-    "linear_seconds": ((), "s", "time of one linear solve there", nan),
-    "spring_updates": (
-        ("mesh_size", "thread_count", "precision"),
-        "s-1",
-        "nonlinear springs a second that explicit steps advance, each step counted anew",
-        nan,
-    ),
+    "spring_updates": (STEPS, "s-1", "nonlinear springs a second that explicit steps advance, each counted anew", nan),
 }
 
 KIND = Kind(
@@ -215,7 +206,6 @@ KIND = Kind(
     dimensions={
         "scene": "scene of the benchmark",
         "approach": "definition / mesh type, or another approach",
-        "curve_count": "number of stiffnesses of a sensitivity curve",
         "thread_count": "number of threads of explicit steps",
         "precision": "floating-point numbers of explicit steps",
     },

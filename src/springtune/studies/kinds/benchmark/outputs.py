@@ -36,8 +36,7 @@ VIEWS = (
             Plot("seconds over unknowns", "seconds", "unknowns", "approach", along="mesh_size", log="xy"),
             Plot("error over mesh size", "error", "mesh_size", "approach", log="xy"),
             Plot("what became of the cases", "status", "mesh_size", "approach", "map"),
-            Plot("a curve as one path, and as many solves", "curve_seconds", "curve_count", log="xy",
-                 beside=(("curve_count", "separate_seconds", "as many separate solves"),)),
+            Plot("springs a second of explicit steps", "spring_updates", "mesh_size", "thread_count", log="x"),
         ),
     ),
 )  # fmt: skip

@@ -14,10 +14,8 @@ from itertools import chain, product
 import numpy as np
 
 from springtune.mechanics.integrators import PRECISIONS
-from springtune.mechanics.series import trace
 from springtune.mechanics.stepping import make_stepper
 from springtune.mesh.types import MESH_TYPES
-from springtune.problem.boundary import weights
 from springtune.problem.compare import assured, deformation_error
 from springtune.problem.geometry import Beam
 from springtune.problem.loads import LOADS
@@ -27,11 +25,10 @@ from springtune.reference import calculix
 from springtune.reference.small_strain import solve_small_strain
 from springtune.scene.motion import motion_of
 from springtune.scene.sheet import Sheet
-from springtune.springs.base import DefinitionError, Springs
-from springtune.springs.lattice import COEFFICIENT, uniform
+from springtune.springs.base import DefinitionError
 
 from ...runs.job import own_reason
-from . import CURVE_COUNTS, PARTS, THREAD_COUNTS
+from . import PARTS, THREAD_COUNTS
 from .approaches import APPROACHES, network
 
 REPETITIONS = 3
@@ -45,9 +42,6 @@ UPDATES = 4_000_000
 FEWEST_STEPS = 50
 """in at least so many steps."""
 
-CURVE_SIZE = 1e-3
-"""Mesh size of the curves whose cost is measured, on the first scene's beam [m]."""
-
 
 def failed(task, why):
     """Result of a scene of which nothing is measured."""
@@ -58,9 +52,7 @@ def solve(task):
     """Errors and seconds of a scene."""
     scene = LoadedBeam(Beam(**task["beam"]), material_of(task["material"]), task["load"], task["force"])
     rows = measure(scene, list(cases(**task)), task["most_seconds"])
-    if task["curves"]:
-        rows += [*curves(scene, max(CURVE_SIZE, min(task["mesh_sizes"]))), *explicit(scene, task["mesh_sizes"])]
-    return {"rows": rows}
+    return {"rows": [*rows, *(explicit(scene, task["mesh_sizes"]) if task["explicit"] else ())]}
 
 
 def cases(approaches, mesh_sizes, finest, **_):
@@ -96,23 +88,16 @@ class LoadedBeam:
         return self.kind.loaded.place(self.beam.length, self.beam.height), self.kind.normal, self.kind.axis
 
 
-def timed(run):
-    """Seconds of a run, and its result."""
-    begin = time.perf_counter()
-    result = run()
-    return time.perf_counter() - begin, result
-
-
-def median(run):
-    """Median seconds of some runs."""
-    return float(np.median([timed(run)[0] for _ in range(REPETITIONS)]))
-
-
 class Clock:
     """Seconds of each part of a run."""
 
     def __init__(self):
         self.seconds = dict.fromkeys(PARTS, 0.0)
+
+    @property
+    def total(self):
+        """Seconds of all parts."""
+        return sum(self.seconds.values())
 
     @contextmanager
     def __call__(self, part):
@@ -127,19 +112,16 @@ def measure(scene, cases, most_seconds):
 
     Where an approach fails it has a status and a message; where it exceeds its seconds finer sizes have.
     """
-    seconds, reference = timed(lambda: solve_small_strain(scene.beam, scene.material, scene.force, kind=scene.kind))
-    meshes, beyond, rows = {}, {}, defaultdict(list)
-    for mesh_type in {case["approach"].partition("/")[2] for case in cases if "/" in case["approach"]}:
-        MESH_TYPES[mesh_type](1.0, 0.5, 0.25)  # libraries are read
+    clock, beyond, rows = Clock(), {}, defaultdict(list)
+    with clock("solving"):
+        reference = solve_small_strain(scene.beam, scene.material, scene.force, kind=scene.kind)
     for case in cases:
         approach, size = case["approach"], case["mesh_size"]
-        if approach in beyond:
-            found = _failed(beyond[approach])
-        else:
-            taken, found = timed(partial(_case, scene, approach, size, meshes))
-            if taken > most_seconds:
-                limit = f"it took longer than the {most_seconds:g} s of `most_seconds`"
-                beyond[approach] = f"not run: at {1e3 * size:g} mm {limit}"
+        begin = time.perf_counter()
+        found = _failed(beyond[approach]) if approach in beyond else _case(scene, approach, size)
+        if time.perf_counter() - begin > most_seconds:
+            limit = f"it took longer than the {most_seconds:g} s of `most_seconds`"
+            beyond[approach] = f"not run: at {1e3 * size:g} mm {limit}"
         found["error"] = float(deformation_error(found.get("displacement", np.nan), reference.displacement))
         rows[approach].append(case | found)
     for own in rows.values():
@@ -149,7 +131,7 @@ def measure(scene, cases, most_seconds):
     about = {
         "reference_displacement": reference.displacement,
         "reference_error_estimate": reference.error_estimate,
-        "reference_seconds": seconds,
+        "reference_seconds": clock.seconds["solving"],
     }
     return [about, *chain.from_iterable(rows.values())]
 
@@ -158,12 +140,17 @@ def _failed(message, status=Status.FAILED):
     return {"status": int(status), "message": message}
 
 
-def _case(scene, approach, size, meshes):
-    """Result of a case; the mesh of a definition is made before, and its time counted."""
+def _case(scene, approach, size):
+    """Result of a case, run again and again; the first run is cold, which a long one does not feel."""
     if approach.startswith("calculix") and not calculix.program():
         return _failed("CalculiX (ccx) is not on this machine; install it, or ask for other approaches")
+    definition, _, mesh_type = approach.partition("/")
+    run, clocks = partial(network, definition=definition, mesh_type=mesh_type), []
+    run = run if mesh_type else APPROACHES[approach]
     try:
-        return _repeat(scene, approach, size, meshes)
+        while len(clocks) <= REPETITIONS and not (clocks and clocks[0].total > LONG):
+            clocks.append(Clock())
+            displacement, unknowns = run(scene, size, clocks[-1])
     except DefinitionError as error:
         return _failed(str(error))
     except MemoryError:
@@ -174,53 +161,10 @@ def _case(scene, approach, size, meshes):
             raise
         traceback.print_exc()
         return _failed(why, Status.NOT_CONVERGED)
-
-
-def _repeat(scene, approach, size, meshes):
-    """Numbers of a case, run again and again."""
-    definition, _, mesh_type = approach.partition("/")
-
-    def make():
-        made = MESH_TYPES[mesh_type](scene.beam.length, scene.beam.height, size)
-        made.edges  # noqa: B018  computed when first asked for
-        return made
-
-    if mesh_type and (mesh_type, size) not in meshes:
-        meshes[mesh_type, size] = timed(make)
-    meshing, mesh = meshes[mesh_type, size] if mesh_type else (0.0, None)
-
-    def run():
-        clock = Clock()
-        found = network(scene, mesh, definition, clock) if mesh_type else APPROACHES[approach](scene, size, clock)
-        return *found, clock.seconds
-
-    # The first run is cold, which a long one does not feel.
-    runs = [timed(run)]
-    if runs[0][0] <= LONG:
-        runs = [timed(run) for _ in range(REPETITIONS)]
-    displacement, unknowns, _ = runs[0][1]
-    parts = {f"{part}_seconds": np.median([seconds[part] for _, (*_, seconds) in runs]) for part in PARTS}
-    parts["meshing_seconds"] += meshing
+    warm = clocks[1:] or clocks
     found = {"displacement": displacement, "unknowns": unknowns, "status": int(Status.SOLVED), "message": ""}
-    return found | parts | {"seconds": np.median([seconds for seconds, _ in runs]) + meshing}
-
-
-def curves(scene, size):
-    """Rows of seconds of sensitivity curves: as one path, and solve by solve."""
-    mesh = MESH_TYPES["structured"](scene.beam.length, scene.beam.height, size)
-    pattern = weights(mesh, scene.kind)
-    membrane = scene.sheet.young_modulus * scene.beam.thickness
-
-    def problem():
-        return Sheet(mesh, scene.beam.thickness).problem(scene.kind, Springs(1.0, uniform(mesh)))
-
-    force = scene.force / (COEFFICIENT * membrane)
-    one = median(lambda: problem().nonlinear(force))
-    yield {"nonlinear_seconds": one, "linear_seconds": median(lambda: problem().linear(force))}
-    for count in CURVE_COUNTS:
-        loads = force / np.linspace(0.4, 1.6, count)
-        together = median(lambda loads=loads: trace(problem(), pattern, loads))
-        yield {"curve_count": count, "curve_seconds": together, "separate_seconds": one * count}
+    found |= {f"{part}_seconds": np.median([clock.seconds[part] for clock in warm]) for part in PARTS}
+    return found | {"seconds": np.median([clock.total for clock in warm])}
 
 
 def explicit(scene, sizes, updates=UPDATES):
@@ -234,9 +178,13 @@ def explicit(scene, sizes, updates=UPDATES):
         steps = max(FEWEST_STEPS, round(updates / len(mesh.edges)))
         for threads, precision in product(THREAD_COUNTS, PRECISIONS):
             # The steps alone: what a run prepares once is soon less than they are.
+            clocks = [Clock() for _ in range(REPETITIONS)]
             with closing(make_stepper(motion, "central-difference", step, precision, threads)) as stepper:
                 stepper.begin(*np.zeros((2, *motion.load.shape)))
                 stepper.advance(steps)  # with the first ones threads begin
-                seconds = median(lambda stepper=stepper, steps=steps: stepper.advance(steps))
+                for clock in clocks:
+                    with clock("solving"):
+                        stepper.advance(steps)
+            seconds = np.median([clock.total for clock in clocks])
             labels = {"mesh_size": size, "thread_count": threads, "precision": precision}
             yield labels | {"spring_updates": steps * len(mesh.edges) / seconds}
