@@ -18,7 +18,7 @@ pytestmark = pytest.mark.slow
 OF_THE_RUN = ("tasks", "done", "logs", "benchmarks")
 """Folders of what a run notes of its jobs: there are others on a cluster."""
 
-TIMED = re.compile("benchmark|speed|definitions.csv|which_definition.md|summary.txt")
+TIMED = re.compile("benchmark|speed|which_definition.md|summary.txt")
 """Files, and the group of a dataset, that tell how fast the machine was."""
 
 

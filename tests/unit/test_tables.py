@@ -157,7 +157,7 @@ def test_the_page_of_the_benchmark_has_numbers_and_holes():
     found = tables(text)
     (row,) = found["traction: approaches on one mesh size"]
     assert (row["at 1 mm"], row["error"], row["time"]) == ("`steady`", "+0.02 %", "80 ms")
-    assert found["Explicit steps"][0]["float32, 2 threads"] == "200"
+    assert found["Explicit steps"][0]["float32, threads: 2"] == "200"
 
 
 @pytest.mark.parametrize(

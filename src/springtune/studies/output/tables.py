@@ -1,6 +1,7 @@
 """Tables of a dataset's arrays: in Markdown, and as rows of the page of all tables."""
 
 from collections.abc import Collection, Iterable, Mapping
+from itertools import product
 from types import MappingProxyType
 from typing import Any
 
@@ -13,6 +14,7 @@ HEADS: dict[str, tuple[str, Any]] = {
     "definition": ("definition", "`{}`".format),
     "approach": ("approach", "`{}`".format),
     "integrator": ("integrator", "`{}`".format),
+    "mesh_type": ("mesh type", str),
     "mesh_size": ("mesh [mm]", lambda size: f"{1e3 * size:g}"),
 }
 """Head of a column of labels, and their texts."""
@@ -26,7 +28,7 @@ def numbers(array: xr.DataArray, form: str = ".3g", scale: float = 1.0, unit: st
 def markdown(rows: Iterable[str], columns: Mapping[str, xr.DataArray], heads: Mapping[str, Any] = HEADS) -> list[str]:
     """Markdown lines: a row for each cell over the dimensions `rows` that has a text, and columns of texts by head.
 
-    Arrays with a further dimension have a column for each label of it, which fills the ``{}`` of their head.
+    Arrays with further dimensions have a column for each cell over them, whose labels fill the ``{}`` of their head.
 
     Examples
     --------
@@ -36,10 +38,10 @@ def markdown(rows: Iterable[str], columns: Mapping[str, xr.DataArray], heads: Ma
     """
     named, found = {name: heads[name] for name in rows}, {}
     for head, texts in columns.items():
-        (further,) = [name for name in texts.dims if name not in named] or [""]
-        labels = texts[further].values if further else [""]
-        found |= {head.format(label): texts.sel({further: label}) if further else texts for label in labels}
-    frame = xr.Dataset({head: texts.reset_coords(drop=True) for head, texts in found.items()}).to_dataframe([*named])
+        further = [name for name in texts.dims if name not in named]
+        for labels in product(*(texts[name].values for name in further)):
+            found[head.format(*labels)] = texts.sel(dict(zip(further, labels))).reset_coords(drop=True)
+    frame = xr.Dataset(found).to_dataframe([*named])
     frame = frame[(frame != "").any(axis=1)].reset_index()
     for name, (_, written) in named.items():
         frame[name] = frame[name].map(written)

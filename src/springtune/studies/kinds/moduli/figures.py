@@ -34,11 +34,8 @@ def definitions(tree):
 
 
 def _main(root, names, selection):
-    """Labels with most scenes of a study; if a selection has no such scene, those with most of its own scenes."""
-    chosen = selection | {name: most_requested(root, name) for name in names}
-    if (root.status.sel(chosen) != 0).any():
-        return chosen
-    root = root[["status"]].sel({name: [label] for name, label in selection.items()})
+    """A selection, and of further dimensions the labels with most of its scenes."""
+    chosen, root = dict(selection), root[["status"]].sel({name: [label] for name, label in selection.items()})
     for name in names:
         chosen[name] = most_requested(root, name)
         root = root.sel({name: [chosen[name]]})
@@ -197,14 +194,9 @@ def _field_errors(panel, error, status):
             rate = np.polyfit(np.log(sizes[there]), np.log(values[there]), 1)[0]
             label += f" ({rate:.1f})".replace("-0.0", "0.0").replace("-", "−")
         panel.plot(places[one[0]], values, label=label, **look)
-    said = [f"grey: {', '.join(others)}"] if others else []
     lacking = [str(name) for name, there, flag in zip(names, known, flags) if not there.any() and (flag > 0).any()]
-    said += [f"no error: {', '.join(lacking)}"] if lacking else []
-    for name, there, flag in zip(names, known, flags):
-        without = sizes[~there & (flag > 0)]
-        if there.any() and len(without):
-            said.append(f"no error: {name} at {', '.join(f'{size:g}' for size in without)} mm")
-    return said, ""
+    said = {"grey": others, "no error": lacking}
+    return [f"{what}: {', '.join(own)}" for what, own in said.items() if own], ""
 
 
 @style.styled
@@ -216,7 +208,7 @@ def plot_definitions_loads(data, ax=None, *, beam=None, mesh_type=None, material
     data : xarray.DataTree or xarray.Dataset
         A study's dataset, or its root.
     ax : Figure or sequence of Axes, optional
-        Where to plot: as many Axes as materials; by default a new figure, with a bar of colours.
+        Where to plot: as many Axes as materials; by default a new figure.
     beam, mesh_type, kinematics : str, optional
         Labels of the scenes. One that is not given must leave no choice.
     materials : sequence of str, optional
@@ -245,53 +237,44 @@ def plot_definitions_loads(data, ax=None, *, beam=None, mesh_type=None, material
     chosen = choose(root.status != 0, beam=beam, mesh_type=mesh_type, kinematics=kinematics)
     root = root.sel(chosen)
     solved = root.status == 1
-    if materials is None:
-        materials = _spread(root, solved)
+    materials = _spread(root, solved) if materials is None else materials
     for material in materials:
         choose(root.status != 0, material=material)
     if solved.any():
         root = root.sel(definition=labels_of(solved, "definition"))
     root = root.sel(load=labels_of(root.status != 0, "load"))
     names, loads = root.definition.values.tolist(), root["load"].values.tolist()
-    wide = style.COLUMN if len(loads) * len(materials) < MOST_IN_COLUMN else style.PAGE
-    figure, axes = style.panels(ax, ncols=len(materials), sharey=True, figsize=(wide, 1.5 + 0.165 * len(names)))
-    doubted = False
-    for panel, material in zip(axes[0], materials):
-        cells = root.sel(material=material)
-        beyond = cells.reference_applies == 0 if "reference_applies" in cells else cells.status < 0
-        beyond = beyond.any([name for name in beyond.dims if name != "load"]).values
-        image = _heat(panel, *(cells[name].transpose("mesh_size", "definition", "load").values
-                               for name in ("deformation_error", "status")), beyond)  # fmt: skip
-        doubted |= bool(beyond.any())
+    place = ("mesh_size", "definition", "load")
+    beyond = root.reference_applies == 0 if "reference_applies" in root else root.status < 0
+
+    def draw(panel, material):
+        cells, error = root.sel(material=material), np.full((len(names), len(loads)), np.nan)
+        doubted = beyond.sel(material=material).any([name for name in beyond.dims if name not in ("material", "load")])
+        for values in 100 * cells.deformation_error.transpose(*place).values[::-1]:  # the finest solved mesh stays
+            error = np.where(np.isfinite(values), values, error)
+        asked = (cells.status != 0).any("mesh_size").transpose(*place[1:]).values
+        texts = np.where(asked, NO_RESULT, NOT_ASKED).astype(object)
+        for row, column in np.argwhere(np.isfinite(error)):
+            texts[row, column] = error_text(error[row, column]) + "*" * bool(doubted[column])
+        heat_map(panel, error, texts)
         panel.set_xticks(range(len(loads)), map(no_mathematics, loads))
         panel.xaxis.set_tick_params(rotation=90, labelsize=style.SMALL)
         panel.set_yticks(range(len(names)), map(no_mathematics, names))
-        ratio = f"ν = {float(cells.material_poisson_ratio):g}"
-        panel.set_title(ratio if material == ratio.replace("ν = ", "nu-") else f"{material}, {ratio}")
-    flags = root.status.values
+        return [], ""
+
+    shown = {}
+    for material in materials:
+        ratio = f"ν = {float(root.material_poisson_ratio.sel(material=material)):g}"
+        shown[ratio if material == ratio.replace("ν = ", "nu-") else f"{material}, {ratio}"] = material
+    flags = root.status.sel(material=materials).values
     said = [sign_of_errors(root), f"{NO_RESULT}: no result" * bool((flags > 1).any())]
-    said += [f"{NOT_ASKED}: not asked for" * bool((flags == 0).any()), f"*: {BEYOND_SMALL_STRAIN}" * doubted]
-    title = f"{labelled_beam(root, chosen['beam'])}, {chosen['mesh_type']}"
-    labels.entitle(figure, f"{title}: deformation error [%] on the finest mesh solved", "; ".join(filter(None, said)))
-    if figure is not None:
-        figure.colorbar(image, ax=axes[0].tolist(), ticks=[-1, 0, 1, 2]).set_ticklabels(["0.1", "1", "10", "100"])
-    return axes[0]
-
-
-MOST_IN_COLUMN = 6
-"""Columns of cells from which a figure is a page wide."""
-
-
-def _heat(panel, errors, flags, beyond):
-    """Draw errors by definition and load with their numbers, marked beyond small strain; return the image."""
-    error = np.full(errors.shape[1:], np.nan)
-    for values in 100 * errors[::-1]:  # the finest solved mesh comes last and stays
-        error = np.where(np.isfinite(values), values, error)
-    asked, texts = (flags != 0).any(axis=0), np.full(error.shape, NOT_ASKED, dtype=object)
-    for row, column in np.argwhere(asked):
-        known = np.isfinite(error[row, column])
-        texts[row, column] = error_text(error[row, column]) + "*" * bool(beyond[column]) if known else NO_RESULT
-    return heat_map(panel, error, texts)
+    said += [f"{NOT_ASKED}: not asked for" * bool((flags == 0).any())]
+    said += [f"*: {BEYOND_SMALL_STRAIN}" * bool(beyond.sel(material=materials).any())]
+    title = (
+        f"{labelled_beam(root, chosen['beam'])}, {chosen['mesh_type']}: deformation error [%] on the finest mesh solved"
+    )
+    said, height = "; ".join(filter(None, said)), 1.2 + 0.165 * len(names)
+    return labels.small_multiples(ax, shown, len(shown), height, title, draw, sharey=True, said=said)
 
 
 def _spread(root, solved):

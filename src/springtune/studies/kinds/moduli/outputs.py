@@ -9,8 +9,8 @@ from ...output.browse import Plot, View
 if TYPE_CHECKING:
     from ...config.model import Study
 
-TABLES = ("definitions.csv", "moduli.csv", "which_definition.md")
-"""Tables that compare definitions: of scenes, of moduli, and what to use."""
+PAGE = "which_definition.md"
+"""The page that compares definitions; `springtune export` writes all their numbers."""
 
 
 def figures(loads: Iterable[object], mesh_types: Iterable[object]) -> dict[str, dict[str, object]]:
@@ -31,7 +31,7 @@ OUTPUTS = (
         "figures and tables that compare definitions",
         figures=_figures,
         plot="studies.kinds.moduli.figures:definitions",
-        tables=lambda study: list(TABLES),
+        tables=lambda study: [PAGE],
         write="studies.kinds.moduli.tables:write",
         lack=needs("moduli", "compares moduli and no grid has them; add 'moduli: true' to a grid"),
     ),
