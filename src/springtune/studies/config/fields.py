@@ -201,9 +201,9 @@ class OneOrMore(Wrapped):
         return items if self.repeats else once(items)
 
 
-def default(value: Any, description: str, **options: Any) -> Any:
+def default(value: Any, **options: Any) -> Any:
     """Field with a default, written as in a study."""
-    return Field(value, validate_default=True, description=description, **options)
+    return Field(value, validate_default=True, **options)
 
 
 def optional(section: Any, description: str) -> tuple[Any, Any]:
@@ -234,9 +234,14 @@ def _parts(annotation: Any) -> tuple[Any, tuple[Any, ...]]:
 
 
 class Section(BaseModel):
-    """A mapping of known keys in a study."""
+    """A mapping of known keys in a study; the text below a key is its meaning in the manual."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True, use_attribute_docstrings=True)
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **_: Any) -> None:
+        for field in cls.model_fields.values():
+            field.description = field.description and " ".join(field.description.split())
 
     @model_validator(mode="before")
     @classmethod

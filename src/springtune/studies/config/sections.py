@@ -63,20 +63,36 @@ PLAUSIBLE = 20.0
 class BeamConfig(Section):
     """A rectangular sheet, its length along x."""
 
-    length: Length = Field(description="Extent along x, the direction of the load.")
-    height: Length = Field(description="Extent along y.")
-    thickness: Length = default("1 mm", description="Extent out of the plane.")
+    length: Length
+    """Extent along x, the direction of the load."""
+
+    height: Length
+    """Extent along y."""
+
+    thickness: Length = default("1 mm")
+    """Extent out of the plane."""
 
 
 class StiffnessConfig(Section):
     """Stiffness of a sheet in plane stress, in the order xx, yy and xy with the shear angle; positive definite."""
 
-    C11: Stress = Field(description="Stress along x for a strain along x.")
-    C22: Stress = Field(description="Stress along y for a strain along y.")
-    C12: SignedStress = Field(description="Stress along x for a strain along y.")
-    C66: Stress = Field(description="Shear stress for a shear angle.")
-    C16: SignedStress = default("0 Pa", description="Shear stress for a strain along x.")
-    C26: SignedStress = default("0 Pa", description="Shear stress for a strain along y.")
+    C11: Stress
+    """Stress along x for a strain along x."""
+
+    C22: Stress
+    """Stress along y for a strain along y."""
+
+    C12: SignedStress
+    """Stress along x for a strain along y."""
+
+    C66: Stress
+    """Shear stress for a shear angle."""
+
+    C16: SignedStress = default("0 Pa")
+    """Shear stress for a strain along x."""
+
+    C26: SignedStress = default("0 Pa")
+    """Shear stress for a strain along y."""
 
 
 MATERIAL_FORMS = (
@@ -106,41 +122,51 @@ class MaterialConfig(Section):
 
     model_config = ConfigDict(json_schema_extra=_one_form)
 
-    young_modulus: Stress | None = Field(None, description="Young's modulus E.")
-    poisson_ratio: PoissonRatio | None = Field(None, description="Poisson's ratio nu; 0.5 is allowed in plane stress.")
-    plane: Plane | None = Field(
-        None,
-        description="'stress' of a thin sheet, the default, or 'strain' of a slice of a long body; E and nu are those "
-        "of the material in three dimensions in both. Isotropic materials alone.",
-    )
-    young_modulus_x: Stress | None = Field(None, description="Young's modulus along the fibres.")
-    young_modulus_y: Stress | None = Field(None, description="Young's modulus across the fibres.")
-    poisson_ratio_xy: OrthotropicRatio | None = Field(
-        None, description="Contraction across the fibres over extension along them, when pulled along them."
-    )
-    shear_modulus: Stress | None = Field(None, description="Shear modulus along and across the fibres.")
-    angle: Annotated[list[Angle], OneOrMore(repeats=True)] | None = Field(
-        None,
-        description="Angle of the fibres from the x axis, counter-clockwise; 0 by default. Several angles are the "
-        "plies of a laminate of equal thicknesses and symmetric stacking.",
-    )
-    stiffness: StiffnessConfig | None = Field(None, description="Elastic constants in plane stress.")
-    uniaxial_test: FileName | None = Field(
-        None,
-        description="CSV file of a uniaxial test of rubber, relative to the study's folder: stretch or strain and "
-        "nominal stress under a head such as `stretch,nominal stress [MPa]` or `strain [%],nominal stress [MPa]`. "
-        "Definition `yeoh` uses the fitted law.",
-    )
-    terms: Terms | None = Field(
-        None, description="Number of terms of the fitted law; 3 by default, 1 is the neo-Hookean law."
-    )
-    equibiaxial_test: FileName | None = Field(
-        None, description="CSV file of an equibiaxial test, to compare the fitted law with."
-    )
-    pure_shear_test: FileName | None = Field(
-        None, description="CSV file of a pure-shear test, to compare the fitted law with."
-    )
-    density: Density | None = Field(None, description="Density rho; needed for dynamics and gravity, not for statics.")
+    young_modulus: Stress | None = None
+    """Young's modulus E."""
+
+    poisson_ratio: PoissonRatio | None = None
+    """Poisson's ratio nu; 0.5 is allowed in plane stress."""
+
+    plane: Plane | None = None
+    """'stress' of a thin sheet, the default, or 'strain' of a slice of a long body; E and nu are those of the
+    material in three dimensions in both. Isotropic materials alone."""
+
+    young_modulus_x: Stress | None = None
+    """Young's modulus along the fibres."""
+
+    young_modulus_y: Stress | None = None
+    """Young's modulus across the fibres."""
+
+    poisson_ratio_xy: OrthotropicRatio | None = None
+    """Contraction across the fibres over extension along them, when pulled along them."""
+
+    shear_modulus: Stress | None = None
+    """Shear modulus along and across the fibres."""
+
+    angle: Annotated[list[Angle], OneOrMore(repeats=True)] | None = None
+    """Angle of the fibres from the x axis, counter-clockwise; 0 by default. Several angles are the plies of a
+    laminate of equal thicknesses and symmetric stacking."""
+
+    stiffness: StiffnessConfig | None = None
+    """Elastic constants in plane stress."""
+
+    uniaxial_test: FileName | None = None
+    """CSV file of a uniaxial test of rubber, relative to the study's folder: stretch or strain and nominal stress
+    under a head such as `stretch,nominal stress [MPa]` or `strain [%],nominal stress [MPa]`. Definition `yeoh` uses
+    the fitted law."""
+
+    terms: Terms | None = None
+    """Number of terms of the fitted law; 3 by default, 1 is the neo-Hookean law."""
+
+    equibiaxial_test: FileName | None = None
+    """CSV file of an equibiaxial test, to compare the fitted law with."""
+
+    pure_shear_test: FileName | None = None
+    """CSV file of a pure-shear test, to compare the fitted law with."""
+
+    density: Density | None = None
+    """Density rho; needed for dynamics and gravity, not for statics."""
 
     @model_validator(mode="after")
     def _whole(self) -> Self:
@@ -198,8 +224,12 @@ class MaterialConfig(Section):
 class StatedStiffness(Section):
     """A stated stiffness of one mesh type and material."""
 
-    mesh_type: MeshType = Field(description="Mesh type.")
-    material: MaterialName = Field(description="Material.")
+    mesh_type: MeshType
+    """Mesh type."""
+
+    material: MaterialName
+    """Material."""
+
     value: Stiffness = Field(
         description=f"Stiffness of every spring; refused beyond a factor of {PLAUSIBLE:g} from sqrt(3)/2 E t."
     )
@@ -208,9 +238,8 @@ class StatedStiffness(Section):
 class PaperConfig(Section):
     """Parameters of the definition `paper`: stated stiffnesses."""
 
-    stiffness: list[StatedStiffness] = Field(
-        description="One entry for each mesh type and material of the grids with `paper`.", min_length=1
-    )
+    stiffness: list[StatedStiffness] = Field(min_length=1)
+    """One entry for each mesh type and material of the grids with `paper`."""
 
     @model_validator(mode="before")
     @classmethod
@@ -229,25 +258,34 @@ class CalibratedConfig(Section):
     sensitivity curves of one beam and load, over all mesh sizes.
     """
 
-    beam: BeamName = Field(description="Beam whose curves calibrate.")
-    load: Load = Field(description="Load whose curves calibrate.")
+    beam: BeamName
+    """Beam whose curves calibrate."""
+
+    load: Load
+    """Load whose curves calibrate."""
 
 
 class DefinitionsConfig(Section):
     """Parameters of the two definitions that need some; `springtune definitions` lists all definitions."""
 
-    paper: PaperConfig | None = Field(None, description="Stated stiffnesses; needed if a grid uses `paper`.")
-    calibrated: CalibratedConfig | None = Field(
-        None, description="Beam and load to calibrate on; needed if a grid uses `calibrated`."
-    )
+    paper: PaperConfig | None = None
+    """Stated stiffnesses; needed if a grid uses `paper`."""
+
+    calibrated: CalibratedConfig | None = None
+    """Beam and load to calibrate on; needed if a grid uses `calibrated`."""
 
 
 class SensitivityConfig(Section):
     """Equally spaced stiffnesses of every sensitivity curve, as multiples of sqrt(3)/2 E t."""
 
-    start: Ratio = default("0.4", alias="from", description="Smallest stiffness.")
-    stop: Ratio = default("1.6", alias="to", description="Largest stiffness.")
-    points: Points = default("61", description="Number of stiffnesses, both ends included.")
+    start: Ratio = default("0.4", alias="from")
+    """Smallest stiffness."""
+
+    stop: Ratio = default("1.6", alias="to")
+    """Largest stiffness."""
+
+    points: Points = default("61")
+    """Number of stiffnesses, both ends included."""
 
     @model_validator(mode="after")
     def _ascending(self) -> Self:
@@ -259,28 +297,60 @@ class SensitivityConfig(Section):
 class MeshFileConfig(Section):
     """A mesh from a file that meshio reads. It fills its beam; its lower left corner may be anywhere."""
 
-    file: FileName = Field(description="The file, relative to the study's folder.")
-    beam: BeamName = Field(description="Beam that the mesh fills.")
-    mesh_size: Length = Field(description="Length of an edge, which names the mesh in grids and in the dataset.")
-    unit: Length = default("1 m", description="Unit of the coordinates in the file.")
+    file: FileName
+    """The file, relative to the study's folder."""
+
+    beam: BeamName
+    """Beam that the mesh fills."""
+
+    mesh_size: Length
+    """Length of an edge, which names the mesh in grids and in the dataset."""
+
+    unit: Length = default("1 m")
+    """Unit of the coordinates in the file."""
 
 
 class ExcludeConfig(Section):
     """Combinations that a grid leaves out: those with one of the given values of every given parameter."""
 
-    beam: Annotated[list[BeamName], OneOrMore()] | None = Field(None, description="Beams.")
-    mesh_type: Annotated[list[MeshType], OneOrMore()] | None = Field(None, description="Mesh types.")
-    mesh_size: Lengths | None = Field(None, description="Lengths of an edge.")
-    material: Annotated[list[MaterialName], OneOrMore()] | None = Field(None, description="Materials.")
-    load: Annotated[list[Load], OneOrMore()] | None = Field(None, description="Loads.")
-    force: Forces | None = Field(None, description="Magnitudes of the force.")
-    pressure: Stresses | None = Field(None, description="Pressures.")
-    thickness: Lengths | None = Field(None, description="Thicknesses.")
-    young_modulus: Stresses | None = Field(None, description="Young's moduli.")
-    poisson_ratio: PoissonRatios | None = Field(None, description="Poisson's ratios.")
-    stiffness_scale: Ratios | None = Field(None, description="Scales of the stiffness.")
-    definition: Annotated[list[DefinitionName], OneOrMore()] | None = Field(None, description="Definitions.")
-    kinematics: Annotated[list[Kinematics], OneOrMore()] | None = Field(None, description="Kinematics.")
+    beam: Annotated[list[BeamName], OneOrMore()] | None = None
+    """Beams."""
+
+    mesh_type: Annotated[list[MeshType], OneOrMore()] | None = None
+    """Mesh types."""
+
+    mesh_size: Lengths | None = None
+    """Lengths of an edge."""
+
+    material: Annotated[list[MaterialName], OneOrMore()] | None = None
+    """Materials."""
+
+    load: Annotated[list[Load], OneOrMore()] | None = None
+    """Loads."""
+
+    force: Forces | None = None
+    """Magnitudes of the force."""
+
+    pressure: Stresses | None = None
+    """Pressures."""
+
+    thickness: Lengths | None = None
+    """Thicknesses."""
+
+    young_modulus: Stresses | None = None
+    """Young's moduli."""
+
+    poisson_ratio: PoissonRatios | None = None
+    """Poisson's ratios."""
+
+    stiffness_scale: Ratios | None = None
+    """Scales of the stiffness."""
+
+    definition: Annotated[list[DefinitionName], OneOrMore()] | None = None
+    """Definitions."""
+
+    kinematics: Annotated[list[Kinematics], OneOrMore()] | None = None
+    """Kinematics."""
 
     @model_validator(mode="after")
     def _something(self) -> Self:
@@ -320,33 +390,42 @@ class GridConfig(Section):
 
     model_config = ConfigDict(json_schema_extra=_rows_may_give)
 
-    beam: Annotated[list[BeamName], OneOrMore(repeats=True)] = Field(description="Beams, by name.")
+    beam: Annotated[list[BeamName], OneOrMore(repeats=True)]
+    """Beams, by name."""
+
     mesh_type: Annotated[list[MeshType], OneOrMore(repeats=True)] = Field(
         description="A name under `mesh_files`, or one of these. "
         + " ".join(f"`{name}`: {one.summary}." for name, one in MESH_TYPES.items())
     )
-    mesh_size: Lengths = Field(description="Lengths of an edge, at most the smaller side of each beam.")
-    material: Annotated[list[MaterialName], OneOrMore(repeats=True)] = Field(description="Materials, by name.")
-    load: Annotated[list[Load], OneOrMore(repeats=True)] = Field(
-        description="With the left end clamped, `traction` and `compression` act along x on the right end, `bending` "
-        "along y. With the lower side clamped, `shear` acts along x on the upper side, which stays level, and "
-        "`pressure` and `follower-pressure` act down on it. All are spread evenly."
-    )
-    force: BeamForces | None = Field(
-        None,
-        description="Magnitude of the force, for all beams or for each; the load gives its sign. Several values make "
-        "the force a dimension. Otherwise a beam, material and load have the same force in all grids.",
-    )
-    pressure: Stresses | None = Field(
-        None,
-        description="Pressure on the upper side instead of `force`, for the loads `pressure` and `follower-pressure`.",
-    )
-    thickness: Lengths | None = Field(None, description="Thicknesses instead of the beams' own.")
-    young_modulus: Stresses | None = Field(None, description="Young's moduli instead of the materials' own.")
-    poisson_ratio: PoissonRatios | None = Field(None, description="Poisson's ratios instead of the materials' own.")
-    stiffness_scale: Ratios | None = Field(
-        None, description="Factors on all stiffnesses of a definition, including its energies."
-    )
+    mesh_size: Lengths
+    """Lengths of an edge, at most the smaller side of each beam."""
+
+    material: Annotated[list[MaterialName], OneOrMore(repeats=True)]
+    """Materials, by name."""
+
+    load: Annotated[list[Load], OneOrMore(repeats=True)]
+    """With the left end clamped, `traction` and `compression` act along x on the right end, `bending` along y. With
+    the lower side clamped, `shear` acts along x on the upper side, which stays level, and `pressure` and
+    `follower-pressure` act down on it. All are spread evenly."""
+
+    force: BeamForces | None = None
+    """Magnitude of the force, for all beams or for each; the load gives its sign. Several values make the force a
+    dimension. Otherwise a beam, material and load have the same force in all grids."""
+
+    pressure: Stresses | None = None
+    """Pressure on the upper side instead of `force`, for the loads `pressure` and `follower-pressure`."""
+
+    thickness: Lengths | None = None
+    """Thicknesses instead of the beams' own."""
+
+    young_modulus: Stresses | None = None
+    """Young's moduli instead of the materials' own."""
+
+    poisson_ratio: PoissonRatios | None = None
+    """Poisson's ratios instead of the materials' own."""
+
+    stiffness_scale: Ratios | None = None
+    """Factors on all stiffnesses of a definition, including its energies."""
 
     @model_validator(mode="after")
     def _one_force(self) -> Self:
@@ -361,22 +440,20 @@ class GridConfig(Section):
                 raise refuse(f"load '{load}' has no pressed side; give 'force', or loads under pressure", "pressure")
         return self
 
-    definition: Annotated[list[DefinitionName], OneOrMore(repeats=True)] = Field(
-        description="Rules for the stiffness of every spring; `springtune definitions` lists them."
-    )
-    kinematics: Annotated[list[Kinematics], OneOrMore(repeats=True)] = default(
-        "nonlinear",
-        description="`nonlinear`: springs keep their length law. `linear`: they keep their tangent at rest.",
-    )
+    definition: Annotated[list[DefinitionName], OneOrMore(repeats=True)]
+    """Rules for the stiffness of every spring; `springtune definitions` lists them."""
+
+    kinematics: Annotated[list[Kinematics], OneOrMore(repeats=True)] = default("nonlinear")
+    """`nonlinear`: springs keep their length law. `linear`: they keep their tangent at rest."""
+
     zip: Annotated[
         list[Annotated[list[Parameter], Field(min_length=2)]],
         BeforeValidator(_one_group, json_schema_input_type=list[Parameter] | list[list[Parameter]]),
         Words("a list of two parameters or more such as [mesh_size, force], or several such lists"),
-    ] = Field(
-        [],
-        description="Parameters whose values are paired instead of combined, such as `[mesh_size, force]`: the first "
-        "with the first, and so on. Give a list of such lists for several groups.",
-    )
+    ] = []
+    """Parameters whose values are paired instead of combined, such as `[mesh_size, force]`: the first with the
+    first, and so on. Give a list of such lists for several groups."""
+
     exclude: Annotated[
         list[ExcludeConfig],
         BeforeValidator(
@@ -384,18 +461,17 @@ class GridConfig(Section):
             json_schema_input_type=ExcludeConfig | list[ExcludeConfig],
         ),
         Words("keys and values to leave out such as {mesh_size: 1 mm}, or a list of several"),
-    ] = Field([], description="Combinations to leave out, such as `{mesh_type: free, mesh_size: 1 mm}`.")
-    rows: FileName | None = Field(
-        None,
-        description="CSV file of combinations, relative to the study's folder: one column for each parameter, named as "
-        "its key, and one row for each combination. Units stand beside the numbers (`5 mm`) or in the head "
-        "(`mesh_size [mm]`). Other parameters of the grid are combined with each row.",
-    )
-    sensitivity: Flag = default(
-        "true",
-        description="Whether each mesh, material, load and kinematics gets a sensitivity curve. "
-        "Curves that `calibrated` needs are always computed.",
-    )
+    ] = []
+    """Combinations to leave out, such as `{mesh_type: free, mesh_size: 1 mm}`."""
+
+    rows: FileName | None = None
+    """CSV file of combinations, relative to the study's folder: one column for each parameter, named as its key,
+    and one row for each combination. Units stand beside the numbers (`5 mm`) or in the head (`mesh_size [mm]`).
+    Other parameters of the grid are combined with each row."""
+
+    sensitivity: Flag = default("true")
+    """Whether each mesh, material, load and kinematics gets a sensitivity curve. Curves that `calibrated` needs are
+    always computed."""
 
     @property
     def groups(self) -> list[tuple[str, ...]]:
@@ -429,33 +505,34 @@ class GridConfig(Section):
 class StudyConfig(Section):
     """A study."""
 
-    title: Text = Field(description="Title of the study, one line.")
-    beams: Annotated[dict[str, BeamConfig], Named("beam")] = Field(
-        {}, description="Beams that grids and sections name."
-    )
-    materials: Annotated[dict[str, MaterialConfig], Named("material")] = Field(
-        {}, description="Materials that grids and sections name."
-    )
-    definitions: DefinitionsConfig = Field(
-        default_factory=DefinitionsConfig, description="Parameters of the definitions `paper` and `calibrated`."
-    )
-    sensitivity: SensitivityConfig = Field(
-        default_factory=SensitivityConfig, description="Range of stiffness of the sensitivity curves."
-    )
-    mesh_files: Annotated[dict[str, list[MeshFileConfig]], Named("mesh type")] | None = Field(
-        None, description="Your own mesh types: for each a list of files, one for each beam and mesh size."
-    )
+    title: Text
+    """Title of the study, one line."""
+
+    beams: Annotated[dict[str, BeamConfig], Named("beam")] = {}
+    """Beams that grids and sections name."""
+
+    materials: Annotated[dict[str, MaterialConfig], Named("material")] = {}
+    """Materials that grids and sections name."""
+
+    definitions: DefinitionsConfig = Field(default_factory=DefinitionsConfig)
+    """Parameters of the definitions `paper` and `calibrated`."""
+
+    sensitivity: SensitivityConfig = Field(default_factory=SensitivityConfig)
+    """Range of stiffness of the sensitivity curves."""
+
+    mesh_files: Annotated[dict[str, list[MeshFileConfig]], Named("mesh type")] | None = None
+    """Your own mesh types: for each a list of files, one for each beam and mesh size."""
+
     outputs: list[str] = Field([])
-    further_references: Annotated[list[FurtherReference], OneOrMore()] = Field(
-        [],
-        description="References at finite strain for every beam, material and load, besides the one of small strain. "
-        "The group `/finite_strain` has them and the networks' errors; under pressure `/block` has them, too. Each "
-        "takes seconds. Incompressible materials have none in plane strain. 'yeoh-plane-stress' needs a material with "
-        "a `uniaxial_test` and uses its fitted law.",
-    )
-    printed: FileName | None = Field(
-        None, description="CSV file of printed values to compare with, relative to the study's folder."
-    )
+    further_references: Annotated[list[FurtherReference], OneOrMore()] = []
+    """References at finite strain for every beam, material and load, besides the one of small strain. The group
+    `/finite_strain` has them and the networks' errors; under pressure `/block` has them, too. Each takes seconds.
+    Incompressible materials have none in plane strain. 'yeoh-plane-stress' needs a material with a `uniaxial_test`
+    and uses its fitted law."""
+
+    printed: FileName | None = None
+    """CSV file of printed values to compare with, relative to the study's folder."""
+
     grids: dict[str, GridConfig] = Field({})
 
     alone: ClassVar[dict[str, tuple[str, ...]]] = {}

@@ -34,35 +34,46 @@ Seconds = Annotated[float, number("a number of seconds above 0, such as 0.5", 0,
 class BenchmarkSceneConfig(Section):
     """A scene of the benchmark."""
 
-    beam: fields.BeamName = Field(description="Beam.")
-    material: fields.MaterialName = Field(description="Material, with a density.")
-    load: fields.Load = Field(description="`traction`, `compression`, `bending` or `pressure`.")
-    force: fields.Force = Field(description="Magnitude of the force.")
+    beam: fields.BeamName
+    """Beam."""
+
+    material: fields.MaterialName
+    """Material, with a density."""
+
+    load: fields.Load
+    """`traction`, `compression`, `bending` or `pressure`."""
+
+    force: fields.Force
+    """Magnitude of the force."""
 
 
 class BenchmarkConfig(Section):
     """Run time against error: every definition on every mesh type, and other approaches; one at a time."""
 
-    scenes: Annotated[dict[str, BenchmarkSceneConfig], Named("scene")] = Field(description="Scenes.")
-    definition: fields.DefinitionNames = Field(description="Definitions that derive a stiffness and need no reference.")
-    mesh_type: Annotated[list[fields.MeshType], OneOrMore()] = Field(description="Mesh types of the definitions.")
-    approach: Annotated[list[OtherApproach], OneOrMore()] = Field(
-        list(OTHER_APPROACHES),
-        description="Other approaches: finite elements, CalculiX where it is on the machine, and what the "
-        "paper names: tensor-mass, pre-computed responses, boundary elements, free-form deformation. All without.",
-    )
-    mesh_size: Annotated[list[fields.Length], OneOrMore()] = Field(description="Lengths of an edge.")
-    finest: fields.Length | None = Field(
-        None, description="The shortest of them that most approaches have; all without."
-    )
-    finest_of: dict[str, fields.Length] = Field(
-        default_factory=dict,
-        description="The shortest of them that an approach has, by its name, such as `delingette/structured: 0.5 mm`.",
-    )
-    most_seconds: Seconds = default(
-        "30",
-        description="Seconds after which an approach is not run on finer sizes, which are holes that say so.",
-    )
+    scenes: Annotated[dict[str, BenchmarkSceneConfig], Named("scene")]
+    """Scenes."""
+
+    definition: fields.DefinitionNames
+    """Definitions that derive a stiffness and need no reference."""
+
+    mesh_type: Annotated[list[fields.MeshType], OneOrMore()]
+    """Mesh types of the definitions."""
+
+    approach: Annotated[list[OtherApproach], OneOrMore()] = Field(list(OTHER_APPROACHES))
+    """Other approaches: finite elements, CalculiX where it is on the machine, and what the paper names:
+    tensor-mass, pre-computed responses, boundary elements, free-form deformation. All without."""
+
+    mesh_size: Annotated[list[fields.Length], OneOrMore()]
+    """Lengths of an edge."""
+
+    finest: fields.Length | None = None
+    """The shortest of them that most approaches have; all without."""
+
+    finest_of: dict[str, fields.Length] = Field(default_factory=dict)
+    """The shortest of them that an approach has, by its name, such as `delingette/structured: 0.5 mm`."""
+
+    most_seconds: Seconds = default("30")
+    """Seconds after which an approach is not run on finer sizes, which are holes that say so."""
 
 
 @dataclass(frozen=True)

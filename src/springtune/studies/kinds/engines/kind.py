@@ -4,8 +4,6 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Annotated
 
-from pydantic import Field
-
 from springtune.mechanics.integrators import PRECISIONS
 from springtune.mesh.types import MESH_TYPES
 from springtune.problem.geometry import Beam
@@ -43,48 +41,67 @@ SceneName = Annotated[str, Scalar(str, {"type": "string"}, "the name of a scene"
 class EngineSceneConfig(Section):
     """A scene that is run in engines."""
 
-    beam: fields.BeamName = Field(description="Beam.")
-    mesh_type: fields.MadeType = default("right", description="Generated mesh type.")
-    mesh_size: fields.Length = Field(description="Length of an edge.")
-    material: fields.MaterialName = Field(description="Material, with a density.")
-    load: fields.Load = Field(description="Load whose forces keep their direction.")
-    force: fields.Force = Field(description="Magnitude of the force.")
+    beam: fields.BeamName
+    """Beam."""
+
+    mesh_type: fields.MadeType = default("right")
+    """Generated mesh type."""
+
+    mesh_size: fields.Length
+    """Length of an edge."""
+
+    material: fields.MaterialName
+    """Material, with a density."""
+
+    load: fields.Load
+    """Load whose forces keep their direction."""
+
+    force: fields.Force
+    """Magnitude of the force."""
 
 
 class EngineRunsConfig(Section):
     """Runs in engines: every combination of the values listed, as in a grid."""
 
-    scene: Annotated[list[SceneName], OneOrMore()] | None = Field(None, description="Scenes; all of them without.")
-    definition: fields.DefinitionNames = Field(
-        description="Definitions that need no reference. One whose energy an engine lacks is a hole that says so."
-    )
-    engine: Annotated[list[EngineName], OneOrMore()] = Field(
-        description="Engines, keys of `springtune.ENGINES`. One that is not installed is a hole that says how it is."
-    )
-    iterations: Annotated[list[Count], OneOrMore()] = default(
-        "10", description="Iterations of the engine's solver in a step; 1 where an engine has none."
-    )
-    substeps: Annotated[list[Count], OneOrMore()] = default("1", description="Steps of a frame.")
-    dt: Annotated[list[FrameTime], OneOrMore()] = default("1/60 s", description="Time of a frame, such as 1/60 s.")
-    precision: Annotated[list[Precision], OneOrMore()] = default(
-        OWN_PRECISION, description="Floating-point numbers; `own` is what an engine has by itself."
-    )
-    stiffness_factor: fields.Ratios = default(
-        "1", description="Factors on what is typed; several give a sensitivity curve in the engine, and the right one."
-    )
+    scene: Annotated[list[SceneName], OneOrMore()] | None = None
+    """Scenes; all of them without."""
+
+    definition: fields.DefinitionNames
+    """Definitions that need no reference. One whose energy an engine lacks is a hole that says so."""
+
+    engine: Annotated[list[EngineName], OneOrMore()]
+    """Engines, keys of `springtune.ENGINES`. One that is not installed is a hole that says how it is."""
+
+    iterations: Annotated[list[Count], OneOrMore()] = default("10")
+    """Iterations of the engine's solver in a step; 1 where an engine has none."""
+
+    substeps: Annotated[list[Count], OneOrMore()] = default("1")
+    """Steps of a frame."""
+
+    dt: Annotated[list[FrameTime], OneOrMore()] = default("1/60 s")
+    """Time of a frame, such as 1/60 s."""
+
+    precision: Annotated[list[Precision], OneOrMore()] = default(OWN_PRECISION)
+    """Floating-point numbers; `own` is what an engine has by itself."""
+
+    stiffness_factor: fields.Ratios = default("1")
+    """Factors on what is typed; several give a sensitivity curve in the engine, and the right one."""
 
 
 class EnginesConfig(Section):
     """Scenes in the engines that people run, at the settings that they run them at."""
 
-    scenes: Annotated[dict[str, EngineSceneConfig], fields.Named("scene")] = Field(description="Scenes.")
-    runs: Annotated[dict[str, EngineRunsConfig], fields.Named("set of runs", for_files=False)] = Field(
-        description="Sets of runs."
-    )
-    frames: Count | None = Field(None, description="Most frames of a run; by default as many as its motion needs.")
-    tolerance: Distance | None = Field(
-        None, description="Distance from rest over its displacement that ends a run; 1e-7, in single precision 1e-4."
-    )
+    scenes: Annotated[dict[str, EngineSceneConfig], fields.Named("scene")]
+    """Scenes."""
+
+    runs: Annotated[dict[str, EngineRunsConfig], fields.Named("set of runs", for_files=False)]
+    """Sets of runs."""
+
+    frames: Count | None = None
+    """Most frames of a run; by default as many as its motion needs."""
+
+    tolerance: Distance | None = None
+    """Distance from rest over its displacement that ends a run; 1e-7, in single precision 1e-4."""
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,6 @@ from dataclasses import asdict, dataclass
 from itertools import product
 from typing import Annotated
 
-from pydantic import Field
-
 from springtune.problem.geometry import Strip, Trapezoid
 from springtune.problem.materials import Material
 from springtune.springs.base import DEFINITIONS
@@ -38,9 +36,14 @@ Loading = Annotated[str, one_of("loading", LOADINGS)]
 class TrapezoidConfig(Section):
     """A symmetric trapezoid that stands on its lower base."""
 
-    lower_base: fields.Length = Field(description="Length of the base on the floor.")
-    upper_base: fields.Length = Field(description="Length of the upper base.")
-    height: fields.Length = Field(description="Height.")
+    lower_base: fields.Length
+    """Length of the base on the floor."""
+
+    upper_base: fields.Length
+    """Length of the upper base."""
+
+    height: fields.Length
+    """Height."""
 
 
 class LayingConfig(Section):
@@ -50,22 +53,36 @@ class LayingConfig(Section):
     the band of its error.
     """
 
-    strip: fields.BeamName = Field(description="Beam that is the strip.")
-    trapezoid: TrapezoidConfig = Field(description="Trapezoid below the strip.")
-    material: fields.MaterialName = Field(description="Material of the strip.")
-    support: fields.MaterialName = Field(
-        description="Material of the trapezoid, which is rigid from 1e4 times the strip's modulus on."
-    )
-    definition: fields.DefinitionNames = Field(description="Definitions that derive a stiffness and need no reference.")
-    mesh_size: Annotated[list[fields.Length], OneOrMore()] = Field(description="Lengths of an edge.")
-    reference_size: fields.Length = default("1 mm", description="Length of an edge of the reference's finest mesh.")
-    loading: Annotated[list[Loading], OneOrMore()] = default(
-        "pressure",
-        description="`pressure`: on the upper face, following it; `gravity`: the same force as weight; `ends`: draws "
-        "the ends down to the floor.",
-    )
-    pressure: fields.Stress = Field(description="Pressure, or weight over the upper face.")
-    friction: Annotated[list[Friction], OneOrMore()] = default("0", description="Coulomb's coefficients of friction.")
+    strip: fields.BeamName
+    """Beam that is the strip."""
+
+    trapezoid: TrapezoidConfig
+    """Trapezoid below the strip."""
+
+    material: fields.MaterialName
+    """Material of the strip."""
+
+    support: fields.MaterialName
+    """Material of the trapezoid, which is rigid from 1e4 times the strip's modulus on."""
+
+    definition: fields.DefinitionNames
+    """Definitions that derive a stiffness and need no reference."""
+
+    mesh_size: Annotated[list[fields.Length], OneOrMore()]
+    """Lengths of an edge."""
+
+    reference_size: fields.Length = default("1 mm")
+    """Length of an edge of the reference's finest mesh."""
+
+    loading: Annotated[list[Loading], OneOrMore()] = default("pressure")
+    """`pressure`: on the upper face, following it; `gravity`: the same force as weight; `ends`: draws the ends down
+    to the floor."""
+
+    pressure: fields.Stress
+    """Pressure, or weight over the upper face."""
+
+    friction: Annotated[list[Friction], OneOrMore()] = default("0")
+    """Coulomb's coefficients of friction."""
 
 
 @dataclass(frozen=True)

@@ -26,8 +26,11 @@ class PatchConfig(Section):
     Its mesh is that of a beam of this extent: give the extent of the beam to compare with.
     """
 
-    length: Length = default("100 mm", description="Extent along x.")
-    height: Length = default("20 mm", description="Extent along y.")
+    length: Length = default("100 mm")
+    """Extent along x."""
+
+    height: Length = default("20 mm")
+    """Extent along y."""
 
 
 @dataclass(frozen=True)

@@ -106,28 +106,29 @@ class ParametersConfig(Section):
     deviation: 2 mm, to: 48 mm, distribution: normal}` is cut off at its ends.
     """
 
-    length: Annotated[Drawn, Distributed("length", "{from: 100 mm, to: 400 mm}")] = Field(
-        description="Extent along x, the direction of the load."
-    )
-    height: Annotated[Drawn, Distributed("height", "{from: 20 mm, to: 80 mm}")] = Field(description="Extent along y.")
-    thickness: Annotated[Drawn, Distributed("thickness", "{from: 1 mm, to: 2 mm}")] = default(
-        "1 mm", description="Extent out of the plane."
-    )
-    mesh_size: Annotated[Drawn, Distributed("mesh_size", "{from: 2 mm, to: 5 mm}")] | None = Field(
-        None, description="Length of an edge; at most the smaller side of any beam. Give this or `relative_mesh_size`."
-    )
-    relative_mesh_size: Annotated[Drawn, Distributed("relative_mesh_size", "{from: 0.1, to: 0.3}")] | None = Field(
-        None, description="Length of an edge over the height."
-    )
-    young_modulus: Annotated[Drawn, Distributed("young_modulus", "{from: 1 GPa, to: 210 GPa}")] = Field(
-        description="Young's modulus E."
-    )
-    poisson_ratio: Annotated[Drawn, Distributed("poisson_ratio", "{from: 0, to: 0.5}")] = Field(
-        description="Poisson's ratio nu."
-    )
-    force: Annotated[Drawn, Distributed("force", "{from: 1 kN, to: 20 kN}")] = Field(
-        description="Magnitude of the force. The load's name carries the sign."
-    )
+    length: Annotated[Drawn, Distributed("length", "{from: 100 mm, to: 400 mm}")]
+    """Extent along x, the direction of the load."""
+
+    height: Annotated[Drawn, Distributed("height", "{from: 20 mm, to: 80 mm}")]
+    """Extent along y."""
+
+    thickness: Annotated[Drawn, Distributed("thickness", "{from: 1 mm, to: 2 mm}")] = default("1 mm")
+    """Extent out of the plane."""
+
+    mesh_size: Annotated[Drawn, Distributed("mesh_size", "{from: 2 mm, to: 5 mm}")] | None = None
+    """Length of an edge; at most the smaller side of any beam. Give this or `relative_mesh_size`."""
+
+    relative_mesh_size: Annotated[Drawn, Distributed("relative_mesh_size", "{from: 0.1, to: 0.3}")] | None = None
+    """Length of an edge over the height."""
+
+    young_modulus: Annotated[Drawn, Distributed("young_modulus", "{from: 1 GPa, to: 210 GPa}")]
+    """Young's modulus E."""
+
+    poisson_ratio: Annotated[Drawn, Distributed("poisson_ratio", "{from: 0, to: 0.5}")]
+    """Poisson's ratio nu."""
+
+    force: Annotated[Drawn, Distributed("force", "{from: 1 kN, to: 20 kN}")]
+    """Magnitude of the force. The load's name carries the sign."""
 
 
 def _read_size(value: str) -> int:
@@ -156,22 +157,31 @@ class SamplesConfig(Section):
     A sample of twice the size keeps its scenes and adds as many. Stored scenes are not solved again.
     """
 
-    design: Design = Field(
-        SOBOL_INDICES,
-        description="`sobol-indices`: Saltelli's design for first- and total-order Sobol indices, with `size` x "
-        "(varied parameters + 2) points; `sobol`: scrambled Sobol points.",
-    )
-    size: Size = Field(description="Number of points: a power of two. For `sobol-indices`, of base samples.")
-    seed: Seed = default("1", description="Seed of the random numbers.")
-    mesh_type: fields.MadeType = default("structured", description="Generated mesh type.")
-    load: Annotated[list[fields.Load], OneOrMore()] = Field(description="Loads; each acts on every point's scene.")
-    definition: fields.DefinitionNames = Field(description="Definitions that derive a stiffness and need no reference.")
-    kinematics: fields.Kinematics = default(
-        "linear",
-        description="`linear` solves scenes once that differ in thickness, Young's modulus and force alone; "
-        "`nonlinear` solves each scene, which takes some ten times as long.",
-    )
-    parameters: ParametersConfig = Field(description="Parameters of the scenes.")
+    design: Design = Field(SOBOL_INDICES)
+    """`sobol-indices`: Saltelli's design for first- and total-order Sobol indices, with `size` x (varied parameters
+    + 2) points; `sobol`: scrambled Sobol points."""
+
+    size: Size
+    """Number of points: a power of two. For `sobol-indices`, of base samples."""
+
+    seed: Seed = default("1")
+    """Seed of the random numbers."""
+
+    mesh_type: fields.MadeType = default("structured")
+    """Generated mesh type."""
+
+    load: Annotated[list[fields.Load], OneOrMore()]
+    """Loads; each acts on every point's scene."""
+
+    definition: fields.DefinitionNames
+    """Definitions that derive a stiffness and need no reference."""
+
+    kinematics: fields.Kinematics = default("linear")
+    """`linear` solves scenes once that differ in thickness, Young's modulus and force alone; `nonlinear` solves
+    each scene, which takes some ten times as long."""
+
+    parameters: ParametersConfig
+    """Parameters of the scenes."""
 
     @property
     def loads(self) -> list[str]:

@@ -122,13 +122,15 @@ def _or_text(*texts: str) -> Any:
 class SegmentConfig(Section):
     """A side of an outline, from its corner to that of the next one."""
 
-    start: Place = Field(alias="from", description="Its corner.")
-    centre: Place | None = Field(
-        None,
-        description="Centre of the arc that it is, the way of less than half a turn: of a circle, or of an ellipse "
-        "with its axes along x and y where its ends are not equally far from it. It is straight without.",
-    )
-    group: GroupName | None = Field(None, description="Group that it belongs to, for supports, loads and quantities.")
+    start: Place = Field(alias="from")
+    """Its corner."""
+
+    centre: Place | None = None
+    """Centre of the arc that it is, the way of less than half a turn: of a circle, or of an ellipse with its axes
+    along x and y where its ends are not equally far from it. It is straight without."""
+
+    group: GroupName | None = None
+    """Group that it belongs to, for supports, loads and quantities."""
 
 
 SIDE_WORDS = Words("a list of sections; see below")
@@ -137,23 +139,27 @@ SIDE_WORDS = Words("a list of sections; see below")
 class CircleConfig(Section):
     """A circle."""
 
-    centre: Place = Field(description="Centre.")
-    radius: Length = Field(description="Radius.")
+    centre: Place
+    """Centre."""
+
+    radius: Length
+    """Radius."""
 
 
 class HoleConfig(Section):
     """A hole, or what fills it: a circle, or an outline."""
 
-    circle: CircleConfig | None = Field(None, description="Where it is round.")
-    outline: Annotated[list[SegmentConfig], SIDE_WORDS] | None = Field(
-        None, description="Where it is not: a round of sides, in either sense."
-    )
-    group: GroupName | None = Field(
-        None, description="Group that the circle belongs to; sides of an outline have their own."
-    )
-    part: PartName | None = Field(
-        None, description="Part of the body that fills it, of a material under `parts`; nothing fills it without."
-    )
+    circle: CircleConfig | None = None
+    """Where it is round."""
+
+    outline: Annotated[list[SegmentConfig], SIDE_WORDS] | None = None
+    """Where it is not: a round of sides, in either sense."""
+
+    group: GroupName | None = None
+    """Group that the circle belongs to; sides of an outline have their own."""
+
+    part: PartName | None = None
+    """Part of the body that fills it, of a material under `parts`; nothing fills it without."""
 
     @model_validator(mode="after")
     def _one_form(self) -> Self:
@@ -170,8 +176,11 @@ class SupportConfig(Section):
 
     model_config = {"json_schema_extra": _or_text("fixed")}
 
-    x: Displacement | None = Field(None, description="Along x; free without.")
-    y: Displacement | None = Field(None, description="Along y; free without.")
+    x: Displacement | None = None
+    """Along x; free without."""
+
+    y: Displacement | None = None
+    """Along y; free without."""
 
     @model_validator(mode="before")
     @classmethod
@@ -194,8 +203,11 @@ class PressureConfig(Section):
 
     model_config = {"json_schema_extra": _or_text()}
 
-    pressure: PressureValue = Field(description="Pressure.")
-    follower: Flag = default("false", description="Whether it turns and grows with the sides, in nonlinear kinematics.")
+    pressure: PressureValue
+    """Pressure."""
+
+    follower: Flag = default("false")
+    """Whether it turns and grows with the sides, in nonlinear kinematics."""
 
     @model_validator(mode="before")
     @classmethod
@@ -208,19 +220,32 @@ class QuantityConfig(Section):
 
     model_config = {"json_schema_extra": _or_text("area", "energy")}
 
-    displacement: Axis | None = Field(
-        None, description="Displacement along it: `at` a point, or the mean one `of` a group of sides, by length."
-    )
-    stress: StressComponent | None = Field(None, description="Stress `at` a point, recovered from the cells around it.")
-    reaction: Axis | None = Field(None, description="Force of the supports `of` a group along it.")
-    area: Flag | None = Field(None, description="Growth of the area of the body; `area` alone says so.")
-    energy: Flag | None = Field(None, description="Strain energy; `energy` alone says so.")
-    at: PointName | None = Field(None, description="Point.")
-    of: GroupName | None = Field(None, description="Group of sides.")
-    expected: Anything | None = Field(
-        None, description="Value that others give, with its unit: the dataset has errors against it, too."
-    )
-    source: Text | None = Field(None, description="Who gives it.")
+    displacement: Axis | None = None
+    """Displacement along it: `at` a point, or the mean one `of` a group of sides, by length."""
+
+    stress: StressComponent | None = None
+    """Stress `at` a point, recovered from the cells around it."""
+
+    reaction: Axis | None = None
+    """Force of the supports `of` a group along it."""
+
+    area: Flag | None = None
+    """Growth of the area of the body; `area` alone says so."""
+
+    energy: Flag | None = None
+    """Strain energy; `energy` alone says so."""
+
+    at: PointName | None = None
+    """Point."""
+
+    of: GroupName | None = None
+    """Group of sides."""
+
+    expected: Anything | None = None
+    """Value that others give, with its unit: the dataset has errors against it, too."""
+
+    source: Text | None = None
+    """Who gives it."""
 
     @model_validator(mode="before")
     @classmethod
@@ -277,28 +302,30 @@ class QuantityConfig(Section):
 class ShapeLoadConfig(Section):
     """What is done to a shape, and what is asked of it."""
 
-    supports: Annotated[dict[str, SupportConfig], Named("support", for_files=False)] = Field(
-        description="What is held, by group or point: `fixed`, or displacements such as `{y: 0 mm}`."
-    )
-    forces: Annotated[dict[str, ForceVector], Words("forces such as [10 kN, 0], by group or point")] = Field(
-        {}, description="Forces along x and y, by group or point: of a group the total one, spread evenly by length."
-    )
-    pressures: Annotated[dict[str, PressureConfig], Words("a stress, or a section, by group; see below")] = Field(
-        {}, description="Pressures, by group; positive towards the body."
-    )
-    gravity: Gravity = default(
-        ["0", "0"], description="Acceleration along x and y, such as `[0, -9.81 m/s^2]`; needs densities."
-    )
-    quantities: Annotated[dict[str, QuantityConfig], Named("quantity")] = Field(
-        description="Quantities of interest, by name; the first one stands for all where one is wanted."
-    )
+    supports: Annotated[dict[str, SupportConfig], Named("support", for_files=False)]
+    """What is held, by group or point: `fixed`, or displacements such as `{y: 0 mm}`."""
+
+    forces: Annotated[dict[str, ForceVector], Words("forces such as [10 kN, 0], by group or point")] = {}
+    """Forces along x and y, by group or point: of a group the total one, spread evenly by length."""
+
+    pressures: Annotated[dict[str, PressureConfig], Words("a stress, or a section, by group; see below")] = {}
+    """Pressures, by group; positive towards the body."""
+
+    gravity: Gravity = default(["0", "0"])
+    """Acceleration along x and y, such as `[0, -9.81 m/s^2]`; needs densities."""
+
+    quantities: Annotated[dict[str, QuantityConfig], Named("quantity")]
+    """Quantities of interest, by name; the first one stands for all where one is wanted."""
 
 
 class ShapeFileConfig(Section):
     """A mesh file of a shape that has several."""
 
-    file: FileName = Field(description="The file, relative to the study's folder.")
-    mesh_size: Length = Field(description="Length of an edge, which names the mesh in the dataset.")
+    file: FileName
+    """The file, relative to the study's folder."""
+
+    mesh_size: Length
+    """Length of an edge, which names the mesh in the dataset."""
 
 
 class OneFileOrMore(Words, Wrapped):
@@ -325,30 +352,35 @@ SHAPE_FILES = OneFileOrMore("the path of a file, or a list such as [{file: fine.
 class ShapeConfig(Section):
     """A body of any outline, or that of a mesh file, with named groups of its sides and points."""
 
-    thickness: Length = default("1 mm", description="Extent out of the plane.")
-    outline: Annotated[list[SegmentConfig], SIDE_WORDS] | None = Field(
-        None, description="Round of its sides, counter-clockwise."
-    )
-    holes: list[HoleConfig] = Field([], description="Holes, and parts of other materials.")
-    file: Annotated[list[ShapeFileConfig], SHAPE_FILES] | None = Field(
-        None,
-        description="Mesh file in the place of an outline, of a format that meshio reads, its path relative to the "
-        "study's folder; its groups are the shape's. Or a list of several with their mesh sizes: the finest one is the "
-        "geometry of the reference.",
-    )
-    unit: Length = default("1 m", description="Unit of the coordinates in the file.")
-    points: Annotated[dict[str, Place], Words("places such as [48 mm, 52 mm], by name")] = Field(
-        {}, description="Named points of an outline or inside of it: particles of every mesh."
-    )
-    refined: Annotated[dict[str, Ratio], Words("numbers above 0, by group, point or part")] = Field(
-        {},
-        description="Where the mesh is finer: mesh size over that of the rest, by group, point or part, such as "
-        "`{hole: 0.25}`; from there on it grows.",
-    )
-    parts: Annotated[dict[str, MaterialName], Words("names of materials, by part")] = Field(
-        {}, description="Materials of the parts, by name; the rest is of the grid's material."
-    )
-    loads: Annotated[dict[str, ShapeLoadConfig], Named("load")] = Field(description="Loads, by name.")
+    thickness: Length = default("1 mm")
+    """Extent out of the plane."""
+
+    outline: Annotated[list[SegmentConfig], SIDE_WORDS] | None = None
+    """Round of its sides, counter-clockwise."""
+
+    holes: list[HoleConfig] = []
+    """Holes, and parts of other materials."""
+
+    file: Annotated[list[ShapeFileConfig], SHAPE_FILES] | None = None
+    """Mesh file in the place of an outline, of a format that meshio reads, its path relative to the study's folder;
+    its groups are the shape's. Or a list of several with their mesh sizes: the finest one is the geometry of the
+    reference."""
+
+    unit: Length = default("1 m")
+    """Unit of the coordinates in the file."""
+
+    points: Annotated[dict[str, Place], Words("places such as [48 mm, 52 mm], by name")] = {}
+    """Named points of an outline or inside of it: particles of every mesh."""
+
+    refined: Annotated[dict[str, Ratio], Words("numbers above 0, by group, point or part")] = {}
+    """Where the mesh is finer: mesh size over that of the rest, by group, point or part, such as `{hole: 0.25}`;
+    from there on it grows."""
+
+    parts: Annotated[dict[str, MaterialName], Words("names of materials, by part")] = {}
+    """Materials of the parts, by name; the rest is of the grid's material."""
+
+    loads: Annotated[dict[str, ShapeLoadConfig], Named("load")]
+    """Loads, by name."""
 
     @model_validator(mode="after")
     def _one_geometry(self) -> Self:
@@ -369,30 +401,30 @@ class ShapeGridConfig(Section):
     A single value stands for a list of one. A scene that two grids ask for is solved once.
     """
 
-    shape: Annotated[list[ShapeName], OneOrMore()] = Field(description="Shapes, by name.")
-    mesh_size: Lengths | None = Field(
-        None, description="Lengths of an edge of triangles; not of shapes from files, whose mesh is that of the file."
-    )
-    material: Annotated[list[MaterialName], OneOrMore()] = Field(description="Materials, by name.")
-    load: Annotated[list[LoadName], OneOrMore()] | None = Field(
-        None, description="Loads of the shapes, by name; all of each shape without."
-    )
-    definition: Annotated[list[DefinitionName], OneOrMore()] = Field(
-        description="Definitions that derive a stiffness on triangles and need no reference."
-    )
-    kinematics: Annotated[list[Kinematics], OneOrMore()] = default(
-        "nonlinear", description="Whether springs keep their length law or their tangent at rest."
-    )
-    reference: Flag = default(
-        "true",
-        description="Whether there is a converged reference; else errors are those against `expected` values alone.",
-    )
-    finite_strain: Flag = default(
-        "false",
-        description="Whether nonlinear scenes of 'neo-hooke', 'yeoh' and 'delingette' are also compared with a "
-        "reference of their law at finite strain. The group `/shapes_finite_strain` has it and the errors. Each takes "
-        "seconds.",
-    )
+    shape: Annotated[list[ShapeName], OneOrMore()]
+    """Shapes, by name."""
+
+    mesh_size: Lengths | None = None
+    """Lengths of an edge of triangles; not of shapes from files, whose mesh is that of the file."""
+
+    material: Annotated[list[MaterialName], OneOrMore()]
+    """Materials, by name."""
+
+    load: Annotated[list[LoadName], OneOrMore()] | None = None
+    """Loads of the shapes, by name; all of each shape without."""
+
+    definition: Annotated[list[DefinitionName], OneOrMore()]
+    """Definitions that derive a stiffness on triangles and need no reference."""
+
+    kinematics: Annotated[list[Kinematics], OneOrMore()] = default("nonlinear")
+    """Whether springs keep their length law or their tangent at rest."""
+
+    reference: Flag = default("true")
+    """Whether there is a converged reference; else errors are those against `expected` values alone."""
+
+    finite_strain: Flag = default("false")
+    """Whether nonlinear scenes of 'neo-hooke', 'yeoh' and 'delingette' are also compared with a reference of their
+    law at finite strain. The group `/shapes_finite_strain` has it and the errors. Each takes seconds."""
 
 
 NAMED_SHAPES = Annotated[dict[str, ShapeConfig], Named("shape")] | None

@@ -22,17 +22,25 @@ ExperimentName = Annotated[str, one_of("experiment", EXPERIMENTS)]
 class StabilityConfig(Section):
     """Experiments on numerical stability: a beam in traction, in motion and under stress far beyond the study's own."""
 
-    beam: fields.BeamName = Field(description="Beam.")
-    material: fields.MaterialName = Field(description="Material, with a density.")
-    force: fields.Force = Field(description="Traction on the right end.")
-    definition: fields.DefinitionNames = Field(
-        description="Definitions that derive a stiffness and need no reference; the first one stands for all where an "
-        "experiment is not about definitions."
-    )
-    mesh_type: fields.MeshType = default("structured", description="Mesh type of triangles.")
-    mesh_size: Annotated[list[fields.Length], OneOrMore()] = Field(
-        description="Lengths of an edge; most experiments take the coarsest."
-    )
+    beam: fields.BeamName
+    """Beam."""
+
+    material: fields.MaterialName
+    """Material, with a density."""
+
+    force: fields.Force
+    """Traction on the right end."""
+
+    definition: fields.DefinitionNames
+    """Definitions that derive a stiffness and need no reference; the first one stands for all where an experiment
+    is not about definitions."""
+
+    mesh_type: fields.MeshType = default("structured")
+    """Mesh type of triangles."""
+
+    mesh_size: Annotated[list[fields.Length], OneOrMore()]
+    """Lengths of an edge; most experiments take the coarsest."""
+
     experiment: Annotated[list[ExperimentName], OneOrMore()] = Field(
         list(EXPERIMENTS),
         description="; ".join(f"`{name}`: {text}" for name, text in EXPERIMENTS.items()) + ". All of them without.",
