@@ -129,7 +129,7 @@ class Stage:
     tasks: Callable[[Study], Iterable[Any]] | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Kind:
     """A study kind.
 

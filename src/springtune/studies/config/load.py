@@ -1,6 +1,5 @@
 """Load a study from YAML: validate it, expand it, remove duplicates and sort."""
 
-from collections.abc import Sequence
 from pathlib import Path
 
 from springtune.registry import NAME, NAME_RULE
@@ -14,7 +13,7 @@ from .model import Study
 from .sections import study_model
 
 
-def load(path: str | Path, kinds: Sequence[Kind], beside: Path | None = None) -> Study:
+def load(path: str | Path, kinds: tuple[Kind, ...], beside: Path | None = None) -> Study:
     """Read, validate and expand a study."""
     path, file = Path(path), str(path)
     beside = beside or path.parent
@@ -22,7 +21,7 @@ def load(path: str | Path, kinds: Sequence[Kind], beside: Path | None = None) ->
     if not NAME.fullmatch(path.stem):
         raise StudyError(f"{file}: '{path.stem}' cannot name a study; rename the file: {NAME_RULE}")
     problems = Problems(file, lines, content, beside)
-    model = study_model(kinds, content if isinstance(content, dict) else ())
+    model = study_model(kinds)
     if content is None:
         problems.stop_at((), f"the file is empty; give the keys {', '.join(model.model_fields)}")
     add_rows(content, problems)

@@ -1,57 +1,20 @@
 """Models of the sections of a study; the JSON schema and the tables of config/README.md are generated from them."""
 
 import json
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
-from types import NoneType
-from typing import Annotated, Any, ClassVar, NamedTuple, Self
+from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import BeforeValidator, ConfigDict, Field, create_model, model_validator
 
 from springtune.mesh.types import MESH_TYPES
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import INCOMPRESSIBLE, MOST_TERMS, AnisotropicMaterial, AnyMaterial, Material
-from springtune.registry import imported
 
-from .fields import (
-    Angle,
-    BeamForces,
-    BeamName,
-    DefinitionName,
-    Density,
-    FileName,
-    Flag,
-    Forces,
-    FurtherReference,
-    Kinematics,
-    Length,
-    Lengths,
-    Load,
-    MaterialName,
-    MeshType,
-    Named,
-    OneOrMore,
-    OrthotropicRatio,
-    Plane,
-    Points,
-    PoissonRatio,
-    PoissonRatios,
-    Ratio,
-    Ratios,
-    Section,
-    SignedStress,
-    Stiffness,
-    Stress,
-    Stresses,
-    Terms,
-    Text,
-    Words,
-    default,
-    expected_value,
-    once,
-    one_of,
-)
-from .kind import Kind, Output, kinds
+from . import fields
+from .fields import Named, OneOrMore, Section, Words, default, expected_value, once, one_of
+from .kind import Kind, kinds
 from .messages import refuse, show
 
 MOST_PARTS = 1000
@@ -63,35 +26,35 @@ PLAUSIBLE = 20.0
 class BeamConfig(Section):
     """A rectangular sheet, its length along x."""
 
-    length: Length
+    length: fields.Length
     """Extent along x, the direction of the load."""
 
-    height: Length
+    height: fields.Length
     """Extent along y."""
 
-    thickness: Length = default("1 mm")
+    thickness: fields.Length = default("1 mm")
     """Extent out of the plane."""
 
 
 class StiffnessConfig(Section):
     """Stiffness of a sheet in plane stress, in the order xx, yy and xy with the shear angle; positive definite."""
 
-    C11: Stress
+    C11: fields.Stress
     """Stress along x for a strain along x."""
 
-    C22: Stress
+    C22: fields.Stress
     """Stress along y for a strain along y."""
 
-    C12: SignedStress
+    C12: fields.SignedStress
     """Stress along x for a strain along y."""
 
-    C66: Stress
+    C66: fields.Stress
     """Shear stress for a shear angle."""
 
-    C16: SignedStress = default("0 Pa")
+    C16: fields.SignedStress = default("0 Pa")
     """Shear stress for a strain along x."""
 
-    C26: SignedStress = default("0 Pa")
+    C26: fields.SignedStress = default("0 Pa")
     """Shear stress for a strain along y."""
 
 
@@ -122,50 +85,50 @@ class MaterialConfig(Section):
 
     model_config = ConfigDict(json_schema_extra=_one_form)
 
-    young_modulus: Stress | None = None
+    young_modulus: fields.Stress | None = None
     """Young's modulus E."""
 
-    poisson_ratio: PoissonRatio | None = None
+    poisson_ratio: fields.PoissonRatio | None = None
     """Poisson's ratio nu; 0.5 is allowed in plane stress."""
 
-    plane: Plane | None = None
+    plane: fields.Plane | None = None
     """'stress' of a thin sheet, the default, or 'strain' of a slice of a long body; E and nu are those of the
     material in three dimensions in both. Isotropic materials alone."""
 
-    young_modulus_x: Stress | None = None
+    young_modulus_x: fields.Stress | None = None
     """Young's modulus along the fibres."""
 
-    young_modulus_y: Stress | None = None
+    young_modulus_y: fields.Stress | None = None
     """Young's modulus across the fibres."""
 
-    poisson_ratio_xy: OrthotropicRatio | None = None
+    poisson_ratio_xy: fields.OrthotropicRatio | None = None
     """Contraction across the fibres over extension along them, when pulled along them."""
 
-    shear_modulus: Stress | None = None
+    shear_modulus: fields.Stress | None = None
     """Shear modulus along and across the fibres."""
 
-    angle: Annotated[list[Angle], OneOrMore(repeats=True)] | None = None
+    angle: Annotated[list[fields.Angle], OneOrMore(repeats=True)] | None = None
     """Angle of the fibres from the x axis, counter-clockwise; 0 by default. Several angles are the plies of a
     laminate of equal thicknesses and symmetric stacking."""
 
     stiffness: StiffnessConfig | None = None
     """Elastic constants in plane stress."""
 
-    uniaxial_test: FileName | None = None
+    uniaxial_test: fields.FileName | None = None
     """CSV file of a uniaxial test of rubber, relative to the study's folder: stretch or strain and nominal stress
     under a head such as `stretch,nominal stress [MPa]` or `strain [%],nominal stress [MPa]`. Definition `yeoh` uses
     the fitted law."""
 
-    terms: Terms | None = None
+    terms: fields.Terms | None = None
     """Number of terms of the fitted law; 3 by default, 1 is the neo-Hookean law."""
 
-    equibiaxial_test: FileName | None = None
+    equibiaxial_test: fields.FileName | None = None
     """CSV file of an equibiaxial test, to compare the fitted law with."""
 
-    pure_shear_test: FileName | None = None
+    pure_shear_test: fields.FileName | None = None
     """CSV file of a pure-shear test, to compare the fitted law with."""
 
-    density: Density | None = None
+    density: fields.Density | None = None
     """Density rho; needed for dynamics and gravity, not for statics."""
 
     @model_validator(mode="after")
@@ -224,13 +187,13 @@ class MaterialConfig(Section):
 class StatedStiffness(Section):
     """A stated stiffness of one mesh type and material."""
 
-    mesh_type: MeshType
+    mesh_type: fields.MeshType
     """Mesh type."""
 
-    material: MaterialName
+    material: fields.MaterialName
     """Material."""
 
-    value: Stiffness = Field(
+    value: fields.Stiffness = Field(
         description=f"Stiffness of every spring; refused beyond a factor of {PLAUSIBLE:g} from sqrt(3)/2 E t."
     )
 
@@ -258,10 +221,10 @@ class CalibratedConfig(Section):
     sensitivity curves of one beam and load, over all mesh sizes.
     """
 
-    beam: BeamName
+    beam: fields.BeamName
     """Beam whose curves calibrate."""
 
-    load: Load
+    load: fields.Load
     """Load whose curves calibrate."""
 
 
@@ -278,13 +241,13 @@ class DefinitionsConfig(Section):
 class SensitivityConfig(Section):
     """Equally spaced stiffnesses of every sensitivity curve, as multiples of sqrt(3)/2 E t."""
 
-    start: Ratio = default("0.4", alias="from")
+    start: fields.Ratio = default("0.4", alias="from")
     """Smallest stiffness."""
 
-    stop: Ratio = default("1.6", alias="to")
+    stop: fields.Ratio = default("1.6", alias="to")
     """Largest stiffness."""
 
-    points: Points = default("61")
+    points: fields.Points = default("61")
     """Number of stiffnesses, both ends included."""
 
     @model_validator(mode="after")
@@ -297,59 +260,59 @@ class SensitivityConfig(Section):
 class MeshFileConfig(Section):
     """A mesh from a file that meshio reads. It fills its beam; its lower left corner may be anywhere."""
 
-    file: FileName
+    file: fields.FileName
     """The file, relative to the study's folder."""
 
-    beam: BeamName
+    beam: fields.BeamName
     """Beam that the mesh fills."""
 
-    mesh_size: Length
+    mesh_size: fields.Length
     """Length of an edge, which names the mesh in grids and in the dataset."""
 
-    unit: Length = default("1 m")
+    unit: fields.Length = default("1 m")
     """Unit of the coordinates in the file."""
 
 
 class ExcludeConfig(Section):
     """Combinations that a grid leaves out: those with one of the given values of every given parameter."""
 
-    beam: Annotated[list[BeamName], OneOrMore()] | None = None
+    beam: Annotated[list[fields.BeamName], OneOrMore()] | None = None
     """Beams."""
 
-    mesh_type: Annotated[list[MeshType], OneOrMore()] | None = None
+    mesh_type: Annotated[list[fields.MeshType], OneOrMore()] | None = None
     """Mesh types."""
 
-    mesh_size: Lengths | None = None
+    mesh_size: fields.Lengths | None = None
     """Lengths of an edge."""
 
-    material: Annotated[list[MaterialName], OneOrMore()] | None = None
+    material: Annotated[list[fields.MaterialName], OneOrMore()] | None = None
     """Materials."""
 
-    load: Annotated[list[Load], OneOrMore()] | None = None
+    load: Annotated[list[fields.Load], OneOrMore()] | None = None
     """Loads."""
 
-    force: Forces | None = None
+    force: fields.Forces | None = None
     """Magnitudes of the force."""
 
-    pressure: Stresses | None = None
+    pressure: fields.Stresses | None = None
     """Pressures."""
 
-    thickness: Lengths | None = None
+    thickness: fields.Lengths | None = None
     """Thicknesses."""
 
-    young_modulus: Stresses | None = None
+    young_modulus: fields.Stresses | None = None
     """Young's moduli."""
 
-    poisson_ratio: PoissonRatios | None = None
+    poisson_ratio: fields.PoissonRatios | None = None
     """Poisson's ratios."""
 
-    stiffness_scale: Ratios | None = None
+    stiffness_scale: fields.Ratios | None = None
     """Scales of the stiffness."""
 
-    definition: Annotated[list[DefinitionName], OneOrMore()] | None = None
+    definition: Annotated[list[fields.DefinitionName], OneOrMore()] | None = None
     """Definitions."""
 
-    kinematics: Annotated[list[Kinematics], OneOrMore()] | None = None
+    kinematics: Annotated[list[fields.Kinematics], OneOrMore()] | None = None
     """Kinematics."""
 
     @model_validator(mode="after")
@@ -390,41 +353,41 @@ class GridConfig(Section):
 
     model_config = ConfigDict(json_schema_extra=_rows_may_give)
 
-    beam: Annotated[list[BeamName], OneOrMore(repeats=True)]
+    beam: Annotated[list[fields.BeamName], OneOrMore(repeats=True)]
     """Beams, by name."""
 
-    mesh_type: Annotated[list[MeshType], OneOrMore(repeats=True)] = Field(
+    mesh_type: Annotated[list[fields.MeshType], OneOrMore(repeats=True)] = Field(
         description="A name under `mesh_files`, or one of these. "
         + " ".join(f"`{name}`: {one.summary}." for name, one in MESH_TYPES.items())
     )
-    mesh_size: Lengths
+    mesh_size: fields.Lengths
     """Lengths of an edge, at most the smaller side of each beam."""
 
-    material: Annotated[list[MaterialName], OneOrMore(repeats=True)]
+    material: Annotated[list[fields.MaterialName], OneOrMore(repeats=True)]
     """Materials, by name."""
 
-    load: Annotated[list[Load], OneOrMore(repeats=True)]
+    load: Annotated[list[fields.Load], OneOrMore(repeats=True)]
     """With the left end clamped, `traction` and `compression` act along x on the right end, `bending` along y. With
     the lower side clamped, `shear` acts along x on the upper side, which stays level, and `pressure` and
     `follower-pressure` act down on it. All are spread evenly."""
 
-    force: BeamForces | None = None
+    force: fields.BeamForces | None = None
     """Magnitude of the force, for all beams or for each; the load gives its sign. Several values make the force a
     dimension. Otherwise a beam, material and load have the same force in all grids."""
 
-    pressure: Stresses | None = None
+    pressure: fields.Stresses | None = None
     """Pressure on the upper side instead of `force`, for the loads `pressure` and `follower-pressure`."""
 
-    thickness: Lengths | None = None
+    thickness: fields.Lengths | None = None
     """Thicknesses instead of the beams' own."""
 
-    young_modulus: Stresses | None = None
+    young_modulus: fields.Stresses | None = None
     """Young's moduli instead of the materials' own."""
 
-    poisson_ratio: PoissonRatios | None = None
+    poisson_ratio: fields.PoissonRatios | None = None
     """Poisson's ratios instead of the materials' own."""
 
-    stiffness_scale: Ratios | None = None
+    stiffness_scale: fields.Ratios | None = None
     """Factors on all stiffnesses of a definition, including its energies."""
 
     @model_validator(mode="after")
@@ -440,10 +403,10 @@ class GridConfig(Section):
                 raise refuse(f"load '{load}' has no pressed side; give 'force', or loads under pressure", "pressure")
         return self
 
-    definition: Annotated[list[DefinitionName], OneOrMore(repeats=True)]
+    definition: Annotated[list[fields.DefinitionName], OneOrMore(repeats=True)]
     """Rules for the stiffness of every spring; `springtune definitions` lists them."""
 
-    kinematics: Annotated[list[Kinematics], OneOrMore(repeats=True)] = default("nonlinear")
+    kinematics: Annotated[list[fields.Kinematics], OneOrMore(repeats=True)] = default("nonlinear")
     """`nonlinear`: springs keep their length law. `linear`: they keep their tangent at rest."""
 
     zip: Annotated[
@@ -464,12 +427,12 @@ class GridConfig(Section):
     ] = []
     """Combinations to leave out, such as `{mesh_type: free, mesh_size: 1 mm}`."""
 
-    rows: FileName | None = None
+    rows: fields.FileName | None = None
     """CSV file of combinations, relative to the study's folder: one column for each parameter, named as its key,
     and one row for each combination. Units stand beside the numbers (`5 mm`) or in the head (`mesh_size [mm]`).
     Other parameters of the grid are combined with each row."""
 
-    sensitivity: Flag = default("true")
+    sensitivity: fields.Flag = default("true")
     """Whether each mesh, material, load and kinematics gets a sensitivity curve. Curves that `calibrated` needs are
     always computed."""
 
@@ -505,7 +468,7 @@ class GridConfig(Section):
 class StudyConfig(Section):
     """A study."""
 
-    title: Text
+    title: fields.Text
     """Title of the study, one line."""
 
     beams: Annotated[dict[str, BeamConfig], Named("beam")] = {}
@@ -524,13 +487,13 @@ class StudyConfig(Section):
     """Your own mesh types: for each a list of files, one for each beam and mesh size."""
 
     outputs: list[str] = Field([])
-    further_references: Annotated[list[FurtherReference], OneOrMore()] = []
+    further_references: Annotated[list[fields.FurtherReference], OneOrMore()] = []
     """References at finite strain for every beam, material and load, besides the one of small strain. The group
     `/finite_strain` has them and the networks' errors; under pressure `/block` has them, too. Each takes seconds.
     Incompressible materials have none in plane strain. 'yeoh-plane-stress' needs a material with a `uniaxial_test`
     and uses its fitted law."""
 
-    printed: FileName | None = None
+    printed: fields.FileName | None = None
     """CSV file of printed values to compare with, relative to the study's folder."""
 
     grids: dict[str, GridConfig] = Field({})
@@ -554,53 +517,32 @@ class StudyConfig(Section):
 GRIDS_NEED = ("beams", "materials")
 
 
-class Later(NamedTuple):
-    """Type of a field, imported only for studies that use the field: each section costs milliseconds."""
-
-    module: str
-    name: str
-
-    def type(self) -> Any:
-        """The type."""
-        return imported(f"{self.module}:{self.name}")
-
-
-def study_model(kinds: Sequence[Kind], given: Container[object] | None = None) -> type[StudyConfig]:
+@cache
+def study_model(kinds: tuple[Kind, ...]) -> type[StudyConfig]:
     """Model of a study: `StudyConfig` and the keys that study kinds add to it and to its grids."""
-    grid_fields: dict[str, Any] = {}
-    study_fields: dict[str, Any] = {}
-    outputs: list[Output] = []
-    for kind in kinds:
-        grid_fields |= kind.grid_fields
-        for name, (annotation, field) in kind.study_fields.items():
-            absent = given is not None and name not in given and field.default is None
-            if isinstance(annotation, Later) and not absent:
-                annotation = annotation.type()
-            study_fields[name] = NoneType if absent else annotation, field
-        outputs += kind.outputs
-    grid = create_model("GridConfig", __base__=GridConfig, **grid_fields)
-    grid.__doc__ = GridConfig.__doc__
-    meanings = "; ".join(f"`{output.name}`: {output.meaning}" for output in outputs)
-    output_name = Annotated[str, one_of("output", [output.name for output in outputs])]
-    study_fields["outputs"] = (
-        Annotated[list[output_name], OneOrMore()],
-        Field(
-            [output.name for output in outputs if output.usual],
-            description=f"Figures and tables of the dataset: {meanings}. "
-            "Figures of scenes show nonlinear kinematics if a grid has them, otherwise linear ones.",
-        ),
-    )
+    made = [output for kind in kinds for output in kind.outputs]
+    own = {name: field for kind in kinds for name, field in kind.grid_fields.items()}
+    grid = create_model("GridConfig", __base__=GridConfig, __doc__=GridConfig.__doc__, **own)
+    added: dict[str, Any] = {name: field for kind in kinds for name, field in kind.study_fields.items()}
     alone: dict[str, tuple[str, ...]] = {}
     for kind in kinds:
         optional_keys = (name for name, (_, field) in kind.study_fields.items() if field.default is None)
         alone |= kind.alone or dict.fromkeys(optional_keys, GRIDS_NEED)
-    own = ", ".join(f"`{name}`" for name in alone)
-    study_fields["grids"] = (
-        Annotated[dict[str, grid], Named("grid", for_files=False)],
-        Field({}, description=f"Grids of scenes to compute. A study with one of {own} needs none."),
+    meanings = "; ".join(f"`{output.name}`: {output.meaning}" for output in made)
+    added["outputs"] = (
+        Annotated[list[Annotated[str, one_of("output", [output.name for output in made])]], OneOrMore()],
+        Field(
+            [output.name for output in made if output.usual],
+            description=f"Figures and tables of the dataset: {meanings}. "
+            "Figures of scenes show nonlinear kinematics if a grid has them, otherwise linear ones.",
+        ),
     )
-    model = create_model("StudyConfig", __base__=StudyConfig, **study_fields)
-    model.__doc__ = StudyConfig.__doc__
+    listed = ", ".join(f"`{name}`" for name in alone)
+    added["grids"] = (
+        Annotated[dict[str, grid], Named("grid", for_files=False)],
+        Field({}, description=f"Grids of scenes to compute. A study with one of {listed} needs none."),
+    )
+    model = create_model("StudyConfig", __base__=StudyConfig, __doc__=StudyConfig.__doc__, **added)
     model.alone = alone
     ways = {"grids": GRIDS_NEED} | alone
     model.model_config["json_schema_extra"] = {"anyOf": [{"required": [*needed, key]} for key, needed in ways.items()]}

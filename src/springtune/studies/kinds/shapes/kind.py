@@ -11,13 +11,13 @@ from pathlib import Path
 from pydantic import Field
 
 from ...config.kind import Kind
-from ...config.sections import Later
 from ...runs.job import JOB
 from ...runs.keys import definition_key, material_key, mesh_type_key, stage_key
 from ...runs.source import hash_of
 from ...runs.stages import Task, stage
 from ..scenes.plan import file_source, mesh_stage, on_meshes, parameters, particles_in, search_seconds, stage_on_meshes
 from .outputs import DRAWING, OUTPUTS, OWN_FILE, mesh_name, stems
+from .sections import NAMED_GRIDS, NAMED_SHAPES
 
 MOST_DRAWN = 1500
 """Particles, about, of the largest mesh that is drawn where a coarser one is there."""
@@ -240,11 +240,11 @@ KIND = Kind(
     "shapes",
     study_fields={
         "shapes": (
-            Later("studies.kinds.shapes.sections", "NAMED_SHAPES"),
+            NAMED_SHAPES,
             Field(None, description="Shapes: bodies of any outline, or those of mesh files, and their loads."),
         ),
         "shape_grids": (
-            Later("studies.kinds.shapes.sections", "NAMED_GRIDS"),
+            NAMED_GRIDS,
             Field(None, description="What is to be computed of the shapes; it makes the group `/shapes`."),
         ),
     },

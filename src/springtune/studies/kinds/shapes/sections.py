@@ -7,24 +7,8 @@ from pydantic_core import CoreSchema, core_schema
 
 from springtune import units
 
-from ...config.fields import (
-    DefinitionName,
-    FileName,
-    Flag,
-    Kinematics,
-    Length,
-    Lengths,
-    MaterialName,
-    Named,
-    OneOrMore,
-    Ratio,
-    Scalar,
-    Section,
-    Text,
-    Wrapped,
-    default,
-    one_of,
-)
+from ...config import fields
+from ...config.fields import Named, OneOrMore, Scalar, Section, Wrapped, default, one_of
 from ...config.messages import refuse, show
 
 KINDS_OF_QUANTITY = {
@@ -142,7 +126,7 @@ class CircleConfig(Section):
     centre: Place
     """Centre."""
 
-    radius: Length
+    radius: fields.Length
     """Radius."""
 
 
@@ -206,7 +190,7 @@ class PressureConfig(Section):
     pressure: PressureValue
     """Pressure."""
 
-    follower: Flag = default("false")
+    follower: fields.Flag = default("false")
     """Whether it turns and grows with the sides, in nonlinear kinematics."""
 
     @model_validator(mode="before")
@@ -229,10 +213,10 @@ class QuantityConfig(Section):
     reaction: Axis | None = None
     """Force of the supports `of` a group along it."""
 
-    area: Flag | None = None
+    area: fields.Flag | None = None
     """Growth of the area of the body; `area` alone says so."""
 
-    energy: Flag | None = None
+    energy: fields.Flag | None = None
     """Strain energy; `energy` alone says so."""
 
     at: PointName | None = None
@@ -244,7 +228,7 @@ class QuantityConfig(Section):
     expected: Anything | None = None
     """Value that others give, with its unit: the dataset has errors against it, too."""
 
-    source: Text | None = None
+    source: fields.Text | None = None
     """Who gives it."""
 
     @model_validator(mode="before")
@@ -321,10 +305,10 @@ class ShapeLoadConfig(Section):
 class ShapeFileConfig(Section):
     """A mesh file of a shape that has several."""
 
-    file: FileName
+    file: fields.FileName
     """The file, relative to the study's folder."""
 
-    mesh_size: Length
+    mesh_size: fields.Length
     """Length of an edge, which names the mesh in the dataset."""
 
 
@@ -352,7 +336,7 @@ SHAPE_FILES = OneFileOrMore("the path of a file, or a list such as [{file: fine.
 class ShapeConfig(Section):
     """A body of any outline, or that of a mesh file, with named groups of its sides and points."""
 
-    thickness: Length = default("1 mm")
+    thickness: fields.Length = default("1 mm")
     """Extent out of the plane."""
 
     outline: Annotated[list[SegmentConfig], SIDE_WORDS] | None = None
@@ -366,17 +350,17 @@ class ShapeConfig(Section):
     its groups are the shape's. Or a list of several with their mesh sizes: the finest one is the geometry of the
     reference."""
 
-    unit: Length = default("1 m")
+    unit: fields.Length = default("1 m")
     """Unit of the coordinates in the file."""
 
     points: Annotated[dict[str, Place], Words("places such as [48 mm, 52 mm], by name")] = {}
     """Named points of an outline or inside of it: particles of every mesh."""
 
-    refined: Annotated[dict[str, Ratio], Words("numbers above 0, by group, point or part")] = {}
+    refined: Annotated[dict[str, fields.Ratio], Words("numbers above 0, by group, point or part")] = {}
     """Where the mesh is finer: mesh size over that of the rest, by group, point or part, such as `{hole: 0.25}`;
     from there on it grows."""
 
-    parts: Annotated[dict[str, MaterialName], Words("names of materials, by part")] = {}
+    parts: Annotated[dict[str, fields.MaterialName], Words("names of materials, by part")] = {}
     """Materials of the parts, by name; the rest is of the grid's material."""
 
     loads: Annotated[dict[str, ShapeLoadConfig], Named("load")]
@@ -404,25 +388,25 @@ class ShapeGridConfig(Section):
     shape: Annotated[list[ShapeName], OneOrMore()]
     """Shapes, by name."""
 
-    mesh_size: Lengths | None = None
+    mesh_size: fields.Lengths | None = None
     """Lengths of an edge of triangles; not of shapes from files, whose mesh is that of the file."""
 
-    material: Annotated[list[MaterialName], OneOrMore()]
+    material: Annotated[list[fields.MaterialName], OneOrMore()]
     """Materials, by name."""
 
     load: Annotated[list[LoadName], OneOrMore()] | None = None
     """Loads of the shapes, by name; all of each shape without."""
 
-    definition: Annotated[list[DefinitionName], OneOrMore()]
+    definition: Annotated[list[fields.DefinitionName], OneOrMore()]
     """Definitions that derive a stiffness on triangles and need no reference."""
 
-    kinematics: Annotated[list[Kinematics], OneOrMore()] = default("nonlinear")
+    kinematics: Annotated[list[fields.Kinematics], OneOrMore()] = default("nonlinear")
     """Whether springs keep their length law or their tangent at rest."""
 
-    reference: Flag = default("true")
+    reference: fields.Flag = default("true")
     """Whether there is a converged reference; else errors are those against `expected` values alone."""
 
-    finite_strain: Flag = default("false")
+    finite_strain: fields.Flag = default("false")
     """Whether nonlinear scenes of 'neo-hooke', 'yeoh' and 'delingette' are also compared with a reference of their
     law at finite strain. The group `/shapes_finite_strain` has it and the errors. Each takes seconds."""
 
