@@ -25,7 +25,6 @@ _NAMES = {
     "studies.kinds.engines.figures": (
         "plot_engine_curves",
         "plot_engine_errors",
-        "plot_engine_factors",
         "plot_engine_maps",
     ),
     "studies.kinds.laying.figures": ("plot_laying",),

@@ -70,7 +70,6 @@ from .studies.kinds import load_study as load_study
 from .studies.kinds.benchmark.figures import plot_benchmark as plot_benchmark
 from .studies.kinds.engines.figures import plot_engine_curves as plot_engine_curves
 from .studies.kinds.engines.figures import plot_engine_errors as plot_engine_errors
-from .studies.kinds.engines.figures import plot_engine_factors as plot_engine_factors
 from .studies.kinds.engines.figures import plot_engine_maps as plot_engine_maps
 from .studies.kinds.laying.figures import plot_laying as plot_laying
 from .studies.kinds.moduli.figures import plot_definitions_loads as plot_definitions_loads

@@ -329,8 +329,7 @@ def test_an_absent_engine_is_run_when_it_is_there_and_again_when_it_is_new(colle
 
 # -- what is drawn -----------------------------------------------------------------------------------------------------
 
-PLOTS = {"engines": (st.plot_engine_errors, st.plot_engine_maps)}
-PLOTS |= {"engine_curves": (st.plot_engine_curves, st.plot_engine_factors)}
+PLOTS = {"engines": (st.plot_engine_errors, st.plot_engine_maps), "engine_curves": (st.plot_engine_curves,)}
 
 
 @pytest.mark.parametrize("names", [("missing",), ("exploding", "creeping"), ("toy", "swinging")])
@@ -359,7 +358,7 @@ def test_outputs_are_figures_of_each_scene_and_a_table(collected):
     assert drawn == {f"engines_{name}_pull.{ending}" for name in ("errors", "maps") for ending in ("png", "pdf")}
     with open(campaign.folder / "tables/engines.csv") as file:
         rows = list(csv.DictReader(file))
-    assert [row["end"] for row in rows] == ["absent"] * 2 + ["rest"] * 2
+    assert [row["engine_status"] for row in rows] == ["absent"] * 2 + ["rest"] * 2
     assert rows[0]["error_percent"] == "" and float(rows[2]["error_percent"]) > float(rows[3]["error_percent"]) > 0
     assert "Scenes in engines" in (campaign.folder / "tables/index.html").read_text()
 

@@ -57,7 +57,6 @@ EVERY_PLOT = {
     st.plot_engine_errors: ({"scene": "sheet"}, None),
     st.plot_engine_maps: ({"scene": "sheet"}, 4),
     st.plot_engine_curves: ({"scene": "strip"}, 4),
-    st.plot_engine_factors: ({"scene": "strip"}, None),
     st.plot_shapes: ({}, None),
     st.plot_shape_errors: ({"shape": "cook", "load": "traction"}, (2, 2)),
     st.plot_shape: ({"shape": "hole"}, 2),
