@@ -8,7 +8,7 @@ import pytest
 
 
 def test_no_input_ends_in_a_traceback_or_in_a_wrong_number(capsys):
-    assert fuzz.main(150, 7) == 0, capsys.readouterr().out
+    assert fuzz.main(80, 7) == 0, capsys.readouterr().out
 
 
 READS = {

@@ -226,16 +226,6 @@ def test_even_tests_of_a_body_without_a_lower_side_do_not_contradict_their_suppo
             np.testing.assert_allclose(moved, case.displacements, rtol=0, atol=1e-9 * np.abs(moved).max())
 
 
-def test_bodies_in_pieces_are_refused_by_tests_of_one_body():
-    """Two inclusions of one material, which the search would hold at two particles of one of them."""
-    holes = [st.Hole.circle((x, 0.02), 0.006, part=part) for x, part in ((0.03, "a"), (0.07, "b"))]
-    shape = replace(PLATE, holes=tuple(holes), points={}, loads={"pull": replace(PULL, quantities=PULL.quantities[:2])})
-    materials = {"": STEEL, "a": THIRD, "b": THIRD}
-    scene = st.Scene(shape, st.mesh_shape(shape, "8 mm"), materials, "pull", definition="adjoint")
-    with pytest.raises(st.DefinitionError, match="'adjoint': on 'a' and 'b': the mesh has 2 parts that no edge joins"):
-        scene.solve()
-
-
 @pytest.mark.parametrize("materials", [{"": BOARD, "core": STEEL}, {"": BOARD, "core": BOARD}])
 def test_choices_for_anisotropic_bodies(grouped, materials):
     """Springs alone among them, which have C12 = C66."""
@@ -245,13 +235,6 @@ def test_choices_for_anisotropic_bodies(grouped, materials):
     assert {choice.definition for choice in choices} == names == {*choices[0].tried}
     assert all(choice.worst < 0.5 and not choice.failures for choice in choices)
     assert [choice.energies for choice in choices if choice.definition == "energy-fit"] == [False]
-
-
-def test_a_motion_does_not_follow():
-    shape = holed(0.008)
-    scene = st.Scene(shape, st.mesh_shape(shape, "5 mm"), STEEL, "push", definition="delingette")
-    with pytest.raises(ValueError, match="load: 'push' turns with the side that it acts on, and forces of a motion"):
-        scene.motion()
 
 
 def test_a_stress_where_materials_meet_is_refused_at_once():

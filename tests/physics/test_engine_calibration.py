@@ -309,13 +309,6 @@ def test_files_run_at_the_setting_or_are_refused(tmp_path):
             fit.net().write(tmp_path / name)
 
 
-@pytest.mark.parametrize("name", ["newton-vbd", "newton-xpbd", "newton-semi-implicit"])
-def test_what_runs_in_newton_set_besides_is_said(name):
-    for one in ("tri_kd=0", "edge_ke=0", "radius=0", "particle_grid=None", "masses"):
-        assert one in st.ENGINES[name].besides
-    assert ("builder.color()" in st.ENGINES[name].besides) == (name == "newton-vbd")
-
-
 def test_a_scene_that_no_engine_runs_is_refused():
     with pytest.raises(st.EngineError, match="kinematics: 'linear', and engines keep the length law"):
         st.fit_engine(strip(kinematics="linear"), "xpbd")

@@ -23,7 +23,6 @@ from springtune.problem.status import Status
 from springtune.reference.small_strain import solve_small_strain
 from springtune.scene.sheet import Sheet
 from springtune.springs import DEFINITIONS, DefinitionError
-from springtune.studies.kinds.scenes.solve import solved as solve_scene
 
 from problems import pulled
 
@@ -131,46 +130,6 @@ class TestWhatClosedFormsGotWrong:
         assert all(before <= after + 1e-6 for before, after in itertools.pairwise(errors))
         return beam, material, mesh, found
 
-    def through_the_stage(self, beam, material, mesh, definition, load):
-        """Error by the stage that solves scenes of studies."""
-        scene = {
-            "material": {"name": "m", "young_modulus": 1e9, "poisson_ratio": material.poisson_ratio},
-            "definition": definition, "kind": LOADS[load].kind.name, "follower": False, "force": 3.0,
-            "kinematics": "linear",
-            "reference": {},
-        }  # fmt: skip
-        result = solve_scene(Sheet(mesh, beam.thickness), scene)
-        assert result["status"] == Status.SOLVED
-        return result["displacement"] / solve_small_strain(beam, material, 3.0, kind=LOADS[load].kind).displacement - 1
-
-    @pytest.mark.parametrize(
-        ("mesh_type", "nu", "definition", "expected"),
-        [
-            # Once printed as +14, +10 and +14 %.
-            ("right", 0.0, "area", {"traction": 2.56, "bending": 1.32, "shear": 0.084}),
-            # Once half of that in bending, and 0 in shear.
-            ("right", 0.3, "delingette", {"bending": -0.178, "shear": -0.0217}),
-            ("structured", 0.5, "patch", {"shear": -0.0944}),
-        ],
-    )
-    def test_errors_are_those_of_solutions(self, mesh_type, nu, definition, expected):
-        beam, material, mesh, found = self.choices(mesh_type, nu, also=[definition])
-        for load in CASES:
-            error = self.through_the_stage(beam, material, mesh, definition, load)
-            assert found[definition].errors[load] == pytest.approx(error, abs=1e-9, rel=1e-6)
-            if load in expected:
-                assert error == pytest.approx(expected[load], rel=0.02)
-
-    @pytest.mark.parametrize("mesh_type", MESH_TYPES)
-    def test_one_cell_high(self, mesh_type):
-        """Bending of one row is too stiff by much, but never by all of it; once printed as -160 %."""
-        beam, material, mesh, found = self.choices(mesh_type, 0.3, height=5e-3)
-        for choice in found.values():
-            if not choice.failures:
-                assert choice.errors["bending"] > -1
-                error = self.through_the_stage(beam, material, mesh, choice.definition, "bending")
-                assert choice.errors["bending"] == pytest.approx(error, abs=1e-9, rel=1e-6)
-
     @pytest.mark.parametrize(("nu", "measured"), [(0.0, -0.76), (0.5, 0.30)])
     def test_poissons_ratio_is_measured(self, nu, measured):
         """Of `area` on squares with one diagonal; once printed as the material's."""
@@ -224,15 +183,10 @@ class TestWhatClosedFormsGotWrong:
         assert "baudet" not in refused.tried
 
 
-class TestRandomBeams:
-    def test_every_number_is_solved_and_the_first_is_the_best(self):
-        random = np.random.default_rng(17)
-        assert sum(check(*(one := random_beam(random))[:2], one[3]) for _ in range(15)) > 60
-
-    @pytest.mark.slow
-    def test_two_hundred_more(self):
-        random = np.random.default_rng(18)
-        assert sum(check(*(one := random_beam(random))[:2], one[3]) for _ in range(200)) > 800
+@pytest.mark.parametrize(("seed", "beams"), [(17, 15), pytest.param(18, 200, marks=pytest.mark.slow)])
+def test_every_number_is_solved_and_the_first_is_the_best(seed, beams):
+    random = np.random.default_rng(seed)
+    assert sum(check(*(one := random_beam(random))[:2], one[3]) for _ in range(beams)) > 4 * beams
 
 
 @pytest.fixture(scope="module")
@@ -313,12 +267,14 @@ class TestWhatScenesSay:
     """A prediction states no number that a scene of the same definition contradicts."""
 
     @pytest.mark.parametrize("mesh_type", MESH_TYPES)
-    def test_of_every_definition_and_load(self, mesh_type):
-        """The row `uniform` once had a stiffness that the definition of that name does not give: +3.8 %, not -6.4."""
-        beam, material = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3)
+    @pytest.mark.parametrize("height", ["8 mm", "40 mm"])
+    def test_of_every_definition_and_load(self, mesh_type, height):
+        """Bending of one row of cells is too stiff by much, but never by all of it."""
+        beam, material = st.Beam("200 mm", height), st.Material("210 GPa", 0.3)
         mesh = st.make_mesh(beam, mesh_type, "8 mm")
         choices = predict(beam, mesh, material, loads=predicted())
         assert compared(beam, mesh, material, choices, predicted()) >= 3 * len(predicted())
+        assert all(one.failures or one.errors["bending"] > -1 for one in choices)
 
     def test_of_eighty_beams(self):
         """Of eight shapes, as a reference scales with size, thickness and modulus."""
@@ -335,27 +291,6 @@ class TestWhatScenesSay:
                 choices = predict(beam, mesh, material, known, loads=[load])
                 count += compared(beam, mesh, material, [choices[random.integers(len(choices))]], [load])
         assert count > 72  # some are unstable
-
-    @pytest.mark.slow
-    def test_of_two_hundred_fresh_beams(self):
-        seed = np.random.SeedSequence().entropy
-        print("seed", seed)  # shown where it fails
-        random, count = np.random.default_rng(seed), 0
-        for _ in range(200):
-            _, material, beam, mesh_type, size = random_case(random)
-            mesh = MESH_TYPES[mesh_type](beam.length, beam.height, size)
-            loads = [str(name) for name in random.choice(predicted(), 2, replace=False)]
-            count += compared(beam, mesh, material, predict(beam, mesh, material, loads=loads), loads)
-        assert count > 1600
-
-    def test_what_was_said_by_closed_forms(self):
-        """On squares with one diagonal: once +15.5 % in shear with `area`, and -23.1 with `patch`."""
-        beam, material = st.Beam("100 mm", "20 mm"), st.Material("210 GPa", 0.3)
-        mesh = st.make_mesh(beam, "right", "2 mm")
-        choices = predict(beam, mesh, material, also=["area", "patch"])
-        found = {choice.definition: choice.errors["shear"] for choice in choices}
-        assert found["area"] == pytest.approx(0.004, abs=5e-4)
-        assert found["patch"] == pytest.approx(-0.115, abs=1e-3)
 
 
 def held_by_bands(random, most):
@@ -385,23 +320,14 @@ def held_by_bands(random, most):
     return len(missed), (missed < 1e-9).sum(), (missed <= np.maximum(2e-3, 0.1 * error)).sum()
 
 
-class TestRandomBands:
+@pytest.mark.parametrize(
+    ("sizes", "least"), [([300] * 3, 60), pytest.param(range(300, 1000, 12), 1000, marks=pytest.mark.slow)]
+)
+def test_random_bands_hold(sizes, least):
     """Of 2,170 errors on 60 meshes 2,153 were in their bands, and 13 off by more than .2 points and a tenth."""
-
-    def test_hold(self):
-        random = np.random.default_rng(3)
-        numbers, held, near = np.sum([held_by_bands(random, 300) for _ in range(3)], axis=0)
-        assert numbers > 60 and held >= 0.98 * numbers and near >= 0.98 * numbers
-
-    @pytest.mark.slow
-    def test_hold_in_ninety_nine_of_a_hundred(self):
-        seed = np.random.SeedSequence().entropy
-        print("seed", seed)
-        random = np.random.default_rng(seed)
-        sizes = random.integers(300, 1000, 60)
-        numbers, held, near = np.sum([held_by_bands(random, int(most)) for most in sizes], axis=0)
-        print(f"{held} and {near} of {numbers}")
-        assert numbers > 1000 and held >= 0.98 * numbers and near >= 0.99 * numbers
+    random = np.random.default_rng(3)
+    numbers, held, near = np.sum([held_by_bands(random, most) for most in sizes], axis=0)
+    assert numbers > least and held >= 0.98 * numbers and near >= 0.98 * numbers
 
 
 class TestLoads:
@@ -517,24 +443,6 @@ class TestAllDefinitionsCount:
             others = sorted(worst for energies, worst in solved.values() if not (springs_alone and energies))
             assert rows[0] == pytest.approx(others[0], rel=1e-6, abs=1e-5)
             assert len(rows) >= min(4, len({round(one, 7) for one in others}))
-
-    @pytest.mark.parametrize(
-        ("length", "height", "size", "nu", "loads", "most"),
-        [
-            (0.12, 0.025, 2.5e-3, 0.33, CASES, 0.006),  # was 3.08 %
-            (0.12, 0.025, 5e-3, 0.33, CASES, 0.0302),  # was 5.94 %
-            (0.2, 0.04, 5e-3, 0.3, ("traction", "bending"), 0.0045),  # was 2.31 %
-        ],
-    )
-    def test_what_a_shortlist_left_out(self, length, height, size, nu, loads, most):
-        beam = Beam(length, height)
-        best = predict(beam, MESH_TYPES["free"](length, height, size), Material(7e10, nu), loads=loads)[0]
-        assert best.worst < most and not best.energies
-
-    def test_a_mesh_for_springs_alone(self):
-        """Once 665 particles."""
-        search = st.find_mesh(Beam(0.2, 0.04), Material(210e9, 0.3), "1 %", loads=CASES[:2], mesh_types=["free"])
-        assert search.best_springs.particles <= 413 and "patch-fit" in search.best_springs.choice.tried
 
     def test_those_of_others_count(self):
         """A definition from outside can be the best one; a faulty one of another package is left out."""

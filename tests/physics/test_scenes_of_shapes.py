@@ -20,7 +20,6 @@ from springtune.problem.boundary import (
     displacement_weights,
     forces,
     interpolation,
-    particle_masses,
     reaction_weights,
 )
 from springtune.problem.geometry import AssumptionWarning
@@ -366,16 +365,6 @@ class TestQuantities:
         field = displacement_weights(grouped, END)
         assert (field[:, 0] * points[:, 1]).sum() == pytest.approx(HEIGHT / 2, rel=1e-9)
 
-    def test_masses_of_parts(self):
-        mesh = MESH_TYPES["free"](LENGTH, HEIGHT, 9e-3)
-        heavy = {3: mesh.points[mesh.triangles].mean(axis=1)[:, 0] < 0.5 * LENGTH}
-        grouped = GroupedMesh(mesh, parts={"heavy": heavy})
-        found = particle_masses(grouped, 1e-3, {"": 1.0, "heavy": 3.0})
-        alone = st.Mesh(mesh.points, mesh.triangles[heavy[3]])
-        assert found.sum() == pytest.approx(1e-3 * (mesh.area + 2 * alone.area), rel=1e-9)
-        with pytest.raises(ValueError, match="the material of part 'heavy' has none"):
-            particle_masses(grouped, 1e-3, {"": 1.0, "heavy": None})
-
 
 class TestMaterials:
     def bar(self, mesh_type="right"):
@@ -447,6 +436,13 @@ class TestRefusals:
             (
                 lambda s: s.scene(load(supports=(*CLAMP, st.Support("right", x=1e-4))), definition="annealed"),
                 "prescribes displacements; choose another definition",
+            ),
+            *(
+                (
+                    lambda s, call=call: call(s.scene(load(supports=(*CLAMP, st.Support("right", x=1e-4))))),
+                    "prescribes displacements",
+                )
+                for call in (st.Scene.motion, st.Scene.buckling_load)
             ),
             (lambda s: s.scene(definition="paper"), "needs a uniform one"),
             (
@@ -527,14 +523,6 @@ class TestAgainstReferences:
         with pytest.raises(ValueError, match="load: none, and .* has 2; give one of them"):
             st.predict(plate(self.pull, replace(self.pull, name="other")), self.grouped, STEEL)
 
-    def test_a_uniform_stiffness_is_told(self):
-        """Of springs of one stiffness, a force is the stiffness times the displacement of a unit one."""
-        soft, hard = (
-            solved(self.shape, self.grouped, THIRD, "paper", stiffness=stiffness).displacement
-            for stiffness in ("1e8 N/m", 2e8)
-        )
-        assert soft == pytest.approx(2 * hard, rel=1e-9)
-
     def test_springs_fitted_to_the_reference(self):
         """Definitions that are told cases get the reference's displacements."""
         scene = st.Scene(self.shape, st.mesh_shape(self.shape, 8e-3), THIRD, "pull", definition="annealed",
@@ -542,33 +530,6 @@ class TestAgainstReferences:
         plain = st.Scene(self.shape, scene.grouped, THIRD, "pull", definition="lattice", kinematics="linear")
         assert DEFINITIONS["annealed"].needs == "cases"
         assert abs(scene.solve().error) < 0.7 * abs(plain.solve().error)
-
-    def test_is_drawn_and_written(self, tmp_path):
-        result = solved(self.shape, self.grouped, STEEL, "lattice", "nonlinear")
-        assert result.plot().get_title(loc="left").startswith("pull: 0.0")
-        assert result.write(tmp_path / "pull.vtu")[0].exists()
-        assert len(result.write(tmp_path / "pull.pvd", steps=2)) == 4
-        net = st.SpringNet.from_scene(result.scene)
-        assert net.header["expected_error"].keys() == {"end", "force"}
-        np.testing.assert_allclose(net.forces.sum(axis=0), [4e3, 0.0], atol=1e-8)
-        assert net.masses.sum() == pytest.approx(7850 * 1e-3 * self.grouped.mesh.area, rel=1e-9)
-        net.write(tmp_path / "net.csv")
-
-    def test_prescribed_displacements_are_in_no_file_of_springs(self, tmp_path):
-        stretch = load(supports=(*CLAMP, st.Support("right", x=1e-4)))
-        result = solved(plate(stretch), self.grouped_plain(), STEEL, "lattice")
-        assert result.write(tmp_path / "moved.vtu")[0].exists()
-        before = sorted(tmp_path.iterdir())
-        with pytest.raises(ValueError, match="load 'pull': prescribes displacements"):
-            result.scene.springs.write(tmp_path / "net.csv", errors=False)
-        assert sorted(tmp_path.iterdir()) == before
-        for refused in (result.scene.motion, result.scene.buckling_load):
-            with pytest.raises(ValueError, match="prescribes displacements"):
-                refused()
-
-    @staticmethod
-    def grouped_plain():
-        return st.mesh_shape(plate(), 8e-3)
 
 
 def test_a_shape_buckles_and_moves_as_the_beam_does():

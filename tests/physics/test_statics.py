@@ -200,13 +200,6 @@ def test_a_path_is_unstable_from_its_first_negative_or_singular_tangent_on(told,
     np.testing.assert_equal(found.unstable_share, share)
 
 
-def test_a_linear_residual_is_over_the_load():
-    """A power of two times the load changes no digit of it."""
-    one, _ = beam_problem("free")
-    two = StaticProblem(one.network, 2.0**-20 * one.network.expand(one.load))
-    assert two.linear(1.0).residual == one.linear(1.0).residual > 0
-
-
 def test_newton_starts_from_the_series_about_rest():
     """Its order is 3: of half the load the error of the guess is a sixteenth, and that of the linear one a quarter."""
     problem = arch()

@@ -1,4 +1,4 @@
-"""Studies, and calls of commands that are refused, from the files of YAML beside."""
+"""Studies, and calls and files that are refused, from the files of YAML beside."""
 
 import shlex
 from pathlib import Path
@@ -23,3 +23,8 @@ def refused_calls(name):
     """Words of calls of a command that are refused, what else `refused_calls.yaml` has of each, and its id."""
     rows = yaml.safe_load((HERE / "refused_calls.yaml").read_text())[name]
     return [pytest.param(shlex.split(call), *told, id=call) for call, *told in rows]
+
+
+def refused_files(name):
+    """Texts of files that are refused, and parts of what is said of each."""
+    return yaml.safe_load((HERE / "refused_files.yaml").read_text())[name]

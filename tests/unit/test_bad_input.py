@@ -26,7 +26,6 @@ from springtune.mesh import (
     read_beam_mesh,
     right,
     structured,
-    write_mesh,
 )
 from springtune.mesh.formats import read_shape
 from springtune.safe_io.inputs import virtual_memory
@@ -87,6 +86,10 @@ STUDIES = {
     "no date": (SMALL.replace("small", "2001-99-99"), ":2: not YAML: '2001-99-99' is no !!timestamp; put it in quotes"),
     "a tag": (SMALL.replace("small", "!own small"), ":2: not YAML: 'small' has the unknown tag '!own'; remove it"),
     "a sign": (SMALL.replace("small", "="), ":2: not YAML: '=' has the unknown tag '!!value'; remove it, or put"),
+    "aliases of aliases": (
+        "a0: &a0 [x, y]\n" + "".join(f"a{n}: &a{n} [*a{n - 1}, *a{n - 1}, *a{n - 1}]\n" for n in range(1, 30)),
+        "study.yaml:1: more than 100000 values, aliases (*name) as what they stand for; give",
+    ),
     "a power of powers": (SMALL.replace("5 mm", "5 mm^9^9^9^9"), "unknown unit 'mm^9^9^9^9'"),
     "beyond measure": (SMALL.replace("30 mm", "1e300 mm"), "'1e300 mm' is beyond all measure; give a length"),
 }
@@ -173,13 +176,6 @@ HALVES = np.array([[0, 1, 2], [0, 2, 3]])
 def test_a_mesh_of_arrays_that_are_none_is_refused(points, triangles, says):
     with pytest.raises(MeshError, match=says):
         Mesh(points, triangles)
-
-
-def test_three_cells_at_an_edge_are_refused():
-    points = np.vstack([POINTS, [[0.4, 0.6]]])
-    mesh = Mesh(points, np.vstack([HALVES, [[0, 2, 4]]]))
-    with pytest.raises(MeshError, match=r"the edge of points \[0, 2\] has 3 cells"):
-        len(mesh.edges)
 
 
 def plate(hole, mesh_type="structured"):
@@ -318,12 +314,6 @@ class TestFiles:
         with pytest.raises(MeshError, match="61 MB, and at most 60 MB are read; write a coarser mesh, or binary VTU"):
             read_beam_mesh(tmp_path / "own.vtu", 0.1, 0.02)
 
-    @pytest.mark.slow
-    def test_more_than_a_million_points_are_refused(self, tmp_path):
-        write_mesh(tmp_path / "own.vtu", right(0.1, 0.02, 4.46e-5))
-        with pytest.raises(MeshError, match=r"100\d{4} points, and at most 1000000 are read; write a coarser mesh"):
-            read_beam_mesh(tmp_path / "own.vtu", 0.1, 0.02)
-
     def test_many_points_at_one_place_are_found_at_once(self, tmp_path):
         """Pairs of them all would be billions."""
         meshio = pytest.importorskip("meshio")
@@ -333,11 +323,6 @@ class TestFiles:
         meshio.Mesh(points, [("triangle", np.arange(len(corners)).reshape(-1, 3))]).write(tmp_path / "own.vtu")
         with pytest.raises(MeshError, match="two points at .* do not join their cells .*; merge duplicate points"):
             read_beam_mesh(tmp_path / "own.vtu", 0.1, 0.02)
-
-    def test_a_mesh_is_written_as_what_its_name_says(self, tmp_path):
-        with pytest.raises(MeshError, match="give a name that ends in .vtu"):
-            write_mesh(tmp_path / "own.msh", MESH)
-        assert not list(tmp_path.iterdir())
 
 
 PLATE = right(0.1, 0.02, 0.01)
@@ -411,8 +396,7 @@ class TestCounts:
             ):
                 read(path)
 
-    @pytest.mark.parametrize("format", ["binary", pytest.param("appended", marks=pytest.mark.slow)])
-    def test_blocks_of_vtu_that_are_zeros_by_the_gigabyte(self, tmp_path, format):
+    def test_blocks_of_vtu_that_are_zeros_by_the_gigabyte(self, tmp_path):
         """A megabyte of zlib for 1.3 GB of coordinates."""
         block = zlib.compress(bytes(2**26))
         count = 20
@@ -421,43 +405,12 @@ class TestCounts:
         path = plate_file(tmp_path, "vtu", "vtu", {})
         text = path.read_text()
         data = re.search(r'<DataArray[^>]*Name="Points"[^>]*>(.*?)</DataArray>', text, re.DOTALL)
-        if format == "binary":
-            text = text.replace(data[1], bomb)
-        else:
-            array = data[0].replace(data[1], "").replace('format="binary"', 'format="appended" offset="0"')
-            text = text.replace(data[0], array)
-            text = text.replace("</VTKFile>", f'<AppendedData encoding="base64">_{bomb}</AppendedData></VTKFile>')
-        path.write_text(text)
+        path.write_text(text.replace(data[1], bomb))
         # In a new process: what earlier tests left mapped and free comes on top of the bound.
         done = subprocess.run([sys.executable, "-c", BOMBED, path], capture_output=True, text=True, check=True)
         said, peak = done.stdout.splitlines()
         assert re.search(r"vtu: .*is damaged.*; write it again", said)
         assert int(peak) < 0.7e9
-
-    def test_a_study_says_it_in_a_line(self, tmp_path):
-        ending, options, _, other = COUNTS["gmsh, text"]
-        path = plate_file(tmp_path, "gmsh, text", ending, options)
-        path.write_bytes(path.read_bytes().replace(b"$Nodes\n1 %d" % len(PLATE.points), other))
-        (tmp_path / "study.yaml").write_text(
-            "title: x\nmaterials: {steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}}\n"
-            "shapes: {p: {file: plate.msh, loads: {pull: {supports: {left: fixed}, forces: {right: [1 N, 0]},"
-            " quantities: {work: energy}}}}}\n"
-            "shape_grids: {g: {shape: p, load: pull, material: steel, definition: lattice}}\n"
-        )
-        asked = CliRunner().invoke(main, ["scenes", str(tmp_path / "study.yaml")])
-        said = [line for line in asked.output.splitlines() if "plate.msh" in line]
-        assert asked.exit_code == 1 and isinstance(asked.exception, SystemExit), asked.output
-        assert len(said) == 1 and "is damaged" in said[0] and "; write it again" in said[0]
-
-    def test_the_bound_is_gone_afterwards(self, tmp_path):
-        resource = pytest.importorskip("resource")
-        before = resource.getrlimit(resource.RLIMIT_AS)
-        path = plate_file(tmp_path, "vtu", "vtu", {})
-        read_beam_mesh(path, 0.1, 0.02)
-        path.write_bytes(path.read_bytes()[:300])
-        with pytest.raises(MeshError):
-            read_beam_mesh(path, 0.1, 0.02)
-        assert resource.getrlimit(resource.RLIMIT_AS) == before
 
 
 class TestOfOtherKinds:
@@ -509,10 +462,6 @@ class TestOfOtherKinds:
         assert told.exit_code and isinstance(told.exception, SystemExit), told.output
         assert ("index.html" if name == "browse" else "odd.csv") in told.output
 
-    def test_what_is_compared(self, odd):
-        told = CliRunner().invoke(main, ["diff", str(odd), str(odd)])
-        assert told.exit_code == 2 and "odd.csv" in told.output
-
     def test_a_mesh(self, odd):
         with pytest.raises(MeshError, match="odd.csv: there is no such file; give"):
             read_beam_mesh(odd, 0.1, 0.02)
@@ -531,17 +480,6 @@ class TestDatasets:
     @pytest.fixture
     def path(self, sound, tmp_path):
         return shutil.copy(sound, tmp_path / "dataset.nc")
-
-    def test_missing_variables_are_told(self, path, capsys):
-        from click.testing import CliRunner
-
-        from springtune.cli import main
-
-        h5py = pytest.importorskip("h5py")
-        with h5py.File(path, "r+") as file:
-            del file["status"]
-        told = CliRunner().invoke(main, ["info", str(path)])
-        assert told.exit_code == 1 and "is damaged, or not as springtune writes it (AttributeError" in told.stderr
 
     @pytest.mark.parametrize(
         "name", ["../x", "/etc/x", "a\nb", "a/b", "", "..", "one + ../x", "x" * 61, "{x}", b"\xff", [7, 8], ["a", "b"]]
@@ -620,6 +558,7 @@ class TestDatasets:
             read_beam_mesh(path, 0.1, 0.02)
 
     ODD = [
+        ("del file['status']", "is damaged, or not as springtune writes it (AttributeError"),
         ("file.create_dataset('odd', 3, h5py.vlen_dtype('f8'))", "has no dimension scale"),
         ("file['odd'] = np.zeros(3, [('a', 'f8')])", "has no dimension scale"),
         ("file['odd'] = np.dtype('f8')", "has no attribute 'maps'"),
@@ -635,7 +574,6 @@ class TestDatasets:
         ("file.create_dataset('odd', 3, h5py.string_dtype(), compression='gzip')", "'odd' has compressed texts"),
         ("file['status'].attrs['scale_factor'] = 'much'", "UFuncTypeError"),
         ("file['status'].attrs['DIMENSION_LIST'] = 1.5", "cannot be read"),
-        ("file.attrs.create('odd', np.zeros(10**8), dtype='f8')", "memory"),
     ]
 
     @pytest.mark.parametrize("spoil, says", ODD)
@@ -672,9 +610,9 @@ class TestDatasets:
                 with pytest.raises(ValueError, match=r"is damaged \(it says that it holds 1\.1\d GB in .* MB\)"):
                     call(path)
 
-    @pytest.mark.parametrize("count", [pytest.param(20_000, marks=pytest.mark.slow), 140_000])
-    def test_texts_that_are_one_text_many_times_take_no_more_than_a_gigabyte(self, path, count):
+    def test_texts_that_are_one_text_many_times_take_no_more_than_a_gigabyte(self, path):
         """In HDF5 a text is a place in the file, and many cells may have the same: 0.2 MB stood for gigabytes."""
+        count = 140_000
         import h5py
 
         h5netcdf = pytest.importorskip("h5netcdf")

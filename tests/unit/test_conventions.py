@@ -1,7 +1,6 @@
 """What holds for the whole source: imports, stages of study kinds, and what tests may touch."""
 
 import ast
-import shutil
 import subprocess
 import sys
 from collections import defaultdict
@@ -21,17 +20,6 @@ def test_imports_keep_the_contracts_of_pyproject():
     """Rooms, their layers, what the library does not import, and no circles."""
     done = subprocess.run(["lint-imports", "--no-cache"], cwd=REPOSITORY, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout
-
-
-@pytest.mark.slow
-def test_the_environment_has_a_command_pip(tmp_path):
-    """Set up stops after it, where no lists of packages are."""
-    (tmp_path / "tools").mkdir()
-    shutil.copy(REPOSITORY / "tools/setup.sh", tmp_path / "tools")
-    done = subprocess.run(["tools/setup.sh", "run"], cwd=tmp_path, capture_output=True, text=True)
-    assert done.returncode == 1 and "installing the packages" in done.stderr
-    told = subprocess.run([tmp_path / ".venv/bin/pip", "--version"], capture_output=True, text=True)
-    assert told.stdout.startswith("pip ") and str(tmp_path) in told.stdout
 
 
 def test_modules_are_imported_by_text_in_one_place():
@@ -190,13 +178,3 @@ def test_a_constant_has_one_meaning():
                         values[name.id].setdefault(ast.dump(value), str(path.relative_to(SOURCE)))
     several = {name: sorted(found.values()) for name, found in values.items() if len(found) > 1 and name not in OWN}
     assert not several, "\n".join(f"{name}: {', '.join(found)}" for name, found in several.items())
-
-
-def test_nothing_is_chosen_by_globals():
-    found = [
-        f"{path.relative_to(REPOSITORY)}:{node.lineno}"
-        for path, tree in PARSED.items()
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "globals"
-    ]
-    assert not found

@@ -11,7 +11,6 @@ import matplotlib
 import mujoco
 import numpy as np
 import pytest
-import xarray as xr
 import yaml
 from click.testing import CliRunner
 
@@ -215,7 +214,7 @@ def repository(tmp_path_factory):
     return folder
 
 
-SLOW = {"take-results-elsewhere.md", "choose-a-mesh.md", "compare-studies.md", "fit-rubber.md"}
+SLOW = {"tune-an-engine.md", "take-results-elsewhere.md", "choose-a-mesh.md", "compare-studies.md", "fit-rubber.md"}
 """Of these, which take some seconds each."""
 
 
@@ -267,49 +266,6 @@ def test_every_module_of_the_rooms_shown_is_on_the_site():
     rooms = {room for room, _ in listed}
     assert rooms
     assert listed == {(room, path.stem) for room in rooms for path in (package / room).glob("[a-z]*.py")}
-
-
-def test_tables_of_studies_are_put_between_the_marks_of_their_pages(tmp_path):
-    pages = run_path(str(REPOSITORY / "tools/pages.py"))
-    for name in (*pages["TABLES"], pages["IN_ENGINES"]):
-        text, page = (REPOSITORY / "docs" / name).read_text(), tmp_path / name
-        page.write_text(text)
-        pages["put"](page, "new tables\n")
-        begin, end = text.index(pages["BEGIN"]), text.index(pages["END"], text.index(pages["BEGIN"]))
-        kept = page.read_text()
-        assert kept == f"{text[:begin]}{pages['BEGIN']}\nnew tables\n\n{text[end:]}"
-    page.write_text("no marks")
-    with pytest.raises(SystemExit, match="the marks around the tables are missing"):
-        pages["put"](page, "new tables\n")
-
-
-def test_a_table_of_engines_has_errors_words_and_the_cheapest_setting():
-    words = "not_requested rest swings moving diverged absent refused failed"
-    parts = {"scene": ["sheet"], "definition": ["patch", "area"], "engine": ["a"], "precision": ["float64"],
-             "dt": [1 / 60], "substeps": [1, 4], "iterations": [10, 100]}  # fmt: skip
-    shape = tuple(map(len, parts.values()))
-    errors, ends = np.full(shape, np.nan), np.zeros(shape, int)
-    errors[0, 0, 0, 0, 0] = [[np.nan, 2.0], [-0.3, 0.01]]
-    ends[0, 0, 0, 0, 0] = [[4, 1], [1, 1]]
-    ends[0, 1] = 6
-    data = xr.Dataset(coords=parts).assign(
-        solver_error=(tuple(parts), errors),
-        frame_seconds=(tuple(parts), np.full(shape, 2e-3)),
-        engine_status=(tuple(parts), ends, {"flag_meanings": words}),
-    )
-    *_, head, _, row = run_path(str(REPOSITORY / "tools/pages.py"))["in_engines"](data).splitlines()
-    assert head == "| engine | definition | 1 substep | 4 substeps | converged from | ms a frame |"
-    assert row == "| a | `patch` | diverged | −30.0 % | 4 x 100 | 2 |"
-
-
-def test_long_tables_are_shortened_on_pages():
-    shorten = run_path(str(REPOSITORY / "tools/pages.py"))["shorten"]
-    rows = [f"| {row} |\n" for row in range(31)]
-    lost = "### bending: what has no numbers\n\n- `a`: why\n\n"
-    head, rest = "### One\n\n| n |\n| --- |\n", "### Two\n"
-    assert shorten("".join([head, *rows[:30], "\n", lost, rest]), "") == "".join([head, *rows[:30], "\n", rest])
-    told = "\n16 more rows are in `results/speed.md`.\n"
-    assert shorten("".join([head, *rows, "\n", rest]), "speed.md") == "".join([head, *rows[:15], told, "\n", rest])
 
 
 def test_every_picture_is_of_a_study_or_an_example():

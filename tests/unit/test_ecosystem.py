@@ -80,21 +80,6 @@ def test_the_software_paper_has_what_the_journal_asks_for():
     assert min(REPOSITORY.glob("*/paper.md")).parent.name == "article"
 
 
-def test_citations_of_the_software_paper_are_the_long_papers():
-    references = yaml.safe_load((REPOSITORY / "workflow/paper/references.yml").read_text())
-    entries = dict(
-        re.findall(r"^@\w+\{([\w-]+),\n(.*?)^\}", (REPOSITORY / "article/paper.bib").read_text(), re.M | re.S)
-    )
-    assert set(entries) == set(re.findall(r"@([a-z][\w-]*)", TEXT))
-    for name, entry in entries.items():
-        field = dict(re.findall(r"^  (\w+) = \{(.*)\},$", entry, re.MULTILINE))
-        known = references[name]
-        plain = (field["title"].strip("{}"), field.get("author", "").split(" and "), field.get("doi"))
-        doi = known.get("serial-number", {}).get("doi")
-        assert plain == (known["title"].strip("{}"), known.get("author", [""]), doi), name
-        assert field.get("year") == (str(known["date"]) if "date" in known else None), name
-
-
 def test_numbers_of_the_software_paper_are_those_of_make_paper():
     """By their names; where the long paper was made here, they are compared with it."""
     folder = REPOSITORY / "workflow/paper"
@@ -110,9 +95,3 @@ def test_numbers_of_the_software_paper_are_those_of_make_paper():
     if made.exists():
         found = json.loads(made.read_text())["numbers"]
         assert stated == {name: found[name]["text"] for name in stated}
-
-
-def test_an_address_of_the_repository_stands_in_both_places():
-    """docs/release.md says where; there is none yet."""
-    citation = yaml.safe_load((REPOSITORY / "CITATION.cff").read_text())
-    assert citation.get("repository-code") == PROJECT.get("urls", {}).get("Source")

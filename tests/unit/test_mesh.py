@@ -57,14 +57,6 @@ def test_any_box_is_covered_once(mesh_type, length, height, size):
             assert len(mesh.outline_edges(axis, value)) >= 1
 
 
-@pytest.mark.parametrize(("size", "particles"), [(5e-3, 415), (2e-3, 2436), (1e-3, 9470)])
-def test_structured_has_the_rows_of_the_paper_beam(size, particles):
-    """Counts of the same network in another program."""
-    mesh = structured(0.2, 0.04, size)
-    assert len(mesh.points) == particles
-    assert quality(mesh)["minimum_angle"] > 29  # half triangles at the ends
-
-
 @pytest.mark.parametrize("mesh_type", ["structured", "right", "free"])
 def test_counts_are_the_same_in_every_unit(mesh_type):
     """Two cells and a half are a half in every unit: rounding took two or three."""
@@ -234,27 +226,6 @@ class TestSlits:
     """Meshes whose cells cover the box once, by their areas, but are not joined throughout."""
 
     MESH = MESH_TYPES["right"](0.1, 0.02, 5e-3)
-
-    @pytest.mark.parametrize("gap", [0.0, 1e-9, 1e-12])
-    @pytest.mark.parametrize(
-        ("doubled", "place"),
-        [
-            (lambda y: y < 0.011, "50, 0"),  # from the outline to the middle
-            (lambda y: y > 0.001, "50, 5"),  # all but one point
-            (lambda y: y == 0.01, "50, 10"),  # one point inside
-            (lambda y: y == 0.0, "50, 0"),
-            (lambda y: y >= 0.0, "50, 0"),  # cut in two
-        ],
-    )
-    def test_points_that_are_not_merged(self, tmp_path, gap, doubled, place):
-        mesh = self.MESH
-        points, cells, _ = part(mesh, lambda at: at[:, 0] > 0.05, lambda at: doubled(mesh.points[at, 1]), gap)
-        apart = f", {1e3 * gap:.3g} mm apart" if gap else ""
-        with pytest.raises(MeshError) as error:
-            read_beam_mesh(save(tmp_path / "slit.vtu", points, cells), 0.1, 0.02)
-        text = str(error.value)
-        assert text.startswith(f"{tmp_path / 'slit.vtu'}: two points at ({place}) mm{apart}, do not join their cells")
-        assert text.endswith("; merge duplicate points")
 
     def test_every_way_in_is_closed(self, tmp_path):
         points, cells, _ = part(self.MESH, lambda at: at[:, 0] > 0.05, lambda at: self.MESH.points[at, 1] < 0.011)

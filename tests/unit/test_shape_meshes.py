@@ -1,8 +1,6 @@
 """Meshes of shapes: made of outlines, read from files, and held against load cases."""
 
 import math
-import subprocess
-import sys
 from itertools import pairwise
 
 import meshio
@@ -139,14 +137,6 @@ def test_a_thin_wall_does_not_close():
         assert grouped.mesh.area == pytest.approx(ring.area, rel=0.08)
 
 
-def test_points_close_to_each_other_and_to_sides_are_particles():
-    points = {"a": (0.5, 0.5), "b": (0.5, 0.501), "low": (0.3, 0.002), "also": (0.5, 0.5), "c": (0.501, 0.5)}
-    square = Shape.rectangle(1, 1, points=points)
-    grouped = mesh_shape(square, 0.2)
-    check_sides(square, grouped)
-    assert grouped.particle("a") == grouped.particle("also") and len(grouped.mesh.points) < 500
-
-
 @pytest.mark.parametrize("distance", [1.5e-6, 2.5e-6, 1e-5])
 def test_points_at_the_limit_are_particles_or_refused(distance):
     """What netgen takes for one point is not made one silently."""
@@ -160,20 +150,6 @@ def test_points_at_the_limit_are_particles_or_refused(distance):
 def test_a_shape_far_from_the_origin_is_meshed_alike():
     far = Shape("far", 1e-3, [Segment((x + 1e4, y - 1e4), group="all") for x, y in [(0, 0), (1, 0), (1, 1), (0, 1)]])
     assert mesh_shape(far, 0.1).mesh.area == pytest.approx(1, rel=1e-9)
-
-
-def test_same_shape_same_mesh_in_another_process():
-    code = (
-        "import hashlib, springtune as st; h = [st.Hole.circle(('50 mm', '20 mm'), '8 mm')]; "
-        "g = st.mesh_shape(st.Shape.rectangle('100 mm', '40 mm', holes=h, points={'p': ('9 mm', '9 mm')}), '3 mm'); "
-        "print(hashlib.sha256(g.mesh.points.tobytes() + g.mesh.triangles.tobytes() + str(sorted(g.sides)).encode() "
-        "+ b''.join(e.tobytes() for e in g.sides.values())).hexdigest())"
-    )
-    outs = {
-        subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
-        for _ in range(2)
-    }
-    assert len(outs) == 1
 
 
 @pytest.mark.parametrize(
@@ -285,14 +261,6 @@ def test_squares_and_points_between_particles_come_back(tmp_path, ending):
     write_mesh(tmp_path / f"own.{ending}", grouped)
     found = read_shape(tmp_path / f"own.{ending}")
     assert same(grouped, found) and found.particle("between") is None and len(found.particles("between")) == 0
-
-
-def test_a_unit_is_that_of_all_coordinates(tmp_path):
-    grouped = mesh_shape(plate(), 5e-3)
-    places = {name: 1e3 * place for name, place in grouped.points.items()}
-    large = GroupedMesh(Mesh(1e3 * grouped.mesh.points, grouped.mesh.triangles), grouped.sides, places, grouped.parts)
-    write_mesh(tmp_path / "mm.msh", large)
-    assert same(grouped, st.read_shape(tmp_path / "mm.msh", "1 mm"))
 
 
 @pytest.mark.usefixtures("mesh_library")

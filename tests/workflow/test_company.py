@@ -5,7 +5,6 @@ import random
 
 import h5py
 import pytest
-import xarray as xr
 
 from springtune.studies.kinds import load_study
 from springtune.studies.runs import job, store
@@ -126,33 +125,3 @@ def test_what_was_stored_before_does_not_matter(study, usual, tmp_path):
                 compute(module, only(content, set(part)))
         compute(module, content)
     same(results(tmp_path), usual)
-
-
-@pytest.mark.slow
-def test_company_does_not_matter(study, usual, tmp_path):
-    for module, content in stages(study, tmp_path):
-        for key in () if module.endswith("calibrate") else sorted(set(keys(content))):
-            compute(module, only(content, {key}))
-        compute(module, content)
-    same(results(tmp_path), usual)
-
-
-@pytest.mark.slow
-def test_cores_do_not_matter(run):
-    """Runs of Snakemake: datasets are the same, variable by variable, apart from times."""
-
-    def collected(cores):
-        run.write(f"on{cores}.yaml", STUDY)
-        code, output = run.snakemake(f"on{cores}.yaml", "--cores", cores, "--until", "collect")
-        assert code == 0, output
-        with xr.open_datatree(run.folder / f"results/on{cores}/dataset.nc", engine="h5netcdf", decode_cf=False) as tree:
-            groups = {node.path: node.to_dataset(inherit=False).load() for node in tree.subtree}
-        return {path: group.drop_vars([name for name in group if "seconds" in name]) for path, group in groups.items()}
-
-    one = collected("1")
-    assert len(one) > 4
-    for cores in ("2", "8"):
-        other = collected(cores)
-        assert one.keys() == other.keys()
-        for path, group in one.items():
-            xr.testing.assert_equal(group, other[path])

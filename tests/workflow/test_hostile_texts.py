@@ -7,12 +7,9 @@ import re
 import zipfile
 from html.parser import HTMLParser
 
-import pyarrow.parquet
 import pytest
-from click.testing import CliRunner
 
 import springtune as st
-from springtune.cli import main
 from springtune.studies.output.browse.page import page
 
 from tables import STUDIES
@@ -99,15 +96,3 @@ def test_tables_and_pages_show_them(results):
             assert HOSTILE in [cell for row in csv.reader(file) for cell in row]
     browsed = Tags(page(results / "dataset.nc"))
     assert HOSTILE in browsed.texts and "alert(1)</script>" not in page(results / "dataset.nc")
-
-
-def test_commands_and_exports_have_them(results, tmp_path):
-    info = CliRunner().invoke(main, ["info", str(results)])
-    assert info.exit_code == 0 and info.stdout.startswith(f"{HOSTILE}\n")
-    for ending in ("csv", "parquet"):
-        target = tmp_path / f"shapes.{ending}"
-        done = CliRunner().invoke(main, ["export", str(results), "--group", "shapes", "--to", str(target)])
-        assert done.exit_code == 0, done.output
-    with (tmp_path / "shapes.csv").open() as file:
-        assert {row["source"] for row in csv.DictReader(file)} == {HOSTILE}
-    assert set(pyarrow.parquet.read_table(tmp_path / "shapes.parquet")["source"].to_pylist()) == {HOSTILE}

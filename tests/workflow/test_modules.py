@@ -125,15 +125,3 @@ def test_a_workflow_on_a_host_finds_its_files(others, host):
     """Which Snakemake reads one by one: no folder has them."""
     code, told = others("-n", snakefile=REMOTE, **host)
     assert code == 0 and re.search(r"^springtune_solve +\d", told, re.MULTILINE), told
-
-
-@HOSTED
-@pytest.mark.slow
-def test_a_workflow_on_a_host_runs(others, host):
-    code, told = others(snakefile=REMOTE, **host)
-    assert code == 0 and (others.folder / "told.txt").is_file(), told
-    code, told = others("--report", "report.zip", snakefile=REMOTE, **host)
-    assert code == 0 and (others.folder / "report.zip").is_file(), told
-    # The paper, with the files beside it and the studies that it reads.
-    code, told = others("-n", "springtune_paper", snakefile=REMOTE, **host)
-    assert code == 0 and re.search(r"^springtune_definitions_mesh +\d", told, re.MULTILINE), told

@@ -59,10 +59,6 @@ def test_a_study_uses_all_that_a_package_declares(run):
     assert (run / "results/even/figures/size_left_steel_lift.png").stat().st_size
 
 
-def test_commands_list_what_packages_declare(run, site):
-    assert "for the example's sake (springtune-example)" in python(run, site, "-m", "springtune", "definitions")
-
-
 IN_ENGINE = """
 import springtune as st
 beam, rubber = st.Beam("200 mm", "40 mm"), st.Material("1 MPa", 0.3, density="1000 kg/m^3")
@@ -149,14 +145,6 @@ def test_what_is_broken_is_left_out_by_name_and_nothing_else(bad):
         "mesh type 'ending' of the package 'bad' is left out: away",
     ):
         assert why in told, told
-
-
-def test_a_taken_name_is_refused_with_both_places(bad):
-    (bad / "bad/springs.py").write_text(
-        "from springtune.springs import definition\n@definition('lattice')\ndef lattice(*_):\n    pass\n"
-    )
-    told = python(REPOSITORY, bad, "-m", "springtune", "definitions")
-    assert "'lattice' is springtune.springs.lattice.springs already; choose another name for bad.springs" in told
 
 
 def test_nothing_is_imported_before_it_is_asked_for(bad):

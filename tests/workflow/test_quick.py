@@ -18,7 +18,6 @@ from nbclient import NotebookClient
 
 import springtune as st
 from cf import complaints
-from springtune.studies.output import dataset
 
 from campaigns import Campaign
 
@@ -29,7 +28,8 @@ SCENE = ("beam", "mesh_type", "mesh_size", "material", "load", "definition", "ki
 def tree(run, repository):
     """By its jobs in this process; tests/unit/test_figures.py draws the other figures."""
     content = yaml.safe_load((repository / "config/quick.yaml").read_text())
-    content["outputs"] = ["sensitivity", "size", "deformed", "paraview", "tables", "block"]
+    content["outputs"] = ["size", "paraview", "tables"]
+    del content["samples"]  # tests/unit/test_samples.py has them
     content["stability"]["experiment"].remove("slivers")  # tests/unit/test_stability.py has them
     content["benchmark"]["mesh_size"] = "5 mm"
     run.write("quick.yaml", yaml.safe_dump(content, sort_keys=False))
@@ -125,14 +125,6 @@ def test_checkers_of_conventions_have_nothing_against_it(run, tree):
     assert complaints(run.folder / "results/quick/dataset.nc") == []
 
 
-@pytest.mark.slow
-def test_checkers_of_conventions_have_nothing_against_its_groups(tree, tmp_path):
-    """They look at the root alone, so groups are made roots."""
-    for name, group in tree.children.items():
-        dataset.write(tmp_path / f"{name}.nc", {"/": group.to_dataset()}, tree.attrs)
-        assert complaints(tmp_path / f"{name}.nc") == [], name
-
-
 @pytest.mark.parametrize("mesh_type", ["structured", "braced"])
 def test_fields_are_meshes_in_equilibrium(tree, mesh_type):
     """By UGRID: cells fill the beam, and the springs' forces balance at each particle that nothing else acts on."""
@@ -159,19 +151,6 @@ def test_fields_are_meshes_in_equilibrium(tree, mesh_type):
     axis, size = {"traction": (0, 20e3), "bending": (1, 200.0)}[load]
     right = points[:, 0] >= 0.1 - 1e-9
     assert abs(total[right, axis].sum()) == pytest.approx(size, rel=1e-5)
-
-
-def test_paraview_gets_what_each_particle_is_off_its_reference(run, tree):
-    """Its mean over the loaded side is what the scene is off its reference."""
-    labels = {"beam": "100x20", "mesh_type": "free", "material": "steel", "load": "traction", "definition": "lattice"}
-    path = run.folder / "results/quick/paraview/100x20_free_5mm_steel_traction_lattice_linear.vtu"
-    net, cell = meshio.read(path), tree.sel(labels | {"kinematics": "linear", "mesh_size": 5e-3})
-    right = np.flatnonzero(net.points[:, 0] >= 0.1 - 1e-9)
-    right = right[np.argsort(net.points[right, 1])]
-    mean = np.trapezoid(net.point_data["error"][right, 0], net.points[right, 1]) / 0.02
-    # The reference is interpolated from a grid, within 1e-5 of its displacement.
-    expected = float(cell.reference_displacement)
-    assert mean == pytest.approx(float(cell.displacement) - expected, abs=2e-5 * expected)
 
 
 def test_root_attributes_tell_where_the_data_come_from(tree, run):
@@ -239,15 +218,6 @@ def test_sensitivity_spans_the_asked_range(tree):
     assert curves.best_stiffness.notnull().any() and curves.predicted_stiffness.notnull().any()
 
 
-def test_meshes_open_in_meshio(run, tree):
-    path = run.folder / "results/quick/meshes/100x20_structured_5mm.vtu"
-    mesh = meshio.read(path)
-    assert [block.type for block in mesh.cells] == ["triangle"]
-    assert mesh.points[:, 0].max() == pytest.approx(0.1)
-    counted = tree.particles.sel(beam="100x20", mesh_type="structured", mesh_size=5e-3)
-    assert int(counted) == len(mesh.points)
-
-
 def test_tables_and_figures_are_there(run, tree):
     results = run.folder / "results/quick"
     rows = list(csv.DictReader((results / "tables/table_1.csv").read_text().splitlines()))
@@ -255,10 +225,8 @@ def test_tables_and_figures_are_there(run, tree):
     assert float(rows[0]["printed_displacement_mm"]) == 0.44
     page = (results / "tables/index.html").read_text()
     assert "Table 1" in page and "20 kN fits" in page
-    for stem in ("sensitivity_100x20_free_steel_traction", "size_structured_rubber_traction",
-                 "deformed_structured_steel_compression"):  # fmt: skip
-        for ending in ("png", "pdf"):
-            assert (results / f"figures/{stem}.{ending}").stat().st_size > 5000
+    for ending in ("png", "pdf"):
+        assert (results / f"figures/size_structured_rubber_traction.{ending}").stat().st_size > 5000
 
 
 def test_paraview_has_the_scenes_whose_fields_are_kept(run, tree):

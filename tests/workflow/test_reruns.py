@@ -9,12 +9,10 @@ import os
 import time
 from pathlib import Path
 
-import meshio
 import numpy as np
 import pytest
 import xarray as xr
 
-from springtune.mesh import MESH_TYPES, Mesh
 from springtune.studies.config.messages import StudyError
 from springtune.studies.kinds import load_study
 
@@ -97,66 +95,6 @@ def test_a_force_that_cannot_be_carried_is_a_marked_hole(run):
     assert (root.residual > 1e-10).all()  # exact: the criterion itself
     assert all("last residual" in message for message in root.message.values.ravel())
     assert np.isfinite(root.reference_displacement).all()
-
-
-def test_a_mesh_of_ones_own_is_solved_again_when_its_file_changes(run, monkeypatch):
-    monkeypatch.chdir(run.folder)
-    mesh = MESH_TYPES["free"](0.05, 0.02, 5e-3)
-    path = run.folder / "own.inp"
-
-    def save(mesh):
-        points = np.column_stack([1e3 * mesh.points, np.zeros(len(mesh.points))])
-        meshio.Mesh(points, [("triangle", mesh.triangles)]).write(path)
-
-    text = study("5 mm").replace("mesh_type: structured\n    mesh", "mesh_type: own\n    mesh")
-    files = "mesh_files: {own: [{file: own.inp, unit: 1 mm, beam: small, mesh_size: 5 mm}]}\n"
-    text = text.replace("grids:", f"{files}grids:").replace("[paper, lattice]", "delingette")
-    run.write("own.yaml", text)
-    save(mesh)
-    Campaign("own.yaml").finish("collect")
-    first = dataset(run, "own").to_dataset()
-    assert first.mesh_type.values.tolist() == ["own"] and (first.status == 1).all()
-    assert abs(first.deformation_error.item()) < 0.02
-
-    moved = mesh.points.copy()
-    inside = ((moved > 1e-9) & (moved < [0.05 - 1e-9, 0.02 - 1e-9])).all(axis=1)
-    moved[inside] += 3e-4
-    save(Mesh(moved, mesh.triangles))
-    again = Campaign("own.yaml").finish("collect")
-    assert {name.partition("_")[0] for name in again} == {"mesh", "sensitivity", "solve", "collect"}
-    second = dataset(run, "own").to_dataset()
-    assert second.displacement.item() != first.displacement.item()
-    assert second.displacement.item() == pytest.approx(first.displacement.item(), rel=0.01)
-
-    save(Mesh(2 * mesh.points, mesh.triangles))
-    Campaign("own.yaml").finish("collect")
-    told = (run.folder / "results/own/summary.txt").read_text()
-    assert "scenes, failed: 1 of 1" in told
-    assert "extends over 100 x 40 mm, its beam over 50 x 20 mm; correct the unit or the beam" in told
-    assert "Traceback" not in told
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        (("beam: small", "beem: small"), ["beem", "beam"]),
-        (("170e6 N/m", "170e6 N/mm"), ["170e6 N/mm", "N/m"]),
-        (("50 mm", "-50 mm"), ["length", "-50 mm"]),
-        (("20 kN", "20 mm"), ["force", "20 mm"]),
-        (("mesh_size: [5 mm]", "mesh_size: [50 mm]"), ["mesh_size", "50 mm"]),
-        (("mesh_size: [5 mm]", "mesh_size: []"), ["mesh_size"]),
-        (("mesh_type: structured\n    mesh", "mesh_type: hexagonal\n    mesh"), ["hexagonal", "structured"]),
-    ],
-    ids=["misspelt key", "stiffness 1000 times too large", "negative", "dimension", "mesh size", "empty", "mesh type"],
-)
-def test_bad_input_is_one_message(run, change, words):
-    text = study("5 mm")
-    assert change[0] in text
-    run.write("bad.yaml", text.replace(*change))
-    with pytest.raises(StudyError) as caught:
-        load_study(run.folder / "bad.yaml")
-    message = str(caught.value)
-    assert "bad.yaml" in message and all(word in message for word in words)
 
 
 def test_bad_input_ends_a_run_with_its_message_and_nothing_written(run):
