@@ -24,6 +24,8 @@ STAGES = {
     "curve": "sensitivity",
     "linear": "solve",
     "nonlinear": "solve",
+    "fields": "solve",
+    "finite": "reference",
     "contrast": "stability",
     "slivers": "stability",
 }
