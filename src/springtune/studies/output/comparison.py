@@ -14,9 +14,11 @@ import xarray as xr
 
 from springtune.problem.quantities import nearest
 
-from .alignment import joined, on_common_axes
 from .dataset import NOT_REQUESTED, flag_words, is_flagged
 from .text import NUMBER, from_json, without_numbers
+
+SAME_NUMBER = 1e-9
+"""Relative difference below which two numbers are one label."""
 
 RELATIVE = 1e-6
 """Default relative tolerance."""
@@ -136,7 +138,7 @@ def compare(
 ) -> Comparison:
     """Compare two datasets by label; of each variable so many changes are listed.
 
-    Numeric labels match within `alignment.SAME_NUMBER`; NaN equals NaN. Values of cells that one study does not request
+    Numeric labels match within `SAME_NUMBER`; NaN equals NaN. Values of cells that one study does not request
     are not compared. Numbers inside texts are compared as numbers. `MEASURED` is left out.
 
     Examples
@@ -149,7 +151,8 @@ def compare(
     >>> [(row.variable, row.labels["beam"], row.after / row.before) for row in compare(tree, other).changes]
     [('stiffness', '100x20', 2.0)]
     """
-    nodes = [{node.path: node.to_dataset() for node in tree.subtree} for tree in on_common_axes([before, after])]
+    nodes = [{node.path: node.to_dataset() for node in tree.subtree} for tree in (before, after)]
+    nodes[1] |= {path: _spelt(data, nodes[0][path]) for path, data in nodes[1].items() if path in nodes[0]}
     held = sorted({str(name) for side in nodes for data in side.values() for name in data.variables})
     for pattern in ignored:
         if not any(fnmatchcase(name, pattern) for name in held):
@@ -177,6 +180,21 @@ def compare(
         {name: (old, new) for name, (old, new) in told.items() if old != new},
         list(difflib.unified_diff(*texts, "before", "after", lineterm="")),
     )
+
+
+def _spelt(data: xr.Dataset, like: xr.Dataset) -> xr.Dataset:
+    """A dataset with its numeric labels as in another one, where they are the same but for rounding."""
+    for name in data.indexes.keys() & like.indexes.keys():
+        labels, known = data.indexes[name], like.indexes[name].sort_values()
+        for index in (labels, known):
+            if not index.is_unique:
+                twice = index[index.duplicated()][0]
+                raise ValueError(f"dimension '{name}' has the label {twice} twice; run the study again")
+        if labels.dtype.kind in "iuf" and known.dtype.kind in "iuf" and len(known):
+            places = known.get_indexer(labels, "nearest", tolerance=SAME_NUMBER * np.abs(labels))
+            spelt = np.where(places < 0, labels, known.to_numpy()[places])
+            data = data.assign_coords({name: (name, spelt, data[name].attrs)})
+    return data
 
 
 def _only(sides: Sequence[Collection[str]]) -> tuple[list[str], ...]:
@@ -210,10 +228,11 @@ class _Group:
 
     def compared(self, left_out: Collection[str]) -> GroupChanges:
         """Compare labels, cells and all variables but some."""
-        sizes = {str(name): len(joined(str(name), self.given)) for one in self.pair for name in one.sizes}
+        sizes = {str(name): size for one in self.pair for name, size in one.sizes.items()}
         units, labels = {}, {}
         for name in sizes:
             axes = [data[name] for data in self.pair if name in data.dims]
+            sizes[name] = len(axes[0].to_index().union(axes[-1].to_index(), sort=False))
             units[name] = str(axes[0].attrs.get("units", "1"))
             if len(axes) == 2 and all(data.sizes[name] and name in data.indexes for data in self.given):
                 one, other = (axis.to_index() for axis in axes)
