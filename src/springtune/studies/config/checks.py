@@ -44,10 +44,9 @@ def check_known(
 
 
 def check_beam_material(problems: Problems, path: Sequence[Key], name: str, config: StudyConfig) -> None:
-    """Check that a beam material is declared and isotropic."""
-    check_known(problems, path, "material", name, config.materials)
-    given = config.materials.get(name)
-    if given and given.young_modulus is None and given.uniaxial_test is None:
+    """Check that a beam material is isotropic."""
+    given = config.materials[name]
+    if given.young_modulus is None and given.uniaxial_test is None:
         problems.add(
             path,
             f"'{name}' is anisotropic, and beams are of isotropic materials, as their references are; put the sheet "
@@ -57,15 +56,14 @@ def check_beam_material(problems: Problems, path: Sequence[Key], name: str, conf
 
 def check_density(config: StudyConfig, name: str, path: Sequence[Key], problems: Problems) -> None:
     """Check that a declared material has a density."""
-    if name in config.materials and config.materials[name].density is None:
+    if config.materials[name].density is None:
         problems.add(path, f"'{name}' has no density; add one to it under materials, such as density: 7850 kg/m^3")
 
 
 def check_scene(
     problems: Problems, path: Sequence[Key], scene: Any, config: StudyConfig, able: Callable[[str], bool], why: str
 ) -> None:
-    """Check that the beam of a scene is declared, its material, too, with a density, and that its load is able."""
-    check_known(problems, (*path, "beam"), "beam", scene.beam, config.beams)
+    """Check that the material of a scene is isotropic with a density, and that its load is able."""
     check_beam_material(problems, (*path, "material"), scene.material, config)
     check_density(config, scene.material, (*path, "material"), problems)
     if not able(scene.load):
@@ -83,42 +81,21 @@ def stated_rows(config: StudyConfig) -> list[StatedStiffness]:
 
 
 def check_names(config: StudyConfig, problems: Problems) -> None:
-    """Check the names that refer to declared sections."""
-
-    def known(path: Sequence[Key], beams: Iterable[str] = (), mesh_types: Iterable[str] = ()) -> None:
-        for beam in beams:
-            check_known(problems, (*path, "beam"), "beam", beam, config.beams)
-        for mesh_type in mesh_types:
-            names = mesh_type_names(config)
-            check_known(problems, (*path, "mesh_type"), "mesh type", mesh_type, names, "mesh_files")
-
-    for name, rows in (config.mesh_files or {}).items():
-        if name in MESH_TYPES:
-            problems.add(("mesh_files", name), f"'{name}' is a mesh type that is made; rename yours")
-        for number, one in enumerate(rows):
-            known(("mesh_files", name, number), [one.beam])
+    """Check what declared sections are used for."""
     for name, grid in config.grids.items():
         path = ("grids", name)
-        known(path, grid.beam, grid.mesh_type)
         for material in grid.material:
             check_beam_material(problems, (*path, "material"), material, config)
-            plane = config.materials[material].plane if material in config.materials else None
-            if plane == "strain" and 0.5 in (grid.poisson_ratio or ()):
+            if config.materials[material].plane == "strain" and 0.5 in (grid.poisson_ratio or ()):
                 what = f"material '{material}' is in plane strain, and this ratio is {INCOMPRESSIBLE}"
                 problems.add((*path, "poisson_ratio"), what)
         if isinstance(grid.force, dict):
-            for beam in grid.force:
-                check_known(problems, (*path, "force", beam), "beam", beam, config.beams)
             for beam in dict.fromkeys(grid.beam):
                 if beam not in grid.force:
                     problems.add((*path, "force"), f"no force for beam '{beam}'; add '{beam}: <force>'")
-    if config.definitions.calibrated:
-        known(("definitions", "calibrated"), [config.definitions.calibrated.beam])
     seen = set()
     for number, row in enumerate(stated_rows(config)):
         where = ("definitions", "paper", "stiffness", number)
-        check_known(problems, (*where, "material"), "material", row.material, config.materials)
-        known(where, mesh_types=[row.mesh_type])
         if (row.mesh_type, row.material) in seen:
             problems.add(where, f"a second stiffness for {row.mesh_type} meshes of {row.material}; remove one")
         seen.add((row.mesh_type, row.material))

@@ -14,6 +14,7 @@ from pydantic import (
     GetJsonSchemaHandler,
     Tag,
     ValidationError,
+    ValidationInfo,
     ValidatorFunctionWrapHandler,
     model_validator,
 )
@@ -126,9 +127,24 @@ PoissonRatio = Annotated[float, POISSON_RATIO]
 Ratio = Annotated[float, number("a number above 0", 0, math.inf, above=True)]
 Terms = Annotated[int, number(f"a whole number from 1 to {MOST_TERMS}", 1, MOST_TERMS, whole=True)]
 Points = Annotated[int, number(f"a whole number from 2 to {MOST_POINTS}, such as 61", 2, MOST_POINTS, whole=True)]
-# Mesh types, beams and materials may be names that a study declares: a type takes any text, `checks` looks it up.
+
+
+def declared(what: str, section: str, beside: Collection[str] = ()) -> AfterValidator:
+    """Annotation of a name that a section of the study declares; the context of validation has its sections."""
+
+    def known(name: str, info: ValidationInfo) -> str:
+        names = () if info.context is None else info.context.get(section, ())
+        if info.context is not None and names is not None and name not in names and name not in beside:
+            raise refuse(f"unknown {what} '{name}'; {nearest(name, [*beside, *names])}; or declare it under {section}")
+        return name
+
+    return AfterValidator(known)
+
+
 MeshType = Annotated[
-    str, Scalar(str, {"type": "string", "examples": list(MESH_TYPES)}, "a mesh type such as 'structured'")
+    str,
+    Scalar(str, {"type": "string", "examples": list(MESH_TYPES)}, "a mesh type such as 'structured'"),
+    declared("mesh type", "mesh_files", MESH_TYPES),
 ]
 MadeType = Annotated[str, one_of("mesh type", MESH_TYPES)]
 Load = Annotated[str, one_of("load", LOADS)]
@@ -138,8 +154,10 @@ Kinematics = Annotated[str, one_of("kinematics", KINEMATICS)]
 DefinitionName = Annotated[str, one_of("definition", DEFINITIONS)]
 Text = Annotated[str, Scalar(str, {"type": "string", "minLength": 1}, "a text")]
 FileName = Annotated[str, Scalar(str, {"type": "string", "minLength": 1}, "the path of a file")]
-BeamName = Annotated[str, Scalar(str, {"type": "string"}, "the name of a beam")]
-MaterialName = Annotated[str, Scalar(str, {"type": "string"}, "the name of a material")]
+BeamName = Annotated[str, Scalar(str, {"type": "string"}, "the name of a beam"), declared("beam", "beams")]
+MaterialName = Annotated[
+    str, Scalar(str, {"type": "string"}, "the name of a material"), declared("material", "materials")
+]
 
 
 class Wrapped:
@@ -338,7 +356,7 @@ def _given(forces: dict[str, list[float]]) -> dict[str, list[float]]:
 
 
 BeamForces = Annotated[
-    Annotated[Forces, Tag("all")] | Annotated[dict[str, Forces], AfterValidator(_given), Tag("each")],
+    Annotated[Forces, Tag("all")] | Annotated[dict[BeamName, Forces], AfterValidator(_given), Tag("each")],
     Discriminator(lambda value: "each" if isinstance(value, dict) and not RANGE_KEYS & value.keys() else "all"),
     Words("a force such as '400 kN', a list, or a range; or these for each beam"),
 ]

@@ -25,7 +25,10 @@ def load(path: str | Path, kinds: tuple[Kind, ...], beside: Path | None = None) 
     if content is None:
         problems.stop_at((), f"the file is empty; give the keys {', '.join(model.model_fields)}")
     add_rows(content, problems)
-    config = validated(model, content, problems)
+    # Names that sections refer to; of a section that is no mapping, whose error is enough, nothing is known.
+    given = content.items() if isinstance(content, dict) else ()
+    sections = {key: one if isinstance(one, dict) else None for key, one in given}
+    config = validated(model, content, problems, context=sections)
     check_names(config, problems)
     problems.stop()
     check_scenes(config, problems)

@@ -122,10 +122,12 @@ def part_of(content: Any, path: Iterable[Key]) -> tuple[tuple[Key, ...], Any]:
     return tuple(found), content
 
 
-def validated(model: "type[Model]", content: Any, problems: Problems, line: int = 0) -> "Model":
+def validated(
+    model: "type[Model]", content: Any, problems: Problems, line: int = 0, context: Mapping[str, Any] | None = None
+) -> "Model":
     """Return the model of a content; each error of pydantic is a problem with place, value and remedy."""
     try:
-        return model.model_validate(content)
+        return model.model_validate(content, context=context)
     except ValidationError as error:
         for details in error.errors(include_url=False):
             # pydantic's path has steps that the file has not: branches of a union, the item of a single value.

@@ -6,7 +6,7 @@ from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self
 
-from pydantic import BeforeValidator, ConfigDict, Field, create_model, model_validator
+from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, create_model, model_validator
 
 from springtune.mesh.types import MESH_TYPES
 from springtune.problem.loads import LOADS
@@ -465,6 +465,13 @@ class GridConfig(Section):
         return self
 
 
+def _own_names(files: dict[str, Any]) -> dict[str, Any]:
+    for name in files:
+        if name in MESH_TYPES:
+            raise refuse(f"'{name}' is a mesh type that is made; rename yours", name)
+    return files
+
+
 class StudyConfig(Section):
     """A study."""
 
@@ -483,7 +490,7 @@ class StudyConfig(Section):
     sensitivity: SensitivityConfig = Field(default_factory=SensitivityConfig)
     """Range of stiffness of the sensitivity curves."""
 
-    mesh_files: Annotated[dict[str, list[MeshFileConfig]], Named("mesh type")] | None = None
+    mesh_files: Annotated[dict[str, list[MeshFileConfig]], Named("mesh type"), AfterValidator(_own_names)] | None = None
     """Your own mesh types: for each a list of files, one for each beam and mesh size."""
 
     outputs: list[str] = Field([])

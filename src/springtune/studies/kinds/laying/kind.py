@@ -9,7 +9,7 @@ from springtune.problem.materials import Material
 from springtune.springs.base import DEFINITIONS
 
 from ...config import fields
-from ...config.checks import check_beam_material, check_for_triangles, check_known, check_particles, check_product
+from ...config.checks import check_beam_material, check_for_triangles, check_particles, check_product
 from ...config.fields import OneOrMore, Section, default, number, one_of, optional
 from ...config.kind import Kind
 from ...runs.keys import definition_key, material_key, mesh_type_key
@@ -109,7 +109,6 @@ class Laying:
 
 
 def _check(config, problems):
-    check_known(problems, ("laying", "strip"), "beam", config.laying.strip, config.beams)
     for key in ("material", "support"):
         check_beam_material(problems, ("laying", key), getattr(config.laying, key), config)
     check_for_triangles(config.laying.definition, ("laying", "definition"), problems)

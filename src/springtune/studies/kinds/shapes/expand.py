@@ -19,7 +19,7 @@ from springtune.problem.quantities import nearest
 from springtune.problem.shapes import Hole, LoadCase, Pressure, Quantity, Segment, Shape, Support, Traction
 from springtune.springs.base import DEFINITIONS
 
-from ...config.checks import FEWER, check_density, check_for_triangles, check_known, check_particles
+from ...config.checks import FEWER, check_density, check_for_triangles, check_particles
 from ...config.expand import file_fault
 from .outputs import MADE, OWN_FILE, mesh_name
 
@@ -193,7 +193,6 @@ def check(config, problems):
     for name, shape in (config.shapes or {}).items():
         path = "shapes", name
         for part, material in shape.parts.items():
-            check_known(problems, (*path, "parts", part), "material", material, config.materials)
             if any(any(case.gravity) for case in shape.loads.values()):
                 check_density(config, material, (*path, "parts", part), problems)
         if shape.file is None:
@@ -333,15 +332,11 @@ def _check_stems(config, problems):
 
 
 def _check_grid(config, grid, path, problems):
-    for material in grid.material:
-        check_known(problems, (*path, "material"), "material", material, config.materials)
     check_for_triangles(grid.definition, (*path, "definition"), problems)
     for name in grid.definition:
         if DEFINITIONS[name].uniaxial:
             problems.add((*path, "definition"), f"'{name}' is for beams that are stretched alone; choose another one")
-    for name in grid.shape:
-        check_known(problems, (*path, "shape"), "shape", name, config.shapes)
-    shapes = {name: config.shapes[name] for name in grid.shape if name in config.shapes}
+    shapes = {name: config.shapes[name] for name in grid.shape}
     weighs = False
     for name, shape in shapes.items():
         for load in grid.load or shape.loads:

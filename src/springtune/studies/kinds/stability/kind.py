@@ -8,7 +8,7 @@ from pydantic import Field
 from springtune.mesh.types import MESH_TYPES
 
 from ...config import fields
-from ...config.checks import check_beam_material, check_density, check_for_triangles, check_known, check_particles
+from ...config.checks import check_beam_material, check_density, check_for_triangles, check_particles
 from ...config.fields import OneOrMore, Section, default, one_of, optional
 from ...config.kind import Kind
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key
@@ -49,7 +49,6 @@ class StabilityConfig(Section):
 
 def _check(config, problems):
     section = config.stability
-    check_known(problems, ("stability", "beam"), "beam", section.beam, config.beams)
     check_beam_material(problems, ("stability", "material"), section.material, config)
     check_density(config, section.material, ("stability", "material"), problems)
     check_for_triangles(section.definition, ("stability", "definition"), problems)
