@@ -93,119 +93,81 @@ def diff(
 
 def comparison_text(found: "Comparison", paths: Sequence[Path], most: int | None = ROWS, config: bool = False) -> str:
     """Comparison as text."""
-    width = max(map(len, COMPARED)) + 1
-    head = [f"{f'{side}:':{width}} {path}" for side, path in zip(COMPARED, paths)]
-    parts = [[*head, _summary(found)]]
-    for group in found.groups:
-        parts += _of_group(group, most)
-    if changes := found.changes:
-        parts.append(_changes(found, changes, most))
+    groups = {group.name: group for group in found.groups}
+    changed = [(group.name, one) for group in found.groups for one in (*group.flags, *group.values) if one.changed]
+    parts = [[f"{f'{side}:':7} {path}" for side, path in zip(COMPARED, paths)]]
+    parts[0].append(_summary(found, sum(one.changed for _, one in changed)))
+    parts += [part for group in found.groups for part in _alone(group, most)]
+    if changed:
+        counts = [["  variable", "cells", "changed", "largest change"]]
+        for name, one in changed:
+            largest = next((row for row in one.rows if math.isfinite(row.difference)), one.rows[0])
+            counts.append(
+                [f"  {variable_name(name, one.name)}", str(one.compared), str(one.changed), _difference(largest)]
+            )
+        flags = [row for group in found.groups for one in group.flags for row in one.rows]
+        rows = [
+            [
+                f"  {variable_name(row.group, row.variable)}",
+                *(_value(row.before), _value(row.after), _difference(row)),
+                _place(groups[row.group], row.labels),
+            ]
+            for row in [*flags[:most], *found.changes[:most]]
+        ]
+        parts.append(["values that changed", *aligned(counts, 0, (1, 2)).splitlines()])
+        table = aligned([["  variable", *COMPARED, "change", "at"], *rows], 0, (1, 2, 3)).splitlines()
+        more = _more(sum(one.changed for _, one in changed) - len(rows))
+        parts.append(["the largest changes, measured by the tolerance", *table, *more])
     if found.attributes or found.config:
-        parts.append(_told(found, config))
+        told = [[f"  {name}", f"{_short(old)} -> {_short(new)}"] for name, (old, new) in found.attributes.items()]
+        parts.append(["told, and no difference of results", *aligned(told, 0).splitlines()])
+        if found.config:
+            less, added = (sum(line.startswith(sign) for line in found.config[2:]) for sign in "-+")
+            shows = "" if config else "; --config shows them"
+            parts[-1].append(f"  the studies' files: {less} lines less, {added} more{shows}")
+            parts[-1] += found.config if config else []
     return paragraphs(parts)
 
 
-def _summary(found: "Comparison") -> str:
+def _summary(found: "Comparison", changed: int) -> str:
     """Summary in one line."""
     groups = found.groups
     said = [f"group {path} only {side}" for side, own in zip(COMPARED, found.alone) for path in own]
     for number, side in enumerate(COMPARED):
-        alone = [(group.cells[number].count, group.name) for group in groups]
-        said += [f"{count} {_cells(name)} only {side}" for count, name in alone if count]
-    counts = {
-        "statuses changed": sum(one.changed for group in groups for one in group.flags),
-        "values changed": sum(one.changed for group in groups for one in group.values),
-        "variables are not in both, or cannot be compared": sum(
-            len(group.unlike) + sum(map(len, group.variables)) for group in groups
-        ),
-    }
-    said += [f"{count} {what}" for what, count in counts.items() if count]
-    result = f"different: {', '.join(said) or 'labels'}" if found.different else "the same"
-    compared = sum(one.compared for group in groups for one in (*group.flags, *group.values))
-    return f"{result}{';' if found.different else ':'} {compared} values compared"
+        said += [f"{g.cells[number].count} {_cells(g.name)} only {side}" for g in groups if g.cells[number].count]
+    unlike = sum(len(group.unlike) + sum(map(len, group.variables)) for group in groups)
+    said += [f"{changed} values changed"] if changed else []
+    said += [f"{unlike} variables are not in both, or cannot be compared"] if unlike else []
+    result = f"different: {', '.join(said) or 'labels'};" if found.different else "the same:"
+    return f"{result} {sum(one.compared for group in groups for one in (*group.flags, *group.values))} values compared"
 
 
 def _cells(group: str) -> str:
     return "scenes" if group == "/" else f"cells of {group}"
 
 
-def _of_group(group: "GroupChanges", most: int | None) -> Iterator[list[str]]:
-    """Paragraphs on the labels, cells, variables and statuses of a group."""
-    lines = []
+def _alone(group: "GroupChanges", most: int | None) -> Iterator[list[str]]:
+    """Paragraphs on labels, cells and variables of a group that only one dataset has."""
+    labels = []
     for name, both in group.labels.items():
         for side, own in zip(COMPARED, both):
-            if own:
-                said = ", ".join(_place(group, {name: label}) for label in own[:most])
-                more = f", and {len(own) - most} more" if most and len(own) > most else ""
-                lines.append(f"  {name} only {side}: {said}{more}")
-    if lines:
-        yield [f"labels of {group.name}", *lines]
+            said = ", ".join(_place(group, {name: label}) for label in own[:most])
+            more = f", and {len(own) - most} more" if most and len(own) > most else ""
+            labels += [f"  {name} only {side}: {said}{more}"] if own else []
+    if labels:
+        yield [f"labels of {group.name}", *labels]
     for side, alone in zip(COMPARED, group.cells):
         if alone.count:
-            lines = [f"  {_place(group, labels)}" for labels in alone.rows]
+            lines = [f"  {_place(group, one)}" for one in alone.rows]
             yield [f"{_cells(group.name)} only {side}: {alone.count}", *lines, *_more(alone.count - len(lines))]
-    lines = [f"  {name} only {side}" for side, own in zip(COMPARED, group.variables) for name in own]
-    lines += [f"  {name} {why}" for name, why in group.unlike.items()]
-    if lines:
-        yield [f"variables of {group.name}", *lines]
-    for one in group.flags:
-        if one.changed:
-            rows = [
-                (f"  {_place(group, row.labels) or 'all'}", f"{_value(row.before)} -> {_value(row.after)}")
-                for row in one.rows
-            ]
-            yield [
-                f"{variable_name(group.name, one.name)} changed: {one.changed} of {one.compared}",
-                *aligned(rows, 0).splitlines(),
-                *_more(one.changed - len(rows)),
-            ]
+    variables = [f"  {name} only {side}" for side, own in zip(COMPARED, group.variables) for name in own]
+    if variables or group.unlike:
+        yield [f"variables of {group.name}", *variables, *(f"  {name} {why}" for name, why in group.unlike.items())]
 
 
 def _place(group: "GroupChanges", labels: "Mapping[str, str | float]") -> str:
     """Labels of dimensions with several labels, for readers."""
     return cell_text({name: label for name, label in labels.items() if group.sizes[name] > 1}, group.units)
-
-
-def _changes(found: "Comparison", changes: "list[Change]", most: int | None) -> list[str]:
-    """Number of changes by variable, and the largest changes."""
-    counts = [["  variable", "cells", "changed", "largest change"]]
-    for group in found.groups:
-        for one in group.values:
-            if one.changed:
-                largest = next((row for row in one.rows if math.isfinite(row.difference)), one.rows[0])
-                counted = [str(one.compared), str(one.changed), _difference(largest)]
-                counts.append([f"  {variable_name(group.name, one.name)}", *counted])
-    axes = {group.name: group for group in found.groups}
-    rows = [
-        [
-            f"  {variable_name(row.group, row.variable)}",
-            *(_value(row.before), _value(row.after), _difference(row)),
-            _place(axes[row.group], row.labels),
-        ]
-        for row in changes[:most]
-    ]
-    total = sum(one.changed for group in found.groups for one in group.values)
-    return [
-        "values that changed",
-        *aligned(counts, 0, (1, 2)).splitlines(),
-        "",
-        "the largest changes, measured by the tolerance",
-        *aligned([["  variable", *COMPARED, "change", "at"], *rows], 0, (1, 2, 3)).splitlines(),
-        *_more(total - len(rows)),
-    ]
-
-
-def _told(found: "Comparison", config: bool) -> list[str]:
-    """Differences of attributes and of the studies' files."""
-    lines = ["told, and no difference of results"]
-    rows = [[f"  {name}", f"{_short(old)} -> {_short(new)}"] for name, (old, new) in found.attributes.items()]
-    lines += aligned(rows, 0).splitlines()
-    if found.config:
-        less, more = (sum(line.startswith(sign) for line in found.config[2:]) for sign in "-+")
-        told = "" if config else "; --config shows them"
-        lines.append(f"  the studies' files: {less} lines less, {more} more{told}")
-        lines += found.config if config else []
-    return lines
 
 
 def _short(text: str) -> str:

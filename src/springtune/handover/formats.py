@@ -4,7 +4,7 @@ import csv
 import io
 import json
 import warnings
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack, redirect_stderr, redirect_stdout
 from dataclasses import replace
 from pathlib import Path
@@ -53,10 +53,6 @@ ARRAYS = {
 
 CELL_ARRAYS = {3: "triangles", 4: "quads"}
 """Arrays that cells stand in, by their corners."""
-
-COUNTED = {"particles": "points", "springs": "springs", "triangles": "triangles", "quads": "quads"}
-"""Arrays by what the header of a net calls their lengths."""
-
 
 Read = tuple[dict[str, np.ndarray], Iterable[Terms], dict[str, Any]]
 """Content of a file: arrays by the names of `ARRAYS`, energies and header."""
@@ -113,34 +109,26 @@ def read(path: str | Path) -> Net:
 
 def _checked(arrays: dict[str, np.ndarray], energies: Iterable[Terms], header: dict[str, Any]) -> Net:
     """Net whose arrays fit each other."""
-    energies = tuple(energies)
+    energies, rows = tuple(energies), _counts(header)
     for name, about in ARRAYS.items():
         if name in arrays:
-            array: np.ndarray = np.ascontiguousarray(arrays[name], dtype=about.kind)
-            arrays[name] = array
-            if array.shape[1:] != ((about.columns,) if about.columns else ()) or not array.ndim:
-                raise ValueError(f"{name} have the shape {array.shape}")
+            array = arrays[name] = np.ascontiguousarray(arrays[name], dtype=about.kind)
+            count = rows.setdefault(about.of or name, len(array))
+            wanted = (count, about.columns) if about.columns else (count,)
+            if array.shape != wanted:
+                raise ValueError(f"{name} of shape {array.shape} in the place of {wanted}")
+            if about.kind is np.int64 and array.size and not (0 <= array.min() and array.max() < rows["points"]):
+                raise ValueError(f"{name} of particles that it does not have")
         elif name != "masses":
             raise ValueError(f"it has no {name}")
+    if any(values.shape[:1] != (len(terms.cells),) for terms in energies for values in terms.values.values()):
+        raise ValueError("its terms are not as many as cells")
     numbers = [array for name, array in arrays.items() if ARRAYS[name].kind is float]
     numbers += [values for terms in energies for values in terms.values.values()]
     if not all(np.isfinite(array).all() for array in numbers):
         raise ValueError("some of its numbers are not finite")
-    for terms in energies:
-        if any(len(values) != len(terms.cells) for values in terms.values.values()):
-            raise ValueError(f"{terms.kind} terms are not as many as cells")
-    count = len(arrays["points"])
-    for name, about in ARRAYS.items():
-        if about.of and name in arrays and len(arrays[name]) != len(arrays[about.of]):
-            raise ValueError(f"{len(arrays[name])} {name} for {len(arrays[about.of])}")
-    for name in ("springs", "triangles", "quads"):
-        if len(arrays[name]) and not (0 <= arrays[name].min() and arrays[name].max() < count):
-            raise ValueError(f"{name} of particles that it does not have")
     if not isinstance(header.get("thickness"), float):
         raise ValueError("its header has no thickness")
-    for said, length in _counts(header).items():
-        if len(arrays[COUNTED[said]]) != length:
-            raise ValueError(f"{len(arrays[COUNTED[said]])} {said}, and its header says {length}")
     parts: dict[str, Any] = {"masses": None} | arrays
     return Net(**parts, energies=energies, thickness=header["thickness"], header=header)
 
@@ -150,28 +138,26 @@ def arrays_of(net: Net) -> dict[str, np.ndarray]:
     return {name: getattr(net, name) for name in ARRAYS if getattr(net, name) is not None}
 
 
-def _counts(header: Mapping[str, Any]) -> dict[str, Any]:
-    """Numbers of particles, springs and cells by the header; a user's own header may lack them."""
-    mesh = header.get("mesh")
-    return {name: mesh[name] for name in COUNTED if name in mesh} if isinstance(mesh, dict) else {}
+def _counts(header: Mapping[str, Any]) -> dict[str, int]:
+    """Rows of arrays by the header; a user's own header may lack them."""
+    mesh = header.get("mesh") or {}
+    said = {"points": "particles", "springs": "springs", "triangles": "triangles", "quads": "quads"}
+    return {name: mesh[word] for name, word in said.items() if word in mesh}
 
 
 # -- tables of cells: the terms of their energies, column by column ------------------------------------------------
 
 
-def _terms(cells: np.ndarray, columns: Mapping[str, np.ndarray]) -> Iterable[Terms]:
-    """Terms of the columns of cells."""
+def _terms(cells: np.ndarray, columns: Mapping[str, Any]) -> Iterable[Terms]:
+    """Terms of the columns of cells, such as ``area_modulus``."""
     for kind, names in VALUES.items():
-        found = {name: columns[f"{kind}_{name}"] for name in names if f"{kind}_{name}" in columns}
+        found = {
+            name: np.ascontiguousarray(columns[full], float) for name in names if (full := f"{kind}_{name}") in columns
+        }
         if found and len(found) < len(names):
             raise ValueError(f"{kind} terms without {', '.join(sorted(set(names) - set(found)))}")
         if found:
-            yield _terms_of(kind, cells, found)
-
-
-def _terms_of(kind: str, cells: np.ndarray, values: Mapping[str, Any]) -> Terms:
-    """Terms of all values of a kind."""
-    return Terms(kind, cells, {name: np.ascontiguousarray(values[name], float) for name in VALUES[kind]})
+            yield Terms(kind, cells, found)
 
 
 def _by_corners(energies: Iterable[Terms]) -> dict[int, dict[str, np.ndarray]]:
@@ -185,8 +171,31 @@ def _by_corners(energies: Iterable[Terms]) -> dict[int, dict[str, np.ndarray]]:
 
 # -- CSV -----------------------------------------------------------------------------------------------------------
 
-PARTICLE_COLUMNS = ("points", "masses", "held", "forces")
-SPRING_COLUMNS = ("springs", "rest_lengths", "stiffness")
+
+Columns = dict[str, tuple[Sequence[str], str]]
+"""Titles of the columns of arrays in a table, and their unit."""
+
+
+def _of_terms(corners: int) -> Columns:
+    """Columns of all values of terms, one for each corner where corners have their own."""
+    ends = {False: [""], True: [f"_{corner}" for corner in "abcd"[:corners]]}
+    return {
+        f"{kind}_{name}": ([f"{kind}_{name}{end}" for end in ends[name in OF_CORNERS]], unit)
+        for kind, units in VALUES.items()
+        for name, unit in units.items()
+    }
+
+
+def _of_arrays(*names: str) -> Columns:
+    return {name: (ARRAYS[name].titles, ARRAYS[name].unit) for name in names}
+
+
+TABLES = {
+    "": _of_arrays("springs", "rest_lengths", "stiffness"),
+    "particles": _of_arrays("points", "masses", "held", "forces"),
+    "triangles": _of_arrays("triangles") | _of_terms(3),
+    "quads": _of_arrays("quads") | _of_terms(4),
+}
 """Arrays that stand beside each other in a table."""
 
 
@@ -196,12 +205,11 @@ def companions(path: Path) -> dict[str, Path]:
 
 
 def _write_csv(path: Path, net: Net) -> list[Path]:
-    arrays, others = arrays_of(net), companions(path)
-    tables = {others["particles"]: _table(arrays, PARTICLE_COLUMNS)}
-    terms = _by_corners(net.energies)
+    arrays, others, terms = arrays_of(net), companions(path), _by_corners(net.energies)
+    tables = {others["particles"]: _table(arrays, TABLES["particles"])}
     for count, name in CELL_ARRAYS.items():
         if len(arrays[name]):
-            tables[others[name]] = _table(arrays, (name,)) | _corner_columns(terms.get(count, {}), count)
+            tables[others[name]] = _table(arrays | terms.get(count, {}), TABLES[name])
     said = [f"# springs of a network; particles are counted from 0, and stand in {shown(others['particles'].name)}"]
     said += [
         f"# cells of {count} corners, and what energies they have, stand in {shown(others[name].name)}"
@@ -210,7 +218,7 @@ def _write_csv(path: Path, net: Net) -> list[Path]:
     ]
     said += [f"# {json_line(line)}" for line in json.dumps(net.header, indent=1, ensure_ascii=False).split("\n")]
     texts = {other: _csv_text(table) for other, table in tables.items()}
-    texts[path] = "\n".join([*said, ""]) + _csv_text(_table(arrays, SPRING_COLUMNS))
+    texts[path] = "\n".join([*said, ""]) + _csv_text(_table(arrays, TABLES[""]))
     _write_all(texts)
     for other in set(others.values()) - set(tables):
         other.unlink(missing_ok=True)  # left by another net
@@ -224,30 +232,25 @@ def _write_all(texts: Mapping[Path, str]) -> None:
             unfinished.enter_context(replacing(one)).write_text(text, encoding="utf-8")
 
 
-def _titled(titles: Iterable[str], unit: str, values: np.ndarray) -> dict[str, np.ndarray]:
-    """Columns of an array by title."""
-    ending = f" [{unit}]" if unit else ""
-    return {f"{title}{ending}": column for title, column in zip(titles, values.reshape(len(values), -1).T)}
-
-
-def _table(arrays: Mapping[str, np.ndarray], names: Iterable[str]) -> dict[str, np.ndarray]:
-    """Columns of arrays by title."""
+def _table(arrays: Mapping[str, np.ndarray], about: Columns) -> dict[str, np.ndarray]:
+    """Columns of arrays by title, with their units."""
     table: dict[str, np.ndarray] = {}
-    for name in names:
+    for name, (titles, unit) in about.items():
         if name in arrays:
             values = arrays[name].astype(int) if arrays[name].dtype == bool else arrays[name]
-            table |= _titled(ARRAYS[name].titles, ARRAYS[name].unit, values)
+            heads = [f"{title} [{unit}]" if unit else title for title in titles]
+            table |= dict(zip(heads, values.reshape(len(values), -1).T))
     return table
 
 
-def _corner_columns(columns: Mapping[str, np.ndarray], count: int) -> dict[str, np.ndarray]:
-    """Columns of terms by title, one for each corner where corners have their own."""
-    table: dict[str, np.ndarray] = {}
-    for name, values in columns.items():
-        kind, _, value = name.partition("_")
-        titles = [f"{name}_{corner}" for corner in "abcd"[:count]] if values.ndim > 1 else [name]
-        table |= _titled(titles, VALUES[kind][value], values)
-    return table
+def _from_table(table: Mapping[str, Sequence[str]], about: Columns) -> dict[str, np.ndarray]:
+    """Arrays of the columns of a table."""
+    found = {}
+    for name, (titles, _) in about.items():
+        if titles[0] in table:
+            values = np.array([[float(text) for text in table[title]] for title in titles]).T
+            found[name] = values if len(titles) > 1 else values[:, 0]
+    return found
 
 
 def _csv_text(table: Mapping[str, np.ndarray]) -> str:
@@ -262,26 +265,19 @@ def _read_csv(path: Path) -> Read:
     lines = path.read_text(encoding="utf-8").split("\n")  # not at line breaks within names
     comments = [line[2:] for line in lines if line.startswith("#")]
     header = json.loads("\n".join(comments[comments.index("{") :]))
-    others = companions(path)
-    for said, length in _counts(header).items():
-        if length and said in others and not others[said].is_file():
-            raise ValueError(f"{others[said].name}, which has its {length} {said}, is not beside it")
-    tables = {"": _csv_table(lines)} | {
-        name: _csv_table(other.read_text(encoding="utf-8").split("\n"))
-        for name, other in others.items()
-        if other.is_file()
-    }
-    of_table = {"": SPRING_COLUMNS, "particles": PARTICLE_COLUMNS} | {name: (name,) for name in CELL_ARRAYS.values()}
+    others, counts = companions(path), _counts(header)
     arrays: dict[str, np.ndarray] = {"triangles": np.zeros((0, 3)), "quads": np.zeros((0, 4))}
     energies: list[Terms] = []
-    for place, table in tables.items():
-        for name in of_table[place]:
-            about = ARRAYS[name]
-            if about.titles[0] in table:
-                found = np.array([[float(text) for text in table[title]] for title in about.titles]).T
-                arrays[name] = (found if about.columns else found[:, 0]).astype(about.kind)
+    for place, about in TABLES.items():
+        if place and not others[place].is_file():
+            if length := counts.get(next(iter(about))):
+                raise ValueError(f"{others[place].name}, which has its {length} {place}, is not beside it")
+            continue
+        rows = others[place].read_text(encoding="utf-8").split("\n") if place else lines
+        found = _from_table(_csv_table(rows), about)
+        arrays |= {name: values for name, values in found.items() if name in ARRAYS}
         if place in CELL_ARRAYS.values():
-            energies += _terms(arrays[place], _joined(table, ARRAYS[place].columns))
+            energies += _terms(arrays[place].astype(np.int64), found)
     return arrays, energies, header
 
 
@@ -290,19 +286,6 @@ def _csv_table(lines: Iterable[str]) -> dict[str, tuple[str, ...]]:
     titles, *rows = csv.reader(line for line in lines if line and not line.startswith("#"))
     columns = list(zip(*rows)) if rows else [()] * len(titles)
     return {title.partition(" [")[0]: column for title, column in zip(titles, columns, strict=True)}
-
-
-def _joined(table: Mapping[str, tuple[str, ...]], count: int) -> dict[str, np.ndarray]:
-    """Columns of terms, those of the corners together."""
-    found = {}
-    for kind, names in VALUES.items():
-        for name in names:
-            full = f"{kind}_{name}"
-            titles = [f"{full}_{corner}" for corner in "abcd"[:count]] if name in OF_CORNERS else [full]
-            if titles[0] in table:
-                values = np.array([[float(text) for text in table[title]] for title in titles]).T
-                found[full] = values if name in OF_CORNERS else values[:, 0]
-    return found
 
 
 # -- JSON ----------------------------------------------------------------------------------------------------------
@@ -340,7 +323,10 @@ def _read_json(path: Path) -> Read:
         for name, one in ARRAYS.items()
         if found[name] is not None
     }
-    energies = [_terms_of(one["kind"], arrays[one["cells"]], one["values"]) for one in found["energies"]]
+    energies = [
+        Terms(one["kind"], arrays[one["cells"]], {name: np.array(one["values"][name]) for name in VALUES[one["kind"]]})
+        for one in found["energies"]
+    ]
     return arrays, energies, found["header"]
 
 

@@ -16,9 +16,9 @@ from .choices import (
     CASES,
     Choice,
     References,
+    best_of,
     check_beam,
     check_loads,
-    contest,
     references,
     trial,
     worst_of,
@@ -70,19 +70,17 @@ def extrapolate(
     made = (MESH_TYPES[mesh_type](beam.length, beam.height, one) for one in sizes)
     trials = [trial(beam, mesh, material, known, loads=loads) for mesh in made]
 
-    def measured(name: str, limits: tuple[float, float]) -> tuple[bool, float] | None:
-        found = []
-        for one in reversed(trials):  # the coarsest one first
-            if (there := one.measured(name, limits)) is None:
-                return None  # also where it has the springs of another one on some of the meshes
-            found.append(there)
-        if any(worst == inf for _, worst in found):
-            return found[0][0], inf
-        errors = [one.errors(name) for one in trials]
-        bands = [band((one[load] for one in errors), sizes, size, own=LEAST_OF_ERROR) for load in errors[0]]
-        return found[0][0], worst_of(bands)
-
-    best = contest(trials[0].names, measured, trials[0].known)
+    measured = {}
+    for name in trials[0].names:
+        each = [one.measured(name) for one in trials]
+        if any(one is None for one in each):
+            continue  # also where it has the springs of another one on some of the meshes
+        energies, worst = bool(each[-1] and each[-1][0]), inf
+        if all(one and one[1] < inf for one in each):
+            errors = [one.errors(name) for one in trials]
+            worst = worst_of(band((one[load] for one in errors), sizes, size, own=LEAST_OF_ERROR) for load in errors[0])
+        measured[name] = energies, worst
+    best = best_of(measured, trials[0].known)
     choices = [_band([one.choice(name) for one in trials], sizes, size) for name in best]
     return TabledList(replace(one, tried=trials[0].tried) for one in choices), sizes
 

@@ -1,9 +1,8 @@
 """Which definition and stiffness to use on a mesh, and how far off it is: solved, with linear kinematics.
 
 All registered definitions that suit the mesh and the materials are solved on the mesh itself under some loads and
-compared with the converged reference of small strain. The best ones are kept, of all and of springs alone; what cannot
-be among them is given up at the first load that says so. A patch test between rollers measures Young's modulus and
-Poisson's ratio of the network.
+compared with the converged reference of small strain. The best ones are kept, of all and of springs alone. A patch test
+between rollers measures Young's modulus and Poisson's ratio of the network.
 """
 
 import time
@@ -432,28 +431,12 @@ def errors_under(
     return dict(quantity_errors({name: values[name] for name in known}, wanted))
 
 
-def contest(
-    names: Iterable[str],
-    measured: Callable[[str, tuple[float, float]], tuple[bool, float] | None],
-    known: References | ShapeReferences,
-    also: Collection[str] = (),
-) -> list[str]:
+def best_of(found: Mapping[str, tuple[bool, float]], known: Mapping[str, Any], also: Collection[str] = ()) -> list[str]:
     """The best definitions of springs alone and of all, and those of `also`, the least worst error first.
 
-    `measured` tells of a definition whether it has energies, and its worst error; None where it has no springs of its
-    own or an error above a limit, the first one of springs alone, the second one of all.
+    `found` tells of a definition whether it has energies, and its worst error.
     """
-    found: dict[str, tuple[bool, float]] = {}
-    equal = as_sure_as(known)
-
-    def limit(energies: bool) -> float:
-        errors = sorted(worst for other, worst in found.values() if energies or not other)
-        return errors[KEPT - 1] + equal if len(errors) >= KEPT else inf
-
-    for name in names:
-        if (one := measured(name, (limit(False), limit(True)))) is not None:
-            found[name] = one
-    order = in_order(found, lambda name: found[name][1], lambda name: (found[name][0], name), equal)
+    order = in_order(found, lambda name: found[name][1], lambda name: (found[name][0], name), as_sure_as(known))
     best = order[:KEPT] + [name for name in order if not found[name][0]][:KEPT]
     return [name for name in order if name in best or name in also]
 
@@ -462,7 +445,7 @@ class Trial:
     """Definitions solved on a mesh, under loads of a beam or a load case of a shape; equal springs once.
 
     `statements` are of one mesh, in linear kinematics; `known` are references by load of a beam or by quantity of a
-    shape; `among` replaces the definitions that suit the mesh, `also` adds some that are not given up.
+    shape; `among` replaces the definitions that suit the mesh, `also` adds some.
 
     `names` are these definitions; `same` has for each one with springs the first one with the same springs;
     `failures` are as of `Choice`, for each definition without.
@@ -478,7 +461,7 @@ class Trial:
         self.statements, self.known, first = statements, known, statements[0]
         self.mesh, self.materials, self.thickness = first.mesh, first.materials, first.thickness
         self._sheet = Sheet(self.mesh, self.thickness, networks=len({one.loading.held.tobytes() for one in statements}))
-        self._errors: dict[str, tuple[dict[str, float | str], list[Statement]]] = {}  # and what is left to solve
+        self._errors: dict[str, dict[str, float | str]] = {}
         self._forces: dict[str, np.ndarray] = {}
         self._moduli: dict[tuple[bytes, ...], tuple[float, float] | str] = {}
         self._test = PatchTest(self.mesh) if isinstance(first, BeamStatement) else None
@@ -511,17 +494,14 @@ class Trial:
                 self._springs.setdefault(self.same[name], springs)
         return self._springs.get(self.same.get(name, ""))
 
-    def errors(self, name: str, limit: float = inf) -> dict[str, float | str]:
-        """Errors of a definition [1] by load or quantity; NaN without a reference, or why the network fails.
-
-        Loads are left out after one with an error above the limit.
-        """
+    def errors(self, name: str) -> dict[str, float | str]:
+        """Errors of a definition [1] by load or quantity; NaN without a reference, or why the network fails."""
         if (name := self.same[name]) not in self._errors:
-            self._errors[name] = self._errors.get(self._alike(name), ({}, [*self.statements]))
-        found, left = self._errors[name]
-        while left and not _exceeds(found, limit):
-            found |= errors_under(left.pop(0), self._sheet, self._springs[name], self.known)
-        return found
+            if (first := self._alike(name)) not in self._errors:
+                each = (errors_under(one, self._sheet, self._springs[name], self.known) for one in self.statements)
+                self._errors[first] = {label: error for one in each for label, error in one.items()}
+            self._errors[name] = self._errors[first]
+        return self._errors[name]
 
     def _alike(self, name: str) -> str:
         """The first definition with the same stiffness matrix, and so the same errors, by its forces on some motion."""
@@ -542,7 +522,8 @@ class Trial:
         Errors that differ by less than the error estimates are equal: then springs alone come first, then names.
         """
         names = [name for name in self.names if name not in without]
-        found = [self.choice(name) for name in contest(names, self.measured, self.known, self._also)]
+        measured = {name: one for name in names if (one := self.measured(name))}
+        found = [self.choice(name) for name in best_of(measured, self.known, self._also)]
         # The patch test is for the best ones alone, and may find one of them unstable.
         failed = {one.definition for one in found if one.failures and {*one.failures} <= {"patch test"}} - {*self._also}
         if failed and len(failed) < len(names):
@@ -554,17 +535,18 @@ class Trial:
         """Definitions that were solved, or have no stable network."""
         return tuple(name for name in self.names if name in self.same or "patch test" in self.failures.get(name, ()))
 
-    def measured(self, name: str, limits: tuple[float, float]) -> tuple[bool, float] | None:
-        """Whether a definition has energies, and its worst error, infinite where it is unstable; see `contest`."""
+    def measured(self, name: str) -> tuple[bool, float] | None:
+        """Whether a definition has energies, and its worst error, infinite where it is unstable; see `best_of`.
+
+        None where it has no springs of its own.
+        """
         springs = self.springs(name)
         if springs is None:
             return None if "springs" in self.failures[name] and name not in self._also else (False, inf)
-        limit = inf if name in self._also else limits[bool(springs.energies)]
-        found = self.errors(name, limit)
-        if self.same[name] != name or _exceeds(found, limit):
-            return None
+        found = self.errors(name)
         errors = [one for one in found.values() if not isinstance(one, str)]
-        return bool(springs.energies), worst_of(errors) if len(errors) == len(found) else inf
+        worst = worst_of(errors) if len(errors) == len(found) else inf
+        return None if self.same[name] != name else (bool(springs.energies), worst)
 
     def choice(self, name: str) -> Choice:
         """Choice of a definition; one without springs has NaN for all numbers."""
@@ -650,10 +632,6 @@ def _common(values: np.ndarray) -> float:
     """The common value of all, NaN where they differ."""
     alike = len(values) and values.any() and np.ptp(values) <= ALIKE * np.abs(values).max()
     return float(np.median(values)) if alike else nan
-
-
-def _exceeds(errors: Mapping[str, float | str], limit: float) -> bool:
-    return any(abs(one) > limit for one in errors.values() if not isinstance(one, str))
 
 
 def _suits(one: Definition, mesh: Mesh, materials: Collection[AnyMaterial]) -> bool:

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import count, takewhile
 from operator import attrgetter
+from typing import cast
 
 import numpy as np
 
@@ -362,7 +363,7 @@ def find_mesh(
             raise ValueError("loads, mesh types: are of beams alone; leave them out for a shape, and give its load")
         load = only_load(beam, load)
         families = [_shape_family(beam, material, load, make or partial(mesh_shape, beam))]
-        known = shape_references(families[0].statements(families[0].side / 4)[0])
+        known = shape_references(cast(ShapeStatement, families[0].statements(families[0].side / 4)[0]))
         what, remedy = f"load {load!r}", "; take it out of the quantities"
     elif load is not None or make is not None:
         raise ValueError(f"load: {load!r} is of shapes alone; give loads for a beam")
