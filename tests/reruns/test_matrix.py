@@ -16,7 +16,7 @@ from rows import CODE, STORED, STUDY, VERSIONS
 import springtune
 from springtune.studies.kinds.scenes import plan
 from springtune.studies.runs import keys, rerun
-from springtune.studies.runs.plan import digest_in
+from springtune.studies.runs.source import read_note
 
 ROWS = STUDY | STORED
 
@@ -96,7 +96,7 @@ def test_springtune_run_makes_missing_what_snakemake_cannot_see(changed):
     due = run.due()
     for record in rerun.outdated(run.study, run.folder) or ():
         record.unlink()
-    seen = [name for name, job in run.jobs.items() if digest_in(job.record) != job.digest]
+    seen = [name for name, job in run.jobs.items() if read_note(job.record).get("digest") != job.digest]
     after = set(seen)
     for name in run.jobs:
         after |= {name} if run.before(name) & after else set()

@@ -215,7 +215,7 @@ def test_keys_are_those_that_results_were_stored_under():
 
 def test_stages_depend_on_what_they_import_and_on_nothing_else():
     solve, mesh = (
-        {path.rpartition("springtune/")[2] for path in code.modules(f"studies.kinds.scenes.{stage}")}
+        {path.relative_to(code.PACKAGE).as_posix() for path in code.closure(f"studies.kinds.scenes.{stage}").files}
         for stage in ("solve", "mesh")
     )
     assert {"mechanics/network.py", "mechanics/statics.py", "springs/lattice.py", "mesh/cells.py"} <= solve
@@ -232,8 +232,8 @@ def test_stages_depend_on_what_they_import_and_on_nothing_else():
     assert "mechanics/statics.py" not in mesh
     # References know the mesh of a network by its type alone, so an edit of a mesh does not solve them again. The sides
     # of outlines are geometry, which load cases are on.
-    meshes = {path for path in code.modules("studies.kinds.scenes.reference") if "springtune/mesh/" in path}
-    assert {path.rpartition("/")[2] for path in meshes} <= {"sides.py"}
+    reference = code.closure("studies.kinds.scenes.reference").files
+    assert {path.name for path in reference if path.parent.name == "mesh"} <= {"sides.py"}
     assert "mechanics/series.py" not in solve  # an edit of curves solves no scenes again
 
 
@@ -241,4 +241,4 @@ def test_definitions_belong_to_their_own_keys_and_to_no_stage():
     # An edit of one definition is to solve that definition's scenes again and no others.
     digests = {name: code.definition_closure(name).digest for name in ("angular", "delingette", "patch", "lattice")}
     assert len(set(digests.values())) == len(digests)
-    assert str(code.PACKAGE / "springs/angular.py") not in code.modules("studies.kinds.scenes.solve")
+    assert code.PACKAGE / "springs/angular.py" not in code.closure("studies.kinds.scenes.solve").files

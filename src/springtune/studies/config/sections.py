@@ -528,7 +528,7 @@ GRIDS_NEED = ("beams", "materials")
 def study_model(kinds: tuple[Kind, ...]) -> type[StudyConfig]:
     """Model of a study: `StudyConfig` and the keys that study kinds add to it and to its grids."""
     made = [output for kind in kinds for output in kind.outputs]
-    own = {name: field for kind in kinds for name, field in kind.grid_fields.items()}
+    own: dict[str, Any] = {name: field for kind in kinds for name, field in kind.grid_fields.items()}
     grid = create_model("GridConfig", __base__=GridConfig, __doc__=GridConfig.__doc__, **own)
     added: dict[str, Any] = {name: field for kind in kinds for name, field in kind.study_fields.items()}
     alone: dict[str, tuple[str, ...]] = {}

@@ -178,7 +178,7 @@ def compare(
         found,
         _only(chosen),
         {name: (old, new) for name, (old, new) in told.items() if old != new},
-        list(difflib.unified_diff(*texts, "before", "after", lineterm="")),
+        list(difflib.unified_diff(texts[0], texts[1], "before", "after", lineterm="")),
     )
 
 
@@ -205,8 +205,8 @@ def _only(sides: Sequence[Collection[str]]) -> tuple[list[str], ...]:
 
 def _facts(attributes: Mapping[Hashable, object]) -> dict[str, str]:
     """Attributes to tell, and versions of packages."""
-    found = {**attributes, **from_json(attributes.get("software"))}
-    return {str(name): str(value) for name, value in found.items() if name not in UNTOLD}
+    found = {str(name): value for name, value in attributes.items()} | from_json(attributes.get("software"))
+    return {name: str(value) for name, value in found.items() if name not in UNTOLD}
 
 
 class _Group:
@@ -229,7 +229,8 @@ class _Group:
     def compared(self, left_out: Collection[str]) -> GroupChanges:
         """Compare labels, cells and all variables but some."""
         sizes = {str(name): size for one in self.pair for name, size in one.sizes.items()}
-        units, labels = {}, {}
+        units: dict[str, str] = {}
+        labels: dict[str, tuple[list[str | float], ...]] = {}
         for name in sizes:
             axes = [data[name] for data in self.pair if name in data.dims]
             sizes[name] = len(axes[0].to_index().union(axes[-1].to_index(), sort=False))
@@ -297,19 +298,21 @@ class _Group:
         points = tuple(range(sum(one in self.cell_dimensions for one in names), one.ndim))
         units = str(one.attrs.get("units", other.attrs.get("units", "1")))
         if texts:
-            excess[differ] = [_of_texts(*map(str, pair), self.tolerance.relative) for pair in zip(a[differ], b[differ])]
+            excess[differ] = [_of_texts(str(x), str(y), self.tolerance.relative) for x, y in zip(a[differ], b[differ])]
         elif differ.any():
             excess[differ] = _of_numbers(a, b, both, points, units, self.tolerance)[differ]
         length = math.prod(one.shape[axis] for axis in points)
         beyond = np.flatnonzero(excess > 1.0)
         found = pd.DataFrame({"place": beyond, "cell": beyond // length, "excess": excess.ravel()[beyond]})
         worst = found.sort_values("excess", ascending=False, kind="stable").drop_duplicates("cell")
+        said = str if texts else float
         rows = [
             Change(
                 self.path,
                 name,
                 _labels(one, np.unravel_index(place, one.shape)),
-                *(str(side.flat[place]) if texts else float(side.flat[place]) for side in (a, b)),
+                said(a.flat[place]),
+                said(b.flat[place]),
                 units,
                 over,
             )

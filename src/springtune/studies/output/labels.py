@@ -175,7 +175,7 @@ def small_multiples(
     entitle(figure, title, said)
     if key and figure is None:
         flat[-1].legend(handles=key)
-    elif key:
+    elif key and figure is not None:
         figure.legend(handles=key, loc="outside upper right", ncols=len(key))
     if ax is None and isinstance(figure, Figure):
         figure.set_size_inches(wide, 0.2 + (height + LINE * lines) * rows + LINE * (bool(said) + bool(key)))

@@ -102,7 +102,7 @@ def _opened(path: Path) -> "xarray.DataTree":
         stack.callback(manager.close)
         for name in ("/", *manager.acquire().groups):
             store = H5NetCDFStore(manager, group=None if name == "/" else name)  # type: ignore[no-untyped-call]
-            variables, attributes = store.load()  # type: ignore[no-untyped-call]
+            variables, attributes = store.load()
             for array in variables.values():
                 if array.dtype == object and array.nbytes > LARGE_ARRAY:
                     del array.encoding["dtype"]

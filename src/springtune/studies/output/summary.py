@@ -1,6 +1,5 @@
 """Summary of a run: what Snakemake's process adds to the stored summary of the dataset, see `summing_up.text`."""
 
-import json
 import os
 import time
 from pathlib import Path
@@ -10,6 +9,7 @@ from springtune.safe_io.tables import aligned
 
 from ..runs import rerun
 from ..runs.plan import Plan
+from ..runs.source import read_note
 from ..runs.workload import clock, results_of
 from .text import FILE, HOLES
 
@@ -99,20 +99,12 @@ def _computed(study: "Study", plan: Plan, since: float) -> str:
         record, stage = plan.record(name), job.stage.name
         if record.exists():
             asked[stage] = asked.get(stage, 0) + len(set(results_of(job.content)))
-            new[stage] = new.get(stage, 0) + (computed(record) if _time(record) >= since else 0)
+            new[stage] = new.get(stage, 0) + (read_note(record).get("computed", 0) if _time(record) >= since else 0)
     counts = [f"{stage} {number} of {asked[stage]}" for stage, number in new.items() if number]
     if counts:
         return ", ".join(counts) + ("" if new == asked else "; the others were stored before")
     ran = [job.name for job in rerun.jobs(study, plan).values() if _time(job.record) >= since]
     return f"nothing but {', '.join(ran)}" if ran else "nothing: all results were stored before"
-
-
-def computed(record: Path) -> int:
-    """Number of tasks that a job computed, without those whose results were stored."""
-    try:
-        return int(json.loads(record.read_bytes())["computed"])
-    except (OSError, ValueError, LookupError, TypeError):
-        return 0
 
 
 def _places(folder: Path) -> str:

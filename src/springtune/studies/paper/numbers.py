@@ -372,7 +372,7 @@ FUNCTIONS = {"abs": abs, "max": max, "min": min, "sqrt": math.sqrt}
 def _formula(text: str, found: Mapping[str, Any], name: str) -> float:
     """Evaluate arithmetic of earlier numbers; NaN if one is missing."""
     known = {key: math.nan if one["value"] is None else one["value"] for key, one in found.items()}
-    names = {"__builtins__": {}, "pi": math.pi, **known, **FUNCTIONS}
+    names: dict[str, Any] = {"__builtins__": {}, "pi": math.pi, **known, **FUNCTIONS}
     try:
         tree = ast.parse(text, mode="eval")
         for node in ast.walk(tree):

@@ -19,7 +19,6 @@ the worker is started anew for the others. A broken program ends the job when al
 """
 
 import ctypes
-import json
 import multiprocessing
 import os
 import signal
@@ -41,7 +40,7 @@ from springtune.registry import imported
 from springtune.safe_io import atomic
 
 from . import store
-from .source import PACKAGE, STATE, hash_of, source_state
+from .source import PACKAGE, STATE, hash_of, read_note, source_state
 from .store import DamagedError
 
 JOB = "studies.runs.job"
@@ -65,7 +64,7 @@ class RefusedError(Exception):
 
 def main(tasks: str, done: str, digest: str) -> None:
     """Do the job of a note, and write its record."""
-    note = _read(Path(tasks))
+    note = read_note(Path(tasks))
     if hash_of(note.get("module"), note.get("content")) != digest:
         raise SystemExit(
             f"{tasks}: not what this job is to do; call the same command again, it writes it anew, without "
@@ -80,15 +79,6 @@ def main(tasks: str, done: str, digest: str) -> None:
         forget_job_of(error.path, Path(tasks).parents[1])
         raise SystemExit(str(error)) from None
     atomic.write_json(done, {"digest": digest, "computed": computed})
-
-
-def _read(path: Path) -> dict[str, Any]:
-    """Content of a note; empty if it cannot be read."""
-    try:
-        found = json.loads(path.read_bytes())
-    except (OSError, ValueError):
-        return {}
-    return found if isinstance(found, dict) else {}
 
 
 def in_worker(name: str, content: dict[str, Any]) -> int:
@@ -179,7 +169,7 @@ def own_reason(error: Exception) -> str:
 def forget_job_of(product: Path, folder: Path) -> None:
     """Remove the record of the job that makes a file, so that the next run does this job again."""
     for path in (folder / TASKS).glob("*_*.json"):
-        if str(product) in _read(path).get("products", ()):
+        if str(product) in read_note(path).get("products", ()):
             (folder / RECORDS / path.name).unlink(missing_ok=True)
 
 

@@ -95,7 +95,7 @@ class Closure(NamedTuple):
 
     def with_(self, other: "Closure") -> "Closure":
         """Union of two closures."""
-        return Closure(*(one | two for one, two in zip(self, other)))
+        return Closure(self.files | other.files, self.packages | other.packages, self.texts | other.texts)
 
 
 @cache

@@ -17,7 +17,7 @@ from springtune.safe_io import atomic
 
 from ..config.kind import kinds
 from .job import RECORDS, TASKS
-from .source import hash_of
+from .source import hash_of, read_note
 
 if TYPE_CHECKING:
     from ..config.kind import Output, Stage
@@ -103,17 +103,9 @@ class Plan:
         """Write the notes that jobs read; unchanged files stay."""
         for name, job in self.jobs.items():
             path = self.tasks(name)
-            if digest_in(path) != job.digest:
+            if read_note(path).get("digest") != job.digest:
                 content = {"digest": job.digest, "module": job.stage.module, "products": list(job.products)}
                 atomic.write_bytes(path, json.dumps(content | {"content": job.content}).encode())
-
-
-def digest_in(path: Path) -> str:
-    """Digest in a note or a record; empty if it cannot be read."""
-    try:
-        return str(json.loads(path.read_bytes())["digest"])
-    except (OSError, ValueError, LookupError, TypeError):
-        return ""
 
 
 def plan(study: "Study", folder: Path, cores: int | None = None, cluster: bool = False) -> Plan:

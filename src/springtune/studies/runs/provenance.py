@@ -65,8 +65,11 @@ def attributes(study: Study, config: str | Path, package: Path = PACKAGE) -> dic
         "created": created,
         "software": json.dumps(software, sort_keys=True),
     }
+    if study.printed_path:
+        name = study.printed_path.name
+        found["references"] = f"paper_*: as printed in {PRINTED.get(name, name)}"
     found |= {"plane_strain": ", ".join(study.plane_strain)} if study.plane_strain else {}
-    return found | ({"study_commit": own} if own else {}) | _references(study)
+    return found | ({"study_commit": own} if own else {})
 
 
 def _plugins(study: Study) -> set[str]:
@@ -74,17 +77,6 @@ def _plugins(study: Study) -> set[str]:
     used = {label for labels in study.axes.values() for label in labels}
     tables: tuple[Extended[Any], ...] = (DEFINITIONS, MESH_TYPES, LOADS)
     return {package for table in tables for name, package in table.packages.items() if name in used}
-
-
-def _references(study: Study) -> dict[str, str]:
-    """Sources of the printed values that the study uses."""
-    cells = {(one.mesh.beam.name, one.mesh.mesh_type, one.material.name, one.load) for one in study.scenes}
-    if not study.printed_path or not any(
-        (one.beam, one.mesh_type, one.material, one.load) in cells for one in study.printed
-    ):
-        return {}
-    name = study.printed_path.name
-    return {"references": f"paper_*: as printed in {PRINTED.get(name, name)}"}
 
 
 def inputs(study: Study, folder: Path) -> dict[str, str]:

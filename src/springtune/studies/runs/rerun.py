@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 from ..config.kind import FORMATS, kinds, modules, outputs
 from .job import RECORDS, TASKS
 from .keys import stage_key
-from .plan import Plan, digest_in, plan, table_files
+from .plan import Plan, plan, table_files
 from .provenance import inputs
-from .source import PACKAGE, checksum, hash_of
+from .source import PACKAGE, checksum, hash_of, read_note
 from .workload import results_of
 
 if TYPE_CHECKING:
@@ -127,7 +127,7 @@ def fault(job: Job, found: dict[str, Job]) -> str:
     """Return why a job must run, or an empty string; jobs before it count only by their products."""
     if not job.record.exists():
         return "not done yet"
-    if digest_in(job.record) != job.digest:
+    if read_note(job.record).get("digest") != job.digest:
         return "something else is asked for"
     for product in job.products:
         if not Path(product).exists():

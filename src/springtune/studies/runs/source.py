@@ -62,6 +62,15 @@ def hash_of(*parts: Any) -> str:
     return hashlib.sha256(_ENCODER.encode(parts).encode()).hexdigest()[:24]
 
 
+def read_note(path: Path) -> dict[str, Any]:
+    """Content of a note or a record; empty if it cannot be read."""
+    try:
+        found = json.loads(path.read_bytes())
+    except (OSError, ValueError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
 def checksum(path: str | Path) -> str:
     """SHA-256 of a file."""
     with open(path, "rb") as file:
