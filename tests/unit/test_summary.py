@@ -20,7 +20,6 @@ from springtune.safe_io import atomic
 from springtune.studies.kinds import load_study
 from springtune.studies.kinds.scenes.variables import ROOT, SENSITIVITY
 from springtune.studies.output import summary, summing_up
-from springtune.studies.output.dataset import Filler
 from springtune.studies.runs import plan, rerun, workload
 
 from tables import STUDIES
@@ -42,25 +41,28 @@ def cell(**chosen):
 
 
 @pytest.fixture
-def root():
+def rows():
     """Four scenes on one beam and one on the other: solved by 1 % and -20 %, one each of what may go wrong."""
-    root = Filler(ROOT.empty(AXES))
-    for beam in AXES["beam"]:
-        known = {"beam": beam, "material": "steel", "load": "traction"}
-        root.put({"reference_displacement": 1e-3}, **known)
-        root.put({"reference_applies": 1}, kinematics="linear", **known)
-    root.put({"status": Status.SOLVED, "deformation_error": 0.01}, **cell())
-    root.put({"status": Status.SOLVED, "deformation_error": -0.2}, **cell(definition="patch"))
+    known = {"material": "steel", "load": "traction", "kinematics": "linear"}
     lost = {"status": Status.UNSTABLE, "deformation_error": 5.0, "message": "it would leave"}
-    root.put(lost, **cell(definition="patch", mesh_size=5e-3))
-    root.put({"status": Status.NOT_CONVERGED, "message": "residual 1e-3"}, **cell(mesh_size=5e-3))
-    root.put({"status": Status.FAILED, "message": "refuses the mesh"}, **cell(beam="80x10"))
-    return root
+    return [
+        *({"beam": one, "reference_displacement": 1e-3, "reference_applies": 1} | known for one in AXES["beam"]),
+        cell() | {"status": Status.SOLVED, "deformation_error": 0.01},
+        cell(definition="patch") | {"status": Status.SOLVED, "deformation_error": -0.2},
+        cell(definition="patch", mesh_size=5e-3) | lost,
+        cell(mesh_size=5e-3) | {"status": Status.NOT_CONVERGED, "message": "residual 1e-3"},
+        cell(beam="80x10") | {"status": Status.FAILED, "message": "refuses the mesh"},
+    ]
+
+
+@pytest.fixture
+def root(rows):
+    return ROOT.of_rows(AXES, rows)
 
 
 class TestText:
     def test_counts_holes_and_errors(self, root):
-        text = summing_up.text({"/": root.data}, "A study")
+        text = summing_up.text({"/": root}, "A study")
         lines = text.splitlines()
         assert lines[0] == "A study"
         assert "  scenes  5  2 solved, 1 not converged, 1 unstable, 1 failed" in lines
@@ -72,41 +74,38 @@ class TestText:
         assert errors == ["patch linear 1 20 % -20 % too stiff", "lattice linear 1 1 % +1 % too soft"]
 
     def test_a_word_turns_with_the_displacement(self, root):
-        root.data["reference_displacement"].values[...] *= -1  # pulled down
-        text = summing_up.text({"/": root.data}, "A study")
+        root["reference_displacement"].values[...] *= -1  # pulled down
+        text = summing_up.text({"/": root}, "A study")
         assert "-20 %  too soft" in text and "+1 %  too stiff" in text
 
     def test_everything_solved_has_no_holes(self, root):
-        data = root.data.where(root.data.status.isin([0, 1]), 0)
+        data = root.where(root.status.isin([0, 1]), 0)
         text = summing_up.text({"/": data.assign(status=data.status.astype("int8"))}, "A study")
         assert "2 solved\n" in text and "Not everything" not in text and "2 of" not in text
 
     def test_nothing_solved(self, root):
-        data = root.data
-        data["status"].values[data.status.values > 0] = Status.FAILED
-        lines = summing_up.text({"/": data}, "A study").splitlines()
+        root["status"].values[root.status.values > 0] = Status.FAILED
+        lines = summing_up.text({"/": root}, "A study").splitlines()
         assert "  scenes  5  5 failed" in lines and not any("worst" in line for line in lines)
         assert lines[-1].startswith("Not everything is solved: 5 of 5 scenes.")
 
-    def test_scenes_without_a_reference_are_named(self, root):
-        place = {"beam": "80x10", "material": "steel", "load": "traction"}
-        root.put({"reference_displacement": np.nan, "reference_message": "no reference: too slender"}, **place)
-        text = summing_up.text({"/": root.data}, "A study")
+    def test_scenes_without_a_reference_are_named(self, rows):
+        rows[1] |= {"reference_displacement": np.nan, "reference_message": "no reference: too slender"}
+        root = ROOT.of_rows(AXES, rows)
+        text = summing_up.text({"/": root}, "A study")
         assert "without a reference, and so without an error: 1 of 5\n  80x10, steel, traction: no reference" in text
 
-    def test_scenes_beyond_small_strain_are_named(self, root):
-        place = {"beam": "100x20", "material": "steel", "load": "traction"}
-        root.put({"reference_applies": 0}, kinematics="linear", **place)
-        root.put({"reference_message": "it turns by 1 rad"}, **place)
-        text = summing_up.text({"/": root.data}, "A study")
+    def test_scenes_beyond_small_strain_are_named(self, rows):
+        rows[0] |= {"reference_applies": 0, "reference_message": "it turns by 1 rad"}
+        root = ROOT.of_rows(AXES, rows)
+        text = summing_up.text({"/": root}, "A study")
         assert "beyond small strain, so the error is not the network's alone: 3 of 5" in text
         assert "100x20, steel, traction: it turns by 1 rad" in text and "worst" not in text
 
     def test_other_groups_are_counted_where_messages_are_of_their_cells(self, root):
-        curves = Filler(SENSITIVITY.empty(AXES))
-        place = {name: label for name, label in cell().items() if name != "definition"}
-        curves.put({"best_stiffness_status": Status.FAILED, "best_stiffness_message": "no minimum"}, **place)
-        lines = summing_up.text({"/": root.data, "/sensitivity": curves.data}, "A study").splitlines()
+        row = cell() | {"best_stiffness_status": Status.FAILED, "best_stiffness_message": "no minimum"}
+        curves = SENSITIVITY.of_rows(AXES, [row])
+        lines = summing_up.text({"/": root, "/sensitivity": curves}, "A study").splitlines()
         assert "  sensitivity, best stiffness  1  1 failed" in lines
         assert "  100x20, free, 1 mm, steel, traction, linear: no minimum" in lines
         assert lines[-1].startswith("Not everything is solved: 3 of 5 scenes; 1 of 1 sensitivity, best stiffness.")
@@ -118,11 +117,10 @@ class TestText:
 
     def test_a_few_are_named_of_many_and_of_each_reason_one_first(self):
         beams = [f"beam-{letter}" for letter in "abcdefghij"]
-        root = Filler(ROOT.empty(AXES | {"beam": beams}))
-        for number, beam in enumerate(beams):
-            why = "refused" if number == 9 else f"residual {number}.5e-3"
-            root.put({"status": Status.FAILED, "message": why}, **cell(beam=beam))
-        lines = summing_up.text({"/": root.data}, "A study").splitlines()
+        whys = [*(f"residual {number}.5e-3" for number in range(9)), "refused"]
+        rows = [cell(beam=beam) | {"status": Status.FAILED, "message": why} for beam, why in zip(beams, whys)]
+        root = ROOT.of_rows(AXES | {"beam": beams}, rows)
+        lines = summing_up.text({"/": root}, "A study").splitlines()
         named = lines[lines.index("scenes, failed: 10 of 10") + 1 :][:4]
         assert [line.partition(",")[0].strip() for line in named] == ["beam-a", "beam-j", "beam-b", "and 7 more"]
 

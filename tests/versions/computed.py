@@ -14,8 +14,7 @@ import h5py
 
 from springtune.studies.kinds import load_study
 from springtune.studies.kinds.scenes import stored
-from springtune.studies.kinds.scenes.solve import stored_key
-from springtune.studies.kinds.scenes.stored import fields_key, unpacked
+from springtune.studies.kinds.scenes.stored import fields_key, stored_key
 from springtune.studies.runs import job as jobs
 from springtune.studies.runs import store
 from springtune.studies.runs.plan import plan
@@ -54,7 +53,7 @@ def computed(study, folder):
         calibration = store.everything(path) if path.exists() else None
         results = {key: one for path in job.products if path.endswith(".h5") for key, one in results_in(path).items()}
         for place, key in enumerate(keys(job.content, calibration)):
-            one = results[key] | unpacked(results.get(fields_key(key), {}))
+            one = results[key] | results.get(fields_key(key), {})
             found |= {(job.stage.name, place, name): value for name, value in one.items()}
     return found
 

@@ -85,14 +85,25 @@ class Group:
         rows: Iterable[Mapping[str, object]] | pd.DataFrame,
         names: Collection[str] | None = None,
     ) -> xr.Dataset:
-        """Create the dataset of rows of labels and values; each value goes to the labels that its variable has."""
+        """Create the dataset of rows of labels and values; each value goes to the labels that its variable has.
+
+        An array fills the first places along the dimensions that rows have no labels of.
+        """
         frame = rows if isinstance(rows, pd.DataFrame) else pd.DataFrame([*rows])
         data = self.empty(axes, names)
-        for name in frame.columns.intersection([*data]):
-            dimensions = [str(one) for one in data[name].dims]
-            cells = frame[[*dimensions, name]].dropna()
-            places = {one: xr.DataArray(cells[one].astype(data[one].dtype).array, dims="row") for one in dimensions}
-            data[name].loc[places] = cells[name].array if dimensions else cells[name].iloc[-1]
+        labels = frame.columns.intersection([*data.dims])
+        found = {name: data.get_index(name).get_indexer(frame[name]) for name in labels}
+        for name in frame.columns.intersection([*data.data_vars]):
+            array, dimensions = data[name].values, [one for one in data[name].dims if one in found]
+            there = frame[[name, *dimensions]].notna().all(axis=1).to_numpy()
+            places, values = [found[one][there] for one in dimensions], frame[name].to_numpy()[there]
+            if any((place < 0).any() for place in places):
+                raise KeyError(f"{name}: rows have labels that the axes have not")
+            if dimensions and len(dimensions) == array.ndim:
+                array[tuple(places)] = values
+                continue
+            for *place, value in zip(*places, values):
+                array[(*place, *map(slice, np.shape(value)))] = value
         return data
 
     def over(self, further: Mapping[str, Sequence[str]], without: Collection[str] = ()) -> "Group":
@@ -104,42 +115,6 @@ class Group:
             if name not in without:
                 variables[name] = (*shared, *further.get(name, ()), *own), units, long_name, nothing
         return replace(self, variables=variables)
-
-
-class Filler:
-    """Writer of single cells by label."""
-
-    def __init__(self, data: xr.Dataset) -> None:
-        self.data = data
-        # Looking an array up costs more than writing a cell of it.
-        self._arrays = {name: ([str(one) for one in array.dims], array.values) for name, array in data.items()}
-        self._places = {
-            str(name): {label: i for i, label in enumerate(data[name].values.tolist())} for name in data.coords
-        }
-        self._texts: dict[object, object] = {}
-
-    def put(self, values: Mapping[str, Any], **labels: Label) -> None:
-        """Write variables by name into one cell; rows and tables may be shorter than their dimensions."""
-        for name, value in values.items():
-            dimensions, array = self._arrays[name]
-            place = tuple(self._places[dimension][labels[dimension]] for dimension in dimensions if dimension in labels)
-            array[place + tuple(slice(size) for size in np.shape(value))] = value
-
-    def put_each(self, values: Sequence[Mapping[str, object]], labels: Sequence[Mapping[str, Label]]) -> None:
-        """Write many cells, one variable at a time."""
-        places = {
-            dimension: np.array([known[one[dimension]] for one in labels])
-            for dimension, known in self._places.items()
-            if labels and dimension in labels[0]
-        }
-        for name in dict.fromkeys(name for one in values for name in one):
-            dimensions, array = self._arrays[name]
-            cells = [number for number, one in enumerate(values) if name in one]
-            found: list[Any] = [values[number][name] for number in cells]
-            if array.dtype == object:  # texts that are alike are one text
-                found = [self._texts.setdefault(one, one) for one in found]
-            place = tuple(places[dimension][cells] for dimension in dimensions if dimension in places)
-            array[place] = np.array(found, dtype=array.dtype)
 
 
 def most_requested(root: xr.Dataset, dimension: str) -> str:

@@ -16,7 +16,7 @@ from ...config.kind import Kind
 from ...config.model import MeshSpec
 from ...runs.keys import definition_key, mesh_type_key
 from ...runs.stages import Task, stage
-from ..scenes.plan import mesh_key, mesh_parameters, mesh_source, particles, search_seconds
+from ..scenes.plan import expected_seconds, mesh_key, mesh_parameters, mesh_source, particles
 from .outputs import OUTPUTS
 
 
@@ -91,7 +91,7 @@ def _tasks(study):
             {"definition": one.definition, "poisson_ratio": one.poisson_ratio},
             (mesh_parameters(mesh), mesh_type_key(one.mesh_type), definition_key(one.definition)),
             labels=asdict(one),
-            seconds=5e-4 + 2e-6 * particles(mesh) + search_seconds(one.definition, particles(mesh)),
+            seconds=expected_seconds(particles(mesh), one.definition),
             name=name,
             file=name,
             shared={"mesh": mesh_source(mesh)},

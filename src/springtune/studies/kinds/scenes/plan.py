@@ -2,7 +2,7 @@
 
 import hashlib
 from collections import defaultdict
-from functools import cache, lru_cache, partial
+from functools import cache, lru_cache
 from math import ceil, floor, log, log10
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,13 +17,12 @@ from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key, 
 from ...runs.source import hash_of
 from ...runs.stages import Task, products, stage
 from . import stored
-from .stored import calibrated_key
 
 if TYPE_CHECKING:
     from springtune.problem.geometry import Beam
     from springtune.problem.materials import Material
 
-    from ...config.model import SceneSpec, Study
+    from ...config.model import Study
 
     Body = tuple[Beam, Material, str]
     Box = tuple[tuple[float, float], tuple[float, float]]
@@ -37,6 +36,15 @@ def particles(mesh):
 def particles_in(area, mesh_size):
     """Approximate number of particles in an area."""
     return area / (0.866 * mesh_size**2)
+
+
+SEARCHING = {"adjoint", "annealed", "evolved", "best-springs"}
+"""Definitions that search for their springs, which takes about fifty times as long as their scene."""
+
+
+def expected_seconds(particles, definition=""):
+    """Expected seconds of a scene, a curve or a mesh."""
+    return (1e-3 + 1e-5 * particles) * (50 if definition in SEARCHING else 1)
 
 
 def _by_mesh(items):
@@ -85,20 +93,18 @@ def interpolants(study: "Study") -> "dict[str, tuple[Box, dict[Body, tuple[float
     """Interpolants of a study by kind of load: their box, and the unit problem of each body in it."""
     if "block" in study.outputs or "definitions" in study.outputs:  # which show whole fields of all references
         return {}
-    scenes = [scene for grid in study.grids for scene in grid.scenes]
-    # Bodies are few and shared; comparing them for each of 100,000 scenes is no way to find them.
-    bodies = {(id(one.mesh.beam), id(one.material), one.load): one for one in scenes}
+    bodies = dict.fromkeys((one.beam, one.material, one.load) for one in study.references)
     if len(bodies) <= CHECKS:
         return {}
-    wanted = [one for one in scenes if DEFINITIONS[one.definition].needs == "cases"]
+    wanted = [one for one in study.scenes if DEFINITIONS[one.definition].needs == "cases"]
     if keeps_fields(study):
-        wanted += shown(scenes, study.swept)
+        wanted += shown_scenes(study)
     # Bodies and loads that share a unit problem share its solution, too.
     whole = {unit_problem(one.mesh.beam, one.material, LOADS[one.load].kind) for one in wanted}
     kinds: dict[str, dict[Body, tuple[float, float]]] = {}
-    for one in bodies.values():
-        body = one.mesh.beam, one.material, one.load
-        aspect_ratio, nu, kind = problem = unit_problem(body[0], body[1], LOADS[body[2]].kind)
+    for body in bodies:
+        beam, material, load = body
+        aspect_ratio, nu, kind = problem = unit_problem(beam, material, LOADS[load].kind)
         if problem not in whole and kind.mirrored and -1 < nu <= 0.5:
             kinds.setdefault(kind.name, {})[body] = aspect_ratio, nu
     boxes = {name: box_of(set(problems.values())) for name, problems in kinds.items()}
@@ -240,61 +246,64 @@ def _finite_problem(reference, kind):
     return found | {"beam": beam_key(reference.beam), "material": material_key(reference.material)}
 
 
-def curve_key(study, curve):
-    """Key of a sensitivity curve."""
-    return hash_of(mesh_key(curve.mesh), _curve(study, curve), stage_key("studies.kinds.scenes.sensitivity"))
-
-
-def scene_key(study: "Study", scene: "SceneSpec") -> str:
-    """Key of a scene; results of calibrated scenes are stored under `solved_keys`."""
-    return hash_of(_common(study, scene)[1], _own(study, scene))
-
-
-def _own(study, scene):
-    """Part of a task that scenes of the same `_common` part differ in."""
-    own = {"force": scene.force}
-    if scene.definition == "paper":
-        own["stiffness"] = study.stiffness_table[scene.mesh.mesh_type, scene.material.name]
-    if scene.stiffness_scale != 1:
-        own["stiffness_scale"] = scene.stiffness_scale
-    if scene.definition == "calibrated":  # stiffness is proportional to thickness
-        own["thickness_ratio"] = scene.mesh.beam.thickness / _calibrating(study)[calibration_name(scene)]
-    return own
-
-
 @once_a_study
-def scene_keys(study):
-    """Keys of a study's scenes by their mesh, in the order of `scenes_by_mesh`: for tasks and the dataset."""
-    return {mesh: [scene_key(study, scene) for scene in scenes] for mesh, scenes in scenes_by_mesh(study).items()}
+def scene_tasks(study):
+    """Tasks of a study's scenes by mesh, in the order of `scenes_by_mesh`.
+
+    A task's key is of its scene; `stored.stored_key` is where its result is.
+    """
+    return {mesh: list(_scene_tasks(study, mesh, scenes)) for mesh, scenes in scenes_by_mesh(study).items()}
 
 
-def _common(study, scene):
-    """Part of a task, and its key, that scenes share if only force or stiffness factor differ."""
-    # By their places: hashing materials for each of 100,000 scenes is slow.
-    place = id(scene.mesh), id(scene.material), scene.load, scene.definition, scene.kinematics
-    known = _commons(study)
-    if place not in known:
-        load, mesh = LOADS[scene.load], scene.mesh
-        task = {
-            "material": material_key(scene.material),
-            "kind": load.kind.name,
-            # In linear kinematics follower forces keep their initial direction.
-            "follower": load.follower and scene.kinematics == "nonlinear",
-            "definition": scene.definition,
-            "kinematics": scene.kinematics,
-        }
-        reference = reference_of(study, mesh.beam, scene.material, scene.load)
-        if "interpolant" not in reference:  # which has no field, all that a scene wants of it
-            task["reference"] = reference
-        code = stage_key("studies.kinds.scenes.solve"), definition_key(scene.definition)
-        key = hash_of(mesh_key(mesh), mesh.beam.thickness, task, code)
-        known[place] = task, key, scene  # the scene, so that nothing else comes to be in these places
-    return known[place][:2]
+def _scene_tasks(study, mesh, scenes):
+    shared, kept = {}, shown_scenes(study)
+    for scene in scenes:
+        place = scene.material, scene.load, scene.definition, scene.kinematics
+        if place not in shared:
+            shared[place] = _shared(study, mesh, *place)
+        task, key = shared[place]
+        own = {"force": scene.force}
+        if scene.definition == "paper":
+            own["stiffness"] = study.stiffness_table[mesh.mesh_type, scene.material.name]
+        if scene.stiffness_scale != 1:
+            own["stiffness_scale"] = scene.stiffness_scale
+        further = {}
+        if scene.definition == "calibrated":  # stiffness is proportional to thickness
+            group = further["calibration"] = calibration_name(scene)
+            own["thickness_ratio"] = mesh.beam.thickness / _calibrating(study)[group][0].mesh.beam.thickness
+        if scene in kept:
+            further["keep_fields"] = True
+        yield {**task, **own, **further, "key": hash_of(key, own)}
 
 
-@once_a_study
-def _commons(study):
-    return {}
+def _shared(study, mesh, material, load, definition, kinematics):
+    """Task, and its key, of scenes of a mesh that differ in force or stiffness alone."""
+    task = {
+        "material": material_key(material),
+        "kind": LOADS[load].kind.name,
+        # In linear kinematics follower forces keep their initial direction.
+        "follower": LOADS[load].follower and kinematics == "nonlinear",
+        "definition": definition,
+        "kinematics": kinematics,
+    }
+    reference = reference_of(study, mesh.beam, material, load)
+    if "interpolant" not in reference:  # which has no field, all that a scene wants of it
+        task["reference"] = reference
+    code = stage_key("studies.kinds.scenes.solve"), definition_key(definition)
+    return task, hash_of(mesh_key(mesh), mesh.beam.thickness, task, code)
+
+
+def curve_task(study, curve):
+    """Task of a sensitivity curve; its stiffnesses [N/m] ascend."""
+    membrane = curve.material.in_plane.young_modulus * curve.mesh.beam.thickness
+    task = {
+        "kind": LOADS[curve.load].kind.name,
+        "force": curve.force,
+        "kinematics": curve.kinematics,
+        "stiffnesses": [ratio * membrane for ratio in study.stiffness_ratios],
+        "reference": reference_of(study, curve.mesh.beam, curve.material, curve.load),
+    }
+    return {"key": hash_of(mesh_key(curve.mesh), task, stage_key("studies.kinds.scenes.sensitivity"))} | task
 
 
 @once_a_study
@@ -303,30 +312,14 @@ def shown_scenes(study):
     return shown(study.scenes, study.swept)
 
 
-def solved_keys(study, mesh, calibration):
-    """Keys under which results of a mesh's scenes are stored, given the calibrated stiffnesses by group."""
-    return [
-        calibrated_key(key, calibration[calibration_name(scene)]["stiffness"])
-        if scene.definition == "calibrated"
-        else key
-        for scene, key in zip(scenes_by_mesh(study)[mesh], scene_keys(study)[mesh])
-    ]
-
-
-def stiffnesses(study, curve):
-    """Stiffnesses of a sensitivity curve [N/m], ascending."""
-    membrane = curve.material.in_plane.young_modulus * curve.mesh.beam.thickness
-    return [ratio * membrane for ratio in study.stiffness_ratios]
-
-
 @once_a_study
 def _calibrating(study):
-    """Thickness of the beam that calibrates each group of scenes [m]; a study gives a group one."""
-    return {calibration_name(one): one.mesh.beam.thickness for one in _calibrating_curves(study)}
-
-
-def _calibrating_curves(study):
-    return [one for one in study.curves if (one.mesh.beam.name, one.load) == study.calibration]
+    """Curves that calibrate each group of scenes."""
+    found = defaultdict(list)
+    for one in study.curves:
+        if (one.mesh.beam.name, one.load) == study.calibration:
+            found[calibration_name(one)].append(one)
+    return dict(found)
 
 
 def calibration_name(scene):
@@ -337,40 +330,13 @@ def calibration_name(scene):
 # -- stages ------------------------------------------------------------------------------------------------------------
 
 
-SEARCH_SECONDS = {
-    "adjoint": (0.05, 2e-4),
-    "annealed": (0.05, 1e-3),
-    "evolved": (0.05, 1e-3),
-    "best-springs": (0.05, 5e-3),
-}
-"""Seconds of definitions that search, on top of their scenes: fixed, and each particle."""
-
-PATH_SECONDS = 1.5e-3, 1e-5
-"""The same of a nonlinear network, and of a curve."""
-
-
-def search_seconds(definition, particles):
-    """Expected seconds of deriving springs."""
-    fixed, each = SEARCH_SECONDS.get(definition, (0.0, 0.0))
-    return fixed + each * particles
-
-
 def _mesh_members(study):
-    """Meshes, and the expected seconds of each with all its scenes and curves."""
-
-    def path(mesh, fixed, each):
-        return fixed + each * particles(mesh)
-
-    seconds = {stem(mesh): path(mesh, 4e-3, 2.5e-5) for mesh in study.meshes}
+    """Meshes by the stem of their files, and the expected seconds of each with all its scenes and curves."""
+    seconds, members, curves = defaultdict(float), defaultdict(list), curves_by_mesh(study)
     for mesh, scenes in scenes_by_mesh(study).items():
-        count, solving = particles(mesh), {"linear": path(mesh, 5e-4, 1e-6), "nonlinear": path(mesh, *PATH_SECONDS)}
-        searching = cache(partial(search_seconds, particles=count))
-        for scene in scenes:
-            seconds[stem(mesh)] += solving[scene.kinematics] + searching(scene.definition)
-    for curve in study.curves:
-        seconds[stem(curve.mesh)] += path(curve.mesh, *PATH_SECONDS)
-    members = defaultdict(list)
-    for mesh in study.meshes:
+        count = particles(mesh)
+        seconds[stem(mesh)] += (1 + len(curves.get(mesh, ()))) * expected_seconds(count)
+        seconds[stem(mesh)] += sum(expected_seconds(count, scene.definition) for scene in scenes)
         members[stem(mesh)].append(mesh)
     return {name: (seconds[name], meshes) for name, meshes in members.items()}
 
@@ -398,23 +364,11 @@ def _reference_tasks(study):
             values, key = _finite_problem(one, kind), finite_key(one, kind)
             found[key] = Task(values, seconds=1.0, name=hash_of(values), key=key)
     yield from found.values()
-    asked = {(one.beam, one.material, one.load) for one in study.references}
     for kind, (box, problems) in interpolants(study).items():
-        if not asked.isdisjoint(problems):  # a part of a study may ask for none
-            key = interpolant_key(kind, box)
-            keys = {solved_reference(*body)["key"]: problem for body, problem in problems.items()}
-            values = {"kind": kind, "box": box, "problems": keys}
-            yield Task(values, seconds=3e-2 * expected_solves(box), name=key, key=key)
-
-
-def _curve(study, curve):
-    return {
-        "kind": LOADS[curve.load].kind.name,
-        "force": curve.force,
-        "kinematics": curve.kinematics,
-        "stiffnesses": stiffnesses(study, curve),
-        "reference": reference_of(study, curve.mesh.beam, curve.material, curve.load),
-    }
+        key = interpolant_key(kind, box)
+        keys = {solved_reference(*body)["key"]: problem for body, problem in problems.items()}
+        values = {"kind": kind, "box": box, "problems": keys}
+        yield Task(values, seconds=3e-2 * expected_solves(box), name=key, key=key)
 
 
 def on_meshes(folder, name, files, **more):
@@ -436,7 +390,7 @@ def stage_on_meshes(name, module, message, content, folder, mesh="mesh", every=(
 def _sensitivity(study, folder, members):
     curves = curves_by_mesh(study)
     files = [
-        {"name": stem(mesh), "tasks": [{"key": curve_key(study, one)} | _curve(study, one) for one in curves[mesh]]}
+        {"name": stem(mesh), "tasks": [curve_task(study, one) for one in curves[mesh]]}
         for meshes in members
         for mesh in meshes
         if mesh in curves
@@ -445,61 +399,40 @@ def _sensitivity(study, folder, members):
 
 
 def _solve(study, folder, members):
-    scenes = scenes_by_mesh(study)
+    tasks = scene_tasks(study)
     files = [
-        {"name": stem(mesh), "thickness": mesh.beam.thickness, "tasks": _scenes(study, mesh)}
+        {"name": stem(mesh), "thickness": mesh.beam.thickness, "tasks": tasks[mesh]}
         for meshes in members
         for mesh in meshes
-        if mesh in scenes  # a part of a study may have curves alone
     ]
-    calibration = str(calibration_path(folder)) if calibrated(study) else None
-    return on_meshes(folder, "solutions", files, calibration=calibration)
+    return on_meshes(folder, "solutions", files, calibration=calibration_file(study, folder))
 
 
-def _scenes(study, mesh):
-    """Tasks of a mesh's scenes."""
-    tasks, kept = [], shown_scenes(study)
-    for scene, key in zip(scenes_by_mesh(study)[mesh], scene_keys(study)[mesh]):
-        task = {**_common(study, scene)[0], "key": key, **_own(study, scene)}
-        if scene in kept:
-            task["keep_fields"] = True
-        if scene.definition == "calibrated":
-            task["calibration"] = calibration_name(scene)
-        tasks.append(task)
-    return tasks
-
-
-@once_a_study
-def calibrated(study):
-    """Scenes whose stiffness is calibrated."""
-    return [scene for scene in study.scenes if scene.definition == "calibrated"]
-
-
-def calibration_path(folder):
-    """Where the calibrated stiffnesses of a study are."""
-    return folder / "calibration.h5"
+def calibration_file(study, folder):
+    """File of the calibrated stiffnesses of a study, if any scene is calibrated."""
+    any_is = any(scene.definition == "calibrated" for scene in study.scenes)
+    return str(folder / "calibration.h5") if any_is else None
 
 
 def _calibrate_members(study):
     """All groups of scenes that share a calibrated stiffness, in one job."""
-    names = {calibration_name(scene) for scene in calibrated(study)}
+    names = {calibration_name(scene) for scene in study.scenes if scene.definition == "calibrated"}
     return {"all": (0.0, sorted(names))} if names else {}
 
 
 def _calibrate(study, folder, members):
     def named(curve):
-        place = {"mesh": stem(curve.mesh), "curve": curve_key(study, curve)}
+        place = {"mesh": stem(curve.mesh), "curve": curve_task(study, curve)["key"]}
         return place | {"load": curve.load, "force": curve.force}
 
-    tasks = [
-        {"name": name, "members": [named(one) for one in _calibrating_curves(study) if calibration_name(one) == name]}
-        for names in members
-        for name in names
-    ]
     return {
-        "file": str(calibration_path(folder)),
+        "file": calibration_file(study, folder),
         "curves": str(folder / "curves"),
-        "groups": tasks,
+        "groups": [
+            {"name": name, "members": [named(one) for one in _calibrating(study)[name]]}
+            for names in members
+            for name in names
+        ],
         "code": stage_key("studies.kinds.scenes.calibrate"),
     }
 

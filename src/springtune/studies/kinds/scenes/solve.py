@@ -16,7 +16,7 @@ from springtune.springs.base import DEFINITIONS, DefinitionError
 
 from ...runs import store
 from . import stored
-from .stored import calibrated_key
+from .stored import stored_key
 
 parts = stored.parts
 
@@ -62,12 +62,6 @@ def order(scene):
     """Order in which scenes of one network follow each other."""
     uniform = DEFINITIONS[scene["definition"]].uniform
     return ("" if uniform else scene["definition"], scene["material"]["poisson_ratio"], LOAD_KINDS[scene["kind"]].held)
-
-
-def stored_key(scene, calibration):
-    """Key of a scene's result; as in `springtune.studies.kinds.scenes.plan.solved_keys`, from the task."""
-    group = scene.get("calibration")
-    return calibrated_key(scene["key"], calibration[group]["stiffness"]) if group else scene["key"]
 
 
 def solve(scene, shared):

@@ -130,13 +130,11 @@ def scaled(found: dict[str, Any], reference: dict[str, Any]) -> dict[str, Any]:
 FIELD_ARRAYS = {"displacements": "f8", "spring_stiffnesses": "f4", "spring_forces": "f4"}
 """Arrays of all particles and springs, and their types."""
 
-PACKED = "fields"
-"""What they are stored as: one array, since three take as long to write as the scene to solve."""
 
-
-def calibrated_key(key: str, stiffness: float | None) -> str:
-    """Key of a scene with a calibrated stiffness [N/m], or None."""
-    return hash_of(key, stiffness)
+def stored_key(scene: dict[str, Any], calibration: dict[str, Any]) -> str:
+    """Key of a scene's result, which depends on the stiffness that calibrates it [N/m], if any."""
+    group = scene.get("calibration")
+    return hash_of(scene["key"], calibration[group]["stiffness"]) if group else str(scene["key"])
 
 
 def fields_key(key: str) -> str:
@@ -146,33 +144,8 @@ def fields_key(key: str) -> str:
 
 def parts(task: dict[str, Any], result: dict[str, Any]) -> dict[str, dict[str, Any]]:
     """Stored parts of a result by key: its numbers and, if they are kept, its fields."""
-    fields = {fields_key(task["key"]): packed(result)} if task.get("keep_fields") else {}
-    return fields | {task["key"]: {name: value for name, value in result.items() if name not in FIELD_ARRAYS}}
-
-
-def packed(result: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Fields of a result as they are stored; empty without any."""
-    if not FIELD_ARRAYS.keys() <= result.keys():
-        return {}
-    arrays = [result[name].astype(kind).ravel() for name, kind in FIELD_ARRAYS.items()]
-    lengths = np.array([len(array) for array in arrays])
-    return {PACKED: np.concatenate([array.view("u1") for array in (lengths, *arrays)])}
-
-
-def unpacked(stored: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Fields of a stored result: the inverse of `packed`.
-
-    Examples
-    --------
-    >>> fields = {"displacements": np.ones((2, 2)), "spring_stiffnesses": np.ones(3), "spring_forces": np.zeros(3)}
-    >>> {name: array.shape for name, array in unpacked(packed(fields)).items()}
-    {'displacements': (2, 2), 'spring_stiffnesses': (3,), 'spring_forces': (3,)}
-    """
-    if PACKED not in stored:
-        return {}
-    head = 8 * len(FIELD_ARRAYS)
-    lengths = stored[PACKED][:head].view("i8")
-    sizes = [length * np.dtype(kind).itemsize for length, kind in zip(lengths, FIELD_ARRAYS.values())]
-    parts = np.split(stored[PACKED][head:], np.cumsum(sizes)[:-1])
-    found = {name: part.view(kind) for part, (name, kind) in zip(parts, FIELD_ARRAYS.items())}
-    return found | {"displacements": found["displacements"].reshape(-1, 2)}
+    found = {task["key"]: {name: value for name, value in result.items() if name not in FIELD_ARRAYS}}
+    if task.get("keep_fields"):
+        kept = {name: result[name].astype(kind) for name, kind in FIELD_ARRAYS.items() if name in result}
+        found[fields_key(task["key"])] = kept
+    return found

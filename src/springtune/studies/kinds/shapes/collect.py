@@ -10,8 +10,8 @@ from ...output.dataset import OF_PARTICLES, OF_SPRINGS, UGRID
 from ...runs import store
 from ..scenes import stored
 from ..scenes import variables as shared
-from ..scenes.collect import fields_on, put_outline, with_objection
-from ..scenes.stored import PACKED, fields_key, unpacked
+from ..scenes.collect import displaced, fields_of_rows, mesh_row, outline_row, with_objection
+from ..scenes.stored import FIELD_ARRAYS, fields_key
 from ..scenes.variables import declared, topology
 from . import kind
 from .expand import law_of
@@ -213,49 +213,32 @@ def _error(value, reference):
     return deformation_error(value, reference) if reference else np.nan
 
 
-OUTLINE_ARRAYS = ("outline_points", "outline_displacements", "outline_lengths")
-
-
 def _fields(study, folder):
     """Group of the drawn networks."""
     part = study.parts["shapes"]
-    cases = {}
-    drawn = kind.shown(part)
+    drawn, cases = kind.shown(part), {}
     for one in (one for one in part.scenes if one in drawn):
-        cases.setdefault((one.shape, one.load), []).append(one)
-    meshes = {case: stored.read(folder / "meshes", kind.file_name(scenes[0])) for case, scenes in cases.items()}
-    outlines = {case: _outline(part, scenes[0], folder) for case, scenes in cases.items()}
-    there = [({"case": ", ".join(case)}, found.mesh) for case, found in meshes.items() if found]
-    axes = study.axes | {"case": tuple(map(", ".join, cases))}
-    found = fields_on(SHAPE_FIELDS, axes, there, [points for points, *_ in outlines.values()])
-    for case, scenes in cases.items():
-        label, one = ", ".join(case), scenes[0]
-        about = {"shape_name": one.shape, "load_name": one.load, "material_name": one.material}
-        about |= {"kinematics_name": one.kinematics, "mesh_type_name": one.mesh_type, "case_mesh_size": one.mesh_size}
-        found.put(about, case=label)
-        points, moved, rounds = outlines[case]
-        put_outline(found, points, moved, case=label)
-        found.put({"outline_round": rounds}, case=label)
-        if not meshes[case]:
-            continue
-        path = folder / "solutions" / f"{kind.file_name(one)}.h5"
-        keys = {scene: fields_key(kind.scene_task(part, scene)["key"]) for scene in scenes}
-        results = store.read(path, set(keys.values()), [PACKED])
-        for scene, key in keys.items():
-            kept = unpacked(results[key])
-            if kept:
-                x, y = kept["displacements"].T
-                values = {"displacement_x": x, "displacement_y": y, "spring_force": kept["spring_forces"]}
-                found.put(values, case=label, definition=scene.definition)
-    return {SHAPE_FIELDS.name: found.data}
+        cases.setdefault(f"{one.shape}, {one.load}", []).append(one)
+    rows = [{"case": case} | row for case, scenes in cases.items() for row in _drawn(part, folder, scenes)]
+    return {SHAPE_FIELDS.name: fields_of_rows(SHAPE_FIELDS, study.axes | {"case": tuple(cases)}, rows)}
 
 
-def _outline(part, one, folder):
-    """Points of the outline, their displacements in the reference, and the number of their round."""
-    case = one.shape, one.material, one.load
-    if case in part.referred:
-        found = _answer(part, folder, *case, arrays=OUTLINE_ARRAYS)
+def _drawn(part, folder, scenes):
+    """Rows of a case: its labels, outline, mesh and networks."""
+    one, file = scenes[0], kind.file_name(scenes[0])
+    about = {f"{name}_name": getattr(one, name) for name in (*CASE_AXES, "kinematics", "mesh_type")}
+    yield about | {"case_mesh_size": one.mesh_size}
+    body = one.shape, one.material, one.load
+    if body in part.referred:
+        found = _answer(part, folder, *body, arrays=("outline_points", "outline_displacements", "outline_lengths"))
         if not found["message"]:
-            points, moved, sizes = (found[name] for name in OUTLINE_ARRAYS)
-            return points, moved, np.repeat(np.arange(len(sizes)), sizes)
-    return np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0, dtype=int)
+            sizes = found["outline_lengths"]
+            rounds = {"outline_round": np.repeat(np.arange(len(sizes)), sizes)}
+            yield rounds | outline_row(found["outline_points"], found["outline_displacements"])
+    if grouped := stored.read(folder / "meshes", file):
+        yield mesh_row(grouped.mesh)
+        keys = {scene: fields_key(kind.scene_task(part, scene)["key"]) for scene in scenes}
+        results = store.read(folder / "solutions" / f"{file}.h5", set(keys.values()), [*FIELD_ARRAYS])
+        for scene, key in keys.items():
+            if results[key]:
+                yield {"definition": scene.definition} | displaced(results[key])

@@ -15,7 +15,15 @@ from ...runs.job import JOB
 from ...runs.keys import definition_key, material_key, mesh_type_key, stage_key
 from ...runs.source import hash_of
 from ...runs.stages import Task, stage
-from ..scenes.plan import file_source, mesh_stage, on_meshes, parameters, particles_in, search_seconds, stage_on_meshes
+from ..scenes.plan import (
+    expected_seconds,
+    file_source,
+    mesh_stage,
+    on_meshes,
+    parameters,
+    particles_in,
+    stage_on_meshes,
+)
 from .outputs import DRAWING, OUTPUTS, OWN_FILE, mesh_name, stems
 from .sections import NAMED_GRIDS, NAMED_SHAPES
 
@@ -126,16 +134,10 @@ def by_mesh(part):
 def _mesh_members(study):
     """Meshes with their scenes, and the expected seconds of both."""
     part = study.parts["shapes"]
-    members = {}
-    for name, scenes in by_mesh(part).items():
-        seconds = 2e-2 + 2.5e-5 * particles(part, scenes[0])
-        members[name] = seconds + sum(_seconds(part, one) for one in scenes), scenes
-    return members
-
-
-def _seconds(part, one):
-    count = particles(part, one)
-    return 5e-3 + 2e-5 * count + search_seconds(one.definition, count)
+    return {
+        name: (sum(expected_seconds(particles(part, one), one.definition) for one in scenes), scenes)
+        for name, scenes in by_mesh(part).items()
+    }
 
 
 def _meshes(study, folder, members):
