@@ -14,6 +14,7 @@ from springtune.problem.geometry import Beam
 from springtune.problem.materials import CONSTANTS, AnisotropicMaterial, Material, material_of
 from springtune.studies.config.expand import declared
 from springtune.studies.config.kind import kinds
+from springtune.studies.config.messages import Problems
 from springtune.studies.config.sections import study_model
 from springtune.studies.runs.keys import beam_key, material_key
 from springtune.studies.runs.source import hash_of
@@ -171,10 +172,10 @@ STUDY = STUDIES["materials"]
 def test_a_study_declares_all_three_forms(load):
     assert len(load(STUDY).scenes) == 1
     config = study_model(kinds()).model_validate(yaml.load(STUDY, yaml.BaseLoader))
-    found = declared(config).materials
+    found = declared(config, Problems("study.yaml")).materials
     assert found["ply"] == replace(PLY.rotated("-30 deg"), name="ply")
     plies = yaml.load(STUDY.replace("angle: -30 deg", "angle: [0 deg, 90 deg, 90 deg, 0 deg]"), yaml.BaseLoader)
-    cross = declared(study_model(kinds()).model_validate(plies)).materials["ply"]
+    cross = declared(study_model(kinds()).model_validate(plies), Problems("study.yaml")).materials["ply"]
     assert cross == AnisotropicMaterial.laminate([(PLY, f"{angle} deg", 1) for angle in (0, 90, 90, 0)], name="ply")
     assert found["board"] == AnisotropicMaterial(9e9, 4e9, -1.5e9, 2e9, density=600.0, name="board")
 

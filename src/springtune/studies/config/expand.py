@@ -29,13 +29,12 @@ from .sections import StudyConfig
 Item = TypeVar("Item", MeshSpec, SceneSpec, CurveSpec, Reference)
 
 
-def files_of_meshes(config: StudyConfig, folder: Path, problems: Problems) -> MeshFiles:
+def files_of_meshes(config: StudyConfig, beams: Mapping[str, Beam], problems: Problems) -> MeshFiles:
     """Meshes from files by (mesh type, beam's name, mesh size)."""
     found: MeshFiles = {}
-    beams = declared(config, folder).beams
     for name, rows in (config.mesh_files or {}).items():
         for number, row in enumerate(rows):
-            path, label = folder / row.file, (name, row.beam, row.mesh_size)
+            path, label = problems.folder / row.file, (name, row.beam, row.mesh_size)
             where = ("mesh_files", name, number)
             fault = file_fault(path)
             if fault:
@@ -45,22 +44,6 @@ def files_of_meshes(config: StudyConfig, folder: Path, problems: Problems) -> Me
             found[label] = MeshSpec(beams[row.beam], name, row.mesh_size, path, row.unit)
     problems.stop()
     return found
-
-
-def files_of_tests(config: StudyConfig, folder: Path, problems: Problems) -> tuple[Path, ...]:
-    """Check each file of material tests, and return their paths."""
-    found: list[Path] = []
-    for name, material in config.materials.items():
-        own = [getattr(material, key) for key in ("uniaxial_test", "equibiaxial_test", "pure_shear_test")]
-        if not material.uniaxial_test:
-            continue
-        try:
-            material.material(name, folder)
-        except ValueError as error:
-            problems.add(("materials", name), str(error))
-        found += [folder / file for file in own if file is not None]
-    problems.stop()
-    return tuple(found)
 
 
 def file_fault(path: Path) -> str:
@@ -84,13 +67,17 @@ class Declared:
     folder: Path = Path()
 
 
-def declared(config: StudyConfig, folder: Path = Path()) -> Declared:
-    """Bodies and materials that a study declares."""
-    return Declared(
-        {name: Beam(beam.length, beam.height, beam.thickness, name) for name, beam in config.beams.items()},
-        {name: material.material(name, folder) for name, material in config.materials.items()},
-        folder,
-    )
+def declared(config: StudyConfig, problems: Problems) -> Declared:
+    """Bodies and materials that a study declares; files of material tests are read."""
+    beams = {name: Beam(beam.length, beam.height, beam.thickness, name) for name, beam in config.beams.items()}
+    materials = {}
+    for name, material in config.materials.items():
+        try:
+            materials[name] = material.material(name, problems.folder)
+        except ValueError as error:
+            problems.add(("materials", name), str(error))
+    problems.stop()
+    return Declared(beams, materials, problems.folder)
 
 
 def _ranks(config: StudyConfig) -> dict[str, dict[str, int]]:
@@ -117,10 +104,9 @@ def swept(config: StudyConfig) -> tuple[str, ...]:
 
 
 def _bodies(
-    config: StudyConfig, files: MeshFiles, folder: Path
+    known: Declared, files: MeshFiles
 ) -> tuple[Callable[..., Beam], Callable[..., Material], Callable[..., MeshSpec | None]]:
     """Functions that make each beam, material and mesh of a study once; a mesh is None if its file is missing."""
-    known = declared(config, folder)
 
     @cache
     def beam(name: str, thickness: float | None) -> Beam:
@@ -150,9 +136,9 @@ def _force(pressure: float, beam: Beam) -> float:
     return float(f"{pressure * beam.length * beam.thickness:.{RANGE_DIGITS}g}")
 
 
-def expand(config: StudyConfig, mesh_files: MeshFiles, problems: Problems) -> tuple[Grid, ...]:
+def expand(config: StudyConfig, bodies: Declared, mesh_files: MeshFiles, problems: Problems) -> tuple[Grid, ...]:
     """Expand grids into scenes and curves."""
-    make_beam, make_material, make_mesh = _bodies(config, mesh_files, problems.folder)
+    make_beam, make_material, make_mesh = _bodies(bodies, mesh_files)
     several = "force" in swept(config)
     forces: dict[tuple[Beam, Material, str], tuple[float, str]] = {}
     grids = []
@@ -240,7 +226,12 @@ def _calibrating(config: StudyConfig, scenes: Sequence[SceneSpec], problems: Pro
 
 
 def build(
-    config: StudyConfig, grids: tuple[Grid, ...], kinds: Sequence[Kind], problems: Problems, about: dict[str, Any]
+    config: StudyConfig,
+    bodies: Declared,
+    grids: tuple[Grid, ...],
+    kinds: Sequence[Kind],
+    problems: Problems,
+    about: dict[str, Any],
 ) -> Study:
     """Build the study with the parts of all study kinds."""
     ranks, names = _ranks(config), swept(config)
@@ -268,7 +259,6 @@ def build(
         used[name] = {getattr(scene, name) for scene in scenes}
     check_cells(config, used, bool(curves), problems)
     problems.stop()
-    bodies = declared(config, problems.folder)
     parts = {kind.name: kind.expand(config, bodies) if kind.wanted(config) else () for kind in kinds}
     if config.printed and names:
         problems.stop_at(

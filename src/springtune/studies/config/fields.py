@@ -141,6 +141,16 @@ def declared(what: str, section: str, beside: Collection[str] = ()) -> AfterVali
     return AfterValidator(known)
 
 
+FILES = "files that a study names"
+"""Key of their list in the context of validation."""
+
+
+def _noted(name: str, info: ValidationInfo) -> str:
+    if info.context is not None:
+        info.context[FILES].append(name)
+    return name
+
+
 MeshType = Annotated[
     str,
     Scalar(str, {"type": "string", "examples": list(MESH_TYPES)}, "a mesh type such as 'structured'"),
@@ -153,7 +163,7 @@ FurtherReference = Annotated[str, one_of("reference", FURTHER_REFERENCES)]
 Kinematics = Annotated[str, one_of("kinematics", KINEMATICS)]
 DefinitionName = Annotated[str, one_of("definition", DEFINITIONS)]
 Text = Annotated[str, Scalar(str, {"type": "string", "minLength": 1}, "a text")]
-FileName = Annotated[str, Scalar(str, {"type": "string", "minLength": 1}, "the path of a file")]
+FileName = Annotated[str, Scalar(str, {"type": "string", "minLength": 1}, "the path of a file"), AfterValidator(_noted)]
 BeamName = Annotated[str, Scalar(str, {"type": "string"}, "the name of a beam"), declared("beam", "beams")]
 MaterialName = Annotated[
     str, Scalar(str, {"type": "string"}, "the name of a material"), declared("material", "materials")

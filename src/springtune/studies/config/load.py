@@ -1,12 +1,14 @@
 """Load a study from YAML: validate it, expand it, remove duplicates and sort."""
 
 from pathlib import Path
+from typing import Any
 
 from springtune.registry import NAME, NAME_RULE
 
 from .checks import check_definitions, check_meshes, check_names, check_scenes
 from .combinations import add_rows
-from .expand import build, expand, files_of_meshes, files_of_tests
+from .expand import build, declared, expand, files_of_meshes
+from .fields import FILES
 from .kind import Kind
 from .messages import Problems, StudyError, read_study, validated
 from .model import Study
@@ -27,7 +29,7 @@ def load(path: str | Path, kinds: tuple[Kind, ...], beside: Path | None = None) 
     add_rows(content, problems)
     # Names that sections refer to; of a section that is no mapping, whose error is enough, nothing is known.
     given = content.items() if isinstance(content, dict) else ()
-    sections = {key: one if isinstance(one, dict) else None for key, one in given}
+    sections: dict[str, Any] = {key: one if isinstance(one, dict) else None for key, one in given} | {FILES: []}
     config = validated(model, content, problems, context=sections)
     check_names(config, problems)
     problems.stop()
@@ -36,15 +38,14 @@ def load(path: str | Path, kinds: tuple[Kind, ...], beside: Path | None = None) 
     for kind in filter(lambda kind: kind.wanted(config), kinds):
         kind.check(config, problems)
     problems.stop()
-    test_files = files_of_tests(config, beside, problems)
-    mesh_files = files_of_meshes(config, beside, problems)
-    grids = expand(config, mesh_files, problems)
+    bodies = declared(config, problems)
+    mesh_files = files_of_meshes(config, bodies.beams, problems)
+    grids = expand(config, bodies, mesh_files, problems)
     check_meshes(config, grids, problems)
     problems.stop()
     check_definitions(config, grids, problems)
     problems.stop()
     printed_path = beside / config.printed if config.printed else None
     about = {"name": path.stem, "path": path, "text": text, "printed_path": printed_path, "mesh_files": mesh_files}
-    about["row_files"] = tuple(beside / grid.rows for grid in config.grids.values() if grid.rows)
-    about["test_files"] = test_files
-    return build(config, grids, kinds, problems, about)
+    about["files"] = tuple(beside / name for name in sections[FILES])
+    return build(config, bodies, grids, kinds, problems, about)

@@ -149,7 +149,7 @@ class Study:
 
     `axes` has the labels of each dimension of the dataset: texts, for ``mesh_size`` numbers [m]. `swept` are parameters
     of `springtune.problem.parameters.SWEPT` that are dimensions. `printed` cells are of
-    `springtune.studies.config.combinations.PrintedCell`, `test_files` tests of rubber.
+    `springtune.studies.config.combinations.PrintedCell`, `files` all that it names.
     """
 
     name: str
@@ -173,8 +173,7 @@ class Study:
     printed_path: Path | None
     axes: dict[str, tuple[str | float, ...]]
     swept: tuple[str, ...] = ()
-    test_files: tuple[Path, ...] = ()
-    row_files: tuple[Path, ...] = ()
+    files: tuple[Path, ...] = ()
 
     @property
     def plane_strain(self) -> tuple[str, ...]:

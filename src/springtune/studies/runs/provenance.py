@@ -93,10 +93,7 @@ def _checkout(folder: Path) -> Path | None:
 
 def input_files(study: Study) -> set[Path]:
     """The study's file and all files that it names."""
-    files = {study.path, *study.test_files, *study.row_files}
-    files |= {mesh.file for mesh in study.mesh_files.values() if mesh.file}
-    files |= {study.printed_path} if study.printed_path else set()
-    return files | {file for kind in kinds() for file in kind.files(study.parts[kind.name])}
+    return {study.path, *study.files, *(file for kind in kinds() for file in kind.files(study.parts[kind.name]))}
 
 
 def _name(file: Path, root: Path) -> str:
