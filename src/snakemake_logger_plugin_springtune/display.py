@@ -5,6 +5,8 @@ import time
 from collections.abc import Callable, Mapping
 from typing import TextIO
 
+from snakemake_interface_logger_plugins.common import LogEvent
+
 from springtune.studies.runs.workload import clock as clock_text
 
 PAUSE = 0.5
@@ -26,28 +28,19 @@ class Display:
     ) -> None:
         self.work, self.stream, self.moves, self.clock = work, stream, moves, clock
         self.begun, self.over, self.writing = clock(), threading.Event(), threading.Lock()
-        self.running, self.done, self.failed = set[int](), set[int](), set[int]()
+        events = LogEvent.JOB_INFO, LogEvent.JOB_FINISHED, LogEvent.JOB_ERROR
+        self.jobs = {event: set[int]() for event in events}
         if moves:
             threading.Thread(target=self._move, daemon=True).start()
 
-    def begin(self, number: int) -> None:
-        """Mark a job as started."""
-        self.running.add(number)
-        self.failed.discard(number)
-
-    def finish(self, number: int) -> None:
-        """Mark a job as done; elsewhere than on a terminal, write a line when its stage is."""
-        self.running.discard(number)
-        self.done.add(number)
-        if not self.moves and number in self.work:
+    def follow(self, event: LogEvent, number: int) -> None:
+        """Note what became of a job; elsewhere than on a terminal, write a line when its stage is done."""
+        for what, jobs in self.jobs.items():
+            (jobs.add if what == event else jobs.discard)(number)
+        if event == LogEvent.JOB_FINISHED and not self.moves and number in self.work:
             stage = [other for other, work in self.work.items() if work[0] == self.work[number][0]]
-            if self.done.issuperset(stage):
+            if self.jobs[event].issuperset(stage):
                 self._write(f"{self.work[number][0]}: done; {self.line()}\n")
-
-    def fail(self, number: int) -> None:
-        """Mark a job as failed."""
-        self.running.discard(number)
-        self.failed.add(number)
 
     def tell(self, write: Callable[[], None]) -> None:
         """Write something else, above the line that moves."""
@@ -65,12 +58,13 @@ class Display:
     def line(self) -> str:
         """Jobs done, times gone by and left at the rate so far, and the stages that run."""
         gone = self.clock() - self.begun
+        running, done, failed = self.jobs.values()
         results = sum(count for _, count in self.work.values())
-        made = sum(self.work[number][1] for number in self.done if number in self.work)
+        made = sum(self.work[number][1] for number in done if number in self.work)
         left = f", about {clock_text(gone * (results - made) / made)} left" if 0 < made < results else ""
-        failed = f", {len(self.failed)} failed" if self.failed else ""
-        stages = dict.fromkeys(self.work[number][0] for number in sorted(self.running) if number in self.work)
-        head = f"{len(self.done)} of {len(self.work)} jobs{failed}, {clock_text(gone)}{left}"
+        lost = f", {len(failed)} failed" if failed else ""
+        stages = dict.fromkeys(self.work[number][0] for number in sorted(running) if number in self.work)
+        head = f"{len(done)} of {len(self.work)} jobs{lost}, {clock_text(gone)}{left}"
         return ": ".join(filter(None, (head, ", ".join(stages) if self.moves else "")))
 
     def _move(self) -> None:

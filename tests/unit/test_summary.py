@@ -327,13 +327,13 @@ def test_what_is_left_follows_the_rate_so_far():
     now = [1000.0]
     display = Display({1: ("a", 30), 2: ("b", 10), 3: ("b", 20)}, io.StringIO(), True, clock=lambda: now[0])
     display.stop()
-    display.begin(1)
+    display.follow(LogEvent.JOB_INFO, 1)
     now[0] += 60
     assert display.line() == "0 of 3 jobs, 1:00 min: a"
-    display.finish(1)
-    display.begin(2)
+    display.follow(LogEvent.JOB_FINISHED, 1)
+    display.follow(LogEvent.JOB_INFO, 2)
     assert display.line() == "1 of 3 jobs, 1:00 min, about 1:00 min left: b"
-    display.fail(2)
+    display.follow(LogEvent.JOB_ERROR, 2)
     assert display.line() == "1 of 3 jobs, 1 failed, 1:00 min, about 1:00 min left"
 
 

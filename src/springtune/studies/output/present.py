@@ -1,6 +1,5 @@
 """Make a study's outputs: figures in PNG and PDF files, and tables."""
 
-import gc
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,9 +15,6 @@ from .reading import lazily
 
 if TYPE_CHECKING:
     from ..config.kind import Output
-
-MANY_PANELS = 16
-"""Panels above which a figure's memory is freed before the next one."""
 
 
 def run(dataset: str | Path, folder: str | Path, *names: str) -> list[Path]:
@@ -59,16 +55,10 @@ def _draw(output: "Output", tree: xr.DataTree, folder: Path) -> Iterator[Path]:
             atomic.write_bytes(folder / f"{stem}.{ending}", content)
             yield folder / f"{stem}.{ending}"
         plt.close(figure)
-        panels = len(figure.axes)
-        del figure
-        if panels > MANY_PANELS:
-            gc.collect()
 
 
 if __name__ == "__main__":
     import os
 
     os.environ["MPLBACKEND"] = "Agg"
-    # Collecting the garbage of small figures costs more than it frees; large figures are collected one by one.
-    gc.disable()
     main(*sys.argv[1:])
