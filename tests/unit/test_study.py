@@ -82,9 +82,11 @@ class TestExpansion:
     def test_names(self, load):
         study = load(changed(("[2 mm, 5 mm]", "[0.5 mm, 5 mm]")))
         assert study.meshes[0].name == "long_structured_0.5mm"
-        assert study.name_of(study.scenes[0]) == "long_structured_0.5mm_steel_traction_paper_nonlinear"
+        assert [*study.labels(study.scenes[0]).values()] == [
+            "long", "structured", 5e-4, "steel", "traction", "paper", "nonlinear"
+        ]  # fmt: skip
         assert len({mesh.name for mesh in study.meshes}) == len(study.meshes)
-        assert len({study.name_of(scene) for scene in study.scenes}) == len(study.scenes)
+        assert len({tuple(study.labels(scene).items()) for scene in study.scenes}) == len(study.scenes)
 
     def test_stiffness_ratios(self, load):
         assert len(load(SMALL).stiffness_ratios) == 61
@@ -179,8 +181,12 @@ def test_expansion_is_complete_without_duplicates_and_in_one_order(tmp_path, ask
         axes = [grid["beam"], grid["mesh_type"], sizes]
         axes += [grid[name] for name in ("material", "load", "definition", "kinematics")]
         expected |= {"_".join(labels) for labels in itertools.product(*axes)}
-    names = [study.name_of(scene) for scene in study.scenes]
-    calibrating = {study.name_of(scene) for scene in study.grids[-1].scenes}
+
+    def name(scene):
+        return "_".join((study.labels(scene) | {"mesh_size": f"{1e3 * scene.mesh.mesh_size:g}mm"}).values())
+
+    names = [name(scene) for scene in study.scenes]
+    calibrating = {name(scene) for scene in study.grids[-1].scenes}
     assert set(names) == expected | calibrating
     for items in (study.meshes, study.scenes, study.curves, study.references):
         assert len(set(items)) == len(items)

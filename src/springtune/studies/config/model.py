@@ -232,12 +232,6 @@ class Study:
         """Labels of the dataset cell of a scene, curve or reference."""
         return one.labels(self.swept)
 
-    def name_of(self, scene: SceneSpec) -> str:
-        """Readable name of a scene, unique in the study."""
-        labels = self.labels(scene) | {"mesh_size": f"{1e3 * scene.mesh.mesh_size:g}mm"}
-        words = (f"{name}={label:.9g}" if isinstance(label, float) else label for name, label in labels.items())
-        return "_".join(words)
-
 
 def swept_value(one: SceneSpec | CurveSpec | Reference, beam: Beam, name: str) -> float:
     """Value of a swept parameter."""
