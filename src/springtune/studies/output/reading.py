@@ -101,8 +101,8 @@ def _opened(path: Path) -> "xarray.DataTree":
         manager = CachingFileManager(h5netcdf.File, str(path), mode="r", kwargs={"decode_vlen_strings": True})
         stack.callback(manager.close)
         for name in ("/", *manager.acquire().groups):
-            store = H5NetCDFStore(manager, group=None if name == "/" else name)  # type: ignore[no-untyped-call]
-            variables, attributes = store.load()
+            store = H5NetCDFStore(manager, group=None if name == "/" else name)
+            variables, attributes = store.load()  # type: ignore[no-untyped-call]
             for array in variables.values():
                 if array.dtype == object and array.nbytes > LARGE_ARRAY:
                     del array.encoding["dtype"]
