@@ -20,8 +20,8 @@ from springtune.problem.geometry import Beam
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import Material
 from springtune.problem.status import Status
-from springtune.reference.small_strain import solve_small_strain
 from springtune.scene.sheet import Sheet
+from springtune.scene.statements import unit_reference
 from springtune.springs import DEFINITIONS, DefinitionError
 
 from problems import pulled
@@ -380,7 +380,7 @@ class TestBodies:
             lambda: extrapolate("right", 1e-3, beam, material),
             lambda: st.find_mesh(beam, material, "1 %"),
         ):
-            with counted(solve_small_strain, MeshType.__call__, Sheet.__init__) as calls:
+            with counted(unit_reference, MeshType.__call__, Sheet.__init__) as calls:
                 with pytest.raises(ValueError, match=f"^beam 'odd': .*{why}"):
                     call()
             assert not calls

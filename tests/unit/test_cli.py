@@ -29,8 +29,8 @@ from springtune.prediction import choices as of_one_mesh
 from springtune.prediction.search import find_mesh
 from springtune.problem.geometry import AssumptionWarning, Beam
 from springtune.problem.materials import Material
-from springtune.reference.small_strain import solve_small_strain
 from springtune.scene.sheet import Sheet
+from springtune.scene.statements import unit_reference
 from springtune.springs import DEFINITIONS
 from springtune.studies.config.kind import kinds
 from springtune.studies.config.sections import schema_text, study_model
@@ -540,15 +540,15 @@ class TestPredictAMesh:
             assert re.search(rf"(?<!\w){re.escape(ending)}\b", said), ending
 
     def test_work_is_counted(self):
-        with counted(MeshType.__call__, solve_small_strain, Sheet.__init__) as calls:
+        with counted(MeshType.__call__, unit_reference, Sheet.__init__) as calls:
             run("predict", *STEEL, "--size", "10 mm", "--loads", "shear")
-        assert calls == {"MeshType.__call__": 1, "solve_small_strain": 1, "Sheet.__init__": 1}
+        assert calls == {"MeshType.__call__": 1, "unit_reference": 1, "Sheet.__init__": 1}
 
     @pytest.mark.filterwarnings("default::springtune.problem.geometry.AssumptionWarning")
     @pytest.mark.parametrize("asked", ["--size", "--error"])
     def test_absurd_numbers_are_refused_before_anything_is_made_or_solved(self, asked):
         """By one line each: no mesh, no reference, no network."""
-        work = (MeshType.__call__, solve_small_strain, Sheet.__init__)
+        work = (MeshType.__call__, unit_reference, Sheet.__init__)
         absurd = [
             *((beam, "5 mm") for beam in ("1e-9x1e-9", "1e12x1e12", "1e6x1", "1x1e6", "1e-9x1", "1e40x1e40")),
             *(

@@ -412,24 +412,17 @@ def _expected_errors(
 ) -> dict[str, float | str]:
     """Error by load, linear kinematics against the reference of small strain; or why it is not computed."""
     # Here, since finite elements take half a second to import.
-    from ..prediction.choices import errors_under, references
+    from ..prediction.choices import errors_under, reference_of
 
     if why := _too_many(sheet):
         return dict.fromkeys(loads, why)
-    errors: dict[str, float | str] = dict.fromkeys(
-        loads, f"{NOT_COMPUTED}: definition '{definition.name}' is not for this load"
-    )
-    # In linear kinematics a load that turns with its side equals the one that does not.
-    steady = {
-        name: next(other for other, one in LOADS.items() if one == replace(LOADS[name], follower=False))
-        for name in loads
-        if LOADS[name].kind.uniaxial or not definition.uniaxial
-    }
-    solved = references(beam, material, steady.values()) if steady else {}
-    for name, other in steady.items():
-        known = {name: solved[other]}
-        statement = BeamStatement(beam, sheet.mesh, material, name, 1.0, "linear")
-        errors |= _in_words(errors_under(statement, sheet, springs, known), known)
+    why = f"{NOT_COMPUTED}: definition '{definition.name}' is not for this load"
+    errors: dict[str, float | str] = dict.fromkeys(loads, why)
+    for name in loads:
+        if LOADS[name].kind.uniaxial or not definition.uniaxial:
+            known = {name: reference_of(beam, material, name)}
+            statement = BeamStatement(beam, sheet.mesh, material, name, 1.0, "linear")
+            errors |= _in_words(errors_under(statement, sheet, springs, known), known)
     return errors
 
 

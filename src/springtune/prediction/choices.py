@@ -20,17 +20,17 @@ from ..mesh.cells import Mesh
 from ..mesh.groups import GroupedMesh
 from ..problem.compare import error_text, quantity_errors
 from ..problem.geometry import Beam
-from ..problem.loads import LOADS, LoadKind
+from ..problem.loads import LOADS
 from ..problem.materials import AnyMaterial, Material
 from ..problem.quantities import nearest
 from ..problem.shapes import Shape
 from ..problem.status import Status
-from ..reference.small_strain import ReferenceNotConvergedError, ReferenceSolution, solve_small_strain
+from ..reference.small_strain import ReferenceNotConvergedError, ReferenceSolution
 from ..safe_io.tables import Tabled, TabledList
 from ..scene.meshes import A_BEAM, A_MATERIAL, A_MESH, is_a
 from ..scene.motion import stable_steps
 from ..scene.sheet import Sheet, chosen
-from ..scene.statements import BeamStatement, ShapeStatement, Statement
+from ..scene.statements import BeamStatement, ShapeStatement, Statement, unit_reference
 from ..springs.base import DEFINITIONS, Definition, DefinitionError, Springs
 
 CASES = ("traction", "bending", "shear")
@@ -223,15 +223,15 @@ def check_names(
 def references(beam: Beam, material: Material, loads: Iterable[str] = CASES) -> References:
     """References of loads."""
     check_beam(beam)
-    found: dict[LoadKind, ReferenceSolution | str] = {}
-    names = check_loads(loads)
-    for kind in (LOADS[load].kind for load in names):
-        if kind not in found:
-            try:
-                found[kind] = solve_small_strain(beam, material, 1.0, kind=kind)
-            except ReferenceNotConvergedError as error:
-                found[kind] = str(error)
-    return {load: found[LOADS[load].kind] for load in names}
+    return {load: reference_of(beam, material, load) for load in check_loads(loads)}
+
+
+def reference_of(beam: Beam, material: Material, load: str) -> ReferenceSolution | str:
+    """Reference of 1 N of any load, or why there is none."""
+    try:
+        return unit_reference(beam, material, LOADS[load].kind, 1.0)
+    except ReferenceNotConvergedError as error:
+        return str(error)
 
 
 def predict(
