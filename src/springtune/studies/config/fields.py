@@ -39,6 +39,9 @@ LONGEST_TEXT = 1000
 
 MOST_LISTED = 10_000
 
+BEYOND_MEASURE = 1e30
+"""Size of a quantity of either sign from which nothing can be computed with it [SI units]."""
+
 FEW_NAMES = 5
 """Most names that a message lists."""
 
@@ -68,19 +71,21 @@ def quantity(kind: str, negative: str = "give a size above zero", signed: bool =
     about = units.QUANTITY_KINDS[kind]
 
     def read(value: str) -> float:
+        if signed and value.strip() in ("0", "0.0", "-0"):  # which needs no unit
+            return 0.0
         try:
             number = units.parse(value, kind)
         except units.UnitError as error:
             raise refuse(str(error)) from None
         if not number > 0 and not signed:
             raise refuse(f"{show(value)} is not above zero; {negative}, such as '{about.example}'")
-        if not signed and beyond(number, kind):
+        if not abs(number) < BEYOND_MEASURE if signed else beyond(number, kind):
             raise refuse(f"{show(value)} is beyond all measure; give {about.words}")
-        return number
+        return number + 0.0
 
-    sign = "[+-]" if signed else r"\+"
-    pattern = rf"^\s*{sign}?[0-9.]+([eE][+-]?[0-9]+)?\s*[^0-9\s].*$"
-    return Scalar(read, {"type": "string", "pattern": pattern, "examples": [about.example]}, about.words)
+    pattern = r"^\s*\+?[0-9.]+([eE][+-]?[0-9]+)?\s*[^0-9\s].*$"
+    form = {"type": ["string", "number"]} if signed else {"type": "string", "pattern": pattern}
+    return Scalar(read, form | {"examples": [about.example]}, about.words)
 
 
 def number(words: str, low: float, high: float, *, above: bool = False, whole: bool = False) -> Scalar:

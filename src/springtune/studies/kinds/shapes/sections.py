@@ -2,13 +2,13 @@
 
 from typing import Annotated, Any, Self
 
-from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, model_validator
-from pydantic_core import CoreSchema, core_schema
+from pydantic import Field, GetJsonSchemaHandler, ValidatorFunctionWrapHandler, model_validator
+from pydantic_core import PydanticCustomError
 
 from springtune import units
 
 from ...config import fields
-from ...config.fields import Named, OneOrMore, Scalar, Section, Wrapped, default, one_of
+from ...config.fields import Named, OneOrMore, Scalar, Section, Words, default, one_of, quantity
 from ...config.messages import refuse, show
 
 KINDS_OF_QUANTITY = {
@@ -24,63 +24,21 @@ PLACES = {"displacement": {"at": "a point", "of": "a group"}, "stress": {"at": "
 PLACES |= {"reaction": {"of": "a group that is held"}, "area": {}, "energy": {}}
 """Keys for the place of a quantity, and what they name, by kind of quantity."""
 
-BEYOND_MEASURE = 1e30
-"""Size of a coordinate, force or pressure from which it is beyond all measure [SI units]."""
 
-
-def signed(kind: str) -> Scalar:
-    """Annotation of a quantity of either sign, or zero, which needs no unit."""
-    about = units.QUANTITY_KINDS[kind]
-    schema = {"type": ["string", "number"], "examples": [about.example]}
-    return Scalar(lambda text: _signed(text, kind), schema, about.words)
-
-
-def _signed(text: str, kind: str) -> float:
-    if text.strip() in ("0", "0.0", "-0"):
-        return 0.0
-    try:
-        value = units.parse(text, kind)
-    except units.UnitError as error:
-        raise refuse(str(error)) from None
-    if not abs(value) < BEYOND_MEASURE:
-        raise refuse(f"{show(text)} is beyond all measure; give one such as '{units.QUANTITY_KINDS[kind].example}'")
-    return value + 0.0
-
-
-class Vector:
+def both(kind: str) -> Words:
     """Annotation of two quantities, along x and along y."""
-
-    def __init__(self, kind: str) -> None:
-        self.item = signed(kind)
-        example = units.QUANTITY_KINDS[kind].example
-        pair = f"0, {example}" if example.startswith("-") else f"{example}, 0"
-        self.words = f"{kind}s along x and y, such as [{pair}]"
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.no_info_plain_validator_function(self._read)
-
-    def __get_pydantic_json_schema__(self, schema: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        return {"type": "array", "items": dict(self.item.schema), "minItems": 2, "maxItems": 2}
-
-    def _read(self, value: object) -> tuple[float, float]:
-        if not isinstance(value, list) or len(value) != 2:
-            raise refuse(f"{show(value)} instead of {self.words}; give {self.words}")
-        x, y = (self.item._read(one) for one in value)
-        return x, y
+    example = units.QUANTITY_KINDS[kind].example
+    pair = f"0, {example}" if example.startswith("-") else f"{example}, 0"
+    return Words(f"{kind}s along x and y, such as [{pair}]")
 
 
-class Words:
-    """Annotation with words for the expected value of a list or mapping."""
-
-    def __init__(self, words: str) -> None:
-        self.words = words
-
-
-Place = Annotated[tuple[float, float], Vector("length")]
-ForceVector = Annotated[tuple[float, float], Vector("force")]
-Gravity = Annotated[tuple[float, float], Vector("acceleration")]
-Displacement = Annotated[float, signed("length")]
-PressureValue = Annotated[float, signed("stress")]
+Displacement = Annotated[float, quantity("length", signed=True)]
+PressureValue = Annotated[float, quantity("stress", signed=True)]
+SignedForce = Annotated[float, quantity("force", signed=True)]
+Acceleration = Annotated[float, quantity("acceleration", signed=True)]
+Place = Annotated[tuple[Displacement, Displacement], both("length")]
+ForceVector = Annotated[tuple[SignedForce, SignedForce], both("force")]
+Gravity = Annotated[tuple[Acceleration, Acceleration], both("acceleration")]
 GroupName = Annotated[str, Scalar(str, {"type": "string", "minLength": 1}, "the name of a group")]
 PointName = Annotated[str, Scalar(str, {"type": "string", "minLength": 1}, "the name of a point")]
 PartName = Annotated[str, Scalar(str, {"type": "string", "minLength": 1}, "the name of a part")]
@@ -259,11 +217,10 @@ class QuantityConfig(Section):
             raise refuse(f"a {kind} has no '{places[0]}'; {remedy}", places[0])
         if self.source and self.expected is None:
             raise refuse("a source of no value; give 'expected', too, or remove it", "source")
-        if self.expected is not None:
-            try:
-                _signed(self.expected, KINDS_OF_QUANTITY[kind])
-            except Exception as error:
-                raise refuse(str(error), "expected") from None
+        try:
+            self.expected_value  # noqa: B018
+        except PydanticCustomError as error:
+            raise refuse(str(error), "expected") from None
         return self
 
     @property
@@ -280,7 +237,8 @@ class QuantityConfig(Section):
     @property
     def expected_value(self) -> float | None:
         """In SI units."""
-        return None if self.expected is None else _signed(self.expected, KINDS_OF_QUANTITY[self.kind])
+        unit = KINDS_OF_QUANTITY[self.kind]
+        return None if self.expected is None else quantity(unit, signed=True).read(self.expected)
 
 
 class ShapeLoadConfig(Section):
@@ -312,13 +270,13 @@ class ShapeFileConfig(Section):
     """Length of an edge, which names the mesh in the dataset."""
 
 
-class OneFileOrMore(Words, Wrapped):
+class OneFileOrMore(Words):
     """Annotation of a list of mesh files; a path alone is a list of one, of no mesh size."""
 
     def __get_pydantic_json_schema__(self, schema: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         return {"anyOf": [{"type": "string", "minLength": 1}, handler(schema["schema"]) | {"minItems": 1}]}
 
-    def _read(self, value: object, handler: core_schema.ValidatorFunctionWrapHandler) -> Any:
+    def _read(self, value: object, handler: ValidatorFunctionWrapHandler) -> Any:
         if isinstance(value, str):
             return [ShapeFileConfig.model_construct(file=value, mesh_size=0.0)]
         if not isinstance(value, list) or not value:
