@@ -9,8 +9,6 @@ and the law of `springtune.mechanics.energies.StableNeoHookeEnergy`. At small st
 `delingette` is; files have the equilibrium of Newton's law.
 """
 
-from typing import Any
-
 import numpy as np
 
 from ..mechanics.energies import Energy, StableNeoHookeEnergy
@@ -79,12 +77,6 @@ def newton_script(net: Net) -> str:
     >>> [line[:14] for line in path.read_text().splitlines() if line.startswith("TRI_K")]
     ['TRI_KE = 384.6', 'TRI_KA = 329.6']
     """
-    grouped = [group.tolist() for group in colours(net)]
-    return filled("newton.py", **_values(net), there=net.stiffness != 0, colours=grouped)
-
-
-def _values(net: Net) -> dict[str, Any]:
-    """Values of the script; ValueError for what Newton lacks."""
     simulation = simulate(net, "Newton", LAWS, membrane_energies)
     shear, first = membrane(net)
     largest, loaded, damping = simulation.largest_step, simulation.loaded_frequency, simulation.mass_damping
@@ -99,15 +91,18 @@ def _values(net: Net) -> dict[str, Any]:
         step, damping, seconds = (float(calibrated[one]) for one in ("step", "damping", "seconds"))
         iterations = int(calibrated["iterations"])
         said = f"the one here is that of {calibrated['setting']}, for which the stiffness is made"
-    return {
-        "net": net,
-        "simulation": simulation,
-        "promised": float(calibrated["displacement"]) if calibrated else None,
-        "damping": damping,
-        "about": [*about(net, simulation, said), *(LAW if net.energies else ())],
-        "tri_ke": shear,
-        "tri_ka": first,
-        "step": step,
-        "iterations": iterations,
-        "seconds": seconds,
-    }
+    return filled(
+        "newton.py",
+        net=net,
+        simulation=simulation,
+        promised=float(calibrated["displacement"]) if calibrated else None,
+        damping=damping,
+        about=[*about(net, simulation, said), *(LAW if net.energies else ())],
+        tri_ke=shear,
+        tri_ka=first,
+        step=step,
+        iterations=iterations,
+        seconds=seconds,
+        there=net.stiffness != 0,
+        colours=[group.tolist() for group in colours(net)],
+    )
