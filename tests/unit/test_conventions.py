@@ -30,7 +30,10 @@ def test_modules_are_imported_by_text_in_one_place():
         for node in ast.walk(tree)
         if {"import_module", "__import__", "exec", "eval"} & {getattr(node, "id", ""), getattr(node, "attr", "")}
     ]
-    assert set(found) == {"registry.py"}
+    assert set(found) == {
+        "registry.py",
+        "studies/paper/numbers.py",
+    }  # the latter computes a formula, node by node checked
 
 
 REPLACEABLE = {
@@ -82,8 +85,7 @@ def test_packages_that_may_be_replaced_are_imported_in_one_module():
         ),
         (
             "from springtune.studies.kinds import load_study; load_study('config/paper.yaml')",
-            "springtune.problem.shapes springtune.studies.kinds.shapes.sections "
-            "springtune.studies.kinds.shapes.checks springtune.studies.kinds.shapes.expand",
+            "springtune.problem.shapes springtune.studies.kinds.shapes.checks springtune.studies.kinds.shapes.expand",
         ),
     ],
 )

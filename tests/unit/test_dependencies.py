@@ -62,7 +62,7 @@ def test_a_closure_is_all_that_is_imported_and_what_only_others_import_is_not_in
 
 def test_no_module_imports_a_package_that_brings_in_others():
     faces = [f"{keys.PACKAGE.name}.{name}" for name in ("mesh", "springs")]
-    assert not any(keys._graph().find_modules_that_directly_import(face) for face in faces)
+    assert not any(keys.imports_graph().find_modules_that_directly_import(face) for face in faces)
 
 
 def test_a_template_counts_with_the_module_of_its_name():
@@ -207,7 +207,7 @@ def own(tmp_path, monkeypatch):
         name = f"own_{tmp_path.name}_{next(number)}"
         (tmp_path / f"{name}.py").write_text(text)
         importlib.import_module(name)
-        keys._digest.cache_clear()
+        keys.file_digest.cache_clear()
         found = keys.definition_closure("own")
         DEFINITIONS.discard("own")
         sys.modules.pop(name)
@@ -300,5 +300,5 @@ def test_a_file_keeps_its_digest_wherever_it_is(tmp_path):
     for folder in (tmp_path / "one", tmp_path / "two"):
         folder.mkdir()
         (folder / "own.py").write_text(MODULE)
-        texts.append(keys._elsewhere(folder / "own.py", MODULE).digest)
+        texts.append(keys.elsewhere(folder / "own.py", MODULE).digest)
     assert texts[0] == texts[1]

@@ -366,20 +366,20 @@ ARITHMETIC = (
     ast.operator,
     ast.USub,
 )
-FUNCTIONS = {"abs": abs, "max": max, "min": min, "sqrt": math.sqrt}
+KNOWN_FUNCTIONS = {"abs": abs, "max": max, "min": min, "sqrt": math.sqrt}
 
 
 def _formula(text: str, found: Mapping[str, Any], name: str) -> float:
     """Evaluate arithmetic of earlier numbers; NaN if one is missing."""
     known = {key: math.nan if one["value"] is None else one["value"] for key, one in found.items()}
-    names: dict[str, Any] = {"__builtins__": {}, "pi": math.pi, **known, **FUNCTIONS}
+    names: dict[str, Any] = {"__builtins__": {}, "pi": math.pi, **known, **KNOWN_FUNCTIONS}
     try:
         tree = ast.parse(text, mode="eval")
         for node in ast.walk(tree):
             if not isinstance(node, ARITHMETIC) or isinstance(node, ast.Name) and node.id not in names:
                 raise PaperError(
                     f"{name}: '{ast.unparse(node)}' of the formula is not known; give a number that is declared above, "
-                    f"+ - * / ** or {', '.join(FUNCTIONS)}"
+                    f"+ - * / ** or {', '.join(KNOWN_FUNCTIONS)}"
                 )
         return float(eval(compile(tree, name, "eval"), names))  # noqa: S307  # of these nodes and names alone
     except (SyntaxError, ArithmeticError, TypeError, ValueError) as error:

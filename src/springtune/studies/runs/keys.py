@@ -76,7 +76,8 @@ def digest_of(text: str | bytes) -> str:
 
 
 @cache
-def _digest(path: Path) -> str:
+def file_digest(path: Path) -> str:
+    """Hash of a file of code as it computes, or of a template."""
     content = path.read_bytes()
     return digest_of(content) if path.suffix == ".py" else hashlib.sha256(content).hexdigest()
 
@@ -91,7 +92,7 @@ class Closure(NamedTuple):
     @property
     def digest(self) -> str:
         """Hash of the code, wherever it is."""
-        return hash_of(sorted([*map(_digest, self.files), *self.texts]))
+        return hash_of(sorted([*map(file_digest, self.files), *self.texts]))
 
     def with_(self, other: "Closure") -> "Closure":
         """Union of two closures."""
@@ -99,8 +100,9 @@ class Closure(NamedTuple):
 
 
 @cache
-def _graph() -> "ImportGraph":
-    import grimp
+def imports_graph() -> "ImportGraph":
+    """Imports of all modules of this package."""
+    import grimp  # here: a job asks for few keys
 
     return grimp.build_graph(
         PACKAGE.name, include_external_packages=True, exclude_type_checking_imports=True, cache_dir=None
@@ -110,7 +112,7 @@ def _graph() -> "ImportGraph":
 @cache
 def closure(*names: str, without: tuple[str, ...] = ()) -> Closure:
     """Closure of modules of this package, without some modules and what only these import."""
-    graph, left_out = _graph(), {full_name(name) for name in without}
+    graph, left_out = imports_graph(), {full_name(name) for name in without}
     found, waiting = set[str](), {full_name(name) for name in names}
     while waiting:
         found.add(one := waiting.pop())
@@ -152,10 +154,10 @@ def declared_closure(one: Declared) -> Closure:
     """Closure of a declared function: of its module, or of a notebook's function."""
     if one.file is None:
         text = _text_of(inspect.unwrap(one.function))
-        return _elsewhere(Path.cwd() / "text.py", text)._replace(texts=frozenset({digest_of(text)}))
+        return elsewhere(Path.cwd() / "text.py", text)._replace(texts=frozenset({digest_of(text)}))
     if one.file.is_relative_to(PACKAGE):
         return closure(".".join(one.file.relative_to(PACKAGE).with_suffix("").parts))
-    return _elsewhere(one.file, one.file.read_bytes())
+    return elsewhere(one.file, one.file.read_bytes())
 
 
 def _text_of(function: Any) -> str:
@@ -172,7 +174,7 @@ def _text_of(function: Any) -> str:
     return text
 
 
-def _elsewhere(path: Path, text: str | bytes) -> Closure:
+def elsewhere(path: Path, text: str | bytes) -> Closure:
     """Closure of code elsewhere, which follows the files of modules that no distribution has."""
     files = {path} if path.is_file() else set[Path]()
     ours, packages = set[str](), plugin_packages() & {*path.with_suffix("").parts}  # a package's version counts, too
@@ -211,7 +213,7 @@ def _modules_of(parts: list[str]) -> set[str]:
     if len(parts) == 1 and parts[0] in places:
         return {places[parts[0]]}
     ways = (".".join(parts[:size]) for size in range(len(parts), 0, -1))
-    return {next((way for way in ways if full_name(way) in _graph().modules), "")} - {""}
+    return {next((way for way in ways if full_name(way) in imports_graph().modules), "")} - {""}
 
 
 def _root(folder: Path, package: str) -> Path | None:
