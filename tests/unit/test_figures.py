@@ -19,8 +19,9 @@ import springtune as st
 from springtune.studies.config.kind import FORMATS, Output, outputs
 from springtune.studies.kinds.moduli.figures import definitions
 from springtune.studies.kinds.scenes import errors, figures
-from springtune.studies.kinds.scenes.figures import NETWORK_LINE, draw_curve
+from springtune.studies.kinds.scenes.figures import draw_curve
 from springtune.studies.output import present, style
+from springtune.studies.output.drawing import NETWORK_LINE
 from springtune.studies.output.style import png_and_pdf
 from springtune.studies.runs.keys import closure
 

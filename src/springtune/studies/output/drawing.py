@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
-from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.colors import Colormap, LinearSegmentedColormap
 from matplotlib.image import AxesImage
 
 from springtune.problem.compare import sign_sentence
@@ -122,17 +122,6 @@ def error_text(error: float, sign: str = "+") -> str:
     return f"{error:{sign}.{0 if size >= 9.95 else 1 if size >= 0.095 else 2}f}".replace("-", "−")
 
 
-def magnification(wanted: float) -> float:
-    """Largest of 1, 2 or 5 times a power of ten that is not above a factor."""
-    power = 10.0 ** math.floor(math.log10(wanted))
-    return max(step for step in (1, 2, 5) if step * power <= wanted * (1 + 1e-9)) * power
-
-
-def largest(values: np.ndarray) -> float:
-    """Largest size of values; 0 where none is known."""
-    return float(np.nanmax(np.abs(values), initial=0.0)) if np.isfinite(values).any() else 0.0
-
-
 def plane(fields: "xr.Dataset", name: str) -> np.ndarray:
     """Vectors in the plane from their components, such as ``"displacement_{}"``, shape (n, 2)."""
     return np.stack([fields[name.format(axis)].values for axis in "xy"], axis=1)
@@ -145,8 +134,52 @@ def extent(places: np.ndarray, nothing: tuple[float, float]) -> tuple[float, flo
     return (float(wide), float(high)) if min(wide, high) > 0 else nothing
 
 
-def spring_ends(fields: "xr.Dataset") -> tuple[np.ndarray, np.ndarray]:
-    """Particles at the ends of the springs of a network, shape (n_springs, 2), and which rows are springs."""
+def magnification(fields: "xr.Dataset") -> float:
+    """Factor on displacements, 1, 2 or 5 times a power of ten, so that the largest is about a fifteenth of the body."""
+    places = np.concatenate([plane(fields, "{}"), plane(fields, "outline_{}")])
+    sizes = np.hypot(fields.reference_displacement_x.values, fields.reference_displacement_y.values)
+    if not np.isfinite(sizes).any():
+        sizes = np.hypot(fields.displacement_x.values, fields.displacement_y.values)
+    largest = np.max(sizes, where=np.isfinite(sizes), initial=0.0)
+    factor = 0.07 * max(extent(places, (0.0, 0.0))) / largest if largest else 0.0
+    if not factor or 0.4 < factor < 2:
+        return 1.0
+    power = 10.0 ** math.floor(math.log10(factor))
+    return max(step for step in (1, 2, 5) if step * power <= factor * (1 + 1e-9)) * power
+
+
+NETWORK_LINE = 0.35
+"""Width of the lines of springs that have one colour [pt]."""
+
+
+def draw_network(
+    panel: Axes, fields: "xr.Dataset", scale: float, most: float = 0.0, cmap: Colormap | None = None
+) -> LineCollection | None:
+    """Draw a deformed network over the outline of its reference in grey, and the outline at rest, dashed.
+
+    Return its lines if they are coloured by their force, up to `most` [N]; None also without displacements.
+    """
+    outline, there = plane(fields, "outline_{}"), plane(fields, "reference_displacement_{}")
+    rounds = fields.outline_round.values if "outline_round" in fields else np.where(np.isfinite(outline[:, 0]), 0, -1)
+    for number in range(int(rounds.max(initial=-1)) + 1):
+        places = np.flatnonzero(rounds == number)
+        closed = np.append(places, places[:1])
+        panel.plot(*1e3 * (outline + scale * there)[closed].T, color="0.7", linewidth=2.0, zorder=1)
+        panel.plot(*1e3 * outline[closed].T, color="0.5", linewidth=0.6, linestyle=(0, (3, 3)), zorder=1)
+    moved = 1e3 * (plane(fields, "{}") + scale * plane(fields, "displacement_{}"))
+    if not np.isfinite(moved).any():
+        return None
     nodes = fields.spring_nodes.transpose("spring", "spring_end").fillna(-1).values.astype(int)
     kept = (nodes >= 0).all(axis=1)
-    return nodes[kept], kept
+    springs = moved[nodes[kept]]
+    panel.set(aspect="equal", adjustable="datalim")
+    if not most:  # one line with gaps: thousands of lines take ten times as long
+        gaps = np.pad(springs, ((0, 0), (0, 1), (0, 0)), constant_values=np.nan)
+        panel.plot(*gaps.reshape(-1, 2).T, color="#0b3c5d", linewidth=NETWORK_LINE)
+        return None
+    width = float(np.clip(18 / np.sqrt(len(springs)), 0.25, 0.9))
+    forces = fields.spring_force.values[kept]
+    lines = LineCollection(springs, array=forces, cmap=cmap, clim=(-most, most), linewidths=width, zorder=2)
+    panel.add_collection(lines)
+    panel.autoscale()
+    return lines

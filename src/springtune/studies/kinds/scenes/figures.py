@@ -8,7 +8,7 @@ from springtune.problem.parameters import with_unit
 
 from ...config.kind import distinct
 from ...output import labels, style
-from ...output.drawing import BEYOND_SMALL_STRAIN, extent, in_words, largest, magnification, plane, spring_ends
+from ...output.drawing import BEYOND_SMALL_STRAIN, draw_network, extent, in_words, magnification, plane
 from ...output.selection import (
     at,
     cells,
@@ -306,41 +306,22 @@ def _deformed(panel, fields, root, selection, beam):
         places = np.flatnonzero(known.notnull().any("particle").values)
         if len(places):
             break
-    fields = fields.isel(mesh_size=places[-1] if len(places) else 0)
-    here = fields.sel(load)
-    rest, moved = 1e3 * plane(fields, "{}"), 1e3 * plane(here, "displacement_{}")
-    outline, there = 1e3 * plane(fields, "outline_{}"), 1e3 * plane(here, "reference_displacement_{}")
-    kept = np.isfinite(outline[:, 0])
-    outline, there = outline[kept], there[kept]
-    most = largest(there if np.isfinite(there).any() else moved)
-    scale = magnification(0.06 * np.ptp(outline[:, 0]) / most) if most > 0 and len(outline) else 1
-    lacking = []
-    if np.isfinite(there).any():
-        panel.fill(*(outline + scale * there).T, facecolor="0.82", edgecolor="0.45", linewidth=0.8)
-        lacking += [f"reference {BEYOND_SMALL_STRAIN}"] if int(root.get("reference_applies", 1)) == 0 else []
-    else:
-        lacking.append("no reference")
-    if len(outline):
-        panel.plot(*np.vstack([outline, outline[:1]]).T, color="0.5", linewidth=0.6, linestyle=(0, (3, 3)))
-    ends, _ = spring_ends(fields)
-    flag = int(root.status.sel(mesh_size=fields.mesh_size.values))
+    here = fields.isel(mesh_size=places[-1] if len(places) else 0).sel(load)
+    scale = magnification(here)
+    draw_network(panel, here, scale)
+    referred = np.isfinite(here.reference_displacement_x.values).any()
+    beyond = int(root.get("reference_applies", 1)) == 0
+    lacking = ["no reference"] if not referred else [f"reference {BEYOND_SMALL_STRAIN}"] if beyond else []
+    flag = int(root.status.sel(mesh_size=here.mesh_size.values))
     status = in_words(flag) or "not asked for"
-    panel.set(aspect="equal", adjustable="datalim", xlabel="x [mm]", ylabel="y [mm]")
-    text = f"{beam}, mesh {1e3 * float(fields.mesh_size):g} mm, displaced ×\u00a0{scale:g}"
-    if np.isfinite(moved).any():
-        # One line with gaps: thousands of lines take ten times as long.
-        springs = np.full((len(ends), 3, 2), np.nan)
-        springs[:, :2] = (rest + scale * moved)[ends]
-        panel.plot(*springs.reshape(-1, 2).T, color="#0b3c5d", linewidth=NETWORK_LINE)
-        lacking += [status] if flag not in (0, 1) else []
-    else:
+    if not np.isfinite(here.displacement_x.values).any():
         labels.say(panel, f"no network: {status}" if flag != 1 else "no network stored", bare=False)
+    elif flag not in (0, 1):
+        lacking.append(status)
+    text = f"{beam}, mesh {1e3 * float(here.mesh_size):g} mm, displaced ×\u00a0{scale:g}"
     panel.set_title(labels.fitted(panel, [", ".join([text, *lacking])], 8))
+    panel.set(aspect="equal", adjustable="datalim", xlabel="x [mm]", ylabel="y [mm]")
     panel.grid(False)
-
-
-NETWORK_LINE = 0.35
-"""Width of the lines of springs [pt]."""
 
 
 # -- the pressed block -------------------------------------------------------------------------------------------------

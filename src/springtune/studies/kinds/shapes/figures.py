@@ -1,7 +1,6 @@
 """Figures of shapes: errors of their quantities over particles and seconds, and their deformed networks."""
 
 import numpy as np
-from matplotlib.collections import LineCollection
 from matplotlib.colors import LinearSegmentedColormap
 
 from springtune.safe_io.escapes import no_mathematics
@@ -321,17 +320,18 @@ def plot_shape(data, ax=None, *, shape=None, load=None, definition=None):
     flat = axes.ravel()[: len(wanted)]
     for panel in axes.ravel()[len(wanted) :]:
         panel.remove()
-    networks = case.sel(definition=[name for name in wanted if name in case.definition.values])
-    scale = _scale(case, networks, max(width, height))
+    networks = case.reindex(definition=wanted)
+    scale = drawing.magnification(networks)
     size = "mesh of the file" if not mesh["mesh_size"] else f"mesh {1e3 * mesh['mesh_size']:g} mm"
     said = [*about.values(), f"{size}, {float(cut.particles):.0f} particles", f"displaced × {scale:g}"]
     lost = [name for name in asked if STATUS[int(cut.status.sel(definition=name))] != "solved" and name not in wanted]
     said += [f"not solved: {', '.join(lost)}"] if lost and definition is None else []
     there = np.isfinite(case.reference_displacement_x.values).any()
-    below = "black: outline of the reference, displaced; dashed: at rest" if there else "no reference"
+    below = "grey: outline of the reference, displaced; dashed: at rest" if there else "no reference"
     labels.entitle(figure, ", ".join(said), below)
     most = _largest_force(networks)
-    drawn = [_network(panel, case, cut, name, scale, most) for panel, name in zip(flat, wanted)]
+    drawn = [_network(panel, networks.sel(definition=name), cut.sel(definition=name), scale, most)
+             for panel, name in zip(flat, wanted)]  # fmt: skip
     for number, panel in enumerate(flat):
         panel.set(aspect="equal", adjustable="datalim", xlabel="x [mm]", ylabel="" if number % columns else "y [mm]")
         panel.set_title(panel.get_title("left") or wanted[number])
@@ -353,15 +353,6 @@ def _few(cut, asked):
     return [name for name in asked if name in order[:MOST_NETWORKS]]
 
 
-def _scale(case, networks, extent):
-    """Factor on displacements: the largest is about a twelfth of the body."""
-    sizes = np.hypot(case.reference_displacement_x.values, case.reference_displacement_y.values)
-    if not np.isfinite(sizes).any():
-        sizes = np.hypot(networks.displacement_x.values, networks.displacement_y.values)
-    factor = 0.08 * extent / (drawing.largest(sizes) or np.inf)
-    return 1.0 if 0.4 < factor < 2 or not factor else drawing.magnification(factor)
-
-
 def _largest_force(networks):
     """Force at the ends of the colour scale [N]; 3 % of the springs are beyond."""
     forces = networks.spring_force.values
@@ -369,37 +360,13 @@ def _largest_force(networks):
     return float(np.quantile(forces, 0.97)) if len(forces) and forces.max() > 0 else 1.0
 
 
-def _network(panel, case, cut, name, scale, most):
+def _network(panel, one, state, scale, most):
     """Draw one network; return its lines, or None."""
-    one = case.sel(definition=name) if name in case.definition.values else None
-    drawn = one is not None and bool(np.isfinite(one.displacement_x.values).any())
-    outline, there = drawing.plane(case, "outline_{}"), drawing.plane(case, "reference_displacement_{}")
-    for number in range(int(case.outline_round.values.max(initial=-1)) + 1):
-        places = np.flatnonzero(case.outline_round.values == number)
-        closed = np.append(places, places[:1])
-        panel.plot(*1e3 * outline[closed].T, color="0.6", linewidth=0.6, linestyle=(0, (3, 3)), zorder=1)
-        if drawn:
-            panel.plot(*1e3 * (outline + scale * there)[closed].T, color="black", linewidth=0.9, zorder=3)
-    flag = int(cut.status.sel(definition=name))
-    lines = None
-    if drawn:
-        springs, kept = drawing.spring_ends(case)
-        forces = one.spring_force.values[kept]
-        width = float(np.clip(18 / np.sqrt(len(springs)), 0.25, 0.9))
-        lines = LineCollection(
-            1e3 * (drawing.plane(case, "{}") + scale * drawing.plane(one, "displacement_{}"))[springs],
-            array=forces,
-            cmap=FORCES,
-            clim=(-most, most),
-            linewidths=width,
-            zorder=2,
-        )
-        panel.add_collection(lines)
-        panel.autoscale()
-        if not np.abs(forces).max() > 0:
-            panel.set_title(f"{name}: forces in an energy")
+    lines = drawing.draw_network(panel, one, scale, most, FORCES)
+    if lines is not None and not np.abs(lines.get_array()).max() > 0:
+        panel.set_title(f"{one.definition.item()}: forces in an energy")
+    flag = int(state.status)
     if flag != STATUS.index("solved"):
-        message = str(cut.message.sel(definition=name).item())
-        text = f"{drawing.in_words(flag)}: {message[:120]}" if lines is None else STATUS[flag]
+        text = f"{drawing.in_words(flag)}: {str(state.message.item())[:120]}" if lines is None else STATUS[flag]
         labels.say(panel, text, bare=False)
     return lines
