@@ -135,7 +135,7 @@ def shape_of_study(text: str) -> "tuple[Study, Shapes, Shape]":
         raise ValueError(f"study: '{text}': there is no study {path or text}; give one such as {STUDY_EXAMPLE}")
     study = load_study(path)
     part = study.parts["shapes"]
-    known = list(part.declared) if part else []
+    known = list(part.shape) if part else []
     if not name and len(known) == 1:
         (name,) = known
     if name not in known:

@@ -207,7 +207,7 @@ class Study:
         >>> print(f"{choices[0].definition}: {100 * choices[0].errors['edge']:+.1f} %")
         patch: -0.4 %
         """
-        known = {name: one for part in self.parts.values() for name, one in getattr(part, "declared", {}).items()}
+        known = self.parts["shapes"].shape if self.parts["shapes"] else {}
         if name not in known:
             there = nearest(name, known) if known else "the study has none; add it under 'shapes'"
             raise ValueError(f"shape: '{name}' is unknown; {there}")
@@ -225,7 +225,7 @@ class Study:
         {'': 'third'}
         """
         self.shape(shape)
-        own = next(part.parts[shape] for part in self.parts.values() if shape in getattr(part, "declared", {}))
+        own = self.parts["shapes"].parts[shape]
         return {"": self.material(material)} | {part: self.material(name) for part, name in own.items()}
 
     def labels(self, one: SceneSpec | CurveSpec | Reference) -> dict[str, str | float]:

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from springtune.problem.geometry import Beam
     from springtune.problem.materials import Material
 
-CARRIERS = {"h5py", "jinja2", "markupsafe", "meshio", "pint", "psutil"}
+CARRIERS = {"h5py", "jinja2", "markupsafe", "meshio", "pint", "psutil", "pydantic"}
 """Packages whose versions do not influence results: they carry numbers as they are."""
 
 DISTRIBUTIONS = {"PIL": "pillow", "netgen": "netgen-mesher", "skfem": "scikit-fem", "yaml": "pyyaml"}

@@ -107,8 +107,6 @@ def _checked(path: Path, wanted: str) -> None:
 
 # -- references --------------------------------------------------------------------------------------------------------
 
-SCALED = ("displacement", "mean_displacement", "displacements")
-
 
 def read_reference(folder: str | Path, reference: dict[str, Any], fields: tuple[str, ...] = ()) -> dict[str, Any]:
     """Reference that is solved by itself for 1 N [m, rad, 1]; not converged, it has ``message`` and ``seconds`` alone.
@@ -120,7 +118,8 @@ def read_reference(folder: str | Path, reference: dict[str, Any], fields: tuple[
 
 def scaled(found: dict[str, Any], reference: dict[str, Any]) -> dict[str, Any]:
     """Answer of a unit problem at the size of a beam and for 1 N."""
-    scales = dict.fromkeys(SCALED, reference["displacement"]) | dict.fromkeys("xy", reference["length"])
+    scales = dict.fromkeys(("displacement", "mean_displacement", "displacements"), reference["displacement"])
+    scales |= dict.fromkeys("xy", reference["length"])
     scales |= dict.fromkeys(("rotation", "strain"), reference["displacement"] / reference["length"])
     return {name: value * scales[name] if name in scales else value for name, value in found.items()}
 

@@ -3,7 +3,6 @@
 import re
 import warnings
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import product
 from operator import attrgetter
 from pathlib import Path
@@ -14,7 +13,7 @@ from springtune.mesh.cells import MeshError
 from springtune.mesh.sheets import free_motion
 from springtune.problem.geometry import AssumptionWarning, size_text
 from springtune.problem.loads import KINEMATICS
-from springtune.problem.materials import Material
+from springtune.problem.materials import AnyMaterial
 from springtune.problem.quantities import nearest
 from springtune.problem.shapes import Hole, LoadCase, Pressure, Quantity, Segment, Shape, Support, Traction
 from springtune.springs.base import DEFINITIONS
@@ -44,11 +43,10 @@ class ShapeScene:
 
 @dataclass(frozen=True)
 class Shapes:
-    """Shapes of a study, their scenes, the materials of parts, refinements, and mesh files by size."""
+    """Shapes and materials of a study by name, scenes, the materials of parts, refinements, and mesh files by size."""
 
-    declared: dict[str, Shape]
-    shapes: tuple[Shape, ...]
-    materials: tuple[Material, ...]
+    shape: dict[str, Shape]
+    material: dict[str, AnyMaterial]
     parts: dict[str, dict[str, str]]
     scenes: tuple[ShapeScene, ...]
     referred: tuple[tuple[str, str, str], ...]
@@ -56,17 +54,7 @@ class Shapes:
     refined: dict[str, dict[str, float]]
     files: dict[str, dict[float, str]]
 
-    @cached_property
-    def shape(self) -> dict[str, Shape]:
-        """Shapes by name."""
-        return {one.name: one for one in self.shapes}
-
-    @cached_property
-    def material(self) -> dict[str, Material]:
-        """Materials by name."""
-        return {one.name: one for one in self.materials}
-
-    def materials_of(self, shape: str, material: str) -> dict[str, Material]:
+    def materials_of(self, shape: str, material: str) -> dict[str, AnyMaterial]:
         """Material of each part of a shape, that of the main part under ``""``."""
         own = {part: self.material[name] for part, name in self.parts[shape].items()}
         return {"": self.material[material]} | own
@@ -159,19 +147,14 @@ def expand(config, declared):
         return shape, mesh_type, one.mesh_size, material, load, *rest
 
     scenes = sorted(found, key=order)
-    names = dict.fromkeys(one.shape for one in scenes)
-    parts = {name: dict(one.parts) for name, one in config.shapes.items()}
-    used = {one.material for one in scenes} | {other for name in names for other in parts[name].values()}
-    all_shapes = {name: shape_of_config(name, one, declared.folder) for name, one in config.shapes.items()}
     return Shapes(
-        all_shapes,
-        tuple(all_shapes[name] for name in names),
-        tuple(material for name, material in declared.materials.items() if name in used),
-        parts,
+        {name: shape_of_config(name, one, declared.folder) for name, one in config.shapes.items()},
+        declared.materials,
+        {name: one.parts for name, one in config.shapes.items()},
         tuple(scenes),
         tuple(dict.fromkeys(key for one in scenes for key in [(one.shape, one.material, one.load)] if key in referred)),
         tuple(dict.fromkeys(key for one in scenes for key in [_finite(one)] if key in finite)),
-        {name: dict(one.refined) for name, one in config.shapes.items()},
+        {name: one.refined for name, one in config.shapes.items()},
         {name: files_of(one, declared.folder) for name, one in config.shapes.items()},
     )
 

@@ -8,7 +8,11 @@ from collections import Counter, defaultdict
 from operator import attrgetter
 from pathlib import Path
 
+import numpy as np
 from pydantic import Field
+
+from springtune.mesh.cells import MeshError
+from springtune.problem.geometry import size_text
 
 from ...config.kind import Kind
 from ...runs.job import JOB
@@ -207,35 +211,36 @@ def _axes(part):
 
 def _size(shape, file):
     """Extents of a shape in words, or of a mesh file of it."""
-    import numpy as np  # here, as those below: few studies have files
-
-    from springtune.mesh.cells import MeshError
-    from springtune.mesh.formats import read_shape
-    from springtune.problem.geometry import size_text
+    if not file:
+        return size_text(*np.ptp(shape.extent, axis=0))
+    from springtune.mesh.formats import read_shape  # here: few studies have files
 
     try:
-        (left, low), (right, top) = shape.extent
-        sides = np.ptp(read_shape(file, shape.unit).mesh.points, axis=0) if file else (right - left, top - low)
+        sides = np.ptp(read_shape(file, shape.unit).mesh.points, axis=0)
     except MeshError as error:
         return str(error)
-    return size_text(*sides) + (f", {Path(file).name} in units of {shape.unit:g} m" if file else "")
+    return f"{size_text(*sides)}, {Path(file).name} in units of {shape.unit:g} m"
 
 
 def _summary(part):
-    meshes = {(one.shape, one.mesh_type, one.mesh_size) for one in part.scenes}
+    sizes = Counter((one.shape, one.mesh_size * (one.mesh_type == OWN_FILE)) for one in part.scenes)
     cases = {(one.shape, one.load) for one in part.scenes}
     quantities = sum(len(part.shape[shape].loads[load].quantities) for shape, load in cases)
-    shapes = f"{len(part.shapes)} shape{'s' * (len(part.shapes) > 1)}"
-    rows = [["shape scenes", len(part.scenes), f"of {shapes} on {len(meshes)} meshes, {quantities} quantities"]]
-    counts = Counter((one.shape, part.files[one.shape].get(one.mesh_size, "")) for one in part.scenes)
-    rows += [[f"  {name}", count, _size(part.shape[name], file)] for (name, file), count in counts.items()]
+    used = {one.shape for one in part.scenes}
+    shapes = f"{len(used)} shape{'s' * (len(used) > 1)} on {len(by_mesh(part))} meshes"
+    rows = [["shape scenes", len(part.scenes), f"of {shapes}, {quantities} quantities"]]
+    rows += [
+        [f"  {name}", count, _size(part.shape[name], part.files[name].get(size, ""))]
+        for (name, size), count in sizes.items()
+    ]
     if count := len(part.referred) + len(part.finite):
         rows.append(["shape references", count, "finite elements on the shapes themselves"])
     return rows
 
 
 def _files(part):
-    return [Path(file) for shape in part.shapes for file in part.files[shape.name].values()] if part else []
+    used = dict.fromkeys(one.shape for one in part.scenes) if part else ()
+    return [Path(file) for shape in used for file in part.files[shape].values()]
 
 
 KIND = Kind(
