@@ -13,10 +13,8 @@ has its name, such as ``templates/mujoco.xml.jinja`` with ``mujoco``.
 
 import ast
 import hashlib
-import inspect
 import os
 import sys
-import textwrap
 from collections.abc import Iterator
 from dataclasses import asdict
 from functools import cache
@@ -83,20 +81,19 @@ def file_digest(path: Path) -> str:
 
 
 class Closure(NamedTuple):
-    """Files and packages that code depends on; `packages` are import names, `texts` digests of what is in no file."""
+    """Files and packages that code depends on; `packages` are import names."""
 
     files: frozenset[Path] = frozenset()
     packages: frozenset[str] = frozenset()
-    texts: frozenset[str] = frozenset()
 
     @property
     def digest(self) -> str:
         """Hash of the code, wherever it is."""
-        return hash_of(sorted([*map(file_digest, self.files), *self.texts]))
+        return hash_of(sorted(map(file_digest, self.files)))
 
     def with_(self, other: "Closure") -> "Closure":
         """Union of two closures."""
-        return Closure(self.files | other.files, self.packages | other.packages, self.texts | other.texts)
+        return Closure(self.files | other.files, self.packages | other.packages)
 
 
 @cache
@@ -151,36 +148,20 @@ def mesh_type_closure(name: str) -> Closure:
 
 @cache
 def declared_closure(one: Declared) -> Closure:
-    """Closure of a declared function: of its module, or of a notebook's function."""
+    """Closure of the module of a declared function."""
     if one.file is None:
-        text = _text_of(inspect.unwrap(one.function))
-        return elsewhere(Path.cwd() / "text.py", text)._replace(texts=frozenset({digest_of(text)}))
+        raise ValueError(f"'{one.name}' was typed, and jobs of a study do not find it; put it into a module of yours")
     if one.file.is_relative_to(PACKAGE):
         return closure(".".join(one.file.relative_to(PACKAGE).with_suffix("").parts))
-    return elsewhere(one.file, one.file.read_bytes())
+    return elsewhere(one.file)
 
 
-def _text_of(function: Any) -> str:
-    """Text of a function that is in no file."""
-    try:
-        text = textwrap.dedent(inspect.getsource(function))
-        ast.parse(text)
-    except OSError:  # a prompt that keeps no text
-        made = function.__code__
-        constants = [value for value in made.co_consts if not hasattr(value, "co_code")]
-        return f"({made.co_code!r}, {made.co_names!r}, {constants!r})"
-    except SyntaxError:  # part of a statement
-        return f"text = {text!r}"
-    return text
-
-
-def elsewhere(path: Path, text: str | bytes) -> Closure:
+def elsewhere(path: Path) -> Closure:
     """Closure of code elsewhere, which follows the files of modules that no distribution has."""
-    files = {path} if path.is_file() else set[Path]()
+    files, waiting = {path}, [path]
     ours, packages = set[str](), plugin_packages() & {*path.with_suffix("").parts}  # a package's version counts, too
-    waiting = [(path, text)]
-    for place, content in waiting:
-        for level, name in _imports(computing(content)):
+    for place in waiting:
+        for level, name in _imports(computing(place.read_bytes())):
             top, *parts = name.split(".")
             if top == PACKAGE.name and not level:
                 ours |= _modules_of(parts)
@@ -188,7 +169,7 @@ def elsewhere(path: Path, text: str | bytes) -> Closure:
             root = place.parents[level - 1] if level else _root(place.parent, top)
             packages |= {top} - sys.stdlib_module_names if root is None else set()
             found = _files_below(root, [top, *parts]) - files if root else set()
-            waiting += [(file, file.read_bytes()) for file in found]
+            waiting += found
             files |= found
     return closure(*ours).with_(Closure(frozenset(files), frozenset(packages)))
 
