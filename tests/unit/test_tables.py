@@ -261,7 +261,7 @@ def test_the_page_has_both_kinematics_and_says_what_was_not_asked(tmp_path):
         "",
     ]
     assert "u marks an equilibrium that is unstable" in html and "<li>not converged: no equilibrium</li>" in html
-    assert "alu-bar, 120 x 25 mm, 2 mm thick" in html
+    assert "alu-bar, 120 x 25 x 2 mm" in html
 
 
 def test_the_page_says_once_what_a_sign_means(tmp_path):

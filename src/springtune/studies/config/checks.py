@@ -108,14 +108,10 @@ def most_scenes() -> int:
     """Return the limit of scenes, which the environment may change."""
     text = os.environ.get(MOST_SCENES_VARIABLE) or str(MOST_SCENES)
     try:
-        found = int(float(text))
+        return int(float(text))
     except (ValueError, OverflowError):
-        found = 0
-    if found < 1:
-        raise ValueError(
-            f"{MOST_SCENES_VARIABLE}: '{text}' is not a number of scenes; give one such as 2000000, or none"
-        )
-    return found
+        remedy = "give one such as 2000000, or none"
+        raise ValueError(f"{MOST_SCENES_VARIABLE}: '{text}' is not a number of scenes; {remedy}") from None
 
 
 def check_count(

@@ -63,18 +63,13 @@ def _beyond(rows: list[Mapping[str, Any]]) -> str:
 
 
 def _beams(root: xr.Dataset) -> list[str]:
-    """Dimensions of a study's beams."""
-    found = []
-    for name in root.beam.values if "beam_length" in root else []:
-        one = root.sel(beam=name)
-        sides = [1e3 * float(one[f"beam_{side}"]) for side in ("length", "height")]
-        told = "beam_thickness" in one and one.beam_thickness.ndim == 0  # else it is swept
-        thick = 1e3 * float(one.beam_thickness) if told else np.nan
-        said = name == f"{sides[0]:g}x{sides[1]:g}"  # as "200x40"
-        if np.isfinite(sides).all() and (not said or np.isfinite(thick)):
-            text = f"{name} mm" if said else f"{name}, {sides[0]:.4g} x {sides[1]:.4g} mm"
-            found.append(f"{text}, {thick:.4g} mm thick" if np.isfinite(thick) else text)
-    return found
+    """Extents of a study's beams; their thickness where it is not swept."""
+    names = [name for name in ("beam_length", "beam_height", "beam_thickness") if name in root]
+    if not names:
+        return []
+    frame = root[[name for name in names if root[name].dims == ("beam",)]].to_dataframe()
+    sizes = (1e3 * frame.filter(like="beam_")).dropna()
+    return [f"{beam}, {' x '.join(f'{size:.4g}' for size in row)} mm" for beam, row in zip(sizes.index, sizes.values)]
 
 
 def texts(rows: list[Mapping[str, Any]]) -> pd.DataFrame:
