@@ -26,9 +26,8 @@ def ending(study: "Study", plan: Plan, since: float) -> str:
 
 def broken(study: "Study", plan: Plan, since: float) -> str:
     """Report at the end of a failed run."""
-    _, logs = _undone(plan, since)
     lines = [f"{study.name} is not complete: a job failed or was stopped."]
-    for path in logs:
+    for path in _failed(plan, since):
         lines += [f"  {_last(path)}", f"    its log: {path}"]
     lines += ["What is computed is kept: the same command takes up where this one stopped."]
     return "\n" + "\n".join(lines) + "\n"
@@ -36,10 +35,10 @@ def broken(study: "Study", plan: Plan, since: float) -> str:
 
 def beside(study: "Study", plan: Plan, since: float) -> str:
     """Report on a study that the paper needed."""
-    undone, logs = _undone(plan, since)
+    undone = [name for name in plan.jobs if not plan.record(name).exists()]
     lines = [f"new in {study.name}: {_computed(study, plan, since)}"]
     lines += [f"  not complete: {', '.join(undone)}"] if undone else []
-    return "\n".join([*lines, *(f"  its log: {path}" for path in logs)]) + "\n"
+    return "\n".join([*lines, *(f"  its log: {path}" for path in _failed(plan, since))]) + "\n"
 
 
 def _last(log: Path) -> str:
@@ -52,18 +51,10 @@ def _last(log: Path) -> str:
     return "it could say nothing: the disk is full; make room" if full else "it said nothing"
 
 
-def _undone(plan: Plan, since: float) -> tuple[list[str], list[Path]]:
-    """Unfinished bundles, and logs of jobs that failed in this run."""
-    folder = plan.folder
-    undone = [name for name in plan.jobs if not plan.record(name).exists()]
-    missing = set(undone)
-    if not (folder / "dataset.nc").exists():
-        missing.add("collect")
-    after = [path.stem for path in sorted((folder / "logs").glob("present_*.log"))] + ["browse", "paper"]
-    # A job after the stages has written its benchmark when it has made all that it is to make.
-    missing |= {name for name in after if _time(folder / "benchmarks" / f"{name}.tsv") < since}
-    logs = [folder / "logs" / f"{name}.log" for name in [*undone, *sorted(missing - set(undone))]]
-    return undone, [path for path in logs if _time(path) >= since]
+def _failed(plan: Plan, since: float) -> list[Path]:
+    """Logs of jobs that failed or were stopped in this run, which wrote no record in it."""
+    logs = sorted((plan.folder / "logs").glob("*.log"))
+    return [path for path in logs if _time(path) >= since and _time(plan.record(path.stem)) < since]
 
 
 def reminder(folder: Path) -> str:

@@ -246,17 +246,11 @@ def _origin(drawing: Drawing, datasets: Mapping[str, Dataset], name: str) -> str
     """Panel selections by study with hashes of datasets, or the script."""
     if drawing.example:
         return f"none, drawn by examples/{drawing.example}.py"
-    told: dict[str, list[str]] = {}
-    for panel in drawing.panels:
-        place = cell_text(panel.at, {"mesh_size": "m"})
-        if place not in told.setdefault(panel.study, []):
-            told[panel.study].append(place)
     parts = []
-    for study, labels in told.items():
-        selection = "; ".join(filter(None, labels))
-        sha256 = chosen(datasets, study, name).sha256[:HASH_SHOWN]
-        parts.append(f"{study}{': ' if selection else ''}{selection}, sha256 {sha256}")
-    return "; ".join(parts)
+    for panel in drawing.panels:
+        place = ": ".join(filter(None, (panel.study, cell_text(panel.at, {"mesh_size": "m"}))))
+        parts.append(f"{place}, sha256 {chosen(datasets, panel.study, name).sha256[:HASH_SHOWN]}")
+    return "; ".join(dict.fromkeys(parts))
 
 
 # -- sketches of what is loaded and how --------------------------------------------------------------------------------
