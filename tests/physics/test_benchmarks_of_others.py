@@ -71,7 +71,7 @@ def kind(shape, load, quantity):
 @pytest.mark.parametrize(
     "row",
     [
-        row if row[0].startswith(("`cook", "`hole", "`arch", "`ring")) else pytest.param(row, marks=pytest.mark.slow)
+        row if row[0].startswith(("`cook", "`hole")) else pytest.param(row, marks=pytest.mark.slow)
         for row in rows("On the finest mesh")
     ],
     ids=lambda row: row[0],

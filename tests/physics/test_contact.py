@@ -135,8 +135,7 @@ def test_outline_has_the_body_on_its_left(mesh_type):
     assert np.linalg.norm(last - first, axis=1).sum() == pytest.approx(2 * (0.02 + 0.01), rel=1e-9)
 
 
-@pytest.mark.parametrize("definition", ["uniform", "area", "delingette"])
-@pytest.mark.parametrize("size", [2e-3, 1e-3])
+@pytest.mark.parametrize(("definition", "size"), [("uniform", 2e-3), ("area", 2e-3), ("delingette", 1e-3)])
 def test_strip_lies_on_the_trapezoid(definition, size):
     laid = lay(STRIP, TRAPEZOID, RUBBER, STEEL, definition, size)
     assert laid.message == "" and laid.load_share == 1.0

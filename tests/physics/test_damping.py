@@ -28,10 +28,17 @@ def bent(one):
     return one.solve().displacements
 
 
+@cache
+def momenta(one):
+    """Network of a scene, and the masses times the shape of its loaded mode."""
+    motion = one.motion()
+    return motion.network, motion.mass * motion.loaded_mode[1]
+
+
 def share(one, displacements):
     """Amplitude of the loaded mode."""
-    motion = one.motion()
-    return (motion.mass * motion.loaded_mode[1]) @ motion.network.reduce(displacements)
+    network, momentum = momenta(one)
+    return momentum @ network.reduce(displacements)
 
 
 def swing(one, integrator, step, periods=3, **options):

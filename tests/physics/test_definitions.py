@@ -91,7 +91,7 @@ def test_a_definition_that_leaves_a_mechanism_refuses_the_mesh(mesh_type):
     """All others have three motions without resistance, clearly apart; rounding decides nothing."""
     mesh = MESH_TYPES[mesh_type](0.06, 0.02, 0.005)
     for one in DEFINITIONS.values():
-        for placed in (mesh, disturbed(mesh, 0.3, 1e-3), disturbed(mesh, 2.0, 50.0)):
+        for placed in (mesh, disturbed(mesh, 2.0, 50.0)):
             if one.needs == "cases" or one.name in ("adjoint", "neo-hooke", "yeoh", "axis-exact"):
                 continue
             try:

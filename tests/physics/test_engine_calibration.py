@@ -362,11 +362,13 @@ class TestBudget:
         yield
         st.ENGINES.discard("late")
 
-    def test_each_choice_is_within_the_budget(self):
+    def test_each_choice_is_within_the_budget_and_of_equal_errors_the_factor_nearer_to_1_is_taken(self):
         search = self.search("5 ms")
         assert search and max(one.frame_seconds for one in search) <= 5e-3
         others = [one for one in search if one is not search.best]
         assert others == sorted(others, key=lambda one: (one.worst, one.frame_seconds)) and search.best is search[0]
+        alike = [one for one in search if one.worst <= min(other.worst for other in search) + 1e-3]
+        assert abs(np.log(search.best.fit.factor)) == min(abs(np.log(one.fit.factor)) for one in alike)
 
     def test_the_best_split_of_the_time_is_taken(self):
         ((name, mesh), *_), budget = self.MESHES.items(), 5e-3
@@ -376,11 +378,6 @@ class TestBudget:
         for one in self.search(budget, meshes={name: mesh}):
             setting = one.fit.result.setting
             assert 1 / setting.substeps**2 / setting.iterations == pytest.approx(least)
-
-    def test_of_equal_errors_the_factor_nearer_to_1_is_taken(self):
-        search = self.search("5 ms")
-        alike = [one for one in search if one.worst <= min(other.worst for other in search) + 1e-3]
-        assert abs(np.log(search.best.fit.factor)) == min(abs(np.log(one.fit.factor)) for one in alike)
 
     def test_no_mesh_has_too_few_cells_to_bend(self):
         made = graded_meshes(BASE.beam, "structured", lambda size: st.make_mesh(BASE.beam, "structured", size))
@@ -403,7 +400,7 @@ class TestBudget:
             self.search(**({"budget": "1 ms"} | options))
 
 
-@pytest.mark.parametrize("number", [1, 6, 7, 14, 37])
+@pytest.mark.parametrize("number", [1, 6, 37])
 def test_what_is_said_of_a_random_question_holds(number):
     assert answered(number) is (number != 6)
 

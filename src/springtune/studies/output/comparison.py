@@ -143,12 +143,12 @@ def compare(
 
     Examples
     --------
-    >>> found = compare(tree, tree)
-    >>> found.different
+    >>> one = xr.DataTree(tree.to_dataset())  # the root alone
+    >>> compare(one, one).different
     False
-    >>> other = tree.copy(deep=True)
+    >>> other = one.copy(deep=True)
     >>> other["stiffness"][0, 0, 0, 0, 0, 0, 0] *= 2
-    >>> [(row.variable, row.labels["beam"], row.after / row.before) for row in compare(tree, other).changes]
+    >>> [(row.variable, row.labels["beam"], row.after / row.before) for row in compare(one, other).changes]
     [('stiffness', '100x20', 2.0)]
     """
     nodes = [{node.path: node.to_dataset() for node in tree.subtree} for tree in (before, after)]
