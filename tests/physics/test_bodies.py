@@ -244,12 +244,3 @@ def test_a_stress_where_materials_meet_is_refused_at_once():
     with pytest.raises(ValueError, match="quantity 'in_core': 'core' is where different materials meet"):
         st.Scene(shape, meshed, {"": STEEL, "core": THIRD}, "pull", definition="delingette")
     assert st.Scene(shape, meshed, {"": STEEL, "core": STEEL}, "pull", definition="delingette").solve().message == ""
-
-
-def test_a_material_of_no_part_is_told_why_it_is_none(grouped):
-    materials = {"": STEEL, "core": THIRD, "cores": THIRD}
-    with pytest.raises(ValueError, match="material: 'cores' is no part of the mesh; known: '', 'core'$"):
-        st.Scene(PLATE, grouped, materials, "pull", definition="delingette")
-    shared = replace(grouped, unusable={"cores": "has cells that part 'core' has, too; a cell has one material"})
-    with pytest.raises(ValueError, match="material: 'cores' has cells that part 'core' has, too"):
-        st.Scene(PLATE, shared, materials, "pull", definition="delingette")

@@ -1,9 +1,11 @@
 """Each definition against the moduli that it must have: closed forms where there are any, else measured tables."""
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import nnls
@@ -310,34 +312,12 @@ def test_patch_makes_young_modulus_exact_on_any_mesh(name, mesh_type):
 
 # -- measured tables (E and G in %, effective nu) for nu = .3, 1/3, .49 -----------------------------------------------
 
-TABLE = {
-    ("structured", "density"): ((5.6, 5.6, 5.6), (0.333, 0.333, 0.333), None),
-    ("right", "uniform"): ((-4.7, -4.7, -4.7), (0, 0, 0), None),
-    ("right", "lattice"): ((-13.4, -13.4, -13.4), (0, 0, 0), None),
-    ("right", "van-gelder"): ((0, 0, 0), (0, 0, 0), None),
-    ("right", "van-gelder-general"): ((9.9, 12.5, 31.6), (0, 0, 0), None),
-    ("right", "delingette-tensile"): ((48.3, 50, 65.1), (0, 0, 0), None),
-    ("right", "element-fit"): ((16.3, 18.5, 36), (0, 0, 0), None),
-    ("right", "density"): ((-19.9, -19.9, -19.9), (0, 0, 0), None),
-    ("right", "oriented"): ((0, 0, 0), (0, 0, 0), None),
-    ("right", "area"): ((-17, -13.4, -0.4), (-0.066, 0, 0.285), None),
-    ("right", "angular"): ((-13, -13.4, -34.9), (0.025, 0, -0.346), None),
-    ("alternating", "uniform"): ((22.7, 22.7, 22.7), None, None),
-    ("alternating", "lattice"): ((13.8, 13.8, 13.8), (0.314, 0.314, 0.314), None),
-    ("alternating", "delingette-tensile"): ((77.5, 78.7, 91.9), (0.197, 0.191, 0.162), None),
-    ("alternating", "area"): ((13.9, 13.8, 13.4), (0.283, 0.314, 0.464), None),
-    ("braced", "uniform"): ((38.9, 38.9, 38.9), None, (125.2, 130.9, 158.1)),
-    ("braced", "lattice"): ((0, 0, 0), (0.333, 0.333, 0.333), (-2.5, 0, 11.75)),
-    ("braced", "lloyd"): ((-11.8, -11.8, -11.8), (0.412, 0.412, 0.412), (13.75, 16.7, 30.4)),
-    ("braced", "element-fit"): ((-16.4, -14.8, -2.4), (0.402, 0.404, 0.413), (4.1, 9.5, 44.6)),
-    ("braced", "baudet"): ((-1.7, 0, 6.8), (0.345, 0.333, 0.288), (0, 0, 0)),
-    ("braced", "axis-exact"): ((0, 0, 0), (0.3, 0.333, 0.49), (-14.3, 0, 92.2)),
-}
+TABLE = yaml.safe_load(Path(__file__).with_name("moduli.yaml").read_text())
 
 
-@pytest.mark.parametrize(("mesh_type", "name"), TABLE)
+@pytest.mark.parametrize(("mesh_type", "name"), [(kind, name) for kind, names in TABLE.items() for name in names])
 def test_measured_moduli(mesh_type, name):
-    youngs, ratios, shears = TABLE[mesh_type, name]
+    youngs, ratios, shears = TABLE[mesh_type][name]
     found = np.array([errors(name, patch(mesh_type), nu) for nu in RATIOS])
     assert 100 * found[:, 0] == pytest.approx(youngs, abs=0.1)
     if ratios:
@@ -452,22 +432,6 @@ def test_what_is_no_declaration_is_refused(wrong):
     with pytest.raises(ValueError, match="definition 'none of ours': .*; give"):
         definition("none of ours", **wrong)(lambda mesh, material, thickness: None)
     assert "none of ours" not in DEFINITIONS
-
-
-def test_rounding_does_not_choose_the_corner_that_is_held():
-    """A regular polygon has two lowest corners of equal x + y; coordinates differ by rounding among processors."""
-    angles, noise = np.arange(12) * np.pi / 6, np.random.default_rng(1)
-    points = np.vstack([np.zeros(2), np.column_stack([np.cos(angles), np.sin(angles)])])
-    triangles = np.array([[0, i + 1, (i + 1) % 12 + 1] for i in range(12)])
-    held = {
-        patch_cases(
-            Mesh(points * (1 + noise.uniform(-1e-15, 1e-15, points.shape)), triangles),
-            Material(1.0, 0.3, name="unit"),
-            1.0,
-        )[0].held.tobytes()
-        for _ in range(20)
-    }
-    assert len(held) == 1
 
 
 @pytest.mark.parametrize("corner", [[0.5, 0.0], [0.0, 0.5], [0.5, 0.5]], ids=str)

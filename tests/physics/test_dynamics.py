@@ -5,8 +5,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from springtune.mechanics import stepping
 from springtune.mechanics.continuation import buckling
@@ -396,17 +394,6 @@ def test_steps_that_follow_each_other_along_a_network_are_those_of_the_whole(lin
     assert np.abs(found.velocities - v).max() <= 1e-9 * np.abs(v).max()
 
 
-@given(st.integers(1, 10**6), st.integers(1, 10**4), st.floats(1, 20), st.integers(1, 64))
-def test_threads_follow_each_other_at_a_distance_that_the_network_has(rows, bandwidth, entries, threads):
-    pointers = (entries * np.arange(rows + 1)).astype(int)
-    count, size, depth = stepping.passes_of(pointers, bandwidth, 80, 40, threads)
-    assert 1 <= count <= threads and 1 <= size and 1 <= depth <= stepping.DEEPEST_PASS
-    if count > 1:
-        assert count * (depth * bandwidth + size) <= rows and count * stepping.FEWEST <= pointers[-1]
-    elif rows * 80 + pointers[-1] * 40 <= stepping.CACHE:  # nothing is gained by going ahead
-        assert (size, depth) == (rows, 1)
-
-
 @pytest.mark.parametrize("broken", [0, 1])
 def test_a_thread_that_fails_ends_the_others(broken):
     motion = beam(size=7e-4)
@@ -424,24 +411,6 @@ def test_a_thread_that_fails_ends_the_others(broken):
     with pytest.raises(MemoryError, match="no room"):
         stepper.advance(10)
     stepper.close()
-
-
-def test_an_interruption_while_threads_begin_ends_those_that_have_begun():
-    motion = beam(size=7e-4)
-    stepper = stepping.make_stepper(motion, "central-difference", 1e-9, threads=2)
-    stepper.begin(np.zeros(motion.load.shape), np.zeros(motion.load.shape))
-    begin = stepper.threads.submit
-
-    def submit(*call):
-        begun.append(begin(*call))
-        raise KeyboardInterrupt
-
-    begun = []
-    stepper.threads.submit = submit
-    with pytest.raises(KeyboardInterrupt):
-        stepper.advance(10)
-    stepper.close()
-    assert begun[0].done()
 
 
 @pytest.mark.parametrize(

@@ -89,13 +89,6 @@ class TestWhatIsFound:
             assert one.step_limit <= scene.motion().step_limit("central-difference") * (1 + 1e-6)
             assert one.step_limit >= 0.8 * scene.motion().step_limit("central-difference")
 
-    def test_sizes_make_the_same_mesh_as_a_text(self, search):
-        for one in found_in(search):
-            text = f"{1e3 * one.size:.12g} mm"
-            assert np.array_equal(
-                st.make_mesh(BEAM, one.mesh_type, text).points, st.make_mesh(BEAM, one.mesh_type, one.size).points
-            )
-
     @pytest.mark.parametrize(("length", "height"), [(0.05, 0.04), (0.012, 0.04), (0.4, 0.04)])
     def test_cells_across_are_those_of_the_smaller_side(self, length, height):
         beam = st.Beam(length, height)
@@ -232,18 +225,6 @@ class TestWhatIsNotFound:
         assert search.best is not None and search.best_springs is None
         patch = [one for one in search.tried if "patch" in one.errors]
         assert patch[-1].particles < 1000 and patch[-1].worst("patch") > 0.1
-
-    def test_a_type_that_has_one_mesh_ends(self):
-        @st.mesh_type("two-triangles")
-        def two(length, height, size):
-            points = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * [length, height]
-            return st.Mesh(points, np.array([[0, 1, 2], [0, 2, 3]]))
-
-        try:
-            search = find_mesh(BEAM, STEEL, "1 %", mesh_types=["two-triangles"])
-        finally:
-            st.MESH_TYPES.discard("two-triangles")
-        assert search.best is None and len(search.tried) == 1
 
     def test_networks_that_are_unstable_are_no_answer(self):
         """A sheet that grows wider as it is pulled."""

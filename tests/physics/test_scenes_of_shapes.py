@@ -509,20 +509,6 @@ class TestAgainstReferences:
         far = st.Scene(self.shape, self.grouped, RUBBER, "pull", definition="area")
         assert "the linear reference does not apply" in far.objection
 
-    def test_predictions_are_scenes(self):
-        names, sheet = ("lattice", "area", "delingette"), None
-        choices = {one.definition: one for one in st.predict(self.shape, self.grouped, STEEL, also=names)}
-        for name in names:
-            scene = st.Scene(self.shape, self.grouped, STEEL, "pull", definition=name, kinematics="linear", sheet=sheet)
-            sheet = scene.sheet
-            assert choices[name].errors == pytest.approx(scene.solve().errors, rel=1e-9, abs=1e-9)
-        for choice in choices.values():
-            assert choice.failures or np.isfinite(choice.worst)
-        with pytest.raises(ValueError, match="load: 'traction' is of shapes alone"):
-            st.predict(*BEAM, load="traction")
-        with pytest.raises(ValueError, match="load: none, and .* has 2; give one of them"):
-            st.predict(plate(self.pull, replace(self.pull, name="other")), self.grouped, STEEL)
-
     def test_springs_fitted_to_the_reference(self):
         """Definitions that are told cases get the reference's displacements."""
         scene = st.Scene(self.shape, st.mesh_shape(self.shape, 8e-3), THIRD, "pull", definition="annealed",

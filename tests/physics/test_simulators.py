@@ -2,18 +2,14 @@
 
 import json
 import re
-import shlex
 import xml.etree.ElementTree as ET
-from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import springtune as st
 from mechanics import spring_forces
-from springtune.cli import main
 from springtune.handover.net import SpringNet
 from springtune.handover.simulation import STEP_SHARE, EquilibriumWarning
 from springtune.mesh import Mesh, signed_areas
@@ -32,9 +28,6 @@ RELEASE = tuple(int(part) for part in mujoco.__version__.split(".")[:2])
 VERSION = RELEASE[0]
 """Of MuJoCo, that runs here; `tests/versions` runs this file by the other one."""
 
-ASKED = "--beam 60x20 --size '5 mm' --material steel --density '7850 kg/m^3' --load traction --force '20 kN'"
-SPRINGS = shlex.split(ASKED)
-"""Of `springtune springs`."""
 
 PROGRAMS = {
     ".xml": "MuJoCo",
@@ -325,26 +318,6 @@ def test_other_versions_and_other_files_are_refused(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_the_command_writes_for_a_version_and_says_so(tmp_path):
-    out = tmp_path / "net.xml"
-    words = ["springs", *SPRINGS, "--out", str(out)]
-    done = CliRunner().invoke(main, [*words, "--definition", "delingette", "--mujoco", str(VERSION)])
-    assert done.exit_code == 0, done.output
-    assert f"for MuJoCo {VERSION}; MuJoCo {OTHER}, whose flex has other constants, refuses it" in done.output
-    assert mujoco.MjModel.from_xml_path(str(out)).nflex == 1
-    done = CliRunner().invoke(main, [*words, "--definition", "lattice"])
-    assert "for MuJoCo 3 and 4: springs are the same in both" in done.output
-    model = mujoco.MjModel.from_xml_path(str(out))
-    assert model.nkey == 1 and model.nu == 1
-    out.unlink()
-    for options, said in (
-        ("--mujoco 5", "Error: --mujoco: 5 is no version of MuJoCo"),
-        ("--definition area", "Error: --definition 'area': has energies of areas"),
-    ):
-        done = CliRunner().invoke(main, [*words, *options.split()])
-        assert done.exit_code == 2 and done.output.startswith(said) and not out.exists()
-
-
 @pytest.mark.parametrize("ending", PROGRAMS)
 def test_a_file_of_springs_is_enough_for_a_simulator(ending, tmp_path):
     """What is read from a file of arrays is written as the scene itself is."""
@@ -479,14 +452,6 @@ def test_sofas_scene_in_python_serves_versions_with_other_names(tmp_path):
 
 
 # -- XPBD --------------------------------------------------------------------------------------------------------------
-
-
-def test_the_package_itself_imports_no_simulator():
-    """Engines import one when they start, the rest of it never."""
-    imports = re.compile(r"^(\s*)(import|from) (mujoco|Sofa|newton|warp)\b", re.MULTILINE)
-    for path in Path(st.__file__).parent.rglob("*.py"):
-        found = [match[1] for match in imports.finditer(path.read_text())]
-        assert not found or path.parent.name == "engines" and all(found), path
 
 
 # -- refusals ----------------------------------------------------------------------------------------------------------

@@ -132,6 +132,3 @@ CODE = {
     for name, one in TABLE["code"].items()
 }
 """File of the package, what is edited in it (None: a statement is added; nothing: it stays), and a row."""
-
-VERSIONS = {name: row(None, **one) for name, one in TABLE["versions"].items()}
-"""Distributions, and what another version of them changes."""

@@ -1,7 +1,6 @@
 """What runs again when something changes: exactly these jobs, exactly these results, and the dataset of a fresh run."""
 
 import hashlib
-import importlib.metadata
 import json
 import os
 import shutil
@@ -11,11 +10,10 @@ from pathlib import Path
 
 import driver
 import pytest
-from rows import CODE, STORED, STUDY, VERSIONS
+from rows import CODE, STORED, STUDY
 
 import springtune
-from springtune.studies.kinds.scenes import plan
-from springtune.studies.runs import keys, rerun
+from springtune.studies.runs import rerun
 from springtune.studies.runs.source import read_note
 
 ROWS = STUDY | STORED
@@ -176,31 +174,3 @@ def test_an_edit_computes_again_what_it_computes(edited, complete, tmp_path):
 def test_an_edit_runs_what_it_concerns(edited, complete):
     package, jobs, _ = edited
     assert set(driven("due", package, complete)) == jobs
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("distribution", VERSIONS)
-def test_another_version_of_a_package_computes_again_what_it_computes(distribution, complete, tmp_path, monkeypatch):
-    version, row = importlib.metadata.version, VERSIONS[distribution]
-    caches = [
-        keys.installed,
-        keys.code_key,
-        keys.stage_key,
-        keys.distribution,
-        plan.mesh_key,
-        plan.solved_reference,
-        plan.interpolant_key,
-    ]
-    shutil.copytree(complete, tmp_path / "study")
-    monkeypatch.chdir(tmp_path / "study")
-    for cache in caches:
-        cache.cache_clear()
-    try:
-        with monkeypatch.context() as patch:
-            patch.setattr(importlib.metadata, "version", lambda name: "999" if name == distribution else version(name))
-            found = driver.Run().finish()
-            left = driver.Run().due()
-    finally:
-        for cache in caches:
-            cache.cache_clear()
-    assert found == (row.jobs, row.solved) and left == []

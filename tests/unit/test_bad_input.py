@@ -8,10 +8,12 @@ import struct
 import subprocess
 import sys
 import zlib
+from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
+import yaml
 from click.testing import CliRunner
 
 import springtune as st
@@ -557,26 +559,9 @@ class TestDatasets:
         with pytest.raises(MeshError, match="own.xdmf: parts of it are in other files"):
             read_beam_mesh(path, 0.1, 0.02)
 
-    ODD = [
-        ("del file['status']", "is damaged, or not as springtune writes it (AttributeError"),
-        ("file.create_dataset('odd', 3, h5py.vlen_dtype('f8'))", "has no dimension scale"),
-        ("file['odd'] = np.zeros(3, [('a', 'f8')])", "has no dimension scale"),
-        ("file['odd'] = np.dtype('f8')", "has no attribute 'maps'"),
-        ("file['odd'] = h5py.Empty('f8')", "'odd' has no shape"),
-        ("odd = file.create_group('odd'); odd['odd'] = odd", "'odd/odd' is linked twice"),
-        ("file['odd'] = file['/']", "is linked twice"),
-        ("file['odd'] = file['status']", "is linked twice"),
-        ("file['odd'] = h5py.SoftLink('/')", "'odd' is a soft link"),
-        ("file.create_group('/a' * 500)", "groups deep"),
-        ("[file.create_group(f'a{n}') for n in range(20_001)]", "over 20,000 groups"),
-        ("file['beam'].attrs['_Netcdf4Dimid'] = np.int32(2**31 - 1)", "KeyError"),
-        ("file.create_dataset('odd', (2000, 2000), 'i1', chunks=(1, 1))", "'odd' is in 4000000 pieces"),
-        ("file.create_dataset('odd', 3, h5py.string_dtype(), compression='gzip')", "'odd' has compressed texts"),
-        ("file['status'].attrs['scale_factor'] = 'much'", "UFuncTypeError"),
-        ("file['status'].attrs['DIMENSION_LIST'] = 1.5", "cannot be read"),
-    ]
-
-    @pytest.mark.parametrize("spoil, says", ODD)
+    @pytest.mark.parametrize(
+        ("spoil", "says"), yaml.safe_load(Path(__file__).with_name("odd_datasets.yaml").read_text())
+    )
     def test_what_a_dataset_cannot_hold_is_refused_in_one_line(self, path, spoil, says):
         import h5py
 

@@ -36,24 +36,6 @@ def test_modules_are_imported_by_text_in_one_place():
     }  # the latter computes a formula, node by node checked
 
 
-REPLACEABLE = {
-    "meshio": {"mesh/formats.py: meshio"},
-    "pyamg": {"linalg/multigrid.py: pyamg.relaxation.relaxation"},
-}
-"""Packages that one module imports, so that another one can take their place, and what of them: their public names."""
-
-
-def test_packages_that_may_be_replaced_are_imported_in_one_module():
-    found = {name: set() for name in REPLACEABLE}
-    for path, tree in PARSED.items():
-        for node in ast.walk(tree):
-            names = [one.name for one in node.names] if isinstance(node, ast.Import) else [getattr(node, "module", "")]
-            for name in filter(None, names):
-                if name.partition(".")[0] in found:
-                    found[name.partition(".")[0]].add(f"{path.relative_to(SOURCE).as_posix()}: {name}")
-    assert found == REPLACEABLE
-
-
 @pytest.mark.parametrize(
     ("program", "heavy"),
     [

@@ -6,7 +6,6 @@ import re
 import tomllib
 from pathlib import Path
 
-import nbformat
 import yaml
 from packaging.requirements import Requirement
 
@@ -51,15 +50,6 @@ def test_hosted_ci_runs_ours_with_pinned_actions():
         assert job["steps"][-1]["run"] == "bash .ci/run" and os.access(REPOSITORY / ".ci/run", os.X_OK)
         for used in (step["uses"] for step in job["steps"] if "uses" in step):
             assert re.fullmatch(r"[\w-]+/[\w-]+@[0-9a-f]{40}", used), f"{used}: pin a commit"
-
-
-def test_the_notebook_has_no_outputs_and_explains_each_step():
-    """tests/workflow/test_quick.py runs it."""
-    notebook = nbformat.read(REPOSITORY / "examples/springtune.ipynb", as_version=4)
-    nbformat.validate(notebook)
-    assert notebook.cells[0].cell_type == "markdown" and "## The page" in notebook.cells[-2].source
-    for cell in notebook.cells:
-        assert cell.cell_type == "markdown" or not (cell.outputs or cell.execution_count)
 
 
 ARTICLE = (REPOSITORY / "article/paper.md").read_text()

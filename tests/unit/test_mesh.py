@@ -1,17 +1,14 @@
 """Meshes: geometry that holds for any size, quality figures, and files."""
 
-import hashlib
 import resource
 
 import meshio
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import Delaunay
 
-from springtune.cli import main
 from springtune.mesh import (
     MESH_TYPES,
     Mesh,
@@ -227,16 +224,6 @@ class TestSlits:
 
     MESH = MESH_TYPES["right"](0.1, 0.02, 5e-3)
 
-    def test_every_way_in_is_closed(self, tmp_path):
-        points, cells, _ = part(self.MESH, lambda at: at[:, 0] > 0.05, lambda at: self.MESH.points[at, 1] < 0.011)
-        path = save(tmp_path / "slit.vtu", points, cells)
-        with pytest.raises(MeshError, match="merge duplicate points"):  # a study's mesh file
-            content = hashlib.sha256(path.read_bytes()).hexdigest()
-            make({"length": 0.1, "height": 0.02, "file": str(path), "unit": 1.0, "content": content})
-        asked = ["predict", "--beam", "100x20", "--mesh", str(path), "--material", "steel"]
-        result = CliRunner().invoke(main, asked)
-        assert result.exit_code == 1 and "merge duplicate points" in result.stderr and result.stdout == ""
-
     def test_a_file_that_changes_during_a_run_is_not_read(self, tmp_path):
         """Its mesh would be stored under the key of what it held before."""
         path = save(tmp_path / "own.vtu", self.MESH.points, {3: self.MESH.triangles})
@@ -265,22 +252,6 @@ class TestSlits:
         finally:
             resource.setrlimit(resource.RLIMIT_AS, before)
 
-    def test_parts_of_different_edges(self, tmp_path):
-        left, right_ = MESH_TYPES["right"](0.05, 0.02, 5e-3), MESH_TYPES["right"](0.05, 0.02, 4e-3)
-        # Both parts have points in the joint's corners; those of the finer one between them hang on the coarser.
-        points = np.vstack([left.points, right_.points + [0.05, 0.0]])
-        number = np.arange(len(points))
-        for y in (0.0, 0.02):
-            ends = np.flatnonzero((points == [0.05, y]).all(axis=1))
-            number[ends] = ends[0]
-        cells = {3: number[np.vstack([left.triangles, right_.triangles + len(left.points)])]}
-        refuse(
-            tmp_path / "joint.vtu",
-            points,
-            cells,
-            r"at \(50, 5\) mm hangs on the edge from \(50, 8\) mm to \(50, 4\) mm .*split",
-        )
-
     def test_cells_that_touch_in_a_point(self, tmp_path):
         """A hole of two cells that meet the rest's outline in points."""
         mesh = self.MESH
@@ -297,19 +268,6 @@ class TestSlits:
         refuse(tmp_path / "two.vtu", np.vstack(points), {3: apart}, said)
         said = "cover 200 % .* edges with two cells on the same side: .*; remove one"
         refuse(tmp_path / "one.vtu", mesh.points, {3: np.vstack([mesh.triangles, other.triangles])}, said)
-
-    def test_dented_quadrilateral(self, tmp_path):
-        mesh = MESH_TYPES["braced"](0.03, 0.03, 0.01)
-        points = mesh.points.copy()
-        points[(points == [0.01, 0.01]).all(axis=1)] = [0.017, 0.017]  # past the diagonal of the middle one
-        refuse(
-            tmp_path / "dent.vtu",
-            points,
-            {4: mesh.quads},
-            "cells with a corner of 180 degrees or more: 1, the first one at .*; split",
-            0.03,
-            0.03,
-        )
 
     def test_triangles_beside_quadrilaterals_and_slivers_are_legal(self, tmp_path):
         mesh = MESH_TYPES["braced"](0.1, 0.02, 5e-3)

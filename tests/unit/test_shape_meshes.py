@@ -342,16 +342,6 @@ def test_names_that_cannot_be_used_are_told(tmp_path):
 
 
 @pytest.mark.usefixtures("mesh_library")
-def test_notes_of_a_format_are_no_groups(tmp_path):
-    """What files of MED say besides, such as `med:nom`, was an empty group."""
-    grouped = mesh_shape(plate(), 5e-3)
-    points = np.isin(np.arange(len(grouped.mesh.points)), grouped.sides["left"]).astype(int)
-    by_meshio(grouped, point_data={"left": points}).write(tmp_path / "plate.med")
-    found = read_shape(tmp_path / "plate.med")
-    assert list(found.sides) == ["left"] and not found.unusable
-
-
-@pytest.mark.usefixtures("mesh_library")
 @pytest.mark.parametrize(
     ("write", "says"),
     [

@@ -192,12 +192,6 @@ def test_the_paper_study_is_the_same_on_every_processor(name, tmp_path):
     assert_same_datasets(REPOSITORY / "config/paper.yaml", tmp_path, environments, CURVE_TOLERANCE, follows)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", PROCESSORS)
-def test_physics_holds_on_every_processor(name, tmp_path):
-    physics(sys.executable, **processor(name, tmp_path))
-
-
 def physics(python, tests="tests/physics", **environment):
     """Run the physics tests by a Python, and assert that they hold."""
     call = [str(python), "-m", "pytest", "-q", "-n", "2", "-m", "not slow", "-p", "no:cacheprovider", tests]

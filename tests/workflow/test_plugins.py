@@ -145,13 +145,3 @@ def test_what_is_broken_is_left_out_by_name_and_nothing_else(bad):
         "mesh type 'ending' of the package 'bad' is left out: away",
     ):
         assert why in told, told
-
-
-def test_nothing_is_imported_before_it_is_asked_for(bad):
-    program = "import sys, springtune as st; st.DEFINITIONS['patch'], st.LOADS['traction'], st.MESH_TYPES['free']"
-    assert "bad" not in python(
-        REPOSITORY, bad, "-c", f"{program}; print(*[one for one in sys.modules if 'bad' == one])"
-    )
-    told = python(REPOSITORY, bad, "-c", f"{program}; st.DEFINITIONS['lost']", code=1)
-    assert "definition 'lost' of the package 'bad' is left out: No module named 'bad.missing'" in told
-    assert "broken" not in told
