@@ -303,28 +303,6 @@ def series(path):
     return [float(row.get("timestep")) for row in rows], [meshio.read(path.parent / row.get("file")) for row in rows]
 
 
-class TestSeries:
-    """What becomes of a collection where the disk is full."""
-
-    @pytest.fixture(params=["write_text", "replace"])
-    def full(self, request, monkeypatch):
-        """A disk on which a list has no room, or on which its last piece does not get its name."""
-        able, done = getattr(Path, request.param), []
-
-        def fail(path, *given, **options):
-            done.append(path)
-            if request.param == "write_text" or len(done) == 2:
-                raise OSError(28, "No space left on device")
-            return able(path, *given, **options)
-
-        monkeypatch.setattr(Path, request.param, fail)
-
-    def test_nothing_is_left(self, full, tmp_path):
-        with pytest.raises(OSError, match="No space left on device"):
-            scene_of("lattice").solve().write(tmp_path / "path.pvd", steps=2)
-        assert not list(tmp_path.iterdir())
-
-
 def test_a_collection_stays_where_there_is_no_room_for_another(tmp_path, monkeypatch):
     result = scene_of("lattice").solve()
     result.write(tmp_path / "path.pvd", steps=1)
