@@ -19,7 +19,7 @@ JOBS = {
     "EVERYTHING": f"reference mesh {SOLVING}",
 }
 SCENES = {"linear": 24, "nonlinear": 25}
-RESULTS = {"SCENES": SCENES, "NETWORKS": {"curve": 16, "moduli": 2, "laying": 4, "contrast": 1} | SCENES}
+RESULTS = {"SCENES": SCENES, "NETWORKS": {"curve": 16, "moduli": 2, "laying": 2, "contrast": 1} | SCENES}
 STAGES = {
     "curve": "sensitivity",
     "linear": "solve",

@@ -109,7 +109,7 @@ class TestPage:
         from springtune.studies.kinds.benchmark.kind import KIND as BENCHMARK
         from springtune.studies.kinds.collect import group_of
         from springtune.studies.kinds.engines.collect import ENGINE_CURVES, ENGINE_RUNS
-        from springtune.studies.kinds.laying.collect import LAYING
+        from springtune.studies.kinds.laying.kind import KIND as LAYING
         from springtune.studies.kinds.moduli.kind import KIND as MODULI
         from springtune.studies.kinds.samples.collect import EFFECTS, SAMPLES, SOBOL
         from springtune.studies.kinds.samples.designs import PARAMETERS
@@ -118,8 +118,8 @@ class TestPage:
         from springtune.studies.kinds.stability.collect import STABILITY
         from springtune.studies.output.browse.page import views
 
-        groups = (ROOT, SENSITIVITY, FINITE_STRAIN, BLOCK, FIELDS, LAYING, STABILITY, ENGINE_RUNS, ENGINE_CURVES)
-        groups += tuple(map(group_of, (MODULI, BENCHMARK)))
+        groups = (ROOT, SENSITIVITY, FINITE_STRAIN, BLOCK, FIELDS, STABILITY, ENGINE_RUNS, ENGINE_CURVES)
+        groups += tuple(map(group_of, (MODULI, BENCHMARK, LAYING)))
         groups += (SAMPLES, EFFECTS, SOBOL, SHAPES, SHAPE_FIELDS, AT_FINITE_STRAIN)
         coordinates = {"/samples": {*PARAMETERS, "sample_mesh_size"}}
         known = {group.name: group for group in groups}

@@ -440,16 +440,16 @@ class TestPressureAndLaying:
 
     def test_strips_and_their_references(self, load):
         study = load(study_text("small laying"))
-        assert len(study.parts["laying"].strips) == 2 * 2 * 2
+        strips = [one for one in study.parts["laying"] if "definition" in one[0]]
+        references = [one for one in study.parts["laying"] if "definition" not in one[0]]
+        assert (len(strips), len(references)) == (2 * 2 * 2, 2)
         # Each on three meshes, the finest first: their spread says how well the reference is known.
-        sizes = [one.mesh_size for one in study.parts["laying"].references if one.friction == 0.3]
-        assert sizes == pytest.approx([1e-3, 1.25e-3, 1.6e-3]) and len(study.parts["laying"].references) == 2 * 3
-        first = study.parts["laying"].strips[0]
-        assert (first.definition, first.mesh_size, first.loading, first.friction) == ("uniform", 1e-3, "pressure", 0.0)
-        assert first.strip.length == 0.1 and first.trapezoid.area == pytest.approx(585e-6)
-        assert study.axes["friction"] == (0.0, 0.3)
+        assert all(values["mesh_sizes"] == pytest.approx([1e-3, 1.25e-3, 1.6e-3]) for _, values in references)
+        assert {values["definition"] for _, values in references} == {"delingette"}
+        labels, values = strips[0]
+        assert labels == {"definition": "uniform", "mesh_size": 1e-3, "loading": "pressure", "friction": 0.0}
+        assert values["strip"]["length"] == 0.1 and values["mesh_sizes"] == [1e-3]
         assert {0.001, 0.002} <= set(study.axes["mesh_size"]) and "uniform" in study.axes["definition"]
-        assert {one.definition for one in study.parts["laying"].references} == {"delingette"}
 
     @pytest.mark.parametrize(("output", "words"), [("block", "load 'pressure'"), ("laying", "section 'laying'")])
     def test_outputs_need_what_they_show(self, refusal, output, words):

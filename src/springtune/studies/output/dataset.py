@@ -87,10 +87,13 @@ class Group:
     ) -> xr.Dataset:
         """Create the dataset of rows of labels and values; each value goes to the labels that its variable has.
 
-        An array fills the first places along the dimensions that rows have no labels of.
+        An array fills the first places along the dimensions that rows have no labels of. Dimensions without an axis
+        have the labels of the rows, in their order.
         """
         frame = rows if isinstance(rows, pd.DataFrame) else pd.DataFrame([*rows])
-        data = self.empty(axes, names)
+        needed = {one for dimensions, *_ in self.variables.values() for one in dimensions} - axes.keys()
+        own = {one: frame[one].dropna().unique().tolist() if one in frame else [] for one in needed}
+        data = self.empty({**axes, **own}, names)
         labels = frame.columns.intersection([*data.dims])
         found = {name: data.get_index(name).get_indexer(frame[name]) for name in labels}
         for name in frame.columns.intersection([*data.data_vars]):
