@@ -19,7 +19,7 @@ from springtune.springs.lattice import half_weight
 from springtune.studies.kinds.benchmark import OTHER_APPROACHES, approach_names
 from springtune.studies.kinds.benchmark import solve as benchmark
 from springtune.studies.kinds.benchmark.approaches import APPROACHES
-from springtune.studies.kinds.benchmark.kind import KIND, Case
+from springtune.studies.kinds.benchmark.kind import KIND
 from springtune.studies.kinds.benchmark.solve import LoadedBeam
 from springtune.studies.kinds.collect import group_of
 
@@ -42,8 +42,7 @@ def answer(scene, approach, size=2e-3):
 
 
 def axes(approaches, sizes):
-    case = Case("traction", BEAM, None, "", 0.0, approaches, sizes, (), 0.0)
-    return KIND.axes([case]) | {"mesh_size": sizes}
+    return KIND.axes({"traction": {"approaches": approaches, "mesh_sizes": sizes}}) | {"mesh_size": sizes}
 
 
 def measured(approaches, sizes, finest, most_seconds=30.0):

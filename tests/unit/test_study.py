@@ -463,10 +463,10 @@ class TestPressureAndLaying:
 class TestBenchmark:
     def test_sizes_are_those_of_the_study(self, load):
         text = study_text("benchmark", ("\ngrids", "\n  finest: 5 mm\n  finest_of: {condensation: 2 mm}\ngrids"))
-        case = load(text).parts["benchmark"][0]
-        assert dict(zip(case.approaches, case.finest))["condensation"] == 2e-3
-        assert {size for name, size in zip(case.approaches, case.finest) if name != "condensation"} == {5e-3}
-        assert set(load(STUDIES["benchmark"]).parts["benchmark"][0].finest) == {2e-3}
+        (scene,) = load(text).parts["benchmark"].values()
+        assert dict(zip(scene["approaches"], scene["finest"]))["condensation"] == 2e-3
+        assert {size for name, size in zip(scene["approaches"], scene["finest"]) if name != "condensation"} == {5e-3}
+        assert all({*one["finest"]} == {2e-3} for one in load(STUDIES["benchmark"]).parts["benchmark"].values())
 
 
 HERE = Path(__file__).parent

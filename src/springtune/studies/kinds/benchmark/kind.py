@@ -1,6 +1,5 @@
 """Run time against error: a study's section ``benchmark``."""
 
-from dataclasses import asdict, dataclass
 from math import nan
 from typing import Annotated
 
@@ -8,9 +7,7 @@ from pydantic import Field
 
 from springtune.mechanics.integrators import PRECISIONS
 from springtune.mesh.types import MESH_TYPES
-from springtune.problem.geometry import Beam
 from springtune.problem.loads import LOADS
-from springtune.problem.materials import Material
 from springtune.problem.quantities import nearest
 from springtune.reference.calculix import program
 from springtune.springs.base import DEFINITIONS
@@ -67,28 +64,13 @@ class BenchmarkConfig(Section):
     """Lengths of an edge."""
 
     finest: fields.Length | None = None
-    """The shortest of them that most approaches have; all without."""
+    """Length of an edge below which approaches are not run; without, all sizes are."""
 
     finest_of: dict[str, fields.Length] = Field(default_factory=dict)
-    """The shortest of them that an approach has, by its name, such as `delingette/structured: 0.5 mm`."""
+    """The same of single approaches by their names, such as `delingette/structured: 0.5 mm`."""
 
     most_seconds: Seconds = default("30")
     """Seconds after which an approach is not run on finer sizes, which are holes that say so."""
-
-
-@dataclass(frozen=True)
-class Case:
-    """A scene of the benchmark; sizes are edges [m], ``finest`` has one for each approach, tension is positive [N]."""
-
-    name: str
-    beam: Beam
-    material: Material
-    load: str
-    force: float
-    approaches: tuple[str, ...]
-    mesh_sizes: tuple[float, ...]
-    finest: tuple[float, ...]
-    most_seconds: float
 
 
 def in_benchmark(load: str) -> bool:
@@ -98,8 +80,6 @@ def in_benchmark(load: str) -> bool:
 
 
 def _check(config, problems):
-    if not config.benchmark:
-        return
     section = config.benchmark
     labels = ("scenes", "definition", "mesh_type", "approach", "mesh_size")
     check_product(problems, section, ("benchmark",), labels, MOST_RUNS)
@@ -121,68 +101,50 @@ def _check(config, problems):
         if name not in approaches:
             message = f"'{name}' is no approach of this benchmark; {nearest(name, approaches)}"
             problems.add(("benchmark", "finest_of", name), message)
-    given = {("finest",): section.finest} | {("finest_of", name): size for name, size in section.finest_of.items()}
-    for place, size in given.items():
-        if size is not None and size not in section.mesh_size:
-            known = ", ".join(f"{1e3 * one:g} mm" for one in sorted(section.mesh_size))
-            problems.add(
-                ("benchmark", *place), f"{1e3 * size:g} mm is no mesh size of this benchmark; choose of {known}"
-            )
 
 
 def _expand(config, declared):
+    """Values of each scene by its name; explicit steps are timed on the first one."""
     section = config.benchmark
-    if not section:
-        return ()
     mesh_types = [name for name in MESH_TYPES if name in section.mesh_type]
     definitions = [name for name in DEFINITIONS if name in section.definition]
     others = [name for name in OTHER_APPROACHES if name in section.approach]
-    approaches = approach_names(definitions, mesh_types, others)
-    finest = section.finest or min(section.mesh_size)
-    return tuple(
-        Case(
-            name,
-            declared.beams[scene.beam],
-            declared.materials[scene.material],
-            scene.load,
-            LOADS[scene.load].sign * scene.force,
-            approaches,
-            tuple(sorted(section.mesh_size)),
-            tuple(section.finest_of.get(name, finest) for name in approaches),
-            section.most_seconds,
-        )
-        for name, scene in section.scenes.items()
-    )
-
-
-def _axes(cases):
+    approaches, finest = approach_names(definitions, mesh_types, others), section.finest or min(section.mesh_size)
+    shared = {"approaches": approaches, "mesh_sizes": sorted(section.mesh_size), "most_seconds": section.most_seconds}
+    shared["finest"] = [section.finest_of.get(name, finest) for name in approaches]
     return {
-        "mesh_size": {size for one in cases for size in one.mesh_sizes},
-        "scene": tuple(one.name for one in cases),
-        "approach": cases[0].approaches,
-        "thread_count": THREAD_COUNTS,
-        "precision": PRECISIONS,
+        name: {
+            **shared,
+            "beam": beam_key(declared.beams[scene.beam]),
+            "material": material_key(declared.materials[scene.material], density=True),
+            "load": scene.load,
+            "force": LOADS[scene.load].sign * scene.force,
+            "explicit": name == next(iter(section.scenes)),
+        }
+        for name, scene in section.scenes.items()
     }
 
 
+def _axes(scenes):
+    first = next(iter(scenes.values()))
+    axes = {"mesh_size": set(first["mesh_sizes"]), "scene": tuple(scenes), "approach": first["approaches"]}
+    return axes | {"thread_count": THREAD_COUNTS, "precision": PRECISIONS}
+
+
 def _tasks(study):
-    """Scenes; explicit steps are timed on the first one."""
-    for place, case in enumerate(study.parts["benchmark"]):
-        values = asdict(case) | {"beam": beam_key(case.beam), "material": material_key(case.material, density=True)}
-        del values["name"]
-        values["explicit"] = place == 0
-        yield Task(values, _code(case), {"scene": case.name}, case, name=case.name)
+    for name, values in study.parts["benchmark"].items():
+        yield Task(values, _code(values["approaches"]), {"scene": name}, name=name)
 
 
-def _code(case):
+def _code(approaches):
     """Keys of what a scene is measured with."""
-    pairs = [approach.split("/") for approach in case.approaches if "/" in approach]
-    definitions, mesh_types = ({pair[place] for pair in pairs} for place in (0, 1))
+    pairs = [approach.split("/") for approach in approaches if "/" in approach]
     # What the approaches do not name is solved and timed on these.
-    definitions, mesh_types = definitions | {"delingette", "lattice"}, mesh_types | {"structured"}
+    definitions = {"delingette", "lattice", *(definition for definition, _ in pairs)}
+    mesh_types = {"structured", *(mesh_type for _, mesh_type in pairs)}
     springs = [definition_key(name) for name in sorted(definitions)]
     meshes = [mesh_type_key(name) for name in sorted(mesh_types)]
-    return springs, meshes, program() if any(name.startswith("calculix") for name in case.approaches) else ""
+    return springs, meshes, program() if any(name.startswith("calculix") for name in approaches) else ""
 
 
 CASE = ("scene", "approach", "mesh_size")

@@ -9,7 +9,7 @@ from ...runs.stages import results
 from . import RUN_ENDS, SETTING
 from .kind import STAGE
 
-NETWORK = ("scene", "definition")
+NETWORK, FACTOR = ("scene", "definition"), "stiffness_factor"
 OF_A_RUN = (*NETWORK, "engine", *SETTING)
 
 RUN_COORDINATES = {
@@ -55,7 +55,7 @@ ENGINE_DIMENSIONS: dict[str, str | tuple[str, str]] = {
     "dt": ("time of a frame", "s"),
     "substeps": "steps of a frame",
     "iterations": "iterations of the solver in a step",
-    "stiffness_factor": "factor on all stiffnesses that are typed",
+    FACTOR: "factor on all stiffnesses that are typed",
 }
 """Own dimensions."""
 
@@ -67,29 +67,23 @@ BEST = {
 FLAGS: dict[str, tuple[str, ...]] = {"engine_status": RUN_ENDS}
 
 ENGINE_RUNS = Group("/engines", _variables(OF_A_RUN), ENGINE_DIMENSIONS, FLAGS)
-ENGINE_CURVES = Group("/engine_curves", _variables((*OF_A_RUN, "stiffness_factor")) | BEST, ENGINE_DIMENSIONS, FLAGS)
+ENGINE_CURVES = Group("/engine_curves", _variables((*OF_A_RUN, FACTOR)) | BEST, ENGINE_DIMENSIONS, FLAGS)
 
 
 def groups(study, folder):
     """Groups of a dataset, see `springtune.studies.kinds.scenes.collect.groups`."""
-    found, made = [(task.of, result) for task, result in results(STAGE, study, folder)], {}
-    for group, of_curve in ((ENGINE_RUNS, False), (ENGINE_CURVES, True)):
-        own = [(run, result) for run, result in found if run.of_curve == of_curve]
-        if own:
-            made[group.name] = _gathered(group, study, own)
+    made, found = {}, [(task.of, task.labels | result) for task, result in results(STAGE, study, folder)]
+    for group, wanted in ((ENGINE_RUNS, False), (ENGINE_CURVES, True)):
+        rows = [row for of_curve, row in found if of_curve == wanted]
+        axes = {name: sorted({row[name] for row in rows}) for name in ("dt", "substeps", "iterations", FACTOR)}
+        curves = defaultdict(list)
+        for row in rows if wanted else ():
+            curves[tuple(row[name] for name in OF_A_RUN)].append((row[FACTOR], row))
+        rows += [dict(zip(OF_A_RUN, setting)) | _best(points) for setting, points in curves.items()]
+        if rows:
+            shared = {name: study.axes[name] for name in study.axes.keys() - ENGINE_DIMENSIONS.keys()}
+            made[group.name] = group.of_rows(shared | axes, rows).set_coords([*RUN_COORDINATES])
     return made
-
-
-def _gathered(group, study, found):
-    axes = {name: tuple(dict.fromkeys(run.labels[name] for run, _ in found)) for name in ENGINE_DIMENSIONS}
-    axes |= {name: tuple(sorted(axes[name])) for name in ("dt", "substeps", "iterations", "stiffness_factor")}
-    rows, curves = [], defaultdict(list)
-    for run, result in found:
-        about = {f"scene_{name}": value for name, value in run.stated} | {"program": run.program}
-        rows.append(run.labels | result | about)
-        curves[tuple(run.labels[name] for name in OF_A_RUN)].append((run.labels["stiffness_factor"], result))
-    rows += [dict(zip(OF_A_RUN, setting)) | _best(points) for setting, points in curves.items()]
-    return group.of_rows(study.axes | axes, rows).set_coords([*RUN_COORDINATES])
 
 
 def _best(points):

@@ -2,13 +2,11 @@
 
 from dataclasses import dataclass
 from itertools import product
-from typing import Annotated
+from typing import Annotated, Any
 
 from springtune.mechanics.integrators import PRECISIONS
 from springtune.mesh.types import MESH_TYPES
-from springtune.problem.geometry import Beam
 from springtune.problem.loads import LOADS
-from springtune.problem.materials import Material
 from springtune.registry import imported
 from springtune.springs.base import DEFINITIONS
 
@@ -106,19 +104,14 @@ class EnginesConfig(Section):
 
 @dataclass(frozen=True)
 class EngineRun:
-    """A scene in an engine; `labels` are those of its cell, with the time of a frame [s].
+    """A scene in an engine: labels of its cell, with the time of a frame [s] and what they stand for, and values.
 
     Runs `of_curve` have factors on what is typed.
     """
 
     labels: dict[str, str | float]
     of_curve: bool
-    program: str
-    stated: EngineSceneConfig
-    beam: Beam
-    material: Material
-    frames: int | None
-    tolerance: float | None
+    values: dict[str, Any]
 
 
 def _engines():
@@ -167,9 +160,12 @@ def _expand(config, declared):
             precision = engine.precisions[0] if precision == OWN_PRECISION else precision
             how = precision, dt, substeps, iterations if engine.iterates else 1, factor
             labels = dict(zip(("scene", *OF_RUNS), (*of, *how)))
-            bodies = declared.beams[stated.beam], declared.materials[stated.material]
-            run = EngineRun(labels, of_curve, engine.program, stated, *bodies, section.frames, section.tolerance)
-            found[*(order.index(name) for order, name in zip(orders, of)), *how, of_curve] = run
+            material = material_key(declared.materials[stated.material], density=True)
+            values = labels | dict(stated) | {"beam": beam_key(declared.beams[stated.beam]), "material": material}
+            values |= {"frames": section.frames, "tolerance": section.tolerance}
+            labels |= {f"scene_{name}": value for name, value in stated} | {"program": engine.program}
+            place = *(order.index(name) for order, name in zip(orders, of)), *how, of_curve
+            found[place] = EngineRun(labels, of_curve, values)
     return tuple(found[place] for place in sorted(found))
 
 
@@ -189,12 +185,11 @@ def _version(engine):
 def _tasks(study):
     """Runs of an engine follow each other in one job, since their seconds are measured."""
     for run in study.parts["engines"]:
-        labels, engine = run.labels, _engines()[run.labels["engine"]]
-        values = {name: value for name, value in labels.items() if name != "scene"} | dict(run.stated)
-        values |= {"beam": beam_key(run.beam), "material": material_key(run.material, density=True)}
-        values |= {"engine_version": _version(engine), "frames": run.frames, "tolerance": run.tolerance}
-        also = mesh_type_key(run.stated.mesh_type), definition_key(labels["definition"]), declared_key(engine)
-        yield Task(values, also, labels, run, name=engine.name)
+        engine = _engines()[run.labels["engine"]]
+        values = {name: value for name, value in run.values.items() if name != "scene"}
+        also = mesh_type_key(values["mesh_type"]), definition_key(values["definition"]), declared_key(engine)
+        values["engine_version"] = _version(engine)
+        yield Task(values, also, run.labels, run.of_curve, name=engine.name)
 
 
 STAGE = stage("engines", "studies.kinds.engines.solve", "Running scenes in engines", _tasks, alone=True)

@@ -1,5 +1,6 @@
 """Samples, gathered in the groups ``/samples``, ``/effects`` and ``/sobol``."""
 
+from dataclasses import replace
 from itertools import chain, product
 from types import SimpleNamespace
 
@@ -102,9 +103,13 @@ def groups(study, folder):
     }
     # Without a mesh, as beyond limits, a network has no particles; other definitions may have a mesh.
     particles = np.max([found["particles"] for found in results.values()], axis=0)
-    frames = [pd.DataFrame({"sample": axes["sample"], "particles": particles})]
+    group, places = _with_coordinates(sample, drawn, study.axes)
+    frames = [pd.DataFrame(places | {"sample": axes["sample"], "particles": particles})]
     frames += chain.from_iterable(_of_load(load, sample, drawn, results, folder / "samples") for load in sample.loads)
-    data = _with_coordinates(SAMPLES.of_rows(axes, pd.concat(frames)), sample, drawn, study.axes)
+    data = group.of_rows(axes, pd.concat(frames)).set_coords([*places])
+    data.attrs = {name: getattr(sample, name) for name in ("design", "size", "seed", "mesh_type", "kinematics")}
+    lacking = LEFT_OUT if sample.design == SOBOL_INDICES else "scenes without a value are left out of main effects"
+    data.attrs |= {"failures": lacking, "varied": " ".join(sample.varied)}
     found = {SAMPLES.name: data, EFFECTS.name: EFFECTS.of_rows(axes, pd.concat(_effects(sample, data, drawn, axes)))}
     if sample.design == SOBOL_INDICES:
         found[SOBOL.name] = SOBOL.of_rows(axes, pd.concat(_indices(sample, data))).assign_attrs(OF_INDICES)
@@ -179,31 +184,19 @@ def _answers(sample, drawn, folder, kind, aspects):
     return answers, f"{len(reasons)} of {len(rows)} points: {reasons[0]}" if reasons else ""
 
 
-def _with_coordinates(data, sample, drawn, dimensions):
-    """The group with the parameters of each row as coordinates."""
-    coordinates = {
+def _with_coordinates(sample, drawn, dimensions):
+    """The group with coordinates of each row, and their values: parameters, base sample, and role in it."""
+    parts, variables, places = roles(sample.design, sample.varied), {}, {}
+    for name, values in drawn.items():
         # A coordinate must not have the name of a dimension that it does not run along, here or in the root.
-        f"sample_{name}" if name in dimensions else name: (
-            "sample",
-            values,
-            {"long_name": PARAMETERS[name][1], "units": PARAMETERS[name][2]},
-        )
-        for name, values in drawn.items()
-    }
-    parts = roles(sample.design, sample.varied)
-    base = np.repeat(np.arange(sample.size, dtype=np.int32), len(parts))
-    about = {"units": "1", "long_name": "base sample that the row belongs to"}
-    coordinates["base"] = ("sample", base, about)
+        own = f"sample_{name}" if name in dimensions else name
+        variables[own], places[own] = (("sample",), PARAMETERS[name][2], PARAMETERS[name][1], np.nan), values
+    variables["base"] = ("sample",), "1", "base sample that the row belongs to", np.int32(0)
+    places["base"] = np.repeat(range(sample.size), sample.each)
     if len(parts) > 1:
-        flags = np.arange(len(parts), dtype="int8")
-        about = {"units": "1", "flag_values": flags, "flag_meanings": " ".join(parts)}
-        about["long_name"] = "part of the base sample: A, B, or A with one parameter of B"
-        coordinates["role"] = ("sample", np.tile(flags, sample.size), about)
-    data = data.assign_coords(coordinates)
-    data.attrs = {name: getattr(sample, name) for name in ("design", "size", "seed", "mesh_type", "kinematics")}
-    lacking = LEFT_OUT if sample.design == SOBOL_INDICES else "scenes without a value are left out of main effects"
-    data.attrs |= {"failures": lacking, "varied": " ".join(sample.varied)}
-    return data
+        variables["role"] = ("sample",), "1", "part of the base sample: A, B, or A with one parameter of B", 0
+        places["role"] = np.tile(range(len(parts)), sample.size)
+    return replace(SAMPLES, variables=SAMPLES.variables | variables, flags={"role": tuple(parts)}), places
 
 
 LEFT_OUT = "where a scene has no value the whole base sample is left out; base_samples_without counts them"

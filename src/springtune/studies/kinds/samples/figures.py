@@ -6,25 +6,21 @@ import numpy as np
 
 from ...output import labels, style
 from ...output.selection import choose, group, labels_of, sign_of_errors
+from .designs import PARAMETERS
 
-PARAMETER_AXES = {
-    "length": ("length", 1e3, "mm"),
-    "height": ("height", 1e3, "mm"),
-    "thickness": ("thickness", 1e3, "mm"),
-    "mesh_size": ("mesh size", 1e3, "mm"),
-    "relative_mesh_size": ("mesh size / height", 1.0, ""),
-    "young_modulus": ("Young's modulus", 1e-9, "GPa"),
-    "poisson_ratio": ("Poisson's ratio", 1.0, ""),
-    "force": ("force", 1.0, "N"),
-}
-"""Name of each parameter on an axis, what its values are multiplied with, and the unit then."""
+WORDS = {"relative_mesh_size": "mesh size / height", "young_modulus": "Young's modulus"}
+WORDS |= {"poisson_ratio": "Poisson's ratio"}
+"""Names of parameters on an axis, where they are not their own."""
+
+SCALES = {"m": (1e3, "mm"), "Pa": (1e-9, "GPa"), "N": (1.0, "N"), "1": (1.0, "")}
+"""What values are multiplied with, and the unit then."""
 
 QUANTITY_AXES = {
     "deformation_error": ("deformation error", 100.0, "%"),
     "displacement": ("displacement", 1e3, "mm"),
     "best_stiffness": ("best stiffness", 1.0, "N/m"),
 }
-"""The same of each quantity."""
+"""Name of each quantity on an axis, what its values are multiplied with, and the unit then."""
 
 FARTHEST = -0.3, 1.5
 """Ends of the axis of Sobol indices at most, whose bands may go farther."""
@@ -42,12 +38,13 @@ def _is_logarithmic(values):
 
 def _unit(name, values):
     """What a parameter's values are multiplied with, and its unit."""
-    _, factor, unit = PARAMETER_AXES[name]
     if name == "young_modulus" and np.nanmax(values) <= SMALL_MODULUS:
         return 1e-6, "MPa"
-    if name == "force" and np.nanmin(values) >= 1e3:
-        return 1e-3, "kN"
-    return factor, unit
+    return (1e-3, "kN") if name == "force" and np.nanmin(values) >= 1e3 else SCALES[PARAMETERS[name][2]]
+
+
+def _words(name):
+    return WORDS.get(name, name.replace("_", " "))
 
 
 def _axis(text, unit):
@@ -114,7 +111,7 @@ def plot_sobol(data, ax=None, *, load=None):
             panel.barh(places, np.maximum(np.nan_to_num(values), 0), wide, color=colour, alpha=alpha, linewidth=0)
             panel.hlines(places + shift, *ends, color="k", linewidth=0.8)
         panel.set(xlim=(low - 0.02, high + 0.02), ylim=(len(names) - 0.45, -0.55), xlabel="share of the variance")
-        panel.set_yticks(range(len(names)), [PARAMETER_AXES[name][0] for name in names])
+        panel.set_yticks(range(len(names)), [_words(name) for name in names])
         panel.tick_params(axis="y", length=0)
         panel.grid(False, axis="y")
         if not np.isfinite(indices.first_order.values).any():
@@ -189,10 +186,10 @@ def plot_effects(data, ax=None, *, load=None, quantity="deformation_error"):
             style.plain(panel, "x")
         else:
             panel.locator_params(axis="x", nbins=4)
-        panel.set(xlabel=_axis(PARAMETER_AXES[name][0], of), ylabel=_axis(text, unit))
+        panel.set(xlabel=_axis(_words(name), of), ylabel=_axis(text, unit))
         return [], "no scene has a value"
 
-    shown = {PARAMETER_AXES[name][0]: name for name in effects.parameter.values.tolist()}
+    shown = {_words(name): name for name in effects.parameter.values.tolist()}
     title = _titled(samples, load, f"mean {text} over each parameter alone")
     note = _lacking(samples.sel(load=load), definitions, quantity)
     return labels.small_multiples(ax, shown, 3, 1.9, title, draw, sharey=True, said=note)

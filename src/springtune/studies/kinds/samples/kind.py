@@ -136,13 +136,9 @@ def _read_size(value: str) -> int:
         size = int(value)
     except ValueError:
         raise refuse(f"{show(value)} is not a whole number; give a power of two such as 1024") from None
-    if size < SMALLEST_SIZE or size & (size - 1):
-        above = max(SMALLEST_SIZE, 1 << max(0, size - 1).bit_length())
-        below = f"{above // 2} or " if above > SMALLEST_SIZE else ""
-        raise refuse(
-            f"{show(value)} is not a power of two from {SMALLEST_SIZE} on, which keeps a sample even and lets it be "
-            f"doubled; give {below}{min(above, MOST_SCENES)}"
-        )
+    if not SMALLEST_SIZE <= size <= MOST_SCENES or size & (size - 1):
+        why = f"is not a power of two from {SMALLEST_SIZE} to {MOST_SCENES}, which keeps a sample even"
+        raise refuse(f"{show(value)} {why} and lets it be doubled; give one such as 1024")
     return size
 
 
