@@ -60,7 +60,7 @@ def stages() -> "tuple[Stage, ...]":
 def table_files(output: "Output", study: "Study") -> list[str]:
     """Files of an output's tables; for the page, all tables as CSV and the page itself."""
     if not output.page:
-        return list(output.tables(study))
+        return [*output.tables(study), *output.texts]
     return [*(f"{stem}.csv" for kind in kinds() if kind.tables for stem in kind.tables(study)), "index.html"]
 
 

@@ -97,7 +97,7 @@ def _present_digest(members: "Iterable[Output]", files: list[str]) -> str:
     used = ["studies.output.present", *modules("outputs")]
     templates = []
     for one in members:
-        used += filter(None, (name.partition(":")[0] for name in (one.plot, one.write)))
+        used += filter(None, (name.partition(":")[0] for name in (one.plot, one.write, *one.texts.values())))
         if one.page:
             used += ["studies.output.page", *modules("kind")]
             used += [kind.place(kind.tables_by) for kind in kinds() if kind.tables]

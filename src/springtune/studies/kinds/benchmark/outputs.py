@@ -5,8 +5,6 @@ from collections.abc import Sequence
 from ...config.kind import Output, needs
 from ...output.browse import Plot, View
 
-PAGE = "speed.md"
-
 
 def figures(scenes: Sequence[object]) -> dict[str, dict[str, object]]:
     """Figures of the benchmark, by stem."""
@@ -19,8 +17,7 @@ OUTPUTS = (
         "figures and the page of the benchmark",
         figures=lambda study: figures(study.axes.get("scene", ())),
         plot="studies.kinds.benchmark.figures:benchmark",
-        tables=lambda study: [PAGE],
-        write="studies.kinds.benchmark.tables:write",
+        texts={"speed.md": "studies.kinds.benchmark.tables:page"},
         lack=needs("benchmark", "shows a benchmark and the study has none; add a section 'benchmark'"),
     ),
 )

@@ -1,25 +1,15 @@
 """The page of the benchmark: every number from the dataset."""
 
-from pathlib import Path
-
 import numpy as np
 import xarray as xr
 
 from springtune.problem.status import Status
-from springtune.safe_io.atomic import write_text
 from springtune.safe_io.escapes import markdown
 
 from ...output import tables
 from ...output.tables import numbers
 from ...output.text import markdown_section
 from . import PARTS
-from .outputs import PAGE
-
-
-def write(tree, folder):
-    """Write the page in Markdown."""
-    write_text(Path(folder) / PAGE, page(tree))
-    return [PAGE]
 
 
 def page(tree: xr.DataTree) -> str:

@@ -1,6 +1,7 @@
 """Scenes in engines, gathered in the groups ``/engines`` and ``/engine_curves``."""
 
 from collections import defaultdict
+from math import nan
 
 import numpy as np
 
@@ -15,10 +16,10 @@ OF_A_RUN = (*NETWORK, "engine", *SETTING)
 RUN_COORDINATES = {
     "scene_beam": (("scene",), "1", "beam", ""),
     "scene_mesh_type": (("scene",), "1", "mesh type", ""),
-    "scene_mesh_size": (("scene",), "m", "asked length of an edge", np.nan),
+    "scene_mesh_size": (("scene",), "m", "asked length of an edge", nan),
     "scene_material": (("scene",), "1", "material", ""),
     "scene_load": (("scene",), "1", "load", ""),
-    "scene_force": (("scene",), "N", "magnitude of the force", np.nan),
+    "scene_force": (("scene",), "N", "magnitude of the force", nan),
     "program": (("engine",), "1", "program that the engine is of", ""),
 }
 """What scenes and engines are."""
@@ -27,22 +28,22 @@ RUN_COORDINATES = {
 def _variables(cell):
     """Variables of runs, of their networks and engines."""
     return {
-        "displacement": (cell, "m", "displacement at rest", np.nan),
+        "displacement": (cell, "m", "displacement at rest", nan),
         "last_displacement": (cell, "m", "displacement that a run ends with that is not at rest, mean where it swings",
-                              np.nan),
-        "error": (cell, "1", "error in the engine, (displacement - reference) / |reference|", np.nan),
-        "solver_error": (cell, "1", "what the engine's solver adds to the errors of definition and law", np.nan),
-        "residual": (cell, "1", "out-of-balance force of the network at rest in the engine, over the load", np.nan),
-        "frame_seconds": (cell, "s", "time of a frame, without the first ones", np.nan),
-        "frames": (cell, "1", "frames that were taken", np.nan),
-        "swing": (cell, "m", "largest amplitude about the mean", np.nan),
+                              nan),
+        "error": (cell, "1", "error in the engine, (displacement - reference) / |reference|", nan),
+        "solver_error": (cell, "1", "what the engine's solver adds to the errors of definition and law", nan),
+        "residual": (cell, "1", "out-of-balance force of the network at rest in the engine, over the load", nan),
+        "frame_seconds": (cell, "s", "time of a frame, without the first ones", nan),
+        "frames": (cell, "1", "frames that were taken", nan),
+        "swing": (cell, "m", "largest amplitude about the mean", nan),
         "status": (cell, "1", "what became of the run", 0),
         "engine_status": (cell, "1", "how the run ended", 0),
         "message": (cell, "1", "why it is not at rest, or not comparable", ""),
-        "network_displacement": (NETWORK, "m", "displacement of the network in equilibrium", np.nan),
-        "reference_displacement": (NETWORK, "m", "displacement of the converged finite elements", np.nan),
-        "definition_error": (NETWORK, "1", "error of the network in equilibrium: that of the definition", np.nan),
-        "particles": (NETWORK, "1", "number of particles", np.nan),
+        "network_displacement": (NETWORK, "m", "displacement of the network in equilibrium", nan),
+        "reference_displacement": (NETWORK, "m", "displacement of the converged finite elements", nan),
+        "definition_error": (NETWORK, "1", "error of the network in equilibrium: that of the definition", nan),
+        "particles": (NETWORK, "1", "number of particles", nan),
         "engine_version": (("engine",), "1", "versions of what the engine needs, as it was run", ""),
         **RUN_COORDINATES,
     }  # fmt: skip
@@ -60,7 +61,7 @@ ENGINE_DIMENSIONS: dict[str, str | tuple[str, str]] = {
 """Own dimensions."""
 
 BEST = {
-    "best_factor": (OF_A_RUN, "1", "factor at which the displacement is the reference's", np.nan),
+    "best_factor": (OF_A_RUN, "1", "factor at which the displacement is the reference's", nan),
     "best_factor_message": (OF_A_RUN, "1", "why no factor is the best", ""),
 }
 

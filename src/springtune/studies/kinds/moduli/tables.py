@@ -1,18 +1,13 @@
 """Which definition to use: what each attains on each mesh type, every number from the dataset."""
 
-from pathlib import Path
-
 import numpy as np
 import xarray as xr
-
-from springtune.safe_io.atomic import write_text
 
 from ...output import tables
 from ...output.dataset import most_requested
 from ...output.selection import in_plane_ratio, unswept
 from ...output.tables import numbers
 from ...output.text import cell_number, markdown_section, markdown_table
-from .outputs import PAGE
 
 TABLE_MESH_TYPES = ("structured", "free", "braced", "alternating", "right")
 TABLE_LOADS = ("traction", "bending", "shear")
@@ -34,12 +29,6 @@ ADVICE = (
 
 COARSENESS = (0.05, 0.1, np.inf)
 """Largest mesh sizes over the height of the beam [1] of each line of the advice."""
-
-
-def write(tree, folder):
-    """Write the page in Markdown."""
-    write_text(Path(folder) / PAGE, decision(tree))
-    return [PAGE]
 
 
 def decision(tree: xr.DataTree) -> str:

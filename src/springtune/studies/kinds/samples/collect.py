@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from itertools import chain, product
+from math import nan
 from types import SimpleNamespace
 
 import numpy as np
@@ -30,16 +31,16 @@ HOW_FAR = "whether a reference of small strain applies to the network: not where
 SAMPLES = Group(
     "/samples",
     {
-        "displacement": (OF_NETWORKS, "m", "displacement of the loaded side, network", np.nan),
-        "deformation_error": (OF_NETWORKS, "1", "(network - reference) / |reference|, signed", np.nan),
-        "stiffness": (OF_NETWORKS, "N/m", "stiffness of all springs, where they have one", np.nan),
+        "displacement": (OF_NETWORKS, "m", "displacement of the loaded side, network", nan),
+        "deformation_error": (OF_NETWORKS, "1", "(network - reference) / |reference|, signed", nan),
+        "stiffness": (OF_NETWORKS, "N/m", "stiffness of all springs, where they have one", nan),
         "status": (OF_NETWORKS, "1", "what became of the scene", 0),
         "message": (OF_NETWORKS, "1", "why the scene is not solved", ""),
-        "reference_displacement": (OF_REFERENCES, "m", "displacement of the loaded side, finite elements", np.nan),
-        "reference_error_estimate": (OF_REFERENCES, "1", REFERENCE_BOUND, np.nan),
+        "reference_displacement": (OF_REFERENCES, "m", "displacement of the loaded side, finite elements", nan),
+        "reference_error_estimate": (OF_REFERENCES, "1", REFERENCE_BOUND, nan),
         "reference_applies": (OF_REFERENCES, "1", HOW_FAR, np.int8(0)),
         "reference_message": (("load",), "1", "why there is no reference", ""),
-        "best_stiffness": (OF_REFERENCES, "N/m", "uniform stiffness without a deformation error", np.nan),
+        "best_stiffness": (OF_REFERENCES, "N/m", "uniform stiffness without a deformation error", nan),
         "particles": (("sample",), "1", "number of particles", 0),
     },
     dimensions={"sample": "row of the design"},
@@ -51,9 +52,9 @@ EFFECT = ("quantity", "parameter", "bin", "load", "definition")
 EFFECTS = Group(
     "/effects",
     {
-        "parameter_value": (("parameter", "bin"), "1", "mean of the parameter in the bin, in its SI unit", np.nan),
-        "main_effect": (EFFECT, "1", "mean of the quantity in the bin, in its SI unit", np.nan),
-        "main_effect_error": (EFFECT, "1", "standard error of the mean, in its SI unit", np.nan),
+        "parameter_value": (("parameter", "bin"), "1", "mean of the parameter in the bin, in its SI unit", nan),
+        "main_effect": (EFFECT, "1", "mean of the quantity in the bin, in its SI unit", nan),
+        "main_effect_error": (EFFECT, "1", "standard error of the mean, in its SI unit", nan),
     },
     dimensions={
         "quantity": "what is looked at",
@@ -75,7 +76,7 @@ ENDS = ("", "_low", "_high")
 SOBOL = Group(
     "/sobol",
     {
-        f"{order}_order{end}": (INDEX, "1", meaning, np.nan)
+        f"{order}_order{end}": (INDEX, "1", meaning, nan)
         for order, about in ORDERS.items()
         for end, meaning in zip(ENDS, (about, "lower end of its bootstrap band", "upper end of its bootstrap band"))
     }

@@ -1,30 +1,20 @@
 """The page of the experiments on stability: tables and rules of thumb, every number from the dataset."""
 
-from pathlib import Path
-
 import numpy as np
 import xarray as xr
 
-from springtune.safe_io.atomic import write_text
 from springtune.safe_io.escapes import markdown
 
 from ...output import tables
 from ...output.dataset import STATUS
 from ...output.tables import numbers
 from ...output.text import markdown_section
-from .outputs import PAGE
 
 HEADS = tables.HEADS | {
     "scale": tables.HEADS["mesh_size"],
     "cg_iterations": ("iterations", lambda count: str(count or "direct")),
     "stiffness_contrast": ("contrast", "{:.0e}".format),
 }
-
-
-def write(tree, folder):
-    """Write the page in Markdown."""
-    write_text(Path(folder) / PAGE, page(tree))
-    return [PAGE]
 
 
 def page(tree: xr.DataTree) -> str:
