@@ -10,7 +10,7 @@ import xarray as xr
 from .selection import records
 from .text import cell_number, markdown_table
 
-HEADS: dict[str, tuple[str, Any]] = {
+LABEL_HEADS: dict[str, tuple[str, Any]] = {
     "definition": ("definition", "`{}`".format),
     "approach": ("approach", "`{}`".format),
     "integrator": ("integrator", "`{}`".format),
@@ -25,7 +25,9 @@ def numbers(array: xr.DataArray, form: str = ".3g", scale: float = 1.0, unit: st
     return xr.apply_ufunc(cell_number, array, form, scale, unit, vectorize=True, output_dtypes=[object])
 
 
-def markdown(rows: Iterable[str], columns: Mapping[str, xr.DataArray], heads: Mapping[str, Any] = HEADS) -> list[str]:
+def markdown(
+    rows: Iterable[str], columns: Mapping[str, xr.DataArray], heads: Mapping[str, Any] = LABEL_HEADS
+) -> list[str]:
     """Markdown lines: a row for each cell over the dimensions `rows` that has a text, and columns of texts by head.
 
     Arrays with further dimensions have a column for each cell over them, whose labels fill the ``{}`` of their head.

@@ -56,7 +56,7 @@ VIEWS = (
     ),
 )
 
-SCALED = {
+ENGINE_COLUMNS = {
     "dt_ms": ("dt", 1e3),
     "displacement_mm": ("displacement", 1e3),
     "reference_mm": ("reference_displacement", 1e3),
@@ -77,7 +77,7 @@ def tables(tree: "xr.DataTree") -> list[dict[str, Any]]:
         return []
     data = tree["engines"].to_dataset()
     names = ("scene", "definition", "engine", "precision", "substeps", "iterations", "engine_status", "message")
-    rows = listed(data, data.status != 0, names, SCALED)
+    rows = listed(data, data.status != 0, names, ENGINE_COLUMNS)
     rows = [row | {"engine_status": RUN_ENDS[row["engine_status"]]} for row in rows]
     note = "Where the load rests, beside finite elements: errors of the definition, in equilibrium, and of the solver."
     return [{"stem": "engines", "title": "Scenes in engines", "note": note, "rows": rows}]

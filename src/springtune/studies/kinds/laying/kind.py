@@ -22,8 +22,8 @@ LOADINGS = ("pressure", "gravity", "ends")
 REFERENCE_SIZES = (1.0, 1.25, 1.6)
 """Mesh sizes of a reference over the given one; the first gives the answer, all of them its band."""
 
-WAY, LAID = ("loading", "friction"), ("definition", "mesh_size")
-OF_STRIP = (*LAID, *WAY)
+LAYING_WAY, LAID = ("loading", "friction"), ("definition", "mesh_size")
+OF_STRIP = (*LAID, *LAYING_WAY)
 """Labels of a strip of springs; a reference has the first ones."""
 
 BAND = "twice its spread over three meshes of finite elements"
@@ -115,10 +115,10 @@ def _expand(config, declared):
     }
     names = [name for name in DEFINITIONS if name in section.definition]
     ways = [*product([name for name in LOADINGS if name in section.loading], sorted(section.friction))]
-    strips = [dict(zip(LAID, one)) for one in product(names, sorted(section.mesh_size))]
-    found = [(one | dict(zip(WAY, way)), one["definition"], [one["mesh_size"]]) for one in strips for way in ways]
+    strips = [dict(zip(OF_STRIP, (*one, *way))) for *one, way in product(names, sorted(section.mesh_size), ways)]
+    found = [(labels, labels["definition"], [labels["mesh_size"]]) for labels in strips]
     sizes = [ratio * section.reference_size for ratio in REFERENCE_SIZES]
-    found += [(dict(zip(WAY, way)), "delingette", sizes) for way in ways]
+    found += [(dict(zip(LAYING_WAY, way)), "delingette", sizes) for way in ways]
     return [(labels, shared | labels | {"definition": name, "mesh_sizes": sizes}) for labels, name, sizes in found]
 
 
@@ -134,7 +134,7 @@ def _outline(name, dimensions, whose):
     return {f"{name}_{axis}": (dimensions, "m", f"{whose} along {axis}", nan) for axis in "xy"}
 
 
-VARIABLES = {
+LAYING_VARIABLES = {
     "area_under_strip": (OF_STRIP, "m2", "area between the strip and the floor, network", nan),
     "area_error": (OF_STRIP, "1", "area under the strip over the trapezoid's, less 1", nan),
     "elongation": (OF_STRIP, "1", "elongation of the strip's lower fibre, network", nan),
@@ -147,15 +147,15 @@ VARIABLES = {
     "message": (OF_STRIP, "1", "why the strip is not laid", ""),
     "skipped": (OF_STRIP, "1", "what the scene did not need", ""),
     **_outline("strip", (*OF_STRIP, "outline_point"), "outline of the laid strip"),
-    "reference_area": (WAY, "m2", "area between the strip and the floor, finite elements", nan),
+    "reference_area": (LAYING_WAY, "m2", "area between the strip and the floor, finite elements", nan),
     "reference_area_error_estimate": (
-        WAY, "m2", f"band of the area between strip and floor, {BAND}", nan,
+        LAYING_WAY, "m2", f"band of the area between strip and floor, {BAND}", nan,
     ),
-    "reference_elongation": (WAY, "1", "elongation of the lower fibre, finite elements", nan),
+    "reference_elongation": (LAYING_WAY, "1", "elongation of the lower fibre, finite elements", nan),
     "reference_elongation_error_estimate": (
-        WAY, "1", f"band of the elongation of the lower fibre, {BAND}", nan,
+        LAYING_WAY, "1", f"band of the elongation of the lower fibre, {BAND}", nan,
     ),
-    **_outline("reference", (*WAY, "outline_point"), "outline of the strip of finite elements"),
+    **_outline("reference", (*LAYING_WAY, "outline_point"), "outline of the strip of finite elements"),
     **_outline("trapezoid", ("corner",), "corners of the trapezoid"),
 }  # fmt: skip
 
@@ -167,7 +167,7 @@ KIND = Kind(
     expand=_expand,
     axes=lambda part: {name: {one[name] for one, _ in part if name in one} for name in LAID},
     summary=lambda part: [["strips", sum("definition" in labels for labels, _ in part), "laid on a trapezoid"]],
-    variables=VARIABLES,
+    variables=LAYING_VARIABLES,
     dimensions={"loading": "what lays the strip", "friction": "Coulomb's coefficient of friction"},
     stages=(stage("laying", "studies.kinds.laying.solve", "Laying the strips", _tasks),),
     outputs=OUTPUTS,

@@ -40,7 +40,7 @@ VIEWS = (
 )  # fmt: skip
 
 
-SCALED = {
+LAYING_COLUMNS = {
     "mesh_size_mm": ("mesh_size", 1e3),
     "area_mm2": ("area_under_strip", 1e6),
     "area_error_percent": ("area_error", 100),
@@ -60,7 +60,7 @@ def tables(tree: "xr.DataTree") -> list[dict[str, Any]]:
         return []
     laid = tree["laying"].to_dataset()
     present = laid.area_under_strip.notnull().transpose("loading", "friction", "mesh_size", "definition")
-    rows = listed(laid, present, ("loading", "friction", "definition"), SCALED)
+    rows = listed(laid, present, ("loading", "friction", "definition"), LAYING_COLUMNS)
     x, y = laid.trapezoid_x.values, laid.trapezoid_y.values
     trapezoid = 0.5e6 * abs(float(np.dot(x, np.roll(y, 1)) - np.dot(y, np.roll(x, 1))))
     note = (

@@ -8,11 +8,11 @@ from ...output import labels, style
 from ...output.selection import choose, group, labels_of, sign_of_errors
 from .designs import PARAMETERS
 
-WORDS = {"relative_mesh_size": "mesh size / height", "young_modulus": "Young's modulus"}
-WORDS |= {"poisson_ratio": "Poisson's ratio"}
+PARAMETER_WORDS = {"relative_mesh_size": "mesh size / height", "young_modulus": "Young's modulus"}
+PARAMETER_WORDS |= {"poisson_ratio": "Poisson's ratio"}
 """Names of parameters on an axis, where they are not their own."""
 
-SCALES = {"m": (1e3, "mm"), "Pa": (1e-9, "GPa"), "N": (1.0, "N"), "1": (1.0, "")}
+UNIT_SCALES = {"m": (1e3, "mm"), "Pa": (1e-9, "GPa"), "N": (1.0, "N"), "1": (1.0, "")}
 """What values are multiplied with, and the unit then."""
 
 QUANTITY_AXES = {
@@ -22,7 +22,7 @@ QUANTITY_AXES = {
 }
 """Name of each quantity on an axis, what its values are multiplied with, and the unit then."""
 
-FARTHEST = -0.3, 1.5
+INDEX_ENDS = -0.3, 1.5
 """Ends of the axis of Sobol indices at most, whose bands may go farther."""
 
 SMALL_MODULUS = 1e9
@@ -40,11 +40,11 @@ def _unit(name, values):
     """What a parameter's values are multiplied with, and its unit."""
     if name == "young_modulus" and np.nanmax(values) <= SMALL_MODULUS:
         return 1e-6, "MPa"
-    return (1e-3, "kN") if name == "force" and np.nanmin(values) >= 1e3 else SCALES[PARAMETERS[name][2]]
+    return (1e-3, "kN") if name == "force" and np.nanmin(values) >= 1e3 else UNIT_SCALES[PARAMETERS[name][2]]
 
 
 def _words(name):
-    return WORDS.get(name, name.replace("_", " "))
+    return PARAMETER_WORDS.get(name, name.replace("_", " "))
 
 
 def _axis(text, unit):
@@ -100,7 +100,7 @@ def plot_sobol(data, ax=None, *, load=None):
             look = "0.35" if alone else style.line(order.index(definition))["color"]
             shown.setdefault(title, (found.sel(quantity=quantity, definition=definition), look))
     bands = found[[name for name in found if name.endswith(("_low", "_high"))]].to_array()
-    low, high = max(min(0.0, bands.min()), FARTHEST[0]), min(max(1.0, bands.max()), FARTHEST[1])
+    low, high = max(min(0.0, bands.min()), INDEX_ENDS[0]), min(max(1.0, bands.max()), INDEX_ENDS[1])
 
     def draw(panel, part):
         indices, colour = part

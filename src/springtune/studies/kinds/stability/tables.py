@@ -10,8 +10,8 @@ from ...output.dataset import STATUS
 from ...output.tables import numbers
 from ...output.text import markdown_section
 
-HEADS = tables.HEADS | {
-    "scale": tables.HEADS["mesh_size"],
+STABILITY_HEADS = tables.LABEL_HEADS | {
+    "scale": tables.LABEL_HEADS["mesh_size"],
     "cg_iterations": ("iterations", lambda count: str(count or "direct")),
     "stiffness_contrast": ("contrast", "{:.0e}".format),
 }
@@ -26,7 +26,7 @@ def page(tree: xr.DataTree) -> str:
 
 
 def _table(rows, columns, title, *said):
-    return markdown_section(title, *said) + tables.markdown(rows, columns, HEADS)
+    return markdown_section(title, *said) + tables.markdown(rows, columns, STABILITY_HEADS)
 
 
 def _limits(data):
