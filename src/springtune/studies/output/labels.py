@@ -173,10 +173,9 @@ def small_multiples(
     for panel in axes[:, 1:].flat if sharey else ():
         panel.set_ylabel("")
     entitle(figure, title, said)
-    if key and figure is None:
-        flat[-1].legend(handles=key)
-    elif key and figure is not None:
-        figure.legend(handles=key, loc="outside upper right", ncols=len(key))
+    if key:
+        place: dict[str, Any] = {"loc": "outside upper right", "ncols": len(key)} if figure else {}
+        (figure or flat[-1]).legend(handles=key, **place)
     if ax is None and isinstance(figure, Figure):
         figure.set_size_inches(wide, 0.2 + (height + LINE * lines) * rows + LINE * (bool(said) + bool(key)))
     return flat

@@ -22,8 +22,8 @@ def page(tree: xr.DataTree) -> str:
         lines += [*markdown_section(f"{scene}: what has no numbers"), *holes, ""] if holes else []
     said = "Nonlinear springs that steps advance, in millions a second. Results do not depend on threads."
     rates = numbers(data.spring_updates, ".0f", 1e-6).transpose(..., "precision", "thread_count")
-    rates = tables.markdown(["mesh_size"], {"{}, threads: {}": rates})
-    return "\n".join([*lines, *markdown_section("Explicit steps", said), *rates])
+    steps = tables.markdown(["mesh_size"], {"{}, threads: {}": rates})
+    return "\n".join([*lines, *markdown_section("Explicit steps", said), *steps])
 
 
 def _time(seconds):

@@ -2,8 +2,6 @@
 
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from ...config.kind import Output, needs
 from ...output.browse import Plot, View
 
@@ -61,11 +59,9 @@ def tables(tree: "xr.DataTree") -> list[dict[str, Any]]:
     laid = tree["laying"].to_dataset()
     present = laid.area_under_strip.notnull().transpose("loading", "friction", "mesh_size", "definition")
     rows = listed(laid, present, ("loading", "friction", "definition"), LAYING_COLUMNS)
-    x, y = laid.trapezoid_x.values, laid.trapezoid_y.values
-    trapezoid = 0.5e6 * abs(float(np.dot(x, np.roll(y, 1)) - np.dot(y, np.roll(x, 1))))
     note = (
         "Area between strip and floor and elongation of the strip's lower fibre; the reference's is known to so many "
         "points: twice the spread of three meshes, since the trapezoid's corners catch between a strip's particles, "
-        f"where depends on the mesh. The networks' own scatter as much. The trapezoid has {trapezoid:.4g} mm²."
+        "where depends on the mesh. The networks' own scatter as much."
     )
     return [{"stem": "laying", "title": "Laid strips", "note": note, "rows": rows}]

@@ -66,8 +66,8 @@ def _laid(task, size):
     if found.message:
         del found.area_under_strip, found.elongation, found.contact_force_error
         return vars(found) | {"status": int(Status.NOT_CONVERGED)}
-    error = found.area_under_strip / made["trapezoid"].area - 1
-    return vars(found) | {"status": int(Status.SOLVED), "area_error": error}
+    area_error = found.area_under_strip / made["trapezoid"].area - 1
+    return vars(found) | {"status": int(Status.SOLVED), "area_error": area_error}
 
 
 def lay(strip, trapezoid, material, support, definition, size, *, loading="pressure", pressure=0.02e6, friction=0.0,

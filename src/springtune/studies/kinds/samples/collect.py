@@ -288,10 +288,9 @@ def sobol_indices(at_a: np.ndarray, at_b: np.ndarray, at_ab: np.ndarray, least: 
     # Terms of each base sample whose means are taken: 2 n_parameters for the indices, two for the variance.
     terms = np.concatenate([at_b * (at_ab - at_a), 0.5 * (at_a - at_ab) ** 2, [(at_a + at_b) / 2],
                             [(at_a**2 + at_b**2) / 2]])  # fmt: skip
-    random, means = np.random.default_rng(0), [terms.mean(axis=1)]
-    for _ in range(RESAMPLES):
-        means.append(terms @ np.bincount(random.integers(rows, size=rows), minlength=rows) / rows)
-    means = np.array(means)
+    random = np.random.default_rng(0)
+    counts = (np.bincount(random.integers(rows, size=rows), minlength=rows) for _ in range(RESAMPLES))
+    means = np.array([terms.mean(axis=1), *(terms @ count / rows for count in counts)])
     found = means[:, : 2 * count] / (means[:, -1] - means[:, -2] ** 2)[:, None]
     values = found[0], *np.quantile(found[1:], [(1 - LEVEL) / 2, (1 + LEVEL) / 2], axis=0)
     halves = zip(ORDERS, (slice(count), slice(count, None)))
