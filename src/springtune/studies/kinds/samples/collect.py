@@ -103,7 +103,7 @@ def groups(study, folder):
         "bin": tuple(range(min(MOST_BINS, max(4, points // BIN_POINTS)))),
     }
     # Without a mesh, as beyond limits, a network has no particles; other definitions may have a mesh.
-    particles = np.max([found["particles"] for found in results.values()], axis=0)
+    particles = np.max([results[key]["particles"] for key in results if key != DRAWN], axis=0)
     group, places = _with_coordinates(sample, drawn, study.axes)
     frames = [pd.DataFrame(places | {"sample": axes["sample"], "particles": particles})]
     frames += chain.from_iterable(_of_load(load, sample, drawn, results, folder / "samples") for load in sample.loads)
@@ -118,24 +118,20 @@ def groups(study, folder):
 
 
 def _stored(sample, folder):
-    """Parameters of all rows, and results by key: displacement, status, particles and messages by row."""
-    keys = {result_key(sample, load, name) for load in sample.loads for name in sample.solved}
-    arrays = {key: ("displacement", "status", "particles") for key in keys}
-    arrays[DRAWN] = tuple(dict.fromkeys([*sample.drawn, "mesh_size"]))
-    parts, messages, before = {key: [] for key in arrays}, {key: {} for key in keys}, 0
-    for ends in blocks(sample.design, sample.size):
-        path = folder / f"{block_key(sample, *ends)}.h5"
-        read = store.read(path, sorted(arrays), sorted({name for names in arrays.values() for name in names}))
-        for key, part in parts.items():
-            part.append(read[key])
-        for key, found in messages.items():
-            found |= {before + int(row): text for row, text in read[key]["messages"].items()}
-        before += len(read[DRAWN]["length"])
-    joined = {
-        key: {name: np.concatenate([part[name] for part in parts[key]]) for name in names}
-        for key, names in arrays.items()
-    }
-    return joined.pop(DRAWN), {key: found | {"messages": messages[key]} for key, found in joined.items()}
+    """Parameters of all rows, and results by key: displacement, status, particles and message of each row."""
+    keys = sorted({result_key(sample, load, name) for load in sample.loads for name in sample.solved})
+    names = [*dict.fromkeys([*sample.drawn, "mesh_size"])]
+    paths = [folder / f"{block_key(sample, *ends)}.h5" for ends in blocks(sample.design, sample.size)]
+    fields = [*names, "displacement", "status", "particles"]
+    read = [store.read(path, [DRAWN, *keys], fields) for path in paths]
+    found = {key: pd.concat([_frame(one[key]) for one in read], ignore_index=True) for key in (DRAWN, *keys)}
+    return {name: found[DRAWN][name].values for name in names}, found
+
+
+def _frame(found):
+    """Arrays of a block, and the message of each row."""
+    frame = pd.DataFrame({name: values for name, values in found.items() if name != "messages"})
+    return frame.assign(message=[found.get("messages", {}).get(str(row), "") for row in frame.index])
 
 
 def _of_load(load, sample, drawn, results, folder):
@@ -166,7 +162,7 @@ def _of_load(load, sample, drawn, results, folder):
         displacement = np.where(there, (sign if is_linear else 1.0) * found["displacement"], np.nan)
         values = {"displacement": displacement, "deformation_error": deformation_error(displacement, reference)}
         values |= {"status": found["status"], "stiffness": softness if name == UNIFORM else np.nan}
-        values["message"] = [found["messages"].get(row, "") for row in range(sample.rows)]
+        values["message"] = found["message"]
         yield pd.DataFrame(rows | {"definition": name} | values)
 
 
