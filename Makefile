@@ -77,7 +77,7 @@ $(MUTANTS): | $(VENV)/.test
 INPUTS ?= 20000
 SEED ?= 1
 slow: $(VENV)/.test $(ENGINES)/.done
-	pytest -n 2 -m slow tests/workflow tests/fuzz tests/browser tests/physics tests/unit src
+	pytest -n 2 -m slow tests/workflow tests/fuzz tests/physics tests/unit src
 	HYPOTHESIS_PROFILE=anew pytest -n 2 -m "not slow" tests/unit tests/physics
 	$(WITH_ENGINES) pytest -n 2 --max-worker-restart 0 --dist loadfile -rs -m slow tests/engines
 	pytest -n 2 tests/faults tests/reruns

@@ -1,4 +1,4 @@
-"""What is fed: studies and mesh files, as bytes and by their structure."""
+"""What is fed: studies as bytes and by their structure, mesh files as bytes."""
 
 import io
 import shutil
