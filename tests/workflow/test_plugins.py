@@ -134,7 +134,7 @@ def bad(tmp_path):
 
 def test_what_is_broken_is_left_out_by_name_and_nothing_else(bad):
     told = python(REPOSITORY, bad, "-m", "springtune", "scenes", "config/quick.yaml")
-    assert re.search(r"^networks +[0-9]+ ", told, re.MULTILINE)
+    assert re.search(r"^scenes +[0-9]+", told, re.MULTILINE)
     for why in (
         "definition 'lattice' of the package 'bad' is left out: ",
         "definition 'lost' of the package 'bad' is left out: No module named 'bad.missing'",
