@@ -10,12 +10,12 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from springtune.units import COMMON, QUANTITY_KINDS, UnitError, parse
+from springtune.units import QUANTITY_KINDS, UnitError, parse
 
 REGISTRY = pint.UnitRegistry()
 
 QUANTITIES = yaml.safe_load(Path(__file__).with_name("units.yaml").read_text())
-USUAL = [(kind, unit) for kind, units in COMMON.items() for unit in units]
+USUAL = [(kind, unit) for kind, one in QUANTITY_KINDS.items() for unit in one.units]
 
 
 @pytest.mark.parametrize(("text", "kind", "value"), QUANTITIES["read"])
@@ -48,7 +48,7 @@ def test_refuses(text, kind, says):
 )
 def test_value_is_the_nearest_float(kind_and_unit, number):
     kind, unit = kind_and_unit
-    assert parse(f"{number} {unit}", kind) == float(number * Decimal(COMMON[kind][unit]))
+    assert parse(f"{number} {unit}", kind) == float(number * Decimal(QUANTITY_KINDS[kind].units[unit]))
 
 
 @given(st.text(max_size=20), st.sampled_from(sorted(QUANTITY_KINDS)))

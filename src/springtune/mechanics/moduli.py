@@ -196,9 +196,7 @@ class PatchTest:
         """
         if self.strip_fault:
             if springs.lateral:
-                raise MeshError(
-                    f"the mesh cannot have a patch test of springs that go with a lateral stress: {self.strip_fault}"
-                )
+                raise MeshError(f"no patch test of springs that go with a lateral stress: {self.strip_fault}")
             return isotropic_moduli(np.linalg.inv(self.stiffness(springs)))
         mesh, (left, right, held, given) = self.mesh, self._rollers
         network = self._network("rollers", held, springs)

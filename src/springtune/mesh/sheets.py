@@ -30,13 +30,13 @@ def sheet_fault(mesh: Mesh) -> str:
     if fault:
         return fault
     points = mesh.points
-    touching = _touching(points, outline)
+    shortest = np.linalg.norm(np.diff(points[outline], axis=1), axis=2).min()
+    small = min(DIGITS * np.ptp(points, axis=0).max(), 0.01 * shortest)
+    touching = np.union1d(*nearer(points, outline, np.full(len(outline), 0.5 * small))[:2])
     if len(touching):
         count = f"outline edges that meet others without being joined: {len(touching)}"
-        first = edge_in_words(points, outline[touching[0]])
-        return (
-            opening(points, outline[touching], count) or f"cells overlap ({count}, the first one {first}); remove some"
-        )
+        first = f"{count}, the first one {edge_in_words(points, outline[touching[0]])}"
+        return opening(points, outline[touching], count) or f"cells overlap ({first}); remove some"
     again = np.flatnonzero(np.bincount(outline[:, 0]) > 1)
     if len(again):
         where = in_words(points[again[0]])
@@ -106,14 +106,6 @@ def opening(points: np.ndarray, edges: np.ndarray, count: str) -> str:
     return ""
 
 
-def _touching(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """Numbers of edges that come near another one with which they share no end."""
-    shortest = np.linalg.norm(np.diff(points[edges], axis=1), axis=2).min()
-    small = min(DIGITS * np.ptp(points, axis=0).max(), 0.01 * shortest)
-    one, other, _ = nearer(points, edges, np.full(len(edges), 0.5 * small))
-    return np.union1d(one, other)
-
-
 def nearer(points: np.ndarray, edges: np.ndarray, reach: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return pairs of disjoint edges nearer than their reaches together, and their distances [m].
 
@@ -141,8 +133,8 @@ def nearer(points: np.ndarray, edges: np.ndarray, reach: np.ndarray) -> tuple[np
         close = distances <= reach[one] + reach[other]
         found.append((one[close], other[close], distances[close]))
         begin = stop
-    ones, others, apart = (np.concatenate(parts) for parts in zip(*found))
-    return ones, others, apart
+    one, other, distances = (np.concatenate(parts) for parts in zip(*found))
+    return one, other, distances
 
 
 def _apart(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> np.ndarray:

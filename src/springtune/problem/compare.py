@@ -71,10 +71,8 @@ def quantity_errors(values: Mapping[str, float], known: Mapping[str, float]) -> 
     >>> quantity_errors({"end": 1.1, "side": 0.1}, {"end": 1.0, "side": 0.0})["side"]
     nan
     """
-    return {
-        name: float(deformation_error(value, known[name])) if known.get(name) else np.nan
-        for name, value in values.items()
-    }
+    given = {name: known.get(name) or np.nan for name in values}
+    return {name: float(deformation_error(value, given[name])) for name, value in values.items()}
 
 
 @dataclass(frozen=True)

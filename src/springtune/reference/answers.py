@@ -134,9 +134,8 @@ def outline(x: np.ndarray, y: np.ndarray, displacements: np.ndarray) -> tuple[np
 
 def field_error(mesh: "Mesh", displacements: np.ndarray, reference: np.ndarray) -> float:
     """Return the L2 difference of displacement fields (n_points, 2) over the norm of the reference's [1]."""
-    difference, size = (
-        mesh.particle_areas @ (field**2).sum(axis=1) for field in (displacements - reference, reference)
-    )
+    fields = displacements - reference, reference
+    difference, size = (mesh.particle_areas @ (field**2).sum(axis=1) for field in fields)
     return float(np.sqrt(difference / size))
 
 

@@ -21,6 +21,7 @@ from functools import cached_property
 from typing import Protocol
 
 import numpy as np
+from scipy.interpolate import krogh_interpolate
 from scipy.sparse import csc_array, csr_array
 from skfem import Basis, ElementQuad2, FacetBasis, MeshQuad
 
@@ -408,11 +409,8 @@ def _spread(near: np.ndarray, length: float, count: int, most: int | None = None
 
 def _extrapolated(path: list[tuple[float, np.ndarray]], share: float) -> np.ndarray:
     """Displacements at a share of the load, by the polynomial through those before."""
-    total = np.zeros(path[0][1].shape)
-    for i, (at, moved) in enumerate(path):
-        factors = [(share - other) / (at - other) for j, (other, _) in enumerate(path) if j != i]
-        total = total + np.prod(factors) * moved
-    return total
+    shares, moved = zip(*path)
+    return np.asarray(krogh_interpolate(shares, np.array(moved), share))
 
 
 _Derivatives = tuple[Sequence[np.ndarray], Sequence[np.ndarray]]

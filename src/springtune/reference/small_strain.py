@@ -69,6 +69,9 @@ FIELD_POINTS = 3000
 _Values = tuple[np.ndarray, tuple[np.ndarray, ...], np.ndarray, np.ndarray]
 
 
+SLENDER = "such slender shapes are for beam theory"
+
+
 class ReferenceNotConvergedError(RuntimeError):
     """The error estimate of a reference stays above its tolerance."""
 
@@ -169,17 +172,13 @@ def _converge(aspect_ratio: float, nu: float, kind: LoadKind, tolerance: float) 
     for degree in range(FIRST_LEVEL, LAST_LEVEL + 1):
         where = f"{kind} reference, {aspect_ratio:.6g} times as long as high, nu = {nu:g}: relative"
         if slenderness > (most := _most_slender(nu, degree)) * (1 + 1e-9):  # the ratio is rounded
-            raise ReferenceNotConvergedError(
-                f"{where} rounding error is unknown at level {degree} if a body that bends has sides of more than "
-                f"{most:.0f} : 1; such slender shapes are for beam theory"
-            )
+            why = f"is unknown at level {degree} if a body that bends has sides of more than {most:.0f} : 1"
+            raise ReferenceNotConvergedError(f"{where} rounding error {why}; {SLENDER}")
         level = UnitLevel(2 * aspect_ratio, nu, degree, kind)  # in half heights
         at = f"at level {degree} ({level.unknowns} unknowns)"
         if not level.round_off <= tolerance:
-            raise ReferenceNotConvergedError(
-                f"{where} rounding error {level.round_off:.1e} {at}, the tolerance is {tolerance:.1e}; such slender "
-                "shapes are for beam theory"
-            )
+            missed = f"rounding error {level.round_off:.1e} {at}, the tolerance is {tolerance:.1e}"
+            raise ReferenceNotConvergedError(f"{where} {missed}; {SLENDER}")
         values.append(level.displacement)
         middle, middle_before = level.measured, middle
         if len(values) < 3:
@@ -189,9 +188,8 @@ def _converge(aspect_ratio: float, nu: float, kind: LoadKind, tolerance: float) 
         estimate = float(max(last, abs(middle - middle_before) / middle) + level.round_off + SHARED)
         if estimate <= tolerance and (last <= before / 2 or before <= level.round_off):
             return level, estimate
-    raise ReferenceNotConvergedError(
-        f"{where} error estimate {estimate:.1e} {at}, the last one, the tolerance is {tolerance:.1e}"
-    )
+    missed = f"error estimate {estimate:.1e} {at}, the last one"
+    raise ReferenceNotConvergedError(f"{where} {missed}, the tolerance is {tolerance:.1e}")
 
 
 def _bent(aspect_ratio: float, kind: LoadKind) -> float:

@@ -171,8 +171,6 @@ def moduli(mesh: Mesh, material: AnyMaterial, definition: AnyDefinition) -> Modu
     is_a(material, ANY_MATERIAL, "material", A_MATERIAL)
     definition = definition_of(definition)
     if definition.needs == "stiffness":
-        raise DefinitionError(
-            f"definition {definition.name!r} is told its stiffness; choose one that derives it, such as 'uniform'"
-        )
+        raise DefinitionError(f"definition {definition.name!r} is told its stiffness; choose one such as 'uniform'")
     with named(definition):
         return MeshModuli(mesh)(material, definition)

@@ -54,15 +54,11 @@ def chosen(known: Mapping[str, Entry], name: object, what: str) -> Entry:
 
 def check_stiffness(definition: Definition, stiffness: object) -> None:
     """Refuse a definition without the uniform stiffness that it needs, or with one that it does not use."""
-    if (definition.needs == "stiffness") == (stiffness is not None):
-        return
-    if stiffness is None:
-        raise ValueError(
-            f"stiffness: definition {definition.name!r} needs a uniform one; give a stiffness such as '170e6 N/m'"
-        )
-    raise ValueError(
-        f"stiffness: {stiffness!r} is not used, definition {definition.name!r} derives its own; leave it out"
-    )
+    name, needed = definition.name, definition.needs == "stiffness"
+    if needed and stiffness is None:
+        raise ValueError(f"stiffness: definition {name!r} needs a uniform one; give a stiffness such as '170e6 N/m'")
+    if stiffness is not None and not needed:
+        raise ValueError(f"stiffness: {stiffness!r} is not used, definition {name!r} derives its own; leave it out")
 
 
 @contextmanager
@@ -244,9 +240,8 @@ class Sheet:
         label = loading.key, springs.lateral, None if loading.given is None else springs.reference
         if label not in problems:
             given = None if loading.given is None else springs.reference * loading.given
-            problems[label] = StaticProblem(
-                network, self.pattern(loading, springs), loading.follower, dead=loading.dead, given=given
-            )
+            pattern = self.pattern(loading, springs)
+            problems[label] = StaticProblem(network, pattern, loading.follower, dead=loading.dead, given=given)
         return problems[label]
 
     def solve(

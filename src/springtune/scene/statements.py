@@ -98,10 +98,6 @@ class Statement(ABC):
         """Law at finite strain of the reference of a definition's network; none of small strain."""
         return definition.law if self.kinematics == "nonlinear" else ""
 
-    def _unit_field(self, sheet: Sheet) -> np.ndarray:
-        """Displacements of the reference at the particles for a factor of 1, shape (n_points, 2)."""
-        return self.reference(sheet).at(self.mesh.points)
-
     def objection(self, sheet: Sheet) -> str:
         """Why the small-strain reference does not apply to networks of nonlinear kinematics; empty if it does."""
         found = cast("ReferenceSolution | ShapeReference", self.reference(sheet))
@@ -109,7 +105,9 @@ class Statement(ABC):
 
     def springs(self, sheet: Sheet, definition: Definition, stiffness: float | None) -> tuple[Springs, float]:
         """Springs of a definition, and the seconds that deriving them took."""
-        case = (self.loading, self.force, self._unit_field(sheet)) if definition.needs == "cases" else None
+        case = None
+        if definition.needs == "cases":
+            case = self.loading, self.force, self.reference(sheet).at(self.mesh.points) / self.force
         return sheet.derive(definition, self.by_part, stiffness, case, self.grouped)
 
     def forces(self, sheet: Sheet, springs: Springs) -> np.ndarray:
@@ -239,9 +237,6 @@ class BeamStatement(Statement):
         """Law of the reference: of beams that of rubber alone."""
         return "rubber" if definition.finite_strain and self.kinematics == "nonlinear" else ""
 
-    def _unit_field(self, sheet: Sheet) -> np.ndarray:
-        return unit_reference(self.beam, self.material, self.kind, 1.0).at(self.mesh.points)
-
 
 class ShapeStatement(Statement):
     """A shape under one of its load cases, times `scale` [1]."""
@@ -259,9 +254,7 @@ class ShapeStatement(Statement):
     ) -> None:
         is_a(shape, Shape, "shape", A_SHAPE)
         if isinstance(grouped, Mesh):
-            raise ValueError(
-                f"mesh: is of no groups, which supports and loads are on; give one such as {A_GROUPED_MESH}"
-            )
+            raise ValueError(f"mesh: is of no groups for supports and loads; give one such as {A_GROUPED_MESH}")
         is_a(grouped, GroupedMesh, "mesh", A_GROUPED_MESH)
         self.shape, self.grouped, self.thickness = shape, grouped, shape.thickness
         self.by_part = _materials(material, grouped)
@@ -291,9 +284,7 @@ class ShapeStatement(Statement):
         all_forces = partial(forces, self.grouped, self.case, self.thickness, densities)
         pattern = all_forces()
         if not (pattern[~held].any() or given.any()):
-            raise ValueError(
-                f"load {self.load!r}: neither pulls what is free nor moves a support; give a force, or move one"
-            )
+            raise ValueError(f"load {self.load!r}: neither pulls what is free nor moves a support; give a force")
         edges, pressure = followed(self.grouped, self.case, self.thickness)
         turning = self.kinematics == "nonlinear" and len(edges) > 0
         return Loading(
@@ -314,28 +305,20 @@ class ShapeStatement(Statement):
         elif one.kind == "stress":
             cell_at(self.grouped, one.of)
             particle = self.grouped.particle(one.of)
-            names = {
-                str(name)
-                for count, labels in part_names(self.grouped).items()
-                for name in labels[(self.mesh.cells[count] == particle).any(axis=1)]
-            }
-            if particle is not None and len({self.by_part[name] for name in names}) > 1:
-                raise ValueError(
-                    f"load {self.load!r}, quantity {one.name!r}: {one.of!r} is where different materials meet; "
-                    "ask for the stress on one side"
-                )
+            found = set()
+            for count, labels in part_names(self.grouped).items():
+                found |= {self.by_part[name] for name in labels[(self.mesh.cells[count] == particle).any(axis=1)]}
+            if particle is not None and len(found) > 1:
+                why = f"{one.of!r} is where different materials meet; ask for the stress on one side"
+                raise ValueError(f"load {self.load!r}, quantity {one.name!r}: {why}")
 
     def check(self, definition: Definition) -> None:
         """Refuse a definition that is for beams alone."""
         if definition.uniaxial:
-            raise ValueError(
-                f"definition: {definition.name!r} is for loads that stretch a beam; choose one such as 'delingette'"
-            )
+            raise ValueError(f"definition: {definition.name!r} is for loads that stretch a beam; choose another")
         if definition.needs == "cases" and self.loading.given is not None:
-            raise ValueError(
-                f"definition: {definition.name!r} is for forces, and load {self.load!r} prescribes displacements; "
-                "choose another definition"
-            )
+            why = f"is for forces, and load {self.load!r} prescribes displacements"
+            raise ValueError(f"definition: {definition.name!r} {why}; choose another definition")
 
     def springs(self, sheet: Sheet, definition: Definition, stiffness: float | None) -> tuple[Springs, float]:
         """Springs of a definition, and the seconds that deriving them took."""
@@ -350,21 +333,18 @@ class ShapeStatement(Statement):
         as_read = self.grouped if self.shape.file else None
         # The shape is kept too, so that its id is not used again.
         key = id(self.shape), self.grouped, case, tuple(self.by_part.items()), law
-        if (key, 1.0) not in sheet.references:
+        if key not in sheet.references:
             if law:
                 from ..reference.finite_shapes import solve_finite_shape  # here, as below
 
-                solved = solve_finite_shape(self.shape, case, self.by_part, as_read, law)
+                found = solve_finite_shape(self.shape, case, self.by_part, as_read, law)
             else:
                 from ..reference.shapes import solve_shape  # here, since finite elements take half a second to import
 
-                solved = solve_shape(self.shape, case, self.by_part, as_read)
-            sheet.references[key, 1.0] = self.shape, solved
-        scale = 1.0 if law else self.scale
-        if (key, scale) not in sheet.references:
-            sheet.references[key, scale] = self.shape, sheet.references[key, 1.0][1].scaled(scale)
-        found: ShapeReference = sheet.references[key, scale][1]
-        return found
+                found = solve_shape(self.shape, case, self.by_part, as_read)
+            sheet.references[key] = self.shape, found
+        reference: ShapeReference = sheet.references[key][1]
+        return reference if law else reference.scaled(self.scale)
 
     def law(self, sheet: Sheet, definition: Definition) -> str:
         """Law of the reference; St. Venant and Kirchhoff's only where small strain does not apply."""
