@@ -2,12 +2,12 @@
 
 import math
 from itertools import cycle
-from numbers import Integral, Real
+from numbers import Real
 
 import numpy as np
 
 from .cells import Mesh, MeshError, no_cells
-from .types import MOST_MESHED, check_box, mesh_type, nearest_counts, nearest_whole
+from .types import check_box, mesh_type, nearest_counts, nearest_whole
 
 ROW_HEIGHT = math.sqrt(3) / 2
 """Height of a row of equilateral triangles of unit edge."""
@@ -86,9 +86,6 @@ def lattice(cells: int, rows: int, size: float = 1.0, row_height: float | None =
     equilateral triangles.
     """
     row_height = ROW_HEIGHT * size if row_height is None else row_height
-    for name, value in (("cells", cells), ("rows", rows)):
-        if not (isinstance(value, Integral) and 1 <= value <= MOST_MESHED):
-            raise MeshError(f"{name}: {value!r} is not a whole number above zero; give one, such as 10")
     check_box(cells * size, rows * row_height, size)
     line = size * np.arange(cells + 1.0)
     return _join(line, line + 0.5 * size, row_height * np.arange(rows + 1.0))

@@ -239,11 +239,10 @@ def _shares(corners: np.ndarray) -> np.ndarray | None:
             step = np.linalg.solve(slopes.T, -shares @ corners)
         except np.linalg.LinAlgError:
             return None
-        place = place + step
-        if np.abs(step).max() < 1e-15:
+        if not np.abs(step).max() >= 1e-15:
             break
-    (a, b), (c, d) = 1 - place, place
-    return np.array([a * b, c * b, c * d, a * d]) if np.isfinite(place).all() else None
+        place = place + step
+    return shares if np.isfinite(shares).all() else None
 
 
 def check_case(grouped: GroupedMesh, case: LoadCase) -> None:

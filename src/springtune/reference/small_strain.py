@@ -30,7 +30,7 @@ from ..linalg.factors import factorize
 from ..problem.geometry import Beam
 from ..problem.loads import AXIAL, BOTTOM, LEFT, RIGHT, TOP, LoadKind
 from ..problem.materials import Material
-from .answers import interpolate, rotation_and_strain, unit_problem, unit_scales
+from .answers import BeamField, rotation_and_strain, unit_problem, unit_scales
 
 #: First and last level tried. Level p has polynomials of degree p and p layers of elements at a corner.
 FIRST_LEVEL, LAST_LEVEL = 3, 9
@@ -77,24 +77,13 @@ class ReferenceNotConvergedError(RuntimeError):
 
 
 @dataclass(frozen=True)
-class ReferenceSolution:
-    """Converged displacements of a beam.
+class ReferenceSolution(BeamField):
+    """Converged displacements of a beam at small strain.
 
-    - `displacement`: Mean displacement of the loaded side along the force [m]; of a pressed side, its middle's.
-    - `mean_displacement`: Mean displacement of the loaded side along the force [m].
-    - `error_estimate`: Bound on the relative error of `displacement` [1].
-    - `x`, `y` (n_x,) and (n_y,): Grid of the field [m], denser near the outline.
-    - `displacements` (n_x, n_y, 2): Displacements on the grid [m].
     - `rotation`, `strain`: Rotation [rad] and strain [1] that limit its use, see `springtune.reference.answers`.
     - `unknowns`: Unknowns of the finest level, for the solved half.
     """
 
-    displacement: float
-    mean_displacement: float
-    error_estimate: float
-    x: np.ndarray
-    y: np.ndarray
-    displacements: np.ndarray
     rotation: float
     strain: float
     unknowns: int
@@ -104,10 +93,6 @@ class ReferenceSolution:
         names = {"displacement": factor, "mean_displacement": factor, "displacements": factor, "x": length, "y": length}
         names |= {"rotation": abs(factor) / length, "strain": abs(factor) / length}
         return replace(self, **{name: getattr(self, name) * by for name, by in names.items()})
-
-    def at(self, points: np.ndarray) -> np.ndarray:
-        """Return displacements [m] at points (n, 2) [m] of the beam, see `springtune.reference.answers.interpolate`."""
-        return interpolate(self.x, self.y, self.displacements, points)
 
 
 def solve_small_strain(
