@@ -344,7 +344,7 @@ class ShapeStatement(Statement):
                 found = solve_shape(self.shape, case, self.by_part, as_read)
             sheet.references[key] = self.shape, found
         reference: ShapeReference = sheet.references[key][1]
-        return reference if law else reference.scaled(self.scale)
+        return reference if law or self.scale == 1 else reference.scaled(self.scale)
 
     def law(self, sheet: Sheet, definition: Definition) -> str:
         """Law of the reference; St. Venant and Kirchhoff's only where small strain does not apply."""
