@@ -71,7 +71,7 @@ LONGEST_QUANTITY = 100
 """Most characters of a quantity."""
 
 _POWER = re.compile(r"(?<![\d\s^*/(.+-])\s*\^\s*[+-]?[\d.]{1,3}(?![\d^.])")
-_NUMBER = re.compile(r"\^|(?<![\w.])(?!1(?![\w.]))[\d.]")
+_OTHER_NUMBER = re.compile(r"\^|(?<![\w.])(?!1(?![\w.]))[\d.]")
 """Power of a name or a bracket, and other powers and numbers but 1."""
 
 
@@ -144,7 +144,7 @@ def _registry() -> "pint.UnitRegistry[float]":
 
 def _plain(unit: str) -> bool:
     """Return whether a unit has no nested or numeric powers: pint would evaluate ``9^9^9^9``."""
-    return not _NUMBER.search(_POWER.sub("", unit))
+    return not _OTHER_NUMBER.search(_POWER.sub("", unit))
 
 
 @cache

@@ -615,7 +615,7 @@ class Shape:
         rounds = [("outline", sides)]
         rounds += [(f"hole {number}", _round(hole.outline, "hole")) for number, hole in enumerate(self.holes, start=1)]
         for what, one in rounds:
-            short = [number for number, side in enumerate(one, start=1) if side.length < ON_SIDE * size]
+            short = [number for number, side in enumerate(one, start=1) if math.dist(*extent([side])) < ON_SIDE * size]
             if short:
                 raise ValueError(f"{what}, side {short[0]}: is shorter than a millionth of the shape; leave it out")
             for before, side in zip((one[-1], *one[:-1]), one):

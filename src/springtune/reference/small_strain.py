@@ -69,7 +69,7 @@ FIELD_POINTS = 3000
 _Values = tuple[np.ndarray, tuple[np.ndarray, ...], np.ndarray, np.ndarray]
 
 
-SLENDER = "such slender shapes are for beam theory"
+FOR_BEAM_THEORY = "such slender shapes are for beam theory"
 
 
 class ReferenceNotConvergedError(RuntimeError):
@@ -158,12 +158,12 @@ def _converge(aspect_ratio: float, nu: float, kind: LoadKind, tolerance: float) 
         where = f"{kind} reference, {aspect_ratio:.6g} times as long as high, nu = {nu:g}: relative"
         if slenderness > (most := _most_slender(nu, degree)) * (1 + 1e-9):  # the ratio is rounded
             why = f"is unknown at level {degree} if a body that bends has sides of more than {most:.0f} : 1"
-            raise ReferenceNotConvergedError(f"{where} rounding error {why}; {SLENDER}")
+            raise ReferenceNotConvergedError(f"{where} rounding error {why}; {FOR_BEAM_THEORY}")
         level = UnitLevel(2 * aspect_ratio, nu, degree, kind)  # in half heights
         at = f"at level {degree} ({level.unknowns} unknowns)"
         if not level.round_off <= tolerance:
             missed = f"rounding error {level.round_off:.1e} {at}, the tolerance is {tolerance:.1e}"
-            raise ReferenceNotConvergedError(f"{where} {missed}; {SLENDER}")
+            raise ReferenceNotConvergedError(f"{where} {missed}; {FOR_BEAM_THEORY}")
         values.append(level.displacement)
         middle, middle_before = level.measured, middle
         if len(values) < 3:
