@@ -2,7 +2,7 @@
 
 import math
 from itertools import cycle
-from numbers import Real
+from numbers import Integral, Real
 
 import numpy as np
 
@@ -86,6 +86,9 @@ def lattice(cells: int, rows: int, size: float = 1.0, row_height: float | None =
     equilateral triangles.
     """
     row_height = ROW_HEIGHT * size if row_height is None else row_height
+    for name, value in (("cells", cells), ("rows", rows)):
+        if not (isinstance(value, Integral) and value >= 1):
+            raise MeshError(f"{name}: {value!r} is not a whole number above zero; give one, such as 10")
     check_box(cells * size, rows * row_height, size)
     line = size * np.arange(cells + 1.0)
     return _join(line, line + 0.5 * size, row_height * np.arange(rows + 1.0))
