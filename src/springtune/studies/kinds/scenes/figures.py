@@ -412,28 +412,21 @@ def _stiffness(panel, curves, root):
     panel.set_title("One stiffness for all loads? (small strain)")
     if curves is None or "linear" not in curves.kinematics.values:
         return [], "The study has no sensitivity curves in linear kinematics of this mesh and material."
-    curves, said, lines = curves.sel(kinematics="linear"), [], []
+    curves, said = curves.sel(kinematics="linear"), []
     loads = labels_of(curves.status != 0, "load")
-    for load in loads:
-        curve, reference = curves.sel(load=load), float(root.reference_displacement.sel(load=load))
-        softness = (curve.displacement * curve.stiffness).values  # one number: linear networks give as 1/k
-        softness = softness[np.isfinite(softness)]
-        if not len(softness) or not np.isfinite(reference):
-            said.append(f"{load}: {'not solved' if not len(softness) else 'no reference'}")
-            continue
-        stiffness = np.linspace(np.nanmin(curve.stiffness.values), np.nanmax(curve.stiffness.values), 600)
-        lines.append((load, stiffness, 100 * np.abs(softness[0] / stiffness / reference - 1)))
-    if not lines:
+    known = curves.stiffness.values[np.isfinite(curves.stiffness.values)]
+    for number, load in enumerate(loads):
+        curve = curves.sel(load=load)
+        if curve.deformation_error.notnull().any():
+            draw_curve(panel, curve, 1.0, load, style.line(number), known)
+        else:
+            said.append(f"{load}: {'not solved' if curve.displacement.isnull().all() else 'no reference'}")
+    if not panel.get_lines():
         return [], "No uniform stiffness has an error: " + ("; ".join(said) or "the study has no curves") + "."
     middle = np.sqrt(3) / 2 * _membrane(curves)
-    low = max(0.7 * middle, min(x.min() for _, x, _ in lines))
-    high = min(1.5 * middle, max(x.max() for _, x, _ in lines))
-    highest = 0.0
-    for number, (load, x, error) in enumerate(lines):
-        look = style.line(number) | {"marker": ""}
-        within = (x >= low) & (x <= high)
-        panel.plot(x[within], error[within], label=load, **look)
-        highest = max(highest, error[within].max(initial=0.0))
+    low, high = max(0.7 * middle, known.min()), min(1.5 * middle, known.max())
+    within = (curves.stiffness >= low) & (curves.stiffness <= high)
+    highest = 100 * float(abs(curves.deformation_error).where(within).max())
     for number, definition in enumerate(name for name in ENERGIES if name in root.definition.values):
         cells = root.sel(definition=definition, kinematics="linear", load=loads)
         errors = 100 * np.abs(cells.deformation_error.values)
@@ -443,7 +436,7 @@ def _stiffness(panel, curves, root):
         if lacking and (flags != 0).any():
             said.append(f"{definition}: {', '.join(lacking)}")
         if known.any():
-            look = style.line(len(lines) + number) | {"marker": ""}
+            look = style.line(len(loads) + number) | {"marker": ""}
             worst = errors[known].max()
             panel.plot([low, high], [worst, worst], label=f"{definition}, worst: {worst:.2g} %", **look)
     panel.set(xlim=(low, high), ylim=(0, min(40.0, 1.05 * highest)))

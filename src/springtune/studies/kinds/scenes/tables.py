@@ -9,7 +9,7 @@ from springtune.problem.parameters import SWEPT
 
 from ...output.dataset import STATUS
 from ...output.page import MOST_ROWS, error_decimals, head
-from ...output.selection import labels_of, of_own_law, own_laws, records
+from ...output.selection import cells, labels_of, of_own_law, own_laws, records
 from ...output.text import decimals, number
 from .outputs import SWEPT_SHOWN, TABLE, stem
 
@@ -22,16 +22,10 @@ def tables(tree):
     if "status" not in root:  # a study without scenes
         return []
     finite = _finite(tree)
-    found = [_table(root.sel(selection), selection, finite) for selection in _selections(root)]
+    found = [_table(root.sel(selection), selection, finite) for selection in cells(root.status != 0, TABLE)]
     found.sort(key=lambda table: (table["number"] is None, table["number"], table["stem"]))
     groups = {"finite_strain": _finite_strain, "block": _block}
     return found + [table(tree[name].to_dataset(), root) for name, table in groups.items() if name in tree]
-
-
-def _selections(root):
-    requested = (root.status != 0).any([dimension for dimension in root.status.dims if dimension not in TABLE])
-    requested = requested.stack(cell=TABLE)
-    return [dict(zip(TABLE, map(str, cell))) for cell in requested.cell.values[requested.values]]
 
 
 def _finite(tree):
@@ -51,17 +45,17 @@ OF_NETWORK = ("status", "message", "stiffness", "displacement", "deformation_err
 """Variables of a scene, and those of a network."""
 
 
-def _table(cells, selection, finite=None):
-    numbers = np.unique(cells.paper_table.values[np.isfinite(cells.paper_table.values)])
+def _table(data, selection, finite=None):
+    numbers = np.unique(data.paper_table.values[np.isfinite(data.paper_table.values)])
     number = int(numbers[0]) if len(numbers) == 1 else None
-    swept = [name for name in SWEPT if name in cells.status.dims]
-    cells = cells if finite is None else cells.merge(finite.sel(selection), join="exact", compat="override")
+    swept = [name for name in SWEPT if name in data.status.dims]
+    data = data if finite is None else data.merge(finite.sel(selection), join="exact", compat="override")
     place = (*ROW, *swept)
-    asked = (cells.status != 0).transpose(*place, "kinematics", "definition")
-    scenes = asked.any(["kinematics", "definition"]).expand_dims(kinematics=cells.kinematics, axis=len(place))
+    asked = (data.status != 0).transpose(*place, "kinematics", "definition")
+    scenes = asked.any(["kinematics", "definition"]).expand_dims(kinematics=data.kinematics, axis=len(place))
     force = () if "force" in swept else ("force",)
     rows = {}
-    for one in records(cells, scenes, [name for name in (*OF_ROW, *force) if name in cells]):
+    for one in records(data, scenes, [name for name in (*OF_ROW, *force) if name in data]):
         row = rows.setdefault(tuple(one[name] for name in place), _row(one, swept, LOADS[selection["load"]].sign))
         applies, kinematics = one["reference_applies"] == 1, one["kinematics"]
         if finite is not None and kinematics != "linear":
@@ -70,7 +64,7 @@ def _table(cells, selection, finite=None):
             if np.isfinite(row["reference_mm"]):  # else it says why there is none
                 row["reference_message"] = str(one["finite_reference_message"])
         row[f"reference_applies_{kinematics}"] = "yes" if applies else "no"
-    for one in records(cells, asked, [name for name in OF_NETWORK if name in cells]):
+    for one in records(data, asked, [name for name in OF_NETWORK if name in data]):
         name = f"{one['definition']}_{one['kinematics']}"
         against_finite = finite is not None and one["kinematics"] != "linear"
         error = one["finite_deformation_error" if against_finite else "deformation_error"]
