@@ -57,7 +57,7 @@ def listed(
     scaled: Mapping[str, tuple[str, float]] = MappingProxyType({}),
 ) -> list[dict[str, Any]]:
     """Rows of the present cells: labels and variables by name, and variables by column times a factor."""
-    variables = [name for name in (*names, *(name for name, _ in scaled.values())) if name in data.data_vars]
+    variables = [name for name in (*names, *(name for name, _ in scaled.values())) if name in data.variables]
     return [
         {name: one[name] for name in names} | {head: factor * one[name] for head, (name, factor) in scaled.items()}
         for one in records(data, present, variables)

@@ -10,6 +10,7 @@ from springtune.problem.parameters import SWEPT
 from ...output.dataset import STATUS
 from ...output.page import MOST_ROWS, error_decimals, head
 from ...output.selection import cells, labels_of, of_own_law, own_laws, records
+from ...output.tables import listed
 from ...output.text import decimals, number
 from .outputs import SWEPT_SHOWN, TABLE, stem
 
@@ -89,7 +90,7 @@ def _row(one, swept, sign):
         "beam": one["beam"],
         "mesh_size_mm": 1e3 * one["mesh_size"],
         "force_N": (sign if "force" in swept else 1.0) * one["force"],
-        **_swept({name: one[name] for name in swept if name != "force"}),
+        **{column: unit * one[name] for column, (name, unit) in _swept(swept).items() if name != "force"},
         "printed_stiffness_N_per_m": one["paper_stiffness"],
         "printed_reference_mm": 1e3 * one["paper_reference_displacement"],
         "printed_displacement_mm": 1e3 * one["paper_displacement"],
@@ -171,27 +172,26 @@ def _stiffnesses(data, definitions, kinematics):
 # -- further tables ----------------------------------------------------------------------------------------------------
 
 
-def _swept(labels):
-    """Columns of swept parameters from the labels of a cell."""
-    return {column: unit * labels[name] for name, (_, column, unit) in SWEPT_SHOWN.items() if name in labels}
-
-
 def _rows(data, present, names, network, reference, error):
     """Rows of networks beside references, from present cells."""
-    for one in records(data, present, dict.fromkeys((*names, network, reference, error))):
-        row = {name: one[name] for name in names} | _swept(one)
-        row |= {"mesh_size_mm": 1e3 * one["mesh_size"], "network_mm": 1e3 * one[network]}
-        yield row | {"reference_mm": 1e3 * one[reference], "error_percent": 100 * one[error]}
+    columns = _swept(present.dims) | {"mesh_size_mm": ("mesh_size", 1e3), "network_mm": (network, 1e3)}
+    columns |= {"reference_mm": (reference, 1e3), "error_percent": (error, 100)}
+    return listed(data, present, [*names, "reference"], columns)
+
+
+def _swept(dimensions):
+    """Swept parameters and their units, by column."""
+    return {column: (name, unit) for name, (_, column, unit) in SWEPT_SHOWN.items() if name in dimensions}
 
 
 def _finite_strain(finite, root):
     """Networks of nonlinear kinematics against references at finite strain."""
     nonlinear = {"kinematics": np.flatnonzero(finite.kinematics.values != "linear")}
     finite = finite.isel(nonlinear).assign(displacement=root.displacement.isel(nonlinear))
-    names = ("material", "load", "beam", "mesh_type", "definition", "reference")
+    names = ("material", "load", "beam", "mesh_type", "definition")
     order = ("material", "load", "beam", "mesh_type", "mesh_size", "definition", "reference", "kinematics")
     present = finite.deformation_error.notnull().transpose(*order, ...)
-    rows = list(_rows(finite, present, names, "displacement", "reference_displacement", "deformation_error"))
+    rows = _rows(finite, present, names, "displacement", "reference_displacement", "deformation_error")
     note = (
         "Networks of nonlinear kinematics against finite elements of rubber: neo-Hookean ones, or of the law that is "
         "fitted to a uniaxial test. At finite strain an error holds the difference of two material laws, where "
@@ -214,9 +214,9 @@ def _block(block, root):
     chosen = xr.where(block.kinematics == "linear", 0, chosen)
     values = ("face_displacement", "reference_face_displacement", "face_error")
     block = block[[*values]].isel(reference=chosen)
-    names = ("beam", "material", "load", "mesh_type", "definition", "kinematics", "reference")
+    names = ("beam", "material", "load", "mesh_type", "definition", "kinematics")
     order = ("material", "load", "mesh_type", "mesh_size", "definition", "kinematics", "beam")
-    rows = list(_rows(block, block.face_displacement.notnull().transpose(*order, ...), names, *values))
+    rows = _rows(block, block.face_displacement.notnull().transpose(*order, ...), names, *values)
     note = (
         "Displacement of the middle of the pressed face along the load. Networks of nonlinear kinematics are compared "
         "with the reference at finite strain in their material's plane where the study has it, linear ones with that "
