@@ -52,11 +52,13 @@ GROUPS = {
 
 def test_rows_fill_the_cells_of_their_labels_and_no_others():
     variables = {"error": (("load", "mesh_size"), "1", "error", np.nan), "status": (("load",), "1", "status", 0),
-                 "seconds": ((), "s", "time", np.nan)}  # fmt: skip
-    group, axes = Group("/rows", variables), {"load": ("traction", "shear"), "mesh_size": (1e-3, 2e-3)}
+                 "seconds": ((), "s", "time", np.nan), "face": (("load", "point"), "m", "face", np.nan)}  # fmt: skip
+    group, axes = Group("/rows", variables), {"load": ("traction", "shear"), "mesh_size": (1e-3, 2e-3), "point": (0, 1)}
     rows = [{"load": "shear", "status": 3}, {"load": "shear", "mesh_size": 2e-3, "error": 0.5}, {"seconds": 4.0}]
+    rows += [{"load": "traction", "face": np.array([5.0])}, {"load": "shear", "status": None}]
     found = group.of_rows(axes, rows)
     np.testing.assert_array_equal(found.error, [[np.nan, np.nan], [np.nan, 0.5]])
+    np.testing.assert_array_equal(found.face, [[5.0, np.nan], [np.nan, np.nan]])  # shorter than its dimension
     assert found.status.values.tolist() == [0, 3] and found.status.dtype == np.int8 and found.seconds == 4
     with pytest.raises(KeyError):
         group.of_rows(axes, [{"load": "bending", "status": 1}])
