@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import brentq
 from skfem import Basis, ElementQuad2, ElementVector, FacetBasis, LinearForm, MeshQuad, condense, solve
 from skfem.models.elasticity import linear_elasticity
 
@@ -348,3 +349,18 @@ def test_field_does_not_depend_on_how_many_points_are_asked_about():
 
 
 # -- weight ---------------------------------------------------------------------------------------------------------
+
+
+def corner_exponent(nu):
+    """Exponent of the displacement where a clamped edge meets a free one squarely, plane stress (Williams 1952)."""
+    return brentq(lambda p: np.sin(p * np.pi / 2) ** 2 - 4 / ((3 - nu) * (1 + nu)) + (1 + nu) / (3 - nu) * p**2, 0.5, 1)
+
+
+@pytest.mark.parametrize("nu", [0.3, 0.5])
+def test_even_quadratic_elements_close_in_at_the_rate_of_the_corner(nu):
+    limit = UnitLevel(2.0, nu, 7).displacement
+    counts = np.array([4, 8, 16])
+    errors = [1 - quadratic(1, nu, count, 1) / limit for count in counts]
+    rate = -np.polyfit(np.log(counts), np.log(errors), 1)[0]
+    # Energy, hence twice the exponent; .1 is scikit-fem's own tolerance for fitted rates.
+    assert rate == pytest.approx(2 * corner_exponent(nu), abs=0.1)

@@ -499,3 +499,10 @@ def test_a_shape_has_an_error_at_finite_strain():
     )
     assert abs(far.solve().error) < 0.02 and far.objection == "" and far.finite_strain
     assert abs(near.solve().error) < 0.02 and near.objection == ""
+
+
+@given(gradients)
+def test_one_term_is_neo_hooke(f):
+    ours, theirs = (law.response(green(f)) for law in (law_of(Rubber((2e5,))), law_of(springtune.Material(1.0, 0.5))))
+    assert ours.stress == pytest.approx(theirs.stress, rel=1e-9, abs=1e-9)
+    assert ours.tangent == pytest.approx(theirs.tangent, rel=1e-9, abs=1e-9)

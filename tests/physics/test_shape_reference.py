@@ -438,3 +438,12 @@ def test_refusals():
     shape, load = square((end,), tractions=pull)
     refused("parts without a material: ''", shape, load, {"core": even})
     refused("has no outline; give the mesh", Shape("read", 1.0, file="a.msh"), load)
+
+
+@pytest.mark.parametrize("factor", [1e-6, 1.0, 1e6])
+def test_a_sector_whose_triangles_once_folded(factor):
+    """Right values are of quadratic triangles on three meshes, to 2e-6, and of CalculiX."""
+    shape = others.sector(np.radians(120), 0.055, 0.1, [(0.005, np.radians(55), 0.0775)])
+    found = solve_shape(shape, shape.loads["press"], Material(factor * 1e9, 0.3))
+    for axis, right in (("x", 3.78166e-4), ("y", 4.26196e-4)):
+        assert found.values[axis] * factor == pytest.approx(right, rel=found.error_estimates[axis] + 3e-6)
