@@ -29,7 +29,7 @@ _NAMES = {
     ),
     "studies.kinds.laying.figures": ("plot_laying",),
     "studies.kinds.moduli.figures": ("plot_definitions_loads", "plot_definitions_size", "plot_moduli"),
-    "studies.kinds.samples.figures": ("plot_effects", "plot_sobol"),
+    "studies.kinds.samples.figures": ("plot_sobol",),
     "studies.kinds.scenes.figures": ("plot_block", "plot_deformed", "plot_sensitivity"),
     "studies.kinds.scenes.errors": ("plot_size", "plot_sweep"),
     "studies.kinds.shapes.figures": ("plot_shape", "plot_shape_errors", "plot_shapes"),

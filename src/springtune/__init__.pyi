@@ -75,7 +75,6 @@ from .studies.kinds.laying.figures import plot_laying as plot_laying
 from .studies.kinds.moduli.figures import plot_definitions_loads as plot_definitions_loads
 from .studies.kinds.moduli.figures import plot_definitions_size as plot_definitions_size
 from .studies.kinds.moduli.figures import plot_moduli as plot_moduli
-from .studies.kinds.samples.figures import plot_effects as plot_effects
 from .studies.kinds.samples.figures import plot_sobol as plot_sobol
 from .studies.kinds.scenes.errors import plot_size as plot_size
 from .studies.kinds.scenes.errors import plot_sweep as plot_sweep

@@ -173,14 +173,7 @@ def samples():
     data = variables(labels, displacement=cell, deformation_error=cell, height=("sample",), force=("sample",))
     data = data.assign(status=xr.ones_like(data.displacement, dtype=np.int8))
     about = {"design": "sobol-indices", "size": 4, "mesh_type": "structured", "kinematics": "linear"}
-    return data.assign_attrs(about | {"varied": "height force"})
-
-
-def effects():
-    labels = {"quantity": ["displacement", "deformation_error"], "parameter": ["height", "force"], "bin": range(4)}
-    cell = ("quantity", "parameter", "bin", "load", "definition")
-    labels |= {"load": LOADS, "definition": DEFINITIONS}
-    return variables(labels, parameter_value=("parameter", "bin"), main_effect=cell, main_effect_error=cell)
+    return data.set_coords(["height", "force"]).assign_attrs(about | {"varied": "height force"})
 
 
 def sobol():
@@ -254,6 +247,6 @@ def _dataset():
     groups |= {"stability": stability, "benchmark": benchmark}
     groups |= {"engines": engines, "engine_curves": engine_curves}
     groups |= {"shapes": shapes, "shape_fields": shape_fields}
-    groups |= {"samples": samples, "effects": effects, "sobol": sobol}
+    groups |= {"samples": samples, "sobol": sobol}
     # Groups are written and read one by one, so that labels of one need not be those of another.
     return xr.DataTree.from_dict({"/": root()} | {f"/{name}": make() for name, make in groups.items()})

@@ -194,7 +194,7 @@ def repository(tmp_path_factory):
     mine["message"] = mine.status.astype(str).where(mine.status > 1, "")
     mine.attrs = {"springtune_version": st.__version__, "config": (REPOSITORY / "config/quick.yaml").read_text()}
     paper = mine.map_over_datasets(_of_the_paper)
-    for name, tree in {"mine": mine, "sobol": dataset("samples", "effects", "sobol"), "paper": paper}.items():
+    for name, tree in {"mine": mine, "sobol": dataset("samples", "sobol"), "paper": paper}.items():
         tree.attrs |= mine.attrs
         tree.attrs["study"] = name
         (folder / f"results/{name}").mkdir(parents=True)

@@ -20,9 +20,9 @@ from springtune.scene.sheet import Sheet
 from springtune.springs import DEFINITIONS
 from springtune.studies.config.kind import kinds
 from springtune.studies.kinds.samples import designs, interpolate, solve
-from springtune.studies.kinds.samples.collect import ENDS, main_effect, sobol_indices
+from springtune.studies.kinds.samples.collect import ENDS, sobol_indices
 from springtune.studies.kinds.samples.designs import DESIGNS, blocks
-from springtune.studies.kinds.samples.figures import plot_effects, plot_sobol
+from springtune.studies.kinds.samples.figures import plot_sobol
 from springtune.studies.kinds.samples.kind import MOST_SOLVED
 from springtune.studies.runs import store
 from springtune.studies.runs.job import Attempts
@@ -186,11 +186,6 @@ class TestIndices:
         found = sobol_indices(np.ones(rows), np.ones(rows), np.ones((2, rows)))
         assert np.isnan([*found.values()]).all()
 
-    def test_main_effect_of_what_has_no_values(self):
-        centre, mean, error = main_effect(np.arange(8.0), np.where(np.arange(8) < 4, np.nan, 1.0), 2)
-        assert np.isnan(centre[0]) and np.isnan(mean[0])
-        assert (centre[1], mean[1], error[1]) == (5.5, 1.0, 0.0)
-
 
 class TestOnce:
     """What is solved once for many scenes is what each of them would be."""
@@ -332,11 +327,10 @@ class TestRuns:
                 assert found[name].variable.equals(expected[name].variable), name
         assert all((campaign.folder / name).exists() for name in ("index.html", "summary.txt", "tables/sobol.csv"))
 
-    def test_designs_without_rows_of_a_pair_have_effects_and_no_indices(self, here):
+    def test_designs_without_rows_of_a_pair_have_no_indices(self, here):
         tree, _ = run(("size: 16", "size: 64\n  design: sobol"))
         assert "sobol" not in tree and "role" not in tree["samples"].coords
         assert tree["samples"].sizes["sample"] == 64
-        assert tree["effects"].main_effect.sel(quantity="deformation_error", load="traction").notnull().all()
 
     def test_parameters_that_grids_sweep_too_can_be_selected(self, here):
         """A coordinate of points must not have the name of a dimension of the grids."""
@@ -544,7 +538,7 @@ class TestRefusals:
 
 
 class TestFigures:
-    def test_bars_and_effects(self, linear):
+    def test_bars_are_total_orders(self, linear):
         panels = plot_sobol(linear, load="traction")
         titles = [panel.get_title(loc="left") for panel in panels]
         assert titles == ["deformation error, lattice", "deformation error, area", "displacement, lattice",
@@ -554,5 +548,3 @@ class TestFigures:
         widths = [bar.get_width() for bar in panels[0].patches[: len(words)]]
         total = linear["sobol"].total_order.sel(quantity="deformation_error", load="traction", definition="lattice")
         np.testing.assert_allclose(widths, np.maximum(total, 0))
-        scales = [panel.get_xscale() for panel in plot_effects(linear, load="traction")]
-        assert scales == ["linear", "linear", "linear", "log", "linear", "linear"]

@@ -64,7 +64,7 @@ def open(path: str | os.PathLike[str]) -> "xarray.DataTree":
     >>> import springtune as st
     >>> with st.open("results/mine") as tree:
     ...     sorted(tree.children), dict(tree.sizes)
-    (['benchmark', 'block', 'effects', 'engine_curves', 'engines', 'fields', 'laying', 'moduli',
+    (['benchmark', 'block', 'engine_curves', 'engines', 'fields', 'laying', 'moduli',
     'samples', 'sensitivity', 'shape_fields', 'shapes', 'sobol', 'stability'], {'beam': 2, 'mesh_type': 2,
     'mesh_size': 3, 'material': 2, 'load': 3, 'definition': 2, 'kinematics': 2})
     >>> st.open("results/nothing")

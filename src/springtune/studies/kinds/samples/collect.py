@@ -1,4 +1,4 @@
-"""Samples, gathered in the groups ``/samples``, ``/effects`` and ``/sobol``."""
+"""Samples, gathered in the groups ``/samples`` and ``/sobol``."""
 
 from dataclasses import replace
 from itertools import chain, product
@@ -47,22 +47,6 @@ SAMPLES = Group(
     further={"reference_applies": {"flag_values": np.array([0, 1], "int8"), "flag_meanings": "no yes"}},
 )
 
-EFFECT = ("quantity", "parameter", "bin", "load", "definition")
-
-EFFECTS = Group(
-    "/effects",
-    {
-        "parameter_value": (("parameter", "bin"), "1", "mean of the parameter in the bin, in its SI unit", nan),
-        "main_effect": (EFFECT, "1", "mean of the quantity in the bin, in its SI unit", nan),
-        "main_effect_error": (EFFECT, "1", "standard error of the mean, in its SI unit", nan),
-    },
-    dimensions={
-        "quantity": "what is looked at",
-        "parameter": "parameter that varies",
-        "bin": "part of the parameter's distribution, each of the same probability",
-    },
-)
-
 INDEX = ("quantity", "parameter", "load", "definition")
 OF_BASE = ("quantity", "load", "definition")
 
@@ -87,20 +71,15 @@ SOBOL = Group(
     dimensions={"quantity": "what is looked at", "parameter": "parameter that varies"},
 )
 
-MOST_BINS, BIN_POINTS = 16, 16
-"""Most parts of a parameter's distribution whose means are its main effect, and fewest points of each."""
-
 
 def groups(study, folder):
     """Groups of a dataset, see `springtune.studies.kinds.scenes.collect.groups`."""
     sample = study.parts["samples"]
     drawn, results = _stored(sample, folder / "samples")
-    points = sample.size * min(2, sample.each)
     axes = study.axes | {
         "sample": tuple(range(sample.rows)),
         "parameter": sample.varied,
         "quantity": sample.quantities,
-        "bin": tuple(range(min(MOST_BINS, max(4, points // BIN_POINTS)))),
     }
     # Without a mesh, as beyond limits, a network has no particles; other definitions may have a mesh.
     particles = np.max([results[key]["particles"] for key in results if key != DRAWN], axis=0)
@@ -109,9 +88,8 @@ def groups(study, folder):
     frames += chain.from_iterable(_of_load(load, sample, drawn, results, folder / "samples") for load in sample.loads)
     data = group.of_rows(axes, pd.concat(frames)).set_coords([*places])
     data.attrs = {name: getattr(sample, name) for name in ("design", "size", "seed", "mesh_type", "kinematics")}
-    lacking = LEFT_OUT if sample.design == SOBOL_INDICES else "scenes without a value are left out of main effects"
-    data.attrs |= {"failures": lacking, "varied": " ".join(sample.varied)}
-    found = {SAMPLES.name: data, EFFECTS.name: EFFECTS.of_rows(axes, pd.concat(_effects(sample, data, drawn, axes)))}
+    data.attrs["varied"] = " ".join(sample.varied)
+    found = {SAMPLES.name: data}
     if sample.design == SOBOL_INDICES:
         found[SOBOL.name] = SOBOL.of_rows(axes, pd.concat(_indices(sample, data))).assign_attrs(OF_INDICES)
     return found
@@ -209,18 +187,6 @@ def _values(sample, data):
         yield {"quantity": quantity, "load": load, "definition": name}, values
 
 
-def _effects(sample, data, drawn, axes):
-    """Means over each parameter alone, of rows that are independent of each other."""
-    each, bins = sample.each, len(axes["bin"])
-    alone = np.flatnonzero(np.arange(sample.rows) % each < 2)  # A and B
-    for parameter in sample.varied:
-        of, at = {"parameter": parameter, "bin": axes["bin"]}, drawn[parameter][alone]
-        yield pd.DataFrame(of | {"parameter_value": main_effect(at, at, bins)[0]})
-        for labels, values in _values(sample, data):
-            _, mean, error = main_effect(at, values[alone], bins)
-            yield pd.DataFrame(labels | of | {"main_effect": mean, "main_effect_error": error})
-
-
 def _indices(sample, data):
     """Sobol indices of each quantity, load and definition."""
     for labels, values in _values(sample, data):
@@ -291,23 +257,3 @@ def sobol_indices(at_a: np.ndarray, at_b: np.ndarray, at_ab: np.ndarray, least: 
     values = found[0], *np.quantile(found[1:], [(1 - LEVEL) / 2, (1 + LEVEL) / 2], axis=0)
     halves = zip(ORDERS, (slice(count), slice(count, None)))
     return {f"{order}_order{end}": one[half] for order, half in halves for end, one in zip(ENDS, values)}
-
-
-def main_effect(parameter: np.ndarray, values: np.ndarray, bins: int) -> np.ndarray:
-    """Return means of parameter and values, and the standard error of the latter, of bins with as many points each.
-
-    Shape (3, bins). Points have to be independent; their values are NaN where there is none.
-
-    Examples
-    --------
-    >>> x = np.linspace(0, 1, 8)
-    >>> main_effect(x, 2 * x, 2)[:2].round(2).tolist()
-    [[0.21, 0.79], [0.43, 1.57]]
-    """
-    found = np.full((3, bins), np.nan)
-    for place, part in enumerate(np.array_split(np.argsort(parameter, kind="stable"), bins)):
-        there = part[np.isfinite(values[part])]
-        if len(there):
-            found[:2, place] = parameter[there].mean(), values[there].mean()
-            found[2, place] = values[there].std(ddof=1) / np.sqrt(len(there)) if len(there) > 1 else np.nan
-    return found

@@ -356,9 +356,7 @@ def _tables(study):
 
 KIND = Kind(
     "samples",
-    study_fields={
-        "samples": optional(SamplesConfig, "Sampled scenes; they make the groups `/samples`, `/effects` and `/sobol`.")
-    },
+    study_fields={"samples": optional(SamplesConfig, "Sampled scenes; they make the groups `/samples` and `/sobol`.")},
     alone={"samples": ()},
     check=_check,
     expand=_expand,

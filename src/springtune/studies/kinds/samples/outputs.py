@@ -1,6 +1,5 @@
 """Figures and table of samples, and what the page to browse shows of them."""
 
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from ...config.kind import Output, needs, stem
@@ -17,34 +16,33 @@ QUANTITIES = {
     "deformation_error": "deformation error",
     "best_stiffness": "uniform stiffness without an error",
 }
-"""Quantities that have indices and main effects."""
+"""Quantities that have indices."""
 
 
-_lack = needs("samples", "shows sampled scenes and the study has none; add a section 'samples'")
+_lack_samples = needs("samples", "shows sampled scenes and the study has none; add a section 'samples'")
 
 
-def _lack_indices(study: "Study") -> str:
+def _lack(study: "Study") -> str:
     sample = study.parts["samples"]
     if sample and sample.design != SOBOL_INDICES:
         return f"shows Sobol indices, which a design '{sample.design}' has not; give design: {SOBOL_INDICES}"
-    return _lack(study)
+    return _lack_samples(study)
 
 
-def _each_load(name: str, study: "Study") -> dict[str, dict[str, str]]:
+def _figures(study: "Study") -> dict[str, dict[str, str]]:
     sample = study.parts["samples"]
-    return {stem(name, {"load": load}): {"load": load} for load in sample.loads} if sample else {}
+    return {stem("sobol", {"load": load}): {"load": load} for load in sample.loads} if sample else {}
 
 
-OUTPUTS = tuple(
+OUTPUTS = (
     Output(
-        name,
-        f"the figure of {shown} of samples",
-        figures=partial(_each_load, name),
-        plot=f"studies.kinds.samples.figures:{name}",
+        "sobol",
+        "the figure of Sobol indices of samples",
+        figures=_figures,
+        plot="studies.kinds.samples.figures:sobol",
         job="samples",
-        lack=lack,
-    )
-    for name, shown, lack in (("sobol", "Sobol indices", _lack_indices), ("effects", "main effects", _lack))
+        lack=_lack,
+    ),
 )
 
 OF_ERRORS = {"quantity": "deformation_error"}
@@ -74,12 +72,6 @@ VIEWS = (
             Plot("first order", "first_order", "parameter", "definition", "points", selection=OF_ERRORS),
             Plot("total order by quantity", "total_order", "parameter", "quantity", "map"),
         ),
-    ),
-    View(
-        "/effects",
-        "Main effects",
-        "Means of a quantity over one parameter, whatever the others are.",
-        (Plot("main effect", "main_effect", "parameter_value", "definition", along="bin", selection=OF_ERRORS),),
     ),
 )  # fmt: skip
 
