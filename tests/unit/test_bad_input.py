@@ -77,23 +77,12 @@ STUDIES = {
         "grids: 2652300 cells of all labels together (421 beam x 6300 mesh_size); a",
     ),
     "a long list": (SMALL.replace("5 mm", sizes(10_001)), "mesh_size: 10001 values; give at most 10000, or split"),
-    "lists in a list of names": (
-        SMALL.replace("lattice", str([["lattice"]] * 30)),
-        "definition[0]: a list instead of a name such as 'paper'; give",
-    ),
-    "a long name": (SMALL.replace("a: {length", "a" * 61 + ": {length"), "' cannot name a beam; use letters, digits"),
     "a long value": (SMALL.replace("5 mm", "5" * 2000 + " mm"), "5...', 2003 characters; give a length such as"),
     "a large file": (SMALL + "#" * 500_000, "larger than 500 kB, which no study is"),
-    "deep": (SMALL.replace("5 mm", "[" * 30 + "5 mm" + "]" * 30), "not a study: nested too deeply"),
-    "no date": (SMALL.replace("small", "2001-99-99"), ":2: not YAML: '2001-99-99' is no !!timestamp; put it in quotes"),
-    "a tag": (SMALL.replace("small", "!own small"), ":2: not YAML: 'small' has the unknown tag '!own'; remove it"),
-    "a sign": (SMALL.replace("small", "="), ":2: not YAML: '=' has the unknown tag '!!value'; remove it, or put"),
     "aliases of aliases": (
         "a0: &a0 [x, y]\n" + "".join(f"a{n}: &a{n} [*a{n - 1}, *a{n - 1}, *a{n - 1}]\n" for n in range(1, 30)),
         "study.yaml:1: more than 100000 values, aliases (*name) as what they stand for; give",
     ),
-    "a power of powers": (SMALL.replace("5 mm", "5 mm^9^9^9^9"), "unknown unit 'mm^9^9^9^9'"),
-    "beyond measure": (SMALL.replace("30 mm", "1e300 mm"), "'1e300 mm' is beyond all measure; give a length"),
 }
 
 

@@ -505,15 +505,6 @@ def content_of(name, study, folder):
 
 
 class TestRefusals:
-    def test_nothing_that_varies(self, refusal):
-        fixed = [(LENGTHS, "80 mm"), ("{from: 20 mm, to: 40 mm}", "40 mm"), (SIZES, "10 mm"), (RATIOS, "0.3")]
-        text = study_text(*fixed, ("{from: 1 N, to: 5 N}", "1 N"), (MODULI, "1 GPa"))
-        assert "nothing varies" in refusal(text)
-
-    def test_figures_of_what_a_study_has_not(self, refusal):
-        text = study_text(("size: 16", "size: 16\n  design: sobol"), outputs="sobol")
-        assert "design 'sobol' has not" in refusal(text)
-
     def test_a_definition_that_does_not_scale_is_refused(self, here):
         from springtune.springs import Springs, definition
 
