@@ -3,8 +3,6 @@
 import base64
 import json
 import re
-import subprocess
-import sys
 import zlib
 
 import h5netcdf
@@ -132,14 +130,6 @@ class TestPage:
                 assert {plot.value, plot.x, *beside} <= set(variables) | dimensions, plot.title
                 assert {plot.by, plot.along} - {""} <= dimensions, plot.title
                 assert set(plot.selection) <= dimensions, plot.title
-
-    def test_imports_nothing_heavy(self):
-        code = (
-            "import sys, springtune.studies.output.browse.page\n"
-            "print(sorted({'xarray', 'matplotlib', 'scipy', 'bokeh', 'pydantic', 'snakemake'} & set(sys.modules)))"
-        )
-        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-        assert done.stdout == "[]\n", done.stderr
 
 
 class TestCommand:

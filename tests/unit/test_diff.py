@@ -6,28 +6,17 @@ import tracemalloc
 import numpy as np
 import pytest
 import xarray as xr
-from click.testing import CliRunner
 
 import springtune as st
-from springtune.cli import main
 from springtune.studies.kinds.benchmark.kind import VARIABLES
 from springtune.studies.kinds.scenes.variables import ROOT, SENSITIVITY
 from springtune.studies.output import dataset
 from springtune.studies.output.comparison import Tolerance, compare
 
 import synthetic
-from tables import refused_calls
+from tables import SMALL_AXES as AXES
+from tables import refused_calls, run
 
-AXES = {
-    "beam": ("200x40", "100x20"),
-    "mesh_type": ("structured", "free"),
-    "mesh_size": (2e-3, 5e-3),
-    "material": ("steel",),
-    "load": ("traction", "bending"),
-    "definition": ("lattice", "patch"),
-    "kinematics": ("linear",),
-    "stiffness_ratio": (0.5, 1.0, 1.5),
-}
 SCENE = {
     "beam": "100x20", "mesh_type": "free", "mesh_size": 5e-3, "material": "steel", "load": "bending",
     "definition": "patch", "kinematics": "linear",
@@ -41,10 +30,6 @@ HELD = {
 """Variables of the datasets that are compared."""
 
 ATTRIBUTES = {"study": "small", "springtune_version": "0", "config": "title: small\nbeams: 1\n"}
-
-
-def run(*arguments):
-    return CliRunner().invoke(main, [str(argument) for argument in arguments])
 
 
 def made(**axes):

@@ -25,7 +25,7 @@ from springtune.studies.output.drawing import NETWORK_LINE
 from springtune.studies.output.style import png_and_pdf
 from springtune.studies.runs.keys import closure
 
-from synthetic import BEAMS, DEFINITIONS, LOADS, SIZES, TYPES, dataset, moduli
+from synthetic import BEAMS, DEFINITIONS, LOADS, SIZES, TYPES, dataset
 
 
 @pytest.fixture(autouse=True)
@@ -278,16 +278,31 @@ def test_an_engine_carries_its_least_errors_over_the_time_of_a_frame(tree):
 # -- what is refused ---------------------------------------------------------------------------------------------------
 
 
-def test_a_choice_that_is_left_is_named_with_its_labels(tree):
-    with pytest.raises(ValueError, match="choose one beam: '100x20', '200x40'"):
-        st.plot_sensitivity(tree, **SCENES)
-    with pytest.raises(ValueError, match="choose one scene: 'traction', 'bending'"):
-        st.plot_benchmark(tree)
-
-
-def test_a_label_that_is_not_there_is_answered_with_those_that_are(tree):
-    with pytest.raises(ValueError, match="nothing has load 'torsion'; there is 'traction', 'compression', 'pressure'"):
-        st.plot_size(tree, **SCENES | {"load": "torsion"})
+@pytest.mark.parametrize(
+    ("plot", "group", "selection", "said"),
+    [
+        (st.plot_sensitivity, "/", SCENES, "choose one beam: '100x20', '200x40'"),
+        (st.plot_benchmark, "/", {}, "choose one scene: 'traction', 'bending'"),
+        (
+            st.plot_size,
+            "/",
+            SCENES | {"load": "torsion"},
+            "nothing has load 'torsion'; there is 'traction', 'compression',",
+        ),
+        (st.plot_deformed, "fields", {}, "give the whole dataset"),
+        (st.plot_block, "fields", {}, "give the whole dataset"),
+        (st.plot_laying, "moduli", {}, "no group '/laying'; it has '/moduli'"),
+        (st.plot_stability_maps, "stability", {}, "no experiment 'maps'; it has 'limits', 'rest'"),
+    ],
+)
+def test_a_refused_plot_names_what_there_is(tree, plot, group, selection, said):
+    data = tree if group == "/" else tree[group].to_dataset()
+    if group == "moduli":
+        data = xr.DataTree.from_dict({"/moduli": data})
+    if group == "stability":
+        data = data.sel(experiment=["limits", "rest"])
+    with pytest.raises(ValueError, match=said):
+        plot(data, **selection)
 
 
 def test_the_only_label_is_taken(tree):
@@ -295,17 +310,6 @@ def test_the_only_label_is_taken(tree):
     data["status"] = data.status.where((data.beam == "200x40") & (data["load"] == "pressure"), 0)
     axes = st.plot_sensitivity(data, mesh_type="free", material="rubber")
     assert axes.get_title("left") == "200x40, free, rubber, pressure"  # a curve alone does not say how long a beam is
-
-
-def test_a_group_or_an_experiment_that_is_missing_is_named(tree):
-    with pytest.raises(ValueError, match="no group '/laying'; it has '/moduli'"):
-        st.plot_laying(xr.DataTree.from_dict({"/moduli": moduli()}))
-    for plot in (st.plot_deformed, st.plot_block):
-        with pytest.raises(ValueError, match="give the whole dataset"):
-            plot(tree["fields"].to_dataset())
-    data = tree["stability"].to_dataset().sel(experiment=["limits", "rest"])
-    with pytest.raises(ValueError, match="no experiment 'maps'; it has 'limits', 'rest'"):
-        st.plot_stability_maps(data)
 
 
 def test_figures_of_a_load_without_the_main_kinematics_are_of_its_own(tree):
@@ -347,12 +351,9 @@ def test_the_stage_draws_what_it_is_told(tree, tmp_path):
     small, curves = tree.to_dataset().sel(chosen), tree["sensitivity"].to_dataset().sel(chosen)
     root = small.assign_attrs(springtune_version="1")
     xr.DataTree.from_dict({"/": root, "/sensitivity": curves}).to_netcdf(path, engine="h5netcdf")
-    stems = [
-        "size_structured_steel_traction",
-        "size_free_steel_traction",
-        "sensitivity_100x20_structured_steel_traction",
-        "sensitivity_100x20_free_steel_traction",
-    ]
+    kinds = [f"size_{name}" for name in ("structured", "free")]
+    kinds += [f"sensitivity_100x20_{name}" for name in ("structured", "free")]
+    stems = [f"{kind}_steel_traction" for kind in kinds]
     made = present.run(path, tmp_path, "size", "sensitivity")
     assert made == [tmp_path / f"figures/{stem}.{ending}" for stem in stems for ending in FORMATS]
     files = sorted(path.name for path in (tmp_path / "figures").iterdir())
@@ -412,16 +413,10 @@ def said(panel):
     return [text.get_text() for text in panel.figure.findobj(Text)]
 
 
-@pytest.fixture
-def beyond():
-    """A dataset none of whose references applies."""
-    tree = dataset()
-    applies = tree.status.isel(mesh_type=0, mesh_size=0, definition=0, drop=True)
-    tree.dataset = tree.to_dataset().assign(reference_applies=0 * applies)
-    return tree
-
-
-def test_what_is_beyond_the_reference_is_marked(tree, beyond):
+def test_what_is_beyond_the_reference_is_marked(tree):
+    """Of a dataset none of whose references applies."""
+    beyond, applies = dataset(), tree.status.isel(mesh_type=0, mesh_size=0, definition=0, drop=True)
+    beyond.dataset = beyond.to_dataset().assign(reference_applies=0 * applies)
     assert "hollow: beyond small strain" in " ".join(said(st.plot_size(beyond, **SCENES)[0]))
     (panel, *_) = st.plot_size(beyond, **SCENES)
     hollow = [line for line in panel.get_lines() if line.get_markerfacecolor() == "white"]
@@ -448,17 +443,11 @@ def test_signed_errors_say_once_what_their_sign_means():
 
 @pytest.mark.parametrize("plot", [st.plot_size, st.plot_definitions_size])
 def test_one_mesh_size_is_no_column_of_dots(tree, plot):
-    selection = EVERY_PLOT[plot][0]
-    for panel in plot(group_of_one_size(tree), **selection):
-        drawn = [line for line in panel.get_lines() if set(line.get_label().split(", ")) & {*DEFINITIONS}]
-        places = [place for line in drawn for place in line.get_xdata()]
+    for panel in plot(tree.to_dataset().isel(mesh_size=[-1]), **EVERY_PLOT[plot][0]):
+        lines = [line for line in panel.get_lines() if set(line.get_label().split(", ")) & {*DEFINITIONS}]
+        places = [place for line in lines for place in line.get_xdata()]
         assert panel.get_xscale() == "linear" and panel.get_xlabel().startswith("One mesh size, ")
         assert places and len(set(places)) == len(places) and not len(panel.get_xticks())
-
-
-def group_of_one_size(tree):
-    """Root of a dataset with its coarsest mesh alone."""
-    return tree.to_dataset().isel(mesh_size=[-1])
 
 
 def test_counts_and_shares_of_large_strains_look_different(tree):

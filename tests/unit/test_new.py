@@ -6,22 +6,17 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 
 import springtune as st
-from springtune.cli import main
 from springtune.cli.run import SLURM
 from springtune.mesh import MESH_TYPES
 from springtune.problem.loads import LOADS
 from springtune.studies.kinds import load_study
 
 from campaigns import Campaign
+from tables import refused_calls, run
 
 REPOSITORY = Path(__file__).parents[2]
-
-
-def run(*arguments):
-    return CliRunner().invoke(main, [str(argument) for argument in arguments])
 
 
 def refused(result, code, *said):
@@ -131,27 +126,14 @@ class TestNew:
         Path("config/gone.yaml").symlink_to("nowhere")
         refused(run("new", "gone"), 1, "is there already")
 
-    @pytest.mark.parametrize(
-        ("given", "said"),
-        [
-            ("a b", "'a b' cannot name a study; use letters, digits"),
-            (".hidden", "cannot name a study"),
-            ("", "cannot name a study"),
-            ("..", "cannot name a study"),
-            ("x" * 61, "cannot name a study"),
-            ("none/mine", "none: there is no such folder; make it, or name another"),
-            ("config", None),
-        ],
-    )
-    def test_names_that_cannot_be_are_told(self, checkout, given, said):
+    @pytest.mark.parametrize(("given", "code", "said"), refused_calls("new"))
+    def test_names_that_cannot_be_are_told(self, checkout, given, code, said):
         before = {path for path in checkout.rglob("*.yaml")}
-        result = run("new", given)
-        if said is None:  # a name like any other
-            assert result.exit_code == 0 and Path("config/config.yaml").is_file()
-            return
-        # A folder that is not there is no mistake in the name.
-        refused(result, 1 if given == "none/mine" else 2, said)
+        refused(run("new", *given), code, said)
         assert {path for path in checkout.rglob("*.yaml")} == before
+
+    def test_a_folders_name_is_a_name_like_any_other(self, checkout):
+        assert run("new", "config").exit_code == 0 and Path("config/config.yaml").is_file()
 
     def test_a_place_that_takes_no_file_is_told(self):
         refused(run("new", "/proc/self/mine"), 1, "/proc/self/mine.yaml: cannot be written: ", "; name another place")
@@ -166,18 +148,7 @@ class TestRun:
         run("new", "two")
         (checkout / "config/folder.yaml").mkdir()
 
-    @pytest.mark.parametrize(
-        ("arguments", "code", "said"),
-        [
-            (["config/one.yaml", "config/two.yaml"], 2, "one study at a time: springtune run config/one.yaml, then"),
-            (["config/one.yaml", "-n", "config/two.yaml"], 2, "one study at a time"),
-            (["config/folder.yaml"], 1, "config/folder.yaml: cannot be read: Is a directory; give the path of a study"),
-            (["config/three.yaml"], 1, "config/three.yaml: cannot be read: No such file or directory"),
-            (["one"], 1, "; did you mean config/one.yaml?"),
-            (["one.yaml"], 1, "; did you mean config/one.yaml?"),
-            (["results/one"], 1, "; did you mean config/one.yaml?"),
-        ],
-    )
+    @pytest.mark.parametrize(("arguments", "code", "said"), refused_calls("run"))
     def test_a_study_that_is_none_is_told(self, arguments, code, said):
         result = run("run", *arguments)
         assert result.exit_code == code and said in result.stderr

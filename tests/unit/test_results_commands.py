@@ -19,22 +19,8 @@ from springtune.cli import main
 from springtune.studies.kinds.scenes.variables import FIELDS, ROOT, SENSITIVITY
 from springtune.studies.output import dataset, scene_files
 
-from tables import refused_calls
-
-AXES = {
-    "beam": ("200x40", "100x20"),
-    "mesh_type": ("structured", "free"),
-    "mesh_size": (2e-3, 5e-3),
-    "material": ("steel",),
-    "load": ("traction", "bending"),
-    "definition": ("lattice", "patch"),
-    "kinematics": ("linear",),
-    "stiffness_ratio": (0.5, 1.0, 1.5),
-}
-
-
-def run(*arguments):
-    return CliRunner().invoke(main, [str(argument) for argument in arguments])
+from tables import SMALL_AXES as AXES
+from tables import refused_calls, run
 
 
 def refused(result, *said, code=1):

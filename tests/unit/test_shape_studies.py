@@ -43,6 +43,11 @@ def done(study, folder):
     return tree, (folder / "summary.txt").read_text()
 
 
+def scenes(study, folder):
+    """Scenes of the dataset of a study of shapes."""
+    return done(study, folder)[0]["shapes"].to_dataset().squeeze(drop=True)
+
+
 # -- what a study may hold ---------------------------------------------------------------------------------------------
 
 
@@ -209,23 +214,7 @@ def test_what_cannot_be_solved_is_a_hole_that_says_why(load, tmp_path):
 
 # -- files -------------------------------------------------------------------------------------------------------------
 
-PLATE = {
-    "title": "A plate of a file",
-    "materials": {"steel": {"young_modulus": "210 GPa", "poisson_ratio": 0.3}},
-    "shapes": {
-        "plate": {
-            "file": "plate.msh",
-            "loads": {
-                "pull": {
-                    "supports": {"left": "fixed"},
-                    "forces": {"right": ["1 kN", 0]},
-                    "quantities": {"stretch": {"displacement": "x", "of": "right"}},
-                }
-            },
-        }
-    },
-    "shape_grids": {"plate": {"shape": "plate", "material": "steel", "definition": "delingette"}},
-}
+PLATE = yaml.safe_load(STUDIES["shape_plate"])
 
 
 @pytest.fixture
@@ -238,8 +227,7 @@ def plate(tmp_path):
 def test_a_file_is_the_mesh_and_the_geometry(load, plate, tmp_path):
     study = load(yaml.safe_dump(PLATE))
     assert study.parts["shapes"].scenes[0].mesh_type == "file" and study.axes["mesh_size"] == (0.0,)
-    tree, _ = done(study, tmp_path / "results/study")
-    cell = tree["shapes"].to_dataset().squeeze(drop=True)
+    cell = scenes(study, tmp_path / "results/study")
     assert int(cell.particles) == len(plate.mesh.points) and STATUS[int(cell.status)] == "solved"
     assert abs(float(cell.error)) < 0.01
     # The file is part of the keys, its place is not.
@@ -254,27 +242,22 @@ def test_a_file_is_the_mesh_and_the_geometry(load, plate, tmp_path):
     assert mesh_key(part, part.scenes[0]) != before
 
 
-def test_groups_of_a_file_are_looked_at_as_the_study_is_read(refusal, plate):
-    text = yaml.safe_dump(PLATE)
-    message = refusal(text.replace("right", "rihgt"))
-    assert "shapes.plate.loads.pull" in message and "no group is named 'rihgt'; did you mean 'right'?" in message
-    assert "supports leave the body free to" in refusal(text.replace("left: fixed", "left: {x: 0}"))
-    assert "is not a file; give its path relative to the study's folder" in refusal(text.replace("plate.msh", "no.msh"))
-    assert "'plate' is a mesh file, which has its own; remove it" in refusal(
-        text.replace("definition: delingette", "definition: delingette\n    mesh_size: 5 mm")
-    )
-    assert "unknown part 'core'; the file has none" in refusal(
-        text.replace("    file:", "    parts: {core: steel}\n    file:")
-    )
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("right", "rihgt", ["shapes.plate.loads.pull", "no group is named 'rihgt'; did you mean 'right'?"]),
+        ("left: fixed", "left: {x: 0}", ["supports leave the body free to"]),
+        ("plate.msh", "no.msh", ["is not a file; give its path relative to the study's folder"]),
+        ("definition:", "mesh_size: 5 mm\n    definition:", ["'plate' is a mesh file, which has its own; remove it"]),
+        ("    file:", "    parts: {core: steel}\n    file:", ["unknown part 'core'; the file has none"]),
+    ],
+)
+def test_groups_of_a_file_are_looked_at_as_the_study_is_read(refusal, plate, old, new, said):
+    message = refusal(yaml.safe_dump(PLATE).replace(old, new))
+    assert all(part in message for part in said), message
 
 
-TWO = yaml.safe_load(yaml.safe_dump(PLATE))
-TWO["materials"] = {
-    "steel": {"young_modulus": "210 GPa", "poisson_ratio": 0},
-    "polymer": {"young_modulus": "2 GPa", "poisson_ratio": 0},
-    "other": {"young_modulus": "3 Pa", "poisson_ratio": 0},
-}
-TWO["shapes"]["plate"]["loads"]["pull"]["supports"] = {"left": {"x": 0}, "lower": {"y": 0}}
+TWO = yaml.safe_load(STUDIES["shape_plate_of_two"])
 STRETCH = 1e3 / (0.04 * 1e-3) * (0.05 / 210e9 + 0.05 / 2e9)
 """Of the plate, its left half of steel, its right half of a polymer [m]."""
 
@@ -332,7 +315,7 @@ def test_each_part_of_a_file_has_its_material(load, refusal, tmp_path, monkeypat
         path.write_bytes(
             b"$Comments\n" + READ_AT_ONCE // 10 * b"nothing at all\n" + b"$EndComments\n" + path.read_bytes()
         )
-        cell = done(load(text), tmp_path / "results/large")[0]["shapes"].to_dataset().squeeze(drop=True)
+        cell = scenes(load(text), tmp_path / "results/large")
         assert STATUS[int(cell.status)] == "failed" and "the body has the parts" in cell.message.item()
 
 
@@ -384,12 +367,10 @@ def test_a_large_file_costs_its_own_scenes(load, plate, tmp_path):
     comment = b"$Comments\n" + READ_AT_ONCE // 10 * b"nothing at all\n" + b"$EndComments\n"
     path = tmp_path / "plate.msh"
     path.write_bytes(comment + path.read_bytes())
-    tree, _ = done(load(yaml.safe_dump(PLATE).replace("right", "rihgt")), tmp_path / "results/study")
-    cell = tree["shapes"].to_dataset().squeeze(drop=True)
+    cell = scenes(load(yaml.safe_dump(PLATE).replace("right", "rihgt")), tmp_path / "results/study")
     assert STATUS[int(cell.status)] == "failed" and "no group is named 'rihgt'" in cell.message.item()
     path.write_bytes(comment + b"$MeshFormat\n")
-    tree, _ = done(load(yaml.safe_dump(PLATE)), tmp_path / "results/broken")
-    cell = tree["shapes"].to_dataset().squeeze(drop=True)
+    cell = scenes(load(yaml.safe_dump(PLATE)), tmp_path / "results/broken")
     assert STATUS[int(cell.status)] == "failed" and cell.message.item().startswith("mesh: ")
 
 
@@ -409,19 +390,11 @@ def test_references_are_told_apart_whatever_they_are_called(load, tmp_path):
     content["materials"] = {"c": third, "b_c": third | {"young_modulus": "2 MPa"}}
     content["shapes"] = {"a": one, "a_b": one}
     grid = content["shape_grids"]["all"]
-    content["shape_grids"] = {
-        "one": grid | {"shape": "a", "material": "b_c"},
-        "other": grid | {"shape": "a_b", "material": "c"},
-    }
+    pairs = {"one": ("a", "b_c"), "other": ("a_b", "c")}
+    content["shape_grids"] = {name: grid | {"shape": a, "material": b} for name, (a, b) in pairs.items()}
     jobs = plan(load(yaml.safe_dump(content)), tmp_path / "results", 1).jobs.values()
-    tasks = [
-        task
-        for job in jobs
-        if job.stage.name == "shape_reference"
-        for file in job.content["files"]
-        for task in file["tasks"]
-    ]
-    assert len({task["key"] for task in tasks}) == 2
+    files = [file for job in jobs if job.stage.name == "shape_reference" for file in job.content["files"]]
+    assert len({task["key"] for file in files for task in file["tasks"]}) == 2
 
 
 def test_twins_are_counted_as_often_as_they_are_computed(load, tmp_path):
@@ -447,8 +420,7 @@ def test_scenes_whose_mesh_could_not_be_made_are_holes_that_say_why(load, tmp_pa
 def test_a_scene_that_cannot_be_stated_is_a_hole(load, tmp_path):
     """All its force is on what is held: known once there is a mesh."""
     text = COOK.replace("forces: {right: [0, 1 N]}", "forces: {left: [0, 1 N]}")
-    tree, _ = done(load(text), tmp_path / "results/study")
-    data = tree["shapes"].to_dataset()
+    data = scenes(load(text), tmp_path / "results/study")
     assert {STATUS[number] for number in data.status.values.ravel()} == {"failed"}
     assert all("neither pulls what is free" in message for message in data.message.values.ravel().tolist())
 
@@ -458,8 +430,7 @@ def test_anisotropic_materials_are_told_without_their_names(load, tmp_path):
         "{young_modulus: 1 MPa, poisson_ratio: 0.3333333333333333}",
         "{young_modulus_x: 2 MPa, young_modulus_y: 1 MPa, poisson_ratio_xy: 0.3, shear_modulus: 1 MPa}",
     )
-    tree, _ = done(load(text), tmp_path / "results/study")
-    messages = tree["shapes"].to_dataset().message.sel(definition="lattice").values.ravel().tolist()
+    messages = scenes(load(text), tmp_path / "results/study").message.sel(definition="lattice").values.ravel().tolist()
     assert all("needs an isotropic material and this one is anisotropic" in message for message in messages)
 
 
@@ -472,10 +443,8 @@ def test_errors_of_rubber_are_against_its_law_at_finite_strain(load, tmp_path):
     grid |= {"definition": ["neo-hooke", "delingette", "lattice"], "kinematics": ["nonlinear", "linear"]}
     grid |= {"mesh_size": "8 mm", "finite_strain": True}
     study = load(yaml.safe_dump(config, sort_keys=False))
-    assert [law for *_, law in study.parts["shapes"].finite] == [
-        "st-venant",
-        "rubber",
-    ] * 2  # as definitions are ordered
+    laws = [law for *_, law in study.parts["shapes"].finite]
+    assert laws == ["st-venant", "rubber"] * 2  # as definitions are ordered
     tree, _ = done(study, tmp_path / "results/study")
     finite, data = tree["shapes_finite_strain"].to_dataset(), tree["shapes"].to_dataset()
     references = finite.reference_value.sel(shape="cook", material="third", quantity="tip")

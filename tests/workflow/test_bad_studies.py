@@ -6,10 +6,8 @@ import sys
 import meshio
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import springtune as st
-from springtune.cli import main
 from springtune.mesh import write_mesh
 
 from tables import STUDIES
@@ -21,18 +19,6 @@ def test_run_passes_on_what_is_snakemakes(repository, tmp_path):
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0 and "collect" in done.stdout.split()
     assert [path.name for path in tmp_path.iterdir()] == [".snakemake"]
-
-
-@pytest.mark.parametrize(
-    ("arguments", "says"),
-    [
-        (["-n", "config/mine.yaml"], "name the study first: springtune run config/mine.yaml -n"),
-        (["--configfile", "config/mine.yaml"], "give the study itself, without --configfile"),
-    ],
-)
-def test_run_called_wrongly_exits_with_2(arguments, says):
-    told = CliRunner().invoke(main, ["run", *arguments])
-    assert told.exit_code == 2 and says in told.stderr
 
 
 FILES = STUDIES["bad_studies_files"]
