@@ -85,7 +85,7 @@ def predict(
     """Recommend a definition and its stiffness for one mesh, with its error under some loads; or find the mesh.
 
     Every choice is solved on the mesh, with linear kinematics, and compared with the converged reference of small
-    strain; a mesh too large for that has bands from coarser ones. With --error, meshes from coarse to fine are solved
+    strain. With --error, meshes from coarse to fine are solved
     so, until the error is kept on one and on the finer ones tried, up to one with twice as many cells across.
     A shape of a study has errors in the quantities that its load case asks for.
 
@@ -139,34 +139,28 @@ def _subject(body: Asked, known: Any) -> "Subject":
 def _on_mesh(body: Asked, under: dict[str, Any], springs_alone: bool, also: tuple[str, ...]) -> Answer:
     """Best definition for one mesh."""
     from ..mesh.types import MESH_TYPES
-    from ..prediction.bands import extrapolate
-    from ..prediction.choices import SOLVED, SOLVED_FROM_FILE, predict, references, shape_references
+    from ..prediction.choices import MOST_SOLVED, predict, references, shape_references
     from .recommendation import prediction_text, recommended
 
-    about, size, sizes = 0.0, body.size, list[float]()
-    if body.is_beam and size is not None:
-        about = MESH_TYPES[body.mesh_type].particles(body.body.length, body.body.height, size)
-    if about > SOLVED and size is not None:
-        if also:
-            raise ValueError(f"--best-springs: the mesh has more than {SOLVED} particles; give a larger --size")
-        known: Any = references(body.body, body.material, **under)
-        found, sizes = extrapolate(body.mesh_type, size, body.body, body.material, known, **under)
-        counts = f"about {about:.2g} particles"
-    else:
+    count, mesh = 0.0, None
+    if body.is_beam and body.size is not None:  # counted before it is made
+        count = MESH_TYPES[body.mesh_type].particles(body.body.length, body.body.height, body.size)
+    if count <= MOST_SOLVED:
         mesh = body.mesh if body.is_beam else body.mesh.mesh
-        if len(mesh.points) > SOLVED_FROM_FILE:
-            raise click.ClickException(
-                f"'{body.mesh_name}' has {len(mesh.points)} particles, more than the {SOLVED_FROM_FILE} that are "
-                "solved here; give a coarser mesh, or make it a mesh of a study"
-            )
-        known = references(body.body, body.material, **under) if body.is_beam else shape_references(_statement(body))
-        found = predict(body.body, body.mesh, body.material, known, **under, also=also)
-        counts = f"{len(mesh.points)} particles, {len(mesh.edges)} springs"
+        count = len(mesh.points)
+    if mesh is None or count > MOST_SOLVED:
+        raise click.ClickException(
+            f"'{body.mesh_name}' has {count:.0f} particles, more than the {MOST_SOLVED} that are solved here; give a "
+            "coarser mesh, or make it a mesh of a study"
+        )
+    known: Any = references(body.body, body.material, **under) if body.is_beam else shape_references(_statement(body))
+    found = predict(body.body, body.mesh, body.material, known, **under, also=also)
+    counts = f"{len(mesh.points)} particles, {len(mesh.edges)} springs"
     found = [choice for choice in found if not (springs_alone and choice.energies)]
     best, _ = recommended(found)
     none = "nothing is recommended for this mesh, so nothing is written; take another mesh"
     make = partial(_recommended_net, body, best.definition if best else None, under.get("loads"), none)
-    return prediction_text(_subject(body, known), body.mesh_name, counts, found, sizes), make
+    return prediction_text(_subject(body, known), body.mesh_name, counts, found), make
 
 
 def _on_meshes(body: Asked, under: dict[str, Any], springs_alone: bool, error: str, mesh_types: str | None) -> Answer:

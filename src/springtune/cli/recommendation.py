@@ -73,15 +73,8 @@ def shape_subject(statement: "ShapeStatement", known: Any) -> Subject:
     return Subject(f"{statement.shape.name}, load {statement.load}", made_of, known, compared, False)
 
 
-def prediction_text(
-    subject: Subject, mesh_name: str, counts: str, choices: "Sequence[Choice]", sizes: Sequence[float] = ()
-) -> str:
-    """Text of a prediction; `sizes` [m] are of the meshes that bands are extrapolated from."""
-    solved = "solved on this mesh"
-    if sizes:
-        low, high = 1e3 * min(sizes), 1e3 * max(sizes)
-        mesh_type = mesh_name.partition(" ")[0]
-        solved = f"bands, extrapolated from solutions on {len(sizes)} {mesh_type} meshes of {low:.3g} to {high:.3g} mm"
+def prediction_text(subject: Subject, mesh_name: str, counts: str, choices: "Sequence[Choice]") -> str:
+    """Text of a prediction."""
     rows = TabledList(choices).table()
     best = {one.definition: one for one in recommended(choices) if one}
     first, plain = (one.definition if one else "none" for one in recommended(choices))
@@ -93,7 +86,7 @@ def prediction_text(
         "",
         aligned(rows, left=2, right=range(3, len(rows[0]) - 1)),
         "",
-        *subject.meaning(solved),
+        *subject.meaning("solved on this mesh"),
         "The first row is the best one by its worst error."
         + (" E, its error, and nu are of a patch test between rollers, in the plane." if subject.of_beam else ""),
         *_also_tried(choices),
@@ -118,7 +111,7 @@ def recommended(choices: "Sequence[Choice]") -> "tuple[Choice | None, Choice | N
 
 def _worst(subject: Subject, choice: "Choice") -> str:
     """Largest error of a choice, its load or quantity, and what its sign means."""
-    bounds = [(error, name) for name, value in choice.errors.items() for error in np.ravel(value) if error == error]
+    bounds = [(error, name) for name, error in choice.errors.items() if error == error]
     worst, name = max(bounds, key=lambda one: abs(one[0]))
     words = [name, sign_word(worst, *subject.compared[name])]
     return f"{choice.definition} {error_text(worst)} ({', '.join(filter(None, words))})"

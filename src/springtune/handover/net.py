@@ -428,10 +428,14 @@ def _expected_errors(
 
 def _too_many(sheet: Sheet) -> str:
     """Return why expected errors are not computed on so large a mesh, or an empty string."""
-    from ..prediction.choices import SOLVED
+    from ..prediction.choices import MOST_SEARCHED
 
     count = len(sheet.mesh.points)
-    return f"{NOT_COMPUTED}: {count} particles, and at most {SOLVED} are solved for a header" if count > SOLVED else ""
+    return (
+        f"{NOT_COMPUTED}: {count} particles, and at most {MOST_SEARCHED} are solved for a header"
+        if count > MOST_SEARCHED
+        else ""
+    )
 
 
 def _in_words(errors: dict[str, float | str], known: Mapping[str, Any]) -> dict[str, float | str]:

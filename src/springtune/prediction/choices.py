@@ -48,17 +48,14 @@ ALIKE = 1e-5
 EQUAL = 1e-11
 """Relative difference below which stiffness matrices count as equal, but for rounding."""
 
-SOLVED, SOLVED_FROM_FILE = 20_000, 100_000
-"""Particles up to which a mesh is solved, in some six seconds; up to which one from a file is, in a minute."""
+MOST_SEARCHED, MOST_SOLVED = 20_000, 100_000
+"""Particles up to which meshes are searched, in some six seconds each; up to which one is solved, in a minute."""
 
 
 ROUNDED = 1e-9
 """Largest error by rounding [1]; references of closed form have a smaller estimate."""
 
 _T = TypeVar("_T")
-
-Number = float | tuple[float, float]
-"""A number, or the two bounds of a band."""
 
 References = dict[str, ReferenceSolution | str]
 """References of 1 N by load, or why one is missing."""
@@ -78,8 +75,6 @@ ShapeReferences = dict[str, QuantityReference | str]
 @dataclass(frozen=True, repr=False)
 class Choice(Tabled):
     """A definition on a mesh: its stiffness, and what it gets wrong there.
-
-    Numbers are those of the mesh. Where it is too large to solve they are bands, pairs of a lower and an upper bound.
 
     Attributes
     ----------
@@ -124,13 +119,13 @@ class Choice(Tabled):
     """
 
     definition: str
-    inside: Number
-    outline: Number
+    inside: float
+    outline: float
     extra: str
     energies: bool
-    errors: dict[str, Number]
-    young_modulus_error: Number
-    poisson_ratio: Number
+    errors: dict[str, float]
+    young_modulus_error: float
+    poisson_ratio: float
     failures: dict[str, str] = field(default_factory=dict)
     tried: tuple[str, ...] = ()
 
@@ -142,13 +137,13 @@ class Choice(Tabled):
     def _rows(self) -> Iterator[tuple[str, str]]:
         yield "definition", self.definition
         for label, value in (("springs inside", self.inside), ("on the outline", self.outline)):
-            yield label, bounds_text(value, "{:.5g} N/m".format, "each its own")
+            yield label, number_text(value, "{:.5g} N/m".format, "each its own")
         for name, error in self.errors.items():
-            yield name, bounds_text(error, error_text, self._missing(name))
+            yield name, number_text(error, error_text, self._missing(name))
         missing = self._missing("patch test")
         if missing != NO_REFERENCE or self.young_modulus_error == self.young_modulus_error:
-            yield "E", bounds_text(self.young_modulus_error, error_text, missing)
-            yield "nu", bounds_text(self.poisson_ratio, lambda ratio: f"{round(ratio, 3) + 0.0:.3f}", missing)
+            yield "E", number_text(self.young_modulus_error, error_text, missing)
+            yield "nu", number_text(self.poisson_ratio, lambda ratio: f"{round(ratio, 3) + 0.0:.3f}", missing)
         yield "besides springs", self.extra
 
     def _missing(self, part: str) -> str:
@@ -163,17 +158,14 @@ class Choice(Tabled):
 NO_REFERENCE = "no reference"
 
 
-def worst_of(errors: Iterable[Number]) -> float:
-    """Largest size of errors or of the bounds of their bands [1]; infinite if all are missing."""
-    sizes = np.abs([np.broadcast_to(error, 2) for error in errors])
-    return inf if np.isnan(sizes).all() else float(np.nanmax(sizes))
+def worst_of(errors: Iterable[float]) -> float:
+    """Largest size of errors [1]; infinite if all are missing."""
+    return max((abs(error) for error in errors if error == error), default=inf)
 
 
-def bounds_text(value: Number, form: Callable[[float], str], missing: str) -> str:
-    """A number, or the bounds of a band, as text."""
-    numbers = value if isinstance(value, tuple) else (value,)
-    texts = [missing if number != number else form(number) for number in numbers]
-    return texts[0] if len(set(texts)) == 1 else " to ".join(texts)
+def number_text(value: float, form: Callable[[float], str], missing: str) -> str:
+    """A number as text, or a word for a missing one."""
+    return form(value) if value == value else missing
 
 
 def check_beam(beam: Beam) -> None:
@@ -552,7 +544,7 @@ class Trial:
         """Choice of a definition; one without springs has NaN for all numbers."""
         springs = self.springs(name)
         if springs is None:
-            errors: dict[str, Number] = dict.fromkeys(self.known, nan)
+            errors: dict[str, float] = dict.fromkeys(self.known, nan)
             return Choice(name, nan, nan, "", False, errors, nan, nan, self.failures[name])
         found = self.errors(name)
         failures = {label: error for label, error in found.items() if isinstance(error, str)}

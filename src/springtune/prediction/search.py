@@ -29,10 +29,9 @@ from ..problem.shapes import Shape
 from ..safe_io.tables import Tabled, mesh_size_text
 from ..scene.meshes import A_MATERIAL, is_a
 from ..scene.statements import ShapeStatement, Statement
-from .bands import FEWEST_CELLS
 from .choices import (
     CASES,
-    SOLVED,
+    MOST_SEARCHED,
     Choice,
     QuantityReference,
     References,
@@ -40,11 +39,11 @@ from .choices import (
     Trial,
     as_sure_as,
     beam_statements,
-    bounds_text,
     check_beam,
     check_loads,
     check_names,
     in_order,
+    number_text,
     only_load,
     references,
     shape_references,
@@ -66,6 +65,9 @@ tried between two of these, where the coarsest mesh is."""
 
 BETWEEN_DIVISIONS = (0.98, 0.95, 0.9, 0.83, 0.7, 0.56)
 """Sizes between whole divisions that an answer is tried on, over its own."""
+
+FEWEST_CELLS = 4
+"""Cells across a mesh above which errors change regularly with the mesh size."""
 
 FINER = tuple(0.5 ** (step / 120) for step in range(1, 120))
 """Sizes over that of an answer. The two with the most stretched cells are tried, too; every fifth of them where the
@@ -187,7 +189,7 @@ class MeshChoice(Tabled):
         for name in ("cells", "particles", "springs"):
             yield name, f"{getattr(self, name):,}"
         for name, error in self.choice.errors.items():
-            yield name, bounds_text(error, error_text, "")
+            yield name, number_text(error, error_text, "")
         yield "static solve", f"{1e3 * self.seconds:.3g} ms"
         if not math.isnan(self.step_limit):
             yield "largest step", f"{self.step_limit:.3g} s"
@@ -294,7 +296,7 @@ def find_mesh(
     mesh_types: Sequence[str] | None = None,
     load: str | None = None,
     make: Callable[[float], GroupedMesh] | None = None,
-    most: int = SOLVED,
+    most: int = MOST_SEARCHED,
 ) -> MeshSearch:
     """Coarsest mesh of each type on which a definition keeps an error, found by solving.
 
@@ -356,7 +358,7 @@ def find_mesh(
     """
     wanted = asked_error(error)
     if not (isinstance(most, int) and most > 0):
-        raise ValueError(f"most: {most!r} is no number of particles; give one such as {SOLVED}")
+        raise ValueError(f"most: {most!r} is no number of particles; give one such as {MOST_SEARCHED}")
     known: References | ShapeReferences
     if isinstance(beam, Shape):
         if loads is not CASES or mesh_types is not None:
