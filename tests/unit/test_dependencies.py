@@ -141,7 +141,7 @@ VERSIONS = {
     "scikit-fem": {"scenes.reference", "benchmark.solve", "shapes.reference", "shapes.solve", "engines.solve"},
     "pyamg": SOLVING,
     "cvxopt": SOLVING | REFERENCE,
-    "scipy": SOLVING | REFERENCE | {"scenes.mesh", "shapes.mesh", "from a file"},
+    "scipy": SOLVING | REFERENCE | {"scenes.mesh", "scenes.calibrate", "shapes.mesh", "from a file", "lattice"},
 }
 
 

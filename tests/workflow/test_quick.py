@@ -112,7 +112,7 @@ def test_benchmark_has_the_names_of_the_contract(tree):
     assert abs(ours - theirs).max() <= 1e-9
     assert (traction.solving_seconds.sel({"approach": "condensation"}) > 0).all()
     assert (data.reference_error_estimate < 1e-4).all()
-    assert (data.spring_updates > 0).all()
+    assert (data.spring_updates.sel(mesh_size=5e-3) > 0).all()
 
 
 def test_every_variable_has_units_and_a_long_name(tree):

@@ -431,11 +431,8 @@ def _too_many(sheet: Sheet) -> str:
     from ..prediction.choices import MOST_SEARCHED
 
     count = len(sheet.mesh.points)
-    return (
-        f"{NOT_COMPUTED}: {count} particles, and at most {MOST_SEARCHED} are solved for a header"
-        if count > MOST_SEARCHED
-        else ""
-    )
+    too_many = f"{NOT_COMPUTED}: {count} particles, and at most {MOST_SEARCHED} are solved for a header"
+    return too_many if count > MOST_SEARCHED else ""
 
 
 def _in_words(errors: dict[str, float | str], known: Mapping[str, Any]) -> dict[str, float | str]:
