@@ -3,12 +3,9 @@
 import hashlib
 import json
 import os
-import resource
 import shutil
-import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import h5py
@@ -31,6 +28,8 @@ from springtune.studies.output.reading import lazily
 from springtune.studies.runs import provenance
 from springtune.studies.runs.source import clone, workflow_folder
 
+from tables import STUDIES
+
 AXES = {
     "beam": ("a", "b"),
     "mesh_type": ("structured",),
@@ -41,6 +40,8 @@ AXES = {
     "kinematics": ("linear",),
     "stiffness_ratio": (0.5, 1.0),
 }
+
+VERSION = {"springtune_version": "0"}
 
 GROUPS = {
     f"{name.split('.')[2]}{group.name}": group
@@ -96,7 +97,7 @@ def test_arrays_are_read_when_needed_and_by_chunks(tmp_path):
     sizes = AXES | {"beam": tuple("abcdefgh"), "stiffness_ratio": tuple(np.linspace(0.4, 1.6, 5000))}
     curves = SENSITIVITY.empty(sizes)
     curves["displacement"].values[:] = np.random.default_rng(1).random(curves.displacement.shape)
-    dataset.write(tmp_path / "dataset.nc", {"/": curves}, {"springtune_version": "0"})
+    dataset.write(tmp_path / "dataset.nc", {"/": curves}, VERSION)
     with h5py.File(tmp_path / "dataset.nc") as file:
         chunk = file["displacement"].chunks
         assert chunk[-1] == 5000 and CHUNK / 4 <= 8 * np.prod(chunk) <= CHUNK
@@ -112,7 +113,7 @@ def test_tables_of_a_few_scenes_among_many_cells_read_no_more_than_they_show(tmp
     root.status[asked] = 1
     root.message[asked] = "what buckles, \u03bb < 1"
     root.displacement[asked] = np.random.default_rng(1).random(root.displacement[asked].shape)
-    dataset.write(tmp_path / "dataset.nc", {"/": root}, {"springtune_version": "0"})
+    dataset.write(tmp_path / "dataset.nc", {"/": root}, VERSION)
     with lazily(tmp_path / "dataset.nc") as tree:
         found = tables(tree)
         unread = {name for name, array in tree.variables.items() if "values with dtype" in repr(array)}
@@ -131,7 +132,7 @@ def test_texts_that_are_mostly_holes_take_no_room_and_read_the_same(tmp_path):
     root.solver[{"mesh_size": 30}] = "SuperLU"
     root.message[{"beam": -1, "mesh_size": -1}] = "what buckles, \u03bb < 1"
     root.status[{"beam": 3}] = 1
-    dataset.write(tmp_path / "dataset.nc", {"/": root}, {"springtune_version": "0"})
+    dataset.write(tmp_path / "dataset.nc", {"/": root}, VERSION)
     # Of 18 arrays; two of texts alone took 96 B a cell.
     assert (tmp_path / "dataset.nc").stat().st_size < 10 * root.message.size
     for engine in ("netcdf4", "h5netcdf"):  # CF's checker brings the first, as many users have it
@@ -146,11 +147,8 @@ def test_texts_that_are_mostly_holes_take_no_room_and_read_the_same(tmp_path):
 
 
 def test_a_dataset_with_large_texts_is_closed(tmp_path):
-    dataset.write(
-        tmp_path / "dataset.nc",
-        {"/": ROOT.empty(AXES | {"mesh_size": tuple(1e-3 * (1 + np.arange(80000)))})},
-        {"springtune_version": "0"},
-    )
+    root = ROOT.empty(AXES | {"mesh_size": tuple(1e-3 * (1 + np.arange(80000)))})
+    dataset.write(tmp_path / "dataset.nc", {"/": root}, VERSION)
     path = str((tmp_path / "dataset.nc").resolve())
 
     def is_open():
@@ -165,7 +163,7 @@ def test_a_dataset_with_large_texts_is_closed(tmp_path):
 def test_texts_of_most_cells_are_stored_as_ever(tmp_path):
     root = ROOT.empty(AXES | {"mesh_size": tuple(1e-3 * (1 + np.arange(20000)))})
     root.solver[:] = "Cholesky"
-    dataset.write(tmp_path / "dataset.nc", {"/": root}, {"springtune_version": "0"})
+    dataset.write(tmp_path / "dataset.nc", {"/": root}, VERSION)
     with h5py.File(tmp_path / "dataset.nc") as file:
         assert file["solver"].chunks is None and file["message"].id.get_storage_size() == 0
 
@@ -181,7 +179,7 @@ class TestConventions:
         dimensions = {dimension for row in group.variables.values() for dimension in row[0]}
         numbers = {"mesh_size", "stiffness_ratio", "face_position", "poisson_ratio", "friction", "strain"}
         axes = {one: (1.0, 2.0) if one in numbers else ("one", "two") for one in dimensions}
-        study = load_study(self.study(tmp_path))
+        study = load_study(small(tmp_path))
         attributes = provenance.attributes(study, study.path)
         dataset.write(tmp_path / "dataset.nc", {"/": group.empty(axes)}, attributes)
         assert complaints(tmp_path / "dataset.nc") == []
@@ -192,15 +190,11 @@ class TestConventions:
         said = " ".join(complaints(tmp_path / "dataset.nc"))
         assert "_FillValue" in said and "fathom" in said and "history" in said
 
-    def study(self, folder):
-        path = folder / "small.yaml"
-        path.write_text(
-            "title: Small\nbeams: {b: {length: 20 mm, height: 10 mm}}\n"
-            "materials: {m: {young_modulus: 1 GPa, poisson_ratio: 0.3}}\n"
-            "grids: {g: {beam: b, mesh_type: right, mesh_size: 5 mm, material: m, load: traction, force: 1 N,"
-            " definition: lattice}}\n"
-        )
-        return path
+
+def small(folder):
+    """Path of a small study in a folder."""
+    (folder / "small.yaml").write_text(STUDIES["small_dataset"])
+    return folder / "small.yaml"
 
 
 def committed(folder, message="a"):
@@ -225,7 +219,7 @@ class TestProvenance:
         (repository / "config").mkdir(parents=True)
         (repository / "requirements").mkdir()
         (repository / "requirements/run.txt").write_text("numpy==2\n")
-        path = TestConventions().study(repository / "config")
+        path = small(repository / "config")
         found = provenance.attributes(load_study(path), path)
         inputs = json.loads(found["inputs"])
         assert set(inputs) == {"config/small.yaml", "requirements/run.txt"}
@@ -234,7 +228,7 @@ class TestProvenance:
         assert "references" not in found  # nothing printed
 
     def test_a_changed_checkout_is_told(self, tmp_path):
-        package, path = library(tmp_path), TestConventions().study(tmp_path)
+        package, path = library(tmp_path), small(tmp_path)
         committed(tmp_path)
         clean = provenance.attributes(load_study(path), path, package=package)
         assert len(clean["git_commit"]) == 40 and "study_commit" not in clean
@@ -245,7 +239,7 @@ class TestProvenance:
     def test_a_study_in_a_checkout_of_its_own_has_two_commits(self, tmp_path):
         package, mine = library(tmp_path / "library"), tmp_path / "mine"
         mine.mkdir()
-        path = TestConventions().study(mine)
+        path = small(mine)
         unknown = provenance.attributes(load_study(path), path, package=package)
         assert unknown["git_commit"] == "" and "study_commit" not in unknown
         committed(tmp_path / "library")
@@ -262,7 +256,7 @@ class TestProvenance:
         """And not that of a folder above, such as of a project whose environment it is in."""
         package = tmp_path / ".venv/springtune"
         (package / "workflow/config").mkdir(parents=True)
-        path = TestConventions().study(package / "workflow/config")
+        path = small(package / "workflow/config")
         committed(tmp_path)
         assert workflow_folder(package) == package / "workflow" and clone(package) is None
         unknown = provenance.attributes(load_study(path), path, package=package)
@@ -278,54 +272,14 @@ def write_curves(path, value):
     data = SENSITIVITY.empty(axes)
     data["displacement"].values[:] = value
     data["stiffness"].values[:] = np.random.default_rng(0).random(data.stiffness.shape)
-    dataset.write(path, {"/": data}, {"springtune_version": "0"})
-
-
-WRITER = """
-import sys
-from test_dataset import write_curves
-value = 2.0
-while True:
-    print("writing", flush=True)
-    write_curves(sys.argv[1], value)
-    value += 1.0
-"""
+    dataset.write(path, {"/": data}, VERSION)
 
 
 class TestInterruptedWrite:
-    @pytest.fixture
-    def writer(self, tmp_path):
-        """Starts a process that writes datasets, one after the other, and says so; and takes what limits it."""
-        started = []
+    """Kills wherever a file is renamed, and full disks of a whole run, are tests/faults's."""
 
-        def start(**options):
-            command = [sys.executable, "-c", WRITER, str(tmp_path / "dataset.nc")]
-            paths = os.pathsep.join(map(str, [Path(__file__).parent, *sys.path]))
-            options |= {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-            started.append(subprocess.Popen(command, env=os.environ | {"PYTHONPATH": paths}, **options))
-            assert started[-1].stdout.readline() == "writing\n"
-            return started[-1]
-
-        yield start
-        for one in started:
-            one.kill()
-            one.wait()
-            one.stdout.close()
-            one.stderr.close()
-
-    @pytest.mark.parametrize("delay", [0.05, 0.15])
-    def test_a_killed_one_leaves_the_dataset_of_before_or_the_new_one(self, tmp_path, writer, delay):
-        write_curves(tmp_path / "dataset.nc", 1.0)
-        process = writer()
-        time.sleep(delay)
-        process.send_signal(signal.SIGKILL)
-        process.wait()
-        with st.open(tmp_path) as tree:
-            assert len(np.unique(tree.displacement.values)) == 1 and tree.stiffness.notnull().all()
-        written = atomic.writer().replace(str(os.getpid()), str(process.pid))
-        assert {file.name for file in tmp_path.iterdir()} <= {"dataset.nc", f"dataset.nc.{written}.unfinished"}
-        atomic.remove_unfinished(tmp_path)
-        assert [file.name for file in tmp_path.iterdir()] == ["dataset.nc"]
+    CROWDED = "import sys, resource; resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))\n"
+    CROWDED += "from test_dataset import write_curves; write_curves(sys.argv[1], 2.0)"
 
     def test_an_unfinished_file_is_no_dataset(self, tmp_path):
         write_curves(tmp_path / "dataset.nc", 1.0)
@@ -342,13 +296,13 @@ class TestInterruptedWrite:
         atomic.remove_unfinished(tmp_path)
         assert not unfinished.exists()
 
-    def test_a_full_disk_is_told_in_one_line_and_leaves_nothing(self, tmp_path, writer):
-        def limit():
-            resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
-
+    def test_a_full_disk_is_told_in_one_line_and_leaves_nothing(self, tmp_path):
         write_curves(tmp_path / "dataset.nc", 1.0)
-        _, said = writer(preexec_fn=limit).communicate()
-        assert "cannot be written" in said and "MB are free there); make room" in said.splitlines()[-1]
+        paths = os.pathsep.join(map(str, [Path(__file__).parent, *sys.path]))
+        command = [sys.executable, "-c", self.CROWDED, str(tmp_path / "dataset.nc")]
+        done = subprocess.run(command, env=os.environ | {"PYTHONPATH": paths}, capture_output=True, text=True)
+        assert "cannot be written" in done.stderr
+        assert "MB are free there); make room" in done.stderr.splitlines()[-1]
         assert [file.name for file in tmp_path.iterdir()] == ["dataset.nc"]
         with st.open(tmp_path) as tree:
             assert (tree.displacement == 1.0).all()

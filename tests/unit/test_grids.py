@@ -33,15 +33,19 @@ GRID = {
 }
 
 
+def grid_text(grid):
+    """Lines of the grid in `HEAD`, without the keys that are None."""
+    lines = yaml.safe_dump({key: value for key, value in grid.items() if value is not None}, sort_keys=False)
+    return "".join(f"    {line}\n" for line in lines.splitlines())
+
+
 @pytest.fixture
 def load(tmp_path):
     """Load a study of one grid: `GRID` with some keys changed, None for those that are not there."""
 
     def load(head=HEAD, **keys):
-        grid = {key: value for key, value in (GRID | keys).items() if value is not None}
-        path = tmp_path / "study.yaml"
-        path.write_text(head + "".join(f"    {line}\n" for line in yaml.safe_dump(grid, sort_keys=False).splitlines()))
-        return load_study(path)
+        (tmp_path / "study.yaml").write_text(head + grid_text(GRID | keys))
+        return load_study(tmp_path / "study.yaml")
 
     return load
 
@@ -92,7 +96,7 @@ class TestCombinations:
         zipped = names[:number] if number > 1 else []
         path = tmp_path_factory.mktemp("grid") / "study.yaml"
         grid = GRID | NUMBERS | ({"zip": zipped} if zipped else {})
-        path.write_text(HEAD + "".join(f"    {line}\n" for line in yaml.safe_dump(grid).splitlines()))
+        path.write_text(HEAD + grid_text(grid))
         found = {(scene.mesh.mesh_size, scene.force, scene.mesh.beam.thickness) for scene in load_study(path).scenes}
         places = itertools.product(range(3), repeat=3)
         order = list(NUMBERS)
@@ -173,7 +177,7 @@ class TestSwept:
         assert load(thickness="2 mm").swept == ("thickness",)
 
     def test_two_forces_of_one_grid_are_a_sweep(self, load):
-        head = HEAD + "".join(f"    {line}\n" for line in yaml.safe_dump(GRID).splitlines()) + "  two:\n"
+        head = HEAD + grid_text(GRID) + "  two:\n"
         assert load(head, force=["1 kN", "2 kN"]).axes["force"] == (1e3, 2e3)
 
     def test_another_beam_than_the_calibrating_one_may_have_two_forces(self, load):
@@ -191,14 +195,8 @@ class TestSwept:
             load(HEAD.replace("grids:", "printed: printed.csv\ngrids:"), force=["1 N", "2 N"])
 
     def test_labels_and_names_tell_scenes_apart(self, load):
-        study = load(
-            beam=["long", "short"],
-            force=["1 N", "2 N"],
-            thickness=["1 mm", "3 mm"],
-            young_modulus=["1 MPa", "2 MPa"],
-            poisson_ratio=["0", "0.5"],
-            stiffness_scale=["0.9", "1.1"],
-        )
+        values = ["1 N", "2 N"], ["1 mm", "3 mm"], ["1 MPa", "2 MPa"], ["0", "0.5"], ["0.9", "1.1"]
+        study = load(beam=["long", "short"], **dict(zip(SWEPT, values)))
         assert study.swept == tuple(SWEPT)
         assert len({tuple(study.labels(scene).items()) for scene in study.scenes}) == len(study.scenes) == 64
 
@@ -217,7 +215,7 @@ def swept(tmp_path_factory):
     grid = GRID | {key: list(each) for key, each in values.items()}
     grid |= {"definition": ["lattice", "delingette"], "kinematics": "nonlinear", "sensitivity": "true"}
     text = HEAD.replace("grids:", "outputs: [size, sensitivity, deformed, sweep, tables]\ngrids:")
-    (folder / "all.yaml").write_text(text + "".join(f"    {line}\n" for line in yaml.safe_dump(grid).splitlines()))
+    (folder / "all.yaml").write_text(text + grid_text(grid))
     alone = {
         number: {key: each[place >> bit & 1] for bit, (key, each) in enumerate(values.items())}
         for number, place in enumerate((13, 22))  # each value of each parameter in one of them
@@ -228,9 +226,7 @@ def swept(tmp_path_factory):
         head = HEAD.replace("{length: 200 mm, height: 30 mm}", body)
         head = head.replace("{young_modulus: 210 GPa, poisson_ratio: 0.3}", law)
         single = grid | {key: None for key in values} | {"force": one["force"]}
-        single = {key: value for key, value in single.items() if value is not None}
-        lines = "".join(f"    {line}\n" for line in yaml.safe_dump(single).splitlines())
-        (folder / f"one{number}.yaml").write_text(head.replace("grids:", "outputs: tables\ngrids:") + lines)
+        (folder / f"one{number}.yaml").write_text(head.replace("grids:", "outputs: tables\ngrids:") + grid_text(single))
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         trees = [Campaign(f"{name}.yaml").collected() for name in ("all", *(f"one{number}" for number in alone))]
@@ -350,21 +346,14 @@ def here(tmp_path, monkeypatch):
 def test_the_beam_that_calibrates_has_its_thickness_from_its_own_curves(here):
     """Another grid sweeps the thickness of this beam under another load; a sheet twice as thick is as far off."""
     calibrating = {"load": "bending", "force": "100 N", "definition": "calibrated"}
-    other = {
-        "load": "traction",
-        "force": "1 kN",
-        "thickness": ["0.5 mm", "2 mm"],
-        "definition": ["lattice", "calibrated"],
-    }
-    path = of_grids(
-        here, "thick", [calibrating, other], definitions={"calibrated": {"beam": "60x20", "load": "bending"}}
-    )
+    other = {"load": "traction", "force": "1 kN", "thickness": ["0.5 mm", "2 mm"]}
+    other["definition"] = ["lattice", "calibrated"]
+    on = {"calibrated": {"beam": "60x20", "load": "bending"}}
+    path = of_grids(here, "thick", [calibrating, other], definitions=on)
     with Campaign(path).collected() as tree:
         root = tree.to_dataset().sel(definition="calibrated").squeeze(drop=True)
-        bending, traction = (
-            root.sel(load="bending", thickness=1e-3),
-            root.sel(load="traction", thickness=[0.5e-3, 2e-3]),
-        )
+        bending = root.sel(load="bending", thickness=1e-3)
+        traction = root.sel(load="traction", thickness=[0.5e-3, 2e-3])
         assert abs(float(bending.deformation_error)) < 1e-9  # which is what it is calibrated for
         assert traction.stiffness.values == pytest.approx(float(bending.stiffness) * np.array([0.5, 2.0]), rel=1e-9)
         assert traction.deformation_error.values == pytest.approx([float(traction.deformation_error[0])] * 2, rel=1e-9)
@@ -382,10 +371,8 @@ def test_who_needs_a_field_has_it_whoever_asks_first(here):
         assert int((root.status > 1).sum()) == 0
         interpolated = asked.sel(load="compression", definition="uniform")
         # Those that share a unit problem with a solved one are solved with it.
-        assert set(np.round(interpolated.poisson_ratio.values[interpolated.field_error.notnull().values], 2)) == {
-            0.2,
-            0.3,
-        }
+        solved = interpolated.poisson_ratio.values[interpolated.field_error.notnull().values]
+        assert set(np.round(solved, 2)) == {0.2, 0.3}
         assert int(interpolated.reference_displacement.notnull().sum()) == 49
 
 
@@ -408,12 +395,8 @@ def test_forces_of_equal_products_are_one_label(here):
 
 
 def test_what_is_zipped_with_the_mesh_size_is_shown_on_its_own_meshes(here):
-    grid = {
-        "load": "traction",
-        "mesh_size": ["10 mm", "5 mm"],
-        "force": ["1 kN", "10 kN"],
-        "zip": ["mesh_size", "force"],
-    }
+    grid = {"load": "traction", "mesh_size": ["10 mm", "5 mm"], "force": ["1 kN", "10 kN"]}
+    grid["zip"] = ["mesh_size", "force"]
     path = of_grids(here, "zipped", [grid], outputs=["deformed", "size", "sweep"])
     Campaign(path).finish()
     with springtune.open("results/zipped") as tree:
@@ -460,12 +443,8 @@ def test_fields_of_a_sweep_say_of_which_values_they_are(here):
         steel = springtune.Material("210 GPa", 0.3)
         scene = springtune.Scene(beam, mesh, steel, "bending", "2 kN", definition="lattice", kinematics="linear")
         result = scene.solve()
-        assert np.allclose(
-            network.displacement_y.values,
-            result.displacements[:, 1],
-            rtol=1e-9,
-            atol=1e-9 * np.abs(result.displacements).max(),
-        )
+        small = 1e-9 * np.abs(result.displacements).max()
+        assert np.allclose(network.displacement_y.values, result.displacements[:, 1], rtol=1e-9, atol=small)
         assert np.allclose(network.spring_force.values, result.spring_forces, rtol=1e-5, atol=1e-3)
         with pytest.raises(ValueError, match=r"fields are not kept of force 1000.0; they are of 2000.0"):
             springtune.field(tree, **place, force=1e3)
