@@ -64,29 +64,20 @@ def root(node):
     return node.id if isinstance(node, ast.Name) else ""
 
 
-def private(name):
-    return name.startswith("_") and not name.endswith("_")  # such as __init__ and _repr_html_ of notebooks
-
-
 TESTS = sorted((REPOSITORY / "tests").rglob("*.py"))
 
 
 @pytest.mark.parametrize("path", TESTS, ids=lambda path: str(path.relative_to(REPOSITORY / "tests")))
 def test_tests_use_what_everybody_may_use(path):
-    """No private names of the package, and nothing of it patched: what a test has to change is an option.
+    """Nothing of the package is patched, and no private name imported (of attributes ruff says so).
 
     Entries of a registry may come and go with a test: that is what registries are for.
     """
     tree, found = ast.parse(path.read_bytes()), []
     names = {"springtune", *package_names(tree)}
     for node in ast.walk(tree):
-        if isinstance(node, ast.Attribute) and private(node.attr):
-            # A class of the tests may have private names of its own.
-            # `os._exit` is Python's, of processes that are forked.
-            if not (isinstance(node.value, ast.Name) and node.value.id in ("self", "cls", "os")):
-                found.append((node.lineno, node.attr))
-        elif isinstance(node, ast.ImportFrom) and (node.module or "").partition(".")[0] == "springtune":
-            found += [(node.lineno, alias.name) for alias in node.names if private(alias.name)]
+        if isinstance(node, ast.ImportFrom) and (node.module or "").partition(".")[0] == "springtune":
+            found += [(node.lineno, alias.name) for alias in node.names if alias.name.startswith("_")]
         elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and root(node.func) == "monkeypatch":
             if node.func.attr in ("setattr", "delattr") and root(node.args[0]) in names:
                 found.append((node.lineno, f"monkeypatch.{node.func.attr}"))
