@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from periodic import periodic_delaunay
 from springtune.mechanics.energies import AngleEnergy, BiquadraticEnergy
 from springtune.mesh import MESH_TYPES, lattice
-from springtune.mesh.periodic import periodic_delaunay
 from springtune.problem.materials import Material
 from springtune.springs import DEFINITIONS, Springs
 from springtune.springs.ielsm import angle_moduli

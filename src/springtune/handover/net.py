@@ -428,11 +428,11 @@ def _expected_errors(
 
 def _too_many(sheet: Sheet) -> str:
     """Return why expected errors are not computed on so large a mesh, or an empty string."""
-    from ..prediction.choices import MOST_SEARCHED
+    from ..prediction.choices import SEARCHED_PARTICLES
 
     count = len(sheet.mesh.points)
-    too_many = f"{NOT_COMPUTED}: {count} particles, and at most {MOST_SEARCHED} are solved for a header"
-    return too_many if count > MOST_SEARCHED else ""
+    too_many = f"{NOT_COMPUTED}: {count} particles, and at most {SEARCHED_PARTICLES} are solved for a header"
+    return too_many if count > SEARCHED_PARTICLES else ""
 
 
 def _in_words(errors: dict[str, float | str], known: Mapping[str, Any]) -> dict[str, float | str]:

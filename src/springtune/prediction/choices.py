@@ -48,7 +48,7 @@ ALIKE = 1e-5
 EQUAL = 1e-11
 """Relative difference below which stiffness matrices count as equal, but for rounding."""
 
-MOST_SEARCHED, MOST_SOLVED = 20_000, 100_000
+SEARCHED_PARTICLES, SOLVED_PARTICLES = 20_000, 100_000
 """Particles up to which meshes are searched, in some six seconds each; up to which one is solved, in a minute."""
 
 

@@ -31,7 +31,7 @@ from ..scene.meshes import A_MATERIAL, is_a
 from ..scene.statements import ShapeStatement, Statement
 from .choices import (
     CASES,
-    MOST_SEARCHED,
+    SEARCHED_PARTICLES,
     Choice,
     QuantityReference,
     References,
@@ -296,7 +296,7 @@ def find_mesh(
     mesh_types: Sequence[str] | None = None,
     load: str | None = None,
     make: Callable[[float], GroupedMesh] | None = None,
-    most: int = MOST_SEARCHED,
+    most: int = SEARCHED_PARTICLES,
 ) -> MeshSearch:
     """Coarsest mesh of each type on which a definition keeps an error, found by solving.
 
@@ -358,7 +358,7 @@ def find_mesh(
     """
     wanted = asked_error(error)
     if not (isinstance(most, int) and most > 0):
-        raise ValueError(f"most: {most!r} is no number of particles; give one such as {MOST_SEARCHED}")
+        raise ValueError(f"most: {most!r} is no number of particles; give one such as {SEARCHED_PARTICLES}")
     known: References | ShapeReferences
     if isinstance(beam, Shape):
         if loads is not CASES or mesh_types is not None:
