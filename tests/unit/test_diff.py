@@ -75,9 +75,8 @@ class TestSame:
 
     def test_seconds_and_what_solved_are_not_compared(self):
         other = made()
-        other["solve_seconds"].values[...] *= 3
-        other["solver"].values[...] = "another"
-        other["sensitivity/curve_seconds"].values[...] *= 3
+        for name, value in (("solve_seconds", 3), ("solver", "another"), ("sensitivity/curve_seconds", 3)):
+            other[name].values[...] = value
         other.attrs |= {"created": "today"}
         found = compare(made(), other)
         assert not found.different and not found.attributes
@@ -213,8 +212,8 @@ class TestChanges:
 
     def test_texts_with_other_numbers_are_compared_by_these(self):
         one, other, third = made(), made(), made()
-        for tree, text in ((one, "residual 2.5e-01"), (other, "residual 2.50000001e-01"), (third, "residual 3e-01")):
-            tree["message"].loc[SCENE] = text
+        for tree, number in ((one, "2.5e-01"), (other, "2.50000001e-01"), (third, "3e-01")):
+            tree["message"].loc[SCENE] = f"residual {number}"
         assert not compare(one, other).different
         assert [row.variable for row in compare(one, third).changes] == ["message"]
 

@@ -8,7 +8,6 @@ import sys
 from pathlib import Path
 
 import h5py
-import meshio
 import numpy as np
 import pytest
 import xarray as xr
@@ -16,9 +15,10 @@ from click.testing import CliRunner
 
 import springtune as st
 from springtune.cli import main
-from springtune.studies.kinds.scenes.variables import FIELDS, ROOT, SENSITIVITY
+from springtune.studies.kinds.scenes.variables import ROOT, SENSITIVITY
 from springtune.studies.output import dataset, scene_files
 
+from synthetic import dataset as every
 from tables import SMALL_AXES as AXES
 from tables import refused_calls, run
 
@@ -134,8 +134,6 @@ class TestInfo:
         assert any(line.startswith("/sensitivity 10 beam 2, mesh_type 2") for line in lines)
 
     def test_a_dataset_of_all_kinds_is_told(self, tmp_path):
-        from synthetic import dataset as every
-
         tree = every()
         tree.attrs = {"springtune_version": "0"}
         tree.to_netcdf(tmp_path / "dataset.nc", engine="h5netcdf")
@@ -240,69 +238,31 @@ class TestExport:
         assert not os.listdir(tmp_path)
 
 
-class TestScenes:
-    @pytest.fixture
-    def fields(self, tmp_path):
-        """Dataset of two scenes of a triangle that have fields."""
-        axes = AXES | {name: tuple(range(4)) for name in ("particle", "spring", "cell_corner", "outline_point")}
-        fields, root = FIELDS.empty(axes | {"spring_end": (0, 1), "cell": (0,)}), ROOT.empty(AXES)
-        place = {"beam": "200x40", "mesh_type": "free", "mesh_size": 5e-3}
-        fields["x"].loc[place], fields["y"].loc[place] = [0.0, 1.0, 0.0, np.nan], [0.0, 0.0, 1.0, np.nan]
-        fields["spring_nodes"].loc[place] = np.array([[0, 1], [0, 2], [1, 2], [-1, -1]])
-        fields["cell_nodes"].loc[place] = np.array([[0, 1, 2, -1]])
-        load = place | {"material": "steel", "load": "bending"}
-        for number, axis in enumerate("xy"):
-            fields[f"particle_reference_{axis}"].loc[load] = [0.0, 0.5, 0.25 * number, np.nan]
-            for shift, definition in enumerate(("lattice", "patch")):
-                cell = load | {"definition": definition, "kinematics": "linear"}
-                fields[f"displacement_{axis}"].loc[cell] = [0.0, 0.75 + shift, 0.0, np.nan]
-                fields["stiffness"].loc[cell], fields["spring_force"].loc[cell] = [1, 2, 3, np.nan], [4, 5, 6, np.nan]
-                root["deformation_error"].loc[cell] = 0.125
-        dataset.write(tmp_path / "dataset.nc", {"/": root, "/fields": fields}, {"springtune_version": "0"})
-        return tmp_path
-
-    def test_a_scene_is_written_for_paraview(self, fields):
-        with st.open(fields) as tree:
-            assert scene_files.write(tree, fields / "scenes") == [Path("scenes.csv")]
-        rows = list(csv.DictReader((fields / "scenes/scenes.csv").read_text().splitlines()))
-        assert [row["definition"] for row in rows] == ["lattice", "patch"]
-        assert {path.name for path in (fields / "scenes").glob("*.vtu")} == {row["file"] for row in rows}
-        net, other = (meshio.read(fields / "scenes" / row["file"]) for row in rows)
-        assert other.point_data["displacement"][1, 0] == 1.75
-        assert {block.type: block.data.tolist() for block in net.cells} == {
-            "line": [[0, 1], [0, 2], [1, 2]],
-            "triangle": [[0, 1, 2]],
-        }
-        assert net.point_data["displacement"].tolist() == [[0, 0, 0], [0.75, 0.75, 0], [0, 0, 0]]
-        assert net.point_data["error"].tolist() == [[0, 0, 0], [0.25, 0.25, 0], [0, -0.25, 0]]
-        assert net.cell_data["stiffness"][0].tolist() == [1, 2, 3] and net.cell_data["force"][0].tolist() == [4, 5, 6]
-
-    def test_where_nothing_is_solved_the_table_is_empty(self, fields):
-        with st.open(fields) as tree:
-            tree.load()
-        tree["fields"]["displacement_x"].values[...] = np.nan
-        (fields / "none").mkdir()
-        (fields / "none/former.vtu").touch()
-        assert scene_files.write(tree, fields / "none") == [Path("scenes.csv")]
-        assert [path.name for path in (fields / "none").iterdir()] == ["scenes.csv"]
-        assert len((fields / "none/scenes.csv").read_text().splitlines()) == 1
+def test_where_nothing_is_solved_the_table_of_scenes_is_empty(tmp_path):
+    """Numbers of scenes that are solved: tests/workflow/test_quick.py."""
+    tree = every()
+    tree["fields"]["displacement_x"].values[...] = np.nan
+    (tmp_path / "former.vtu").touch()
+    assert scene_files.write(tree, tmp_path) == [Path("scenes.csv")]
+    assert [path.name for path in tmp_path.iterdir()] == ["scenes.csv"]
+    assert len((tmp_path / "scenes.csv").read_text().splitlines()) == 1
 
 
-class TestField:
-    def test_refusals_say_what_there_is(self, path):
-        from synthetic import dataset as every
+@pytest.mark.parametrize(
+    ("chosen", "said"),
+    [
+        ({"mesh_size": None}, "choose one mesh_size"),
+        ({"beam": "1x1"}, "nothing has beam '1x1'; there is '100x20', '200x40'"),
+        ({"load": "none"}, "nothing has load 'none'; there is 'traction'"),
+        ({"loads": "none"}, "no dimension 'particle' to choose of|no dimension 'loads'"),
+    ],
+)
+def test_a_refused_field_names_what_there_is(chosen, said):
+    place = {"beam": "200x40", "mesh_type": "free", "mesh_size": 5e-3} | chosen
+    with pytest.raises(ValueError, match=said):
+        st.field(every(), **{name: label for name, label in place.items() if label is not None})
 
-        tree = every()
-        with pytest.raises(ValueError, match="choose one mesh_size"):
-            st.field(tree, beam="200x40", mesh_type="free")
-        with pytest.raises(ValueError, match="nothing has beam '1x1'; there is '100x20', '200x40'"):
-            st.field(tree, beam="1x1", mesh_type="free", mesh_size=5e-3)
-        with pytest.raises(ValueError, match="nothing has load 'none'; there is 'traction'"):
-            st.field(tree, beam="200x40", mesh_type="free", mesh_size=5e-3, load="none")
-        with pytest.raises(ValueError, match="no dimension 'particle' to choose of|no dimension 'loads'"):
-            st.field(tree, loads="none")
-        with (
-            st.open(path) as without,
-            pytest.raises(ValueError, match="no group '/fields'; add 'deformed' or 'paraview'"),
-        ):
-            st.field(without)
+
+def test_a_dataset_without_fields_has_none(path):
+    with st.open(path) as tree, pytest.raises(ValueError, match="no group '/fields'; add 'deformed' or 'paraview'"):
+        st.field(tree)

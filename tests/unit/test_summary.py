@@ -60,10 +60,14 @@ def root(rows):
     return ROOT.of_rows(AXES, rows)
 
 
+def told(root):
+    """Summary of a dataset of scenes alone."""
+    return summing_up.text({"/": root}, "A study")
+
+
 class TestText:
     def test_counts_holes_and_errors(self, root):
-        text = summing_up.text({"/": root}, "A study")
-        lines = text.splitlines()
+        lines = told(root).splitlines()
         assert lines[0] == "A study"
         assert "  scenes  5  2 solved, 1 not converged, 1 unstable, 1 failed" in lines
         assert "  100x20, free, 5 mm, steel, traction, lattice, linear: residual 1e-3" in lines
@@ -75,30 +79,28 @@ class TestText:
 
     def test_a_word_turns_with_the_displacement(self, root):
         root["reference_displacement"].values[...] *= -1  # pulled down
-        text = summing_up.text({"/": root}, "A study")
+        text = told(root)
         assert "-20 %  too soft" in text and "+1 %  too stiff" in text
 
     def test_everything_solved_has_no_holes(self, root):
         data = root.where(root.status.isin([0, 1]), 0)
-        text = summing_up.text({"/": data.assign(status=data.status.astype("int8"))}, "A study")
+        text = told(data.assign(status=data.status.astype("int8")))
         assert "2 solved\n" in text and "Not everything" not in text and "2 of" not in text
 
     def test_nothing_solved(self, root):
         root["status"].values[root.status.values > 0] = Status.FAILED
-        lines = summing_up.text({"/": root}, "A study").splitlines()
+        lines = told(root).splitlines()
         assert "  scenes  5  5 failed" in lines and not any("worst" in line for line in lines)
         assert lines[-1].startswith("Not everything is solved: 5 of 5 scenes.")
 
     def test_scenes_without_a_reference_are_named(self, rows):
         rows[1] |= {"reference_displacement": np.nan, "reference_message": "no reference: too slender"}
-        root = ROOT.of_rows(AXES, rows)
-        text = summing_up.text({"/": root}, "A study")
+        text = told(ROOT.of_rows(AXES, rows))
         assert "without a reference, and so without an error: 1 of 5\n  80x10, steel, traction: no reference" in text
 
     def test_scenes_beyond_small_strain_are_named(self, rows):
         rows[0] |= {"reference_applies": 0, "reference_message": "it turns by 1 rad"}
-        root = ROOT.of_rows(AXES, rows)
-        text = summing_up.text({"/": root}, "A study")
+        text = told(ROOT.of_rows(AXES, rows))
         assert "beyond small strain, so the error is not the network's alone: 3 of 5" in text
         assert "100x20, steel, traction: it turns by 1 rad" in text and "worst" not in text
 
@@ -120,7 +122,7 @@ class TestText:
         whys = [*(f"residual {number}.5e-3" for number in range(9)), "refused"]
         rows = [cell(beam=beam) | {"status": Status.FAILED, "message": why} for beam, why in zip(beams, whys)]
         root = ROOT.of_rows(AXES | {"beam": beams}, rows)
-        lines = summing_up.text({"/": root}, "A study").splitlines()
+        lines = told(root).splitlines()
         named = lines[lines.index("scenes, failed: 10 of 10") + 1 :][:4]
         assert [line.partition(",")[0].strip() for line in named] == ["beam-a", "beam-j", "beam-b", "and 7 more"]
 
@@ -163,8 +165,7 @@ class TestEnding:
         return summary.ending(study, made, since), made.folder, since
 
     def test_says_what_is_new_and_where_it_is(self, planned):
-        study, made, names = planned
-        folder = made.folder
+        folder = planned[1].folder
         (folder / "figures").mkdir(parents=True)
         (folder / "dataset.nc").touch()
         (folder / summary.FILE).write_text("Told before\n")
@@ -174,8 +175,7 @@ class TestEnding:
         assert "new      nothing: all results were stored before" in self.finish(planned, "none")[0]
 
     def test_a_summary_older_than_the_results_is_not_shown(self, planned):
-        study, made, names = planned
-        folder = made.folder
+        folder = planned[1].folder
         folder.mkdir(parents=True)
         (folder / summary.FILE).write_text("Told before\n")
         os.utime(folder / summary.FILE, (0, 0))
@@ -183,8 +183,7 @@ class TestEnding:
         assert "Told before" not in text and "The dataset is older than these results." in text
 
     def test_what_broke_is_named(self, planned):
-        study, made, names = planned
-        folder = made.folder
+        (study, made, names), folder = planned, planned[1].folder
         _, _, since = self.finish(planned, "solve")
         made.record(names[-1]).unlink()
         (folder / "logs").mkdir()
