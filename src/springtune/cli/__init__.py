@@ -1,6 +1,5 @@
 """Command line: `springtune COMMAND`."""
 
-import io
 import os
 import re
 import sys
@@ -45,7 +44,6 @@ COMMANDS = {
     "diff": ("diff", "List what changed from one dataset to another, scene by scene."),
     "export": ("results", "Write a group of a dataset as CSV or Parquet."),
     "archive": ("results", "Pack the results of a study into one file."),
-    "schema": ("study", "Print the JSON schema of studies, for editors."),
 }
 """Modules and meanings of the commands, in the order of the help; each is imported when it is called."""
 
@@ -82,38 +80,19 @@ COMPLETION = "_SPRINGTUNE_COMPLETE"
 """Environment variable by which a shell asks click for completions."""
 
 
-class Shown(io.TextIOBase):
+class Shown:
     """Stream that escapes all control characters except line breaks and tabs."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
-
-    @property
-    def encoding(self) -> str:  # type: ignore[override]  # typeshed has an attribute
-        """Encoding of the stream."""
-        return self._stream.encoding
-
-    @property
-    def errors(self) -> str | None:  # type: ignore[override]
-        """Error handling of the encoding."""
-        return self._stream.errors
 
     def write(self, text: str) -> int:
         """Write a text, and return its length."""
         self._stream.write(UNSEEN.sub(lambda one: one[0] if one[0] in "\n\t" else shown(one[0]), text))
         return len(text)
 
-    def flush(self) -> None:
-        """Flush the stream."""
-        self._stream.flush()
-
-    def isatty(self) -> bool:
-        """Whether the stream is a terminal."""
-        return self._stream.isatty()
-
-    def fileno(self) -> int:
-        """Number of the stream's file."""
-        return self._stream.fileno()
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
 
 
 class Commands(click.Group):

@@ -1,4 +1,4 @@
-"""Commands for studies: new, scenes, definitions and schema."""
+"""Commands for studies: new, scenes and definitions."""
 
 import os
 from pathlib import Path
@@ -58,7 +58,7 @@ def template_text(path: Path, body: str) -> str:
     """Text of a new study of a beam or of a shape."""
     from ..mesh.types import MESH_TYPES
 
-    schema = Path(os.path.relpath(config_file(SCHEMA), path.parent)).as_posix()
+    schema = Path(os.path.relpath(config_file("study.schema.json"), path.parent)).as_posix()
     words = path.stem.replace("-", " ").replace("_", " ").strip() or path.stem
     template = Template(Path(__file__).with_name(f"study_of_a_{body}.yaml").read_text())
     text = template.substitute(
@@ -113,14 +113,3 @@ def definitions() -> None:
         for name, one in DEFINITIONS.items()
     ]
     click.echo(aligned(rows, left=2))
-
-
-SCHEMA = "study.schema.json"
-
-
-@click.command(epilog=examples("springtune schema > study.schema.json"))
-def schema() -> None:
-    """Print the JSON schema of studies, for editors."""
-    from ..studies.config.sections import schema_text
-
-    click.echo(schema_text(), nl=False)

@@ -9,9 +9,8 @@ PARAMETER_WORDS = {"relative_mesh_size": "mesh size / height", "young_modulus": 
 PARAMETER_WORDS |= {"poisson_ratio": "Poisson's ratio"}
 """Names of parameters on an axis, where they are not their own."""
 
-QUANTITY_WORDS = {"deformation_error": "deformation error", "displacement": "displacement"}
-QUANTITY_WORDS |= {"best_stiffness": "best stiffness"}
-"""Names of quantities, in the order of their panels."""
+SHOWN_QUANTITIES = ("deformation_error", "displacement", "best_stiffness")
+"""Quantities in the order of their panels."""
 
 INDEX_ENDS = -0.3, 1.5
 """Ends of the axis of Sobol indices at most, whose bands may go farther."""
@@ -63,10 +62,10 @@ def plot_sobol(data, ax=None, *, load=None):
     load = choose(asked.any("quantity"), load=load)["load"]
     found, asked = found.sel(load=load), asked.sel(load=load)
     names, order, shown = found.parameter.values.tolist(), found["definition"].values.tolist(), {}
-    for quantity in (name for name in QUANTITY_WORDS if name in found["quantity"].values):
+    for quantity in (name for name in SHOWN_QUANTITIES if name in found["quantity"].values):
         for definition in labels_of(asked.sel(quantity=[quantity]), "definition"):
             alone = quantity == "best_stiffness"  # of uniform springs alone
-            title = QUANTITY_WORDS[quantity] + ("" if alone else f", {definition}")
+            title = quantity.replace("_", " ") + ("" if alone else f", {definition}")
             look = "0.35" if alone else style.line(order.index(definition))["color"]
             shown.setdefault(title, (found.sel(quantity=quantity, definition=definition), look))
     bands = found[[name for name in found if name.endswith(("_low", "_high"))]].to_array()
