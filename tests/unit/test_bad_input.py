@@ -169,13 +169,19 @@ def test_a_mesh_of_arrays_that_are_none_is_refused(points, triangles, says):
         Mesh(points, triangles)
 
 
+def of_cells(mesh, kept, corners=3):
+    """A mesh of some cells of another one."""
+    used, cells = np.unique(kept, return_inverse=True)
+    cells = cells.reshape(-1, corners)
+    return Mesh(mesh.points[used], *([cells] if corners == 3 else [mesh.triangles, cells]))
+
+
 def plate(hole, mesh_type="structured"):
     """A plate without the cells in its middle, or without a corner."""
     whole = MESH_TYPES[mesh_type](0.1, 0.04, 2.5e-3)
     middles = whole.points[whole.triangles].mean(axis=1)
     keep = (np.abs(middles - ([0.05, 0.02] if hole else [0.1, 0.04])) > 0.01).any(axis=1)
-    used, cells = np.unique(whole.triangles[keep], return_inverse=True)
-    return Mesh(whole.points[used], cells.reshape(-1, 3))
+    return of_cells(whole, whole.triangles[keep])
 
 
 @pytest.mark.parametrize("hole", [True, False])
@@ -190,10 +196,8 @@ def test_a_patch_test_takes_no_rim_for_an_end(hole, definition):
 
 def test_parts_and_slanted_sides_have_the_moduli_of_linear_triangles():
     whole = right(0.1, 0.02, 5e-3)
-    twice = Mesh(
-        np.vstack([whole.points, whole.points + [0.2, 0]]),
-        np.vstack([whole.triangles, whole.triangles + len(whole.points)]),
-    )
+    cells = np.vstack([whole.triangles, whole.triangles + len(whole.points)])
+    twice = Mesh(np.vstack([whole.points, whole.points + [0.2, 0]]), cells)
     trapezoid = Mesh(whole.points * (1 + whole.points[:, 1:] * [5, 0]), whole.triangles)
     turned = Mesh(whole.points @ [[0.8, 0.6], [-0.6, 0.8]], whole.triangles)
     for mesh in (twice, trapezoid, turned, plate(True, "right")):
@@ -205,9 +209,7 @@ def test_parts_and_slanted_sides_have_the_moduli_of_linear_triangles():
 def test_springs_with_a_lateral_stress_are_tested_on_strips_alone():
     """Their stress pulls on the two long faces."""
     squares = braced(0.1, 0.04, 5e-3)
-    kept = Mesh(squares.points, squares.triangles, squares.quads[1:])
-    used, corners = np.unique(kept.quads, return_inverse=True)
-    notched = Mesh(kept.points[used], kept.triangles, corners.reshape(-1, 4))
+    notched = of_cells(squares, squares.quads[1:], 4)
     with pytest.raises(MeshError, match="lateral stress: its ends do not run .*; give a full rectangle"):
         st.moduli(notched, STEEL, "baudet-corrected")
 
@@ -220,14 +222,10 @@ def test_a_strip_with_staggered_ends_has_one():
         assert abs(st.moduli(mesh, STEEL, "delingette").young_modulus_error) < 1e-9
 
 
-def test_a_scene_and_a_prediction_are_of_a_beam_that_is_filled():
-    beam = st.Beam("100 mm", "40 mm")
-    for call in (
-        lambda: st.Scene(beam, plate(True), STEEL, "traction", "1 kN"),
-        lambda: st.predict(beam, plate(True), STEEL),
-    ):
-        with pytest.raises(ValueError, match="mesh: does not fill its beam: its cells cover 90 %"):
-            call()
+@pytest.mark.parametrize("call", [st.predict, lambda *scene: st.Scene(*scene, "traction", "1 kN")])
+def test_a_scene_and_a_prediction_are_of_a_beam_that_is_filled(call):
+    with pytest.raises(ValueError, match="mesh: does not fill its beam: its cells cover 90 %"):
+        call(st.Beam("100 mm", "40 mm"), plate(True), STEEL)
 
 
 MESH = st.make_mesh(BEAM, "structured", "5 mm")
@@ -248,13 +246,8 @@ CALLS = {
     "density": lambda odd: st.Material(1.0, 0.3, "" if odd is None else odd),
     "size": lambda odd: st.make_mesh(BEAM, "free", odd),
     "mesh type": lambda odd: st.make_mesh(BEAM, odd, "5 mm"),
-    "beam": lambda odd: scene(beam=odd),
-    "mesh": lambda odd: scene(mesh=odd),
-    "material": lambda odd: scene(material=odd),
-    "load": lambda odd: scene(load=odd),
-    "force": lambda odd: scene(force=odd),
-    "definition": lambda odd: scene(definition=odd),
-    "kinematics": lambda odd: scene(kinematics=odd),
+    **{name: lambda odd, name=name: scene(**{name: odd})
+       for name in ("beam", "mesh", "material", "load", "force", "definition", "kinematics")},
     "stiffness": lambda odd: scene(definition="paper", stiffness=odd),
     "sheet": lambda odd: scene(sheet=odd if odd is not None else 1),
     "curve": st.sensitivity,
@@ -266,12 +259,10 @@ CALLS = {
     "stated": lambda odd: st.DEFINITIONS["paper"].springs(MESH, STEEL, 1e-3, odd),
     "cases": lambda odd: st.DEFINITIONS["annealed"].springs(MESH, STEEL, 1e-3, odd),
     "reference": lambda odd: st.Springs(odd if not isinstance(odd, int) or odd < 10**300 else 0, np.ones(3)),
-    "name of a definition": lambda odd: st.definition(odd if odd != "x" else "")(
-        lambda mesh, material, thickness: None
-    ),
+    "name of a definition": lambda odd: st.definition(odd if odd != "x" else "")(lambda *scene: None),
     "name of a mesh type": lambda odd: st.mesh_type(odd if odd != "x" else "")(lambda length, height, size: None),
     "field": st.field,
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", CALLS)

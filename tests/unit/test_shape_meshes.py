@@ -50,25 +50,19 @@ def check_sides(shape, grouped):
         assert tuple(place) == shape.points[name]
 
 
+STARS = some.lists(some.floats(0.5, 1.0), min_size=3, max_size=9)
+
+
 @pytest.mark.filterwarnings("ignore:.*its longer side is")
 @settings(max_examples=25, deadline=None)
-@given(
-    some.lists(some.floats(0.5, 1.0), min_size=3, max_size=9),
-    some.floats(0.05, 0.2),
-    some.floats(0.06, 0.5),
-    some.floats(-3, 3),
-)
+@given(STARS, some.floats(0.05, 0.2), some.floats(0.06, 0.5), some.floats(-3, 3))
 def test_any_star_with_a_hole_is_filled(radii, hole, size, power):
     """Lengths from a micrometre to a kilometre."""
     scale = 10.0**power
     angles = [2 * math.pi * (i + 0.3) / len(radii) for i in range(len(radii))]
     corners = [(scale * r * math.cos(angle), scale * r * math.sin(angle)) for r, angle in zip(radii, angles)]
-    star = Shape(
-        "star",
-        1e-3,
-        [Segment(corner, group=f"side{i}") for i, corner in enumerate(corners)],
-        [Hole.circle((0, 0), scale * hole)],
-    )
+    sides = [Segment(corner, group=f"side{i}") for i, corner in enumerate(corners)]
+    star = Shape("star", 1e-3, sides, [Hole.circle((0, 0), scale * hole)])
     grouped = mesh_shape(star, scale * size)
     check_sides(star, grouped)
     around = grouped.sides["hole"]
@@ -216,26 +210,19 @@ def write_vtu(path, grouped):
         marks[name] = np.arange(len(grouped.mesh.points)) == grouped.particle(name)
     parts = {name: [masks[3].astype(np.int32)] for name, masks in grouped.parts.items()}
     data = {name: mark.astype(np.uint8) for name, mark in marks.items()} | {"u": grouped.mesh.points}
-    by_meshio(grouped, point_data=data, cell_data=parts | {"density": [np.ones(len(grouped.mesh.triangles))]}).write(
-        path
-    )
+    parts["density"] = [np.ones(len(grouped.mesh.triangles))]
+    by_meshio(grouped, point_data=data, cell_data=parts).write(path)
 
 
 def write_abaqus(path, grouped):
     sets = {name: np.unique(edges) for name, edges in grouped.sides.items()}
     sets |= {name: np.array([grouped.particle(name)]) for name in grouped.points}
     cells = {name: [np.flatnonzero(masks[3])] for name, masks in grouped.parts.items()}
-    by_meshio(grouped, point_sets=sets, cell_sets=cells | {"Eall": [np.arange(len(grouped.mesh.triangles))]}).write(
-        path
-    )
+    cells["Eall"] = [np.arange(len(grouped.mesh.triangles))]
+    by_meshio(grouped, point_sets=sets, cell_sets=cells).write(path)
 
 
-FILES = {
-    "own.vtu": write_mesh,
-    "own.msh": write_mesh,
-    "marks.vtu": write_vtu,
-    "sets.inp": write_abaqus,
-}
+FILES = {"own.vtu": write_mesh, "own.msh": write_mesh, "marks.vtu": write_vtu, "sets.inp": write_abaqus}
 
 
 @pytest.mark.usefixtures("mesh_library")
