@@ -221,12 +221,10 @@ def swept(tmp_path_factory):
         for number, place in enumerate((13, 22))  # each value of each parameter in one of them
     }
     for number, one in alone.items():
-        body = f"{{length: 200 mm, height: 30 mm, thickness: {one['thickness']}}}"
-        law = f"{{young_modulus: {one['young_modulus']}, poisson_ratio: {one['poisson_ratio']}}}"
-        head = HEAD.replace("{length: 200 mm, height: 30 mm}", body)
-        head = head.replace("{young_modulus: 210 GPa, poisson_ratio: 0.3}", law)
-        single = grid | {key: None for key in values} | {"force": one["force"]}
-        (folder / f"one{number}.yaml").write_text(head.replace("grids:", "outputs: tables\ngrids:") + grid_text(single))
+        body = {"length": "200 mm", "height": "30 mm", "thickness": one["thickness"]}
+        law = {name: one[name] for name in ("young_modulus", "poisson_ratio")}
+        single = {key: value for key, value in grid.items() if key not in values} | {"force": one["force"]}
+        of_grids(folder, f"one{number}", [single], beams={"long": body}, materials={"steel": law})
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         trees = [Campaign(f"{name}.yaml").collected() for name in ("all", *(f"one{number}" for number in alone))]

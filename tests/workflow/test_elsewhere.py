@@ -15,19 +15,14 @@ from tables import STUDIES
 STUDY = STUDIES["elsewhere"]
 
 
-def test_rules_whose_jobs_go_elsewhere_have_a_benchmark(repository):
-    """What is noted of a job names it, and a rule cannot be told to have none."""
+def test_rules_have_a_benchmark_and_quote_all_that_they_give_to_a_shell(repository):
+    """What is noted of a job names it; the command of a job on another machine is quoted already."""
     for path in sorted((repository / "workflow/rules").glob("*.smk")):
         text = path.read_text()
         rules = re.findall(r"^ *(?:rule \w+|rule|use rule \w+ as \w+ with):$", text, re.MULTILINE)
         assert len(rules) == text.split().count("benchmark:"), path
-
-
-def test_rules_quote_all_that_they_give_to_a_shell(repository):
-    """All but the command of a job on another machine, which is quoted already."""
-    for path in sorted((repository / "workflow/rules").glob("*.smk")):
-        blocks = re.findall(r"shell:\n((?:\s+\".*\"\n)+)", path.read_text())
-        assert len(blocks) == path.read_text().count("shell:"), path
+        blocks = re.findall(r"shell:\n((?:\s+\".*\"\n)+)", text)
+        assert len(blocks) == text.count("shell:"), path
         fields = [field for block in blocks for field in re.findall(r"\{(.*?)\}", block)]
         assert all(field.endswith(":q") for field in fields) or fields == ["params.command"], path
 

@@ -117,15 +117,7 @@ def test_a_study_that_is_edited_during_its_run_makes_no_dataset_of_another_one(r
     run.write("edited.yaml", STUDY)
     with contextlib.chdir(run.folder):
         Campaign("edited.yaml").finish("solve_0")
-    told = [
-        sys.executable,
-        "-m",
-        "springtune.studies.kinds.collect",
-        "edited.yaml",
-        "results/edited",
-        "dataset.nc",
-        "d.json",
-    ]
-    done = subprocess.run([*told, "of before"], cwd=run.folder, capture_output=True, text=True)
+    told = ["springtune.studies.kinds.collect", "edited.yaml", "results/edited", "dataset.nc", "d.json", "of before"]
+    done = subprocess.run([sys.executable, "-m", *told], cwd=run.folder, capture_output=True, text=True)
     assert done.returncode == 1 and "edited.yaml was changed while the study ran; call the same" in done.stderr
     assert not (run.folder / "dataset.nc").exists()
