@@ -1,5 +1,6 @@
 """Command line: `springtune COMMAND`."""
 
+import io
 import os
 import re
 import sys
@@ -80,19 +81,38 @@ COMPLETION = "_SPRINGTUNE_COMPLETE"
 """Environment variable by which a shell asks click for completions."""
 
 
-class Shown:
+class Shown(io.TextIOBase):
     """Stream that escapes all control characters except line breaks and tabs."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
+
+    @property
+    def encoding(self) -> str:  # type: ignore[override]  # typeshed has an attribute
+        """Encoding of the stream."""
+        return self._stream.encoding
+
+    @property
+    def errors(self) -> str | None:  # type: ignore[override]
+        """Error handling of the encoding."""
+        return self._stream.errors
 
     def write(self, text: str) -> int:
         """Write a text, and return its length."""
         self._stream.write(UNSEEN.sub(lambda one: one[0] if one[0] in "\n\t" else shown(one[0]), text))
         return len(text)
 
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._stream, name)
+    def flush(self) -> None:
+        """Flush the stream."""
+        self._stream.flush()
+
+    def isatty(self) -> bool:
+        """Whether the stream is a terminal."""
+        return self._stream.isatty()
+
+    def fileno(self) -> int:
+        """Number of the stream's file."""
+        return self._stream.fileno()
 
 
 class Commands(click.Group):

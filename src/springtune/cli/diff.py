@@ -51,7 +51,6 @@ def tolerance(context: click.Context, parameter: click.Parameter, given: str | N
 @click.option("--ignore", "ignored", multiple=True, help="Variables to leave out, such as 'reference_*'.")
 @click.option("--rows", type=click.IntRange(1), default=ROWS, show_default=True, help="Rows of each table.")
 @click.option("--all", "every", is_flag=True, help="All rows.")
-@click.option("--config", is_flag=True, help="Show the diff of the studies' files, too.")
 def diff(
     before: str,
     after: str,
@@ -61,7 +60,6 @@ def diff(
     ignored: tuple[str, ...],
     rows: int,
     every: bool,
-    config: bool,
 ) -> None:
     """Say what changed from one dataset to another beyond a tolerance, scene by scene.
 
@@ -84,14 +82,14 @@ def diff(
         ):
             given, most = Tolerance(RELATIVE if relative is None else relative, absolute), None if every else rows
             found = compare(one, other, given, groups, ignored, most)
-            click.echo(comparison_text(found, paths, most, config))
+            click.echo(comparison_text(found, paths, most))
     except (OSError, ValueError) as error:
         raise WrongCall(shown(error)) from None
     if found.different:
         raise click.exceptions.Exit(1)
 
 
-def comparison_text(found: "Comparison", paths: Sequence[Path], most: int | None = ROWS, config: bool = False) -> str:
+def comparison_text(found: "Comparison", paths: Sequence[Path], most: int | None = ROWS) -> str:
     """Comparison as text."""
     groups = {group.name: group for group in found.groups}
     changed = [(group.name, one) for group in found.groups for one in (*group.flags, *group.values) if one.changed]
@@ -118,14 +116,9 @@ def comparison_text(found: "Comparison", paths: Sequence[Path], most: int | None
         table = aligned([["  variable", *COMPARED, "change", "at"], *rows], 0, (1, 2, 3)).splitlines()
         more = _more(sum(one.changed for _, one in changed) - len(rows))
         parts.append(["the largest changes, measured by the tolerance", *table, *more])
-    if found.attributes or found.config:
+    if found.attributes:
         told = [[f"  {name}", f"{_short(old)} -> {_short(new)}"] for name, (old, new) in found.attributes.items()]
         parts.append(["told, and no difference of results", *aligned(told, 0).splitlines()])
-        if found.config:
-            less, added = (sum(line.startswith(sign) for line in found.config[2:]) for sign in "-+")
-            shows = "" if config else "; --config shows them"
-            parts[-1].append(f"  the studies' files: {less} lines less, {added} more{shows}")
-            parts[-1] += found.config if config else []
     return paragraphs(parts)
 
 

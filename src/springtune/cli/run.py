@@ -61,10 +61,6 @@ def run(most: int | None, results: Path | None, strict: bool, arguments: tuple[s
     if late:
         first = f"./{late[0]}" if late[0].startswith("-") else f"{late[0]} {options[0]}"
         raise click.UsageError(f"name the study first: springtune run {first}")
-    words = zip(["", *options], options)
-    second = [one for before, one in words if one.endswith((".yaml", ".yml")) and before in NO_VALUE and one[0] != "-"]
-    if named and second:
-        raise click.UsageError(f"one study at a time: springtune run {arguments[0]}, then springtune run {second[0]}")
     if _wants_slurm(options) and not find_spec(SLURM):
         why = "the profile slurm needs Snakemake's plugin for Slurm, which is not installed"
         raise click.UsageError(f"{why}; {how_to_install('slurm')}")
@@ -211,10 +207,6 @@ def _wants_slurm(options: list[str]) -> bool:
     named = [two for one, two in zip(options, options[1:]) if one == "--workflow-profile"]
     named += [one.partition("=")[2] for one in options if one.startswith("--workflow-profile=")]
     return any(Path(one).name == "slurm" for one in named)
-
-
-NO_VALUE = {"", "-n", "--dry-run", "--dryrun", "-F", "--forceall", "-f", "--force", "-p", "--printshellcmds", "-k"}
-"""Words after which an argument is not the value of an option: options without value, or none."""
 
 
 def _meant(path: Path) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -114,7 +113,6 @@ class Comparison:
     groups: list[GroupChanges]
     alone: tuple[list[str], ...]
     attributes: dict[str, tuple[str, str]]
-    config: list[str]
 
     @property
     def different(self) -> bool:
@@ -173,13 +171,7 @@ def compare(
     told = {name: (facts[0].get(name, ""), facts[1].get(name, "")) for name in facts[0] | facts[1]}
     inputs = [from_json(tree.attrs.get("inputs")) for tree in (before, after)]
     told |= {name: (inputs[0][name], inputs[1][name]) for name in inputs[0] if name in inputs[1]}
-    texts = [str(tree.attrs.get("config", "")).splitlines() for tree in (before, after)]
-    return Comparison(
-        found,
-        _only(chosen),
-        {name: (old, new) for name, (old, new) in told.items() if old != new},
-        list(difflib.unified_diff(texts[0], texts[1], "before", "after", lineterm="")),
-    )
+    return Comparison(found, _only(chosen), {name: (old, new) for name, (old, new) in told.items() if old != new})
 
 
 def _spelt(data: xr.Dataset, like: xr.Dataset) -> xr.Dataset:
