@@ -6,6 +6,7 @@ file format ``latest``, and of data by the filter Fletcher-32. A file has its na
 another is not read.
 """
 
+import io
 import json
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -139,8 +140,9 @@ def add(path: str | Path, results: Mapping[str, Mapping[str, Any]]) -> None:
     import h5py  # here: a plan reads no results
 
     scalars: dict[str, dict[str, Any]] = {}
-    # In memory: what is on the disk is written at once.
-    with h5py.File("results", "w", driver="core", backing_store=False, libver="latest") as file:
+    # In memory: what is on the disk is written at once. The image of an open file has a stale checksum before HDF5 2.
+    image = io.BytesIO()
+    with h5py.File(image, "w", libver="latest") as file:
         if stored(path):
             with _opened(path) as (before, known):
                 scalars = {name: kept for name, kept in known.items() if name not in results}
@@ -155,9 +157,7 @@ def add(path: str | Path, results: Mapping[str, Mapping[str, Any]]) -> None:
                 else:
                     scalars[name][label] = value.item() if isinstance(value, np.generic | np.ndarray) else value
         _put(file, SCALARS, np.frombuffer(json.dumps([Path(path).name, scalars]).encode(), np.uint8))
-        file.flush()
-        image = file.id.get_file_image()
-    atomic.write_bytes(path, image)
+    atomic.write_bytes(path, image.getvalue())
 
 
 def _put(file: "h5py.File", name: str, array: np.ndarray) -> None:
