@@ -24,6 +24,7 @@ from springtune.problem.geometry import AssumptionWarning
 from springtune.springs import DEFINITIONS
 
 from problems import free_network
+from tables import refused_objects
 
 STEEL = st.Material("210 GPa", 0.3, density="7850 kg/m^3", name="steel")
 THIRD = st.Material("210 GPa", 1 / 3, name="third")
@@ -416,54 +417,10 @@ class TestRefusals:
         grouped = GroupedMesh(self.grouped.mesh, self.grouped.sides, points)
         return st.Scene(plate(case, points=points), grouped, STEEL, "pull")
 
-    @pytest.mark.parametrize(
-        ("make", "message"),
-        [
-            (lambda s: s.scene(grouped=s.grouped.mesh), r"mesh: is of no groups.*mesh_shape"),
-            (lambda s: s.scene(name="pul"), "load: 'pul' is unknown; did you mean 'pull'"),
-            (lambda s: st.Scene(s.shape, s.grouped, STEEL, "pull", "1 kN"), "force: '1 kN' is not used"),
-            *((lambda s, scale=one: s.scene(scale=scale), "scale: .* is no factor") for one in (0, np.inf, "2", True)),
-            (lambda s: s.scene(material=210), "material: 210 is not a Material"),
-            (lambda s: s.scene(material={"": STEEL, "rim": RUBBER}), "material: 'rim' is no part of the mesh"),
-            (lambda s: s.scene(material={}), "main part, '' has none; given: none"),
-            (lambda s: st.Scene(*BEAM, "traction", "1 kN", scale=2), "scale: 2 is of loads of shapes alone"),
-            (lambda s: st.Scene(*BEAM, "traction"), "force: none"),
-            (lambda s: st.sensitivity(s.scene(definition="lattice")), "is of a shape, and a curve is of a beam"),
-            (
-                lambda s: s.scene(load(supports=(*CLAMP, st.Support("right", x=1e-4))), definition="annealed"),
-                "prescribes displacements; choose another definition",
-            ),
-            *(
-                (
-                    lambda s, call=call: call(s.scene(load(supports=(*CLAMP, st.Support("right", x=1e-4))))),
-                    "prescribes displacements",
-                )
-                for call in (st.Scene.motion, st.Scene.buckling_load)
-            ),
-            (lambda s: s.scene(definition="paper"), "needs a uniform one"),
-            (
-                lambda s: s.held(st.Support("left", x=0.0), st.Support("lower", x=1e-3)),
-                r"supports on 'left' and 'lower' move the particle at \(0, 0\) mm by",
-            ),
-            (lambda s: s.held(*CLAMP, name="left"), "neither pulls what is free nor moves a support"),
-            (
-                lambda s: s.held(*CLAMP, st.Support("there", y=0.0), there=np.array([0.0501, 0.0201])),
-                "point 'there' is no particle of the mesh",
-            ),
-            (
-                lambda s: s.scene(grouped=GroupedMesh(s.grouped.mesh, {"lower": s.grouped.sides["lower"]})),
-                "no group is named 'left'; known: lower",
-            ),
-            (lambda s: s.held(*ROLLERS[:1]), "its supports leave the body free to move along y"),
-            (
-                lambda s: s.scene(load(gravity=(0.0, -9.81)), material=THIRD),
-                "density: the material of the body has none",
-            ),
-        ],
-    )
-    def test_of_scenes(self, make, message):
+    @pytest.mark.parametrize(("code", "message"), refused_objects("scenes of shapes"))
+    def test_of_scenes(self, code, message):
         with pytest.raises(ValueError, match=message):
-            make(self)
+            eval(code, globals() | {"s": self})
 
     @pytest.mark.parametrize("name", [name for name, one in DEFINITIONS.items() if one.uniaxial])
     def test_of_definitions_for_beams_alone(self, name):

@@ -10,6 +10,8 @@ import sys
 import zlib
 from pathlib import Path
 
+import h5py
+import meshio
 import numpy as np
 import pytest
 import xarray as xr
@@ -298,7 +300,6 @@ class TestFiles:
 
     def test_many_points_at_one_place_are_found_at_once(self, tmp_path):
         """Pairs of them all would be billions."""
-        meshio = pytest.importorskip("meshio")
         whole = right(0.1, 0.02, 5e-4)
         corners = whole.triangles.ravel()
         points = np.column_stack([whole.points[corners], np.zeros(len(corners))])
@@ -338,7 +339,6 @@ COUNTS = {
 
 def plate_file(folder, name, ending, options):
     """A good file of `PLATE`, in a format of meshio."""
-    meshio = pytest.importorskip("meshio")
     path = folder / f"plate.{ending}"
     points = PLATE.points if name == "su2" else np.column_stack([PLATE.points, np.zeros(len(PLATE.points))])
     mesh = meshio.Mesh(points, [("triangle", PLATE.triangles)])
@@ -467,7 +467,6 @@ class TestDatasets:
         "name", ["../x", "/etc/x", "a\nb", "a/b", "", "..", "one + ../x", "x" * 61, "{x}", b"\xff", [7, 8], ["a", "b"]]
     )
     def test_a_study_whose_name_is_no_name_is_refused(self, path, name):
-        h5py = pytest.importorskip("h5py")
         with h5py.File(path, "r+") as file:
             file.attrs["study"] = name
         with pytest.raises(ValueError, match="dataset.nc: attribute 'study' is .*use letters, digits"):
@@ -475,8 +474,6 @@ class TestDatasets:
 
     def links(self, name, path):
         """Change a dataset so that data of another file are in it."""
-        import h5py
-
         with h5py.File(path, "r+") as file:
             shape, attributes = file["deformation_error"].shape, dict(file["deformation_error"].attrs)
             del file["deformation_error"]
@@ -516,7 +513,6 @@ class TestDatasets:
         assert not path.with_name("x.csv").exists()
 
     def test_a_mesh_file_is_refused_likewise(self, tmp_path):
-        h5py = pytest.importorskip("h5py")
         mesh, name = plate_file(tmp_path, "h5m", "h5m", {"add_global_ids": False}), "tstt/nodes/coordinates"
         with h5py.File(mesh, "r+") as file:
             shape = file[name].shape
@@ -543,8 +539,6 @@ class TestDatasets:
         ("spoil", "says"), yaml.safe_load(Path(__file__).with_name("odd_datasets.yaml").read_text())
     )
     def test_what_a_dataset_cannot_hold_is_refused_in_one_line(self, path, spoil, says):
-        import h5py
-
         with h5py.File(path, "r+") as file:
             exec(spoil, {"file": file, "h5py": h5py, "np": np})
         told = CliRunner().invoke(main, ["info", str(path)])
@@ -563,8 +557,6 @@ class TestDatasets:
 
     def test_a_gigabyte_is_the_most_that_a_small_dataset_says_it_holds(self, path):
         """A chunk is read as one, so that a single number of it took a gigabyte and more."""
-        import h5py
-
         sound = path.read_bytes()
         for made in ({"shape": (140_000_000,), "chunks": (1024,)},
                      {"shape": (10,), "maxshape": (None,), "chunks": (140_000_000,)}):  # fmt: skip
@@ -578,8 +570,6 @@ class TestDatasets:
     def test_texts_that_are_one_text_many_times_take_no_more_than_a_gigabyte(self, path):
         """In HDF5 a text is a place in the file, and many cells may have the same: 0.2 MB stood for gigabytes."""
         count = 140_000
-        import h5py
-
         h5netcdf = pytest.importorskip("h5netcdf")
         with h5netcdf.File(path, "a") as file:
             for name, length in (("one", 1), ("many", count)):

@@ -18,6 +18,8 @@ from springtune.mesh.sheets import outline_of, sheet_fault
 from springtune.problem.boundary import check_case
 from springtune.problem.shapes import Hole, LoadCase, Segment, Shape, Support, Traction
 
+from tables import refused_objects
+
 
 def plate(**more):
     holes = [Hole.circle((0.05, 0.02), 0.008), Hole.circle((0.02, 0.02), 0.005, part="core")]
@@ -416,45 +418,9 @@ def pull(*supports, at="right", **more):
     return LoadCase("pull", supports, [Traction(at, (1, 0))], **more)
 
 
-CASES = {
-    "held": (pull(Support("left", 0, 0)), ""),
-    "three": (pull(Support("left", x=0), Support("corner", y=0)), ""),
-    "slides": (pull(Support("left", x=0)), "leave the body free to move along y; hold it"),
-    "slides along x": (pull(Support("lower", y=0)), "free to move along x"),
-    "turns": (pull(Support("corner", 0, 0)), "free to turn about (0, 0) mm"),
-    "turns about another": (pull(Support("tip", x=0), Support("corner", y=0)), "free to turn about (0, 21) mm"),
-    "two free": (pull(Support("corner", x=0)), "free to move and turn"),
-    "in line": (pull(Support("tip", 0, 0), Support("also", y=0)), "free to turn about (100, 21) mm"),
-    "moved": (LoadCase("pull", [Support("left", 0, 0), Support("right", "1 mm")]), ""),
-    "torn": (
-        LoadCase("pull", [Support("left", 0, 0), Support("lower", y="1 mm")]),
-        "supports on 'left' and 'lower' move the particle at (0, 0) mm by different amounts along y",
-    ),
-    "misspelt": (pull(Support("left", 0, 0), at="rihgt"), "traction: no group is named 'rihgt'; did you mean 'right'?"),
-    "pressure on a point": (
-        LoadCase("pull", [Support("left", 0, 0)], pressures=[st.Pressure("tip", 1)]),
-        "pressure: 'tip' is a point, and needs sides; known: lower, right",
-    ),
-    "stress of sides": (
-        pull(Support("left", 0, 0), quantities=[st.Quantity("s", "stress", "left", "xx")]),
-        "quantity 's': 'left' is sides, and needs a point",
-    ),
-    "reaction": (
-        pull(Support("left", x=0), Support("corner", y=0), quantities=[st.Quantity("r", "reaction", "left", "y")]),
-        "quantity 'r': no support holds 'left' along y; held: corner",
-    ),
-    "loaded between": (pull(Support("left", 0, 0), at="between"), "point 'between' is no particle of the mesh"),
-    "asked between": (pull(Support("left", 0, 0), quantities=[st.Quantity("u", "displacement", "between", "x")]), ""),
-    "asked outside": (
-        pull(Support("left", 0, 0), quantities=[st.Quantity("u", "displacement", "away", "x")]),
-        "quantity 'u': point 'away' is not in the body",
-    ),
-}
-
-
-@pytest.mark.parametrize("name", CASES)
-def test_load_cases_are_held_against_the_mesh(name):
-    case, says = CASES[name]
+@pytest.mark.parametrize(("code", "says"), refused_objects("load cases"))
+def test_load_cases_are_held_against_the_mesh(code, says):
+    case = eval(code)
     made = mesh_shape(plate(points={"tip": (0.1, 0.021), "also": (0.1, 0.03), "corner": (0, 0)}), 5e-3)
     points = {**made.points, "between": np.array([0.0321, 0.0123]), "away": np.array([0.05, 0.02])}
     grouped = GroupedMesh(made.mesh, made.sides, points, made.parts)
