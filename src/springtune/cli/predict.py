@@ -139,18 +139,19 @@ def _subject(body: Asked, known: Any) -> "Subject":
 def _on_mesh(body: Asked, under: dict[str, Any], springs_alone: bool, also: tuple[str, ...]) -> Answer:
     """Best definition for one mesh."""
     from ..mesh.types import MESH_TYPES
-    from ..prediction.choices import SOLVED_PARTICLES, predict, references, shape_references
+    from ..prediction.choices import SEARCHED_PARTICLES, SOLVED_PARTICLES, predict, references, shape_references
     from .recommendation import prediction_text, recommended
 
-    count, mesh = 0.0, None
+    most, count, mesh = SEARCHED_PARTICLES if also else SOLVED_PARTICLES, 0.0, None
     if body.is_beam and body.size is not None:  # counted before it is made
         count = MESH_TYPES[body.mesh_type].particles(body.body.length, body.body.height, body.size)
-    if count <= SOLVED_PARTICLES:
+    if count <= most:
         mesh = body.mesh if body.is_beam else body.mesh.mesh
         count = len(mesh.points)
-    if mesh is None or count > SOLVED_PARTICLES:
+    if mesh is None or count > most:
         raise click.ClickException(
-            f"'{body.mesh_name}' has {count:.0f} particles, more than the {SOLVED_PARTICLES} that are solved here; "
+            f"'{body.mesh_name}' has {count:.0f} particles, more than the {most} that are solved here"
+            f"{' with --best-springs' * bool(also)}; "
             "give a coarser mesh, or make it a mesh of a study"
         )
     known: Any = references(body.body, body.material, **under) if body.is_beam else shape_references(_statement(body))

@@ -98,11 +98,7 @@ def scenes(config: Path, most: int | None) -> None:
     click.echo(summary(study, [row for kind, part in parts if part for row in kind.summary(part)]))
 
 
-@click.command(
-    epilog=examples(
-        "springtune definitions | grep area",
-    )
-)
+@click.command(epilog=examples("springtune definitions | grep area"))
 def definitions() -> None:
     """List the definitions of spring stiffness."""
     from .. import DEFINITIONS
