@@ -14,7 +14,7 @@ export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 # Jobs and tests are many processes: Python is to keep what it compiles.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: study report paper test test-browser test-engines test-faults test-fuzz test-versions test-reruns release-check slow lint licences docs site pictures lock test-slurm test-archive test-storage scale test-container million mutants catalogue clean
+.PHONY: study report paper test slow lint docs site pictures lock test-browser test-engines test-slurm mutants clean
 
 study: $(VENV)/.run
 	springtune run "$$STUDY"
@@ -26,12 +26,10 @@ report: study
 paper: $(VENV)/.run
 	snakemake paper
 
-# Files in this order, those that take longest first: at the end no core waits for the other. The inputs of tests/fuzz are
-# others each day: the line that is printed has their seed, by which `make test FUZZ_SEED=...` makes them again.
+# Files in this order, those that take longest first: at the end no core waits for the other.
 # A process that crashes ends the run: pytest-xdist 3.8 hangs if it starts another one.
-FUZZ_SEED := $(shell date -u +%Y%m%d)
 test: $(VENV)/.test
-	FUZZ_SEED=$(FUZZ_SEED) pytest -n 2 --max-worker-restart 0 --dist loadfile --no-loadscope-reorder -m "not slow" tests/workflow tests/fuzz tests/reruns tests/faults tests/physics tests/unit src
+	pytest -n 2 --max-worker-restart 0 --dist loadfile --no-loadscope-reorder -m "not slow" tests/workflow tests/fuzz tests/reruns tests/faults tests/physics tests/unit src
 	SPRINGTUNE_SOLVER=superlu pytest -q -n 2 -m "not slow" tests/physics/test_statics.py tests/physics/test_path.py tests/physics/test_continuation.py
 
 # The page to browse, in a headless Chromium: apt-get install chromium chromium-driver.
@@ -53,52 +51,16 @@ $(ENGINES)/.done: requirements/engines.txt | $(VENV)/.test
 	sh tools/engines.sh $(ENGINES)
 	touch $@
 
-# Every write, rename and opening of a file of a small study failed once, by an error, by a full disk and by a kill.
-test-faults: $(VENV)/.test
-	pytest -n 2 tests/faults
-
-# Spoiled studies, mesh files and datasets by the thousand; INPUTS and SEED choose others. Some minutes.
-INPUTS ?= 20000
-SEED ?= 1
-test-fuzz: $(VENV)/.test
-	OPENBLAS_NUM_THREADS=1 python tests/fuzz $(INPUTS) $(SEED)
-
-# The same numbers by SuperLU and by CHOLMOD, with the oldest packages that pyproject.toml allows, and with the newest by
-# each Python (python3.11 ...) on PATH; physics holds with them. They are installed, and what is not there is named.
-# The quick study, the paper's and physics by the kernels of other processors; what this one cannot run is named, too.
-test-versions: $(VENV)/.test
-	pytest -rs tests/versions
-
-# A table of changes: which jobs run then, what they compute, and that the dataset is that of a fresh run.
-test-reruns: $(VENV)/.test
-	pytest -n 2 tests/reruns
-
-# The container image, built and used as its page says; BASE=debootstrap where no registry can be reached.
-test-container:
-	sh tests/container/run.sh
-
-# A release without releasing: built, checked, installed where nothing else is. What it needs is installed apart.
-release-check: $(VENV)/.test
-	pytest -rs tests/release
-
 # Studies on a Slurm of two nodes on this machine, as root: the same bytes as without, whatever becomes of jobs and nodes.
 test-slurm: $(VENV)/.test build/slurm/.done
 	pytest tests/slurm
 
 # The plugin costs every start of Snakemake half a second, so it has an environment of its own.
-build/slurm/.done: requirements/run.txt requirements/slurm.txt requirements/cholesky.txt | $(VENV)/.test
+build/slurm/.done: requirements/run.txt requirements/slurm.txt | $(VENV)/.test
 	uv venv --quiet --clear --python $(VENV)/bin/python build/slurm
 	uv pip install --quiet --compile-bytecode --python build/slurm --require-hashes -r requirements/run.txt -r requirements/slurm.txt
-	-uv pip install --quiet --python build/slurm --only-binary :all: --require-hashes -r requirements/cholesky.txt
+	-uv pip install --quiet --python build/slurm --only-binary :all: --require-hashes -r $(VENV)/cholesky.txt
 	touch $@
-
-# Archives of studies: valid to a validator of others, which is installed, and reproduced in a new environment.
-test-archive: $(VENV)/.test
-	pytest -rs tests/archive
-
-# Results on object storage: Snakemake's plugin and a server of S3 on this machine, installed apart.
-test-storage: $(VENV)/.test
-	pytest -rs tests/storage
 
 # Small errors put into the physics one at a time, and whether a test fails for each: hours; SHARE tries a part of them.
 SHARE ?= 1
@@ -106,26 +68,30 @@ MUTANTS := build/mutants/packages
 mutants: $(VENV)/.test $(MUTANTS)
 	PYTHONPATH="$$PWD/src:$(MUTANTS)" python tools/mutants.py --share $(SHARE)
 
-$(MUTANTS): requirements/mutants.txt
-	python -m uv pip install --quiet --require-hashes --no-deps --target $@ --requirement $<
-	touch $@
+$(MUTANTS): | $(VENV)/.test
+	python -m uv pip install --quiet --constraint requirements/test.txt --target $@ 'cosmic-ray>=8.4' 'coverage>=7.6'
 
+# What takes minutes: slow tests, new random examples, each file operation of a small study failed once, 20,000 spoiled
+# inputs (INPUTS and SEED choose others), other versions, solvers and processors, and a release without releasing.
+# What this machine lacks is named, and skipped.
+INPUTS ?= 20000
+SEED ?= 1
 slow: $(VENV)/.test $(ENGINES)/.done
-	pytest -n 2 -m slow tests/workflow tests/fuzz tests/browser tests/physics tests/unit src
+	pytest -n 2 -m slow tests/workflow tests/fuzz tests/physics tests/unit src
 	HYPOTHESIS_PROFILE=anew pytest -n 2 -m "not slow" tests/unit tests/physics
 	$(WITH_ENGINES) pytest -n 2 --max-worker-restart 0 --dist loadfile -rs -m slow tests/engines
+	pytest -n 2 tests/faults tests/reruns
+	OPENBLAS_NUM_THREADS=1 python tests/fuzz/fuzz.py $(INPUTS) $(SEED)
+	pytest -rs tests/versions tests/release
 
 # Format, lint, types and spelling, as before each commit: .pre-commit-config.yaml. What can be mended is.
 lint: $(VENV)/.test
 	sh tools/lint.sh
 
-# The licences of all packages of the lock files, in docs/licences.md.
-licences: $(VENV)/.test
-	python tools/licences.py
-
-# The configuration's schema and manual, from the models that validate it.
+# What is written from the code: schema and manual of studies, and docs/catalogue.md of all definitions; half a minute.
 docs: $(VENV)/.run
 	SPRINGTUNE_PLUGINS=none python tools/manual.py
+	SPRINGTUNE_PLUGINS=none OPENBLAS_NUM_THREADS=1 python tools/catalogue.py
 
 # The pages, the names' docstrings and the examples as a site: build/site/index.html. An example reads the quick study.
 site: $(VENV)/.test results/quick/dataset.nc
@@ -134,44 +100,35 @@ site: $(VENV)/.test results/quick/dataset.nc
 results/quick/dataset.nc: | $(VENV)/.run
 	snakemake --configfile config/quick.yaml
 
-# The pictures and tables of the pages, from their studies; the benchmark among them takes minutes.
+# The pictures and tables of the pages, from their studies, and what is measured on this machine: docs/scale.md and a
+# million particles in docs/speed.md. Half an hour and 3 GB.
 pictures: $(VENV)/.run $(ENGINES)/.done
 	$(WITH_ENGINES) python tools/pictures.py
 	python tools/pages.py
-
-# Sources, moduli, errors and costs of all definitions, in docs/catalogue.md; half a minute.
-catalogue: $(VENV)/.run
-	SPRINGTUNE_PLUGINS=none OPENBLAS_NUM_THREADS=1 python tools/catalogue.py
-
-# The tables of a million particles in docs/speed.md, measured on this machine; some minutes and 3 GB.
-million: $(VENV)/.run
 	OPENBLAS_NUM_THREADS=1 python tools/million.py --write
-
-# What studies of a thousand to a hundred thousand scenes take, into docs/scale.md; some minutes.
-scale: $(VENV)/.run
 	python tools/scale.py --write
 
 # Stamps: nothing is installed again until a requirement changes.
-$(VENV)/.run: requirements/installer.txt requirements/run.txt requirements/cholesky.txt pyproject.toml tools/setup.sh
+$(VENV)/.run: requirements/installer.txt requirements/run.txt requirements/test.txt pyproject.toml tools/setup.sh
 	sh tools/setup.sh run
 
 $(VENV)/.test: requirements/test.txt $(VENV)/.run
 	sh tools/setup.sh test
 
-LOCK = uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-annotate --no-header
-lock: $(VENV)/.run
+# Versions and hashes of all packages, and their licences in docs/licences.md. uv does not read pip's configuration, so the
+# indexes, where pip has some of its own, are handed on, and are equal, as to pip.
+LOCK = uv pip compile --quiet --index-strategy unsafe-best-match --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-annotate --no-header
+lock: export UV_DEFAULT_INDEX ?= $(shell pip config get global.index-url 2>/dev/null)
+lock: export UV_INDEX ?= $(shell pip config get global.extra-index-url 2>/dev/null)
+lock: $(VENV)/.test
 	$(LOCK) requirements/installer.in --output-file requirements/installer.txt
 	$(LOCK) pyproject.toml requirements/build.in --extra archive --extra paper --output-file requirements/run.txt
 	$(LOCK) pyproject.toml requirements/build.in --extra test --constraints requirements/run.txt --output-file requirements/test.txt
-	$(LOCK) requirements/release.in --output-file requirements/release.txt
 	$(LOCK) requirements/slurm.in --constraints requirements/run.txt --output-file requirements/slurm.txt
-	$(LOCK) pyproject.toml requirements/build.in requirements/storage.in --extra s3 --output-file requirements/storage.txt
 	$(LOCK) requirements/engines.in --constraints requirements/test.txt --output-file requirements/engines.txt
-	$(LOCK) requirements/mutants.in --constraints requirements/test.txt --output-file requirements/mutants.txt
-	$(LOCK) requirements/cholesky.in --constraints requirements/test.txt --output-file requirements/cholesky.txt
-	$(LOCK) requirements/validator.in --output-file requirements/validator.txt
+	python tools/licences.py
 
-# Everything that was computed, of all studies; `springtune clean` removes only what no study asks for any more.
+# Everything that was computed, of all studies.
 clean:
 	@if [ -e results ] && [ "$(YES)" != 1 ]; then \
 	    printf 'Remove all results (%s) and .snakemake? What was solved is solved again. [y/N] ' "$$(du -sh results/ | cut -f1)"; \

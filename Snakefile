@@ -5,58 +5,54 @@
 #     snakemake paper                                    the paper, and the studies that it reads
 
 
+from snakemake.utils import min_version
+
+min_version("9.8")
+
+
 include: "workflow/rules/environment.smk"
 include: "workflow/rules/internals.smk"
+include: "workflow/rules/common.smk"
+include: "workflow/rules/hooks.smk"
+include: "workflow/rules/stages.smk"
+include: "workflow/rules/collect.smk"
+include: "workflow/rules/outputs.smk"
+include: "workflow/rules/browse.smk"
 
 
-if not NOTED:
+if config.get("paper", True):  # a study that is read for the paper has none of its own
 
-    include: "workflow/rules/common.smk"
-    include: "workflow/rules/hooks.smk"
-    include: "workflow/rules/scenes.smk"
-    include: "workflow/rules/shapes.smk"
-    include: "workflow/rules/moduli.smk"
-    include: "workflow/rules/laying.smk"
-    include: "workflow/rules/stability.smk"
-    include: "workflow/rules/samples.smk"
-    include: "workflow/rules/refinement.smk"
-    include: "workflow/rules/benchmark.smk"
-    include: "workflow/rules/further.smk"
-    include: "workflow/rules/collect.smk"
-    include: "workflow/rules/outputs.smk"
-    include: "workflow/rules/browse.smk"
+    include: "workflow/rules/paper.smk"
 
-    if config.get("paper", True):  # a study that is read for the paper has none of its own
 
-        include: "workflow/rules/paper.smk"
+if not MODULE:
 
-    if not MODULE:
+    report: "workflow/report/study.rst"
 
-        report: "workflow/report/study.rst"
 
-    rule all:
-        default_target: not HAS_TARGET
-        message:
-            f"{RESULTS} is complete"
-        input:
-            # Stages, too, so that missing stored results are made again.
-            STORED,
-            rules.collect.output,
-            OUTPUTS.values(),
-            str(RESULTS / rerun.PAGE),  # no report(): the report names the rule that made it
+rule all:
+    default_target: not HAS_TARGET
+    message:
+        f"{RESULTS} is complete"
+    input:
+        # Stages, too, so that missing stored results are made again.
+        STORED,
+        rules.collect.output,
+        OUTPUTS.values(),
+        str(RESULTS / rerun.PAGE),  # no report(): the report names the rule that made it
 
-    if "storage" in config or {"publish", "fetch"} & {*WORDS}:
 
-        include: "workflow/rules/storage.smk"
+onstart:
+    begin()
 
-    onstart:
-        begin()
 
-    onsuccess:
-        log_end("ending")
+onsuccess:
+    log_end("ending")
 
-    onerror:
-        log_end("broken")
 
-    if MODULE:
-        add_hooks(onstart=begin, onsuccess=lambda: log_end("ending"), onerror=lambda: log_end("broken"))
+onerror:
+    log_end("broken")
+
+
+if MODULE:
+    add_hooks(onstart=begin, onsuccess=lambda: log_end("ending"), onerror=lambda: log_end("broken"))

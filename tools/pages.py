@@ -1,9 +1,5 @@
-"""Put tables of studies into the pages that show them; `make pictures`.
+"""Put tables of studies into the pages that show them; `make pictures`."""
 
-`python tools/pages.py --compare OLD.nc NEW.nc` prints how the seconds of two benchmarks compare instead.
-"""
-
-import argparse
 import re
 from pathlib import Path
 
@@ -36,8 +32,9 @@ USUAL, GOOD = 10, 0.02
 LONG, KEPT = 30, 15
 """Rows above which a table is shortened, and rows that it keeps on its page."""
 
-NOISE = 1.3
-"""Ratio of seconds that runs of one program on one machine show among themselves."""
+
+LEFT_OUT = r"^### (?:Mesh type `(?:alternating|right|isosceles-0\.[35])`|Scenes of the study)\n.*?(?=^###|\Z)"
+"""Tables that stay in the file of the study: mesh types that no springs alone suit, and messages of scenes."""
 
 
 def put(page: Path, tables: str) -> None:
@@ -58,7 +55,8 @@ def shorten(tables: str, file: str) -> str:
             return table[0]
         return "".join([head, rule, *rows[:KEPT], f"\n{len(rows) - KEPT} more rows are in `results/{file}`.\n"])
 
-    numbers = re.sub(r"^### [^\n]*: what has no numbers\n.*?(?=^###|\Z)", "", tables, flags=re.MULTILINE | re.DOTALL)
+    apart = rf"^### [^\n]*: what has no numbers\n.*?(?=^###|\Z)|{LEFT_OUT}"
+    numbers = re.sub(apart, "", tables, flags=re.MULTILINE | re.DOTALL)
     return re.sub(r"(?:^\|.*\n)+", first, numbers, flags=re.MULTILINE)
 
 
@@ -114,58 +112,12 @@ def _off(error: float) -> str:
     return f"x {_short(1 + error)}" if error >= 1 else f"{round(100 * error, 1) + 0.0:+.1f} %".replace("-", "−")
 
 
-def benchmark(path: Path) -> xr.Dataset:
-    """Benchmark of a dataset."""
-    try:
-        with reading.open(path) as tree:
-            if "benchmark" not in tree:
-                raise SystemExit(f"{path}: has no group /benchmark; run config/benchmark.yaml")
-            return tree["benchmark"].to_dataset().load()
-    except (OSError, RuntimeError, ValueError) as error:
-        raise SystemExit(f"{error}; run config/benchmark.yaml") from None
-
-
-def comparison(old: xr.Dataset, new: xr.Dataset) -> tuple[list[str], int]:
-    """Ratios of the seconds of two benchmarks over their median, approach by approach, and how many are slower.
-
-    Flagged are ratios beyond `NOISE` and beyond three times the spread of the runs.
-    """
-    both = {name: [label for label in old[name].values if label in new[name].values]
-            for name in ("scene", "approach", "mesh_size")}  # fmt: skip
-    old, new = (one.sel(both).transpose("approach", "scene", "mesh_size") for one in (old, new))
-    ratio = (new.seconds / old.seconds).values
-    if not np.isfinite(ratio).any():
-        return ["The two datasets have no case in common."], 0
-    spread = np.fmax(*((one.seconds_spread / one.seconds).values for one in (old, new)))
-    middle = float(np.nanmedian(ratio))
-    lines = [f"{int(np.isfinite(ratio).sum())} cases in common, median ratio new / old {middle:.2f}."]
-    flagged = 0
-    for i, approach in enumerate(both["approach"]):
-        cells = np.isfinite(ratio[i])
-        if not cells.any():
-            continue
-        own = float(np.median(ratio[i][cells])) / middle
-        noise = max(NOISE, 1 + 3 * float(np.median(spread[i][cells])))
-        word = "slower" if own > noise else "faster" if own < 1 / noise else ""
-        flagged += own > noise
-        lines.append(f"{own:6.2f}  {approach}  {word}".rstrip())
-    return lines, flagged
-
-
 def main() -> None:
-    """Renew the pages, or compare two benchmarks: the status is 1 where an approach became slower."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--compare", nargs=2, type=Path, metavar=("OLD.nc", "NEW.nc"), help="datasets of benchmarks")
-    if not (compared := parser.parse_args().compare):
-        for page, tables in TABLES.items():
-            put(REPOSITORY / "docs" / page, shorten((REPOSITORY / "results" / tables).read_text(), tables))
-        with reading.open(REPOSITORY / "results/engines/dataset.nc") as tree:
-            put(REPOSITORY / "docs" / IN_ENGINES, in_engines(tree["engines"].to_dataset().load()))
-        return
-    lines, flagged = comparison(*map(benchmark, compared))
-    print("\n".join(lines))
-    if flagged:
-        raise SystemExit(1)
+    """Renew the pages."""
+    for page, tables in TABLES.items():
+        put(REPOSITORY / "docs" / page, shorten((REPOSITORY / "results" / tables).read_text(), tables))
+    with reading.open(REPOSITORY / "results/engines/dataset.nc") as tree:
+        put(REPOSITORY / "docs" / IN_ENGINES, in_engines(tree["engines"].to_dataset().load()))
 
 
 if __name__ == "__main__":

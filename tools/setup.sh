@@ -58,7 +58,8 @@ install --require-hashes -r "requirements/$what.txt" || {
     exit 1
 }
 if [ "$what" = run ]; then
-    install --only-binary :all: --require-hashes -r requirements/cholesky.txt ||
+    sed -n '/^cvxopt==/,/[^\\]$/p' requirements/test.txt >"$venv/cholesky.txt"
+    install --only-binary :all: --require-hashes -r "$venv/cholesky.txt" ||
         say "no CHOLMOD for this machine: SuperLU factorizes in its place, in three to five times the time"
 fi
 "$python" -m pip install --quiet --no-deps --no-build-isolation --no-index --editable .

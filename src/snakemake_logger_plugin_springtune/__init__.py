@@ -5,6 +5,7 @@ Snakemake imports all plugins at each start, so the display is imported only by 
 
 import os
 import sys
+from functools import cached_property
 from logging import WARNING, Handler, LogRecord
 from typing import TYPE_CHECKING
 
@@ -29,7 +30,6 @@ class LogHandler(LogHandlerBase):
     def __post_init__(self) -> None:
         Handler.__init__(self)  # the interface before 2.0 leaves it out
         self.display: Display | None = None
-        self.plain: Handler | None = None
         self.held: list[LogRecord] = []
         asked = self.common_settings
         quiet = {str(getattr(one, "name", one)).lower() for one in asked.quiet or ()}
@@ -44,7 +44,7 @@ class LogHandler(LogHandlerBase):
             # A display that fails must not take what the run has to say with it.
             self.wanted = False
             self._stop()
-            self._plain().emit(record)
+            self.plain.emit(record)
 
     def close(self) -> None:
         """Restore the terminal, and write what is held back."""
@@ -52,17 +52,17 @@ class LogHandler(LogHandlerBase):
         super().close()
 
     def _show(self, record: LogRecord) -> None:
-        estimates, event = getattr(record, "estimates", None), getattr(record, "event", None)
+        work, event = getattr(record, "work", None), getattr(record, "event", None)
         if not self.wanted:
-            self._plain().emit(record)
-        elif estimates is not None:
+            self.plain.emit(record)
+        elif work is not None:
             from .display import Display
 
             stream = sys.stderr
             stream.write(f"{record.getMessage()}\n")
             self.held.clear()
             moves = stream.isatty() and os.environ.get("TERM", "dumb") != "dumb" and not os.environ.get("CI")
-            self.display = Display(estimates, record.cores, stream, moves, record.slowdown)  # type: ignore[attr-defined]
+            self.display = Display(work, stream, moves)
         elif getattr(record, "ends", False):
             self.wanted = False  # what Snakemake says after it is shown
             self._stop()
@@ -75,18 +75,15 @@ class LogHandler(LogHandlerBase):
             # An error, or a job: without the Snakefile's hooks (--no-hooks) there is nothing to display.
             self.wanted = record.levelno >= WARNING
             self._stop()
-            self._plain().emit(record)
+            self.plain.emit(record)
 
     def _follow(self, display: "Display", record: LogRecord) -> None:
+        numbers = {LogEvent.JOB_INFO: "jobid", LogEvent.JOB_FINISHED: "job_id", LogEvent.JOB_ERROR: "jobid"}
         event = getattr(record, "event", None)
-        if event == LogEvent.JOB_INFO:
-            display.begin(record.jobid)  # type: ignore[attr-defined]
-        elif event == LogEvent.JOB_FINISHED:
-            display.finish(record.job_id)  # type: ignore[attr-defined]
-        elif event == LogEvent.JOB_ERROR:
-            display.fail(record.jobid)  # type: ignore[attr-defined]
+        if event in numbers:
+            display.follow(event, getattr(record, numbers[event]))
         if record.levelno >= WARNING:
-            display.tell(lambda: self._plain().emit(record))
+            display.tell(lambda: self.plain.emit(record))
 
     def _stop(self) -> None:
         """Remove the display, or write what was held back for want of one."""
@@ -95,13 +92,12 @@ class LogHandler(LogHandlerBase):
             self.display = None
         held, self.held = self.held, []
         for record in held:
-            self._plain().emit(record)
+            self.plain.emit(record)
 
-    def _plain(self) -> Handler:
+    @cached_property
+    def plain(self) -> Handler:
         """Snakemake's own handler."""
-        if self.plain is None:
-            from snakemake.logging import ColorizingTextHandler
+        from snakemake.logging import ColorizingTextHandler
 
-            stream = sys.stdout if self.common_settings.stdout else sys.stderr
-            self.plain = ColorizingTextHandler(self.common_settings.nocolor, stream, self.formatter)
-        return self.plain
+        stream = sys.stdout if self.common_settings.stdout else sys.stderr
+        return ColorizingTextHandler(self.common_settings.nocolor, stream, self.formatter)

@@ -2,8 +2,8 @@
 
 A decorator adds a function to a mapping. On first use the mapping imports all modules of a package to find what they
 declare. Code outside the package uses the same decorator. Other packages declare more by entry points of the groups
-``springtune.definitions``, ``springtune.engines``, ``springtune.loads``, ``springtune.mesh_types`` and
-``springtune.kinds``. They are imported when their name is asked for, or all names.
+``springtune.definitions``, ``springtune.engines``, ``springtune.loads`` and ``springtune.mesh_types``. They are
+imported when their name is asked for, or all names.
 """
 
 import inspect
@@ -33,7 +33,7 @@ class PluginWarning(UserWarning):
     """What another package declares is left out; the message says why."""
 
 
-GROUPS = ("definitions", "engines", "loads", "mesh_types", "kinds")
+GROUPS = ("definitions", "engines", "loads", "mesh_types")
 """Groups of entry points, after ``springtune.``."""
 
 
@@ -58,21 +58,13 @@ def plugin_packages() -> set[str]:
     return {one.module.partition(".")[0] for group in plugins().values() for one in group}
 
 
-@cache
-def full_name(module: str) -> str:
-    """Name under which Python imports a module: one of the package, or of a package with entry points."""
-    place = Path(__file__).with_name(module.partition(".")[0])
-    ours = place.is_dir() or place.with_suffix(".py").is_file()
-    return module if not ours and place.name in plugin_packages() else f"springtune.{module}"
-
-
 def imported(name: str) -> Any:
-    """Import a module, or with ``module:name`` an attribute of it; see `full_name`.
+    """Import a module of the package, or with ``module:name`` an attribute of it.
 
     All imports by text use this function: commands, study kinds, stages, outputs, public names and hooks.
     """
     module, _, attribute = name.partition(":")
-    found = import_module(full_name(module))
+    found = import_module(f"springtune.{module}")
     return getattr(found, attribute) if attribute else found
 
 

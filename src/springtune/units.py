@@ -16,9 +16,9 @@ if TYPE_CHECKING:
     import pint
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Kind:
-    """Kind of a quantity.
+    """Kind of a quantity, with its usual units and their size in its SI unit.
 
     Examples
     --------
@@ -29,6 +29,7 @@ class Kind:
     name: str
     unit: str
     example: str
+    units: dict[str, str]
 
     @property
     def words(self) -> str:
@@ -36,40 +37,30 @@ class Kind:
         return f"{_article(self.name)} such as '{self.example}'"
 
 
+DEGREE = "0.01745329251994329576923690768488612713"
+"""A degree [rad]."""
+
 QUANTITY_KINDS = {
     kind.name: kind
     for kind in (
-        Kind("length", "m", "200 mm"),
-        Kind("force", "N", "400 kN"),
-        Kind("stiffness", "N/m", "170e6 N/m"),
-        Kind("stress", "Pa", "210 GPa"),
-        Kind("density", "kg/m^3", "7850 kg/m^3"),
-        Kind("area", "m^2", "12 mm^2"),
-        Kind("energy", "J", "3.5 J"),
-        Kind("acceleration", "m/s^2", "9.81 m/s^2"),
-        Kind("angle", "rad", "30 deg"),
-        Kind("time", "s", "5 ms"),
-        Kind("frequency", "Hz", "10 Hz"),
+        Kind("length", "m", "200 mm", {"m": "1", "cm": "1e-2", "mm": "1e-3", "um": "1e-6", "km": "1e3"}),
+        Kind("force", "N", "400 kN", {"N": "1", "mN": "1e-3", "kN": "1e3", "MN": "1e6"}),
+        Kind(
+            "stiffness", "N/m", "170e6 N/m", {"N/m": "1", "kN/m": "1e3", "MN/m": "1e6", "N/mm": "1e3", "kN/mm": "1e6"}
+        ),
+        Kind("stress", "Pa", "210 GPa", {"Pa": "1", "kPa": "1e3", "MPa": "1e6", "GPa": "1e9", "N/mm^2": "1e6"}),
+        Kind("density", "kg/m^3", "7850 kg/m^3", {"kg/m^3": "1", "g/cm^3": "1e3", "t/m^3": "1e3", "kg/dm^3": "1e3"}),
+        Kind("area", "m^2", "12 mm^2", {"m^2": "1", "cm^2": "1e-4", "mm^2": "1e-6"}),
+        Kind("energy", "J", "3.5 J", {"J": "1", "mJ": "1e-3", "kJ": "1e3", "N*m": "1", "N*mm": "1e-3"}),
+        Kind("acceleration", "m/s^2", "9.81 m/s^2", {"m/s^2": "1", "mm/s^2": "1e-3"}),
+        Kind("angle", "rad", "30 deg", {"rad": "1", "deg": DEGREE, "mrad": "1e-3"}),
+        Kind("time", "s", "5 ms", {"s": "1", "ms": "1e-3", "us": "1e-6", "min": "60"}),
+        Kind("frequency", "Hz", "10 Hz", {"Hz": "1", "mHz": "1e-3", "kHz": "1e3"}),
     )
 }
 """Kinds of quantity by name."""
 
-COMMON = {
-    "length": {"m": "1", "cm": "1e-2", "mm": "1e-3", "um": "1e-6", "km": "1e3"},
-    "force": {"N": "1", "mN": "1e-3", "kN": "1e3", "MN": "1e6"},
-    "stiffness": {"N/m": "1", "kN/m": "1e3", "MN/m": "1e6", "N/mm": "1e3", "kN/mm": "1e6", "N/cm": "1e2"},
-    "stress": {"Pa": "1", "kPa": "1e3", "MPa": "1e6", "GPa": "1e9", "N/m^2": "1", "N/mm^2": "1e6"},
-    "density": {"kg/m^3": "1", "g/cm^3": "1e3", "t/m^3": "1e3", "kg/dm^3": "1e3"},
-    "area": {"m^2": "1", "cm^2": "1e-4", "mm^2": "1e-6"},
-    "energy": {"J": "1", "mJ": "1e-3", "kJ": "1e3", "N*m": "1", "N*mm": "1e-3"},
-    "acceleration": {"m/s^2": "1", "mm/s^2": "1e-3"},
-    "time": {"s": "1", "ms": "1e-3", "us": "1e-6", "min": "60"},
-    "frequency": {"Hz": "1", "mHz": "1e-3", "kHz": "1e3"},
-    "angle": {"rad": "1", "deg": "0.01745329251994329576923690768488612713", "mrad": "1e-3"},
-}
-"""Usual units of each kind and their size in its SI unit."""
-
-_KNOWN = {unit: (kind, Decimal(size)) for kind, units in COMMON.items() for unit, size in units.items()}
+_KNOWN = {unit: (kind.name, Decimal(size)) for kind in QUANTITY_KINDS.values() for unit, size in kind.units.items()}
 
 _QUANTITY = re.compile(r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)(?:/([0-9]+))?\s*(.*)", re.DOTALL)
 
@@ -79,7 +70,9 @@ _OF_PRINT = re.compile("pixel|point|pica|didot|cicero|dot")
 LONGEST_QUANTITY = 100
 """Most characters of a quantity."""
 
-_TOKEN = re.compile(r"[^\W\d]\w*|[0-9.]+|\S")
+_POWER = re.compile(r"(?<![\d\s^*/(.+-])\s*\^\s*[+-]?[\d.]{1,3}(?![\d^.])")
+_OTHER_NUMBER = re.compile(r"\^|(?<![\w.])(?!1(?![\w.]))[\d.]")
+"""Power of a name or a bracket, and other powers and numbers but 1."""
 
 
 class UnitError(ValueError):
@@ -115,7 +108,7 @@ def parse(text: str, kind: str) -> float:
     spelling = _spelling(unit)
     known = _KNOWN.get(spelling) or _ask_pint(spelling)
     if known is None:
-        near = get_close_matches(unit, COMMON[kind], n=1, cutoff=0.5)
+        near = get_close_matches(unit, wanted.units, n=1, cutoff=0.5)
         meant = f", did you mean '{near[0]}'?" if near else ";"
         raise UnitError(f"'{text}': unknown unit '{unit}'{meant} {remedy}")
     is_kind, size = known
@@ -151,16 +144,7 @@ def _registry() -> "pint.UnitRegistry[float]":
 
 def _plain(unit: str) -> bool:
     """Return whether a unit has no nested or numeric powers: pint would evaluate ``9^9^9^9``."""
-    tokens = _TOKEN.findall(unit)
-    exponent = False  # whether the token before is a power, but for its sign
-    for before, token in zip(["", *tokens], tokens):
-        if token[0].isdigit() or token[0] == ".":
-            if not (exponent and len(token) <= 3) and token != "1":
-                return False
-        elif token == "^" and not (before[-1:].isalpha() or before == ")"):
-            return False
-        exponent = token == "^" or (exponent and token in "+-")
-    return not exponent
+    return not _OTHER_NUMBER.search(_POWER.sub("", unit))
 
 
 @cache

@@ -2,8 +2,6 @@
 
 import ast
 import os
-import statistics
-import threading
 from pathlib import Path
 from urllib.request import url2pathname
 
@@ -13,12 +11,10 @@ from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 
 from springtune.problem.compare import sign_sentence
-from springtune.studies.output.browse.server import Server
 from springtune.studies.output.colours import ERROR_COLOURS
 
 CURVE = "springtune.charts.curve.sources.points.data.y.join()"
 HEADING = "document.querySelector('.chosen-cell h2').textContent"
-REPOSITORY = Path(__file__).parents[2]
 
 
 def grid(browser):
@@ -38,24 +34,6 @@ def show(browser, view):
 class TestCube:
     def test_is_small_enough_to_mail(self, cube):
         assert os.path.getsize(url2pathname(cube.removeprefix("file://"))) <= 5e6
-
-    def test_time_to_the_first_view_and_of_a_selection(self, browser, cube, record_property, capsys):
-        """Measured and told; whether a machine is busy decides no test."""
-        browser.open(cube)
-        table = browser.ask("return performance.getEntriesByName('table')[0].startTime")
-        ready = browser.ask("return performance.getEntriesByName('ready')[0].startTime")
-        took = []
-        grid(browser).click()
-        for _ in range(20):
-            before = browser.ask(f"return {HEADING}")
-            grid(browser).send_keys(Keys.ARROW_DOWN)
-            browser.wait(f"return {HEADING} !== arguments[0] && springtune.took > 0", before)
-            took.append(browser.ask("return springtune.took"))
-        record_property("milliseconds", {"table": table, "ready": ready, "selection": statistics.median(took)})
-        with capsys.disabled():
-            print(f"\ntable {table:.0f} ms, all charts {ready:.0f} ms, a selection {statistics.median(took):.0f} ms "
-                  f"(at most {max(took):.0f} ms)")  # fmt: skip
-        assert len(took) == 20 and not browser.complaints()
 
     def test_filters_and_sorting(self, browser, cube):
         browser.open(cube)
@@ -228,21 +206,6 @@ def test_pages_ask_for_nothing_and_complain_of_nothing(browser, small, cube):
         assert {one.partition("#")[0] for one in browser.requests()} == {address}
 
 
-def test_the_server_of_a_page_is_all_that_it_asks(browser, small):
-    with Server(Path(url2pathname(small.removeprefix("file://"))).with_name("dataset.nc")) as server:
-        thread = threading.Thread(target=server.serve_forever, args=(0.01,))
-        thread.start()
-        try:
-            browser.open(server.address)
-            assert browser.complaints() == []
-            assert browser.requests() == [server.address]
-            code = "return fetch('dataset.nc').then(() => 'sent', () => 'refused')"
-            assert browser.ask(code) == "refused"  # by the policy, even to its own server
-        finally:
-            server.shutdown()
-            thread.join()
-
-
 def test_figures_that_are_not_shown_are_gone(browser, small):
     """BokehJS keeps what it was told to show until it is told otherwise, and gets slower with each."""
     browser.open(small)
@@ -306,11 +269,6 @@ class TestWhatIsSo:
         browser.open(samples_alone)
         assert browser.ask("return springtune.opened") == "samples" and "cells" not in views(browser)
         assert "Samples: 16 samples" in text(browser, "#holds") and not text(browser, "#end")
-
-    def test_very_many_samples_come_before_a_few_cells(self, browser, odd):
-        browser.open(odd)
-        many = "springtune.groups['/samples'].tally = () => ({ solved: 1e5 }); return springtune.first()"
-        assert browser.ask("return springtune.first()") == "cells" and browser.ask(many) == "samples"
 
     def test_cells_beyond_the_linear_reference_are_marked(self, browser, odd):
         browser.open(odd)
@@ -453,10 +411,3 @@ def test_on_a_phone_the_error_is_in_view(browser, odd):
         "const c = document.querySelector('.list tr[data-place]').children[arguments[0]].getBoundingClientRect();"
         "return [c.left, c.right, g.left, g.right]", place)  # fmt: skip
     assert low < left < right <= high
-
-
-def test_no_chart_is_narrower_than_its_labels(browser, odd):
-    """BokehJS leaves a bit of the label of an axis beside a plot that was narrower than it."""
-    browser.open(odd)
-    browser.resize(100)
-    assert browser.ask("return document.querySelector('#panel-size .chart').clientWidth") > 200

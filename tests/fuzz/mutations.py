@@ -68,47 +68,43 @@ def places(tree, path=()):
     return found
 
 
+def nested(value, depth):
+    """A value in lists of lists."""
+    for _ in range(depth):
+        value = [value]
+    return value
+
+
 def spoil_tree(random, tree):
     """Tree of dicts, lists and texts with some of what it holds taken out, doubled, swapped or replaced."""
     tree = copy.deepcopy(tree)
     for _ in range(random.choice((1, 1, 2, 2, 4))):
-        known = places(tree)
-        path = random.choice(known)
+        path = random.choice(places(tree))
         if not path:
             continue
-        holder = tree
-        for key in path[:-1]:
-            holder = holder[key]
-        key, kind = path[-1], random.randrange(10)
-        value = holder[key]
+        *above, key = path
+        holder, other = tree, tree
+        for step in above:
+            holder = holder[step]
+        for step in random.choice(places(tree)):
+            other = other[step]
+        value, word = holder[key], random.choice(WORDS)
+        kind = random.randrange(9)
         if kind == 0:
             del holder[key]
-        elif kind == 1:
-            holder[key] = random.choice(WORDS)
-        elif kind == 2:
-            holder[key] = [value] * random.choice((0, 1, 2, 30))
-        elif kind == 3:
-            holder[key] = {random.choice(WORDS): value}
-        elif kind == 4 and isinstance(holder, dict):
-            holder[random.choice(WORDS)] = value
-        elif kind == 5:
-            other = tree
-            for step in random.choice(known):
-                try:
-                    other = other[step]
-                except (KeyError, IndexError, TypeError):
-                    break
-            holder[key] = copy.deepcopy(other)
-        elif kind == 6:
-            holder[key] = [f"{1 + number / 1000:g} mm" for number in range(random.choice((3, 300, 3000, 30000)))]
-        elif kind == 7 and isinstance(value, str):
-            holder[key] = value.replace(random.choice("0123456789 "), random.choice(WORDS))
-        elif kind == 8:
-            for _ in range(random.choice((5, 40, 200))):
-                value = [value]
-            holder[key] = value
+        elif kind == 1 and isinstance(holder, dict):
+            holder[word] = value
         else:
-            holder[key] = None
+            holder[key] = (
+                word,
+                None,
+                [value] * random.choice((0, 1, 2, 30)),
+                {word: value},
+                copy.deepcopy(other),
+                [f"{1 + number / 1000:g} mm" for number in range(random.choice((3, 300, 30000)))],
+                value.replace(random.choice("0123456789 "), word) if isinstance(value, str) else word,
+                nested(value, random.choice((5, 40, 200))),
+            )[kind - 1]
         if len(places(tree)) > 40_000:
             break
     return tree

@@ -6,6 +6,7 @@ from springtune.mechanics.network import Network
 from springtune.mechanics.statics import StaticProblem
 from springtune.mesh import MESH_TYPES, Mesh
 from springtune.problem.loads import AXIAL
+from springtune.problem.shapes import LoadCase, Quantity, Support, Traction
 from springtune.scene.sheet import Sheet
 from springtune.springs import Springs
 from springtune.springs.lattice import uniform
@@ -16,6 +17,15 @@ def beam_problem(mesh_type="structured", length=0.1, height=0.02, size=5e-3, rel
     mesh = MESH_TYPES[mesh_type](length, height, size)
     sheet = Sheet(mesh, 1.0)
     return sheet.problem(kind, Springs(1.0, (relative or uniform)(mesh))), sheet.weights(kind)
+
+
+CLAMP = (Support("left", x=0, y=0),)
+
+
+def pulled(*force, name="pull", components="x", supports=CLAMP, others=()):
+    """Load case of a force on the right side, the left one held; its displacements there, and others."""
+    ends = [Quantity("end" if components == one else one, "displacement", "right", one) for one in components]
+    return LoadCase(name, supports, [Traction("right", force)], quantities=[*ends, *others])
 
 
 def free_network(mesh, springs):

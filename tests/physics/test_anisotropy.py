@@ -55,15 +55,6 @@ def differ(found, wanted):
     return np.abs(found - wanted).max() / np.abs(wanted).max()
 
 
-@pytest.mark.parametrize("material", [Material(3.0, 0.2), PLY, PLY.rotated("90 deg")])
-@pytest.mark.parametrize("name", ["delingette", "delingette-tensile", "element-fit", "energy-fit", "orthotropic"])
-def test_stiffnesses_are_multiples_of_the_membranes(name, material):
-    """E t, or the largest stiffness in plane stress times the thickness."""
-    mesh = braced(1.0) if name == "orthotropic" else MESH_TYPES["right"](0.02, 0.01, 2e-3)
-    largest = 3.0 if material.isotropic else material.plane_stress.max()
-    assert DEFINITIONS[name].springs(mesh, material, THICKNESS).reference == pytest.approx(largest * THICKNESS)
-
-
 @pytest.mark.parametrize("ratio", [0.8, 1.0, 1.2])
 @pytest.mark.parametrize("nu", [0.0, 0.3, 0.45])
 def test_flechons_areas_complete_the_bulk_modulus(ratio, nu):
@@ -177,14 +168,6 @@ def test_springs_alone_are_exact_for_cauchy_materials_on_rows_made_for_them(alon
     assert differ(affine("energy-fit", rectangles, material), material.plane_stress) <= 1e-9
 
 
-@pytest.mark.parametrize("name", ["lattice", "van-gelder", "energy-fit"])
-def test_energy_fit_is_the_lattice_at_a_third(name):
-    mesh, material = lattice(6, 4, 1e-3), Material(1.0, 1 / 3)
-    springs = DEFINITIONS[name].springs(mesh, material, 1.0)
-    wanted = np.sqrt(3) / 4 * mesh.cells_per_edge
-    assert springs.reference * springs.relative == pytest.approx(wanted, rel=1e-9)
-
-
 def test_energy_fit_is_the_least_of_relative_energies():
     """Every other set of springs of a triangle has the larger norm, negative ones excluded."""
     generator = np.random.default_rng(2)
@@ -267,18 +250,6 @@ def test_definitions_of_isotropic_materials_refuse_others_by_name(name):
     mesh = MESH_TYPES["braced" if 3 not in DEFINITIONS[name].cells else "right"](0.02, 0.01, 2e-3)
     with pytest.raises(DefinitionError, match="needs an isotropic material and 'ply' is anisotropic; choose one of"):
         DEFINITIONS[name].springs(mesh, PLY, THICKNESS, 1.0)
-
-
-def test_a_stiffness_that_is_given_is_for_any_material():
-    mesh = MESH_TYPES["right"](0.02, 0.01, 2e-3)
-    assert DEFINITIONS["paper"].springs(mesh, PLY, THICKNESS, 1e6).reference == 1e6
-
-
-def test_what_is_chosen_instead_fits_the_mesh():
-    with pytest.raises(DefinitionError) as caught:
-        DEFINITIONS["lattice"].springs(braced(1.0), PLY, THICKNESS)
-    assert "'orthotropic'" in str(caught.value)
-    assert not any(name in str(caught.value) for name in ("'delingette'", "'lattice'", "'paper'"))
 
 
 def test_springs_that_are_just_not_there_are_no_negative_ones():
@@ -406,23 +377,6 @@ def test_definitions_that_know_one_body_refuse_parts():
         derive_by_parts(DEFINITIONS["evolved"], grouped, two, THICKNESS, [1])
     with pytest.raises(DefinitionError, match="on 'far': needs an isotropic material and 'board' is anisotropic"):
         derive_by_parts(DEFINITIONS["lattice"], grouped, two | {"far": BOARD}, THICKNESS)
-
-
-def test_parts_of_one_material_are_told_what_the_whole_body_is():
-    grouped = halves(MESH_TYPES["right"](0.02, 0.01, 5e-3), 0)
-    one = Material(1.0, 0.3)
-    springs = derive_by_parts(DEFINITIONS["paper"], grouped, {"": one, "far": one}, THICKNESS, 1e6)
-    assert springs.reference == 1e6 and (springs.relative == 1).all()
-
-
-def test_energies_of_one_kind_are_one_of_all_parts():
-    mesh = MESH_TYPES["right"](0.04, 0.012, 2e-3)
-    far = mesh.points[mesh.triangles][..., 0].mean(axis=1) > 0.03  # fewer cells than the other part
-    grouped = GroupedMesh(mesh, parts={"far": {3: far}})
-    materials = {"": Material(1.0, 0.2), "far": Material(2.0, 0.4)}
-    for name in ("area", "delingette"):
-        (energy,) = derive_by_parts(DEFINITIONS[name], grouped, materials, THICKNESS).energies
-        assert np.array_equal(energy.corners, mesh.triangles)
 
 
 def test_beams_refuse_what_is_not_isotropic_by_name():

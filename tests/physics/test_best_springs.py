@@ -191,4 +191,4 @@ def test_predict_refuses_them_where_no_mesh_is_solved(more, capsys):
     ask = "predict --beam 200x20 --mesh free --young 1MPa --poisson 0.3 --best-springs " + more
     with pytest.raises(SystemExit):
         main(ask.split())
-    assert "--best-springs: " in capsys.readouterr().err
+    assert "--best-springs" in capsys.readouterr().err

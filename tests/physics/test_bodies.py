@@ -12,23 +12,16 @@ from springtune.reference.small_strain import ReferenceNotConvergedError
 from springtune.springs import DEFINITIONS
 from springtune.springs.identification import patch_cases
 
+from problems import pulled
+
 STEEL = st.Material("210 GPa", 0.3, density="7850 kg/m^3", name="steel")
 THIRD = st.Material("70 GPa", 1 / 3, density="2700 kg/m^3", name="third")
 RUBBER = st.Material("1 GPa", 0.5, density="1000 kg/m^3", name="rubber")
 HARD = st.Material("3 GPa", 0.5, density="1000 kg/m^3", name="hard")
 BOARD = st.AnisotropicMaterial("14 GPa", "9 GPa", "3 GPa", "4 GPa", density="600 kg/m^3", name="board")
 
-PULL = st.LoadCase(
-    "pull",
-    (st.Support("left", x=0.0, y=0.0),),
-    (st.Traction("right", ("100 N", 0.0)),),
-    quantities=(
-        st.Quantity("end", "displacement", "right", "x"),
-        st.Quantity("held", "reaction", "left", "x"),
-        st.Quantity("in_core", "stress", "core", "xx"),
-        st.Quantity("beside", "stress", "beside", "xx"),
-    ),
-)
+STRESSES = [st.Quantity(name, "stress", of, "xx") for name, of in (("in_core", "core"), ("beside", "beside"))]
+PULL = pulled("100 N", 0.0, others=[st.Quantity("held", "reaction", "left", "x"), *STRESSES])
 PLATE = st.Shape.rectangle(
     0.1,
     0.04,
@@ -75,7 +68,7 @@ def test_axial_and_rotational_springs_of_two_materials_are_linear_triangles_of_b
     ("definition", "materials"),
     [("area", (STEEL, THIRD)), ("normal-shear", (STEEL, THIRD)), ("neo-hooke", (RUBBER, STEEL))],
 )
-@pytest.mark.parametrize("ending", ["json", "h5", "csv", "vtu"])
+@pytest.mark.parametrize("ending", ["json", "csv", "vtu"])
 def test_springs_of_parts_with_energies_of_their_own_are_files_of_all_cells(
     grouped, tmp_path, ending, definition, materials
 ):
@@ -99,18 +92,10 @@ def test_springs_of_parts_with_energies_of_their_own_are_files_of_all_cells(
 
 def test_what_is_zero_by_symmetry_has_no_relative_error():
     """It would be all that counts, by seven orders of magnitude; and a point on held sides takes nothing from them."""
-    case = st.LoadCase(
-        "pull",
-        (st.Support("left", x=0.0), st.Support("pin", x=0.0, y=0.0)),
-        (st.Traction("right", ("4 kN", 0.0)),),
-        quantities=(
-            st.Quantity("end", "displacement", "right", "x"),
-            st.Quantity("aside", "displacement", "right", "y"),
-            st.Quantity("pinned", "reaction", "pin", "y"),
-            st.Quantity("pinned_x", "reaction", "pin", "x"),
-            st.Quantity("held", "reaction", "left", "x"),
-        ),
-    )
+    reactions = (("pinned", "pin", "y"), ("pinned_x", "pin", "x"), ("held", "left", "x"))
+    others = [st.Quantity(name, "reaction", of, component) for name, of, component in reactions]
+    others.append(st.Quantity("aside", "displacement", "right", "y"))
+    case = pulled("4 kN", 0.0, supports=(st.Support("left", x=0.0), st.Support("pin", x=0.0, y=0.0)), others=others)
     hole = st.Hole.circle((0.05, 0.02), 0.008)
     shape = st.Shape.rectangle(0.1, 0.04, holes=[hole], points={"pin": (0.0, 0.02)}, loads={"pull": case})
     grouped = st.mesh_shape(shape, "5 mm")
@@ -174,11 +159,7 @@ class TestMeshOfAnotherShape:
             st.Segment((0.0, 0.03), centre=(0.0, 0.0), group="inner"),
         )
         nested = [st.Hole.circle((0.03, 0.03), 0.01, part="ring"), st.Hole.ellipse((0.03, 0.03), 0.006, 0.003)]
-        case = st.LoadCase(
-            "pull", (st.Support("left", x=0.0, y=0.0),), (st.Traction("right", (1.0, 0.0)),),
-            quantities=(st.Quantity("end", "displacement", "right", "x"),),
-        )  # fmt: skip
-        shape = st.Shape("knee", 1e-3, outline, nested, loads={"pull": case})
+        shape = st.Shape("knee", 1e-3, outline, nested, loads={"pull": pulled(1.0, 0.0)})
         steel = {"ring": STEEL, "": STEEL}
         assert st.Scene(shape, st.mesh_shape(shape, size, refined=refined), steel, "pull", definition="lattice")
 
@@ -218,10 +199,8 @@ def test_a_point_in_the_middle_of_a_side_is_no_corner():
 
 def test_what_is_next_to_nothing_does_not_count_in_a_choice():
     """Inside a rim under pressure one stress all but vanishes; errors relative to it are of no use."""
-    case = st.LoadCase(
-        "pull", (st.Support("left", x=0.0), st.Support("lower", y=0.0)), (st.Traction("right", ("4 kN", 1e-3)),),
-        quantities=(st.Quantity("end", "displacement", "right", "x"), st.Quantity("top", "stress", "in", "xy")),
-    )  # fmt: skip
+    rollers = (st.Support("left", x=0.0), st.Support("lower", y=0.0))
+    case = pulled("4 kN", 1e-3, supports=rollers, others=[st.Quantity("top", "stress", "in", "xy")])
     shape = st.Shape.rectangle(0.1, 0.04, points={"in": (0.05, 0.02)}, loads={"pull": case})
     for choice in st.predict(shape, st.mesh_shape(shape, "8 mm"), STEEL):
         assert np.isnan(choice.errors["top"])
@@ -247,16 +226,6 @@ def test_even_tests_of_a_body_without_a_lower_side_do_not_contradict_their_suppo
             np.testing.assert_allclose(moved, case.displacements, rtol=0, atol=1e-9 * np.abs(moved).max())
 
 
-def test_bodies_in_pieces_are_refused_by_tests_of_one_body():
-    """Two inclusions of one material, which the search would hold at two particles of one of them."""
-    holes = [st.Hole.circle((x, 0.02), 0.006, part=part) for x, part in ((0.03, "a"), (0.07, "b"))]
-    shape = replace(PLATE, holes=tuple(holes), points={}, loads={"pull": replace(PULL, quantities=PULL.quantities[:2])})
-    materials = {"": STEEL, "a": THIRD, "b": THIRD}
-    scene = st.Scene(shape, st.mesh_shape(shape, "8 mm"), materials, "pull", definition="adjoint")
-    with pytest.raises(st.DefinitionError, match="'adjoint': on 'a' and 'b': the mesh has 2 parts that no edge joins"):
-        scene.solve()
-
-
 @pytest.mark.parametrize("materials", [{"": BOARD, "core": STEEL}, {"": BOARD, "core": BOARD}])
 def test_choices_for_anisotropic_bodies(grouped, materials):
     """Springs alone among them, which have C12 = C66."""
@@ -268,13 +237,6 @@ def test_choices_for_anisotropic_bodies(grouped, materials):
     assert [choice.energies for choice in choices if choice.definition == "energy-fit"] == [False]
 
 
-def test_a_motion_does_not_follow():
-    shape = holed(0.008)
-    scene = st.Scene(shape, st.mesh_shape(shape, "5 mm"), STEEL, "push", definition="delingette")
-    with pytest.raises(ValueError, match="load: 'push' turns with the side that it acts on, and forces of a motion"):
-        scene.motion()
-
-
 def test_a_stress_where_materials_meet_is_refused_at_once():
     points = {"core": (0.08, 0.031), "beside": (0.02, 0.01)}
     shape = replace(PLATE, points=points)
@@ -282,12 +244,3 @@ def test_a_stress_where_materials_meet_is_refused_at_once():
     with pytest.raises(ValueError, match="quantity 'in_core': 'core' is where different materials meet"):
         st.Scene(shape, meshed, {"": STEEL, "core": THIRD}, "pull", definition="delingette")
     assert st.Scene(shape, meshed, {"": STEEL, "core": STEEL}, "pull", definition="delingette").solve().message == ""
-
-
-def test_a_material_of_no_part_is_told_why_it_is_none(grouped):
-    materials = {"": STEEL, "core": THIRD, "cores": THIRD}
-    with pytest.raises(ValueError, match="material: 'cores' is no part of the mesh; known: '', 'core'$"):
-        st.Scene(PLATE, grouped, materials, "pull", definition="delingette")
-    shared = replace(grouped, unusable={"cores": "has cells that part 'core' has, too; a cell has one material"})
-    with pytest.raises(ValueError, match="material: 'cores' has cells that part 'core' has, too"):
-        st.Scene(PLATE, shared, materials, "pull", definition="delingette")

@@ -67,15 +67,6 @@ def test_contact_patch(meshes, moves_little):
     assert contact.contact_force() == pytest.approx([0, 2e4 * 0.02 * 1e-3], abs=1e-9)
 
 
-@pytest.mark.parametrize(("modulus", "close"), [(5e6, 5e-3), (210e9, 1e-4)])
-def test_patch_of_steel_and_rubber(modulus, close):
-    """The softer block grows wider than the other, by .6 % at most: its corners hang over."""
-    lower, upper = block("free", 2.5e-3, 0.0, modulus), block("structured", 1.7e-3, 0.01, pressure=2e4)
-    Contact([lower, upper], floor=True, size=2e-3).solve(first=1.0)
-    top = upper.network.mesh.points[:, 1] > 0.02 - 1e-9
-    assert upper.displacements[top, 1] == pytest.approx(-0.01 * 2e4 * (1e-6 + 1 / modulus), rel=close)
-
-
 def half_disc(edge, largest=0.12, grading=0.3):
     """Lower half of a disc of radius 1 that touches y = 0, fine at the bottom."""
     geometry = SplineGeometry()
@@ -135,11 +126,6 @@ def test_hertz_on_a_mesh_that_is_fine_below_the_contact_too():
         assert found == pytest.approx(1, abs=0.01)
 
 
-def test_hertz_comes_closer():
-    coarse, fine = hertz(0.02), hertz(0.003)
-    assert np.abs(np.array(fine) - 1).max() < np.abs(np.array(coarse) - 1).max()
-
-
 @pytest.mark.parametrize("mesh_type", ["free", "braced", "structured"])
 def test_outline_has_the_body_on_its_left(mesh_type):
     mesh = MESH_TYPES[mesh_type](0.02, 0.01, 2.5e-3)
@@ -149,8 +135,7 @@ def test_outline_has_the_body_on_its_left(mesh_type):
     assert np.linalg.norm(last - first, axis=1).sum() == pytest.approx(2 * (0.02 + 0.01), rel=1e-9)
 
 
-@pytest.mark.parametrize("definition", ["uniform", "area", "delingette"])
-@pytest.mark.parametrize("size", [2e-3, 1e-3])
+@pytest.mark.parametrize(("definition", "size"), [("uniform", 2e-3), ("area", 2e-3), ("delingette", 1e-3)])
 def test_strip_lies_on_the_trapezoid(definition, size):
     laid = lay(STRIP, TRAPEZOID, RUBBER, STEEL, definition, size)
     assert laid.message == "" and laid.load_share == 1.0
@@ -186,11 +171,6 @@ def test_elongation_is_known_as_well_as_it_says(friction):
     assert 1e-4 < band(values) < 0.03
     for size in (0.8e-3, 0.7e-3, 0.6e-3):
         assert elongation(size) == pytest.approx(values[0], abs=band(values))
-
-
-def test_a_single_mesh_tells_no_band():
-    assert band([0.01, 0.013, 0.012]) == pytest.approx(0.006)
-    assert np.isnan(band([0.01, np.nan]))
 
 
 @pytest.mark.parametrize("loading", ["gravity", "ends"])
@@ -330,15 +310,6 @@ def test_many_corners_cost_few_iterations():
         assert penetration(contact) <= 1e-8 * 2e-3
     first, second = (contact.bodies[0].displacements for contact in (coarse, fine))
     assert first[:, 1].min() == pytest.approx(second[:, 1].min(), rel=2e-3)  # sagittas differ by 5e-4 of the radius
-
-
-@pytest.mark.slow
-def test_fine_sheet_on_many_corners():
-    contact = draped(241, 0.5e-3)
-    assert len(contact.bodies[0].points) > 1000
-    assert penetration(contact) <= 1e-8 * 0.5e-3
-    assert contact.contact_force() == pytest.approx([0, 0.3], abs=1e-8)
-    assert contact.iterations <= 500  # 326
 
 
 def test_a_force_along_the_floor_slips_at_the_limit():

@@ -91,21 +91,6 @@ def test_what_is_only_pulled_does_not_buckle():
     assert np.isnan(load) and "no buckling load" in why
 
 
-def test_what_snaps_has_a_limit_point_and_no_buckling_load():
-    """A shallow arch of a strip of triangles, clamped at both ends, dead load on its crown."""
-    angle = np.linspace(-0.2, 0.2, 13)
-    inner = np.stack([np.sin(angle), np.cos(angle)], axis=1)
-    cells = [corners for i in range(12) for corners in ([i, i + 14, i + 13], [i, i + 1, i + 14])]
-    mesh = Mesh(np.concatenate([inner, 1.02 * inner]), np.array(cells))
-    clamped = np.zeros((26, 2), dtype=bool)
-    clamped[[0, 12, 13, 25]] = True
-    crown = np.zeros((26, 2))
-    crown[19, 1] = 1.0
-    problem = StaticProblem(Network(mesh, clamped, np.ones(len(mesh.edges))), crown)
-    assert problem.judge(-1.0, problem.nonlinear(-1.0))[0] is Status.UNSTABLE
-    assert np.isnan(buckling(problem, -1e-2).load)
-
-
 SNAPPED = [
     # found by the search below: stable equilibria behind a stretch of the path that is not
     ("delingette", SHEAR, "structured", 14.79, 0.38, 0.49, 3),
@@ -242,3 +227,18 @@ def test_a_slender_cantilever_is_an_elastica(definition, slenderness, ratio):
     deflection = float(np.tensordot(found.displacements, pattern, axes=2)) / length
     # Shear and stretch are of the order of (H / L)^2, strains of up to ratio H / 2 L of their square.
     assert deflection == pytest.approx(elastica(ratio), rel=(5 + ratio**2) / slenderness**2)
+
+
+def test_what_snaps_has_a_limit_point_and_no_buckling_load():
+    """A shallow arch of a strip of triangles, clamped at both ends, dead load on its crown."""
+    angle = np.linspace(-0.2, 0.2, 13)
+    inner = np.stack([np.sin(angle), np.cos(angle)], axis=1)
+    cells = [corners for i in range(12) for corners in ([i, i + 14, i + 13], [i, i + 1, i + 14])]
+    mesh = Mesh(np.concatenate([inner, 1.02 * inner]), np.array(cells))
+    clamped = np.zeros((26, 2), dtype=bool)
+    clamped[[0, 12, 13, 25]] = True
+    crown = np.zeros((26, 2))
+    crown[19, 1] = 1.0
+    problem = StaticProblem(Network(mesh, clamped, np.ones(len(mesh.edges))), crown)
+    assert problem.judge(-1.0, problem.nonlinear(-1.0))[0] is Status.UNSTABLE
+    assert np.isnan(buckling(problem, -1e-2).load)

@@ -9,7 +9,8 @@ import pytest
 from scipy.linalg import eigh
 
 import springtune as st
-from springtune.mechanics.dynamics import Motion
+
+from tables import refused_files
 
 BEAM, RUBBER = st.Beam("100 mm", "10 mm"), st.Material("1 MPa", 0.45, density="1100 kg/m^3")
 DECREMENT = 0.3
@@ -27,10 +28,17 @@ def bent(one):
     return one.solve().displacements
 
 
+@cache
+def momenta(one):
+    """Network of a scene, and the masses times the shape of its loaded mode."""
+    motion = one.motion()
+    return motion.network, motion.mass * motion.loaded_mode[1]
+
+
 def share(one, displacements):
     """Amplitude of the loaded mode."""
-    motion = one.motion()
-    return (motion.mass * motion.loaded_mode[1]) @ motion.network.reduce(displacements)
+    network, momentum = momenta(one)
+    return momentum @ network.reduce(displacements)
 
 
 def swing(one, integrator, step, periods=3, **options):
@@ -340,17 +348,7 @@ def test_a_swing_is_read_from_a_file(tmp_path):
     assert (found.period, found.decrement) == pytest.approx((exact.period, exact.decrement), rel=1e-6)
 
 
-@pytest.mark.parametrize(
-    "text, says",
-    [
-        (None, "cannot be read: No such file or directory; give two columns"),
-        ("", "is empty; give two columns"),
-        ("time,displacement\n0,1\n", "line 1: 'time,displacement' is no head of a decay; give two columns"),
-        ("time [s],displacement [N]\n0,1\n", "head: '1 N' is a force; give a length"),
-        ("time [s],displacement [mm]\n0,zero\n", "line 2, column .*: 'zero' is no finite number"),
-        ("time [s],displacement [mm]\n", "times: have shape .*; give 12 points or more"),
-    ],
-)
+@pytest.mark.parametrize(("text", "says"), refused_files("decay"))
 def test_files_that_are_no_swing_are_refused(text, says, tmp_path):
     path = tmp_path / "swing.csv"
     if text is not None:
@@ -377,12 +375,3 @@ TIMES = np.linspace(0, 1, 50)
 def test_points_that_are_no_swing_are_refused(times, moved, says):
     with pytest.raises(ValueError, match=says):
         st.fit_decay(times, moved)
-
-
-def test_a_motion_can_be_damped_by_a_fit():
-    """From a measured swing to dampers, and by a run back to the swing."""
-    one = scene()
-    made = swing(one, "implicit-midpoint", 1e-3, mass_damping=2.0)
-    damping = st.damping_of(one, decrement=made.decrement, period=made.period)
-    assert damping.notes == () and damping.mass_damping == pytest.approx(2.0, rel=1e-3)
-    assert isinstance(one.motion(**damping.options("mass")), Motion)

@@ -1,9 +1,11 @@
 """Each definition against the moduli that it must have: closed forms where there are any, else measured tables."""
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import nnls
@@ -15,13 +17,10 @@ from springtune.mesh.bonds import bonded
 from springtune.problem.geometry import Beam
 from springtune.problem.materials import Material, Rubber
 from springtune.springs import DEFINITIONS, DefinitionError, Springs, definition
-from springtune.springs.base import not_negative
 from springtune.springs.element_fit import least_squares
 from springtune.springs.identification import Misfit, patch_cases
 from springtune.springs.lattice import predicted_stiffness
 from springtune.springs.searched import adjoint
-from springtune.studies.runs import driver, store
-from springtune.studies.runs.task_costs import TaskCosts
 
 HEIGHT, SIZE = 20e-3, 2e-3
 RATIOS = (0.3, 1 / 3, 0.49)
@@ -94,7 +93,7 @@ def test_a_definition_that_leaves_a_mechanism_refuses_the_mesh(mesh_type):
     """All others have three motions without resistance, clearly apart; rounding decides nothing."""
     mesh = MESH_TYPES[mesh_type](0.06, 0.02, 0.005)
     for one in DEFINITIONS.values():
-        for placed in (mesh, disturbed(mesh, 0.3, 1e-3), disturbed(mesh, 2.0, 50.0)):
+        for placed in (mesh, disturbed(mesh, 2.0, 50.0)):
             if one.needs == "cases" or one.name in ("adjoint", "neo-hooke", "yeoh", "axis-exact"):
                 continue
             try:
@@ -313,34 +312,12 @@ def test_patch_makes_young_modulus_exact_on_any_mesh(name, mesh_type):
 
 # -- measured tables (E and G in %, effective nu) for nu = .3, 1/3, .49 -----------------------------------------------
 
-TABLE = {
-    ("structured", "density"): ((5.6, 5.6, 5.6), (0.333, 0.333, 0.333), None),
-    ("right", "uniform"): ((-4.7, -4.7, -4.7), (0, 0, 0), None),
-    ("right", "lattice"): ((-13.4, -13.4, -13.4), (0, 0, 0), None),
-    ("right", "van-gelder"): ((0, 0, 0), (0, 0, 0), None),
-    ("right", "van-gelder-general"): ((9.9, 12.5, 31.6), (0, 0, 0), None),
-    ("right", "delingette-tensile"): ((48.3, 50, 65.1), (0, 0, 0), None),
-    ("right", "element-fit"): ((16.3, 18.5, 36), (0, 0, 0), None),
-    ("right", "density"): ((-19.9, -19.9, -19.9), (0, 0, 0), None),
-    ("right", "oriented"): ((0, 0, 0), (0, 0, 0), None),
-    ("right", "area"): ((-17, -13.4, -0.4), (-0.066, 0, 0.285), None),
-    ("right", "angular"): ((-13, -13.4, -34.9), (0.025, 0, -0.346), None),
-    ("alternating", "uniform"): ((22.7, 22.7, 22.7), None, None),
-    ("alternating", "lattice"): ((13.8, 13.8, 13.8), (0.314, 0.314, 0.314), None),
-    ("alternating", "delingette-tensile"): ((77.5, 78.7, 91.9), (0.197, 0.191, 0.162), None),
-    ("alternating", "area"): ((13.9, 13.8, 13.4), (0.283, 0.314, 0.464), None),
-    ("braced", "uniform"): ((38.9, 38.9, 38.9), None, (125.2, 130.9, 158.1)),
-    ("braced", "lattice"): ((0, 0, 0), (0.333, 0.333, 0.333), (-2.5, 0, 11.75)),
-    ("braced", "lloyd"): ((-11.8, -11.8, -11.8), (0.412, 0.412, 0.412), (13.75, 16.7, 30.4)),
-    ("braced", "element-fit"): ((-16.4, -14.8, -2.4), (0.402, 0.404, 0.413), (4.1, 9.5, 44.6)),
-    ("braced", "baudet"): ((-1.7, 0, 6.8), (0.345, 0.333, 0.288), (0, 0, 0)),
-    ("braced", "axis-exact"): ((0, 0, 0), (0.3, 0.333, 0.49), (-14.3, 0, 92.2)),
-}
+TABLE = yaml.safe_load(Path(__file__).with_name("moduli.yaml").read_text())
 
 
-@pytest.mark.parametrize(("mesh_type", "name"), TABLE)
+@pytest.mark.parametrize(("mesh_type", "name"), [(kind, name) for kind, names in TABLE.items() for name in names])
 def test_measured_moduli(mesh_type, name):
-    youngs, ratios, shears = TABLE[mesh_type, name]
+    youngs, ratios, shears = TABLE[mesh_type][name]
     found = np.array([errors(name, patch(mesh_type), nu) for nu in RATIOS])
     assert 100 * found[:, 0] == pytest.approx(youngs, abs=0.1)
     if ratios:
@@ -442,11 +419,6 @@ def test_what_is_no_stiffness_or_thickness_is_refused(make, values, message):
             make(value)
 
 
-def test_what_the_decorator_takes_for_granted():
-    assert DEFINITIONS["lattice"].cells == (3, 4)
-    assert all(DEFINITIONS[name].anisotropic for name in ("adjoint", "annealed", "evolved", "paper"))
-
-
 @pytest.mark.parametrize("name", ["lattice", "patch", "patch-fit", "element-fit", "energy-fit", "area", "delingette"])
 def test_springs_are_as_stiff_as_the_sheet_is_thick(name):
     mesh, steel = MESH_TYPES["structured"](0.03, 0.01, 2.5e-3), Material(210e9, 0.3, name="steel")
@@ -455,33 +427,11 @@ def test_springs_are_as_stiff_as_the_sheet_is_thick(name):
     np.testing.assert_allclose(thick.reference * thick.relative, 3 * thin.reference * thin.relative, rtol=1e-9)
 
 
-def test_springs_of_no_stiffness_are_springs_and_none_is_their_measure():
-    assert Springs(1.0, np.array([0.0, 1.0])).spring_ratio == np.inf
-    assert Springs(1.0, np.array([0.5, 4.0])).spring_ratio == 8.0
-    assert not_negative(np.array([0.0, 1.0])).tolist() == [0.0, 1.0]
-
-
 @pytest.mark.parametrize("wrong", [{"cells": (5,)}, {"cells": ()}, {"cells": "34"}, {"needs": "luck"}], ids=repr)
 def test_what_is_no_declaration_is_refused(wrong):
     with pytest.raises(ValueError, match="definition 'none of ours': .*; give"):
         definition("none of ours", **wrong)(lambda mesh, material, thickness: None)
     assert "none of ours" not in DEFINITIONS
-
-
-def test_rounding_does_not_choose_the_corner_that_is_held():
-    """A regular polygon has two lowest corners of equal x + y; coordinates differ by rounding among processors."""
-    angles, noise = np.arange(12) * np.pi / 6, np.random.default_rng(1)
-    points = np.vstack([np.zeros(2), np.column_stack([np.cos(angles), np.sin(angles)])])
-    triangles = np.array([[0, i + 1, (i + 1) % 12 + 1] for i in range(12)])
-    held = {
-        patch_cases(
-            Mesh(points * (1 + noise.uniform(-1e-15, 1e-15, points.shape)), triangles),
-            Material(1.0, 0.3, name="unit"),
-            1.0,
-        )[0].held.tobytes()
-        for _ in range(20)
-    }
-    assert len(held) == 1
 
 
 @pytest.mark.parametrize("corner", [[0.5, 0.0], [0.0, 0.5], [0.5, 0.5]], ids=str)
@@ -574,16 +524,17 @@ def test_searches_are_repeatable_and_better_than_their_start(name):
 # -- the stage ---------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("mesh_type", ["structured", "isosceles-0.3", "braced"])
-def test_stage_measures_the_mesh_that_is_made(tmp_path, mesh_type):
-    """Rows fitted to a box are no exact lattice: on 100 x 20 mm at 2 mm, E is off by +3.3 % and nu is .356."""
-    box = {"length": 0.1, "height": HEIGHT}
-    asked = [{"key": "one", "definition": "lattice", "poisson_ratio": 0.3}]
-    patch = {"name": "one", "mesh": box | {"mesh_type": mesh_type, "mesh_size": SIZE}, "tasks": asked}
-    driver.run("studies.kinds.moduli.solve", {"folder": str(tmp_path), "files": [patch]}, TaskCosts())
-    found = store.read(tmp_path / "one.h5", ["one"])["one"]
-    young, ratio, shear = errors("lattice", MESH_TYPES[mesh_type](**box, size=SIZE), 0.3)
-    measured = found["young_modulus_error"], found["effective_poisson_ratio"], found["shear_modulus_error"]
-    assert measured == pytest.approx((young, ratio, shear), rel=1e-9)
-    if mesh_type == "structured":
-        assert measured[:2] == pytest.approx((0.033, 0.356), abs=5e-4)
+def test_rounding_does_not_choose_the_corner_that_is_held():
+    """A regular polygon has two lowest corners of equal x + y; coordinates differ by rounding among processors."""
+    angles, noise = np.arange(12) * np.pi / 6, np.random.default_rng(1)
+    points = np.vstack([np.zeros(2), np.column_stack([np.cos(angles), np.sin(angles)])])
+    triangles = np.array([[0, i + 1, (i + 1) % 12 + 1] for i in range(12)])
+    held = {
+        patch_cases(
+            Mesh(points * (1 + noise.uniform(-1e-15, 1e-15, points.shape)), triangles),
+            Material(1.0, 0.3, name="unit"),
+            1.0,
+        )[0].held.tobytes()
+        for _ in range(20)
+    }
+    assert len(held) == 1

@@ -5,8 +5,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from springtune.mechanics import stepping
 from springtune.mechanics.continuation import buckling
@@ -82,19 +80,6 @@ def test_a_quarter_of_a_trapezoid_to_each_corner_moves_its_centre():
     assert centre(halves, masses(halves, 1.0, 1.0)) == pytest.approx([1.4, 0.4])
 
 
-def test_a_free_particle_without_mass_is_refused():
-    motion = beam()
-    inertia = motion.inertia[:, 0].copy()
-    inertia[-1] = 0.0
-    with pytest.raises(ValueError, match="have no mass"):
-        Motion(motion.network, inertia)
-
-
-def test_a_negative_damping_is_refused():
-    with pytest.raises(ValueError, match="negative"):
-        oscillator(mass_damping=-1.0)
-
-
 # -- frequencies and steps ---------------------------------------------------------------------------------------------
 
 
@@ -137,10 +122,9 @@ def test_limit_of_one_mode_with_lagged_damping(xi, expected):
 
 DAMPINGS = {
     "none": lambda motion: {},
+    "energies": lambda motion: {},
     "mass": lambda motion: {"mass_damping": 0.6 * motion.omega_max},
-    "mass, ratio 0.2": lambda motion: {"mass_damping": 0.4 * motion.omega_max},
     "springs": lambda motion: {"dampers": 0.3 / motion.omega_max * motion.network.stiffness},
-    "springs, ratio 0.2": lambda motion: {"dampers": 0.4 / motion.omega_max * motion.network.stiffness},
     "uneven": lambda motion: {
         "mass_damping": 0.1 * motion.omega_max,
         "dampers": 0.5 / motion.omega_max * np.random.default_rng(1).uniform(0, 1, len(motion.network.first)),
@@ -152,39 +136,18 @@ DAMPINGS = {
 @pytest.mark.parametrize("damping", DAMPINGS)
 @pytest.mark.parametrize("integrator", EXPLICIT)
 def test_limit_of_the_step_is_within_one_percent(integrator, damping, linear):
-    """Below it 1e4 steps from noise stay bounded; above it they diverge."""
-    motion = beam(force=0.0, linear=linear)
+    """Below it 4,000 steps from noise stay bounded; above it they diverge."""
+    motion = beam("delingette" if damping == "energies" else "lattice", force=0.0, linear=linear)
     motion = with_(motion, **DAMPINGS[damping](motion))
     noise = 1e-7 * np.random.default_rng(0).standard_normal(motion.load.shape) * ~motion.network.held
     limit = motion.step_limit(integrator)
-    stable = motion.run(integrator, 0.99 * limit, 10_000, noise)
+    stable = motion.run(integrator, 0.99 * limit, 4_000, noise)
     assert stable.status == "moving" and np.abs(stable.displacements).max() <= 20 * np.abs(noise).max()
-    growing = motion.run(integrator, 1.01 * limit, 10_000, noise)
+    growing = motion.run(integrator, 1.01 * limit, 4_000, noise)
     grown = growing.status != "moving" or np.abs(growing.displacements).max() > 1e3 * np.abs(noise).max()
     assert grown
     if linear:
         assert growing.status == "diverged" and "take at most" in growing.message
-
-
-@pytest.mark.parametrize("integrator", EXPLICIT)
-@pytest.mark.parametrize("damper", ["mass", "springs"])
-def test_limit_at_a_fifth_of_critical_damping_is_the_closed_form(integrator, damper):
-    """The highest mode sets it: ``(2 / omega) (sqrt(1 + xi^2) - xi)`` where damping lags, ``2 / omega`` where not."""
-    motion = beam(force=0.0)
-    damped = with_(motion, **DAMPINGS[f"{damper}, ratio 0.2"](motion))
-    lags = damper == "springs" or integrator != "central-difference"
-    expected = 2 / motion.omega_max * (np.sqrt(1 + 0.2**2) - 0.2 if lags else 1.0)
-    assert damped.step_limit(integrator) == pytest.approx(expected, rel=1e-6)
-
-
-def test_limit_of_a_network_with_energies_besides_springs():
-    motion = beam("delingette", force=0.0)
-    noise = 1e-7 * np.random.default_rng(0).standard_normal(motion.load.shape) * ~motion.network.held
-    limit = motion.step_limit("central-difference")
-    for linear in (True, False):
-        moving = with_(motion, linear=linear)
-        assert moving.run("central-difference", 0.99 * limit, 2000, noise).status == "moving"
-        assert moving.run("central-difference", 1.01 * limit, 2000, noise).status in ("diverged", "inverted")
 
 
 def test_lowest_loaded_mode_is_the_bars():
@@ -223,30 +186,6 @@ def test_dynamic_relaxation_ends_in_the_static_solution(definition, linear):
     found = relax(motion.network, motion.load, linear=linear)
     assert found.status == "rest" and found.residual <= 1e-10  # exact: the criterion itself
     assert np.abs(found.displacements - static).max() <= 1e-6 * np.abs(static).max()
-
-
-@cache
-def let_go(linear):
-    """A damped beam of a few cells, how it is stretched before it is let go, for how long, and where it then is."""
-    motion = with_(beam(size=0.01, length=0.04, linear=linear), load=None)
-    motion = with_(motion, mass_damping=0.2 * motion.omega_max)
-    points = motion.network.mesh.points
-    start = 0.05 * points * [1.0, -0.3] * ~motion.network.held
-    time = 12 / motion.omega_max
-    return motion, start, time, motion.run("implicit-midpoint", time / 4096, 4096, start).displacements
-
-
-@pytest.mark.parametrize(
-    "integrator, order",
-    [("symplectic-euler", 1), ("central-difference", 2), ("central-difference-lagged", 1), ("backward-euler", 1),
-     ("implicit-midpoint", 2)],
-)  # fmt: skip
-@pytest.mark.parametrize("linear", [True, False])
-def test_order_of_convergence(integrator, order, linear):
-    """Against a much finer run."""
-    motion, start, time, exact = let_go(linear)
-    errors = [np.abs(motion.run(integrator, time / n, n, start).displacements - exact).max() for n in (256, 512)]
-    assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.1)
 
 
 DAMPED = {
@@ -383,14 +322,6 @@ def test_truncated_conjugate_gradients_stop_short_and_say_so():
     assert cut.status == "moving" and "not at rest" in cut.message and cut.residual > 1e-3
 
 
-def test_single_precision_keeps_six_digits():
-    motion = damped(beam(linear=False))
-    step = 0.8 * motion.step_limit("central-difference")
-    double = motion.run("central-difference", step, 3000).displacements
-    single = motion.run("central-difference", step, 3000, precision="float32").displacements
-    assert 0 < np.abs(single - double).max() <= 1e-4 * np.abs(double).max()
-
-
 def chain(count, **options):
     """Particles on a line between two held ones, on springs of 1 and with masses of 1: the strip beside it is held."""
     x = np.arange(count + 1.0)
@@ -463,24 +394,6 @@ def test_steps_that_follow_each_other_along_a_network_are_those_of_the_whole(lin
     assert np.abs(found.velocities - v).max() <= 1e-9 * np.abs(v).max()
 
 
-@given(st.integers(1, 10**6), st.integers(1, 10**4), st.floats(1, 20), st.integers(1, 64))
-def test_threads_follow_each_other_at_a_distance_that_the_network_has(rows, bandwidth, entries, threads):
-    pointers = (entries * np.arange(rows + 1)).astype(int)
-    count, size, depth = stepping.passes_of(pointers, bandwidth, 80, 40, threads)
-    assert 1 <= count <= threads and 1 <= size and 1 <= depth <= stepping.DEEPEST_PASS
-    if count > 1:
-        assert count * (depth * bandwidth + size) <= rows and count * stepping.FEWEST <= pointers[-1]
-    elif rows * 80 + pointers[-1] * 40 <= stepping.CACHE:  # nothing is gained by going ahead
-        assert (size, depth) == (rows, 1)
-
-
-def test_a_pass_is_no_deeper_than_its_rows_have_room_in_the_cache():
-    pointers = 3 * np.arange(10**6 + 1)
-    depths = [stepping.passes_of(pointers, bandwidth, 80, 40, 2)[2] for bandwidth in (100, 500, 1000, 10**5)]
-    assert depths == [stepping.DEEPEST_PASS, 4, 2, 1]
-    assert 500 * 4 * (80 + 3 * 40) <= stepping.CACHE < 500 * 6 * (80 + 3 * 40)
-
-
 @pytest.mark.parametrize("broken", [0, 1])
 def test_a_thread_that_fails_ends_the_others(broken):
     motion = beam(size=7e-4)
@@ -500,41 +413,23 @@ def test_a_thread_that_fails_ends_the_others(broken):
     stepper.close()
 
 
-def test_an_interruption_while_threads_begin_ends_those_that_have_begun():
-    motion = beam(size=7e-4)
-    stepper = stepping.make_stepper(motion, "central-difference", 1e-9, threads=2)
-    stepper.begin(np.zeros(motion.load.shape), np.zeros(motion.load.shape))
-    begin = stepper.threads.submit
-
-    def submit(*call):
-        begun.append(begin(*call))
-        raise KeyboardInterrupt
-
-    begun = []
-    stepper.threads.submit = submit
-    with pytest.raises(KeyboardInterrupt):
-        stepper.advance(10)
-    stepper.close()
-    assert begun[0].done()
-
-
 @pytest.mark.parametrize(
-    ("integrator", "options", "message"),
+    ("call", "message"),
     [
-        ("central-difference", {"threads": 0}, "threads: 0 is not a whole number above zero"),
-        ("central-difference", {"precision": "float16"}, "unknown precision 'float16'; known: float64, float32"),
-        ("implicit-midpoint", {"threads": 2}, "'implicit-midpoint' takes its steps in double precision and one thread"),
-        ("backward-euler", {"precision": "float32"}, "'backward-euler' takes its steps in double precision"),
+        (lambda: beam().run("central-difference", 1e-9, 1, threads=0), "threads: 0 is not a whole number above zero"),
+        (lambda: beam().run("central-difference", 1e-9, 1, precision="float16"), "'float16'; known: float64, float32"),
+        (lambda: beam().run("implicit-midpoint", 1e-9, 1, threads=2), "its steps in double precision and one thread"),
+        (lambda: beam().run("backward-euler", 1e-9, 1, precision="float32"), "takes its steps in double precision"),
+        (lambda: beam("delingette").run("central-difference", 1e-9, 1, threads=2), "with energies moves in one; give"),
+        (lambda: oscillator().run("leapfrog", 0.1, 1), "known: symplectic-euler"),
+        (lambda: oscillator().run("symplectic-euler", 0.0, 1), "above zero"),
+        (lambda: oscillator(mass_damping=-1.0), "negative"),
+        (lambda: Motion(beam().network, 0 * beam().inertia[:, 0]), "have no mass"),
     ],
-)
-def test_what_a_scheme_has_not_is_refused(integrator, options, message):
+)  # fmt: skip
+def test_what_a_scheme_has_not_is_refused(call, message):
     with pytest.raises(ValueError, match=message):
-        beam().run(integrator, 1e-9, 1, **options)
-
-
-def test_networks_with_energies_move_in_one_thread():
-    with pytest.raises(ValueError, match="a network with energies moves in one; give 1"):
-        beam("delingette").run("central-difference", 1e-9, 1, threads=2)
+        call()
 
 
 class Counted(Network):
@@ -547,17 +442,11 @@ class Counted(Network):
         return super().factorize_matrix(*arguments, **options)
 
 
-@pytest.mark.parametrize("integrator", EXPLICIT)
-def test_explicit_steps_factorize_nothing(integrator):
-    motion = beam(network_type=Counted)
-    assert motion.run(integrator, 0.9 * motion.step_limit(integrator), 200).status == "moving"
-    assert motion.run(integrator, 0.9 * motion.step_limit(integrator), 200, rest=1e-9).status == "moving"
-    assert relax(motion.network, motion.load, max_steps=200).status == "moving"
-    assert motion.network.taken == 0
-
-
 def test_an_explicit_run_to_rest_factorizes_once():
     motion = beam(network_type=Counted)
+    for integrator in EXPLICIT:
+        assert motion.run(integrator, 0.9 * motion.step_limit(integrator), 200).status == "moving"
+    assert motion.network.taken == 0
     assert relax(motion.network, motion.load).status == "rest"
     assert motion.network.taken == 1
     found = damped(motion)
@@ -595,7 +484,7 @@ def to_rest(motion, way):
 
 
 @pytest.mark.parametrize("way", ["relax", *INTEGRATORS])
-@pytest.mark.parametrize("share", [0.8, 1.3, 2.0])
+@pytest.mark.parametrize("share", [0.99, 1.01, 2.0])
 def test_rest_on_an_unstable_equilibrium_is_told(share, way):
     """Above its buckling load a straight column is in balance, and nothing but noise would move it."""
     found = to_rest(column(share), way)
@@ -605,11 +494,6 @@ def test_rest_on_an_unstable_equilibrium_is_told(share, way):
     else:
         assert found.status == "unstable"
         assert "1 negative pivot" in found.message and "sideways" in found.message
-
-
-@pytest.mark.parametrize("share", [0.99, 1.01])
-def test_the_buckling_load_divides_rest_from_unstable(share):
-    assert to_rest(column(share), "relax").status == ("rest" if share < 1 else "unstable")
 
 
 @pytest.mark.parametrize("way", ["relax", *INTEGRATORS])
@@ -638,24 +522,6 @@ def test_a_column_pushed_sideways_rests_bent(way):
     assert motion.network.factorize_tangent(found.displacements).negative_pivots == 0
 
 
-def test_an_arch_that_snaps_through_rests_behind():
-    """Pushed beyond its limit load, a shallow arch jumps to the far side, where it is stable."""
-    flat = MESH_TYPES["braced"](0.1, 4e-3, 2e-3)
-    points = flat.points.copy()
-    points[:, 1] += 4e-3 * np.sin(np.pi * points[:, 0] / 0.1)
-    mesh = Mesh(points, flat.triangles, flat.quads)
-    springs = DEFINITIONS["lattice"].springs(flat, STEEL, THICKNESS)
-    directions = np.zeros(points.shape, dtype=bool)
-    directions[np.isin(flat.points[:, 0], [0.0, 0.1])] = True
-    network = Network(mesh, directions, springs.relative)
-    middle = np.argmin(np.hypot(flat.points[:, 0] - 0.05, flat.points[:, 1] - 4e-3))
-    load = np.zeros(points.shape)
-    load[middle, 1] = -1e-4
-    found = relax(network, load)
-    assert (found.status, found.message) == ("rest", "")
-    assert found.displacements[middle, 1] < -6e-3
-
-
 def test_rest_on_a_singular_tangent_is_unstable():
     """Two springs in a line: nothing holds the particle between them sideways, as at a limit point."""
     mesh = Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [1.0, 1.0]]), np.array([[0, 1, 3], [1, 2, 3]]))
@@ -681,19 +547,6 @@ def test_a_body_that_floats_is_not_judged():
     assert found.status == "rest" and "free to move as a whole" in found.message
 
 
-def test_a_run_records_the_bound_of_its_step():
-    motion = beam()
-    bound = motion.run("central-difference", 1e-8, 1).step_bound
-    assert bound == 2 / motion.particle_bound <= motion.step_limit("central-difference")
-    assert motion.run("backward-euler", 1e-3, 1).step_bound == np.inf
-
-
-def test_a_rest_criterion_ends_a_run():
-    motion = damped(beam())
-    step = 0.8 * motion.step_limit("central-difference")
-    assert motion.run("central-difference", step, 100_000, rest=1e-4).steps < 5000
-
-
 def test_a_turning_point_is_no_rest():
     """An undamped beam stands still for an instant and passes through balance in another: neither is rest."""
     motion = beam(linear=True)
@@ -707,10 +560,3 @@ def test_a_run_through_inverted_triangles_is_reported():
     motion = damped(beam(force=-2e6, size=0.01))
     found = motion.run("central-difference", 0.3 * motion.step_limit("central-difference"), 20_000, rest=1e-6)
     assert found.status in ("inverted", "diverged") and found.message
-
-
-def test_unknown_integrators_and_steps_are_refused():
-    with pytest.raises(ValueError, match="known: symplectic-euler"):
-        oscillator().run("leapfrog", 0.1, 1)
-    with pytest.raises(ValueError, match="above zero"):
-        oscillator().run("symplectic-euler", 0.0, 1)

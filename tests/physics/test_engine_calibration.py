@@ -309,13 +309,6 @@ def test_files_run_at_the_setting_or_are_refused(tmp_path):
             fit.net().write(tmp_path / name)
 
 
-@pytest.mark.parametrize("name", ["newton-vbd", "newton-xpbd", "newton-semi-implicit"])
-def test_what_runs_in_newton_set_besides_is_said(name):
-    for one in ("tri_kd=0", "edge_ke=0", "radius=0", "particle_grid=None", "masses"):
-        assert one in st.ENGINES[name].besides
-    assert ("builder.color()" in st.ENGINES[name].besides) == (name == "newton-vbd")
-
-
 def test_a_scene_that_no_engine_runs_is_refused():
     with pytest.raises(st.EngineError, match="kinematics: 'linear', and engines keep the length law"):
         st.fit_engine(strip(kinematics="linear"), "xpbd")
@@ -369,11 +362,13 @@ class TestBudget:
         yield
         st.ENGINES.discard("late")
 
-    def test_each_choice_is_within_the_budget(self):
+    def test_each_choice_is_within_the_budget_and_of_equal_errors_the_factor_nearer_to_1_is_taken(self):
         search = self.search("5 ms")
         assert search and max(one.frame_seconds for one in search) <= 5e-3
         others = [one for one in search if one is not search.best]
         assert others == sorted(others, key=lambda one: (one.worst, one.frame_seconds)) and search.best is search[0]
+        alike = [one for one in search if one.worst <= min(other.worst for other in search) + 1e-3]
+        assert abs(np.log(search.best.fit.factor)) == min(abs(np.log(one.fit.factor)) for one in alike)
 
     def test_the_best_split_of_the_time_is_taken(self):
         ((name, mesh), *_), budget = self.MESHES.items(), 5e-3
@@ -383,11 +378,6 @@ class TestBudget:
         for one in self.search(budget, meshes={name: mesh}):
             setting = one.fit.result.setting
             assert 1 / setting.substeps**2 / setting.iterations == pytest.approx(least)
-
-    def test_of_equal_errors_the_factor_nearer_to_1_is_taken(self):
-        search = self.search("5 ms")
-        alike = [one for one in search if one.worst <= min(other.worst for other in search) + 1e-3]
-        assert abs(np.log(search.best.fit.factor)) == min(abs(np.log(one.fit.factor)) for one in alike)
 
     def test_no_mesh_has_too_few_cells_to_bend(self):
         made = graded_meshes(BASE.beam, "structured", lambda size: st.make_mesh(BASE.beam, "structured", size))
@@ -410,7 +400,7 @@ class TestBudget:
             self.search(**({"budget": "1 ms"} | options))
 
 
-@pytest.mark.parametrize("number", [1, 6, 7, 14, 37])
+@pytest.mark.parametrize("number", [1, 6, 37])
 def test_what_is_said_of_a_random_question_holds(number):
     assert answered(number) is (number != 6)
 

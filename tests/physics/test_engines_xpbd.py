@@ -9,15 +9,10 @@ import springtune as st
 
 from engine_scenes import TEN
 from engine_scenes import scene as scene_of_engines
+from problems import pulled
 
-CASE = st.LoadCase(
-    "push",
-    (st.Support("left", 0, 0),),
-    (st.Traction("right", (0.0, 1.0)),),
-    quantities=(st.Quantity("deflection", "displacement", "right", "y"),),
-)
 LENGTH, HEIGHT = 0.12, 0.04
-SHEET = st.Shape.rectangle(LENGTH, HEIGHT, loads={"push": CASE})
+SHEET = st.Shape.rectangle(LENGTH, HEIGHT, loads={"push": pulled(0.0, 1.0, name="push", components="y")})
 SOFT = {"density": "1000 kg/m^3"}
 MATERIALS = {
     "rubber": st.Material("1 MPa", 0.45, **SOFT),

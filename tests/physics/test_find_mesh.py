@@ -10,6 +10,8 @@ from springtune.prediction.search import asked_error, find_mesh
 from springtune.problem.status import Status
 from springtune.scene.sheet import Sheet
 
+from problems import pulled
+
 BEAM, STEEL = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3, density="7850 kg/m^3")
 
 
@@ -87,13 +89,6 @@ class TestWhatIsFound:
             assert one.step_limit <= scene.motion().step_limit("central-difference") * (1 + 1e-6)
             assert one.step_limit >= 0.8 * scene.motion().step_limit("central-difference")
 
-    def test_sizes_make_the_same_mesh_as_a_text(self, search):
-        for one in found_in(search):
-            text = f"{1e3 * one.size:.12g} mm"
-            assert np.array_equal(
-                st.make_mesh(BEAM, one.mesh_type, text).points, st.make_mesh(BEAM, one.mesh_type, one.size).points
-            )
-
     @pytest.mark.parametrize(("length", "height"), [(0.05, 0.04), (0.012, 0.04), (0.4, 0.04)])
     def test_cells_across_are_those_of_the_smaller_side(self, length, height):
         beam = st.Beam(length, height)
@@ -127,17 +122,8 @@ class TestRandomSearches:
 
     def test_meshes_in_between_keep_it_too(self):
         random = np.random.default_rng(8)
-        ratios = np.array([ratio for _ in range(5) for ratio in self.searched(random, 700)])
+        ratios = np.array([ratio for _ in range(4) for ratio in self.searched(random, 400)])
         assert len(ratios) >= 3 and (ratios <= 1).all()
-
-    @pytest.mark.slow
-    def test_fresh_ones(self):
-        seed = np.random.SeedSequence().entropy
-        print("seed", seed)
-        random = np.random.default_rng(seed)
-        ratios = np.array([ratio for _ in range(100) for ratio in self.searched(random, 4000)])
-        print(len(ratios), np.sort(ratios)[-5:])
-        assert len(ratios) > 80 and (ratios > 1).mean() <= 0.05 and ratios.max() < 2
 
 
 BETWEEN = (0.98, 0.95, 0.9, 0.83, 0.7, 0.56)
@@ -192,9 +178,7 @@ class TestBetweenWholeDivisions:
             assert any(finer.cells != int(finer.cells) for finer in one.finer)
 
     def test_shapes_are_tried_there_too(self):
-        pull = st.LoadCase("pull", [st.Support("left", x=0, y=0)], [st.Traction("right", ("4 kN", 0))],
-                           quantities=[st.Quantity("end", "displacement", "right", "x")])  # fmt: skip
-        plate = st.Shape.rectangle("100 mm", "40 mm", loads={"pull": pull})
+        plate = st.Shape.rectangle("100 mm", "40 mm", loads={"pull": pulled("4 kN", 0)})
         search = find_mesh(plate, STEEL, "2 %")
         one, known = search.best, search.known["end"].value
         assert one.confirmed and any(finer.cells != int(finer.cells) for finer in one.finer)
@@ -242,18 +226,6 @@ class TestWhatIsNotFound:
         patch = [one for one in search.tried if "patch" in one.errors]
         assert patch[-1].particles < 1000 and patch[-1].worst("patch") > 0.1
 
-    def test_a_type_that_has_one_mesh_ends(self):
-        @st.mesh_type("two-triangles")
-        def two(length, height, size):
-            points = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * [length, height]
-            return st.Mesh(points, np.array([[0, 1, 2], [0, 2, 3]]))
-
-        try:
-            search = find_mesh(BEAM, STEEL, "1 %", mesh_types=["two-triangles"])
-        finally:
-            st.MESH_TYPES.discard("two-triangles")
-        assert search.best is None and len(search.tried) == 1
-
     def test_networks_that_are_unstable_are_no_answer(self):
         """A sheet that grows wider as it is pulled."""
         search = find_mesh(BEAM, st.Material(1e9, -0.6), "2 %", mesh_types=["structured"], most=1500)
@@ -263,11 +235,20 @@ class TestWhatIsNotFound:
 
 class TestArguments:
     @pytest.mark.parametrize(
-        "error", ["1", "x %", "-1 %", "0 %", "100 %", "nan %", "inf %", "1 mm", 0, 1, -0.1, 5, None, True, np.nan, [1]]
-    )
-    def test_errors_that_are_none(self, error):
-        with pytest.raises(ValueError, match="^error: .* is no error above 0 and below 100 %; give one such as '1 %'"):
-            find_mesh(BEAM, STEEL, error)
+        ("wrong", "values", "message"),
+        [
+            ("error", ["1", "x %", "-1 %", "0 %", "100 %", "nan %", "inf %", "1 mm", 0, 1, -0.1, 5, None, True, [1]],
+             "error: .* is no error above 0 and below 100 %; give one such as '1 %'"),
+            ("mesh_types", ["structured", [], ["triangles"], 3, [["free"]], [None]], "mesh types: .*(structured|give)"),
+            ("most", [0, -1, 1.5, "many", None], "most: .* is no number of particles; give one such as 20000"),
+            ("beam", ["200x40"], "beam: "),
+            ("material", ["steel"], "material: "),
+        ],
+    )  # fmt: skip
+    def test_what_is_wrong_is_named(self, wrong, values, message):
+        for value in values:
+            with pytest.raises(ValueError, match=f"^{message}"):
+                find_mesh(**{"beam": BEAM, "material": STEEL, "error": "1 %"} | {wrong: value})
 
     @pytest.mark.parametrize(("text", "error"), [("1 %", 0.01), (" 0.5% ", 0.005), ("1e-1 %", 0.001), (0.02, 0.02)])
     def test_errors(self, text, error):
@@ -287,19 +268,3 @@ class TestArguments:
             ValueError, match="^loads: 'bending' has no reference, so .* such slender shapes are for beam"
         ):
             find_mesh(st.Beam(10.0, 1e-3), st.Material(1e9, 0.5), "1 %", loads=["traction", "bending"])
-
-    @pytest.mark.parametrize("names", ["structured", [], ["triangles"], 3, [["free"]], [None]])
-    def test_mesh_types(self, names):
-        with pytest.raises(ValueError, match="^mesh types: .*(structured|give)"):
-            find_mesh(BEAM, STEEL, "1 %", mesh_types=names)
-
-    @pytest.mark.parametrize("most", [0, -1, 1.5, "many", None])
-    def test_most(self, most):
-        with pytest.raises(ValueError, match="^most: .* is no number of particles; give one such as 20000"):
-            find_mesh(BEAM, STEEL, "1 %", most=most)
-
-    def test_beams_and_materials(self):
-        with pytest.raises(ValueError, match="^beam: "):
-            find_mesh("200x40", STEEL, "1 %")
-        with pytest.raises(ValueError, match="^material: "):
-            find_mesh(BEAM, "steel", "1 %")

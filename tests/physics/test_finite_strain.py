@@ -68,28 +68,11 @@ def test_stress_and_tangent_are_derivatives(nu, plane, f, d):
     assert change == pytest.approx(piola_change(material, f, d), abs=2e-6)
 
 
-@pytest.mark.parametrize("nu", [0.3, 0.49, 0.5])
-def test_small_strain_is_the_limit(nu):
-    material = Material(1e6, nu, name="any")
-    for kind, force in ((FACE, -2e-3), (AXIAL, 4e-5), (AXIAL, -4e-5), (BENDING, 4e-6), (SHEAR, 2e-3)):
-        finite = solve_finite_strain(BLOCK, material, force, kind=kind)
-        small = solve_small_strain(BLOCK, material, force, kind=kind)
-        # Strains of 1e-5 and the coarse elements' error at the corners.
-        assert finite.displacement == pytest.approx(small.displacement, rel=2e-4)
-
-
 def test_nodes_of_one_line_may_differ_by_rounding():
     """One beam in 800 ended in an error: two nodes of a line were rounded to different digits."""
     found = solve_finite_strain(Beam(16.6756, 1.0, 1e-3, "b"), Material(1e9, 0.3, name="any"), 100.0, kind=AXIAL)
     # The bar's, less what the clamp takes: .01 of a height.
     assert found.displacement == pytest.approx(100.0 * 16.6756 / (1e9 * 1e-3), rel=1e-3)
-
-
-def test_traction_of_calculix():
-    found = solve_finite_strain(BLOCK, Material(1e6, 0.49, name="rubber"), 0.4, kind=AXIAL)
-    # CPS8 of 2 mm, neo-Hooke, NLGEOM: 2.00747 mm, 1e-4 too stiff at the corners as in small strain.
-    assert found.displacement == pytest.approx(2.00747e-3, rel=2e-4)
-    assert found.error_estimate <= 1e-4
 
 
 def test_incompressible_bar_stretches_as_by_hand():
@@ -120,13 +103,16 @@ def test_the_estimate_under_pressure_covers_the_error(plane, nu, aspect_ratio, s
     assert abs(found.displacement / finer - 1) <= found.error_estimate
 
 
-@pytest.mark.parametrize(("kind", "stress"), [(AXIAL, 4e-6), (BENDING, 1e-9), (SHEAR, 1e-6)])
+@pytest.mark.parametrize(
+    ("kind", "stress", "nu"),
+    [(AXIAL, 4e-6, 0.3), (AXIAL, -1e-6, 0.49), (BENDING, 1e-9, 0.3), (SHEAR, 1e-6, 0.3), (FACE, -1e-6, 0.5)],
+)
 @pytest.mark.parametrize("aspect_ratio", [1, 30])
-def test_small_strain_is_the_limit_of_any_shape(kind, stress, aspect_ratio):
-    beam = Beam(aspect_ratio * 0.01, 0.01, 1e-3, "any")
-    force = stress * 1e6 * beam.thickness * (beam.length if kind == SHEAR else beam.height)
-    finite = solve_finite_strain(beam, Material(1e6, 0.3, name="any"), force, kind=kind)
-    small = solve_small_strain(beam, Material(1e6, 0.3, name="any"), force, kind=kind)
+def test_small_strain_is_the_limit_of_any_shape(kind, stress, nu, aspect_ratio):
+    beam, material = Beam(aspect_ratio * 0.01, 0.01, 1e-3, "any"), Material(1e6, nu, name="any")
+    force = stress * 1e6 * beam.thickness * (beam.length if kind in (SHEAR, FACE) else beam.height)
+    finite = solve_finite_strain(beam, material, force, kind=kind)
+    small = solve_small_strain(beam, material, force, kind=kind)
     assert finite.displacement == pytest.approx(small.displacement, rel=1e-4)
     # It is an estimate of the elements' error; strains and turns of the order of 1e-6 come to 1e-6 besides.
     assert abs(finite.displacement / small.displacement - 1) <= finite.error_estimate + 1e-5
@@ -181,14 +167,6 @@ def test_compression_shortens_more_than_it_stretches():
     stress = 1.0 / (1e6 * 0.04e-3)
     even = (pulled.displacement + pushed.displacement) / 2 / BLOCK.length
     assert even == pytest.approx(stress**2, rel=0.1)
-
-
-def test_profile_is_symmetric_and_holds_both_displacements():
-    found = solve_finite_strain(BLOCK, Material(1e6, 0.49, name="rubber"), -20.0, follower=True)
-    assert found.positions[[0, -1]].tolist() == [0, 1]
-    assert np.allclose(found.profile, found.profile[::-1], rtol=1e-9)
-    assert found.displacement == found.profile[len(found.profile) // 2]
-    assert found.profile.min() < found.mean_displacement < found.profile.max()
 
 
 def test_a_reference_is_on_the_stable_path():

@@ -114,12 +114,6 @@ def test_points_outside_are_refused():
     assert built(AXIAL).evaluate(outside, 0.5).displacement == built(AXIAL).evaluate(12, 0.5).displacement
 
 
-@pytest.mark.parametrize("box", [((0, 1), (0, 0.5)), ((2, 1), (0, 0.5)), ((1, 2), (0, 0.6)), ((1, 2), (-1, 0.5))])
-def test_ranges_that_are_none_are_refused(box):
-    with pytest.raises(ValueError, match="a range of"):
-        Interpolant.build(AXIAL, *box)
-
-
 def test_what_cannot_be_certified_is_said():
     box = BOXES[AXIAL]
     with pytest.raises(NotCertifiedError, match="'axial' over aspect ratios 1 to 12 .*: more than 20 solves"):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial import Delaunay
 
+from periodic import periodic_delaunay, periodic_stiffness
 from springtune.linalg.factors import SingularError
 from springtune.mechanics.moduli import (
     PatchTest,
@@ -13,11 +14,9 @@ from springtune.mechanics.moduli import (
     free_body,
     mean_gradient,
     outline_forces,
-    periodic_stiffness,
 )
 from springtune.mechanics.network import Network
-from springtune.mesh import Mesh, MeshError, signed_areas
-from springtune.mesh.periodic import periodic_delaunay
+from springtune.mesh import Mesh, signed_areas
 from springtune.problem.materials import Material
 from springtune.springs import DEFINITIONS
 
@@ -158,18 +157,3 @@ def test_a_network_without_stiffness_is_refused():
         periodic_stiffness(mesh, copied, SimpleNamespace(relative=np.zeros(len(mesh.edges)), energies=()))
     with pytest.raises(SingularError, match="unstable at rest"):
         periodic_stiffness(mesh, copied, SimpleNamespace(relative=-np.ones(len(mesh.edges)), energies=()))
-
-
-@pytest.mark.parametrize(
-    "points",
-    [
-        np.stack(np.meshgrid(np.arange(5) / 5, np.arange(5) / 5), axis=2).reshape(-1, 2),  # squares
-        np.full((20, 2), np.nan),
-        np.tile([[0.5, 0.5]], (20, 1)),
-        np.random.default_rng(1).uniform(size=(20, 2)) * 3,  # beyond one period
-    ],
-    ids=["squares", "nan", "one place", "beyond"],
-)
-def test_points_without_a_periodic_triangulation_are_refused(points):
-    with pytest.raises(MeshError, match="points: .*; give a dozen points or more"):
-        periodic_delaunay(points, 1.0, 1.0)

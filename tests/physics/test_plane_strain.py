@@ -8,10 +8,12 @@ import springtune as st
 from springtune.mechanics.network import Network
 from springtune.prediction.choices import references
 from springtune.problem.loads import AXIAL
-from springtune.problem.shapes import LoadCase, Pressure, Quantity, Segment, Shape, Support, Traction
+from springtune.problem.shapes import LoadCase, Pressure, Quantity, Segment, Shape, Support
 from springtune.reference.finite_shapes import solve_finite_shape
 from springtune.reference.finite_strain import solve_finite_strain
 from springtune.reference.shapes import solve_shape
+
+from problems import pulled
 
 BEAM = st.Beam("200 mm", "40 mm")
 STEEL = st.Material("210 GPa", 0.3, plane="strain", name="steel")
@@ -179,17 +181,12 @@ def test_a_shape_at_finite_strain_is_in_the_plane_of_its_material():
         even = shear * volume ** (-2 / 3) * (stretches - total / (3 * stretches))
         return even + bulk * (volume - 1) * stretches[::-1] - [force / (height * 1e-3), 0]
 
-    case = LoadCase(
-        "pull",
-        (Support("left", x=0.0), Support("lower", y=0.0)),
-        [Traction("right", (force, 0.0))],
-        quantities=(Quantity("end", "displacement", "right", "x"),),
-    )
+    case = pulled(force, 0.0, supports=(Support("left", x=0.0), Support("lower", y=0.0)))
     shape = Shape.rectangle(length, height, loads={"pull": case})
     found = solve_finite_shape(shape, case, {"": rubber}).values["end"]
     assert found == pytest.approx((root(stresses, [1.3, 0.8], tol=1e-12).x[0] - 1) * length, rel=1e-9)
     sheet = solve_finite_shape(shape, case, {"": rubber}, law="st-venant").values["end"]
-    pulled = root(
+    stretched = root(
         lambda a: a * (a**2 - 1) / 2 * rubber.in_plane.young_modulus - force / (height * 1e-3), 1.3, tol=1e-12
     )
-    assert sheet == pytest.approx((pulled.x[0] - 1) * length, rel=1e-9)
+    assert sheet == pytest.approx((stretched.x[0] - 1) * length, rel=1e-9)

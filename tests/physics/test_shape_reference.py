@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import shapes_of_others as others
-from springtune.mesh.cells import Mesh, MeshError, signed_areas
+from springtune.mesh.cells import Mesh, signed_areas
 from springtune.mesh.groups import GroupedMesh
 from springtune.mesh.outlines import mesh_shape
 from springtune.problem.geometry import Beam
@@ -17,6 +17,8 @@ from springtune.reference import shapes
 from springtune.reference.shapes import Level, solve_each, solve_shape
 from springtune.reference.small_strain import ReferenceNotConvergedError, solve_small_strain
 from springtune.reference.triangles import side_fit, side_functions, tabulated
+
+from problems import pulled
 
 STEEL = Material(210e9, 0.3, density=7850.0, name="steel")
 PLASTIC = Material(1e9, 0.3, name="plastic")
@@ -128,36 +130,6 @@ def test_lame_ring_to_a_millionth():
     np.testing.assert_allclose(found.at(r * ways), exact, rtol=0, atol=1e-6 * np.abs(exact).max())
 
 
-def test_cook_to_five_digits():
-    """Values to which tolerances of 1e-5 and 1e-7 agree, whatever the coarse mesh."""
-    shape, material = others.cook()
-    found = solve_shape(shape, shape.loads["shear"], material, tolerance=1e-5)
-    assert found.values["tip"] == pytest.approx(23.9677, abs=2e-4)
-    assert found.values["mean-tip"] == pytest.approx(24.0416, abs=1e-4)
-    assert found.values["reaction"] == pytest.approx(-1.0, rel=1e-9)
-    # The mean displacement of the loaded side is twice the energy, over the force.
-    assert 2 * found.energy == pytest.approx(found.values["mean-tip"], rel=1e-9)
-
-
-def test_stress_inside():
-    """At a named point within the ring, which becomes a corner of triangles."""
-    shape, material = others.ring()
-    inside = replace(shape, points={"inside": (0.6, 0.45)}, loads={})
-    names = ("xx", "yy", "xy")
-    quantities = tuple(Quantity(component, "stress", "inside", component) for component in names)
-    load = replace(shape.loads["pressure"], quantities=quantities)
-    found = solve_shape(inside, load, material, tolerance=1e-5)
-    radial, hoop = (1e6 / 3 * (1 + sign / 0.75**2) for sign in (-1, 1))
-    across, along = 0.8, 0.6
-    exact = [
-        radial * across**2 + hoop * along**2,
-        radial * along**2 + hoop * across**2,
-        (radial - hoop) * across * along,
-    ]
-    assert [found.values[name] for name in names] == pytest.approx(exact, rel=1e-4)
-    assert found.stress_at(np.array([[0.6, 0.45]]))[0] == pytest.approx(exact, rel=1e-3)
-
-
 @pytest.mark.parametrize("make", [others.cook, others.nafems_le1, others.ring, others.holed_plate])
 def test_patch(make):
     """Affine displacements on the outline are those within, in any sheet, to rounding."""
@@ -212,15 +184,6 @@ def test_kirsch():
     np.testing.assert_allclose(found.stress_at(points), stresses, rtol=0, atol=1e-3 * 1e6)
 
 
-@pytest.mark.parametrize("factor", [1e-6, 1.0, 1e6])
-def test_a_sector_whose_triangles_once_folded(factor):
-    """Right values are of quadratic triangles on three meshes, to 2e-6, and of CalculiX."""
-    shape = others.sector(np.radians(120), 0.055, 0.1, [(0.005, np.radians(55), 0.0775)])
-    found = solve_shape(shape, shape.loads["press"], Material(factor * 1e9, 0.3))
-    for axis, right in (("x", 3.78166e-4), ("y", 4.26196e-4)):
-        assert found.values[axis] * factor == pytest.approx(right, rel=found.error_estimates[axis] + 3e-6)
-
-
 def folded(shape):
     """Triangles of the first levels that have a determinant of the wrong sign somewhere."""
     problem, count = shapes.Problem(shape, shape.loads["press"], {"": PLASTIC}, None), 0
@@ -250,24 +213,6 @@ def test_no_triangle_of_a_sector_folds(seed, monkeypatch):
     shape = others.random_sector(seed)
     assert folded(shape) == 0
     estimates_hold(shape, monkeypatch)
-
-
-@pytest.mark.slow
-def test_no_triangle_of_many_sectors_folds(monkeypatch):
-    for seed in range(260):
-        shape = others.random_sector(seed)
-        assert folded(shape) == 0, seed
-        if seed % 3 == 0:
-            estimates_hold(shape, monkeypatch)
-
-
-def test_a_folded_triangle_is_refused(monkeypatch):
-    """Where none looks before, each level does."""
-    shape = others.random_sector(FOLDED[0])
-    with monkeypatch.context() as patch:
-        patch.setattr(shapes, "_unfolded", lambda mesh: True)
-        with pytest.raises(MeshError, match=r"a triangle folds along an arc near \(.*\) mm; give the arc as shorter"):
-            solve_shape(shape, shape.loads["press"], PLASTIC)
 
 
 def test_a_re_entrant_corner():
@@ -334,12 +279,8 @@ def test_two_materials_one_behind_the_other():
     mesh = Mesh(points, np.zeros((0, 3), dtype=int), quads)
     sides = {"left": np.array([[1, 0]]), "right": np.array([[6, 7]]), "lower": np.array([[0, 2], [2, 4], [4, 6]])}
     grouped = GroupedMesh(mesh, sides, {}, {"soft": {4: np.array([False, True, False])}})
-    load = LoadCase(
-        "pull",
-        (Support("left", x=0.0), Support("lower", y=0.0)),
-        (Traction("right", (3.0, 0.0)),),
-        quantities=(Quantity("end", "displacement", "right", "x"), Quantity("held", "reaction", "left", "x")),
-    )
+    rollers = (Support("left", x=0.0), Support("lower", y=0.0))
+    load = pulled(3.0, 0.0, supports=rollers, others=[Quantity("held", "reaction", "left", "x")])
     shape = Shape("bar", 0.5, file="bar.msh")
     materials = {"": Material(100.0, 0.0), "soft": Material(10.0, 0.0)}
     found = solve_shape(shape, load, materials, grouped)
@@ -497,3 +438,12 @@ def test_refusals():
     shape, load = square((end,), tractions=pull)
     refused("parts without a material: ''", shape, load, {"core": even})
     refused("has no outline; give the mesh", Shape("read", 1.0, file="a.msh"), load)
+
+
+@pytest.mark.parametrize("factor", [1e-6, 1.0, 1e6])
+def test_a_sector_whose_triangles_once_folded(factor):
+    """Right values are of quadratic triangles on three meshes, to 2e-6, and of CalculiX."""
+    shape = others.sector(np.radians(120), 0.055, 0.1, [(0.005, np.radians(55), 0.0775)])
+    found = solve_shape(shape, shape.loads["press"], Material(factor * 1e9, 0.3))
+    for axis, right in (("x", 3.78166e-4), ("y", 4.26196e-4)):
+        assert found.values[axis] * factor == pytest.approx(right, rel=found.error_estimates[axis] + 3e-6)

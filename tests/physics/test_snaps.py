@@ -9,6 +9,8 @@ from springtune.mechanics.continuation import follow
 from springtune.mechanics.dynamics import relax
 from springtune.problem.status import Status
 
+from problems import pulled
+
 ARCHES = draw()
 
 
@@ -96,9 +98,7 @@ def test_one_event_has_one_status(definition, size, status, says):
         "hole", "1 mm",
         [st.Segment((0.01, 0), group="lower"), st.Segment((0.1, 0), group="right"), st.Segment((0.1, 0.05)),
          st.Segment((0, 0.05), group="left"), st.Segment((0, 0.01), (0, 0))],
-        loads={"pull": st.LoadCase("pull", [st.Support("lower", y=0), st.Support("left", x=0)],
-                                   [st.Traction("right", ("50 N", 0))],
-                                   quantities=[st.Quantity("end", "displacement", "right", "x")])},
+        loads={"pull": pulled("50 N", 0, supports=[st.Support("lower", y=0), st.Support("left", x=0)])},
     )  # fmt: skip
     result = st.Scene(
         hole, st.mesh_shape(hole, size), st.Material("1 MPa", 1 / 3), "pull", definition=definition

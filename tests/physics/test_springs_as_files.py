@@ -2,7 +2,7 @@
 
 import os
 import xml.etree.ElementTree as ElementTree
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 
 import meshio
@@ -13,13 +13,10 @@ from click.testing import CliRunner
 import springtune as st
 from mechanics import angle_forces, area_forces, area_of, spring_forces
 from springtune.cli import main
-from springtune.handover import paraview
 from springtune.handover.formats import ENDINGS
 from springtune.handover.newton import membrane
 from springtune.mechanics.energies import AngleEnergy, AreaEnergy
 from springtune.mechanics.integrators import EXPLICIT, IMPLICIT
-from springtune.studies.kinds.scenes.solve import solved
-from springtune.studies.kinds.scenes.stored import packed, unpacked
 
 from tables import refused_calls
 
@@ -217,15 +214,6 @@ class TestHeader:
             solved = scene_of("area", load=steady, force="1 N", kinematics="linear").solve()
             assert error == pytest.approx(solved.error, abs=1e-9), name
 
-    def test_errors_are_of_the_loads_asked_for(self):
-        mesh, loads = scene_of("patch").mesh, ["pressure", "compression"]
-        choices = {choice.definition: choice for choice in st.predict(BEAM, mesh, STEEL, loads=loads, also=["patch"])}
-        net = st.SpringNet.from_mesh(mesh, STEEL, "patch", beam=BEAM, loads=loads)
-        assert net.header["expected_error"] == choices["patch"].errors
-        for given, options in (["shake"], {"beam": BEAM}), (["traction"], {}):
-            with pytest.raises(ValueError, match="^loads: "):
-                st.SpringNet.from_mesh(mesh, STEEL, "patch", loads=given, **options)
-
     def test_what_is_not_computed_says_why(self):
         loose = st.SpringNet.from_mesh(scene_of("lattice").mesh, replace(STEEL, density=None), "lattice")
         assert loose.masses is None and not loose.held.any() and not loose.forces.any()
@@ -248,17 +236,6 @@ class TestHeader:
         # What a load holds makes no mode higher: free, the step is no longer than held.
         free = st.SpringNet.from_mesh(scene.mesh, STEEL, definition, thickness=BEAM.thickness)
         assert free.header["largest_stable_step"]["central-difference"] <= steps["central-difference"] * (1 + 1e-9)
-
-    def test_formula_and_source_are_those_of_the_definition(self):
-        for name, definition in st.DEFINITIONS.items():
-            if definition.needs or 3 not in definition.cells or name == "axis-exact":
-                continue
-            header = net_of(scene_of(name)).header
-            assert header["formula"] == definition.summary and len(header["source"]) > 100
-        assert "Delingette, IEEE TVCG 14(2):329, 2008" in net_of(scene_of("delingette")).header["source"]
-
-    def test_masses_are_those_of_the_sheet(self):
-        assert net_of(scene_of("lattice")).masses.sum() == pytest.approx(7850 * 0.1 * 0.02 * 2e-3, rel=1e-9)
 
 
 class TestScene:
@@ -320,53 +297,10 @@ class TestResult:
         assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("kinematics", ["nonlinear", "linear"])
-@pytest.mark.parametrize(("definition", "mesh_type"), [("area", "free"), ("delingette", "free"), ("flechon", "braced")])
-def test_fields_of_a_study_are_those_of_a_result(definition, mesh_type, kinematics):
-    """Stiffness and force of each spring, which a study keeps with seven digits."""
-    scene = scene_of(definition, mesh_type, kinematics=kinematics)
-    task = {"definition": definition, "material": asdict(STEEL), "kind": scene.kind.name, "follower": False}
-    task |= {"force": scene.force, "kinematics": kinematics, "keep_fields": True}
-    made, result = solved(scene.sheet, task), scene.solve()
-    stored = unpacked(packed(made))
-    assert (made["displacement"], made["status"]) == (result.displacement, result.status)
-    assert (stored["spring_stiffnesses"] == result.stiffness.astype("float32")).all()
-    assert np.allclose(stored["spring_forces"], result.spring_forces, rtol=1e-6, atol=1e-6 * 20e3)
-    assert result.stiffness.any() == (definition != "delingette")  # whose law is all an energy
-
-
 def series(path):
     """Times of a collection and the grids of its pieces."""
     rows = ElementTree.parse(path).getroot().findall("Collection/DataSet")
     return [float(row.get("timestep")) for row in rows], [meshio.read(path.parent / row.get("file")) for row in rows]
-
-
-class TestSeries:
-    """What becomes of a collection where the disk is full."""
-
-    @pytest.fixture(params=["write_text", "replace"])
-    def full(self, request, monkeypatch):
-        """A disk on which a list has no room, or on which its last piece does not get its name."""
-        able, done = getattr(Path, request.param), []
-
-        def fail(path, *given, **options):
-            done.append(path)
-            if request.param == "write_text" or len(done) == 2:
-                raise OSError(28, "No space left on device")
-            return able(path, *given, **options)
-
-        monkeypatch.setattr(Path, request.param, fail)
-
-    def test_nothing_is_left(self, full, tmp_path):
-        with pytest.raises(OSError, match="No space left on device"):
-            scene_of("lattice").solve().write(tmp_path / "path.pvd", steps=2)
-        assert not list(tmp_path.iterdir())
-
-    def test_other_files_in_the_folder_do_not_hide_the_cause(self, tmp_path):
-        with pytest.raises(OSError, match="No space left on device"), paraview.series(tmp_path / "path.pvd") as add:
-            add(0.0, lambda path: (path.write_text("piece"), (tmp_path / "path/notes.txt").touch()))
-            raise OSError(28, "No space left on device")
-        assert [path.name for path in tmp_path.rglob("*")] == ["path", "notes.txt"]
 
 
 def test_a_collection_stays_where_there_is_no_room_for_another(tmp_path, monkeypatch):
@@ -449,7 +383,9 @@ class TestFiles:
     def test_a_file_with_fewer_cells_than_its_header_says_is_refused(self, ending, tmp_path):
         net = net_of(scene_of("lattice"))
         replace(net, triangles=net.triangles[:-1]).write(tmp_path / f"net{ending}")
-        with pytest.raises(ValueError, match=r"204 triangles, and its header says 205\); write it again"):
+        with pytest.raises(
+            ValueError, match=r"triangles of shape \(204, 3\) in the place of \(205, 3\)\); write it again"
+        ):
             st.SpringNet.read(tmp_path / f"net{ending}")
 
     def test_tables_of_a_net_of_before_are_gone(self, tmp_path):
@@ -464,17 +400,6 @@ class TestFiles:
         for do in (st.SpringNet.read, net_of(scene_of("lattice")).write, scene_of("lattice").springs.write):
             with pytest.raises(ValueError, match=r"'\.stl' is no format of springs; give a name ending in \.csv"):
                 do(tmp_path / "net.stl")
-
-    def test_a_folder_is_not_made(self, tmp_path):
-        scene, path = scene_of("lattice"), tmp_path / "none/net"
-        writers = {".csv": net_of(scene).write, ".json": scene.springs.write, ".xml": net_of(scene).write}
-        writers |= {".vtu": scene.solve().write, ".pvd": scene.solve().write}
-        for ending, do in writers.items():
-            with pytest.raises(ValueError, match=r"folder .*none does not exist; make it first"):
-                do(path.with_suffix(ending))
-        with pytest.raises(ValueError, match=r"folder .*none does not exist; make it first"):
-            scene.write_motion(path.with_suffix(".pvd"), scene.motion(), "central-difference", 1e-7, 10)
-        assert not list(tmp_path.iterdir())
 
     def test_energies_of_ones_own_are_refused(self, tmp_path):
         class Own(AreaEnergy):
@@ -509,19 +434,6 @@ class TestCommand:
         assert "error of the displacement, solved on this mesh: traction" in result.stdout
         assert "largest stable step of explicit integrators" in result.stdout
 
-    def test_a_mesh_file(self, tmp_path):
-        mesh = st.make_mesh(BEAM, "free", "5 mm")
-        grid = meshio.Mesh(
-            1e3 * np.column_stack([mesh.points, np.zeros(len(mesh.points))]), {"triangle": mesh.triangles}
-        )
-        grid.write(tmp_path / "own.vtu")
-        told = ("--beam", "100x20", "--mesh", tmp_path / "own.vtu", "--unit", "mm", "--material", "rubber")
-        result = self.run(*told, "--out", tmp_path / "net.json")
-        assert result.exit_code == 0, result.stderr
-        assert "largest stable step" not in result.stdout
-        net = st.SpringNet.read(tmp_path / "net.json")
-        assert net.header["mesh"]["name"] == "own.vtu" and net.header["material"]["young_modulus"] == 1e6
-
     @pytest.mark.parametrize(("options", "said"), refused_calls("springs"))
     def test_refuses_in_a_line_and_writes_nothing(self, options, said, tmp_path, monkeypatch):
         monkeypatch.chdir(tmp_path)
@@ -551,10 +463,8 @@ class TestPlaneStrain:
         assert net.header["material"]["plane"] == "strain"
         shear, first = membrane(net)
         assert (shear, first) == pytest.approx((1e3 / 2.9, 1e3 * 0.45 / (1.45 * 0.1)))
-        net.write(tmp_path / "net.usda")
-        text = (tmp_path / "net.usda").read_text()
-        assert "Poisson's ratio 0.45, plane strain, density 1800 kg/m3" in text
-        assert f"physics:poissonsRatio = {0.45 / 0.55!r}" in text
+        net.write(tmp_path / "net.newton.py")
+        assert "Poisson's ratio 0.45, plane strain, density 1800 kg/m3" in (tmp_path / "net.newton.py").read_text()
 
     def test_a_flex_of_mujoco_4_is_refused_where_its_ratio_is_above_a_half(self, tmp_path):
         with pytest.raises(ValueError, match="ratio of 0.818 in its plane, and a flex of MuJoCo 4"):

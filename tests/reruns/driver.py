@@ -8,16 +8,13 @@ import sys
 from pathlib import Path
 
 import meshio
-import netCDF4
 import numpy as np
+import xarray as xr
 
 sys.path.append(str(Path(__file__).parents[1] / "unit"))  # for `campaigns`, where this is a program
 
 from springtune.mesh import MESH_TYPES
-from springtune.springs import DEFINITIONS
-from springtune.studies.runs import checked_json, driver, records, rerun, run_tasks
-from springtune.studies.runs.keys import CODE_FILE, OURS
-from springtune.studies.runs.task_costs import TaskCosts
+from springtune.studies.runs import job, rerun
 
 from campaigns import Campaign
 
@@ -49,18 +46,16 @@ class Run(Campaign):
         jobs : set of str
             Jobs that ran; those of stages without the number of their bundle.
         solved : dict of str to int
-            What they computed, by the kind of task.
+            What they computed, by the stage.
         """
         names, solved = self.due(), {}
         if names:
             self.plan.write()
-            OURS.remember(FOLDER.parent / CODE_FILE)
         for name in names:
             self.do(name)
-            work = checked_json.read(self.jobs[name].record).get("work", {})
-            # What definitions cost is told beside the scene that they are part of.
-            for kind in work.keys() - set(DEFINITIONS):
-                solved[kind] = solved.get(kind, 0) + work[kind][0]
+            computed = json.loads(self.jobs[name].record.read_text()).get("computed", 0)
+            if computed:
+                solved[self.called(name)] = solved.get(self.called(name), 0) + computed
         return {self.called(name) for name in names}, solved
 
     def called(self, name):
@@ -69,13 +64,10 @@ class Run(Campaign):
 
     def do_stage(self, name):
         """A job of a stage, in this process, which compiles once what it needs."""
-        run_tasks.with_repair(lambda: self._compute(name), FOLDER)
-
-    def _compute(self, name):
-        note, spent = checked_json.read(self.plan.tasks(name)), TaskCosts()
-        driver.run(note["module"], note["content"], spent)
-        assert not spent.broken
-        records.write(self.jobs[name].record, note["digest"], note["products"], **spent.summary())
+        note = json.loads(self.plan.tasks(name).read_text())
+        computed = job.do(note["module"], note["content"])
+        self.jobs[name].record.parent.mkdir(parents=True, exist_ok=True)
+        self.jobs[name].record.write_text(json.dumps({"digest": note["digest"], "computed": computed}))
 
 
 def prepare(folder):
@@ -97,18 +89,17 @@ def write_mesh(path, shift=0.0):
 
 def dataset(folder):
     """What the dataset of a study holds, without times."""
-    with netCDF4.Dataset(folder / FOLDER / rerun.DATASET) as file:
-        return _group(file)
+    with xr.open_datatree(folder / FOLDER / rerun.DATASET, engine="h5netcdf", decode_cf=False) as tree:
+        nodes = {node.path: node.to_dataset(inherit=False).load() for node in tree.subtree}
+    return {path: _without_times(data) for path, data in nodes.items()}
 
 
-def _group(group):
-    group.set_auto_maskandscale(False)
-    found = {name: str(group.getncattr(name)) for name in group.ncattrs() if not TIMES.search(name)}
-    for name, variable in group.variables.items():
+def _without_times(data):
+    found = {name: str(one) for name, one in data.attrs.items() if not TIMES.search(name)}
+    for name, array in data.variables.items():
         if not TIMES.search(name):
-            values = np.asarray(variable[...])
-            found[name] = (variable.dimensions, values.tolist() if values.dtype == object else values.tobytes())
-    return found | {f"{name}/": _group(below) for name, below in group.groups.items()}
+            found[name] = (array.dims, array.values.tolist() if array.dtype.kind in "OU" else array.values.tobytes())
+    return found
 
 
 if __name__ == "__main__":  # with the package of another folder

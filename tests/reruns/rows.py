@@ -19,7 +19,17 @@ JOBS = {
     "EVERYTHING": f"reference mesh {SOLVING}",
 }
 SCENES = {"linear": 24, "nonlinear": 25}
-RESULTS = {"SCENES": SCENES, "NETWORKS": {"curve": 16, "moduli": 2, "laying": 4, "contrast": 1} | SCENES}
+RESULTS = {"SCENES": SCENES, "NETWORKS": {"curve": 16, "moduli": 2, "laying": 2, "contrast": 1} | SCENES}
+STAGES = {
+    "curve": "sensitivity",
+    "linear": "solve",
+    "nonlinear": "solve",
+    "fields": "solve",
+    "finite": "reference",
+    "contrast": "stability",
+    "slivers": "stability",
+}
+"""Stages that compute results of a kind."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +43,7 @@ class Row:
     jobs : set of str
         Names of the jobs that run then, and no others.
     solved : dict
-        Results that are computed then, by kind of task, and no others.
+        Results that are computed then, by stage, and no others.
     cores : int
         Cores of the run.
     """
@@ -53,7 +63,8 @@ def row(change, jobs="", solved=None, cores=1):
     """Row of the table, its capitals written out."""
     counts = {}
     for name, count in (solved or {}).items():
-        counts |= RESULTS.get(name) or {name: count}
+        for kind, one in (RESULTS.get(name) or {name: count}).items():
+            counts[STAGES.get(kind, kind)] = counts.get(STAGES.get(kind, kind), 0) + one
     return Row(change, {job for name in jobs.split() for job in JOBS.get(name, name).split()}, counts, cores)
 
 
@@ -73,22 +84,9 @@ def replace_twice(first, second):
     replace(second)
 
 
-def flip(path):
-    """Change one bit in the middle of a file; size and time stay."""
-    state, content = path.stat(), bytearray(path.read_bytes())
-    content[len(content) // 2] ^= 1
-    path.write_bytes(content)
-    os.utime(path, ns=(state.st_atime_ns, state.st_mtime_ns + 1))
-
-
-def cut(path):
-    """Leave half of a file."""
-    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
-
-
-def first(how, pattern):
-    """Do something to the first of some files."""
-    how(sorted(driver.FOLDER.glob(pattern))[0])
+def delete_first(pattern):
+    """Delete the first of some files."""
+    sorted(driver.FOLDER.glob(pattern))[0].unlink()
 
 
 def touch_everything():
@@ -125,27 +123,12 @@ def change_of(told):
 
 TABLE = yaml.safe_load(Path(__file__).with_name("rows.yaml").read_text())
 STUDY = {name: row(**one | {"change": change_of(one["change"])}) for name, one in TABLE["study"].items()}
-DAMAGE = {"deleted": Path.unlink, "with a bit flipped": flip, "cut": cut}
-EMPTY = {"empty": lambda path: path.write_bytes(b"")}
-NOTES = {"task file": "tasks/solve_0.json", "bundles": "tasks/bundles.json", "costs": "../costs.json"}
-STORED = (
-    {
-        f"{what} {called}": row(partial(first, how, one["path"]), one["jobs"], one.get("solved"))
-        for what, one in TABLE["files"].items()
-        for called, how in (DAMAGE | EMPTY).items()
-    }
-    | {
-        f"{what} {called}": row(partial(first, how, path))
-        for what, path in (NOTES | {"code": "../code.json"}).items()
-        for called, how in DAMAGE.items()
-    }
-    | {"everything touched": row(touch_everything)}
-)
+STORED = {
+    f"{what} deleted": row(partial(delete_first, one["path"]), one.get("jobs", ""), one.get("solved"))
+    for what, one in TABLE["files"].items()
+} | {"everything touched": row(touch_everything)}
 CODE = {
     name: (one["module"], one.get("edit"), row(None, one.get("jobs", ""), one.get("solved")))
     for name, one in TABLE["code"].items()
 }
 """File of the package, what is edited in it (None: a statement is added; nothing: it stays), and a row."""
-
-VERSIONS = {name: row(None, **one) for name, one in TABLE["versions"].items()}
-"""Distributions, and what another version of them changes."""

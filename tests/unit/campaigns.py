@@ -9,9 +9,8 @@ from springtune.studies.kinds import collect, load_study
 from springtune.studies.kinds.scenes import plan as scenes
 from springtune.studies.output import present, reading
 from springtune.studies.output.browse import page as browse
-from springtune.studies.runs import driver, rerun, run_tasks
+from springtune.studies.runs import job, rerun
 from springtune.studies.runs.plan import plan
-from springtune.studies.runs.task_costs import TaskCosts
 
 
 def load_text(folder, text, name="study.yaml"):
@@ -29,30 +28,27 @@ def refusal(folder, text, name="study.yaml"):
 
 def do_stages(study, folder, *stages):
     """Run the jobs of a study, or of some of its stages, and assert that no task is broken."""
-    for job in plan(study, folder, 1).jobs.values():
-        if not stages or job.stage.name in stages:
-            costs = TaskCosts()
-            driver.run(job.stage.module, job.content, costs)
-            assert not costs.broken, costs.broken
+    for one in plan(study, folder, 1).jobs.values():
+        if not stages or one.stage.name in stages:
+            job.do(one.stage.module, one.content)
 
 
 class Campaign:
     """A study of this folder, as it is to be run now."""
 
-    def __init__(self, config, cores=1, chosen=None):
+    def __init__(self, config, cores=1):
         for cache in (scenes.mesh_key, scenes.stem):  # a run is a process of its own, and files change
             cache.cache_clear()
         self.config, self.study = str(config), load_study(config)
         self.folder = Path("results") / self.study.name
         self.plan = plan(self.study, self.folder, cores)
-        self.chosen = chosen
-        self.jobs = rerun.jobs(self.study, self.plan, chosen)
+        self.jobs = rerun.jobs(self.study, self.plan)
 
     def due(self):
         """Names of the jobs that are to run, in order."""
         found = []
-        for name, job in self.jobs.items():
-            if rerun.fault(job, self.jobs) or self.before(name) & set(found):
+        for name, one in self.jobs.items():
+            if rerun.fault(one, self.jobs) or self.before(name) & set(found):
                 found.append(name)
         return found
 
@@ -89,18 +85,17 @@ class Campaign:
 
     def do(self, name):
         """A job, by the function that its rule calls."""
-        job, dataset = self.jobs[name], str(self.folder / rerun.DATASET)
+        one, dataset = self.jobs[name], str(self.folder / rerun.DATASET)
         if name in self.plan.jobs:
             self.do_stage(name)
         elif name == rerun.COLLECT:
-            untold = rerun.untold(self.folder, self.chosen)
-            collect.main(self.config, str(self.folder), dataset, str(job.record), job.digest, *untold)
+            collect.main(self.config, str(self.folder), dataset, str(one.record), one.digest)
         elif name == rerun.BROWSE:
-            browse.main(dataset, job.products[0], str(job.record), job.digest, *rerun.linked(self.study))
+            browse.main(dataset, one.products[0], str(one.record), one.digest, *rerun.linked(self.study))
         else:
             names = [one.name for one in rerun.output_jobs(self.study)[name]]
-            present.main(dataset, str(self.folder), str(job.record), job.digest, *names)
+            present.main(dataset, str(self.folder), str(one.record), one.digest, *names)
 
     def do_stage(self, name):
         """A job of a stage."""
-        run_tasks.main(str(self.plan.tasks(name)), str(self.jobs[name].record), self.jobs[name].digest)
+        job.main(str(self.plan.tasks(name)), str(self.jobs[name].record), self.jobs[name].digest)

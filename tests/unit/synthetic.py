@@ -133,40 +133,16 @@ def stability():
     return data.assign_coords(experiment=done)
 
 
-def refinement():
-    """Two refinements of two definitions; of one of them the last value is not there."""
-    labels = {"refinement": ["size", "thick"], "definition": DEFINITIONS, "point": range(4), "crossing": range(2)}
-    value, crossing = ("refinement", "definition", "point"), ("refinement", "definition", "crossing")
-    named = {"refined_mesh_size": value, "refined_thickness": value, "deformation_error": value}
-    named |= {f"crossing_{name}": crossing for name in ("mesh_size", "mesh_size_width", "thickness", "thickness_width")}
-    data = variables(labels, **named, crossing_change=crossing)
-    data["tolerance"] = "refinement", [0.01, 0.02]
-    data["parameter"] = "refinement", np.array(["mesh_size", "thickness"], dtype=object)
-    scenes = [
-        "100x20, structured mesh, steel, traction 10 kN, nonlinear",
-        "200x40, free mesh 5 mm, rubber, bending 1 N, linear",
-    ]
-    data["scene"] = "refinement", np.array(scenes, dtype=object)
-    data["spacing"] = "refinement", np.array(["logarithmic", "linear"], dtype=object)
-    data["value_count"] = ("refinement", "definition"), np.array([[4, 3], [4, 4]])
-    data["crossing_level"] = xr.zeros_like(data.crossing_change)
-    data["status"] = xr.ones_like(data.deformation_error, dtype=np.int8)
-    data["reference_applies"] = xr.ones_like(data.status)
-    data.deformation_error[0, 1, 3] = np.nan
-    return data
-
-
 def benchmark():
     labels = {
-        "scene": ["traction", "bending"], "approach": ["delingette/structured", "relaxation", "calculix-cps3"],
-        "mesh_size": SIZES, "curve_count": [1, 11],
+        "scene": ["traction", "bending"], "approach": ["delingette/structured", "condensation", "calculix-cps3"],
+        "mesh_size": SIZES,
     }  # fmt: skip
-    cell, fit = ("scene", "approach", "mesh_size"), ("scene", "approach")
+    cell = ("scene", "approach", "mesh_size")
     parts = dict.fromkeys([f"{name}_seconds" for name in ("meshing", "assembling", "factorizing", "solving")], cell)
     return variables(
-        labels, error=cell, assured_error=cell, seconds=cell, unknowns=cell, **parts, cost_exponent=fit, error_rate=fit,
-        reference_error_estimate=("scene",), reference_seconds=("scene",), separate_seconds=("curve_count",),
-        curve_seconds=("curve_count",),
+        labels, error=cell, assured_error=cell, seconds=cell, unknowns=cell, **parts,
+        reference_error_estimate=("scene",), reference_seconds=("scene",),
     )  # fmt: skip
 
 
@@ -197,14 +173,7 @@ def samples():
     data = variables(labels, displacement=cell, deformation_error=cell, height=("sample",), force=("sample",))
     data = data.assign(status=xr.ones_like(data.displacement, dtype=np.int8))
     about = {"design": "sobol-indices", "size": 4, "mesh_type": "structured", "kinematics": "linear"}
-    return data.assign_attrs(about | {"varied": "height force"})
-
-
-def effects():
-    labels = {"quantity": ["displacement", "deformation_error"], "parameter": ["height", "force"], "bin": range(4)}
-    cell = ("quantity", "parameter", "bin", "load", "definition")
-    labels |= {"load": LOADS, "definition": DEFINITIONS}
-    return variables(labels, parameter_value=("parameter", "bin"), main_effect=cell, main_effect_error=cell)
+    return data.set_coords(["height", "force"]).assign_attrs(about | {"varied": "height force"})
 
 
 def sobol():
@@ -275,9 +244,9 @@ def dataset(*names):
 @cache
 def _dataset():
     groups = {"sensitivity": sensitivity, "fields": fields, "block": block, "moduli": moduli, "laying": laying}
-    groups |= {"stability": stability, "benchmark": benchmark, "refinement": refinement}
+    groups |= {"stability": stability, "benchmark": benchmark}
     groups |= {"engines": engines, "engine_curves": engine_curves}
     groups |= {"shapes": shapes, "shape_fields": shape_fields}
-    groups |= {"samples": samples, "effects": effects, "sobol": sobol}
+    groups |= {"samples": samples, "sobol": sobol}
     # Groups are written and read one by one, so that labels of one need not be those of another.
     return xr.DataTree.from_dict({"/": root()} | {f"/{name}": make() for name, make in groups.items()})

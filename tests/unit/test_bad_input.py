@@ -8,10 +8,14 @@ import struct
 import subprocess
 import sys
 import zlib
+from pathlib import Path
 
+import h5py
+import meshio
 import numpy as np
 import pytest
 import xarray as xr
+import yaml
 from click.testing import CliRunner
 
 import springtune as st
@@ -26,11 +30,9 @@ from springtune.mesh import (
     read_beam_mesh,
     right,
     structured,
-    write_mesh,
 )
 from springtune.mesh.formats import read_shape
 from springtune.safe_io.inputs import virtual_memory
-from springtune.studies.output import reading
 from springtune.studies.output.browse.page import page
 from springtune.studies.output.dataset import write
 
@@ -77,19 +79,12 @@ STUDIES = {
         "grids: 2652300 cells of all labels together (421 beam x 6300 mesh_size); a",
     ),
     "a long list": (SMALL.replace("5 mm", sizes(10_001)), "mesh_size: 10001 values; give at most 10000, or split"),
-    "lists in a list of names": (
-        SMALL.replace("lattice", str([["lattice"]] * 30)),
-        "definition[0]: a list instead of a name such as 'paper'; give",
-    ),
-    "a long name": (SMALL.replace("a: {length", "a" * 61 + ": {length"), "' cannot name a beam; use letters, digits"),
     "a long value": (SMALL.replace("5 mm", "5" * 2000 + " mm"), "5...', 2003 characters; give a length such as"),
     "a large file": (SMALL + "#" * 500_000, "larger than 500 kB, which no study is"),
-    "deep": (SMALL.replace("5 mm", "[" * 30 + "5 mm" + "]" * 30), "not a study: nested too deeply"),
-    "no date": (SMALL.replace("small", "2001-99-99"), ":2: not YAML: '2001-99-99' is no timestamp; put it in quotes"),
-    "a tag": (SMALL.replace("small", "!own small"), ":2: a study has no tags such as '!own'; remove it"),
-    "a sign": (SMALL.replace("small", "="), ":2: not YAML: '=' means nothing by itself; put it in quotes"),
-    "a power of powers": (SMALL.replace("5 mm", "5 mm^9^9^9^9"), "unknown unit 'mm^9^9^9^9'"),
-    "beyond measure": (SMALL.replace("30 mm", "1e300 mm"), "'1e300 mm' is beyond all measure; give a length"),
+    "aliases of aliases": (
+        "a0: &a0 [x, y]\n" + "".join(f"a{n}: &a{n} [*a{n - 1}, *a{n - 1}, *a{n - 1}]\n" for n in range(1, 30)),
+        "study.yaml:1: more than 100000 values, aliases (*name) as what they stand for; give",
+    ),
 }
 
 
@@ -176,11 +171,11 @@ def test_a_mesh_of_arrays_that_are_none_is_refused(points, triangles, says):
         Mesh(points, triangles)
 
 
-def test_three_cells_at_an_edge_are_refused():
-    points = np.vstack([POINTS, [[0.4, 0.6]]])
-    mesh = Mesh(points, np.vstack([HALVES, [[0, 2, 4]]]))
-    with pytest.raises(MeshError, match=r"the edge of points \[0, 2\] has 3 cells"):
-        len(mesh.edges)
+def of_cells(mesh, kept, corners=3):
+    """A mesh of some cells of another one."""
+    used, cells = np.unique(kept, return_inverse=True)
+    cells = cells.reshape(-1, corners)
+    return Mesh(mesh.points[used], *([cells] if corners == 3 else [mesh.triangles, cells]))
 
 
 def plate(hole, mesh_type="structured"):
@@ -188,8 +183,7 @@ def plate(hole, mesh_type="structured"):
     whole = MESH_TYPES[mesh_type](0.1, 0.04, 2.5e-3)
     middles = whole.points[whole.triangles].mean(axis=1)
     keep = (np.abs(middles - ([0.05, 0.02] if hole else [0.1, 0.04])) > 0.01).any(axis=1)
-    used, cells = np.unique(whole.triangles[keep], return_inverse=True)
-    return Mesh(whole.points[used], cells.reshape(-1, 3))
+    return of_cells(whole, whole.triangles[keep])
 
 
 @pytest.mark.parametrize("hole", [True, False])
@@ -204,10 +198,8 @@ def test_a_patch_test_takes_no_rim_for_an_end(hole, definition):
 
 def test_parts_and_slanted_sides_have_the_moduli_of_linear_triangles():
     whole = right(0.1, 0.02, 5e-3)
-    twice = Mesh(
-        np.vstack([whole.points, whole.points + [0.2, 0]]),
-        np.vstack([whole.triangles, whole.triangles + len(whole.points)]),
-    )
+    cells = np.vstack([whole.triangles, whole.triangles + len(whole.points)])
+    twice = Mesh(np.vstack([whole.points, whole.points + [0.2, 0]]), cells)
     trapezoid = Mesh(whole.points * (1 + whole.points[:, 1:] * [5, 0]), whole.triangles)
     turned = Mesh(whole.points @ [[0.8, 0.6], [-0.6, 0.8]], whole.triangles)
     for mesh in (twice, trapezoid, turned, plate(True, "right")):
@@ -219,9 +211,7 @@ def test_parts_and_slanted_sides_have_the_moduli_of_linear_triangles():
 def test_springs_with_a_lateral_stress_are_tested_on_strips_alone():
     """Their stress pulls on the two long faces."""
     squares = braced(0.1, 0.04, 5e-3)
-    kept = Mesh(squares.points, squares.triangles, squares.quads[1:])
-    used, corners = np.unique(kept.quads, return_inverse=True)
-    notched = Mesh(kept.points[used], kept.triangles, corners.reshape(-1, 4))
+    notched = of_cells(squares, squares.quads[1:], 4)
     with pytest.raises(MeshError, match="lateral stress: its ends do not run .*; give a full rectangle"):
         st.moduli(notched, STEEL, "baudet-corrected")
 
@@ -234,14 +224,10 @@ def test_a_strip_with_staggered_ends_has_one():
         assert abs(st.moduli(mesh, STEEL, "delingette").young_modulus_error) < 1e-9
 
 
-def test_a_scene_and_a_prediction_are_of_a_beam_that_is_filled():
-    beam = st.Beam("100 mm", "40 mm")
-    for call in (
-        lambda: st.Scene(beam, plate(True), STEEL, "traction", "1 kN"),
-        lambda: st.predict(beam, plate(True), STEEL),
-    ):
-        with pytest.raises(ValueError, match="mesh: does not fill its beam: its cells cover 90 %"):
-            call()
+@pytest.mark.parametrize("call", [st.predict, lambda *scene: st.Scene(*scene, "traction", "1 kN")])
+def test_a_scene_and_a_prediction_are_of_a_beam_that_is_filled(call):
+    with pytest.raises(ValueError, match="mesh: does not fill its beam: its cells cover 90 %"):
+        call(st.Beam("100 mm", "40 mm"), plate(True), STEEL)
 
 
 MESH = st.make_mesh(BEAM, "structured", "5 mm")
@@ -262,13 +248,8 @@ CALLS = {
     "density": lambda odd: st.Material(1.0, 0.3, "" if odd is None else odd),
     "size": lambda odd: st.make_mesh(BEAM, "free", odd),
     "mesh type": lambda odd: st.make_mesh(BEAM, odd, "5 mm"),
-    "beam": lambda odd: scene(beam=odd),
-    "mesh": lambda odd: scene(mesh=odd),
-    "material": lambda odd: scene(material=odd),
-    "load": lambda odd: scene(load=odd),
-    "force": lambda odd: scene(force=odd),
-    "definition": lambda odd: scene(definition=odd),
-    "kinematics": lambda odd: scene(kinematics=odd),
+    **{name: lambda odd, name=name: scene(**{name: odd})
+       for name in ("beam", "mesh", "material", "load", "force", "definition", "kinematics")},
     "stiffness": lambda odd: scene(definition="paper", stiffness=odd),
     "sheet": lambda odd: scene(sheet=odd if odd is not None else 1),
     "curve": st.sensitivity,
@@ -280,12 +261,10 @@ CALLS = {
     "stated": lambda odd: st.DEFINITIONS["paper"].springs(MESH, STEEL, 1e-3, odd),
     "cases": lambda odd: st.DEFINITIONS["annealed"].springs(MESH, STEEL, 1e-3, odd),
     "reference": lambda odd: st.Springs(odd if not isinstance(odd, int) or odd < 10**300 else 0, np.ones(3)),
-    "name of a definition": lambda odd: st.definition(odd if odd != "x" else "")(
-        lambda mesh, material, thickness: None
-    ),
+    "name of a definition": lambda odd: st.definition(odd if odd != "x" else "")(lambda *scene: None),
     "name of a mesh type": lambda odd: st.mesh_type(odd if odd != "x" else "")(lambda length, height, size: None),
     "field": st.field,
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", CALLS)
@@ -319,26 +298,14 @@ class TestFiles:
         with pytest.raises(MeshError, match="61 MB, and at most 60 MB are read; write a coarser mesh, or binary VTU"):
             read_beam_mesh(tmp_path / "own.vtu", 0.1, 0.02)
 
-    @pytest.mark.slow
-    def test_more_than_a_million_points_are_refused(self, tmp_path):
-        write_mesh(tmp_path / "own.vtu", right(0.1, 0.02, 4.46e-5))
-        with pytest.raises(MeshError, match=r"100\d{4} points, and at most 1000000 are read; write a coarser mesh"):
-            read_beam_mesh(tmp_path / "own.vtu", 0.1, 0.02)
-
     def test_many_points_at_one_place_are_found_at_once(self, tmp_path):
         """Pairs of them all would be billions."""
-        meshio = pytest.importorskip("meshio")
         whole = right(0.1, 0.02, 5e-4)
         corners = whole.triangles.ravel()
         points = np.column_stack([whole.points[corners], np.zeros(len(corners))])
         meshio.Mesh(points, [("triangle", np.arange(len(corners)).reshape(-1, 3))]).write(tmp_path / "own.vtu")
         with pytest.raises(MeshError, match="two points at .* do not join their cells .*; merge duplicate points"):
             read_beam_mesh(tmp_path / "own.vtu", 0.1, 0.02)
-
-    def test_a_mesh_is_written_as_what_its_name_says(self, tmp_path):
-        with pytest.raises(MeshError, match="give a name that ends in .vtu"):
-            write_mesh(tmp_path / "own.msh", MESH)
-        assert not list(tmp_path.iterdir())
 
 
 PLATE = right(0.1, 0.02, 0.01)
@@ -372,7 +339,6 @@ COUNTS = {
 
 def plate_file(folder, name, ending, options):
     """A good file of `PLATE`, in a format of meshio."""
-    meshio = pytest.importorskip("meshio")
     path = folder / f"plate.{ending}"
     points = PLATE.points if name == "su2" else np.column_stack([PLATE.points, np.zeros(len(PLATE.points))])
     mesh = meshio.Mesh(points, [("triangle", PLATE.triangles)])
@@ -412,8 +378,7 @@ class TestCounts:
             ):
                 read(path)
 
-    @pytest.mark.parametrize("format", ["binary", pytest.param("appended", marks=pytest.mark.slow)])
-    def test_blocks_of_vtu_that_are_zeros_by_the_gigabyte(self, tmp_path, format):
+    def test_blocks_of_vtu_that_are_zeros_by_the_gigabyte(self, tmp_path):
         """A megabyte of zlib for 1.3 GB of coordinates."""
         block = zlib.compress(bytes(2**26))
         count = 20
@@ -422,43 +387,12 @@ class TestCounts:
         path = plate_file(tmp_path, "vtu", "vtu", {})
         text = path.read_text()
         data = re.search(r'<DataArray[^>]*Name="Points"[^>]*>(.*?)</DataArray>', text, re.DOTALL)
-        if format == "binary":
-            text = text.replace(data[1], bomb)
-        else:
-            array = data[0].replace(data[1], "").replace('format="binary"', 'format="appended" offset="0"')
-            text = text.replace(data[0], array)
-            text = text.replace("</VTKFile>", f'<AppendedData encoding="base64">_{bomb}</AppendedData></VTKFile>')
-        path.write_text(text)
+        path.write_text(text.replace(data[1], bomb))
         # In a new process: what earlier tests left mapped and free comes on top of the bound.
         done = subprocess.run([sys.executable, "-c", BOMBED, path], capture_output=True, text=True, check=True)
         said, peak = done.stdout.splitlines()
         assert re.search(r"vtu: .*is damaged.*; write it again", said)
         assert int(peak) < 0.7e9
-
-    def test_a_study_says_it_in_a_line(self, tmp_path):
-        ending, options, _, other = COUNTS["gmsh, text"]
-        path = plate_file(tmp_path, "gmsh, text", ending, options)
-        path.write_bytes(path.read_bytes().replace(b"$Nodes\n1 %d" % len(PLATE.points), other))
-        (tmp_path / "study.yaml").write_text(
-            "title: x\nmaterials: {steel: {young_modulus: 210 GPa, poisson_ratio: 0.3}}\n"
-            "shapes: {p: {file: plate.msh, loads: {pull: {supports: {left: fixed}, forces: {right: [1 N, 0]},"
-            " quantities: {work: energy}}}}}\n"
-            "shape_grids: {g: {shape: p, load: pull, material: steel, definition: lattice}}\n"
-        )
-        asked = CliRunner().invoke(main, ["scenes", str(tmp_path / "study.yaml")])
-        said = [line for line in asked.output.splitlines() if "plate.msh" in line]
-        assert asked.exit_code == 1 and isinstance(asked.exception, SystemExit), asked.output
-        assert len(said) == 1 and "is damaged" in said[0] and "; write it again" in said[0]
-
-    def test_the_bound_is_gone_afterwards(self, tmp_path):
-        resource = pytest.importorskip("resource")
-        before = resource.getrlimit(resource.RLIMIT_AS)
-        path = plate_file(tmp_path, "vtu", "vtu", {})
-        read_beam_mesh(path, 0.1, 0.02)
-        path.write_bytes(path.read_bytes()[:300])
-        with pytest.raises(MeshError):
-            read_beam_mesh(path, 0.1, 0.02)
-        assert resource.getrlimit(resource.RLIMIT_AS) == before
 
 
 class TestOfOtherKinds:
@@ -500,22 +434,15 @@ class TestOfOtherKinds:
 
     @pytest.mark.parametrize(
         "command",
-        [("scenes",), ("run",), ("split", "--into", "2"), ("clean",), ("info",), ("verify",), ("browse",), ("accept",),
-         ("export", "--to", "x.csv")],
+        [("scenes",), ("run",), ("archive",), ("info",), ("browse",), ("export", "--to", "x.csv")],
         ids=lambda command: command[0],
     )  # fmt: skip
     def test_what_a_command_is_given(self, tmp_path, odd, command, monkeypatch):
         monkeypatch.chdir(tmp_path)
         name, *options = command
         told = CliRunner().invoke(main, [name, odd.name, *options])
-        assert told.exit_code and isinstance(told.exception, SystemExit) and "odd.csv" in told.output, told.output
-
-    def test_archives_and_what_is_compared(self, tmp_path, odd):
-        archive = odd.rename(odd.with_suffix(".zip"))
-        told = CliRunner().invoke(main, ["verify", str(archive)])
-        assert told.exit_code == 1 and "odd.zip: cannot be read (" in told.output
-        told = CliRunner().invoke(main, ["diff", str(archive), str(archive)])
-        assert told.exit_code == 2 and "odd.zip" in told.output
+        assert told.exit_code and isinstance(told.exception, SystemExit), told.output
+        assert ("index.html" if name == "browse" else "odd.csv") in told.output
 
     def test_a_mesh(self, odd):
         with pytest.raises(MeshError, match="odd.csv: there is no such file; give"):
@@ -536,56 +463,17 @@ class TestDatasets:
     def path(self, sound, tmp_path):
         return shutil.copy(sound, tmp_path / "dataset.nc")
 
-    def test_links_that_are_none_are_refused(self, path):
-        """The library of netCDF ended the process by SIGSEGV on it."""
-        h5py = pytest.importorskip("h5py")
-        reading.check_links(path)
-        with h5py.File(path, "r+") as file:
-            del file["deformation_error"].attrs["DIMENSION_LIST"]
-            file["deformation_error"].attrs["DIMENSION_LIST"] = 1.5
-        with pytest.raises(ValueError, match="DIMENSION_LIST of deformation_error is none of netCDF's"):
-            reading.check_links(path)
-
-    def test_a_dataset_that_says_it_is_huge_is_refused(self, path):
-        netCDF4 = pytest.importorskip("netCDF4")
-        with netCDF4.Dataset(path, "a") as file:
-            file.createDimension("n", 10**10)
-            file.createVariable("huge", "f8", ("n",), chunksizes=(1024,))
-        with pytest.raises(ValueError, match=r"is damaged \(it says that it holds 80 GB in .* MB\)"):
-            st.open(path)
-        with pytest.raises(ValueError, match=r"is damaged \(it says that it holds 80 GB in .* MB\)"):
-            page(path)
-
-    def test_missing_variables_are_told(self, path, capsys):
-        from click.testing import CliRunner
-
-        from springtune.cli import main
-
-        h5py = pytest.importorskip("h5py")
-        with h5py.File(path, "r+") as file:
-            del file["status"]
-        told = CliRunner().invoke(main, ["info", str(path)])
-        assert told.exit_code == 1 and "is damaged, or not as springtune writes it (AttributeError" in told.stderr
-
     @pytest.mark.parametrize(
         "name", ["../x", "/etc/x", "a\nb", "a/b", "", "..", "one + ../x", "x" * 61, "{x}", b"\xff", [7, 8], ["a", "b"]]
     )
     def test_a_study_whose_name_is_no_name_is_refused(self, path, name):
-        h5py = pytest.importorskip("h5py")
-        for study in (name, "one + other"):
-            with h5py.File(path, "r+") as file:
-                file.attrs["study"] = study
-            for call in (st.open, reading.attributes):
-                if study is name:
-                    with pytest.raises(ValueError, match="dataset.nc: attribute 'study' is .*use letters, digits"):
-                        call(path)
-                else:
-                    assert getattr(found := call(path), "attrs", found)["study"] == "one + other"
+        with h5py.File(path, "r+") as file:
+            file.attrs["study"] = name
+        with pytest.raises(ValueError, match="dataset.nc: attribute 'study' is .*use letters, digits"):
+            st.open(path)
 
     def links(self, name, path):
         """Change a dataset so that data of another file are in it."""
-        import h5py
-
         with h5py.File(path, "r+") as file:
             shape, attributes = file["deformation_error"].shape, dict(file["deformation_error"].attrs)
             del file["deformation_error"]
@@ -617,26 +505,19 @@ class TestDatasets:
                 call(path)
         with pytest.raises(PaperError, match=says):
             for_paper([path])
-        commands = ["info", "diff . other.nc", "diff other.nc .", "export --to x.csv", "browse", "accept"]
+        commands = ["info", "diff . other.nc", "diff other.nc .", "export --to x.csv"]
         for command in commands:
             first, *rest = command.split()
             told = CliRunner().invoke(main, [first, *([] if "other.nc" in rest else ["dataset.nc"]), *rest])
             assert told.exit_code and re.search(says, told.output), f"{command}: {told.output}"
         assert not path.with_name("x.csv").exists()
 
-    def test_a_net_and_a_mesh_file_are_refused_likewise(self, tmp_path):
-        h5py = pytest.importorskip("h5py")
-        springs = st.Scene(BEAM, MESH, STEEL, "traction", "1 kN", definition="lattice").springs
-        net = tmp_path / "net.h5"
-        springs.write(net, errors=False)
-        mesh = plate_file(tmp_path, "h5m", "h5m", {"add_global_ids": False})
-        for path, name in ((net, "points"), (mesh, "tstt/nodes/coordinates")):
-            with h5py.File(path, "r+") as file:
-                shape = file[name].shape
-                del file[name]
-                file.create_dataset(name, shape, "f8", external=[("/etc/passwd", 0, h5py.h5f.UNLIMITED)])
-        with pytest.raises(ValueError, match="'points' is stored outside of the file, in '/etc/passwd'"):
-            st.SpringNet.read(net)
+    def test_a_mesh_file_is_refused_likewise(self, tmp_path):
+        mesh, name = plate_file(tmp_path, "h5m", "h5m", {"add_global_ids": False}), "tstt/nodes/coordinates"
+        with h5py.File(mesh, "r+") as file:
+            shape = file[name].shape
+            del file[name]
+            file.create_dataset(name, shape, "f8", external=[("/etc/passwd", 0, h5py.h5f.UNLIMITED)])
         with pytest.raises(MeshError, match="'tstt/nodes/coordinates' is stored outside of the file, in '/etc/passwd'"):
             read_beam_mesh(mesh, 0.1, 0.02)
         with h5py.File(mesh, "r+") as file:
@@ -655,61 +536,27 @@ class TestDatasets:
             read_beam_mesh(path, 0.1, 0.02)
 
     @pytest.mark.parametrize(
-        "spoil, says",
-        {
-            "half": ("file['odd'] = np.zeros(3, 'f2')", "'odd' has the type float16"),
-            "long": ("file['odd'] = np.zeros(3, 'g')", "'odd' has the type float128"),
-            "compound": ("file['odd'] = np.zeros(3, [('a', 'f8')])", "'odd' has the type"),
-            "vlen": ("file.create_dataset('odd', 3, h5py.vlen_dtype('f8'))", "'odd' has the type"),
-            "reference": ("file.create_dataset('odd', 3, h5py.ref_dtype)", "'odd' has the type"),
-            "opaque": ("file['odd'] = np.zeros(3, 'V7')", "'odd' has the type"),
-            "enumeration": ("file['odd'] = np.zeros(3, bool)", "'odd' has the type"),
-            "named type": ("file['odd'] = np.dtype('f8')", "'odd' is a type"),
-            "attribute": ("file.attrs['odd'] = np.float16(1)", "attribute 'odd' of '/' has the type float16"),
-            "no shape": ("file['odd'] = h5py.Empty('f8')", "'odd' has no shape"),
-            "filter": ("file.create_dataset('odd', data=np.zeros(9), compression='lzf')", "filter 32000"),
-            "itself": ("odd = file.create_group('odd'); odd['odd'] = odd", "'odd/odd' is linked twice"),
-            "the root": ("file['odd'] = file['/']", "is linked twice"),
-            "two names": ("file['odd'] = file['status']", "is linked twice"),
-            "soft": ("file['odd'] = h5py.SoftLink('/')", "'odd' is a soft link; it is not followed: write the array"),
-            "deep": ("file.create_group('/a' * 500)", "groups deep"),
-            "many": ("[file.create_group(f'a{n}') for n in range(20_001)]", "over 20,000 groups"),
-            "dimension": ("file['beam'].attrs['_Netcdf4Dimid'] = np.int32(2**31 - 1)", "_Netcdf4Dimid of beam is none"),
-            "pieces": (
-                "file.create_dataset('odd', (2000, 2000), 'i1', chunks=(1, 1), compression='gzip')",
-                "'odd' is in 4000000 pieces",
-            ),
-            "factor": ("file['status'].attrs['scale_factor'] = 'much'", "is a text instead of a number"),
-            "list": ("file['status'].attrs['REFERENCE_LIST'] = 1", "REFERENCE_LIST of status is none"),
-            "heap": ("zero(16, 32)", "the heap at byte"),
-            "size in a heap": ("zero(24, 26)", "cannot be read"),
-            "number in a heap": ("zero(16, 18)", "the heap at byte"),
-        }.values(),
+        ("spoil", "says"), yaml.safe_load(Path(__file__).with_name("odd_datasets.yaml").read_text())
     )
-    def test_what_netcdf_crashes_or_hangs_on_is_refused_before(self, path, spoil, says):
-        """A process of its own, so that a crash is one."""
-        h5py = pytest.importorskip("h5py")
-
-        def zero(first, end):
-            file.close()
-            content = bytearray(path.read_bytes())
-            at = content.index(b"GCOL")
-            content[at + first : at + end] = bytes(end - first)
-            path.write_bytes(content)
-
+    def test_what_a_dataset_cannot_hold_is_refused_in_one_line(self, path, spoil, says):
         with h5py.File(path, "r+") as file:
-            exec(spoil, {"file": file, "h5py": h5py, "np": np, "zero": zero})
-        code = "import sys, springtune as st\ntry: st.open(sys.argv[1])\nexcept ValueError as error: print(error)"
-        told = subprocess.run([sys.executable, "-c", code, path], capture_output=True, text=True, timeout=60)
-        assert told.returncode == 0 and says in told.stdout, told
+            exec(spoil, {"file": file, "h5py": h5py, "np": np})
+        told = CliRunner().invoke(main, ["info", str(path)])
+        assert told.exit_code == 1 and isinstance(told.exception, SystemExit), told.output
+        assert len(told.output.splitlines()) == 1 and str(path) in told.output and says in told.output
+
+    @pytest.mark.parametrize("first, end", [(16, 32), (24, 26), (16, 18)])
+    def test_a_heap_that_never_ends_is_refused(self, path, first, end):
+        """HDF5 reads it for ever."""
+        content = bytearray(path.read_bytes())
+        at = content.index(b"GCOL")
+        content[at + first : at + end] = bytes(end - first)
+        path.write_bytes(content)
+        with pytest.raises(ValueError, match="the heap at byte|cannot be read|damaged"):
+            st.open(path)
 
     def test_a_gigabyte_is_the_most_that_a_small_dataset_says_it_holds(self, path):
         """A chunk is read as one, so that a single number of it took a gigabyte and more."""
-        netCDF4 = pytest.importorskip("netCDF4")
-        with netCDF4.Dataset(path, "a") as file:
-            file.createDimension("n", 10)
-        import h5py
-
         sound = path.read_bytes()
         for made in ({"shape": (140_000_000,), "chunks": (1024,)},
                      {"shape": (10,), "maxshape": (None,), "chunks": (140_000_000,)}):  # fmt: skip
@@ -720,11 +567,9 @@ class TestDatasets:
                 with pytest.raises(ValueError, match=r"is damaged \(it says that it holds 1\.1\d GB in .* MB\)"):
                     call(path)
 
-    @pytest.mark.parametrize("count", [pytest.param(20_000, marks=pytest.mark.slow), 140_000])
-    def test_texts_that_are_one_text_many_times_take_no_more_than_a_gigabyte(self, path, count):
+    def test_texts_that_are_one_text_many_times_take_no_more_than_a_gigabyte(self, path):
         """In HDF5 a text is a place in the file, and many cells may have the same: 0.2 MB stood for gigabytes."""
-        import h5py
-
+        count = 140_000
         h5netcdf = pytest.importorskip("h5netcdf")
         with h5netcdf.File(path, "a") as file:
             for name, length in (("one", 1), ("many", count)):
@@ -735,10 +580,9 @@ class TestDatasets:
             _, place = file["one"].id.read_direct_chunk((0,))
             file["many"].id.write_direct_chunk((0,), place * count)
         before = virtual_memory()
-        with pytest.raises(ValueError, match="more than 1 GB|cannot be read"), st.open(path) as tree:
-            tree["many"].load()
-        with pytest.raises(ValueError, match="more than 1 GB|cannot be read|is damaged"):
-            page(path)
+        for call in (st.open, page):
+            with pytest.raises(ValueError, match=r"is damaged \(it says that it holds 2.5\d? GB in"):
+                call(path)
         assert virtual_memory() < before + 1.2e9
 
     def test_a_large_dataset_of_texts_and_fields_opens_at_once(self, tmp_path):

@@ -5,9 +5,11 @@ import json
 import os
 import re
 import runpy
+import shlex
 import subprocess
 import sys
-from dataclasses import fields, replace
+from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -20,34 +22,29 @@ from click.testing import CliRunner
 import springtune
 from counting import counted
 from springtune.cli import COMMANDS, Commands, Shown, main
-from springtune.cli.recommendation import beam_subject, prediction_json, prediction_text
+from springtune.cli.recommendation import beam_subject, prediction_text
 from springtune.handover.formats import ENDINGS
 from springtune.handover.simulation import simulate
 from springtune.mesh import MESH_TYPES, Mesh, braced, write_mesh
 from springtune.mesh.types import MeshType
-from springtune.prediction import bands
 from springtune.prediction import choices as of_one_mesh
 from springtune.prediction.search import find_mesh
 from springtune.problem.geometry import AssumptionWarning, Beam
 from springtune.problem.materials import Material
-from springtune.reference.small_strain import solve_small_strain
 from springtune.scene.sheet import Sheet
+from springtune.scene.statements import unit_reference
 from springtune.springs import DEFINITIONS
 from springtune.studies.config.kind import kinds
 from springtune.studies.config.sections import schema_text, study_model
 from springtune.studies.kinds import load_study
 
-from tables import STUDIES, refused_calls
+from tables import STUDIES, refused_calls, refused_numbers, run
 
 CONFIG = Path(__file__).parents[2] / "config"
 RENEW = "run `make docs`"
 TOOL = runpy.run_path(str(Path(__file__).parents[2] / "tools/manual.py"))
 BEGIN, END, MANUAL, SCHEMA = (TOOL[name] for name in ("BEGIN", "END", "MANUAL", "SCHEMA"))
 manual_text, sections = TOOL["manual_text"], TOOL["sections"]
-
-
-def run(*arguments):
-    return CliRunner().invoke(main, [str(argument) for argument in arguments])
 
 
 def words(text):
@@ -63,72 +60,59 @@ def completed(words, number):
 
 
 @pytest.mark.filterwarnings("default::springtune.problem.geometry.AssumptionWarning")
-class TestThickBodies:
-    """Plane stress is an assumption about thin sheets: a beam 1 km thick was taken without a word."""
+class TestAssumptions:
+    """A beam 1 km thick and one of 200 m were taken without a word."""
 
     STUDY = STUDIES["cli_thickbodies"]
 
     def test_a_study_says_each(self, tmp_path):
         path = tmp_path / "thick.yaml"
         path.write_text(self.STUDY)
-        found = run("scenes", path)
-        assert found.exit_code == 0, found.output
-        told = [line for line in found.stderr.splitlines() if line.startswith("warning: ")]
+        told = [line for line in run("scenes", path).stderr.splitlines() if line.startswith("warning: ")]
         begins = [line.removeprefix("warning: ").partition(" exceeds ")[0] for line in told]
-        assert sorted(begins) == [
-            "beam 'block', thickness: 1e+06 mm",
-            "beam 'sheet', thickness: 15 mm",
-            "refine.thicker, thickness: 30 mm",
-            "samples, thickness: 13 mm",
-            "shape 'plate', thickness: 20 mm",
-        ]
+        thick = {"beam 'block'": "1e+06", "beam 'sheet'": "15", "samples": "13", "shape 'plate'": "20"}
+        assert sorted(begins) == [f"{name}, thickness: {size} mm" for name, size in thick.items()]
         assert all("its smaller side, 12 mm" in line and "give a smaller thickness" in line for line in told)
-
-    def test_a_command_says_it_beside_its_answer(self):
-        found = run(
-            "predict", "--beam", "60x12", "--thickness", "1 km", "--size", "6 mm", "--material", "steel", "--json"
-        )
-        assert found.stderr.count("warning: beam '60x12', thickness: 1e+06 mm exceeds its smaller side, 12 mm") == 1
-        assert json.loads(found.stdout)
-
-    def test_the_library_warns(self):
-        with pytest.warns(AssumptionWarning, match="beam '60x12', thickness: 13 mm exceeds its smaller side, 12 mm"):
-            springtune.Beam("60 mm", "12 mm", "13 mm")
-        with pytest.warns(AssumptionWarning, match="shape '60x12', thickness"):
-            springtune.Shape.rectangle("60 mm", "12 mm", thickness="13 mm")
-        springtune.Beam("60 mm", "12 mm", "12 mm")
-
-
-@pytest.mark.filterwarnings("default::springtune.problem.geometry.AssumptionWarning")
-class TestSizesOfAnotherUnit:
-    """A beam of 200 m was taken without a word."""
-
-    def test_the_library_warns(self):
-        for sides, said in (((200, 40), "200 m, more than 100 m"), (("8 um", "8 um", "1 um"), "8e-06 m, less than 10")):
-            for body in (springtune.Beam, springtune.Shape.rectangle):
-                with pytest.warns(AssumptionWarning) as found:
-                    body(*sides[:2], thickness=sides[2] if sides[2:] else 1e-3)
-                (message,) = {str(one.message) for one in found}
-                assert f"its longer side is {said}" in message and "a text such as '200 mm' has its own" in message
-        springtune.Beam(100, 40), springtune.Beam("10 um", "10 um", "1 um")
-
-    def test_a_study_and_a_command_warn_once(self, tmp_path):
-        path = tmp_path / "long.yaml"
-        path.write_text(TestThickBodies.STUDY.replace("60 mm", "600 m"))
+        path.write_text(self.STUDY.replace("60 mm", "600 m"))
         told = run("scenes", path).stderr
         assert told.count("warning: beam 'sheet': its longer side is 600 m, more than 100 m; check the unit") == 1
-        found = run("predict", "--beam", "200000x40000", "--size", "9000 mm", "--material", "steel")
-        assert found.stderr.count("warning: beam '200000x40000': its longer side is 200 m, more than 100 m") == 1
+
+    @pytest.mark.parametrize(
+        ("asked", "said"),
+        [
+            (
+                "--beam 60x12 --thickness '1 km' --size '6 mm'",
+                "'60x12', thickness: 1e+06 mm exceeds its smaller side, 12 mm",
+            ),
+            ("--beam 200000x40000 --size '9000 mm'", "'200000x40000': its longer side is 200 m, more than 100 m"),
+        ],
+    )
+    def test_a_command_says_it_beside_its_answer(self, asked, said):
+        found = run("predict", "--material", "steel", *shlex.split(asked))
+        assert found.stderr.count(f"warning: beam {said}") == 1 and "recommended: " in found.stdout
+
+    @pytest.mark.parametrize(
+        ("sides", "said"),
+        [
+            (("60 mm", "12 mm", "13 mm"), "'60x12', thickness: 13 mm exceeds its smaller side, 12 mm"),
+            ((200, 40, 1e-3), "its longer side is 200 m, more than 100 m.* a text such as '200 mm' has its own"),
+            (("8 um", "8 um", "1 um"), "its longer side is 8e-06 m, less than 10"),
+            (("60 mm", "12 mm", "12 mm"), None),
+            ((100, 40, 1e-3), None),
+            (("10 um", "10 um", "1 um"), None),
+        ],
+    )
+    def test_the_library_warns(self, sides, said):
+        for body in (springtune.Beam, springtune.Shape.rectangle):
+            with pytest.warns(AssumptionWarning, match=said) if said else nullcontext():
+                body(*sides[:2], thickness=sides[2])
 
 
-def test_shells_complete_commands_and_values(monkeypatch):
+def test_shells_complete_commands_and_options(monkeypatch):
     monkeypatch.chdir(CONFIG.parent)
     assert completed("springtune ", 1) == [f"plain,{name}" for name in COMMANDS]
-    assert completed("springtune scenes config/p", 2) == ["plain,config/paper.yaml"]
+    assert completed("springtune scenes config/p", 2) == ["file,config/p"]
     assert completed("springtune scenes elsewhere/", 2) == ["file,elsewhere/"]
-    assert completed("springtune predict --mesh f", 3) == ["plain,free"]
-    assert completed("springtune predict --mesh my.m", 3) == ["file,my.m"]
-    assert completed("springtune predict --material s", 3) == ["plain,steel"]
     assert "plain,--beam" in completed("springtune predict --", 2)
 
 
@@ -159,8 +143,7 @@ class TestScenes:
         assert "meshes 18 each serves 25 scenes and curves on average" in lines
         assert "references 9 from 4 solutions: small strain scales with force, E t and size" in lines
         assert any(line.startswith("curves 90 of 61 stiffnesses") for line in lines)
-        assert any(line.startswith("networks 99 ") for line in lines)
-        assert "printed 45 cells to compare with, 45 of them in this study" in lines
+        assert "printed 45 cells to compare with" in lines
         assert [line for line in lines if line.startswith("table ")] == [f"table {n} 54 54 9 3 18" for n in range(1, 6)]
 
     def test_says_what_grids_share(self, tmp_path):
@@ -186,16 +169,6 @@ class TestScenes:
             "did you mean 'length'? known: length, height, thickness\n"
         )
         assert [file.name for file in tmp_path.iterdir()] == ["bad.yaml"]
-
-    def test_imports_nothing_heavy(self):
-        code = (
-            "import sys; from springtune.cli import main\n"
-            "try: main(['scenes', sys.argv[1]])\n"
-            "except SystemExit: pass\n"
-            "print(sorted({'xarray', 'matplotlib', 'snakemake', 'scipy', 'pint', 'h5py'} & set(sys.modules)))"
-        )
-        done = subprocess.run([sys.executable, "-c", code, CONFIG / "paper.yaml"], capture_output=True, text=True)
-        assert done.stdout.splitlines()[-1] == "[]", done.stderr
 
 
 def test_runs_as_a_module():
@@ -230,8 +203,7 @@ def test_a_home_that_cannot_be_written_is_one_note(tmp_path, monkeypatch, capsys
 
 
 class TestSchema:
-    def test_printed_and_kept_in_step(self):
-        assert run("schema").stdout == schema_text()
+    def test_it_is_kept_in_step(self):
         assert (CONFIG / SCHEMA).read_text() == schema_text(), RENEW
 
     def test_manual_is_kept_in_step(self):
@@ -287,7 +259,8 @@ class TestSchema:
 
     def test_every_section_is_in_the_manual(self):
         models = {model.__name__ for model in sections(study_model(kinds())).values()}
-        assert models == {*json.loads(schema_text())["$defs"], "StudyConfig"}
+        defined = {name for name in json.loads(schema_text())["$defs"] if not name.endswith("_distribution")}
+        assert models == defined | {"StudyConfig"}
 
 
 @pytest.fixture(scope="module")
@@ -299,42 +272,39 @@ def choices():
     return beam, material, known, of_one_mesh.predict(beam, mesh, material, known)
 
 
-ABOUT = {"particles": 105, "springs": 268}
+COUNTS = "105 particles, 268 springs"
+SAID = yaml.safe_load(Path(__file__).with_name("said.yaml").read_text())
+ABSURD = {name: refused_numbers(f"predict, absurd {name}") for name in ("beams", "sizes", "errors")}
+STEEL, RUBBER = ("--beam", "100x20", "--material", "steel"), ("--beam", "200x40", "--material", "rubber")
 
 
 class TestPredict:
-    STEEL = ("--beam", "100x20", "--material", "steel")
-    OWN = ("--beam", "100x20", "--size", "5 mm")
-
     def test_recommends_with_numbers(self):
-        result = run("predict", *self.STEEL, "--size", "5 mm")
+        result = run("predict", *STEEL, "--size", "5 mm")
         assert result.exit_code == 0
         rows = {line.split()[0]: line for line in result.stdout.splitlines() if line.startswith("  ")}
         names = {"van-gelder-general", "element-fit", "patch-area", "patch", "energy-fit"}
         assert list(rows)[0] == "definition" and set(rows) == {"definition", *names}
-        assert "recommended: van-gelder-general; with springs alone: van-gelder-general" in result.stdout
         assert "+0.00 %" in rows["patch"]
         # Traction, bending and shear as in tests/physics/test_predict.py, in order of the worst of them.
         assert rows["patch-area"].split("N/m")[2].split()[:6] == ["+0.45", "%", "-6.31", "%", "+1.60", "%"]
-        assert "\nAlso tried: uniform, density, " in result.stdout and ", delingette, " in result.stdout
-        assert "; not tried, since they search for seconds: adjoint, best-springs.\n" in result.stdout
         worst = [max(abs(float(word)) for word in line.split(" %")[0:3] for word in word.split()[-1:]) for line in
                  list(rows.values())[1:]]  # fmt: skip
         assert worst == sorted(worst)
-        for said in (
-            "solved on this mesh",
-            "linear kinematics (small strain)",
-            "converged reference",
-            "error estimate",
-        ):
-            assert said in result.stdout
+
+    @pytest.mark.parametrize(("call", "said"), [(call, said) for call, *said in SAID])
+    def test_what_a_prediction_says(self, call, said, tmp_path, monkeypatch):
+        monkeypatch.chdir(tmp_path)
+        write_mesh("own.vtu", MESH_TYPES["braced"](0.1, 0.02, 5e-3))
+        result = run("predict", *shlex.split(call))
+        assert result.exit_code == 0 and not [part for part in said if part not in result.stdout], result.stdout
 
     def test_what_has_no_reference_says_so(self, choices):
         beam, material, known, _ = choices
         known = known | {"bending": "its error estimate is 1"}
         mesh = MESH_TYPES["structured"](beam.length, beam.height, 5e-3)
         found = of_one_mesh.predict(beam, mesh, material, known)
-        lines = prediction_text(beam_subject(beam, material, known), "", ABOUT, found).splitlines()
+        lines = prediction_text(beam_subject(beam, material, known), "", COUNTS, found).splitlines()
         rows = [line for line in lines if line.startswith("  ")]
         assert len(rows) > 5 and all("no reference" in row for row in rows[1:])
         assert "bending: no reference; its error estimate is 1" in lines
@@ -346,7 +316,7 @@ class TestPredict:
         failed = numbers | {"extra": "", "failures": {"patch test": "unstable: the network is unstable at rest"}}
         found = [replace(one, **failed) if one.definition == "patch" else one for one in found]
         ordered = sorted(found, key=lambda one: one.worst)
-        text = prediction_text(beam_subject(beam, material, known), "", ABOUT, ordered)
+        text = prediction_text(beam_subject(beam, material, known), "", COUNTS, ordered)
         assert "with springs alone: van-gelder" in text
         rows = {line.split()[0]: line for line in text.splitlines() if line.startswith("  ")}
         assert rows["patch"].split()[-5:] == ["unstable"] * 5
@@ -356,76 +326,43 @@ class TestPredict:
         """Rectangles three times as long as high: springs along them would be negative."""
         square = braced(0.1, 0.06, 5e-3)
         write_mesh(tmp_path / "flat.vtu", Mesh(square.points * [1.0, 1 / 3], square.triangles, square.quads))
-        result = run("predict", *self.STEEL, "--mesh", tmp_path / "flat.vtu")
+        result = run("predict", *STEEL, "--mesh", tmp_path / "flat.vtu")
         assert result.exit_code == 0 and "recommended: element-fit; with springs alone: element-fit" in result.stdout
         assert not re.search(r"\b(patch|baudet)\b[^-]", result.stdout.replace("patch test", ""))
 
-    @pytest.mark.slow
-    def test_large_meshes_have_bands(self):
-        result = run("predict", *self.STEEL, "--size", "0.25 mm")
-        assert result.exit_code == 0
-        assert "about 3.7e+04 particles" in result.stdout
-        assert "bands, extrapolated from solutions on 6 structured meshes of 0." in result.stdout
-        rows = [line for line in result.stdout.splitlines() if line.startswith("  ")]
-        assert all(row.count(" to ") >= 3 for row in rows[1:])
-
-    def test_large_files_are_refused(self, tmp_path):
+    def test_large_meshes_are_refused(self, tmp_path):
+        result = run("predict", *STEEL, "--size", "0.1 mm")
+        assert result.exit_code == 1 and "particles, more than the 100000 that are solved here" in result.stderr
         write_mesh(tmp_path / "own.vtu", MESH_TYPES["braced"](0.1, 0.02, 0.14e-3))
-        result = run("predict", *self.STEEL, "--mesh", tmp_path / "own.vtu")
+        result = run("predict", *STEEL, "--mesh", tmp_path / "own.vtu")
         assert result.exit_code == 1
         assert (
             "own.vtu' has 102960 particles, more than the 100000 that are solved here; give a coarser" in result.stderr
         )
 
-    @pytest.mark.parametrize("mesh_type", ["structured", "free", "right"])
-    def test_absurd_sizes_are_refused_before_a_mesh_is_made(self, mesh_type):
-        for size in ("1e-9 mm", "0.005 mm"):  # 2,000 mm2 over 5e6 particles: .02 mm, rows of triangles .0215
-            result = run("predict", *self.STEEL, "--mesh", mesh_type, "--size", size)
-            assert result.exit_code == 2 and len(result.stderr.splitlines()) == 1
-            assert f"--size: '{size}' makes some " in result.stderr
-            assert "of beam '100x20', more than can be meshed (5,000,000); give at least 0.02" in result.stderr
-        slender = run("predict", "--beam", "1e4x1", "--material", "steel", "--mesh", mesh_type, "--size", "1e-3 mm")
-        assert "of beam '1e4x1', more than can be meshed (5,000,000); give at least 0.0" in slender.stderr
 
-    def test_material_of_ones_own_and_a_mesh_file(self, tmp_path):
-        write_mesh(tmp_path / "own.vtu", MESH_TYPES["braced"](0.1, 0.02, 5e-3))
-        mesh = ("--mesh", tmp_path / "own.vtu")
-        result = run("predict", "--beam", "100x20", "--young", "3 GPa", "--poisson", "0.45", *mesh)
-        assert result.exit_code == 0
-        assert "recommended: area" in result.stdout and "own.vtu" in result.stdout
-        assert "K_A = 658.3 MPa" in result.stdout  # E (3 nu - 1) / (2 (1 - nu^2))
-        strained = run(
-            "predict", "--beam", "100x20", "--young", "3 GPa", "--poisson", "0.45", *mesh, "--plane", "strain"
-        )
-        assert "nu = 0.45, t = 1 mm, plane strain: in the plane E = 3.76176 GPa, nu = 0.8182\n" in strained.stdout
-        assert "  nu in plane  besides" in strained.stdout and "  nu  besides" in result.stdout.replace("nu   ", "nu  ")
-        assert "K_A = 8276 MPa" in strained.stdout  # lambda - G, of three dimensions
-
-    @pytest.mark.parametrize(("arguments", "message"), refused_calls("predict"))
-    def test_refusals_are_one_line(self, arguments, message):
-        result = run("predict", *arguments)
-        assert result.exit_code == 2
-        assert message in result.stderr
-        assert len(result.stderr.splitlines()) == 1
+@pytest.mark.parametrize(
+    ("table", "arguments", "messages"),
+    [
+        pytest.param(table, one.values[0], one.values[1:], id=one.id)
+        for table in ("predict", "predict, a mesh", "predict, an engine")
+        for one in refused_calls(table)
+    ],
+)
+def test_refused_predictions_are_one_line(table, arguments, messages, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "own.msh").write_text("")
+    body = {"predict": (), "predict, a mesh": STEEL, "predict, an engine": RUBBER}[table]
+    result = run("predict", *body, *arguments)
+    assert result.exit_code == 2 and len(result.stderr.splitlines()) == 1
+    assert all(message in result.stderr for message in messages), result.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["own.msh"]
 
 
 class TestPredictAMesh:
     """`predict --error`, and what predictions are written as."""
 
-    STEEL = ("--beam", "100x20", "--material", "steel")
     FIND = (*STEEL, "--error", "8 %", "--mesh", "right,braced")
-    NONE = (
-        "--beam",
-        "100x20",
-        "--material",
-        "rubber",
-        "--error",
-        "3 %",
-        "--mesh",
-        "right",
-        "--loads",
-        "traction,shear",
-    )
 
     def test_an_error_is_answered_by_meshes(self):
         result = run("predict", *self.FIND, "--density", "7850 kg/m^3")
@@ -445,137 +382,52 @@ class TestPredictAMesh:
         assert heads.split()[-7:] == ["traction", "bending", "shear", "static", "solve", "largest", "step"]
         assert f"Solved: {len(search.tried)} meshes of " in result.stdout
         assert "all finer meshes tried, up to twice as fine" in result.stdout and "linear kinematics" in result.stdout
-        assert "None: a definition is given up if its error, extrapolated by its change" in result.stdout
+        assert "A definition is given up if its error, by its change over the last doubling" in result.stdout
 
-    def test_none_is_said(self):
-        result = run("predict", *self.NONE, "--springs-alone")
-        assert result.exit_code == 0 and "\nwith springs alone: none\n" in result.stdout
+    def test_none_is_said_and_nothing_written(self, tmp_path):
+        asked = ["--beam", "100x20", "--material", "rubber", "--error", "3 %", "--mesh", "right"]
+        target = tmp_path / "net.json"
+        result = run("predict", *asked, "--loads", "traction,shear", "--springs-alone", "--write", target)
+        assert "\nwith springs alone: none\n" in result.stdout
         assert "right, with springs alone: none up to" in result.stdout and "nearest is" in result.stdout
         assert "recommended" not in result.stdout and "with any definition" not in result.stdout
-
-    def test_signs_are_told(self):
-        size = (*self.STEEL, "--size", "5 mm", "--mesh", "right")
-        text = run("predict", *size, "--loads", "compression,traction").stdout
-        assert (
-            "Of errors, positive: too soft; under compression, where displacements are negative, negative is too soft."
-            in text
-        )
-        assert "at worst: delingette" in text and "% (compression, too " in text
-        text = run("predict", *size, "--loads", "pressure").stdout
-        assert "\nOf errors, negative: too soft.\n" in text and "% (pressure, too stiff)" in text
-
-    def test_json_of_a_prediction(self):
-        result = run("predict", *self.STEEL, "--size", "5 mm", "--loads", "bending,pressure", "--json")
-        found = json.loads(result.stdout)
-        assert list(found) == [
-            "springtune", "beam", "material", "loads", "references", "mesh", "extrapolated_from", "recommended",
-            "recommended_springs_alone", "tried", "choices",
-        ]  # fmt: skip
-        beam, material = Beam(0.1, 0.02), Material(210e9, 0.3)
-        mesh = MESH_TYPES["structured"](0.1, 0.02, 5e-3)
-        choices = of_one_mesh.predict(beam, mesh, material, loads=["bending", "pressure"])
-        assert [one["definition"] for one in found["choices"]] == [one.definition for one in choices]
-        assert [one["errors"] for one in found["choices"]] == [one.errors for one in choices]
-        assert found["recommended"] == choices[0].definition
-        assert found["mesh"] == {
-            "type": "structured", "file": None, "size": 0.005, "particles": len(mesh.points), "springs": len(mesh.edges)
-        }  # fmt: skip
-        assert {*found["choices"][0]} == {field.name for field in fields(of_one_mesh.Choice)} - {"tried"} | {"worst"}
-        assert found["tried"] == [*choices[0].tried]
-        own = [one for one in found["choices"] if one["definition"] == "element-fit"]
-        assert own[0]["inside"] is None and found["extrapolated_from"] == []
-        assert set(found["references"]["bending"]) == {"displacement_per_newton", "error_estimate"}
-
-    def test_json_of_bands(self):
-        beam, material = Beam(0.1, 0.02), Material(210e9, 0.3)
-        known = of_one_mesh.references(beam, material)
-        choices, sizes = bands.extrapolate("braced", 1e-3, beam, material, known, most=600)
-        found = json.loads(prediction_json(beam_subject(beam, material, known), {"type": "braced"}, choices, sizes))
-        low, high = found["choices"][0]["errors"]["bending"]
-        assert low < high and found["extrapolated_from"] == sizes
-
-    def test_json_of_a_search(self):
-        found = json.loads(run("predict", *self.FIND, "--json", "--density", "7850 kg/m^3").stdout)
-        assert list(found) == [
-            "springtune", "beam", "material", "loads", "references", "error", "most", "recommended", "by_type",
-            "recommended_springs_alone", "springs_by_type", "tried",
-        ]  # fmt: skip
-        best = found["recommended"]
-        assert list(best) == [
-            "mesh_type", "size", "cells", "particles", "springs", "confirmed", "finer_sizes", "seconds", "step_limit",
-            "choice",
-        ]  # fmt: skip
-        assert best in found["by_type"].values() and best["confirmed"] and best["step_limit"] > 0
-        assert found["springs_by_type"]["right"] is None and found["error"] == 0.08
-        assert {*found["tried"][0]} == {"mesh_type", "size", "cells", "particles", "springs", "errors", "energies"}
-
-    @pytest.mark.parametrize("ending", ["csv", "json", "vtu", "h5"])
-    def test_the_springs_of_what_is_recommended_are_written(self, tmp_path, ending):
-        target = tmp_path / f"net.{ending}"
-        result = run(
-            "predict", *self.STEEL, "--size", "10 mm", "--springs-alone", "--loads", "bending", "--write", target
-        )
-        assert result.exit_code == 0 and target.is_file()
-        assert f"{target}: " in result.stdout and "springs of definition " in result.stdout
+        assert result.exit_code == 1 and not target.exists()
+        assert result.stderr == "Error: --write: no mesh keeps 3 %, so nothing is written; allow a larger error\n"
 
     def test_what_is_written_is_what_is_said(self, tmp_path):
         target = tmp_path / "net.json"
-        said = run("predict", *self.FIND, "--write", target, "--json")
-        best, written = json.loads(said.stdout)["recommended"], json.loads(target.read_text())
-        header = written["header"]
-        assert header["definition"] == best["choice"]["definition"]
-        assert header["mesh"]["particles"] == best["particles"]
-        assert header["expected_error"] == pytest.approx(best["choice"]["errors"], rel=1e-9)
-        assert "net.json" in said.stderr
+        said = run("predict", *self.FIND, "--write", target).stdout
+        header = json.loads(target.read_text())["header"]
+        best = next(line for line in said.splitlines() if line.startswith("recommended: "))
+        assert header["definition"] in best and f"{header['mesh']['particles']:,} particles" in best
+        assert "net.json: " in said
 
         target.unlink()
-        said = run("predict", *self.STEEL, "--size", "5 mm", "--write", target, "--springs-alone")
+        said = run("predict", *STEEL, "--size", "5 mm", "--write", target, "--springs-alone")
         header = json.loads(target.read_text())["header"]
         assert f"recommended: {header['definition']}; with springs alone: {header['definition']}" in said.stdout
 
-        said = run("predict", *self.STEEL, "--size", "5 mm", "--loads", "pressure", "--write", target, "--json")
-        choices, header = json.loads(said.stdout)["choices"], json.loads(target.read_text())["header"]
-        assert header["definition"] == choices[0]["definition"] and [*header["expected_error"]] == ["pressure"]
-        assert header["expected_error"] == pytest.approx(choices[0]["errors"], rel=1e-9)
-
-    def test_nothing_is_written_where_nothing_is_recommended(self, tmp_path):
-        target = tmp_path / "net.json"
-        result = run("predict", *self.NONE, "--springs-alone", "--write", target)
-        assert result.exit_code == 1 and not target.exists()
-        assert result.stderr == "--write: no mesh keeps 3 %, so nothing is written; allow a larger error\n"
-
-    @pytest.mark.parametrize(("arguments", "message"), refused_calls("predict, a mesh"))
-    def test_refusals_are_one_line(self, arguments, message, tmp_path, monkeypatch):
-        monkeypatch.chdir(tmp_path)
-        (tmp_path / "own.msh").write_text("")
-        result = run("predict", *self.STEEL, *arguments)
-        assert result.exit_code == 2 and message in result.stderr and len(result.stderr.splitlines()) == 1
-        assert [path.name for path in tmp_path.iterdir()] == ["own.msh"]
-
-    @pytest.mark.parametrize(("arguments", "message"), refused_calls("predict, an engine"))
-    def test_wrong_options_of_engines_are_refused_in_a_line(self, arguments, message):
-        result = run("predict", "--beam", "200x40", "--material", "rubber", *arguments)
-        assert result.exit_code == 2 and message in result.stderr and len(result.stderr.splitlines()) == 1
+        run("predict", *STEEL, "--size", "5 mm", "--loads", "pressure", "--write", target)
+        header, mesh = json.loads(target.read_text())["header"], MESH_TYPES["structured"](0.1, 0.02, 5e-3)
+        best = of_one_mesh.predict(Beam(0.1, 0.02), mesh, Material(210e9, 0.3), loads=["pressure"])[0]
+        assert header["definition"] == best.definition
+        assert header["expected_error"] == pytest.approx(best.errors, rel=1e-9)
 
     def test_an_engine_is_calibrated_to(self, tmp_path):
-        """Text, JSON and the springs that are written say the same."""
+        """The text and the springs that are written say the same."""
         asked = [
             *("--engine", "xpbd", "--dt", "1/60", "--substeps", "20", "--beam", "200x40", "--size", "20 mm"),
             *("--material", "rubber", "--density", "1000 kg/m^3", "--load", "traction", "--force", "0.2 N"),
             *("--loads", "shear", "--definition", "patch"),
         ]
-        text, target = run("predict", *asked), tmp_path / "net.json"
+        target = tmp_path / "net.json"
+        text = run("predict", *asked, "--write", target)
         assert text.exit_code == 0, text.output
-        found = json.loads(run("predict", *asked, "--json", "--write", target).stdout)
-        lines = words(text.stdout)
+        lines, written = words(text.stdout), json.loads(target.read_text())
         assert lines[1] == "engine xpbd, dt 1/60 s, 20 substeps, 10 iterations, float64"
-        assert lines[2] == f"factor {found['factor']:.5g}"
-        assert lines[3] == f"type compliance {found['typed']['compliance']['value']} m/N: 1 / k of a spring"
-        assert [one["load"] for one in found["loads"]] == ["traction", "shear"] and abs(found["error"]) < 2e-3
-        assert len(found["loads"][0]["sizes"]) == 4 and found["loads"][1]["least"] is None
-        written = json.loads(target.read_text())
-        least, most = map(float, found["typed"]["compliance"]["value"].split(" to "))
-        assert written["header"]["calibrated"]["factor"] == pytest.approx(found["factor"])
+        assert lines[2] == f"factor {written['header']['calibrated']['factor']:.5g}"
+        compliance = re.fullmatch("type compliance ([^ ]+) to ([^ ]+) m/N: 1 / k of a spring", lines[3])
+        least, most = map(float, compliance.groups())
         assert 1 / max(written["stiffness"]) == pytest.approx(least, rel=1e-4)
         assert 1 / min(written["stiffness"]) == pytest.approx(most, rel=1e-4)
 
@@ -587,7 +439,7 @@ class TestPredictAMesh:
         result = run("predict", *asked, "--write", tmp_path / "net.csv")
         assert "in 4 orders of the same particles" in result.stdout and "take more substeps" in result.stdout
         assert result.exit_code == 1 and not [*tmp_path.iterdir()]
-        assert result.stderr.startswith("--write: there is no factor, so nothing is written: the error at dt 1/60 s")
+        assert result.stderr.startswith("Error: --write: there is no factor, so nothing is written: the error at dt")
 
     def test_a_budget_is_searched(self, tmp_path):
         """In so long a frame that any machine has time for all settings."""
@@ -610,49 +462,38 @@ class TestPredictAMesh:
             *("--density", "1000 kg/m^3", "--load", "traction", "--force", "0.2 N", "--loads", "traction"),
         ]
         try:
-            result = run("predict", *asked, "--json", "--write", tmp_path / "net.csv")
+            result = run("predict", *asked, "--write", tmp_path / "net.csv")
         finally:
             springtune.ENGINES.discard("at-once")
-        found = json.loads(result.stdout)
-        assert all(one["frame_seconds"] <= 10 for one in found["tried"])
-        chosen = found["tried"][found["chosen"]]
-        assert chosen["worst"] < 2e-3 and (tmp_path / "net.csv").exists() and result.stderr.startswith(f"{tmp_path}")
+        assert result.exit_code == 0 and (tmp_path / "net.csv").exists(), result.output
+        assert "chosen, the least error at worst:" in result.stdout
 
     @pytest.mark.parametrize("command", ["predict", "springs"])
     def test_help_has_the_ending_of_every_format(self, command):
         said = run(command, "--help").stdout
-        for ending in (*ENDINGS, ".xml", ".mjcf", ".scn", ".py", ".newton.py", ".usda", ".xpbd.json", ".lmp"):
+        for ending in (*ENDINGS, ".xml", ".mjcf", ".scn", ".py", ".newton.py", ".xpbd.json"):
             assert re.search(rf"(?<!\w){re.escape(ending)}\b", said), ending
 
     def test_work_is_counted(self):
-        with counted(MeshType.__call__, solve_small_strain, Sheet.__init__) as calls:
-            run("predict", *self.STEEL, "--size", "10 mm", "--loads", "shear")
-        assert calls == {"MeshType.__call__": 1, "solve_small_strain": 1, "Sheet.__init__": 1}
+        with counted(MeshType.__call__, unit_reference, Sheet.__init__) as calls:
+            run("predict", *STEEL, "--size", "10 mm", "--loads", "shear")
+        assert calls == {"MeshType.__call__": 1, "unit_reference": 1, "Sheet.__init__": 1}
 
     @pytest.mark.filterwarnings("default::springtune.problem.geometry.AssumptionWarning")
-    @pytest.mark.parametrize("asked", ["--size", "--error"])
-    def test_absurd_numbers_are_refused_before_anything_is_made_or_solved(self, asked):
+    @pytest.mark.parametrize(
+        ("beam", "asked", "value"),
+        [
+            *((beam, *one) for beam in ABSURD["beams"] for one in (("--size", "5 mm"), ("--error", "5 %"))),
+            *(("100x20", "--size", size) for size in ABSURD["sizes"]),
+            *(("100x20", "--error", error) for error in ABSURD["errors"]),
+        ],
+    )
+    def test_absurd_numbers_are_refused_before_anything_is_made_or_solved(self, beam, asked, value):
         """By one line each: no mesh, no reference, no network."""
-        work = (MeshType.__call__, solve_small_strain, Sheet.__init__)
-        absurd = [
-            *((beam, "5 mm") for beam in ("1e-9x1e-9", "1e12x1e12", "1e6x1", "1x1e6", "1e-9x1", "1e40x1e40")),
-            *(
-                (beam, "5 mm")
-                for beam in ("nanx1", "1xnan", "infx1", "-1x1", "0x0", "1e999x1", "x", "1x2x3", "1e-999x1")
-            ),
-            *(("100x20", size) for size in ("1e-9 mm", "1e30 mm", "nan mm", "inf mm", "-1 mm", "0 mm", "1e-320 mm")),
-            *(("100x20", size) for size in ("1e999 mm", "5", "mm", "", "5 N", "5 mm mm", "\N{INFINITY} mm", "1_0 mm")),
-        ]
-        for beam, size in absurd:
-            if asked == "--error" and beam == "100x20":
-                size = size.replace("mm", "%").replace("1e30 %", "100 %").replace("1_0 %", "1_000 %")
-                if size == "1e-9 %" or size == "1e-320 %":
-                    continue  # is compared with the reference's estimate
-            with counted(*work) as calls:
-                result = run("predict", "--beam", beam, asked, size, "--material", "steel")
-            assert not calls and result.exit_code == 2, (beam, size)
-            assert result.stdout == "" and len(result.stderr.splitlines()) == 1, (beam, size)
-            assert "; give " in result.stderr or "? give " in result.stderr or "beam theory" in result.stderr
+        with counted(MeshType.__call__, unit_reference, Sheet.__init__) as calls:
+            result = run("predict", "--beam", beam, asked, value, "--material", "steel")
+        assert not calls and result.exit_code == 2 and result.stdout == "" and len(result.stderr.splitlines()) == 1
+        assert "; give " in result.stderr or "? give " in result.stderr or "beam theory" in result.stderr
 
 
 def test_no_way_of_writing_leaves_control_characters():

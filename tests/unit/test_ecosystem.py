@@ -6,7 +6,6 @@ import re
 import tomllib
 from pathlib import Path
 
-import nbformat
 import yaml
 from packaging.requirements import Requirement
 
@@ -33,15 +32,11 @@ def test_conda_environments_have_what_the_package_needs():
 
 
 def test_the_extra_of_all_engines_is_what_their_lock_file_is_made_of():
-    extras = {name: [Requirement(one) for one in ones] for name, ones in PROJECT["optional-dependencies"].items()}
-    needed = {}
-    for whole in extras["engines"]:
-        for one in (one for extra in whole.extras for one in extras[extra]):
-            one.marker = whole.marker or one.marker
-            needed[one.name] = one
+    extras = PROJECT["optional-dependencies"]
     lines = (REPOSITORY / "requirements/engines.in").read_text().splitlines()
-    asked = {one.name: one for one in map(Requirement, lines[1:])}
-    assert asked == needed
+    assert extras["engines"] == ["springtune[mujoco,newton]"] and sorted(lines[1:]) == sorted(
+        extras["mujoco"] + extras["newton"]
+    )
 
 
 def test_hosted_ci_runs_ours_with_pinned_actions():
@@ -55,15 +50,6 @@ def test_hosted_ci_runs_ours_with_pinned_actions():
         assert job["steps"][-1]["run"] == "bash .ci/run" and os.access(REPOSITORY / ".ci/run", os.X_OK)
         for used in (step["uses"] for step in job["steps"] if "uses" in step):
             assert re.fullmatch(r"[\w-]+/[\w-]+@[0-9a-f]{40}", used), f"{used}: pin a commit"
-
-
-def test_the_notebook_has_no_outputs_and_explains_each_step():
-    """tests/workflow/test_quick.py runs it."""
-    notebook = nbformat.read(REPOSITORY / "examples/springtune.ipynb", as_version=4)
-    nbformat.validate(notebook)
-    assert notebook.cells[0].cell_type == "markdown" and "## The page" in notebook.cells[-2].source
-    for cell in notebook.cells:
-        assert cell.cell_type == "markdown" or not (cell.outputs or cell.execution_count)
 
 
 ARTICLE = (REPOSITORY / "article/paper.md").read_text()
@@ -84,21 +70,6 @@ def test_the_software_paper_has_what_the_journal_asks_for():
     assert min(REPOSITORY.glob("*/paper.md")).parent.name == "article"
 
 
-def test_citations_of_the_software_paper_are_the_long_papers():
-    references = yaml.safe_load((REPOSITORY / "workflow/paper/references.yml").read_text())
-    entries = dict(
-        re.findall(r"^@\w+\{([\w-]+),\n(.*?)^\}", (REPOSITORY / "article/paper.bib").read_text(), re.M | re.S)
-    )
-    assert set(entries) == set(re.findall(r"@([a-z][\w-]*)", TEXT))
-    for name, entry in entries.items():
-        field = dict(re.findall(r"^  (\w+) = \{(.*)\},$", entry, re.MULTILINE))
-        known = references[name]
-        plain = (field["title"].strip("{}"), field.get("author", "").split(" and "), field.get("doi"))
-        doi = known.get("serial-number", {}).get("doi")
-        assert plain == (known["title"].strip("{}"), known.get("author", [""]), doi), name
-        assert field.get("year") == (str(known["date"]) if "date" in known else None), name
-
-
 def test_numbers_of_the_software_paper_are_those_of_make_paper():
     """By their names; where the long paper was made here, they are compared with it."""
     folder = REPOSITORY / "workflow/paper"
@@ -114,9 +85,3 @@ def test_numbers_of_the_software_paper_are_those_of_make_paper():
     if made.exists():
         found = json.loads(made.read_text())["numbers"]
         assert stated == {name: found[name]["text"] for name in stated}
-
-
-def test_an_address_of_the_repository_stands_in_both_places():
-    """docs/release.md says where; there is none yet."""
-    citation = yaml.safe_load((REPOSITORY / "CITATION.cff").read_text())
-    assert citation.get("repository-code") == PROJECT.get("urls", {}).get("Source")

@@ -5,12 +5,10 @@ import faulthandler
 import importlib
 import os
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
-import yaml
 
 import springtune as st
 from springtune.studies.kinds.engines import RUN_ENDS
@@ -20,18 +18,11 @@ from springtune.studies.output.comparison import compare
 from springtune.studies.runs import keys
 
 from campaigns import Campaign
+from tables import STUDIES
 
 ABSENT = "no_such_program_of_springtune"
 
-STUDY = """
-title: Engines of a test
-beams: {strip: {length: 100 mm, height: 40 mm}}
-materials: {rubber: {young_modulus: 1 MPa, poisson_ratio: 0.3, density: 1000 kg/m^3}}
-engines:
-  scenes: {pull: {beam: strip, mesh_size: 20 mm, material: rubber, load: traction, force: 0.2 N}}
-  runs:
-    map: {definition: patch, engine: [ENGINES], iterations: [1, 100], substeps: [1, 4], dt: [1/60 s, 5 ms]}
-"""
+STUDY = STUDIES["engines"].replace("xpbd", "[ENGINES]")
 CURVE = """    curve: {definition: patch, engine: [ENGINES], iterations: [2, 50],
             stiffness_factor: {from: 0.5, to: 8, points: 5, spacing: logarithmic}}
 """
@@ -49,35 +40,21 @@ class Toy:
         self.frames += frames
 
     def displacements(self):
-        return self.moved
+        return self.moved * self.factor(self.frames)
+
+    @staticmethod
+    def factor(frames):
+        return 1
 
 
-class Swinging(Toy):
-    """Swings for ever."""
-
-    def displacements(self):
-        return self.moved * (1 + (self.frames % 3))
+def moving(name, factor):
+    """Engine whose displacements are those of the toy times a factor of the frames."""
+    return type(name, (Toy,), {"factor": staticmethod(factor), "__doc__": name})
 
 
-class Creeping(Toy):
-    """Never rests."""
-
-    def displacements(self):
-        return self.moved * (1 + self.frames)
-
-
-class Exploding(Toy):
-    """Flies apart in large steps."""
-
-    def displacements(self):
-        return self.moved * 1e9
-
-
-class Broken(Toy):
-    """Raises what no engine of ours does."""
-
-    def advance(self, frames):
-        raise TypeError("a new version takes no frames")
+def broken(frames):
+    """What no engine of ours raises."""
+    raise TypeError("a new version takes no frames")
 
 
 class Aborting(Toy):
@@ -96,8 +73,15 @@ def missing(net, setting, damping):
     return module.Toy(net, setting, damping)
 
 
-TOYS = {"toy": Toy, "swinging": Swinging, "creeping": Creeping, "exploding": Exploding, "broken": Broken}
-TOYS |= {"aborting": Aborting}
+TOYS = {"toy": Toy, "aborting": Aborting} | {
+    name: moving(name, factor)
+    for name, factor in {
+        "swinging": lambda frames: 1 + frames % 3,
+        "creeping": lambda frames: 1 + frames,
+        "exploding": lambda frames: 1e9,
+        "broken": broken,
+    }.items()
+}
 
 
 @pytest.fixture(autouse=True)
@@ -142,10 +126,8 @@ def test_runs_are_every_combination_once_and_in_a_canonical_order(load):
     study = load(text + CURVE.replace("ENGINES", "xpbd"))
     runs = study.parts["engines"]
     assert len(runs) == 2 * 2 * 2 * 2 + 2 * 5 and [one.labels["engine"] for one in runs][:1] == ["xpbd"]
-    assert {run.labels["precision"] for run in runs} == {"float64"} and {run.labels["dt"] for run in runs} == {
-        1 / 60,
-        5e-3,
-    }
+    labels = {(run.labels["precision"], run.labels["dt"]) for run in runs}
+    assert labels == {("float64", 1 / 60), ("float64", 5e-3)}
     backwards = text.replace("[1, 100]", "[100, 1]").replace("[toy, xpbd]", "[xpbd, toy]")
     assert load(backwards + CURVE.replace("ENGINES", "xpbd")).parts["engines"] == runs
 
@@ -162,46 +144,7 @@ def test_what_is_not_installed_is_said_before_a_run(load):
     assert (what, count) == ("engines", 16) and said == "runs in missing, toy; not installed: missing"
 
 
-REFUSED_STUDIES = {
-    "engine: [xpdb]": "engines.runs.map.engine: unknown engine 'xpdb'; did you mean 'xpbd'?",
-    "engine: []": "an empty list",
-    "iterations: 0": "'0' is out of range; give a whole number from 1 to 100000",
-    "substeps: 1.5": "'1.5' is not a whole number",
-    "dt: 1/0 s": "engines.runs.map.dt: ",
-    "dt: 5 mm": "'5 mm' is a length; give a time",
-    "precision: float16": "engines.runs.map.precision: unknown precision 'float16'; did you mean 'float64'?",
-    "stiffness_factor: 0": "'0' is out of range; give a number above 0",
-    "scene: push": "engines.runs.map.scene: unknown scene 'push'; known: pull; or declare it under engines.scenes",
-    "definition: calibrated": "engines.runs.map.definition: 'calibrated' needs a reference or a stated stiffness",
-    "definition: baudet": "'baudet' needs a reference or a stated stiffness, or other cells or loads than scene 'pull'",
-}
-
-
-@pytest.mark.parametrize("row", REFUSED_STUDIES)
-def test_a_wrong_key_is_refused_with_a_remedy(refusal, row):
-    content = yaml.load(STUDY.replace("ENGINES", "xpbd"), yaml.BaseLoader)
-    content["engines"]["runs"]["map"] |= yaml.load(row, yaml.BaseLoader)
-    assert REFUSED_STUDIES[row] in refusal(yaml.safe_dump(content))
-
-
-@pytest.mark.parametrize(
-    ("key", "value", "said"),
-    [
-        ("load", "follower-pressure", "'follower-pressure' turns with its side, and forces in engines do not; choose"),
-        ("beam", "stripe", "engines.scenes.pull.beam: unknown beam 'stripe'; did you mean 'strip'?"),
-        ("material", "heavy", "'heavy' has no density; add one to it under materials"),
-        ("mesh_size", "50 mm", "50 mm is larger than beam 'strip'"),
-        ("mesh_type", "fre", "unknown mesh type 'fre'; did you mean 'free'?"),
-    ],
-)
-def test_a_wrong_scene_is_refused_with_a_remedy(refusal, key, value, said):
-    content = yaml.load(STUDY.replace("ENGINES", "xpbd"), yaml.BaseLoader)
-    content["materials"]["heavy"] = {"young_modulus": "1 MPa", "poisson_ratio": "0.3"}
-    content["engines"]["scenes"]["pull"][key] = value
-    assert said in refusal(yaml.safe_dump(content))
-
-
-def test_a_tolerance_ends_a_run_sooner(collected, refusal):
+def test_a_tolerance_ends_a_run_sooner(collected):
     text = STUDY.replace("[1, 100], substeps: [1, 4], dt: [1/60 s, 5 ms]", "20")
     exact, near = (
         collected("xpbd", text=text.replace("  runs:", f"  tolerance: {tolerance}\n  runs:"))["engines"].to_dataset()
@@ -209,9 +152,6 @@ def test_a_tolerance_ends_a_run_sooner(collected, refusal):
     )
     assert near.frames.item() < exact.frames.item()
     assert abs(near.displacement.item() / exact.displacement.item() - 1) < 1e-3
-    assert "'0.5' is out of range; give a number up to 0.01" in refusal(
-        text.replace("ENGINES", "xpbd").replace("  runs:", "  tolerance: 0.5\n  runs:")
-    )
 
 
 def test_too_many_runs_and_cells_are_refused(refusal):
@@ -245,7 +185,7 @@ def test_every_end_is_in_the_dataset_with_its_reason(collected):
     absent = data.sel(precision="float32", engine="missing")
     assert f"needs {ABSENT}>=1; install the extra" in absent.message.item()
     assert "broken: TypeError: a new version takes no frames" in data.message.sel(precision="float64").values
-    assert "ended by SIGABRT" in str(data.message.sel(engine="aborting", precision="float64").item())
+    assert "the process that solved it died" in str(data.message.sel(engine="aborting", precision="float64").item())
     assert data.program.sel(engine="missing").item() == "others" and data.scene_load.item() == "traction"
     swinging = data.sel(engine="swinging", precision="float64")
     assert swinging.swing > 0 and np.isfinite(swinging.last_displacement)
@@ -273,10 +213,8 @@ def test_a_crash_loses_one_run_and_what_is_stored_is_kept(collected):
 
 def test_the_best_factor_gives_the_references_displacement(collected):
     text = STUDY.replace("iterations: [1, 100], substeps: [1, 4], dt: [1/60 s, 5 ms]", "iterations: 7")
-    tree = collected(
-        "toy",
-        text=text + CURVE.replace("0.5, to: 8, points: 5", "0.01, to: 100, points: 4").replace("[2, 50]", "[1, 50]"),
-    )
+    curve = CURVE.replace("0.5, to: 8, points: 5", "0.01, to: 100, points: 4").replace("[2, 50]", "[1, 50]")
+    tree = collected("toy", text=text + curve)
     curves = tree["engine_curves"].to_dataset().squeeze()
     assert "iterations" not in tree["engines"].to_dataset().squeeze().dims  # curves add no holes to the other group
     beam, rubber = st.Beam("100 mm", "40 mm"), st.Material("1 MPa", 0.3, density="1000 kg/m^3")
@@ -299,9 +237,9 @@ def forget():
 
 def test_runs_depend_on_the_module_of_their_own_engine_alone():
     """And on no writer of files for others."""
-    shared = {Path(file).parent.name + "/" + Path(file).name for file in keys.modules("studies.kinds.engines.solve")}
+    shared = {f"{file.parent.name}/{file.name}" for file in keys.closure("studies.kinds.engines.solve").files}
     assert "engines/run.py" in shared and not {"engines/xpbd.py", "engines/vbd.py", "handover/formats.py"} & shared
-    own = {path.name for path in keys.OURS.closure(st.ENGINES["xpbd"].file).files}
+    own = {path.name for path in keys.closure("engines.xpbd").files}
     assert {"xpbd.py", "textbook.py"} <= own and "vbd.py" not in own
     assert keys.declared_key(st.ENGINES["xpbd"]) != keys.declared_key(st.ENGINES["vbd"])
 
@@ -330,8 +268,7 @@ def test_an_absent_engine_is_run_when_it_is_there_and_again_when_it_is_new(colle
 
 # -- what is drawn -----------------------------------------------------------------------------------------------------
 
-PLOTS = {"engines": (st.plot_engine_errors, st.plot_engine_maps)}
-PLOTS |= {"engine_curves": (st.plot_engine_curves, st.plot_engine_factors)}
+PLOTS = {"engines": (st.plot_engine_errors, st.plot_engine_maps), "engine_curves": (st.plot_engine_curves,)}
 
 
 @pytest.mark.parametrize("names", [("missing",), ("exploding", "creeping"), ("toy", "swinging")])
@@ -360,7 +297,7 @@ def test_outputs_are_figures_of_each_scene_and_a_table(collected):
     assert drawn == {f"engines_{name}_pull.{ending}" for name in ("errors", "maps") for ending in ("png", "pdf")}
     with open(campaign.folder / "tables/engines.csv") as file:
         rows = list(csv.DictReader(file))
-    assert [row["end"] for row in rows] == ["absent"] * 2 + ["rest"] * 2
+    assert [row["engine_status"] for row in rows] == ["absent"] * 2 + ["rest"] * 2
     assert rows[0]["error_percent"] == "" and float(rows[2]["error_percent"]) > float(rows[3]["error_percent"]) > 0
     assert "Scenes in engines" in (campaign.folder / "tables/index.html").read_text()
 

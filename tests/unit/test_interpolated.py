@@ -6,7 +6,7 @@ import pytest
 from springtune.reference.interpolant import TOLERANCE
 from springtune.studies.config.kind import kinds
 from springtune.studies.kinds import load_study
-from springtune.studies.kinds.scenes import any_reference
+from springtune.studies.kinds.scenes import any_reference, reference
 from springtune.studies.kinds.scenes.kind import summary
 from springtune.studies.kinds.scenes.plan import (
     box_of,
@@ -15,7 +15,7 @@ from springtune.studies.kinds.scenes.plan import (
     reference_of,
     solved_reference,
 )
-from springtune.studies.runs import driver, store
+from springtune.studies.runs import store
 from springtune.studies.runs.plan import plan
 
 from campaigns import do_stages
@@ -140,9 +140,9 @@ def test_what_cannot_be_interpolated_is_solved_by_itself(load, tmp_path):
     }
 
 
-def test_one_that_is_beyond_its_limits_is_a_hole(load, tmp_path):
+def test_one_whose_process_dies_is_a_hole(load, tmp_path):
     study = load(lengths(MANY))
     (job,) = [job for job in plan(study, tmp_path, 1).jobs.values() if job.stage.name == "reference"]
     (task,) = (task for file in job.content["files"] for task in file["tasks"])
-    driver.gone(job.stage.module, job.content, task["key"], "too slow", "at most 1 s")
-    assert any_reference.read(tmp_path / "references", references(study)[0])["message"] == "too slow"
+    reference.crashed(job.content, task["key"], "it died")
+    assert any_reference.read(tmp_path / "references", references(study)[0])["message"] == "it died"

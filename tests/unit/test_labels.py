@@ -3,12 +3,9 @@
 import io
 from itertools import combinations
 
-import matplotlib
 import numpy as np
 import pytest
 import xarray as xr
-from hypothesis import given
-from hypothesis import strategies as st
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.text import Text
@@ -30,7 +27,7 @@ def tree():
 
 HOSTILE = "$x_{$ </text><script>"
 
-RENAMED = ("beam", "mesh_type", "material", "definition", "shape", "quantity", "refinement")
+RENAMED = ("beam", "mesh_type", "material", "definition", "shape", "quantity")
 """Dimensions whose labels are somebody's, and not chosen by name in a figure."""
 
 
@@ -116,40 +113,23 @@ def test_texts_of_a_pdf_can_be_searched_and_a_rare_character_is_there():
 # -- texts -------------------------------------------------------------------------------------------------------------
 
 
-finite = st.floats(-1.0, 2.0, allow_nan=False)
-
-
-@given(st.lists(finite, min_size=1, max_size=12))
-def test_spread_things_do_not_overlap_and_keep_their_order(wanted):
-    sizes = [0.05] * len(wanted)
-    places = labels.spread(wanted, sizes, 0.0, 1.0)
-    order = np.argsort(wanted, kind="stable")
-    assert (np.diff(places[order]) > 0.05 - 1e-9).all()
-    assert places.min() > 0.025 - 1e-9 and places.max() < 0.975 + 1e-9
-
-
-def test_what_has_room_stays_where_it_is():
-    assert labels.spread([0.9, 0.1, 0.5], [0.1, 0.1, 0.1], 0, 1) == pytest.approx([0.9, 0.1, 0.5])
-    # Two in one place go apart by the same way.
-    assert labels.spread([0.5, 0.5], [0.2, 0.2], 0, 1) == pytest.approx([0.4, 0.6])
-
-
-def test_lines_are_wrapped_at_spaces_and_one_word_is_left_whole():
-    text = labels.wrapped("one two three four", labels.width("one two three") + 1e-6)
-    assert text == "one two three\nfour"
+def test_texts_are_wrapped_at_spaces_and_a_number_keeps_its_unit():
+    room = 14 * labels.CHARACTER * style.SMALL / 72 + 1e-6
+    assert labels.wrapped("one two three four", room) == "one two three\nfour"
+    assert labels.wrapped("100x20, mesh 5 mm, rubber", room) == "100x20, mesh\n5 mm, rubber"
     assert labels.wrapped("unbreakable", 0.01) == "unbreakable"
-    assert [labels.lines_of(one) for one in ("", "a", "a\nb")] == [0, 1, 2]
 
 
-def test_names_widen_the_panel_and_leave_ticks_at_the_data():
-    with matplotlib.rc_context(style.SETTINGS):
-        panel = Figure(figsize=(3, 2)).subplots()
-        panel.set_xscale("log")
-        panel.plot([1, 2, 5], [1, 2, 3])
-        panel.set_xlim(1, 5)
-        labels.name_lines(panel, [(5, 3, "a name", "k"), (5, np.nan, "nowhere", "k")])
-    assert panel.get_xlim()[0] == 1 and panel.get_xlim()[1] > 5
-    assert panel.get_xticks().max() <= 5 and [text.get_text() for text in panel.texts] == ["a name"]
+def test_names_stand_beside_the_panel_in_the_order_of_their_ends():
+    figure = Figure(figsize=(3, 2), layout="constrained")
+    panel = figure.subplots()
+    for name, values in {"low": [3, 1], "high": [1, 2], "nowhere": [np.nan, np.nan]}.items():
+        panel.plot(values, label=name)
+    labels.finish(panel, why="nothing")
+    assert [text.get_text() for text in panel.get_legend().get_texts()] == ["high", "low"]
+    figure.draw_without_rendering()
+    names = panel.get_legend().get_window_extent()
+    assert panel.get_window_extent().x1 < names.x0 and names.x1 <= figure.bbox.x1
 
 
 def test_curves_that_are_one_line_to_the_eye_share_a_name():

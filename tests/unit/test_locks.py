@@ -1,17 +1,14 @@
 """Locks of runs: whose they are, and whether that process lives."""
 
+import fcntl
 import os
-import platform
-import shutil
 from pathlib import Path
 
-import psutil
 import pytest
 from click.testing import CliRunner
 
 from springtune.cli import main
-from springtune.safe_io.atomic import this_host
-from springtune.studies.runs import checked_json, locks
+from springtune.studies.runs import locks
 
 from tables import STUDIES
 
@@ -26,67 +23,36 @@ def here(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
 
-def note(**changed):
-    """A run of this process, or another one."""
-    process = psutil.Process()
-    known = {"host": this_host(), "pid": process.pid, "start": process.create_time(), "command": "snakemake",
-             "folders": [str(STUDY)]}  # fmt: skip
-    checked_json.write(locks.RUNS / "of_a_test.json", known | changed)
-
-
-def test_without_notes_nobody_computes():
+def test_without_a_note_nobody_computes():
     assert not locks.check_idle(STUDY)
 
 
-@pytest.mark.parametrize("changed", [{"start": 1.0}, {"pid": 2**22 + 1}], ids=["its number is another's", "gone"])
-def test_a_process_that_is_gone_was_killed(changed):
-    note(**changed)
-    assert locks.check_idle(STUDY)
-    locks.forget()
-    assert not list(locks.RUNS.iterdir()) and not locks.check_idle(STUDY)
-
-
-def test_a_note_that_is_damaged_is_ignored():
-    note()
-    (locks.RUNS / "of_a_test.json").write_text("cut")
-    assert not locks.check_idle(STUDY)
-
-
-def test_a_living_process_is_named_with_the_remedy():
-    note()
-    told = rf"results/mine: process {os.getpid()} on this machine computes it since .* \(snakemake\); wait .* kill \d+"
+def test_a_run_locks_its_study_until_its_end_and_is_named_with_the_remedy():
+    locks.begin([STUDY])
+    told = rf"results/mine: process {os.getpid()} on .* computes it since .* \(.*\); wait for its end, or .* kill \d+"
     with pytest.raises(locks.LockedError, match=told):
         locks.check_idle(STUDY)
-
-
-def test_a_process_on_another_machine_is_named_with_a_remedy_that_works():
-    note(host="elsewhere", start=1.0)
-    with pytest.raises(
-        locks.LockedError, match="on elsewhere, .*: rm -r .snakemake/springtune, then snakemake --unlock"
-    ):
-        locks.check_idle(STUDY)
-    shutil.rmtree(".snakemake/springtune")
-    assert not locks.check_idle(STUDY)
-
-
-def test_runs_of_other_studies_do_not_count():
-    note(folders=["results/mine_too"])
-    assert not locks.check_idle(STUDY)
-
-
-def test_a_run_notes_itself_until_its_end():
-    locks.begin([STUDY])
-    with pytest.raises(locks.LockedError, match=f"process {os.getpid()}"):
-        locks.check_idle(STUDY)
+    assert not locks.check_idle(Path("results/mine_too"))
     locks.end()
-    assert not locks.check_idle(STUDY) and not list(locks.RUNS.iterdir())
+    assert not locks.check_idle(STUDY)
 
 
-def test_processes_of_two_machines_with_one_number_have_notes_of_their_own(monkeypatch):
+@pytest.mark.parametrize("note", ['{"pid": 1}', "cut"])
+def test_a_process_that_is_gone_was_killed_which_is_said_once(note):
+    (STUDY / "tasks").mkdir(parents=True)
+    (STUDY / locks.RUN_FILE).write_text(note)
+    assert locks.check_idle(STUDY) and not locks.check_idle(STUDY)
+
+
+def test_where_there_are_no_locks_nothing_is_said(monkeypatch):
     locks.begin([STUDY])
-    monkeypatch.setattr(platform, "node", lambda: "login.cluster")
-    locks.begin([Path("results/other")])
-    assert len(list(locks.RUNS.iterdir())) == 2
+
+    def flock(*_):
+        raise OSError("no locks here")
+
+    monkeypatch.setattr(fcntl, "flock", flock)
+    assert not locks.check_idle(STUDY) and (STUDY / locks.RUN_FILE).read_text()
+    locks.end()
 
 
 class TestClaims:
@@ -148,12 +114,7 @@ class TestClaims:
         (STUDY / "dataset.nc").touch()
         Path("config/mine.yaml").write_text(SMALL)
         refusal = "results/mine: holds the results of w/mine.yaml, another study of the same name; rename"
-        for command in (
-            ["clean", "config/mine.yaml", "--remove"],
-            ["merge", "config/mine.yaml", "results/mine"],
-            ["diff", "config/mine.yaml", "results/mine"],
-        ):
-            told = CliRunner().invoke(main, command)
-            assert told.exit_code and refusal in told.output, told.output
-        told = CliRunner().invoke(main, ["clean", "results/mine"])
+        told = CliRunner().invoke(main, ["archive", "config/mine.yaml"])
+        assert told.exit_code and refusal in told.output, told.output
+        told = CliRunner().invoke(main, ["archive", "results/mine"])
         assert told.exit_code == 1 and "w/mine.yaml: beams: 'beams' is missing" in told.output

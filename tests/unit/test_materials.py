@@ -14,9 +14,10 @@ from springtune.problem.geometry import Beam
 from springtune.problem.materials import CONSTANTS, AnisotropicMaterial, Material, material_of
 from springtune.studies.config.expand import declared
 from springtune.studies.config.kind import kinds
+from springtune.studies.config.messages import Problems
 from springtune.studies.config.sections import study_model
-from springtune.studies.runs.checked_json import hash_of
 from springtune.studies.runs.keys import beam_key, material_key
+from springtune.studies.runs.source import hash_of
 
 from tables import STUDIES
 
@@ -171,19 +172,12 @@ STUDY = STUDIES["materials"]
 def test_a_study_declares_all_three_forms(load):
     assert len(load(STUDY).scenes) == 1
     config = study_model(kinds()).model_validate(yaml.load(STUDY, yaml.BaseLoader))
-    found = declared(config).materials
+    found = declared(config, Problems("study.yaml")).materials
     assert found["ply"] == replace(PLY.rotated("-30 deg"), name="ply")
     plies = yaml.load(STUDY.replace("angle: -30 deg", "angle: [0 deg, 90 deg, 90 deg, 0 deg]"), yaml.BaseLoader)
-    cross = declared(study_model(kinds()).model_validate(plies)).materials["ply"]
+    cross = declared(study_model(kinds()).model_validate(plies), Problems("study.yaml")).materials["ply"]
     assert cross == AnisotropicMaterial.laminate([(PLY, f"{angle} deg", 1) for angle in (0, 90, 90, 0)], name="ply")
     assert found["board"] == AnisotropicMaterial(9e9, 4e9, -1.5e9, 2e9, density=600.0, name="board")
-
-
-REFINE = """
-refine:
-  one: {beam: bar, mesh_type: right, mesh_size: 5 mm, material: ply, load: traction, definition: lattice,
-        parameter: force, from: 1 kN, to: 2 kN}
-"""
 
 
 def sections():
@@ -192,7 +186,6 @@ def sections():
     yield (REPOSITORY / "config/laying.yaml").read_text(), "laying", "support"
     yield (REPOSITORY / "config/stability.yaml").read_text(), "stability", "material"
     yield (REPOSITORY / "config/benchmark.yaml").read_text(), "benchmark", "scenes"
-    yield STUDY + REFINE, "refine", "one"
 
 
 @pytest.mark.parametrize(("text", "section", "key"), list(sections()))
@@ -202,8 +195,6 @@ def test_sections_of_beams_take_isotropic_materials_alone(refusal, text, section
     inside = study[section]
     if section == "benchmark":
         inside, key = next(iter(inside["scenes"].values())), "material"
-    elif section == "refine":
-        inside, key = inside[key], "material"
     inside[key] = "ply"
     message = refusal(yaml.safe_dump(study))
     assert section in message and "'ply' is anisotropic, and beams are of isotropic materials" in message

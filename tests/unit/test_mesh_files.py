@@ -1,11 +1,13 @@
 """Mesh files that say one body in many ways: each moves as the clean one does, or is refused by its true reason."""
 
 import re
+from pathlib import Path
 
 import h5py
 import meshio
 import numpy as np
 import pytest
+import yaml
 from scipy.io import netcdf_file
 
 import springtune as st
@@ -65,14 +67,14 @@ SETS = SIDES + PARTS
 INP = f"*HEADING\nplate\n{MESH}{SETS}"
 
 
-def blocks(quads="CPS4", triangles="CPS3", hard="", soft=""):
+def blocks(hard="", soft=""):
     """Elements in four blocks."""
     lines = [one.splitlines(keepends=True) for one in (CPS4, CPS3)]
     parts = [
-        (quads, hard, lines[0][:2]),
-        (quads, soft, lines[0][2:]),
-        (triangles, soft, lines[1][4:]),
-        (triangles, hard, lines[1][:4]),
+        ("CPS4", hard, lines[0][:2]),
+        ("CPS4", soft, lines[0][2:]),
+        ("CPS3", soft, lines[1][4:]),
+        ("CPS3", hard, lines[1][:4]),
     ]
     return "".join(f"*ELEMENT, TYPE={kind}{name}\n{''.join(found)}" for kind, name, found in parts)
 
@@ -80,63 +82,41 @@ def blocks(quads="CPS4", triangles="CPS3", hard="", soft=""):
 POLAR = rows([[float(np.hypot(x, y)), float(np.degrees(np.arctan2(y, x)))] for x, y in POINTS])
 TURNED = rows([[float(y) + 3, 7 - float(x)] for x, y in POINTS])
 PART = f"*PART, NAME=Plate\n*NODE\n{TURNED}{MESH.partition(NODES)[2]}"
-END = "*END ASSEMBLY\n"
 PLACE = "*ASSEMBLY, NAME=a\n*INSTANCE, NAME=Plate-1, PART=PLATE\n-7., 3., 0.\n0., 0., 0., 0., 0., 1., 90.\n"
 REFERENCE = "*Node\n1, 500., 500., 0.\n*NSET, NSET=ref\n1,\n"
 ASSEMBLED = SETS.replace("=left", "=left, INSTANCE=Plate-1").replace("=right", "=right, instance=Plate-1")
 
-ABAQUS = {
-    "clean": INP,
-    "lower case, with comments, blanks, CR and a mark at the beginning": "\ufeff"
-    + (MESH + SETS).lower().replace("\n", "\r\n** a, 1\r\n\r\n  "),
-    "upper case of keywords in two sets of one name": INP.replace("right\n5, 10,", "right\n5, 10\n*Nset, nset=RIGHT\n"),
-    "sets of cells twice": INP.replace("7, 8\n", "*ELSET, ELSET=Hard\n7, 8\n"),
-    "sets over blocks and types": INP.replace(MESH, f"*NODE\n{NODES}" + blocks()),
-    "sets on blocks": INP.partition("*ELSET")[0].replace(
-        MESH, f"*NODE\n{NODES}" + blocks(hard=", ELSET=hard", soft=",elset=soft")
-    ),
-    "ranges": INP.replace("hard\n1, 2, 5, 6,\n7, 8", "hard, GENERATE\n1, 2\n5, 8, 1"),
-    "ranges with steps": INP.replace("right\n5, 10, 15", "right, generate\n5, 15, 5"),
-    "sets of sets": INP.replace("hard\n1, 2, 5, 6,\n7, 8", "low\n1, 2\n*ELSET, ELSET=hard\nLOW, 5, 6, 7, 8"),
-    "a keyword in two lines": INP.replace("*ELSET, ELSET=hard", "*ELSET,\n  ELSET=hard"),
-    "sets on nodes": INP.replace("*NSET, NSET=left\n1, 6, 11\n", "").replace(
-        f"*NODE\n{NODES}",
-        "*NODE, NSET=left\n1, 0, 0\n6, 0, 10\n11, 0, 20\n*NODE\n"
-        + "".join(line for line in NODES.splitlines(keepends=True) if not re.match(r"(1|6|11),", line)),
-    ),
-    "exponents of Fortran and directions": INP.replace("15.0, 10.0\n", "1.5D1, 1.0d+01, 0., 0., 0., 1.\n"),
-    "cells of sides": INP + "*ELSET, ELSET=left\n1, 6\n*ELSET, ELSET=right\n4, 11\n",
-    "points of parts": INP + "*NSET, NSET=hard, ELSET=hard\n*NSET, NSET=soft, ELSET=soft\n",
-    "entities of Gmsh": INP.replace(MESH, f"*NODE\n{NODES}" + blocks(hard=", ELSET=Surface1", soft=", ELSET=Surface2"))
-    + "*ELSET, ELSET=all\nhard, soft\n",
-    "parts by sections": INP.replace("CPS3\n", "CPS3, ELSET=upper\n")
-    + "*ELSET, ELSET=probe\n2, 3\n*SOLID SECTION, ELSET=hard, "
-    "MATERIAL=a\n*SOLID SECTION, ELSET=SOFT\n*ELSET, ELSET=_S1, INTERNAL\n1, 3\n",
-    "polar coordinates": INP.replace(f"*NODE\n{NODES}", f"*NODE, SYSTEM=C\n{POLAR}"),
-    "an instance": f"{PART}*END PART\n{PLACE}*END INSTANCE\n{REFERENCE}"
-    + ASSEMBLED.replace("T=hard", "T=hard, instance=Plate-1").replace("T=soft", "T=soft, instance=Plate-1")
-    + END,
-    "an instance, other sets of its names in the part": f"{PART}{PARTS}*NSET, NSET=left\n3, 4\n*END PART\n"
-    f"*PART, NAME=other\n*NODE\n1, 9, 9\n*END PART\n{PLACE}*END INSTANCE\n{ASSEMBLED.partition('*ELSET')[0]}{END}",
-    "sets of an assembly by the name of the instance": f"{PART}{PARTS}*END PART\n{PLACE}*END INSTANCE\n{REFERENCE}"
-    f"*NSET, NSET=left\nPlate-1.1, Plate-1.6,PLATE-1.11\n*NSET, NSET=right\nPlate-1.5, Plate-1.10, Plate-1.15\n{END}",
-    "a mesh in an instance": f"*PART, NAME=Plate\n*END PART\n{PLACE}{PART.partition('Plate')[2]}{SETS}"
-    f"*END INSTANCE\n{END}",
-    **{
-        f"types {quads} and {triangles}": INP.replace(MESH, f"*NODE\n{NODES}" + blocks(quads, triangles))
-        for quads, triangles in [
-            ("CPE4", "CPE3"),
-            ("cps4i", "cps3"),
-            ("CPS4R", "CPS3T"),
-            ("CPE4RH", "CPE3H"),
-            ("M3D4R", "M3D3"),
-            ("S4R", "S3R"),
-            ("S4R5", "STRI3"),
-            ("S4", "S3"),
-            ("CPEG4I", "CPEG3"),
-        ]
-    },
-}
+# What mesh_files.yaml puts into texts, and begins with.
+BLOCKED, NAMED = INP.replace(MESH, f"*NODE\n{NODES}{blocks()}"), blocks(hard=", ELSET=hard", soft=",elset=soft")
+SURFACES = blocks(hard=", ELSET=Surface1", soft=", ELSET=Surface2")
+REST = "".join(line for line in NODES.splitlines(keepends=True) if not re.match(r"(1|6|11),", line))
+HEAD, ASSEMBLED_SIDES = INP.partition("*ELSET")[0], ASSEMBLED.partition("*ELSET")[0]
+START, INSIDE = "*PART, NAME=Plate\n", PART.partition("Plate")[2]
+NOT_READ = "is not supported; mesh the part in the program and write all nodes and elements"
+OTHER_FILES = "parts of it are in other files, whose changes would not be seen"
+LINEAR = "write linear triangles and quadrilaterals only"
+MSH = "write 4.1 or 2.2: Mesh.MshFileVersion = 4.1"
+ROWS = yaml.safe_load(Path(__file__).with_name("mesh_files.yaml").read_text())
+
+
+def filled(text):
+    """A text in which {NAME} is a text of this module."""
+    return re.sub(r"\{([A-Z_]+)\}", lambda found: globals()[found[1]], text)
+
+
+def changed(name, *changes):
+    """A text of this module with some texts in place of others; END is the end of it."""
+    text = globals()[name] if name else ""
+    for old, new in changes:
+        assert old == "END" or filled(old) in text, old
+        text = text + filled(new) if old == "END" else text.replace(filled(old), filled(new))
+    return text
+
+
+ABAQUS = {name: changed(*row) for name, row in ROWS["abaqus"].items()}
+ABAQUS["lower case, with comments, blanks, CR and a mark at the beginning"] = "\ufeff" + (MESH + SETS).lower().replace(
+    "\n", "\r\n** a, 1\r\n\r\n  "
+)
 
 
 def section(name, *rows):
@@ -186,7 +166,7 @@ def msh41(names=True, sign=-1, two=False, parametric=0, loose=False):
     )
 
 
-def msh22(names=True, nodes="Nodes", partition=0):
+def msh22(names=True, partition=0):
     """Version 2.2, where an element that is in two groups stands twice."""
     groups = [
         (1, 101, "right"),
@@ -202,7 +182,7 @@ def msh22(names=True, nodes="Nodes", partition=0):
     return (
         section("MeshFormat", [2.2, 0, 8])
         + named(groups, names)
-        + section(nodes, [15], *((n, x, y, 0) for n, (x, y) in enumerate(POINTS, 1)))
+        + section("Nodes", [15], *((n, x, y, 0) for n, (x, y) in enumerate(POINTS, 1)))
         + section("Elements", [len(listed)], *listed)
     )
 
@@ -394,10 +374,6 @@ def test_blocks_without_name_and_number_are_the_body(tmp_path):
     assert not read_shape(tmp_path / "a.e").parts
 
 
-def with_line(line, data="1, 2, 3\n"):
-    return INP.replace("*ELEMENT, TYPE=CPS4\n", f"{line}\n{data}*ELEMENT, TYPE=CPS4\n")
-
-
 def raw_pieces(path):
     pieces(path)
     path.write_text(path.read_text().replace("</VTKFile>", '<AppendedData encoding="raw">_</AppendedData></VTKFile>'))
@@ -418,80 +394,24 @@ def replaced(write, old, new):
     return written
 
 
-ALL_NODES = "is not supported; mesh the part in the program and write all nodes and elements"
-OTHER_FILES = "parts of it are in other files, whose changes would not be seen"
-LINEAR = "write linear triangles and quadrilaterals only"
-MSH = "write 4.1 or 2.2: Mesh.MshFileVersion = 4.1"
+MSH41, MSH22, PARTITIONED = msh41(), msh22(), msh22(partition=2)
+SMALL, WIDE = NASTRAN["small"], NASTRAN["wide"]
 
-REFUSED = {
-    **{
-        f"{name}.inp": (with_line(f"*{name}"), rf"`\*{name.upper()}` in line 19 {ALL_NODES}")
-        for name in ("ngen", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SYSTEM", "PARAMETER")
-    },
-    **{
-        f"{name}.inp": (
-            INP.replace("CPS4\n", f"{name}\n"),
-            rf"`\*ELEMENT` in line 19 has TYPE={name.upper()}, which is not supp",
-        )
-        for name in ("CPS8R", "cps8r", "S8R", "CPS6", "CAX4", "C3D8", "SPRINGA", "B22")
-    },
-    "sphere.inp": (INP.replace("*NODE\n", "*NODE, SYSTEM=S\n"), r"`\*NODE` in line 3 has SYSTEM=S; write x and y"),
-    "include.inp": (with_line("*INCLUDE, INPUT=a.inp", ""), OTHER_FILES),
-    "input.inp": (INP.replace("*NODE\n", "*NODE, INPUT=a.inp\n"), OTHER_FILES),
-    "parts.inp": (f"{PART}*END PART\n{PART}*END PART\n", r"`\*PART` in line 33 is a second one"),
-    "instances.inp": (f"{PART}*END PART\n" + 2 * f"{PLACE}*END INSTANCE\n", r"`\*INSTANCE` in line 39 is a second one"),
-    "later.inp": (INP.replace("5, 10, 15", "late"), r"`\*NSET` in line 35 has the set 'late', which is not before it"),
-    "columns.inp": (INP.replace("CPS3\n", "CPS4\n"), "TYPE=CPS4, and rows that are not 5 numbers"),
-    "twice.inp": (INP.replace("\n2, 15.0", "\n1, 15.0"), "points have one number twice: 1; renumber them"),
-    "elements.inp": (INP.replace("\n5, 6, 7, 12", "\n4, 6, 7, 12"), "elements have one number twice"),
-    "lines.inp": (INP.replace("CPS4", "T2D2").replace("CPS3", "T2D2"), "rows that are not 3 numbers"),
-    "bars.inp": ("*NODE\n1, 0, 0\n2, 1, 0\n*ELEMENT, TYPE=T2D2\n1, 1, 2\n", "no cell block 'triangle' or 'quad'"),
-    "missing.inp": (INP.replace("12, 9, 15, 14", "12, 9, 15, 99"), "a cell has point 99, which the file does not have"),
-    "old.msh": (msh41().replace("4.1 0", "4 0"), f"is MSH of version 4; {MSH}"),
-    "40.msh": (msh41().replace("4.1 0", "4.0 0"), f"is MSH of version 4.0; {MSH}"),
-    "1.msh": ("$NOD\n1\n1 0 0 0\n$ENDNOD\n", f"is MSH of version 1; {MSH}"),
-    "parameters.msh": (
-        msh22(nodes="ParametricNodes"),
-        r"has \$ParametricNodes, which are not read; write Mesh.SaveParam",
-    ),
-    "split.msh": (msh22(partition=2), "is one of several partitions; write all into one file: Mesh.PartitionSplit"),
-    "partitions.msh": (
-        msh41().replace("$Nodes", "$PartitionedEntities\n$EndPartitionedEntities\n$Nodes"),
-        r"has \$PartitionedEntities, which are not read; write the mesh before it is partitioned",
-    ),
-    "order.msh": (msh41().replace("2 1 3 2\n", "2 1 16 2\n"), f"has cells 'quad8'; {LINEAR}: Mesh.ElementOrder = 1"),
-    "short.msh": (msh41().replace("$EndElements", ""), "it is damaged, or has what is not supported; write it again"),
-    "system.bdf": (
-        NASTRAN["small"].replace("GRID    3       ", "GRID    3       7"),
-        "GRID 3 is in coordinate system 7; write all in the basic one, CP = 0",
-    ),
-    "default.bdf": (NASTRAN["wide"].replace("BULK\n", "BULK\nGRDSET,,1\n"), "GRDSET  is in coordinate system 1"),
-    "include.bdf": (NASTRAN["wide"].replace("BULK\n", "BULK\ninclude 'a.bdf'\n"), OTHER_FILES),
-    "order.bdf": (NASTRAN["small"].replace("CTRIA3", "CTRIA6"), f"has cells CTRIA6; {LINEAR}"),
-    "solid.bdf": (NASTRAN["wide"].replace("CQUAD4", "CTETRA"), f"has cells CTETRA; {LINEAR}"),
-    "hexahedra.e": (
-        lambda path: write_exodus(path, kinds=("TETRA4", "TRI3")),
-        f"has cells 'TETRA4' of 4 points; {LINEAR}",
-    ),
+
+def unnamed_types(path):
+    """A binary file of VTK without the types of its cells."""
+    write_mesh(path.with_suffix(".vtu"), CLEAN)
+    meshio.read(path.with_suffix(".vtu")).write(path)
+    path.write_bytes(path.read_bytes().replace(b"CELL_TYPES", b"NO_TYPES__"))
+
+
+REFUSED = {file: (changed(*row), filled(says)) for file, *row, says in ROWS["refused"]} | {
+    "hexahedra.e": (lambda path: write_exodus(path, kinds=("TETRA4", "TRI3")), "'TETRA4' of 4 points; " + LINEAR),
     "raw.vtu": (raw_pieces, "has 4 pieces in raw bytes; write it in text or base64, or as one piece"),
     "lz4.vtu": (replaced(pieces, b"ZLib", b"LZ4"), "is compressed by LZ4, which is not read; write it with ZLib"),
     "ghosts.vtu": (one_of_several, OTHER_FILES),
     "parallel.vtu": (replaced(pieces, b'"Unstr', b'"PUnstr'), OTHER_FILES),
-    "parallel.pvtu": ("<VTKFile/>", OTHER_FILES),
-    "poly.vtk": (
-        "# vtk DataFile Version 3.0\na\nASCII\nDATASET POLYDATA\n",
-        r"not supported \(Only VTK .*not POLYDATA\)",
-    ),
-    "binary.vtk": (
-        replaced(
-            lambda path: (
-                write_mesh(path.with_suffix(".vtu"), CLEAN) or meshio.read(path.with_suffix(".vtu")).write(path)
-            ),
-            b"CELL_TYPES",
-            b"NO_TYPES__",
-        ),
-        "has what is not supported.*; write it again, in text",
-    ),
+    "binary.vtk": (unnamed_types, "has what is not supported.*; write it again, in text"),
 }
 
 

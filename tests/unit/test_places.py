@@ -160,15 +160,18 @@ found = {
 }
 from springtune.studies.runs import plan
 stages = [one.module for one in plan.stages()]
-found["stages"] = {stage: keys.stage_closure(stage).digest for stage in stages}
-found["modules"] = {stage: keys.modules(stage) for stage in stages}
+found["stages"] = {stage: keys.closure(stage).digest for stage in stages}
+found["modules"] = {stage: sorted(map(str, keys.closure(stage).files)) for stage in stages}
 print(json.dumps(found))
 """
 
-SCENES = """
-import operator, sys
+USED = """
+import json, sys
+from click.testing import CliRunner
+from springtune.cli import main
 from springtune.studies.kinds import load_study
-print(*map(operator.attrgetter(sys.argv[2]), load_study(sys.argv[1]).scenes))
+told = [CliRunner().invoke(main, command.split()).output for command in sys.argv[2:]]
+print(json.dumps([sorted({(one.definition, one.mesh.mesh_type) for one in load_study(sys.argv[1]).scenes}), *told]))
 """
 
 
@@ -197,55 +200,35 @@ def copy(tmp_path_factory):
     return folder, report(folder)
 
 
-@pytest.fixture
-def added(copy, request):
-    """The copy with the file of a recipe."""
-    folder, before = copy
-    path = folder / "springtune" / request.param
-    assert not path.exists()
-    path.write_text(RECIPES[request.param])
-    yield folder, path, before, report(folder)
-    path.unlink()
+FILES = {"DEFINITIONS": ("springs/twice.py", "lattice", "twice"), "MESH_TYPES": ("mesh/left.py", "right", "left")}
 
 
-def check(added, registry, name, after):
+def test_a_definition_and_a_mesh_type_are_one_file_each(copy, tmp_path):
     """A file more is one name more, at its place; nothing else is to be computed again."""
-    _, path, before, found = added
-    names = list(before[registry])
-    names.insert(names.index(after) + 1, name)
-    assert list(found[registry]) == names
-    other = {"DEFINITIONS", "MESH_TYPES"} - {registry}
-    assert {one: digest for one, digest in found[registry].items() if one != name} == before[registry]
-    assert found[registry][name] not in before[registry].values()
-    assert all(found[one] == before[one] for one in (*other, "stages"))
-    assert found["modules"] == before["modules"]
-    assert found["light"]
-    path.write_text(path.read_text() + "\n# Edited.\n")
-    assert report(added[0])[registry] == found[registry]
-    path.write_text(path.read_text() + "\nEDITED = True\n")
-    edited = report(added[0])
-    assert [one for one in edited[registry] if edited[registry][one] != found[registry][one]] == [name]
-    assert edited["stages"] == found["stages"]
-
-
-@pytest.mark.parametrize("added", ["springs/twice.py"], indirect=True)
-def test_a_definition_is_one_file(added, tmp_path):
-    check(added, "DEFINITIONS", "twice", "lattice")
-    folder = added[0]
-    assert "twice" in [line.split()[0] for line in python(folder, "-m", "springtune", "definitions").splitlines()]
+    folder, before = copy
+    for place, _, _ in FILES.values():
+        (folder / "springtune" / place).write_text(RECIPES[place])
+    found = report(folder)
+    assert found["light"] and all(found[one] == before[one] for one in ("stages", "modules"))
+    for registry, (_, after, name) in FILES.items():
+        names = list(before[registry])
+        names.insert(names.index(after) + 1, name)
+        assert list(found[registry]) == names
+        assert {one: digest for one, digest in found[registry].items() if one != name} == before[registry]
+        assert found[registry][name] not in before[registry].values()
+    for text, counts in (("# Edited.", False), ("EDITED = True", True)):
+        for place, _, _ in FILES.values():
+            path = folder / "springtune" / place
+            path.write_text(f"{path.read_text()}\n{text}\n")
+        edited = report(folder)
+        assert edited["stages"] == found["stages"]
+        for registry, (_, _, name) in FILES.items():
+            changed = [one for one, digest in edited[registry].items() if digest != found[registry][one]]
+            assert changed == [name] * counts
     study = tmp_path / "one.yaml"
-    study.write_text(STUDY.replace("DEFINITION", "twice").replace("MESH_TYPE", "free"))
-    assert python(folder, "-m", "springtune", "scenes", study).splitlines()[-1].split()[:2] == ["all", "4"]
-    assert set(python(folder, "-c", SCENES, study, "definition").split()) == {"uniform", "twice"}
-
-
-@pytest.mark.parametrize("added", ["mesh/left.py"], indirect=True)
-def test_a_mesh_type_is_one_file(added, tmp_path):
-    check(added, "MESH_TYPES", "left", "right")
-    folder = added[0]
-    study = tmp_path / "one.yaml"
-    study.write_text(STUDY.replace("DEFINITION", "lattice").replace("MESH_TYPE", "left"))
-    assert set(python(folder, "-c", SCENES, study, "mesh.mesh_type").split()) == {"structured", "left"}
-    beam = ("--beam", "100x20", "--material", "steel")
-    text = python(folder, "-m", "springtune", "predict", *beam, "--mesh", "left", "--size", "10 mm")
-    assert "left" in text and "recommended" in text
+    study.write_text(STUDY.replace("DEFINITION", "twice").replace("MESH_TYPE", "left"))
+    predict = "predict --beam 100x20 --material steel --mesh left --size 10mm"
+    scenes, listed, predicted = json.loads(python(folder, "-c", USED, study, "definitions", predict))
+    assert scenes == [[name, kind] for name in ("twice", "uniform") for kind in ("left", "structured")]
+    assert "twice" in [line.split()[0] for line in listed.splitlines()]
+    assert "left" in predicted and "recommended" in predicted

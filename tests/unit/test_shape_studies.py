@@ -1,6 +1,5 @@
 """Studies of shapes: what they may hold, what they expand to, and what their dataset says."""
 
-import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,11 +12,11 @@ from click.testing import CliRunner
 import springtune as st
 from springtune.cli import main
 from springtune.mesh import write_mesh
-from springtune.studies.archive import verify
 from springtune.studies.config.kind import outputs
 from springtune.studies.kinds import collect
 from springtune.studies.kinds.moduli.figures import definitions
 from springtune.studies.kinds.scenes import stored
+from springtune.studies.kinds.shapes import mesh
 from springtune.studies.kinds.shapes.expand import READ_AT_ONCE
 from springtune.studies.kinds.shapes.kind import mesh_key, reference_task, scene_task
 from springtune.studies.kinds.shapes.task_values import ONE_LOAD, geometry, named, shape_of
@@ -25,9 +24,7 @@ from springtune.studies.kinds.shapes.task_values import load as values_of
 from springtune.studies.output import page
 from springtune.studies.output.dataset import STATUS
 from springtune.studies.output.export import export
-from springtune.studies.runs import driver, store
 from springtune.studies.runs.plan import plan, table_files
-from springtune.studies.runs.task_costs import TaskCosts
 from springtune.studies.runs.workload import results_of
 
 from campaigns import do_stages, load_text
@@ -40,10 +37,15 @@ COOK = STUDIES["shapes"]
 def done(study, folder):
     """Tree of the dataset of a study, its groups and its folder; all stages run in this process."""
     do_stages(study, folder)
-    made, told = collect.run(study, study.path, folder, folder / "dataset.nc")
-    with xr.open_datatree(made, engine="netcdf4") as tree:
+    collect.run(study, study.path, folder, folder / "dataset.nc")
+    with xr.open_datatree(folder / "dataset.nc", engine="h5netcdf") as tree:
         tree.load()
-    return tree, told.read_text()
+    return tree, (folder / "summary.txt").read_text()
+
+
+def scenes(study, folder):
+    """Scenes of the dataset of a study of shapes."""
+    return done(study, folder)[0]["shapes"].to_dataset().squeeze(drop=True)
 
 
 # -- what a study may hold ---------------------------------------------------------------------------------------------
@@ -51,7 +53,7 @@ def done(study, folder):
 
 def test_a_study_of_nothing_is_told_what_it_may_have(refusal):
     text = "title: nothing\nmaterials: {one: {young_modulus: 1 MPa, poisson_ratio: 0.3}}\n"
-    others = "or 'laying', 'stability', 'benchmark', 'samples', 'refine', 'shapes' and 'shape_grids'"
+    others = "or 'laying', 'stability', 'benchmark', 'samples', 'shapes' and 'shape_grids'"
     assert f"'beams' is missing; give a section for each beam, by name; see below, {others}" in refusal(text)
     shapes = COOK.partition("shape_grids:")[0]
     assert "'shape_grids' is missing; give a section" in refusal(shapes)
@@ -180,21 +182,6 @@ def test_a_study_of_shapes_alone_has_all_its_pages(cook, tmp_path):
     assert "Sources: cook, tip: somebody." in (tmp_path / "index.html").read_text()
 
 
-def test_scenes_of_shapes_are_made_again(cook, tmp_path):
-    """The same numbers, whichever are drawn; a number that is not what its scene gives is found."""
-    study, tree, _ = cook
-    beside = study.path.parent
-    made = list(verify.again(beside / "results/study", beside, 1, 0))
-    assert len(made) == 1 and made[0].agrees and made[0].before == "solved"
-    names = {one.name for one in study.parts["shapes"].scenes}
-    assert made[0].labels in names and "cook_free_8mm_third_shear_lattice_linear" in names
-    other = tree.copy(deep=True)
-    other["shapes"].value.loc[{"mesh_size": 8e-3, "definition": "lattice", "quantity": "tip"}] *= 1 + 1e-5
-    other.to_netcdf(tmp_path / "dataset.nc")
-    wrong = [one.labels for one in verify.again(tmp_path, beside, 9, 0) if not one.agrees]
-    assert wrong == ["cook_free_8mm_third_shear_lattice_linear"]
-
-
 def test_networks_that_are_drawn_are_stored(cook):
     _, tree, _ = cook
     fields = tree["shape_fields"].to_dataset().sel(case="cook, shear")
@@ -227,23 +214,7 @@ def test_what_cannot_be_solved_is_a_hole_that_says_why(load, tmp_path):
 
 # -- files -------------------------------------------------------------------------------------------------------------
 
-PLATE = {
-    "title": "A plate of a file",
-    "materials": {"steel": {"young_modulus": "210 GPa", "poisson_ratio": 0.3}},
-    "shapes": {
-        "plate": {
-            "file": "plate.msh",
-            "loads": {
-                "pull": {
-                    "supports": {"left": "fixed"},
-                    "forces": {"right": ["1 kN", 0]},
-                    "quantities": {"stretch": {"displacement": "x", "of": "right"}},
-                }
-            },
-        }
-    },
-    "shape_grids": {"plate": {"shape": "plate", "material": "steel", "definition": "delingette"}},
-}
+PLATE = yaml.safe_load(STUDIES["shape_plate"])
 
 
 @pytest.fixture
@@ -256,8 +227,7 @@ def plate(tmp_path):
 def test_a_file_is_the_mesh_and_the_geometry(load, plate, tmp_path):
     study = load(yaml.safe_dump(PLATE))
     assert study.parts["shapes"].scenes[0].mesh_type == "file" and study.axes["mesh_size"] == (0.0,)
-    tree, _ = done(study, tmp_path / "results/study")
-    cell = tree["shapes"].to_dataset().squeeze(drop=True)
+    cell = scenes(study, tmp_path / "results/study")
     assert int(cell.particles) == len(plate.mesh.points) and STATUS[int(cell.status)] == "solved"
     assert abs(float(cell.error)) < 0.01
     # The file is part of the keys, its place is not.
@@ -272,27 +242,22 @@ def test_a_file_is_the_mesh_and_the_geometry(load, plate, tmp_path):
     assert mesh_key(part, part.scenes[0]) != before
 
 
-def test_groups_of_a_file_are_looked_at_as_the_study_is_read(refusal, plate):
-    text = yaml.safe_dump(PLATE)
-    message = refusal(text.replace("right", "rihgt"))
-    assert "shapes.plate.loads.pull" in message and "no group is named 'rihgt'; did you mean 'right'?" in message
-    assert "supports leave the body free to" in refusal(text.replace("left: fixed", "left: {x: 0}"))
-    assert "is not a file; give its path relative to the study's folder" in refusal(text.replace("plate.msh", "no.msh"))
-    assert "'plate' is a mesh file, which has its own; remove it" in refusal(
-        text.replace("definition: delingette", "definition: delingette\n    mesh_size: 5 mm")
-    )
-    assert "unknown part 'core'; the file has none" in refusal(
-        text.replace("    file:", "    parts: {core: steel}\n    file:")
-    )
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("right", "rihgt", ["shapes.plate.loads.pull", "no group is named 'rihgt'; did you mean 'right'?"]),
+        ("left: fixed", "left: {x: 0}", ["supports leave the body free to"]),
+        ("plate.msh", "no.msh", ["is not a file; give its path relative to the study's folder"]),
+        ("definition:", "mesh_size: 5 mm\n    definition:", ["'plate' is a mesh file, which has its own; remove it"]),
+        ("    file:", "    parts: {core: steel}\n    file:", ["unknown part 'core'; the file has none"]),
+    ],
+)
+def test_groups_of_a_file_are_looked_at_as_the_study_is_read(refusal, plate, old, new, said):
+    message = refusal(yaml.safe_dump(PLATE).replace(old, new))
+    assert all(part in message for part in said), message
 
 
-TWO = yaml.safe_load(yaml.safe_dump(PLATE))
-TWO["materials"] = {
-    "steel": {"young_modulus": "210 GPa", "poisson_ratio": 0},
-    "polymer": {"young_modulus": "2 GPa", "poisson_ratio": 0},
-    "other": {"young_modulus": "3 Pa", "poisson_ratio": 0},
-}
-TWO["shapes"]["plate"]["loads"]["pull"]["supports"] = {"left": {"x": 0}, "lower": {"y": 0}}
+TWO = yaml.safe_load(STUDIES["shape_plate_of_two"])
 STRETCH = 1e3 / (0.04 * 1e-3) * (0.05 / 210e9 + 0.05 / 2e9)
 """Of the plate, its left half of steel, its right half of a polymer [m]."""
 
@@ -335,11 +300,11 @@ def test_each_part_of_a_file_has_its_material(load, refusal, tmp_path, monkeypat
     assert found.values["E soft" if whole else "E hard"] == pytest.approx(2e9 if whole else 210e9, rel=1e-4)
 
     monkeypatch.chdir(tmp_path)
-    call = ["--shape", "study.yaml:plate", "--material", material]
+    call = ["--study", "study.yaml:plate", "--material", material]
     (tmp_path / "study.yaml").write_text(text)
-    said = CliRunner().invoke(main, ["predict", *call, "--json"])
-    best = json.loads(said.output)["choices"][0]
-    assert best["errors"]["stretch"] == pytest.approx(0, abs=1e-9), said.output
+    assert st.predict(body, mesh, materials)[0].errors["stretch"] == pytest.approx(0, abs=1e-9)
+    said = CliRunner().invoke(main, ["predict", *call])
+    assert said.exit_code == 0 and " +0.00 % (stretch" in said.output.replace("-0.00", "+0.00"), said.output
     said = CliRunner().invoke(main, ["springs", *call, "--definition", "delingette", "--out", "net.json"])
     assert said.exit_code == 0 and "stretch +" in said.output, said.output
     del shape["parts"]
@@ -350,7 +315,7 @@ def test_each_part_of_a_file_has_its_material(load, refusal, tmp_path, monkeypat
         path.write_bytes(
             b"$Comments\n" + READ_AT_ONCE // 10 * b"nothing at all\n" + b"$EndComments\n" + path.read_bytes()
         )
-        cell = done(load(text), tmp_path / "results/large")[0]["shapes"].to_dataset().squeeze(drop=True)
+        cell = scenes(load(text), tmp_path / "results/large")
         assert STATUS[int(cell.status)] == "failed" and "the body has the parts" in cell.message.item()
 
 
@@ -371,7 +336,7 @@ def test_files_of_several_sizes_show_convergence(load, refusal, tmp_path, monkey
     np.testing.assert_allclose(line.get_xdata(), data.particles[::-1])
     monkeypatch.chdir(tmp_path)
     (tmp_path / "study.yaml").write_text(text)
-    predict = ["predict", "--shape", "study.yaml", "--material", "steel"]
+    predict = ["predict", "--study", "study.yaml", "--material", "steel"]
     said = CliRunner().invoke(main, predict).output
     assert "--size: missing; 'plate' has files of 5 mm, 10 mm, 20 mm; give one" in said
     assert "100 x 40 mm, steel" in CliRunner().invoke(main, [*predict, "--size", "20 mm"]).output
@@ -389,7 +354,7 @@ def test_extents_are_in_sight(tmp_path, monkeypatch, unit, warned):
     shape = PLATE["shapes"]["plate"] | {"file": "plate.msh"} | unit
     (tmp_path / "study.yaml").write_text(yaml.safe_dump(PLATE | {"shapes": {"plate": shape}}))
     monkeypatch.chdir(tmp_path)
-    asked = ["--shape", "study.yaml", "--material", "steel"]
+    asked = ["--study", "study.yaml", "--material", "steel"]
     for command in (["scenes", "study.yaml"], ["predict", *asked], ["springs", *asked, "--out", "net.csv"]):
         said = CliRunner().invoke(main, command)
         assert ("80 x 60 mm," if unit.get("unit") == "1 mm" else "80 x 60 m,") in said.stdout
@@ -402,12 +367,10 @@ def test_a_large_file_costs_its_own_scenes(load, plate, tmp_path):
     comment = b"$Comments\n" + READ_AT_ONCE // 10 * b"nothing at all\n" + b"$EndComments\n"
     path = tmp_path / "plate.msh"
     path.write_bytes(comment + path.read_bytes())
-    tree, _ = done(load(yaml.safe_dump(PLATE).replace("right", "rihgt")), tmp_path / "results/study")
-    cell = tree["shapes"].to_dataset().squeeze(drop=True)
+    cell = scenes(load(yaml.safe_dump(PLATE).replace("right", "rihgt")), tmp_path / "results/study")
     assert STATUS[int(cell.status)] == "failed" and "no group is named 'rihgt'" in cell.message.item()
     path.write_bytes(comment + b"$MeshFormat\n")
-    tree, _ = done(load(yaml.safe_dump(PLATE)), tmp_path / "results/broken")
-    cell = tree["shapes"].to_dataset().squeeze(drop=True)
+    cell = scenes(load(yaml.safe_dump(PLATE)), tmp_path / "results/broken")
     assert STATUS[int(cell.status)] == "failed" and cell.message.item().startswith("mesh: ")
 
 
@@ -427,19 +390,11 @@ def test_references_are_told_apart_whatever_they_are_called(load, tmp_path):
     content["materials"] = {"c": third, "b_c": third | {"young_modulus": "2 MPa"}}
     content["shapes"] = {"a": one, "a_b": one}
     grid = content["shape_grids"]["all"]
-    content["shape_grids"] = {
-        "one": grid | {"shape": "a", "material": "b_c"},
-        "other": grid | {"shape": "a_b", "material": "c"},
-    }
+    pairs = {"one": ("a", "b_c"), "other": ("a_b", "c")}
+    content["shape_grids"] = {name: grid | {"shape": a, "material": b} for name, (a, b) in pairs.items()}
     jobs = plan(load(yaml.safe_dump(content)), tmp_path / "results", 1).jobs.values()
-    tasks = [
-        task
-        for job in jobs
-        if job.stage.name == "shape_reference"
-        for file in job.content["files"]
-        for task in file["tasks"]
-    ]
-    assert len({task["key"] for task in tasks}) == 2
+    files = [file for job in jobs if job.stage.name == "shape_reference" for file in job.content["files"]]
+    assert len({task["key"] for file in files for task in file["tasks"]}) == 2
 
 
 def test_twins_are_counted_as_often_as_they_are_computed(load, tmp_path):
@@ -454,26 +409,18 @@ def test_twins_are_counted_as_often_as_they_are_computed(load, tmp_path):
     assert asked == {"shape_reference": 1, "shape_mesh": 2, "shape_solve": 4}
 
 
-def test_scenes_whose_mesh_was_beyond_limits_are_solved_once_these_are_raised(load, tmp_path):
-    class Limited(TaskCosts):
-        limits = "1 s"
-
+def test_scenes_whose_mesh_could_not_be_made_are_holes_that_say_why(load, tmp_path):
     study = load(COOK.replace("[16 mm, 8 mm]", "16 mm").replace("linear}", "linear, reference: false}"))
     jobs = {job.stage.name: job for job in plan(study, tmp_path / "results/study", 1).jobs.values()}
-    mesh, solve = jobs["shape_mesh"], jobs["shape_solve"]
-    driver.gone(mesh.stage.module, mesh.content, "shape_cook_free_16mm", "not done", "1 s")
-    driver.run(solve.stage.module, solve.content, Limited())
-    (path,) = (tmp_path / "results/study/solutions").iterdir()
-    assert store.stored(path, "1 s") and not store.stored(path, "1 min")
+    mesh.crashed(jobs["shape_mesh"].content, "shape_cook_free_16mm", "it died")
     tree, told = done(study, tmp_path / "results/study")
-    assert "2 solved" in told
+    assert "2 failed" in told and set(tree["shapes"].message.values.ravel()) == {"mesh: it died"}
 
 
 def test_a_scene_that_cannot_be_stated_is_a_hole(load, tmp_path):
     """All its force is on what is held: known once there is a mesh."""
     text = COOK.replace("forces: {right: [0, 1 N]}", "forces: {left: [0, 1 N]}")
-    tree, _ = done(load(text), tmp_path / "results/study")
-    data = tree["shapes"].to_dataset()
+    data = scenes(load(text), tmp_path / "results/study")
     assert {STATUS[number] for number in data.status.values.ravel()} == {"failed"}
     assert all("neither pulls what is free" in message for message in data.message.values.ravel().tolist())
 
@@ -483,8 +430,7 @@ def test_anisotropic_materials_are_told_without_their_names(load, tmp_path):
         "{young_modulus: 1 MPa, poisson_ratio: 0.3333333333333333}",
         "{young_modulus_x: 2 MPa, young_modulus_y: 1 MPa, poisson_ratio_xy: 0.3, shear_modulus: 1 MPa}",
     )
-    tree, _ = done(load(text), tmp_path / "results/study")
-    messages = tree["shapes"].to_dataset().message.sel(definition="lattice").values.ravel().tolist()
+    messages = scenes(load(text), tmp_path / "results/study").message.sel(definition="lattice").values.ravel().tolist()
     assert all("needs an isotropic material and this one is anisotropic" in message for message in messages)
 
 
@@ -497,10 +443,8 @@ def test_errors_of_rubber_are_against_its_law_at_finite_strain(load, tmp_path):
     grid |= {"definition": ["neo-hooke", "delingette", "lattice"], "kinematics": ["nonlinear", "linear"]}
     grid |= {"mesh_size": "8 mm", "finite_strain": True}
     study = load(yaml.safe_dump(config, sort_keys=False))
-    assert [law for *_, law in study.parts["shapes"].finite] == [
-        "st-venant",
-        "rubber",
-    ] * 2  # as definitions are ordered
+    laws = [law for *_, law in study.parts["shapes"].finite]
+    assert laws == ["st-venant", "rubber"] * 2  # as definitions are ordered
     tree, _ = done(study, tmp_path / "results/study")
     finite, data = tree["shapes_finite_strain"].to_dataset(), tree["shapes"].to_dataset()
     references = finite.reference_value.sel(shape="cook", material="third", quantity="tip")
@@ -520,7 +464,7 @@ def test_errors_of_rubber_are_against_its_law_at_finite_strain(load, tmp_path):
 def test_datasets_without_beams_say_where_their_networks_and_tables_are(load, tmp_path):
     study = load(COOK.replace("kinematics: linear", "kinematics: linear, reference: false").replace(", 8 mm]", "]"))
     tree, _ = done(study, tmp_path / "results/study")
-    with pytest.raises(ValueError, match="group '/': it has no variables; give one of shapes, shape_fields"):
+    with pytest.raises(ValueError, match="--group /: the group has no variables; give one of shapes, shape_fields"):
         export(tree, tmp_path / "table.csv")
     with pytest.raises(ValueError, match="nor has its study beams; 'shape_fields' has those of shapes: take"):
         st.field(tree, shape="cook")

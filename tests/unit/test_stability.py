@@ -1,6 +1,5 @@
 """The section `stability` of a study, and its stage."""
 
-import numpy as np
 import pytest
 
 from springtune.mechanics.integrators import BEHAVIOURS
@@ -10,9 +9,8 @@ from springtune.studies.kinds.stability import AXES, EXPERIMENTS, ONCE
 from springtune.studies.kinds.stability import solve as stability
 from springtune.studies.kinds.stability.collect import STABILITY
 from springtune.studies.output.dataset import DIMENSIONS
-from springtune.studies.runs import driver, store
+from springtune.studies.runs import job, store
 from springtune.studies.runs import keys as code
-from springtune.studies.runs.task_costs import TaskCosts
 
 from tables import STUDIES
 
@@ -41,13 +39,16 @@ def test_every_variable_has_its_dimensions_described():
 
 
 @pytest.mark.parametrize("name", ["contrast", "slivers", "perturbation", "poisson", "strains", "buckling"])
-def test_results_have_the_shapes_of_the_dataset(name):
+def test_rows_have_the_names_and_labels_of_the_dataset(name):
     setup = stability.Setup(
         name, Beam(0.06, 0.02, 1e-3, "b"), Material(210e9, 0.3, 7850.0, "steel"), 2e4, "lattice", "structured", (5e-3,)
     )
-    for variable, values in stability.RUN[name](setup).items():
-        dimensions = [one for one in STABILITY.variables[variable][0] if one not in ("definition", "mesh_size")]
-        assert np.shape(values) == tuple(len(AXES[one]) for one in dimensions), variable
+    rows = [{"definition": "lattice", "experiment": name} | row for row in stability.RUN[name](setup)]
+    names = {variable for row in rows for variable in row} & {*STABILITY.variables}
+    found = STABILITY.of_rows(AXES | {"definition": ["lattice"], "mesh_size": [5e-3]}, rows, names)
+    assert {key for row in rows for key in row} <= {*found.variables, "definition", "experiment"}
+    for variable in names - {one for one in names if one.endswith(("_error", "displacement", "message"))}:
+        assert found[variable].notnull().any(), variable
 
 
 def test_a_failing_experiment_is_stored_with_its_message(tmp_path):
@@ -57,7 +58,7 @@ def test_a_failing_experiment_is_stored_with_its_message(tmp_path):
              "definition": "axis-exact", "mesh_type": "free", "mesh_sizes": [5e-3]}  # fmt: skip
     tasks = [{"key": "one", "name": "contrast"} | setup]
     content = {"folder": str(tmp_path), "files": [{"name": "one", "tasks": tasks}]}
-    driver.run("studies.kinds.stability.solve", content, TaskCosts())
+    job.do("studies.kinds.stability.solve", content)
     assert store.read(tmp_path / "one.h5", ["one"])["one"]["experiment_message"]
 
 
@@ -69,5 +70,5 @@ def test_static_stages_know_no_dynamics():
         "studies.kinds.moduli.solve",
         "studies.kinds.laying.solve",
     ):
-        assert not any(file.endswith(("dynamics.py", "kernels.py")) for file in code.modules(stage))
-    assert any(file.endswith("dynamics.py") for file in code.modules("studies.kinds.stability.solve"))
+        assert not {"dynamics.py", "kernels.py"} & {file.name for file in code.closure(stage).files}
+    assert "dynamics.py" in {file.name for file in code.closure("studies.kinds.stability.solve").files}

@@ -6,58 +6,11 @@ import sys
 import meshio
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import springtune as st
-from springtune.cli import main
 from springtune.mesh import write_mesh
 
 from tables import STUDIES
-
-BOMB = "a0: &a0 [x, y]\n" + "".join(f"a{n}: &a{n} [*a{n - 1}, *a{n - 1}, *a{n - 1}]\n" for n in range(1, 30))
-
-BAD = {
-    "tab": (b"title: x\nbeams:\n\tsmall: {length: 50 mm}\n", "study.yaml:3: not YAML: found character '\\t'"),
-    "not text": (b"title: \xff\n", "study.yaml:1: not UTF-8 text: byte 0xff; save the file in UTF-8"),
-    "empty": (b"", "study.yaml: the file is empty; give the keys title"),
-    "alias bomb": (
-        BOMB.encode(),
-        "study.yaml:11: more than 100000 values, aliases (*name) as what they stand for; give",
-    ),
-    "missing": (None, "study.yaml: cannot be read: No such file or directory; give the path of a study"),
-    "wrong": (b"title: x\nbeems: {}\n", "study.yaml:2: beems: unknown key 'beems'; did you mean 'beams'?"),
-}
-
-
-def told_of(folder, name):
-    """What both commands say of a bad study."""
-    content, says = BAD[name]
-    path = folder / "study.yaml"
-    path.unlink(missing_ok=True)
-    if content is not None:
-        path.write_bytes(content)
-    for command in ("scenes", "run"):
-        told = CliRunner().invoke(main, [command, str(path)])
-        assert told.exit_code == 1 and str(folder / says) in told.stderr
-    return told.stderr.strip().replace(f"{folder}/", "")
-
-
-@pytest.mark.parametrize("name", BAD)
-def test_commands_say_the_same_of_a_bad_study(tmp_path, name):
-    told_of(tmp_path, name)
-
-
-OURS = ("alias bomb", "wrong")
-"""What Snakemake can read; of the others it speaks in its own words."""
-
-
-@pytest.mark.parametrize("name", [one if one in OURS else pytest.param(one, marks=pytest.mark.slow) for one in BAD])
-def test_snakemake_refuses_a_bad_study(run, name):
-    message = told_of(run.folder, name)
-    code, text = run.snakemake("study.yaml", "-n")
-    assert code == 1
-    # Snakemake's folder is the study's, so that its path is shorter there.
-    assert name not in OURS or message in text.replace(f"{run.folder}/", "") and "Traceback" not in text
 
 
 def test_run_passes_on_what_is_snakemakes(repository, tmp_path):
@@ -66,18 +19,6 @@ def test_run_passes_on_what_is_snakemakes(repository, tmp_path):
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0 and "collect" in done.stdout.split()
     assert [path.name for path in tmp_path.iterdir()] == [".snakemake"]
-
-
-@pytest.mark.parametrize(
-    ("arguments", "says"),
-    [
-        (["-n", "config/mine.yaml"], "name the study first: springtune run config/mine.yaml -n"),
-        (["--configfile", "config/mine.yaml"], "give the study itself, without --configfile"),
-    ],
-)
-def test_run_called_wrongly_exits_with_2(arguments, says):
-    told = CliRunner().invoke(main, ["run", *arguments])
-    assert told.exit_code == 2 and says in told.stderr
 
 
 FILES = STUDIES["bad_studies_files"]
@@ -101,7 +42,7 @@ def test_a_bad_mesh_file_costs_its_own_scenes_alone(run):
             assert (scenes.status.sel(mesh_type=mesh_type) == st.Status.SOLVED).all()
             assert scenes.particles.sel(mesh_type=mesh_type) > 0
         for mesh_type, why in (
-            ("cut", "cut.vtu: meshio cannot read it"),
+            ("cut", "cut.vtu: cannot be read: it is damaged"),
             ("lost", "points with coordinates that are no"),
         ):
             lost = scenes.sel(mesh_type=mesh_type)
@@ -139,9 +80,10 @@ def test_a_strict_run_tells_holes_by_its_exit_code(tmp_path, repository):
     code, text = run("--strict")
     assert code == 3, text
     assert text.endswith("--strict: 1 scenes are not solved\n")
-    assert "Select jobs" not in text and text.count("\nMeshing: 1 job done, ") == 1  # a line for each stage
-    assert run()[0] == 0
+    assert "Select jobs" not in text and text.count("\nMeshing: done; ") == 1  # a line for each stage
     dataset = tmp_path / "results/hole/dataset.nc"
     dataset.write_bytes(dataset.read_bytes()[:1000])
-    code, text = run("--strict", "-n")
-    assert code == 0 and "dataset.nc is damaged" in text and "Traceback" not in text, text
+    code, text = run("--strict")
+    assert code == 1 and "dataset.nc: cannot be read (" in text and "delete it" in text and "Traceback" not in text, (
+        text
+    )

@@ -4,8 +4,6 @@ import shutil
 import subprocess
 import sys
 
-import yaml
-
 SMALL = """\
 title: small
 beams: {short: {length: 60 mm, height: 20 mm}}
@@ -50,14 +48,3 @@ use rule * from springtune
         done = subprocess.run(command, cwd=tmp_path / "deployed", capture_output=True, text=True)
         assert done.returncode == 0 and "results/config is complete" in done.stdout, done.stderr
     assert (repository / ".test/config/config.yaml").samefile(repository / "config/quick.yaml")
-
-
-def test_settings_of_the_catalog(repository):
-    usage = yaml.safe_load((repository / ".snakemake-workflow-catalog.yml").read_text())["usage"]
-    assert {"mandatory-flags", "software-stack-deployment", "report"} == set(usage)
-    option, study = usage["mandatory-flags"]["flags"].split()
-    assert option == "--configfile" and (repository / study).is_file()
-    for path in ("config/README.md", "workflow/Snakefile", "workflow/envs/springtune.yaml", "LICENSE"):
-        assert (repository / path).is_file()
-    first = " ".join((repository / "README.md").read_text().split("\n\n")[2].split())
-    assert "Snakemake workflow" in first and "Python library" in first

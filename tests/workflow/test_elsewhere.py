@@ -15,47 +15,14 @@ from tables import STUDIES
 STUDY = STUDIES["elsewhere"]
 
 
-def test_a_plan_for_a_cluster_has_jobs_of_the_wanted_time(run):
-    """A bundle of both meshes is what one machine does."""
-    run.write("elsewhere.yaml", STUDY)
-    code, output = run.snakemake("elsewhere.yaml", "-n", "--config", "job_minutes=1e-6")
-    assert code == 0 and re.search(r"^solve +2$", output, re.MULTILINE), output
-    assert not (run.folder / "results").exists()  # of a study that was never run a plan writes nothing
-
-
-@pytest.mark.parametrize("minutes", ["-1", *(pytest.param(one, marks=pytest.mark.slow) for one in ("soon", "true"))])
-def test_a_time_that_is_none_is_refused_by_its_name(run, minutes):
-    run.write("elsewhere.yaml", STUDY)
-    code, output = run.snakemake("elsewhere.yaml", "-n", "--config", f"job_minutes={minutes}")
-    assert code == 1 and "Traceback" not in output
-    assert re.search(f"job_minutes={minutes}: no number of minutes; the profile slurm has 5", output, re.IGNORECASE)
-
-
-def test_what_the_dataset_is_not_to_tell_reaches_the_job_that_writes_it(run):
-    run.write("elsewhere.yaml", STUDY)
-    code, output = run.snakemake("elsewhere.yaml", "-n", "-p", "--config", "no_diff=true", "no_host=true")
-    assert code == 0 and re.search(r"kinds\.collect .* git_diff host > ", output), output
-    code, output = run.snakemake("elsewhere.yaml", "-n", "-p")
-    assert code == 0 and re.search(r"kinds\.collect .* [0-9a-f]{24} +> ", output), output
-    code, output = run.snakemake("elsewhere.yaml", "-n", "--config", "no_host=maybe")
-    assert code == 1 and "--config no_host=maybe: neither true nor false; give one of them" in output, output
-    code, output = run.springtune("elsewhere.yaml", "--no-host", "-n", "-p")
-    assert code == 0 and re.search(r"kinds\.collect .* host > ", output), output
-
-
-def test_rules_whose_jobs_go_elsewhere_have_a_benchmark(repository):
-    """What is noted of a job names it, and a rule cannot be told to have none."""
+def test_rules_have_a_benchmark_and_quote_all_that_they_give_to_a_shell(repository):
+    """What is noted of a job names it; the command of a job on another machine is quoted already."""
     for path in sorted((repository / "workflow/rules").glob("*.smk")):
         text = path.read_text()
         rules = re.findall(r"^ *(?:rule \w+|rule|use rule \w+ as \w+ with):$", text, re.MULTILINE)
-        assert len(rules) == text.split().count("benchmark:") + ("rule publish:" in text), path
-
-
-def test_rules_quote_all_that_they_give_to_a_shell(repository):
-    """All but the command of a job on another machine, which is quoted already."""
-    for path in sorted((repository / "workflow/rules").glob("*.smk")):
-        blocks = re.findall(r"shell:\n((?:\s+\".*\"\n)+)", path.read_text())
-        assert len(blocks) == path.read_text().count("shell:"), path
+        assert len(rules) == text.split().count("benchmark:"), path
+        blocks = re.findall(r"shell:\n((?:\s+\".*\"\n)+)", text)
+        assert len(blocks) == text.count("shell:"), path
         fields = [field for block in blocks for field in re.findall(r"\{(.*?)\}", block)]
         assert all(field.endswith(":q") for field in fields) or fields == ["params.command"], path
 
@@ -130,36 +97,3 @@ def test_slurm_gets_no_path_that_its_plugin_would_have_to_quote(what, name):
         f"{f'/home/{name}'!r}: the plugin for Slurm passes paths to a shell without quotes; use letters, digits and "
         "@ + = : , . / _ - in names of files and folders"
     )
-
-
-def test_storage_without_a_place_is_asked_for(run):
-    run.write("elsewhere.yaml", STUDY)
-    code, output = run.snakemake("elsewhere.yaml", "--nolock", "publish")
-    assert code == 1 and "where? give --config storage=s3://bucket/folder" in output, output
-
-
-def test_a_job_on_a_node_reads_no_study_and_writes_its_own_files_alone(run, repository):
-    """As the plugin calls it; that its study is none, and grew by a million scenes, is not seen."""
-    run.write("unread.yaml", "no: study\n")
-    folder = run.folder / "results/unread"
-    told = {
-        "rule": "solve",
-        "wildcards": {"bundle": "3"},
-        "output": ["results/unread/done/solve_{bundle}.json"],
-        "log": ["results/unread/logs/solve_{bundle}.log"],
-        "benchmark": "results/unread/benchmarks/solve_{bundle}.tsv",
-        "threads": 1,
-        "command": "echo '{braces}' $HDF5_USE_FILE_LOCKING > results/unread/done/solve_3.json",
-    }
-    workload.remember_commands(folder, [told | {"wildcards": {"bundle": "2"}, "command": "false"}, told])
-    before = (folder / workload.COMMANDS_FILE).read_bytes()
-    command = [sys.executable, "-m", "snakemake", "--snakefile", repository / "Snakefile", "--mode", "remote",
-               "--target-jobs", "solve:bundle=3", "--allowed-rules", "solve", "--cores", "all", "--force", "--nolock",
-               "--no-hooks", "--ignore-incomplete", "--configfiles", "unread.yaml",
-               "--config", "job_minutes=5"]  # fmt: skip
-    done = subprocess.run(list(map(str, command)), cwd=run.folder, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    assert (folder / "done/solve_3.json").read_text() == "{braces} FALSE\n"
-    made = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
-    assert made - {"logs/solve_3.log"} == {workload.COMMANDS_FILE, "done/solve_3.json", "benchmarks/solve_3.tsv"}
-    assert (folder / workload.COMMANDS_FILE).read_bytes() == before

@@ -1,13 +1,10 @@
 """Another workflow that uses this one: ``module springtune``, of this machine and of a host."""
 
 import re
-import shutil
-import subprocess
 import zipfile
 from pathlib import Path
 
 import pytest
-import snakemake.sourcecache
 
 from tables import STUDIES
 
@@ -94,46 +91,3 @@ def test_what_a_module_cannot_be_given_is_told(others, given, says):
     code, told = others("-n", *given.pop("arguments", ()), **given)
     assert code == 1 and says in told and "Traceback" not in told, told
     assert not (others.folder / "results").exists()
-
-
-@pytest.fixture
-def host(tmp_path):
-    """Environment in which git gets a repository of this workflow where it asks a host for one."""
-    repository = tmp_path / "host/owner/workflow"
-    shutil.copytree(REPOSITORY / "workflow", repository / "workflow")
-    shutil.copy(REPOSITORY / "Snakefile", repository)
-    git = ["git", "-c", "user.name=a", "-c", "user.email=a@b.c"]
-    for command in (["init", "-q", "-b", "main"], ["add", "."], ["commit", "-q", "-m", "a"]):
-        subprocess.run([*git, *command], cwd=repository, check=True)
-    instead = f"url.{tmp_path}/host/.insteadOf"
-    return {
-        "GIT_CONFIG_COUNT": "1", "GIT_CONFIG_KEY_0": instead, "GIT_CONFIG_VALUE_0": "https://github.com/",
-        "XDG_CACHE_HOME": str(tmp_path / "cache"),
-    }  # fmt: skip
-
-
-REMOTE = 'github("owner/workflow", path="Snakefile", branch="main")'
-
-
-HOSTED = pytest.mark.skipif(
-    not hasattr(snakemake.sourcecache, "HostedGitRepo"), reason="this Snakemake asks hosts without git"
-)
-
-
-@HOSTED
-def test_a_workflow_on_a_host_finds_its_files(others, host):
-    """Which Snakemake reads one by one: no folder has them."""
-    code, told = others("-n", snakefile=REMOTE, **host)
-    assert code == 0 and re.search(r"^springtune_solve +\d", told, re.MULTILINE), told
-
-
-@HOSTED
-@pytest.mark.slow
-def test_a_workflow_on_a_host_runs(others, host):
-    code, told = others(snakefile=REMOTE, **host)
-    assert code == 0 and (others.folder / "told.txt").is_file(), told
-    code, told = others("--report", "report.zip", snakefile=REMOTE, **host)
-    assert code == 0 and (others.folder / "report.zip").is_file(), told
-    # The paper, with the files beside it and the studies that it reads.
-    code, told = others("-n", "springtune_paper", snakefile=REMOTE, **host)
-    assert code == 0 and re.search(r"^springtune_definitions_mesh +\d", told, re.MULTILINE), told

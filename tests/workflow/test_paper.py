@@ -2,8 +2,6 @@
 
 import re
 
-import pytest
-
 STUDIES = ("paper", "definitions", "block", "laying", "stability", "benchmark", "shapes")
 STUDY = """
 title: As small as it gets
@@ -37,22 +35,3 @@ def test_the_paper_takes_all_its_studies_and_another_target_takes_one(run):
     code, output = run.snakemake("definitions.yaml", "-n")
     assert code == 0, output
     assert {"collect", "mesh", "solve"} <= jobs(output) and not {"paper", "block_collect"} & jobs(output)
-
-
-@pytest.mark.slow
-def test_a_paper_without_its_numbers_says_which_and_studies_are_as_if_they_were_run_by_themselves(run):
-    write(run)
-    code, output = run.snakemake("paper.yaml", "--keep-going", "paper")
-    assert code != 0
-    log = "results/paper/logs/paper.log"
-    said = (run.folder / log).read_text().splitlines()
-    why = "dataset.nc has no group /sensitivity; give one that it has, or run the study again"
-    assert any(line.endswith(why) for line in said)
-    assert said[-1] in output and f"its log: {log}" in output
-    assert not (run.folder / "results/paper/paper.pdf").exists()
-    times = run.times("results/*/dataset.nc")
-    assert len(times) == len(STUDIES)
-    for name in ("paper", "definitions"):
-        code, output = run.snakemake(f"{name}.yaml", "--keep-going", f"results/{name}/dataset.nc")
-        assert code == 0 and "Nothing to be done" in output, output
-    assert run.times("results/*/dataset.nc") == times

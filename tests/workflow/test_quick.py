@@ -14,15 +14,9 @@ import numpy as np
 import pytest
 import xarray as xr
 import yaml
-from click.testing import CliRunner
 from nbclient import NotebookClient
 
 import springtune as st
-from cf import complaints
-from springtune.cli import main
-from springtune.studies.kinds import load_study
-from springtune.studies.output import dataset
-from springtune.studies.runs.rerun import orphans
 
 from campaigns import Campaign
 
@@ -33,27 +27,26 @@ SCENE = ("beam", "mesh_type", "mesh_size", "material", "load", "definition", "ki
 def tree(run, repository):
     """By its jobs in this process; tests/unit/test_figures.py draws the other figures."""
     content = yaml.safe_load((repository / "config/quick.yaml").read_text())
-    content["outputs"] = ["sensitivity", "size", "deformed", "paraview", "tables", "block"]
+    content["outputs"] = ["size", "paraview", "tables"]
+    del content["samples"]  # tests/unit/test_samples.py has them
     content["stability"]["experiment"].remove("slivers")  # tests/unit/test_stability.py has them
     content["benchmark"]["mesh_size"] = "5 mm"
     run.write("quick.yaml", yaml.safe_dump(content, sort_keys=False))
     with contextlib.chdir(run.folder):
-        Campaign("quick.yaml").finish()
+        Campaign("quick.yaml", cores=None).finish()  # the bundles of `snakemake` on this machine
     with xr.open_datatree(run.folder / "results/quick/dataset.nc", engine="h5netcdf") as opened:
         yield opened.load()
 
 
 def test_root_has_the_names_of_the_contract(tree):
     root = tree.to_dataset()
-    for name in ("displacement", "deformation_error", "stiffness", "status", "message", "solve_seconds", "iterations",
-                 "residual"):  # fmt: skip
+    for name in "displacement deformation_error stiffness status message solve_seconds iterations residual".split():
         assert root[name].dims == SCENE, name
     for name in ("reference_displacement", "force"):
         assert root[name].dims == ("beam", "material", "load"), name
-    for name in ("reference_error_estimate", "particles", "springs", "paper_displacement", "paper_deformation_error",
-                 "paper_reference_displacement", "minimum_angle", "edge_length_spread",
-                 "beam_length", "beam_height", "beam_thickness"):  # fmt: skip
-        assert name in root
+    further = "reference_error_estimate particles springs minimum_angle edge_length_spread"
+    further += " paper_displacement paper_deformation_error paper_reference_displacement"
+    assert {*further.split(), "beam_length", "beam_height", "beam_thickness"} <= {*root.variables}
     assert root.mesh_size.values.tolist() == [2e-3, 5e-3]
     assert root.status.attrs["flag_meanings"] == "not_requested solved linear_only not_converged unstable failed"
     assert list(root.status.attrs["flag_values"]) == [0, 1, 2, 3, 4, 5]
@@ -70,9 +63,8 @@ def test_block_and_laying_have_the_names_of_the_contract(tree):
     assert finite == pytest.approx(small, rel=0.1) and finite != small
     # Linear kinematics know no other place than that at rest: the pressure follows nothing.
     assert area == pressed.face_displacement.sel(definition="area", load="follower-pressure").item()
-    assert tree.displacement.sel(place).sel(
-        definition="area", load="pressure", kinematics="linear"
-    ).item() == area  # fmt: skip
+    same = place | {"definition": "area", "load": "pressure", "kinematics": "linear"}
+    assert tree.displacement.sel(same).item() == area
     strip = laid.sel(definition="area", mesh_size=2e-3, loading="pressure", friction=0)
     assert abs(strip.area_error.item()) <= 0.01 and strip.penetration.item() <= 1e-3
     assert abs(strip.elongation.item() - strip.reference_elongation.item()) <= 0.01
@@ -109,33 +101,14 @@ def test_stability_has_the_names_of_the_contract(tree):
 def test_benchmark_has_the_names_of_the_contract(tree):
     """That seconds are there; how many, and their ratios, depend on what else the machine does."""
     data = tree["benchmark"].to_dataset()
-    for name in ("error", "seconds", "peak_memory"):
+    for name in ("error", "seconds", "unknowns"):
         assert data[name].dims == ("scene", "approach", "mesh_size"), name
     traction = data.sel(scene="traction", mesh_size=5e-3)
     ours, theirs = (traction.error.sel({"approach": name}) for name in ("delingette/structured", "linear-triangles"))
     assert abs(ours - theirs).max() <= 1e-9
     assert (traction.solving_seconds.sel({"approach": "condensation"}) > 0).all()
-    assert (traction.pareto.max() == 1).all() and (data.reference_error_estimate < 1e-4).all()
-    assert (data.curve_seconds > 0).all()
-    assert data.separate_seconds.values == pytest.approx(data.curve_count * data.nonlinear_seconds)
-
-
-def test_every_variable_has_units_and_a_long_name(tree):
-    for group in tree.subtree:
-        for name, variable in group.to_dataset(inherit=False).variables.items():
-            assert variable.attrs.get("units") and variable.attrs.get("long_name"), f"{group.path}/{name}"
-
-
-def test_checkers_of_conventions_have_nothing_against_it(run, tree):
-    assert complaints(run.folder / "results/quick/dataset.nc") == []
-
-
-@pytest.mark.slow
-def test_checkers_of_conventions_have_nothing_against_its_groups(tree, tmp_path):
-    """They look at the root alone, so groups are made roots."""
-    for name, group in tree.children.items():
-        dataset.write(tmp_path / f"{name}.nc", {"/": group.to_dataset()}, tree.attrs)
-        assert complaints(tmp_path / f"{name}.nc") == [], name
+    assert (data.reference_error_estimate < 1e-4).all()
+    assert (data.spring_updates.sel(mesh_size=5e-3) > 0).all()
 
 
 @pytest.mark.parametrize("mesh_type", ["structured", "braced"])
@@ -166,28 +139,9 @@ def test_fields_are_meshes_in_equilibrium(tree, mesh_type):
     assert abs(total[right, axis].sum()) == pytest.approx(size, rel=1e-5)
 
 
-def test_paraview_gets_what_each_particle_is_off_its_reference(run, tree, tmp_path):
-    """Its mean over the loaded side is what the scene is off its reference."""
-    labels = {"beam": "100x20", "mesh_type": "free", "material": "steel", "load": "traction", "definition": "lattice"}
-    chosen = ",".join(f"{name}={label}" for name, label in (labels | {"kinematics": "linear"}).items())
-    told = ["export", str(run.folder / "results/quick"), "--to", str(tmp_path / "net.vtu"), "--select", chosen]
-    assert CliRunner().invoke(main, told).exit_code == 0
-    net, cell = meshio.read(tmp_path / "net.vtu"), tree.sel(labels | {"kinematics": "linear", "mesh_size": 5e-3})
-    right = np.flatnonzero(net.points[:, 0] >= 0.1 - 1e-9)
-    right = right[np.argsort(net.points[right, 1])]
-    mean = np.trapezoid(net.point_data["error"][right, 0], net.points[right, 1]) / 0.02
-    # The reference is interpolated from a grid, within 1e-5 of its displacement.
-    expected = float(cell.reference_displacement)
-    assert mean == pytest.approx(float(cell.displacement) - expected, abs=2e-5 * expected)
-
-
-def test_nothing_lies_there_that_the_study_does_not_ask_for(run, tree):
-    assert orphans(load_study(run.folder / "quick.yaml"), run.folder / "results/quick") == []
-
-
 def test_root_attributes_tell_where_the_data_come_from(tree, run):
     for name in ("title", "Conventions", "study", "config", "springtune_version", "git_commit", "created", "software",
-                 "host", "history", "source", "references", "git_diff"):  # fmt: skip
+                 "history", "source", "references"):  # fmt: skip
         assert name in tree.attrs
     text = (run.folder / "quick.yaml").read_bytes()
     assert json.loads(tree.attrs["inputs"]) == {
@@ -229,13 +183,8 @@ def test_uniform_scenes_lie_on_their_sensitivity_curve(tree):
 
 def test_calibrated_is_the_mean_best_stiffness(tree):
     root, curves = tree.to_dataset(), tree["sensitivity"].to_dataset()
-    place = {
-        "mesh_type": "structured",
-        "material": "steel",
-        "load": "traction",
-        "kinematics": "nonlinear",
-        "beam": "100x20",
-    }
+    place = {"mesh_type": "structured", "material": "steel", "load": "traction", "kinematics": "nonlinear"}
+    place["beam"] = "100x20"
     best = curves.best_stiffness.sel(place)
     assert best.sizes == {"mesh_size": 2}
     stiffness = root.stiffness.sel(place | {"definition": "calibrated"})
@@ -250,15 +199,6 @@ def test_sensitivity_spans_the_asked_range(tree):
     assert curves.best_stiffness.notnull().any() and curves.predicted_stiffness.notnull().any()
 
 
-def test_meshes_open_in_meshio(run, tree):
-    path = run.folder / "results/quick/meshes/100x20_structured_5mm.vtu"
-    mesh = meshio.read(path)
-    assert [block.type for block in mesh.cells] == ["triangle"]
-    assert mesh.points[:, 0].max() == pytest.approx(0.1)
-    counted = tree.particles.sel(beam="100x20", mesh_type="structured", mesh_size=5e-3)
-    assert int(counted) == len(mesh.points)
-
-
 def test_tables_and_figures_are_there(run, tree):
     results = run.folder / "results/quick"
     rows = list(csv.DictReader((results / "tables/table_1.csv").read_text().splitlines()))
@@ -266,34 +206,27 @@ def test_tables_and_figures_are_there(run, tree):
     assert float(rows[0]["printed_displacement_mm"]) == 0.44
     page = (results / "tables/index.html").read_text()
     assert "Table 1" in page and "20 kN fits" in page
-    for stem in ("sensitivity_100x20_free_steel_traction", "size_structured_rubber_traction",
-                 "deformed_structured_steel_compression"):  # fmt: skip
-        for ending in ("png", "pdf"):
-            assert (results / f"figures/{stem}.{ending}").stat().st_size > 5000
+    for ending in ("png", "pdf"):
+        assert (results / f"figures/size_structured_rubber_traction.{ending}").stat().st_size > 5000
 
 
 def test_paraview_has_the_scenes_whose_fields_are_kept(run, tree):
     """Numbers of one are those of the same scene, solved by the library."""
     folder = run.folder / "results/quick/paraview"
-    pieces = re.findall(r'file="(.*?)"', (folder / "scenes.pvd").read_text())
+    rows = list(csv.DictReader((folder / "scenes.csv").read_text().splitlines()))
+    pieces = [row["file"] for row in rows]
     assert len(pieces) == int(tree["fields"].displacement_x.isel(particle=0).notnull().sum())
-    assert sorted(pieces) == sorted(path.relative_to(folder).as_posix() for path in folder.glob("*/*"))
-    grid = meshio.read(folder / "scenes/100x20_structured_5mm_steel_traction_lattice_nonlinear.vtu")
+    assert sorted(pieces) == sorted(path.relative_to(folder).as_posix() for path in folder.glob("*.vtu"))
+    grid = meshio.read(folder / "100x20_structured_5mm_steel_traction_lattice_nonlinear.vtu")
     beam, steel = st.Beam("100 mm", "20 mm"), st.Material("210 GPa", 0.3)
-    result = st.Scene(
-        beam, st.make_mesh(beam, "structured", "5 mm"), steel, "traction", "20 kN", definition="lattice"
-    ).solve()
-    assert np.allclose(
-        grid.point_data["displacement"][:, :2],
-        result.displacements,
-        rtol=0,
-        atol=1e-9 * np.abs(result.displacements).max(),
-    )
+    mesh = st.make_mesh(beam, "structured", "5 mm")
+    result = st.Scene(beam, mesh, steel, "traction", "20 kN", definition="lattice").solve()
+    small = 1e-9 * np.abs(result.displacements).max()
+    assert np.allclose(grid.point_data["displacement"][:, :2], result.displacements, rtol=0, atol=small)
     assert np.allclose(grid.cell_data["stiffness"][0], result.stiffness, rtol=1e-6)  # stored with seven digits
     assert np.allclose(grid.cell_data["force"][0], result.spring_forces, rtol=1e-6, atol=1e-6 * 20e3)
-    assert grid.field_data["deformation_error"] == pytest.approx(result.error, rel=1e-9)
     error = result.displacements - result.reference().at(result.scene.mesh.points)
-    assert np.allclose(grid.point_data["error"][:, :2], error, rtol=0, atol=1e-9 * np.abs(result.displacements).max())
+    assert np.allclose(grid.point_data["error"][:, :2], error, rtol=0, atol=small)
 
 
 def test_snippets_of_the_docs_run(run, tree, repository, monkeypatch):
@@ -343,10 +276,10 @@ def test_snakemake_runs_the_same_jobs(run, tree):
     code, output = run.snakemake("quick.yaml", "-n", "-p", "--forceall")
     assert code == 0, output
     with contextlib.chdir(run.folder):
-        here = Campaign("quick.yaml", cores=2)
+        here = Campaign("quick.yaml", cores=None)
     jobs = {(str(here.plan.tasks(one)), str(here.jobs[one].record), here.jobs[one].digest) for one in here.plan.jobs}
     assert set(re.findall(r"kinds\.collect|present|browse", output)) == {"kinds.collect", "present", "browse"}
-    assert len(jobs) > 10 and set(re.findall(r"run_tasks (\S+) (\S+) (\S+) > ", output)) == jobs
+    assert len(jobs) > 10 and set(re.findall(r"runs\.job (\S+) (\S+) (\S+) > ", output)) == jobs
 
 
 def test_the_linter_has_no_remark(run, tree):

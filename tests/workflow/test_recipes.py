@@ -51,6 +51,8 @@ def test_a_group_is_a_module_and_a_row_and_a_kind_is_a_package_and_a_study(repos
     assert written == 4  # one module of a group, three of a kind
     row = RECIPES["row of studies/kinds/scenes/outputs.py"].partition("\n")[2]
     add_row(package / "studies/kinds/scenes/outputs.py", row, "OUTPUTS")
+    with (repository / "workflow/rules/stages.smk").open("a") as rules:
+        rules.write(f"\n\n{RECIPES['end of workflow/rules/stages.smk']}")
     study = re.search(r"^```yaml\n# config/columns.yaml\n(.*?)^```", CONTRIBUTING, re.DOTALL | re.MULTILINE)[1]
     (repository / "config/columns.yaml").write_text(study)
     command = ["-m", "snakemake", "--snakefile", "Snakefile", "--cores", "2", "--configfile", "config/columns.yaml"]

@@ -15,9 +15,6 @@ rule browse:
         digest=JOBS["browse"].digest,
         # What the page links to; other jobs make it meanwhile.
         files=rerun.linked(STUDY),
-    resources:
-        runtime=minutes(rerun.BROWSE),
-        mem_mb=megabytes(rerun.BROWSE),
     log:
         RESULTS / "logs/browse.log",
     benchmark:

@@ -17,10 +17,6 @@ rule collect:
         config=lambda wildcards: str(CONFIG),
         folder=lambda wildcards, output: str(Path(output.dataset).parent),
         digest=JOBS["collect"].digest,
-        untold=rerun.untold(RESULTS, LEFT_EMPTY),
-    resources:
-        runtime=minutes(rerun.COLLECT),
-        mem_mb=megabytes(rerun.COLLECT),
     log:
         RESULTS / "logs/collect.log",
     benchmark:
@@ -29,4 +25,4 @@ rule collect:
         ENVIRONMENT
     shell:
         "python -m springtune.studies.kinds.collect {params.config:q} {params.folder:q} {output.dataset:q}"
-        " {output.done:q} {params.digest:q} {params.untold:q} > {log:q} 2>&1"
+        " {output.done:q} {params.digest:q} > {log:q} 2>&1"

@@ -1,11 +1,9 @@
 """The study, the plan of its jobs, and helpers that the rules share."""
 
 import gc
-import os
 import re
 import sys
 import warnings
-from math import inf
 from pathlib import Path
 
 from springtune.problem.geometry import AssumptionWarning
@@ -14,8 +12,7 @@ from springtune.studies.config.kind import FORMATS
 from springtune.studies.config.messages import StudyError
 from springtune.studies.kinds import load_study
 from springtune.studies.runs import locks, rerun, workload
-from springtune.studies.runs.keys import CODE_FILE, OURS
-from springtune.studies.runs.plan import plan, stages
+from springtune.studies.runs.plan import plan
 
 
 def refused(why):
@@ -36,35 +33,10 @@ def loaded_study():
         refused(f"{error}{remedy if MODULE and 'study' not in config else ''}")
 
 
-def job_seconds():
-    """Intended seconds of a job, from a cluster's profile or ``--config job_minutes=5``; None in the jobs themselves."""
-    if IS_CHILD:
-        return None
-    minutes = config.get("job_minutes", 0)
-    if isinstance(minutes, bool) or not isinstance(minutes, int | float) or not 0 <= minutes < inf:
-        usual = "the profile slurm has 5, a machine of one's own 0, for as few as pay"
-        refused(f"--config job_minutes={minutes}: no number of minutes; {usual}")
-    return 60.0 * minutes
-
-
-def left_empty():
-    """Attributes that the dataset leaves empty, by ``--config no_host=true``; also in studies that the paper reads."""
-    chosen = {}
-    for option in rerun.BLANKED:
-        # `springtune run` sets the variable: its --config would replace the one of a profile.
-        variable = f"SPRINGTUNE_{option.upper()}"
-        value = str(config.get(option, os.environ.get(variable, ""))).lower()
-        if value not in ("", "true", "false"):
-            refused(f"--config {option}={value}: neither true nor false; give one of them")
-        if value:
-            os.environ[variable], chosen[option] = value, value == "true"
-    return chosen
-
-
 # Keys of results have the versions of the packages that Snakemake sees, so jobs must run on these.
 # Snakemake takes braces in a path of it for wildcards.
 ENVIRONMENT = None if DEPLOYED or "{" in str(SOURCE) else "../envs/springtune.yaml"
-"""What rules need, for readers and for `--lint`; see docs/how-to/use-conda.md."""
+"""What rules need, for readers and for `--lint`; see docs/how-to/use-conda-or-a-container.md."""
 
 if DEPLOYED and not IS_CHILD:
     print("note: jobs run in the environment of Snakemake; --software-deployment-method is not used", file=sys.stderr)
@@ -76,7 +48,6 @@ if UNUSABLE_PATH and not IS_CHILD:
 if MOVED:
     refused(f"module {MODULE}: results are in results/<study> and take no other prefix; leave the prefix out")
 
-LEFT_EMPTY = left_empty()
 # Scenes and their tasks stay to the end: collecting garbage among them takes a fifth of the reading.
 gc.disable()
 STUDY = loaded_study()
@@ -84,11 +55,8 @@ RESULTS = Path("results") / STUDY.name
 if not MODULE:
     config |= {"title": rst(STUDY.title), "results": str(RESULTS)}  # for the report's text
 
-# The number of jobs follows from the cores; on a cluster, which has room for all, from the seconds of a job.
-CORES = 1 if ON_CLUSTER or IS_CHILD else workflow.cores or 1
-OURS.recall(RESULTS.parent / CODE_FILE)
-PLAN = plan(STUDY, RESULTS, CORES, job_seconds())
-JOBS = rerun.jobs(STUDY, PLAN, LEFT_EMPTY)
+PLAN = plan(STUDY, RESULTS, cluster=ON_CLUSTER or IS_CHILD)
+JOBS = rerun.jobs(STUDY, PLAN)
 gc.freeze()
 gc.enable()
 try:
@@ -109,9 +77,9 @@ def done(stage):
     return [PLAN.record(job.name) for job in PLAN.jobs.values() if job.stage.name == stage]
 
 
-def bundles(stage):
-    """Pattern of a stage's bundles, for the constraint of its wildcard."""
-    return "|".join(map(re.escape, PLAN.labels(stage))) or "none"
+def bundles():
+    """Pattern of the labels of bundles."""
+    return "|".join(sorted({re.escape(job.label) for job in PLAN.jobs.values()})) or "none"
 
 
 def digest(name):
@@ -120,27 +88,6 @@ def digest(name):
     A function of the wildcards alone: Snakemake does not compare parameters that depend on input or output.
     """
     return lambda wildcards: JOBS[name.format(**dict(wildcards))].digest
-
-
-# A change of these resources is no reason to run a job again.
-
-
-def minutes(name):
-    """Resource ``runtime`` of the jobs of a rule, by the name of their record."""
-    return lambda wildcards, attempt: needs(name, wildcards).minutes(attempt)
-
-
-def megabytes(name):
-    """Resource ``mem_mb`` of the jobs of a rule, by the name of their record."""
-    return lambda wildcards, attempt: needs(name, wildcards).megabytes(attempt)
-
-
-def needs(name, wildcards):
-    """Expected seconds and memory of a job, from measured costs of its tasks."""
-    job = name.format(**dict(wildcards))
-    if job in PLAN.jobs:
-        return PLAN.needs[PLAN.jobs[job].stage.name, PLAN.jobs[job].label]
-    return workload.presented_needs(RESULTS, job, len(JOBS[job].products) if job in JOBS else 1)
 
 
 # Figures and tables in Snakemake's report.

@@ -8,8 +8,7 @@ from pathlib import Path
 from snakemake.exceptions import WorkflowError
 
 from springtune.studies.runs import workload
-from springtune.studies.runs.run_tasks import STATE, source_state
-from springtune.studies.runs.source import USUAL_STUDY, config_file, workflow_folder
+from springtune.studies.runs.source import STATE, USUAL_STUDY, config_file, source_state, workflow_folder
 
 BEGUN = time.time()
 """Start of this run [s since the epoch]; newer files are its products."""

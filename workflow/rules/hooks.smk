@@ -21,9 +21,6 @@ def begin():
             remove_unfinished(one.folder.parent, below=False)  # of what studies share
             locks.claim(one.folder, study.path)
             one.write()
-        OURS.remember(RESULTS.parent / CODE_FILE)
-        if ON_CLUSTER:
-            workload.remember_commands(RESULTS, jobs_to_run())
     except locks.LockedError as error:
         raise WorkflowError(str(error)) from None
     except OSError as error:
@@ -34,23 +31,13 @@ def begin():
 
 
 def log_begin():
-    """Log the expected work of the run; the progress display reads the estimate of each job."""
-    jobs = [(job["number"], job["rule"], job["threads"], job["outputs"]) for job in jobs_to_run()]
-    estimates, names = {}, []
-    for study, one in READ:
-        prefix = "" if study is STUDY else f"{study.name}_"
-        own = [
-            (number, rule.removeprefix(prefix), threads, outputs)
-            for number, rule, threads, outputs in jobs
-            if outputs and Path(outputs[0]).is_relative_to(one.folder)
-        ]
-        names += [study.name] if own or study is STUDY else []
-        estimates |= workload.estimates(study, one, own)
-    side_by_side = max(1, min(NODES, len(jobs))) if ON_CLUSTER else CORES
-    load = 0.0 if ON_CLUSTER else os.getloadavg()[0]
-    slower = workload.slowdown(side_by_side, load, os.cpu_count() or 1)
-    text = f"{', '.join(names)}: {workload.told(estimates, side_by_side, slower, load)}"
-    logger.info(text, extra={"estimates": estimates, "cores": side_by_side, "slowdown": slower})
+    """Log the jobs of the run; the progress display reads what each is for, and how many results it has."""
+    jobs, work = jobs_to_run(), {}
+    for _, one in READ:
+        work |= workload.results_by_stage(
+            one, {n: paths for n, paths in jobs.items() if Path(paths[0]).is_relative_to(one.folder)}
+        )
+    logger.info(f"{STUDY.name}: {len(jobs)} jobs", extra={"work": work})
 
 
 def log_end(how):

@@ -1,6 +1,6 @@
 """Undocumented parts of Snakemake, all in this file. A run works without each of them.
 
-`make test-versions` runs this file with the oldest and the newest Snakemake.
+`make slow` runs this file with the oldest and the newest Snakemake.
 """
 
 import sys
@@ -30,25 +30,11 @@ DEPLOYED = bool(getattr(workflow.deployment_settings, "deployment_method", ()))
 
 
 def jobs_to_run():
-    """Jobs of this run; an empty list if Snakemake does not tell."""
+    """Outputs of each job of this run, by its number; empty if Snakemake does not tell."""
     try:
-        return [
-            {
-                "number": workflow.dag.jobid(job),
-                "rule": job.rule.name,
-                "wildcards": dict(job.wildcards_dict),
-                "outputs": list(map(str, job.output)),
-                # With wildcards, which name the jobs that a child starts.
-                "output": list(map(str, job.rule.output)),
-                "log": list(map(str, job.rule.log)),
-                "benchmark": str(job.rule.benchmark),
-                "threads": job.threads,
-                "command": job.shellcmd,
-            }
-            for job in workflow.dag.needrun_jobs()
-        ]
+        return {workflow.dag.jobid(job): [*map(str, job.output)] for job in workflow.dag.needrun_jobs() if job.output}
     except AttributeError:
-        return []
+        return {}
 
 
 def end_timers():
@@ -67,40 +53,3 @@ def add_hooks(**added):
     for name, before in HOOKS.items():
         if before:
             setattr(workflow, f"_{name}", lambda log, before=before, own=added[name]: (before(log), own()))
-
-
-def noted_job():
-    """The job of this process on a cluster, from the notes of its run, so that no study is read and planned."""
-    if MODULE or not IS_CHILD or "--target-jobs" not in WORDS:
-        return None
-    try:
-        from snakemake.target_jobs import parse_target_jobs_cli_args
-    except ImportError:
-        return None
-    rest = WORDS[WORDS.index("--target-jobs") + 1 :]
-    number = next((place for place, word in enumerate(rest) if word.startswith("-")), len(rest))
-    targets = parse_target_jobs_cli_args(rest[:number])
-    if len(targets) != 1:  # a group's
-        return None
-    return workload.recall_command(Path("results") / CONFIG.stem, targets[0].rulename, targets[0].wildcards_dict)
-
-
-NOTED = noted_job()
-
-if NOTED:
-
-    rule:
-        name:
-            NOTED["rule"]
-        output:
-            NOTED["output"],
-        params:
-            # A function, so that braces in the command are not wildcards.
-            command=lambda wildcards: NOTED["command"],
-        threads: NOTED["threads"]
-        log:
-            NOTED["log"],
-        benchmark:
-            NOTED["benchmark"]
-        shell:
-            "{params.command}"

@@ -20,9 +20,6 @@ for job, made in MADE.items():
             folder=lambda wildcards, output: str(Path(output.done).parents[1]),
             digest=JOBS[job].digest,
             outputs=[one.name for one in made],
-        resources:
-            runtime=minutes(job),
-            mem_mb=megabytes(job),
         log:
             RESULTS / f"logs/{job}.log",
         benchmark:

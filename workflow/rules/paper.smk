@@ -47,9 +47,6 @@ rule paper:
         source=lambda wildcards: str(PAPER_SOURCE),
         folder=lambda wildcards, output: str(Path(output.paper).with_suffix("")),
         digest=PAPER.digest if PAPER_WANTED else "none",
-    resources:
-        runtime=minutes(rerun.PAPER),
-        mem_mb=megabytes(rerun.PAPER),
     log:
         "results/paper/logs/paper.log",
     benchmark:

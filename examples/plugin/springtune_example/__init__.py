@@ -1,1 +1,1 @@
-"""A definition, a load, a mesh type and a study kind for springtune."""
+"""A definition, a load, a mesh type and an engine for springtune."""

@@ -2,15 +2,13 @@
 
 import io
 import os
+import re
 import sys
 import warnings
 from contextlib import redirect_stderr, redirect_stdout
-from itertools import groupby
-from pathlib import Path
-from typing import Any, NamedTuple, TextIO
+from typing import Any, TextIO
 
 import click
-from click.shell_completion import CompletionItem
 
 from .. import __version__
 from ..registry import imported
@@ -28,65 +26,51 @@ def examples(*lines: str) -> str:
     return "\n".join(["\b", "Examples:", *(f"  {line}" for line in lines)])
 
 
-def studies_here(context: click.Context, parameter: click.Parameter, begun: str) -> list[CompletionItem]:
-    """Complete studies in ``config/``, or other files."""
-    found = [path.as_posix() for path in sorted(Path("config").glob("*.yaml"))]
-    chosen = [CompletionItem(path) for path in found if path.startswith(begun)]
-    return chosen or [CompletionItem(begun, type="file")]
-
-
-def mesh_types(context: click.Context, parameter: click.Parameter, begun: str) -> list[CompletionItem]:
-    """Complete mesh types, or files."""
-    from ..mesh import MESH_TYPES  # here: only completion needs it
-
-    chosen = [CompletionItem(name) for name in MESH_TYPES if name.startswith(begun)]
-    return chosen or [CompletionItem(begun, type="file")]
-
-
-WRONG, FAILED = 2, 1
-"""Exit codes: an option is wrong; the request cannot be met."""
-
-
 class WrongCall(click.ClickException):
     """A command was called with wrong options."""
 
-    exit_code = WRONG
+    exit_code = 2
 
-
-class Row(NamedTuple):
-    """A command: its heading in the help, module, function and meaning."""
-
-    heading: str
-    module: str
-    function: str
-    meaning: str
-
-
-STUDIES, RESULTS, HOUSE = "Studies", "Results", "For those who work on springtune"
 
 COMMANDS = {
-    "new": Row(STUDIES, "study", "new", "Write a small study to begin with."),
-    "run": Row(STUDIES, "run", "run", "Run a study."),
-    "scenes": Row(STUDIES, "study", "scenes", "Say what a study asks for, before anything runs."),
-    "split": Row(STUDIES, "study", "split", "Write the parts of a study for several sites."),
-    "definitions": Row(STUDIES, "study", "definitions", "List the definitions of spring stiffness."),
-    "predict": Row(STUDIES, "predict", "predict", "Recommend a definition for one mesh, or a mesh for one error."),
-    "identify": Row(STUDIES, "identify", "identify", "Find a material's constants from measured tests."),
-    "springs": Row(STUDIES, "predict", "springs", "Write the springs of one mesh for another program."),
-    "browse": Row(RESULTS, "results", "browse", "Browse the results of a study."),
-    "info": Row(RESULTS, "results", "info", "Say what a dataset holds, and where it comes from."),
-    "diff": Row(RESULTS, "diff", "diff", "Say what changed from one dataset to another, scene by scene."),
-    "accept": Row(RESULTS, "diff", "accept", "Keep values and curves as right, or say what departs from them."),
-    "export": Row(RESULTS, "results", "export", "Write a dataset as CSV, Parquet or Zarr."),
-    "merge": Row(RESULTS, "study", "merge", "Put the results of a study's parts together."),
-    "verify": Row(RESULTS, "results", "verify", "Compare results with their checksums, and compute some again."),
-    "archive": Row(
-        RESULTS, "results", "archive", "Pack a finished study into one file, to be cited and computed again."
-    ),
-    "clean": Row(RESULTS, "results", "clean", "List what no study asks for any more, and remove it."),
-    "schema": Row(HOUSE, "study", "schema", "Print the JSON schema of studies, for editors."),
+    "new": ("study", "Write a small study to begin with."),
+    "run": ("run", "Run a study."),
+    "scenes": ("study", "List a study's scenes and what they share; nothing runs."),
+    "definitions": ("study", "List the definitions of spring stiffness."),
+    "predict": ("predict", "Recommend a definition for one mesh, or a mesh for one error."),
+    "identify": ("identify", "Find a material's constants from measured tests."),
+    "springs": ("predict", "Write the springs of one mesh for another program."),
+    "browse": ("results", "Open the page of a study in a browser."),
+    "info": ("results", "Show what a dataset holds, and where it comes from."),
+    "diff": ("diff", "List what changed from one dataset to another, scene by scene."),
+    "export": ("results", "Write a group of a dataset as CSV or Parquet."),
+    "archive": ("results", "Pack the results of a study into one file."),
 }
-"""Commands by name, in the order of the help; each is imported when it is called."""
+"""Modules and meanings of the commands, in the order of the help; each is imported when it is called."""
+
+ARGUMENT = re.compile("(mesh size|mesh types?|Young's modulus|Poisson's ratio|[a-z]+)(?=:| '| of ')")
+"""Begin of messages with the name of an argument."""
+
+OPTIONS = {"mesh size": "size", "mesh type": "mesh", "mesh types": "mesh", "length": "beam", "height": "beam"} | {
+    "Young's modulus": "young",
+    "Poisson's ratio": "poisson",
+}
+"""Options of arguments that have another name."""
+
+
+def in_options(message: str, command: click.Command | None) -> str:
+    """Message that begins with the name of an argument, with the option of a command in its place.
+
+    Examples
+    --------
+    >>> in_options("force: '3 mm' is a length; give a force", main.get_command(None, "springs"))
+    "--force: '3 mm' is a length; give a force"
+    """
+    if command and (found := ARGUMENT.match(message)):
+        option = "--" + OPTIONS.get(found[1], found[1])
+        if any(option in one.opts for one in command.params):
+            return option + message[found.end() :]
+    return message
 
 
 SAID = f"{__name__}.said"
@@ -151,9 +135,11 @@ class Commands(click.Group):
             why = f"{error.filename}: {error.strerror}" if error.filename and error.strerror else error
             raise click.ClickException(shown(why)) from None
         except ValueError as error:
-            lines = error.args if all(isinstance(one, str) for one in error.args) else (error,)
-            refused = WrongCall if getattr(error, "wrong_call", str(error).startswith("--")) else click.ClickException
-            raise refused("\n".join(map(shown, lines))) from None
+            lines = error.args if all(isinstance(one, str) for one in error.args) else (str(error),)
+            command = self.get_command(ctx, ctx.invoked_subcommand or "")
+            said = "\n".join(shown(in_options(line, command)) for line in lines)
+            wrong = getattr(error, "wrong_call", said.startswith("--"))
+            raise (WrongCall if wrong else click.ClickException)(said) from None
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Names of the commands."""
@@ -163,15 +149,13 @@ class Commands(click.Group):
         """Command of a name; None if there is none."""
         if cmd_name not in COMMANDS:
             return None
-        row = COMMANDS[cmd_name]
-        found: click.Command = imported(f"cli.{row.module}:{row.function}")
+        found: click.Command = imported(f"cli.{COMMANDS[cmd_name][0]}:{cmd_name}")
         return found
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the commands under their headings."""
-        for heading, rows in groupby(COMMANDS.items(), key=lambda item: item[1].heading):
-            with formatter.section(heading):
-                formatter.write_dl([(name, row.meaning) for name, row in rows])
+        """Write the commands, without importing them."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, meaning) for name, (_, meaning) in COMMANDS.items()])
 
 
 @click.group(

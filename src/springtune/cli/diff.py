@@ -1,37 +1,25 @@
-"""Compare datasets, and keep accepted values."""
+"""Command diff: compare two datasets."""
 
-import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from ..safe_io.escapes import clipped, shown
 from ..safe_io.tables import aligned
 from ..studies.output.text import cell_text, paragraphs, variable_name
-from ..studies.runs.source import CONFIG_FOLDER
-from . import examples
-from .options import RESULTS_FOLDER, dataset_path
+from . import WrongCall, examples
+from .options import dataset_path
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from ..studies.output.comparison import Change, Comparison, GroupChanges
 
 ROWS = 20
 """Rows of a table."""
 
-DIFFERENT, TROUBLE = 1, 2
-"""Exit codes, as those of diff."""
-
-
-class Trouble(click.ClickException):
-    """Nothing could be compared."""
-
-    exit_code = TROUBLE
+COMPARED = ("before", "after")
 
 
 def tolerance(context: click.Context, parameter: click.Parameter, given: str | None) -> float | None:
@@ -51,8 +39,6 @@ def tolerance(context: click.Context, parameter: click.Parameter, given: str | N
     epilog=examples(
         "springtune diff results/before results/mine",
         "springtune diff before.nc mine --relative 1e-3 --group sensitivity",
-        "springtune diff before.nc after.nc --json > changes.json",
-        "springtune diff before mine --definitions",
     )
 )
 @click.argument("before")
@@ -65,9 +51,6 @@ def tolerance(context: click.Context, parameter: click.Parameter, given: str | N
 @click.option("--ignore", "ignored", multiple=True, help="Variables to leave out, such as 'reference_*'.")
 @click.option("--rows", type=click.IntRange(1), default=ROWS, show_default=True, help="Rows of each table.")
 @click.option("--all", "every", is_flag=True, help="All rows.")
-@click.option("--config", is_flag=True, help="Show the diff of the studies' files, too.")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
-@click.option("--definitions", "by_definition", is_flag=True, help="Compare the errors of definitions side by side.")
 def diff(
     before: str,
     after: str,
@@ -77,9 +60,6 @@ def diff(
     ignored: tuple[str, ...],
     rows: int,
     every: bool,
-    config: bool,
-    as_json: bool,
-    by_definition: bool,
 ) -> None:
     """Say what changed from one dataset to another beyond a tolerance, scene by scene.
 
@@ -88,199 +68,99 @@ def diff(
     --relative is of its largest number. Seconds, what is measured of the machine, when and where a dataset was made are
     not compared; versions and the studies' files are told and make no difference.
 
-    With --definitions it says instead how many scenes of each definition have an error, and the median and the largest
-    of these without their sign, in both. Scenes of one dataset alone count, too.
-
     Exits with 0 if nothing changed, 1 if something did, and 2 if nothing could be compared.
     """
-    from ..studies.output import comparison, expected, reading
+    from ..studies.output import reading
+    from ..studies.output.comparison import RELATIVE, Tolerance, compare
 
-    if by_definition and (ignored or every or config or relative is not None or absolute is not None):
-        raise click.UsageError("--definitions goes with --group and --json alone")
     try:
         paths = [dataset_path(before), dataset_path(after)]
-        with opened(paths[0]) as one, opened(paths[1]) as other, reading.guarded(f"{paths[0]}, {paths[1]}"):
-            kept = expected.ACCEPTED in one.attrs
-            if expected.ACCEPTED in other.attrs:
-                raise ValueError(f"{paths[1]}: holds accepted values; give them first, and then results")
-            if kept and (relative is not None or absolute is not None):
-                raise ValueError(f"{paths[0]}: has its own tolerances; leave --relative and --absolute out, or edit it")
-            if by_definition:
-                if kept:
-                    raise ValueError(f"{paths[0]}: holds accepted values; give two datasets")
-                errors = comparison.compare_definitions(one, other, groups)
-                click.echo(json.dumps(errors, indent=1) if as_json else definitions_text(errors, paths))
-                return
-            given = comparison.Tolerance(comparison.RELATIVE if relative is None else relative, absolute)
-            found = comparison.compare(
-                one, other, None if kept else given, groups, ignored, None if every else rows,
-                own=expected.tolerances(one), part=kept,
-            )  # fmt: skip
-            if as_json:
-                click.echo(json.dumps(as_dict(found, paths, config), indent=1))
-            else:
-                sides = ("accepted", "now") if kept else ("before", "after")
-                click.echo(comparison_text(found, paths, sides, None if every else rows, config))
+        with (
+            reading.open(paths[0]) as one,
+            reading.open(paths[1]) as other,
+            reading.guarded(f"{paths[0]}, {paths[1]}"),
+        ):
+            given, most = Tolerance(RELATIVE if relative is None else relative, absolute), None if every else rows
+            found = compare(one, other, given, groups, ignored, most)
+            click.echo(comparison_text(found, paths, most))
     except (OSError, ValueError) as error:
-        raise Trouble(shown(error)) from None
+        raise WrongCall(shown(error)) from None
     if found.different:
-        raise click.exceptions.Exit(DIFFERENT)
+        raise click.exceptions.Exit(1)
 
 
-@contextmanager
-def opened(path: Path) -> "Iterator[xr.DataTree]":
-    """Context of an open dataset, or of accepted values."""
-    from ..studies.output import expected, reading
-
-    if path.suffix == ".yaml":
-        yield expected.read(path)
-        return
-    reading.check_opens(path)
-    with reading.open(path) as tree:
-        yield tree
-
-
-# -- text --------------------------------------------------------------------------------------------------------------
-
-
-def comparison_text(
-    found: "Comparison", paths: Sequence[Path], sides: Sequence[str], most: int | None = ROWS, config: bool = False
-) -> str:
+def comparison_text(found: "Comparison", paths: Sequence[Path], most: int | None = ROWS) -> str:
     """Comparison as text."""
-    width = max(map(len, sides)) + 1
-    head = [f"{f'{side}:':{width}} {path}" for side, path in zip(sides, paths)]
-    parts = [[*head, _summary(found, sides)]]
-    for group in found.groups:
-        parts += _of_group(group, sides, most)
-    changes = found.changes
-    if changes:
-        parts.append(_changes(found, changes, sides, most))
-    if found.attributes or found.config:
-        parts.append(_told(found, config))
+    groups = {group.name: group for group in found.groups}
+    changed = [(group.name, one) for group in found.groups for one in (*group.flags, *group.values) if one.changed]
+    parts = [[f"{f'{side}:':7} {path}" for side, path in zip(COMPARED, paths)]]
+    parts[0].append(_summary(found, sum(one.changed for _, one in changed)))
+    parts += [part for group in found.groups for part in _alone(group, most)]
+    if changed:
+        counts = [["  variable", "cells", "changed", "largest change"]]
+        for name, one in changed:
+            largest = next((row for row in one.rows if math.isfinite(row.difference)), one.rows[0])
+            counts.append(
+                [f"  {variable_name(name, one.name)}", str(one.compared), str(one.changed), _difference(largest)]
+            )
+        flags = [row for group in found.groups for one in group.flags for row in one.rows]
+        rows = [
+            [
+                f"  {variable_name(row.group, row.variable)}",
+                *(_value(row.before), _value(row.after), _difference(row)),
+                _place(groups[row.group], row.labels),
+            ]
+            for row in [*flags[:most], *found.changes[:most]]
+        ]
+        parts.append(["values that changed", *aligned(counts, 0, (1, 2)).splitlines()])
+        table = aligned([["  variable", *COMPARED, "change", "at"], *rows], 0, (1, 2, 3)).splitlines()
+        more = _more(sum(one.changed for _, one in changed) - len(rows))
+        parts.append(["the largest changes, measured by the tolerance", *table, *more])
+    if found.attributes:
+        told = [[f"  {name}", f"{_short(old)} -> {_short(new)}"] for name, (old, new) in found.attributes.items()]
+        parts.append(["told, and no difference of results", *aligned(told, 0).splitlines()])
     return paragraphs(parts)
 
 
-def definitions_text(errors: "Sequence[Mapping[str, Any]]", paths: Sequence[Path]) -> str:
-    """Errors of definitions in two datasets, side by side."""
-    parts = [[f"before: {paths[0]}", f"after:  {paths[1]}"]]
-    for group in dict.fromkeys(row["group"] for row in errors):
-        rows = [["  definition", "scenes", "after", "median", "after", "change", "worst", "after", "change"]]
-        for row in (one for one in errors if one["group"] == group):
-            texts = [f"  {row['definition']}", *(str(count or 0) for count in row["scenes"].values())]
-            for pair in (row["median"].values(), row["worst"].values()):
-                texts += ["none" if share is None else f"{100 * share:.3g} %" for share in pair]
-                old, new = pair
-                texts.append("" if None in pair else f"{100 * (new - old):+.2g}")
-            rows.append(texts)
-        what = "scenes" if group == "/" else group
-        parts.append([f"errors of {what} without their sign", *aligned(rows, 0, range(1, 9)).splitlines()])
-    return paragraphs([*parts, *([] if errors else [["neither has errors of definitions"]])])
-
-
-def _summary(found: "Comparison", sides: Sequence[str]) -> str:
+def _summary(found: "Comparison", changed: int) -> str:
     """Summary in one line."""
-    said = [f"group {path} only {side}" for side, own in zip(sides, found.alone) for path in own]
-    for number, side in enumerate(sides):
-        for group in found.groups:
-            count, what = group.cells[number].count, "scenes" if group.name == "/" else f"cells of {group.name}"
-            said += [f"{count} {what} only {side}"] if count else []
-    statuses = sum(one.changed for group in found.groups for one in group.flags)
-    values = sum(one.changed for group in found.groups for one in group.values)
-    unlike = sum(len(group.unlike) + sum(map(len, group.variables)) for group in found.groups)
-    said += [f"{statuses} statuses changed"] if statuses else []
-    said += [f"{values} values changed"] if values else []
+    groups = found.groups
+    said = [f"group {path} only {side}" for side, own in zip(COMPARED, found.alone) for path in own]
+    for number, side in enumerate(COMPARED):
+        said += [f"{g.cells[number].count} {_cells(g.name)} only {side}" for g in groups if g.cells[number].count]
+    unlike = sum(len(group.unlike) + sum(map(len, group.variables)) for group in groups)
+    said += [f"{changed} values changed"] if changed else []
     said += [f"{unlike} variables are not in both, or cannot be compared"] if unlike else []
-    compared = sum(one.compared for group in found.groups for one in (*group.flags, *group.values))
-    if said:
-        return f"different: {', '.join(said)}; {compared} values compared"
-    if found.different:
-        return f"different: labels; {compared} values compared"
-    return f"the same: {compared} values compared"
+    result = f"different: {', '.join(said) or 'labels'};" if found.different else "the same:"
+    return f"{result} {sum(one.compared for group in groups for one in (*group.flags, *group.values))} values compared"
 
 
-def _of_group(group: "GroupChanges", sides: Sequence[str], most: int | None) -> Iterator[list[str]]:
-    """Paragraphs on the labels, cells, variables and statuses of a group."""
-    what = "scenes" if group.name == "/" else f"cells of {group.name}"
-    lines = []
+def _cells(group: str) -> str:
+    return "scenes" if group == "/" else f"cells of {group}"
+
+
+def _alone(group: "GroupChanges", most: int | None) -> Iterator[list[str]]:
+    """Paragraphs on labels, cells and variables of a group that only one dataset has."""
+    labels = []
     for name, both in group.labels.items():
-        for side, own in zip(sides, both):
-            shown = own[:most]
-            if own:
-                said = ", ".join(_place(group, {name: label}) for label in shown)
-                more = f", and {len(own) - len(shown)} more" if len(own) > len(shown) else ""
-                lines.append(f"  {name} only {side}: {said}{more}")
-    if lines:
-        yield [f"labels of {group.name}", *lines]
-    for side, alone in zip(sides, group.cells):
+        for side, own in zip(COMPARED, both):
+            said = ", ".join(_place(group, {name: label}) for label in own[:most])
+            more = f", and {len(own) - most} more" if most and len(own) > most else ""
+            labels += [f"  {name} only {side}: {said}{more}"] if own else []
+    if labels:
+        yield [f"labels of {group.name}", *labels]
+    for side, alone in zip(COMPARED, group.cells):
         if alone.count:
-            lines = [f"  {_place(group, labels)}" for labels in alone.rows]
-            yield [f"{what} only {side}: {alone.count}", *lines, *_more(alone.count - len(lines))]
-    lines = [f"  {name} only {side}" for side, own in zip(sides, group.variables) for name in own]
-    lines += [f"  {name} {why}" for name, why in group.unlike.items()]
-    if lines:
-        yield [f"variables of {group.name}", *lines]
-    for one in group.flags:
-        if one.changed:
-            rows = [
-                [
-                    f"  {_place(group, row.labels | row.point) or 'all'}",
-                    f"{row.before or 'nothing'} -> {row.after or 'nothing'}",
-                ]
-                for row in one.rows
-            ]
-            yield [
-                f"{variable_name(group.name, one.name)} changed: {one.changed} of {one.compared}",
-                *aligned(rows, 0).splitlines(),
-                *_more(one.changed - len(rows)),
-            ]
+            lines = [f"  {_place(group, one)}" for one in alone.rows]
+            yield [f"{_cells(group.name)} only {side}: {alone.count}", *lines, *_more(alone.count - len(lines))]
+    variables = [f"  {name} only {side}" for side, own in zip(COMPARED, group.variables) for name in own]
+    if variables or group.unlike:
+        yield [f"variables of {group.name}", *variables, *(f"  {name} {why}" for name, why in group.unlike.items())]
 
 
 def _place(group: "GroupChanges", labels: "Mapping[str, str | float]") -> str:
     """Labels of dimensions with several labels, for readers."""
     return cell_text({name: label for name, label in labels.items() if group.sizes[name] > 1}, group.units)
-
-
-def _changes(found: "Comparison", changes: "list[Change]", sides: Sequence[str], most: int | None) -> list[str]:
-    """Number of changes by variable, and the largest changes."""
-    head = ["  variable", "cells", "changed", "largest change"]
-    counts = [
-        [f"  {variable_name(group.name, one.name)}", one.compared, one.changed, _largest(one.rows)]
-        for group in found.groups
-        for one in group.values
-        if one.changed
-    ]
-    axes = {group.name: group for group in found.groups}
-    rows = [["  variable", *sides, "change", "at"]]
-    for row in changes[:most]:
-        group = axes[row.group]
-        at = _place(group, row.labels | row.point)
-        rows.append(
-            [f"  {variable_name(row.group, row.variable)}", _value(row.before), _value(row.after), _difference(row), at]
-        )
-    total = sum(one.changed for group in found.groups for one in group.values)
-    return [
-        "values that changed", *aligned([head, *counts], 0, (1, 2)).splitlines(), "",
-        "the largest changes, measured by the tolerance", *aligned(rows, 0, (1, 2, 3)).splitlines(),
-        *_more(total - len(rows) + 1),
-    ]  # fmt: skip
-
-
-def _largest(rows: "list[Change]") -> str:
-    """Largest change, preferably a number."""
-    return _difference(next((row for row in rows if math.isfinite(row.difference)), rows[0]))
-
-
-def _told(found: "Comparison", config: bool) -> list[str]:
-    """Differences of attributes and of the studies' files."""
-    lines = ["told, and no difference of results"]
-    rows = [[f"  {name}", f"{_short(old)} -> {_short(new)}"] for name, (old, new) in found.attributes.items()]
-    lines += aligned(rows, 0).splitlines()
-    if found.config:
-        less, more = (sum(line.startswith(sign) for line in found.config[2:]) for sign in "-+")
-        told = "" if config else "; --config shows them"
-        lines.append(f"  the studies' files: {less} lines less, {more} more{told}")
-        lines += found.config if config else []
-    return lines
 
 
 def _short(text: str) -> str:
@@ -307,196 +187,3 @@ def _difference(row: "Change") -> str:
     before = float(row.before)
     share = f" ({100 * number / abs(before):+.2g} %)" if before and units else ""
     return f"{number:+.3g}{units}{share}"
-
-
-# -- JSON --------------------------------------------------------------------------------------------------------------
-
-
-def as_dict(found: "Comparison", paths: Sequence[Path], config: bool = False) -> dict[str, object]:
-    """Comparison as a dict for JSON."""
-    return {
-        "different": found.different,
-        "before": str(paths[0]),
-        "after": str(paths[1]),
-        "groups_only_before": found.alone[0],
-        "groups_only_after": found.alone[1],
-        "groups": {group.name: _group_dict(group) for group in found.groups},
-        "attributes": {name: {"before": old, "after": new} for name, (old, new) in found.attributes.items()},
-    } | ({"config": found.config} if config else {})
-
-
-def _group_dict(group: "GroupChanges") -> dict[str, object]:
-    sides = ("before", "after")
-    made: dict[str, object] = {
-        "labels": {
-            name: {f"only_{side}": own for side, own in zip(sides, both)} for name, both in group.labels.items()
-        },
-        "cells_in_both": group.both,
-    }
-    for side, alone, names in zip(sides, group.cells, group.variables):
-        made[f"cells_only_{side}"] = {"count": alone.count, "rows": alone.rows}
-        made[f"variables_only_{side}"] = names
-    made["not_comparable"] = group.unlike
-    for part, found in (("status", group.flags), ("values", group.values)):
-        made[part] = {
-            one.name: {"compared": one.compared, "changed": one.changed, "rows": [_row_dict(row) for row in one.rows]}
-            for one in found
-            if one.changed
-        }
-    return made
-
-
-def _row_dict(row: "Change") -> dict[str, object]:
-    def plain(value: float | str) -> float | str | None:
-        return value if isinstance(value, str) or math.isfinite(value) else None
-
-    found: dict[str, object] = {**row.labels, **row.point}
-    return {
-        "at": found, "before": plain(row.before), "after": plain(row.after), "difference": plain(row.difference),
-        "over_tolerance": plain(row.excess), "units": row.units,
-    }  # fmt: skip
-
-
-EXPECTED_FOLDER = CONFIG_FOLDER / "expected"
-
-LISTED_UNSOLVED = 10
-"""Unsolved scenes that are listed by name."""
-
-
-@click.command(
-    epilog=examples(
-        "springtune accept results/mine",
-        "springtune accept mine --variables displacement,sensitivity/displacement --relative 1e-4",
-        "springtune accept --check",
-        "springtune accept --check mine --to config/expected/mine.nc",
-    )
-)
-@click.argument("results", required=False)
-@click.option(
-    "--to",
-    "target",
-    type=click.Path(path_type=Path),
-    help="File: .yaml, or .nc.  [default: config/expected/<study>.yaml]",
-)
-@click.option("--check", is_flag=True, help="Compare results with what is accepted; of all studies without RESULTS.")
-@click.option("--variables", default="", help="Names with commas between, such as sensitivity/displacement.")
-@click.option("--relative", callback=tolerance, help="Tolerance of all values.  [default: that of the file, else 1e-6]")
-@click.option("--absolute", callback=tolerance, help="The same, in SI units.")
-@click.option("--unsolved", is_flag=True, help="Accept that scenes are not solved.")
-@click.option("--all", "every", is_flag=True, help="With --check, all rows.")
-def accept(
-    results: str | None,
-    target: Path | None,
-    check: bool,
-    variables: str,
-    relative: float | None,
-    absolute: float | None,
-    unsolved: bool,
-    every: bool,
-) -> None:
-    """Keep values and whole curves of a study as right, or say what departs from them.
-
-    RESULTS is results/<study>, its dataset.nc, or the name of a study. What is accepted is a file to be kept with the
-    study and reviewed as code is: a line a scene, with its status, displacement, error and stiffness, and one a curve.
-    Tolerances in it are yours: of all values, of a variable, of a line. Accepting anew says what changes, and keeps
-    them. Scenes that are not solved are listed and refused without --unsolved.
-
-    With --check, exits with 0 if all is as accepted, 1 if anything departs, and 2 if nothing could be compared.
-    """
-    if check:
-        if variables or relative is not None or absolute is not None or unsolved:
-            raise click.UsageError("--check takes variables and tolerances from the file; edit that")
-        _check(results, target, every)
-        return
-    if results is None:
-        raise click.UsageError("name the results to accept: springtune accept results/mine")
-    from ..studies.output import comparison, expected, reading
-
-    path, names = dataset_path(results), [name.strip() for name in variables.split(",") if name.strip()]
-    with opened(path) as tree, reading.guarded(path):
-        if expected.ACCEPTED in tree.attrs:
-            raise ValueError(f"{path}: holds accepted values; give the results of a study")
-        unsolved_cells = expected.unsolved(tree)
-        if unsolved_cells:
-            _tell_unsolved(unsolved_cells)
-            if not unsolved:
-                raise ValueError(f"{path}: nothing is accepted; mend these, or accept that they are so with --unsolved")
-        target = target or _usual_target(str(tree.attrs.get("study", path.parent.name)))
-        former = expected.read(target) if target.exists() else None
-        made = expected.accepted(tree, names or (_names(former) if former is not None else []))
-    if former is not None:
-        made = expected.with_tolerances_of(made, former)
-    if relative is not None or absolute is not None:
-        own = expected.tolerances(made)
-        before = own.get("", comparison.Tolerance())
-        given = comparison.Tolerance(
-            before.relative if relative is None else relative, before.absolute if absolute is None else absolute
-        )
-        made = expected.with_tolerances(made, own | {"": given})
-    if former is not None:
-        found = comparison.compare(former, made, groups=(), own=expected.tolerances(former), most=20)
-        click.echo(comparison_text(found, (target, path), sides=("accepted", "now")))
-    expected.write(target, made)
-    click.echo(
-        f"{target}: {_count(made)} accepted of {path}; keep it with the study, and `springtune accept --check` compares"
-    )
-
-
-def _usual_target(study: str) -> Path:
-    """File of the accepted values of a study."""
-    found = [EXPECTED_FOLDER / f"{study}{ending}" for ending in (".yaml", ".nc")]
-    return next((path for path in found if path.exists()), found[0])
-
-
-def _names(tree: "xr.DataTree") -> list[str]:
-    """Names of accepted variables."""
-    from ..studies.output.comparison import OF_CELLS
-
-    nodes = [(node.path, str(name)) for node in tree.subtree for name in node.data_vars]
-    return [variable_name(path, name) for path, name in nodes if name != OF_CELLS]
-
-
-def _count(tree: "xr.DataTree") -> str:
-    """Number of scenes and other cells in words."""
-    from ..studies.output.expected import cells
-
-    counts = cells(tree).items()
-    return ", ".join(f"{count} scenes" if path == "/" else f"{count} of {path}" for path, count in counts)
-
-
-def _tell_unsolved(unsolved_cells: list[tuple[str, str, str, str]]) -> None:
-    """Print the unsolved cells."""
-    click.echo(f"{len(unsolved_cells)} are not solved:", err=True)
-    for group, place, status, why in unsolved_cells[:LISTED_UNSOLVED]:
-        head = "" if group == "/" else f"{group}: "
-        click.echo(shown(f"  {head}{place}: {status}{f', {why}' if why else ''}"), err=True)
-    if len(unsolved_cells) > LISTED_UNSOLVED:
-        click.echo(f"  and {len(unsolved_cells) - LISTED_UNSOLVED} more", err=True)
-
-
-def _check(results: str | None, target: Path | None, every: bool) -> None:
-    """Compare with accepted values, and exit as diff does."""
-    from ..studies.output import comparison, expected, reading
-
-    try:
-        files = [path for path in EXPECTED_FOLDER.glob("*") if path.suffix in expected.EXPECTED_ENDINGS]
-        if target is not None:
-            files = [target]
-        elif results is not None:
-            files = [_usual_target(dataset_path(results).parent.name)]
-        if not files:
-            raise ValueError(f"{EXPECTED_FOLDER}: nothing is accepted; call `springtune accept results/<study>` first")
-        departed = False
-        for file in sorted(files):
-            kept = expected.read(file)
-            path = dataset_path(results or str(RESULTS_FOLDER / kept.attrs[expected.ACCEPTED]))
-            with opened(path) as tree, reading.guarded(path):
-                found = comparison.compare(
-                    kept, tree, own=expected.tolerances(kept), part=True, most=None if every else 20
-                )
-            departed |= found.different
-            click.echo(comparison_text(found, (file, path), sides=("accepted", "now")))
-    except (OSError, ValueError) as error:
-        raise Trouble(shown(error)) from None
-    if departed:
-        raise click.exceptions.Exit(DIFFERENT)

@@ -1,33 +1,28 @@
 """Find a material's constants from measured tests."""
 
-import os
-import re
-from collections.abc import Mapping
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from . import examples
-from .options import asked_beam, refusals, shape_of_study
+from .options import STUDY_EXAMPLE, asked_beam, shape_of_study, writing
 
 if TYPE_CHECKING:
     from ..scene.identify import Identified
     from ..scene.measured import MeasuredTest
 
-ARGUMENT = re.compile("^(?=(law|known|load|force|angle|noise):)")
-"""Begin of messages with the name of an argument, which is an option here."""
-
-KEYS = ("beam", "thickness", "shape", "load", "force", "angle", "noise", "shift", "file")
+TEST_KEYS = ("beam", "thickness", "study", "load", "force", "angle", "noise", "shift", "file")
 """Keys of a test in a list of tests; all but the file are options, too."""
+
+PLOT_ENDINGS = (".png", ".svg", ".pdf")
 
 
 @click.command(
     epilog=examples(
         "springtune identify pull.csv --beam 100x20 --load traction",
         'springtune identify dic.csv --beam 100x20 --load traction --force "400 N" --noise "1 um" --plot residuals.png',
-        "springtune identify tests.yaml --law orthotropic --write mine.yaml",
+        "springtune identify tests.yaml --law orthotropic",
         "springtune identify config/treloar/uniaxial.csv --law yeoh",
     )
 )
@@ -35,7 +30,7 @@ KEYS = ("beam", "thickness", "shape", "load", "force", "angle", "noise", "shift"
 @click.option("--law", default="isotropic", show_default=True, help="isotropic, orthotropic, regions, yeoh, neo-hooke.")
 @click.option("--known", multiple=True, help="A constant that is known, such as nu=0.3; may be repeated.")
 @click.option("--beam", help="Length x height in mm, such as 100x20.")
-@click.option("--shape", help="A study's shape, such as config/shapes.yaml:cook, in the place of a beam.")
+@click.option("--study", help=f"A study's shape instead of a beam, such as {STUDY_EXAMPLE}.")
 @click.option("--thickness", default="1 mm", show_default=True, help="Thickness of a beam.")
 @click.option("--load", help="Load of the beam, or load case of the shape: what is held and which side is loaded.")
 @click.option("--force", help="Force on a beam at which a field was measured, such as '400 N'.")
@@ -43,61 +38,34 @@ KEYS = ("beam", "thickness", "shape", "load", "force", "angle", "noise", "shift"
 @click.option("--noise", help="Noise of the displacements, such as '1 um'; estimated without.")
 @click.option("--shift/--no-shift", default=True, help="Remove the rigid motion of fields, and the zero of curves.")
 @click.option("--plot", type=click.Path(path_type=Path), help="Draw the residuals: a .png, .svg or .pdf file.")
-@click.option("--write", type=click.Path(path_type=Path), help="Write a small study with the material: a .yaml file.")
-def identify(
-    files: tuple[Path, ...], law: str, known: tuple[str, ...], plot: Path | None, write: Path | None, **options: Any
-) -> None:
+def identify(files: tuple[Path, ...], law: str, known: tuple[str, ...], plot: Path | None, **options: Any) -> None:
     """Find a material's constants from measured tests of a sheet, with 95 % intervals.
 
     FILES are CSV files of one test, or YAML files with a list of tests, whose keys are the options and 'file'. Columns
     have units in their heads, such as 'force [N],displacement [mm]' or 'x [mm],y [mm],u [um],v [um]'.
     """
-    from ..safe_io.atomic import check_folder, replacing, write_text
+    from ..safe_io.atomic import check_folder, replacing
     from ..scene.identify import SHEET_LAWS
     from ..scene.identify import identify as identified
 
-    endings = {"--plot": (".png", ".svg", ".pdf"), "--write": (".yaml", ".yml")}
-    with refusals("--plot" if plot else "--write", plot or write, partial(ARGUMENT.sub, "--")):
-        for option, path in (("--plot", plot), ("--write", write)):
-            if path and path.suffix not in endings[option]:
-                raise ValueError(f"{option}: '{path}' has another ending than {', '.join(endings[option])}; give one")
-            if path:
-                check_folder(path)
-        rows = [options | row for path in files for row in _rows(path)]
-        if SHEET_LAWS.get(law) == ():
-            found = identified(files[0] if len(files) == 1 else [], law)
-        else:
-            given = {name: value for name, _, value in (one.partition("=") for one in known)}
-            found = identified([_test(**row) for row in rows], law, known=given)
-        text = _study(found, rows[0], write) if write else ""
-        if write:
-            _check(text, write)
-        if plot:
-            import matplotlib.pyplot as plt
+    if plot:
+        if plot.suffix not in PLOT_ENDINGS:
+            raise ValueError(f"--plot: '{plot}' has another ending than {', '.join(PLOT_ENDINGS)}; give one")
+        check_folder(plot)
+    rows = [options | row for path in files for row in _rows(path)]
+    if SHEET_LAWS.get(law) == ():
+        found = identified(files[0] if len(files) == 1 else [], law)
+    else:
+        given = {name: value for name, _, value in (one.partition("=") for one in known)}
+        found = identified([_test(**row) for row in rows], law, known=given)
+    if plot:
+        import matplotlib.pyplot as plt
 
-            found.plot()
-            with replacing(plot) as unfinished:
-                plt.savefig(unfinished, format=plot.suffix[1:])
-            plt.close()
-        if write:
-            write_text(write, text)
-    click.echo(found)
-
-
-def _check(text: str, target: Path) -> None:
-    """Refuse a study that would not load, with the reason."""
-    from tempfile import TemporaryDirectory
-
-    from ..studies.kinds import load_study
-
-    with TemporaryDirectory() as folder:
-        trial = Path(folder, target.name)
-        trial.write_text(text, "utf-8")
-        try:
-            load_study(trial, target.absolute().parent)
-        except ValueError as error:
-            said = str(error).replace(str(trial), str(target))
-            raise ValueError(f"--write: the study of what was found would be refused: {said}") from None
+        found.plot()
+        with writing("--plot", plot), replacing(plot) as unfinished:
+            plt.savefig(unfinished, format=plot.suffix[1:])
+        plt.close()
+    click.echo(f"{found}\n\nin a study:\n{_materials(found, rows[0]['file'])}", nl=False)
 
 
 def _rows(path: Path) -> list[dict[str, Any]]:
@@ -113,43 +81,38 @@ def _rows(path: Path) -> list[dict[str, Any]]:
     except (AttributeError, KeyError, TypeError, ValueError, YAMLError) as error:
         raise ValueError(
             f"{path}: is no list of tests ({type(error).__name__}: {error}); give 'tests:' and names, each with some "
-            f"of the keys {', '.join(KEYS)}"
+            f"of the keys {', '.join(TEST_KEYS)}"
         ) from None
     for row in rows:
-        if wrong := [key for key in row if key not in KEYS]:
-            raise ValueError(f"{path}: a test has the key {wrong[0]!r}; known: {', '.join(KEYS)}")
-        row |= {key: path.parent / row[key] for key in ("file", "shape") if row.get(key)}
+        if wrong := [key for key in row if key not in TEST_KEYS]:
+            raise ValueError(f"{path}: a test has the key {wrong[0]!r}; known: {', '.join(TEST_KEYS)}")
+        row |= {key: path.parent / row[key] for key in ("file", "study") if row.get(key)}
     return rows
 
 
 def _test(
-    beam: str | None, shape: str | None, thickness: str, load: str, file: Path | None = None, **others: Any
+    beam: str | None, study: str | None, thickness: str, load: str, file: Path | None = None, **others: Any
 ) -> "MeasuredTest":
     """Test of its options."""
     from ..scene.measured import MeasuredTest
 
-    if not ((beam or shape) and load and file):
-        raise ValueError("--load: a test needs a body, a load and a file; give such as --beam 100x20 --load traction")
+    if not ((beam or study) and load and file):
+        raise ValueError("load: a test needs a body, a load and a file; give such as --beam 100x20 --load traction")
     if beam:
         return MeasuredTest(asked_beam(str(beam), thickness), load, file, **others)
-    study, _, body = shape_of_study(str(shape))
-    if study.plane_strain:
+    about, _, body = shape_of_study(str(study))
+    if about.plane_strain:
         raise ValueError(
-            f"--shape: {shape}: material {study.plane_strain[0]!r} is in plane strain, and tests are analysed in plane "
+            f"study: {study}: material {about.plane_strain[0]!r} is in plane strain, and tests are analysed in plane "
             "stress; give a study in plane stress"
         )
     return MeasuredTest(body, load, file, **others)
 
 
-def _study(found: "Identified", row: Mapping[str, Any], target: Path) -> str:
-    """Text of a small study of the first test's body with the material that was found."""
-    from yaml import safe_dump, safe_load
+def _materials(found: "Identified", file: Path) -> str:
+    """Materials that were found, as a section of a study."""
+    from yaml import safe_dump
 
-    from .study import template_text
-
-    study = safe_load(template_text(target, "shape" if row["shape"] else "beam"))
-    (grid,) = (study.get("grids") or study["shape_grids"]).values()
-    names = {part: one.name for part, one in found.materials.items()}
     texts = [round(one, 6) if name[:2] == "nu" else f"{one:.6g} Pa" for name, one in found.values.items()]
     if found.law == "orthotropic":
         keys = ("young_modulus_x", "young_modulus_y", "poisson_ratio_xy", "shear_modulus")
@@ -157,22 +120,6 @@ def _study(found: "Identified", row: Mapping[str, Any], target: Path) -> str:
     elif "nu" in found.values:
         materials = [{"young_modulus": text, "poisson_ratio": texts[-1]} for text in texts[:-1]]
     else:
-        materials = [{"uniaxial_test": os.path.relpath(row["file"], target.parent), "terms": len(texts)}]
-    study["materials"] = dict(zip(names.values(), materials))
-    grid |= {"material": names.pop("", next(iter(names.values())))} | ({"load": row["load"]} if row["load"] else {})
-    if row["shape"]:
-        source, _, shape = shape_of_study(str(row["shape"]))
-        study["shapes"] = {"plate": safe_load(source.text)["shapes"][shape.name] | {"parts": names}}
-        if shape.file:
-            study["shapes"]["plate"]["file"] = os.path.relpath(shape.file, target.parent)
-            del grid["mesh_size"]
-    elif found.law == "orthotropic":
-        raise ValueError("--write: beams of a study are isotropic; give a --shape, or leave --write out")
-    else:
-        beam = asked_beam(str(row["beam"] or "100x20"), row["thickness"])
-        loads = next(iter(found.places.values())) if "nu" in found.values else [1.0]
-        force = row["force"] or f"{max(map(abs, loads)):g} N"
-        grid |= {"beam": beam.name, "mesh_size": f"{250 * beam.height:g} mm", "force": force}
-        (sides,) = study["beams"].values()
-        study["beams"] = {beam.name: {side: f"{1e3 * getattr(beam, side):g} mm" for side in sides}}
-    return safe_dump(study, sort_keys=False)
+        materials = [{"uniaxial_test": str(file), "terms": len(texts)}]
+    names = [one.name for one in found.materials.values()]
+    return safe_dump({"materials": dict(zip(names, materials))}, sort_keys=False)

@@ -1,198 +1,160 @@
-"""Text and JSON of `springtune predict`."""
+"""Texts of `springtune predict` and `springtune springs`."""
 
-import json
 import math
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from .. import __version__
 from ..problem.compare import error_text, sign_sentence, sign_word
 from ..problem.geometry import size_text
 from ..problem.shapes import QUANTITY_UNITS
-from ..safe_io.tables import TabledList, aligned
+from ..safe_io.tables import TabledList, aligned, mesh_size_text
 
 if TYPE_CHECKING:
-    from ..prediction.choices import Choice, References, ShapeReferences
-    from ..prediction.search import MeshChoice, MeshSearch
+    from ..engines.budget import BudgetSearch
+    from ..engines.calibration import EngineFit
+    from ..handover.net import SpringNet
+    from ..prediction.choices import Choice
+    from ..prediction.search import MeshSearch
     from ..problem.geometry import Beam
     from ..problem.materials import Material
     from ..scene.statements import ShapeStatement
 
-MEANT = "Errors are (network - reference) / |reference| of"
 
-
-@dataclass(frozen=True)
-class Subject:
+class Subject(NamedTuple):
     """A beam under loads, or a shape under a load case, as a prediction names it.
 
-    `name` and `made_of` (material, thickness) are texts, `about` is the same as JSON. `known` are references by load,
-    of a shape by quantity, `compared` their values and kinds; `meaning` says what an error is of, `sign` what its sign
-    means. `dense`: all materials have a density, so that there are largest time steps. Only shapes have a `load`, only
-    beams rows of a table of `references`.
+    `known` are references by load, of a shape by quantity; `compared` the value and kind of those that were found.
     """
 
     name: str
     made_of: str
-    about: dict[str, Any]
-    known: "References | ShapeReferences"
+    known: Any
     compared: dict[str, tuple[float, str]]
-    load: str
-    meaning: str
-    sign: list[str]
-    dense: bool
-    references: list[list[str]]
+    of_beam: bool
 
-    @property
-    def estimate(self) -> str:
-        """Largest error estimate of the references."""
-        estimates = [found.error_estimate for found in self.known.values() if not isinstance(found, str)]
-        return f"{100 * max(estimates, default=0):.1g} %"
+    def meaning(self, solved: str) -> list[str]:
+        """Lines on what errors mean, of networks that were solved in some way."""
+        what = "the displacement of the loaded side" if self.of_beam else "each quantity"
+        found = [self.known[name].error_estimate for name in self.compared]
+        moved = {name: value for name, (value, kind) in self.compared.items() if kind == "displacement"}
+        of = "errors" if len(moved) == len(self.compared) else "errors of displacements"
+        return [
+            f"Errors are (network - reference) / |reference| of {what}: {solved},",
+            "with linear kinematics (small strain), against the converged reference of small strain (error estimate "
+            f"{100 * max(found, default=0):.1g} %).",
+            *([f"Of {of}, {sign_sentence(moved, 'under' if self.of_beam else 'of')}."] if moved else []),
+        ]
 
 
-def beam_subject(beam: "Beam", material: "Material", known: "References") -> Subject:
+def beam_subject(beam: "Beam", material: "Material", known: Any) -> Subject:
     """Beam of a prediction."""
     from ..problem.loads import LOADS
 
     def constants(one: "Material") -> str:
-        young = one.young_modulus
-        return f"E = {young / 1e9:.6g} GPa" if young >= 1e9 else f"E = {young / 1e6:.6g} MPa"
+        size, unit = (1e9, "GPa") if one.young_modulus >= 1e9 else (1e6, "MPa")
+        return f"E = {one.young_modulus / size:.6g} {unit}, nu = {one.poisson_ratio:.4g}"
 
-    made_of = f"{material.name}, {constants(material)}, nu = {material.poisson_ratio:g}, "
-    made_of += f"t = {1e3 * beam.thickness:g} mm"
+    made_of = f"{material.name}, {constants(material)}, t = {1e3 * beam.thickness:g} mm"
     if material.plane == "strain":
-        sheet = material.in_plane
-        made_of += f", plane strain: in the plane {constants(sheet)}, nu = {sheet.poisson_ratio:.4g}"
-    references = {
-        load: {"message": found}
-        if isinstance(found, str)
-        else {"displacement_per_newton": float(found.displacement), "error_estimate": found.error_estimate}
-        for load, found in known.items()
-    }
-    about = {"beam": asdict(beam), "material": asdict(material), "loads": list(known), "references": references}
-    signs = {load: LOADS[load].sign for load in known}
-    meaning = f"{MEANT} the displacement of the loaded side"
-    compared = {load: (sign, "displacement") for load, sign in signs.items()}
-    sign = [f"Of errors, {sign_sentence(signs)}."]
-    return Subject(beam.label, made_of, about, known, compared, "", meaning, sign, material.density is not None, [])
+        made_of += f", plane strain: in the plane {constants(material.in_plane)}"
+    compared = {load: (LOADS[load].sign, "displacement") for load, one in known.items() if not isinstance(one, str)}
+    return Subject(beam.label, made_of, known, compared, True)
 
 
-def shape_subject(statement: "ShapeStatement", known: "ShapeReferences") -> Subject:
+def shape_subject(statement: "ShapeStatement", known: Any) -> Subject:
     """Shape of a prediction."""
-    kind = {one.name: one.kind for one in statement.case.quantities}
-    compared = {name: (found.value, kind[name]) for name, found in known.items() if not isinstance(found, str)}
-    moved = {name: value for name, (value, of) in compared.items() if of == "displacement"}
-    of = "errors" if len(moved) == len(compared) else "errors of displacements"
-    sign = [f"Of {of}, {sign_sentence(moved, 'of')}."] if moved else []
+    kinds = {one.name: one.kind for one in statement.case.quantities}
+    compared = {name: (one.value, kinds[name]) for name, one in known.items() if not isinstance(one, str)}
     sides = np.ptp(statement.mesh.points, axis=0).tolist()
-    about = {
-        "shape": statement.shape.name,
-        "extent": sides,
-        "load": statement.load,
-        "thickness": statement.thickness,
-        "materials": {part: asdict(one) for part, one in statement.by_part.items()},
-        "references": {
-            name: {"message": found} if isinstance(found, str) else found._asdict() for name, found in known.items()
-        },
-    }
-    references = [
-        [name, f"{found.value:.6g} {QUANTITY_UNITS[kind[name]]}", f"{100 * found.error_estimate:.1g} %"]
-        for name, found in known.items()
-        if not isinstance(found, str)
-    ]
-    return Subject(
-        f"{statement.shape.name}, load {statement.load}",
-        f"{size_text(*sides)}, {statement.named_materials}, t = {1e3 * statement.thickness:g} mm",
-        about,
-        known,
-        compared,
-        statement.load,
-        f"{MEANT} each quantity",
-        sign,
-        all(one.density is not None for one in statement.materials),
-        references,
-    )
+    made_of = f"{size_text(*sides)}, {statement.named_materials}, t = {1e3 * statement.thickness:g} mm"
+    return Subject(f"{statement.shape.name}, load {statement.load}", made_of, known, compared, False)
 
 
-def prediction_text(
-    subject: Subject,
-    mesh_name: str,
-    about: dict[str, Any],
-    choices: "Sequence[Choice]",
-    sizes: Sequence[float] = (),
-) -> str:
-    """Text of a prediction; `sizes` [m] are of the meshes that bands are extrapolated from."""
-    columns, of_beam = list(subject.known), not subject.load
-    heads, *rows = TabledList(choices).table()
-    kept = [place for place, head in enumerate(heads) if of_beam or head not in ("E", "nu")]
-    rows = [[row[place] for place in kept] for row in (heads, *rows)]
-    if of_beam and subject.about["material"]["plane"] == "strain":
-        rows[0] = ["nu in plane" if head == "nu" else head for head in rows[0]]
-    notes = [f"{name}: no reference; {found}" for name, found in subject.known.items() if isinstance(found, str)]
-    for choice in choices:
-        notes += [f"{choice.definition}, {part}: {reason}" for part, reason in choice.failures.items()]
-    first, plain = (name or "none" for name in recommended(choices))
-    by_rule = recommended([choice for choice in choices if choice.definition != "best-springs"])
-    particles, springs = about["particles"], about["springs"]
-    counts = f"{particles} particles, {springs} springs" if springs else f"about {particles:.2g} particles"
-    how = "solved on this mesh"
-    if sizes:
-        low, high = 1e3 * min(sizes), 1e3 * max(sizes)
-        mesh_type = mesh_name.partition(" ")[0]
-        how = f"bands, extrapolated from solutions on {len(sizes)} {mesh_type} meshes of {low:.3g} to {high:.3g} mm"
-    ranked = "The first row is the best one by its worst error."
+def prediction_text(subject: Subject, mesh_name: str, counts: str, choices: "Sequence[Choice]") -> str:
+    """Text of a prediction."""
+    rows = TabledList(choices).table()
+    best = {one.definition: one for one in recommended(choices) if one}
+    first, plain = (one.definition if one else "none" for one in recommended(choices))
     lines = [
         f"{subject.name}, {mesh_name}: {counts}; {subject.made_of}",
         "",
         f"recommended: {first}; with springs alone: {plain}",
-        *_at_worst(subject, choices, (first, plain, *map(str, by_rule))),
+        *([f"at worst: {', '.join(_worst(subject, one) for one in best.values())}"] if best else []),
         "",
-        aligned(rows, left=2, right=range(3, 3 + len(columns) + 2 * of_beam)),
+        aligned(rows, left=2, right=range(3, len(rows[0]) - 1)),
         "",
-        f"{subject.meaning}{': ' if of_beam else ', '}{how},",
-        f"{KINEMATICS_TEXT} (error estimate {subject.estimate})." if of_beam else f"{KINEMATICS_TEXT}.",
-        *subject.sign,
-        f"{ranked} E, its error, and nu are of a patch test between rollers." if of_beam else ranked,
+        *subject.meaning("solved on this mesh"),
+        "The first row is the best one by its worst error."
+        + (" E, its error, and nu are of a patch test between rollers, in the plane." if subject.of_beam else ""),
         *_also_tried(choices),
     ]
-    if subject.references:
-        heads = ["quantity", "reference", "error estimate"]
-        lines += ["", aligned([heads, *subject.references], left=1, right=(1, 2))]
-    return "\n".join([*lines, *([""] if notes and not of_beam else []), *notes])
+    if not subject.of_beam and subject.compared:
+        table = [
+            (name, f"{value:.6g} {QUANTITY_UNITS[kind]}", f"{100 * subject.known[name].error_estimate:.1g} %")
+            for name, (value, kind) in subject.compared.items()
+        ]
+        lines += ["", aligned([("quantity", "reference", "error estimate"), *table], left=1, right=(1, 2))]
+    lines += [f"{name}: no reference; {found}" for name, found in subject.known.items() if isinstance(found, str)]
+    return "\n".join(
+        [*lines, *(f"{one.definition}, {part}: {why}" for one in choices for part, why in one.failures.items())]
+    )
+
+
+def recommended(choices: "Sequence[Choice]") -> "tuple[Choice | None, Choice | None]":
+    """The best choice, and the best of springs alone; None if there is none."""
+    solved = [choice for choice in choices if choice.worst < math.inf]
+    return next(iter(solved), None), next((choice for choice in solved if not choice.energies), None)
+
+
+def _worst(subject: Subject, choice: "Choice") -> str:
+    """Largest error of a choice, its load or quantity, and what its sign means."""
+    bounds = [(error, name) for name, error in choice.errors.items() if error == error]
+    worst, name = max(bounds, key=lambda one: abs(one[0]))
+    words = [name, sign_word(worst, *subject.compared[name])]
+    return f"{choice.definition} {error_text(worst)} ({', '.join(filter(None, words))})"
+
+
+def _also_tried(choices: "Sequence[Choice]") -> list[str]:
+    """Line with the definitions that were tried and have no row, and with those that were not."""
+    from ..springs.base import DEFINITIONS
+
+    rows = [choice.definition for choice in choices]
+    tried = choices[0].tried if choices else ()
+    slow = [name for name, one in DEFINITIONS.items() if one.cost > 1 and not one.needs and name not in (*tried, *rows)]
+    left = f"; not tried, since they search for seconds: {', '.join(slow)}" if slow else ""
+    return [f"Also tried: {', '.join(name for name in tried if name not in rows) or 'none'}{left}."] if tried else []
 
 
 def search_text(subject: Subject, search: "MeshSearch", springs_alone: bool = False) -> str:
     """Text of a search for a mesh."""
     from ..prediction.search import answer_text, tried_names
 
-    where, steps = "in" if subject.load else "under", subject.dense
-    wanted = f"{100 * search.error:.6g} %"
-    lines = [
-        f"{subject.name}; {subject.made_of}; an error of at most {wanted} {where} {_listed(search.loads)}",
-        "",
-        *([] if springs_alone else [f"recommended: {answer_text(search.best)}"]),
-        f"with springs alone: {answer_text(search.best_springs)}",
+    wanted, where = f"{100 * search.error:.6g} %", "under" if subject.of_beam else "in"
+    *loads, last = search.loads
+    named = f"{', '.join(loads)} and {last}" if loads else last
+    parts = {} if springs_alone else {"with any definition": (search.best, search.by_type)}
+    parts["with springs alone"] = search.best_springs, search.springs_by_type
+    lines = [f"{subject.name}; {subject.made_of}; an error of at most {wanted} {where} {named}", ""]
+    lines += [
+        f"{what.replace('with any definition', 'recommended')}: {answer_text(one)}" for what, (one, _) in parts.items()
     ]
-    right = (3, *range(5, 9 + len(search.loads) + steps))
-    notes = []
-    tables = [] if springs_alone else [("with any definition", search.by_type, False)]
-    tables.append(("with springs alone", search.springs_by_type, True))
-    for what, found, alone in tables:
+    notes: dict[str, None] = {}
+    for what, (_, found) in parts.items():
         chosen = sorted((one for one in found.values() if one), key=lambda one: (not one.confirmed, one.particles))
-        notes += [f"{name}, {what}: {_nearest(search, name, alone)}" for name, one in found.items() if one is None]
         if chosen:
-            lines += ["", f"{what}:", aligned(TabledList(chosen).table(), left=2, right=right)]
-    answers = [one for _, found, _ in tables for one in found.values()]
-    explained = []
-    if any(one and not one.confirmed for one in answers):
-        few = f"up to {search.most:,} particles these are too few to be sure"
-        explained.append(f"* kept on all finer meshes tried, but {few}.")
-    if None in answers:
-        change = "extrapolated by its change over the last doubling"
-        explained.append(f"None: a definition is given up if its error, {change},")
-        explained.append(f"is too large at {search.most:,} particles, too.")
+            table = TabledList(chosen).table()
+            lines += ["", f"{what}:", aligned(table, left=2, right=range(3, len(table[0])))]
+        if any(not one.confirmed for one in chosen):
+            few = f"up to {search.most:,} particles these are too few to be sure"
+            notes[f"* kept on all finer meshes tried, but {few}."] = None
+        notes |= {
+            f"{name}, {what}: {_nearest(search, name, what == 'with springs alone')}": None
+            for name, one in found.items()
+            if one is None
+        }
     counts, names = [one.particles for one in search.tried], tried_names(search.tried, springs_alone)
     lines += [
         "",
@@ -200,136 +162,84 @@ def search_text(subject: Subject, search: "MeshSearch", springs_alone: bool = Fa
         f"Tried: {', '.join(name for name in names if any(one.worst(name) < math.inf for one in search.tried))}.",
         f"A mesh counts if its error and that of all finer meshes tried, up to twice as fine, stay below {wanted},",
         "with a margin: the last change may happen once more. Sizes between whole divisions are tried, too.",
-        "Meshes are ranked by their particles.",
-        f"{subject.meaning}, solved on each mesh,",
-        f"{KINEMATICS_TEXT} (error estimate {subject.estimate}).",
-        *subject.sign,
-        "Static solve: of one load with its network assembled and factorized, measured here once.",
+        *subject.meaning("solved on each mesh"),
+        "Meshes are ranked by their particles. Static solve: of one load, measured here once. Largest step: of",
+        "undamped explicit integrators, about rest, held nowhere; it needs a density.",
+        "A definition is given up if its error, by its change over the last doubling, stays too large on finer meshes.",
     ]
-    lines += ["Largest step: of undamped explicit integrators, about rest, held nowhere."] if steps else []
-    return "\n".join([*lines, *explained, *notes])
-
-
-def prediction_json(
-    subject: Subject, mesh: dict[str, Any], choices: "Sequence[Choice]", sizes: Sequence[float] = ()
-) -> str:
-    """A prediction as JSON; numbers that are missing are null, and those of a band are lists of two."""
-    first, plain = recommended(choices)
-    return json_text(
-        {"springtune": __version__}
-        | subject.about
-        | {"mesh": mesh}
-        | ({} if subject.load else {"extrapolated_from": list(sizes)})
-        | {
-            "recommended": first,
-            "recommended_springs_alone": plain,
-            "tried": list(choices[0].tried) if choices else [],
-            "choices": [_choice_json(choice) for choice in choices],
-        }
-    )
-
-
-def search_json(subject: Subject, search: "MeshSearch", springs_alone: bool = False) -> str:
-    """A search for a mesh as JSON; numbers that are missing are null."""
-
-    def one_json(one: "MeshChoice | None") -> dict[str, Any] | None:
-        if one is None:
-            return None
-        own = {name: getattr(one, name) for name in ("mesh_type", "size", "cells", "particles", "springs", "confirmed")}
-        kept = {"finer_sizes": [finer.size for finer in one.finer]}
-        return own | kept | {"seconds": one.seconds, "step_limit": one.step_limit, "choice": _choice_json(one.choice)}
-
-    found = {"springtune": __version__} | subject.about | {"error": search.error, "most": search.most}
-    if not springs_alone:
-        found["recommended"] = one_json(search.best)
-        found["by_type"] = {name: one_json(one) for name, one in search.by_type.items()}
-    found["recommended_springs_alone"] = one_json(search.best_springs)
-    found["springs_by_type"] = {name: one_json(one) for name, one in search.springs_by_type.items()}
-    return json_text(found | {"tried": [asdict(one) for one in search.tried]})
-
-
-def recommended(choices: "Sequence[Choice]") -> tuple[str | None, str | None]:
-    """The best definition, and the best with springs alone; None if there is none."""
-    solved = [choice for choice in choices if choice.worst < math.inf]
-    plain = [choice for choice in solved if not choice.energies]
-    return (solved[0].definition if solved else None), (plain[0].definition if plain else None)
-
-
-KINEMATICS_TEXT = "with linear kinematics (small strain), against the converged reference of small strain"
-"""Kinematics and reference of the errors."""
-
-
-def _at_worst(subject: Subject, choices: "Sequence[Choice]", names: Sequence[str]) -> list[str]:
-    """Line with the largest error of each recommended definition, its part and what its sign means."""
-    texts = []
-    for choice in choices:
-        if choice.definition in names:
-            bounds = ((error, name) for name, value in choice.errors.items() for error in np.ravel(value))
-            worst, name = max((one for one in bounds if one[0] == one[0]), key=lambda one: abs(one[0]))
-            word = sign_word(worst, *subject.compared[name])
-            texts.append(f"{choice.definition} {error_text(worst)} ({name}{word and ', '}{word})")
-    return [f"at worst: {', '.join(texts)}"] if texts else []
-
-
-def _also_tried(choices: "Sequence[Choice]") -> list[str]:
-    """Line with the definitions that were tried and have no row, and with those that were not."""
-    from ..springs import DEFINITIONS
-
-    if not choices:
-        return []
-    rows, tried = [choice.definition for choice in choices], choices[0].tried
-    slow = [name for name, one in DEFINITIONS.items() if one.cost > 1 and not one.needs and name not in (*tried, *rows)]
-    left = f"; not tried, since they search for seconds: {', '.join(slow)}" if slow else ""
-    return [f"Also tried: {', '.join(name for name in tried if name not in rows) or 'none'}{left}."]
-
-
-def _listed(words: Sequence[str]) -> str:
-    return " and ".join([", ".join(words[:-1]), words[-1]] if words[1:] else words)
+    return "\n".join([*lines, *notes])
 
 
 def _nearest(search: "MeshSearch", mesh_type: str, springs_alone: bool) -> str:
     """Reason why no mesh was found, and the nearest one."""
-    from ..prediction.choices import as_sure_as, in_order
-    from ..prediction.search import size_text, tried_names
+    from ..prediction.search import tried_names
 
     tried = [one for one in search.tried if one.mesh_type == mesh_type]
-    allowed = tried_names(tried, springs_alone)
-    names = [(one, name) for one in tried for name in one.errors if name in allowed]
-    near = [(one.worst(name), one, name) for one, name in names if one.worst(name) < math.inf]
-    if not near:
+    near = [
+        (round(one.worst(name), 9), one.particles, name, one.size)
+        for one in tried
+        for name in tried_names(tried, springs_alone)
+        if name in one.errors
+    ]
+    worst, particles, name, size = min(near, default=(math.inf, 0, "", 0.0))
+    if worst == math.inf:
         return f"none; of at most {search.most:,} particles there is no mesh, or no network on it is stable"
-    ordered = in_order(
-        near,
-        lambda found: found[0],
-        lambda found: (found[2] in found[1].energies, found[1].particles, found[2], found[1].size),
-        as_sure_as(search.known),
+    further = "; finer ones do not keep it" if worst <= search.error else ""
+    return (
+        f"none up to {max(count for _, count, *_ in near):,} particles; nearest is {name} at {mesh_size_text(size)} "
+        f"({particles:,} particles), {100 * worst:.3g} % off at worst{further}"
     )
-    worst, one, name = ordered[0]
-    most = max(other.particles for other, _ in names)
-    where = f"{name} at {size_text(one.size)} ({one.particles:,} particles)"
-    if worst <= search.error:
-        return (
-            f"none up to {most:,} particles; {where} keeps it, {100 * worst:.3g} % off at worst, but finer ones do not"
-        )
-    return f"none up to {most:,} particles; nearest is {where}, {100 * worst:.3g} % off at worst"
 
 
-def _choice_json(choice: "Choice") -> dict[str, Any]:
-    found = asdict(choice) | {"worst": choice.worst}
-    del found["tried"]  # of all choices together
-    return found
+def fit_text(fit: "EngineFit", mesh_name: str) -> str:
+    """Text of a calibration."""
+    about, mesh = fit.scene.statement, fit.scene.mesh
+    lines = [
+        f"{about.body}, {mesh_name}: {len(mesh.points)} particles, {len(mesh.edges)} springs; "
+        f"{about.named_materials}; {about.label}; definition {fit.scene.definition.name}",
+        aligned(fit._table(), left=2),
+    ]
+    if fit.bands:
+        converging = "" if len(fit.bands) == 1 else ": of others than the first, at what moves finite elements as far"
+        lines += ["", f"errors at shares of a load{converging}:", aligned(fit.bands.table(), left=2)]
+        off = [one.load for one in fit.bands[1:] if abs(one.error - one.definition_error) > one.within / 2]
+        hides = f"The factor hides from {fit.scene.load} that the solver has not converged, not from {', '.join(off)}."
+        lines += [hides] if off else []
+    if fit.needed:
+        lines += ["", f"under {fit.scene.load}, solver error below 1 % without a factor:"]
+        lines.append(aligned(fit.needed.table(), left=2))
+    return "\n".join(lines)
 
 
-def json_text(content: dict[str, Any]) -> str:
-    """Content as JSON; numbers that are missing are null."""
+def budget_text(search: "BudgetSearch") -> str:
+    """Text of a search within a budget."""
+    if search.best is None:
+        least = error_text(search[0].worst).lstrip("+")
+        return f"No stiffness makes any of them right; the nearest is off by {least}. Take a larger budget."
+    return f"{search!r}\n\nchosen, the least error at worst:\n{fit_text(search.best.fit, search.best.mesh)}"
 
-    def plain(value: Any) -> Any:
-        if isinstance(value, dict):
-            return {name: plain(one) for name, one in value.items()}
-        if isinstance(value, list | tuple):
-            # A band with a missing bound is missing.
-            numbers = [plain(one) for one in value]
-            return None if isinstance(value, tuple) and None in numbers else numbers
-        return None if isinstance(value, float) and not math.isfinite(value) else value
 
-    return json.dumps(plain(content), indent=2, ensure_ascii=False)
+def written_text(net: "SpringNet", written: Iterable[Path], mujoco: int | None = None) -> str:
+    """Written files and their expected errors, as text."""
+    from ..handover.formats import FOR_MUJOCO, ending_of
+    from ..handover.mujoco import for_versions
+
+    header, (first, *others) = net.header, written
+    springs = f"{len(net.springs)} springs" if net.stiffness.any() else f"{len(net.springs)} edges with no own springs"
+    extent = [] if header["beam"] else [size_text(*np.ptp(net.points, axis=0).tolist())]
+    besides = [f"{terms.kind} terms of {len(terms.cells)} cells" for terms in net.energies]
+    counts = [*extent, f"{len(net.points)} particles", springs, *besides]
+    lines = [f"{first}: {', '.join(counts)} of definition {header['definition']}"]
+    lines += [f"beside it: {', '.join(map(str, others))}"] if others else []
+    lines += [for_versions(net.energies, mujoco)] if ending_of(first) in FOR_MUJOCO else []
+    errors, what = header["expected_error"], "error of the displacement" if header["beam"] else "errors"
+    if isinstance(errors, dict):
+        known = [f"{load} {100 * error:+.3g} %" for load, error in errors.items() if isinstance(error, float)]
+        lines += [f"{what}, solved on this mesh: {', '.join(known)}"] if known else []
+        lines += [f"{load}: {why}" for load, why in errors.items() if isinstance(why, str)]
+    else:
+        lines.append(f"{what}: {errors}")
+    if isinstance(steps := header["largest_stable_step"], dict):
+        step = min(step for step in steps.values() if isinstance(step, float))
+        lines.append(f"largest stable step of explicit integrators, undamped: {step:.4g} s")
+    return "\n".join(lines)

@@ -13,7 +13,7 @@ import click
 
 from ..registry import how_to_install
 from ..studies.runs.source import USUAL_STUDY, config_file, workflow_folder
-from . import examples, studies_here
+from . import examples
 from .options import allow, max_scenes
 
 if TYPE_CHECKING:
@@ -32,21 +32,15 @@ NOT_SOLVED = 3
         "springtune run config/mine.yaml --workflow-profile slurm",
     ),
     context_settings={"ignore_unknown_options": True},
-    options_metavar="[--strict] [--max-scenes N] [--results FOLDER] [--no-diff] [--no-host]",
+    options_metavar="[--strict] [--max-scenes N] [--results FOLDER]",
 )
 @max_scenes
 @click.option(
     "--results", type=click.Path(file_okay=False, path_type=Path), help="Folder in which results/ is, made if missing."
 )
 @click.option("--strict", is_flag=True, help="Exit with 3 if scenes are not solved; they are data otherwise.")
-@click.option("--no-diff", is_flag=True, help="Leave what differs from the commit out of the dataset.")
-@click.option("--no-host", is_flag=True, help="Leave the machine's name out of the dataset.")
-@click.argument(
-    "arguments", nargs=-1, type=click.UNPROCESSED, metavar="[STUDY] [OPTIONS OF SNAKEMAKE]", shell_complete=studies_here
-)
-def run(
-    most: int | None, results: Path | None, strict: bool, no_diff: bool, no_host: bool, arguments: tuple[str, ...]
-) -> None:
+@click.argument("arguments", nargs=-1, type=click.UNPROCESSED, metavar="[STUDY] [OPTIONS OF SNAKEMAKE]")
+def run(most: int | None, results: Path | None, strict: bool, arguments: tuple[str, ...]) -> None:
     """Run a study, the paper's where none is named.
 
     Checks the study and then runs Snakemake, with results/ in this folder or that of --results. All options but those
@@ -67,9 +61,6 @@ def run(
     if late:
         first = f"./{late[0]}" if late[0].startswith("-") else f"{late[0]} {options[0]}"
         raise click.UsageError(f"name the study first: springtune run {first}")
-    second = [one for before, one in zip([""] + options, options) if _is_study(one) and before in NO_VALUE]
-    if named and second:
-        raise click.UsageError(f"one study at a time: springtune run {arguments[0]}, then springtune run {second[0]}")
     if _wants_slurm(options) and not find_spec(SLURM):
         why = "the profile slurm needs Snakemake's plugin for Slurm, which is not installed"
         raise click.UsageError(f"{why}; {how_to_install('slurm')}")
@@ -87,8 +78,6 @@ def run(
         click.echo(f"results go to {results}/results/{study.name}; paths below are as seen from {results}", err=True)
     path = path.relative_to(folder) if path.is_relative_to(folder) else path
     workflow = [] if folder == source else ["--snakefile", str(source / "Snakefile")]
-    left_empty = {name: True for name, given in (("no_diff", no_diff), ("no_host", no_host)) if given}
-    os.environ |= {f"SPRINGTUNE_{name.upper()}": "true" for name in left_empty}
     forced: list[str] = []
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -103,11 +92,11 @@ def run(
         studies = [study, *(load_study(config_file(f"{name}.yaml", path.parent)) for name in others)]
     if _plans(options):
         # A dry run removes no records. An option of the user's, which comes later, replaces this one.
-        outdated = _outdated(studies, left_empty, "a run makes it again")
+        outdated = _outdated(studies, _wants_slurm(options), "a run makes it again")
         forced = ["--forcerun", *map(str, outdated)] if outdated else []
     elif _computes(options):
         _unlock(studies, [*_snakemake(), *workflow, "--unlock", f"--configfile={path}"])
-        found = _outdated(studies, left_empty, "it is made again")
+        found = _outdated(studies, _wants_slurm(options), "it is made again")
         for record in found or {}:
             record.unlink()
         if found == {} and _asks_for_all(options):
@@ -178,7 +167,7 @@ def _unlock(studies: "list[Study]", command: list[str]) -> None:
     here = Path.cwd()
     state = Path(".snakemake")
     if not os.access(state if state.exists() else here, os.W_OK):
-        remedy = "`springtune info`, `browse` and `verify` write nothing: call these"
+        remedy = "`springtune info` and `browse` write nothing: call these"
         raise click.ClickException(f"{here} cannot be written; {remedy}")
     disk = os.statvfs(here)
     if disk.f_blocks and not disk.f_bavail:
@@ -186,18 +175,17 @@ def _unlock(studies: "list[Study]", command: list[str]) -> None:
     killed = [one.name for one in studies if locks.check_idle(_results(one))]
     if killed:
         subprocess.run(command, check=False, capture_output=True)
-        locks.forget()
         which = ", ".join(str(Path("results", name)) for name in killed)
         click.echo(f"{which}: the run before was killed and left its lock; the lock is removed", err=True)
 
 
-def _outdated(studies: "list[Study]", left_empty: dict[str, bool], remedy: str) -> dict[Path, str] | None:
-    """Records of outdated jobs, with the reasons; None if a job was never done. Damaged files are printed."""
+def _outdated(studies: "list[Study]", cluster: bool, remedy: str) -> dict[Path, str] | None:
+    """Records of outdated jobs, with the reasons; None if a job was never done. Missing files are printed."""
     from ..studies.runs import rerun
 
-    each = [rerun.outdated(study, _results(study), left_empty) for study in studies]
+    each = [rerun.outdated(study, _results(study), cluster) for study in studies]
     found = {record: why for one in each for record, why in (one or {}).items()}
-    for why in filter(rerun.is_damage, found.values()):
+    for why in filter(rerun.is_missing, found.values()):
         click.echo(f"{why}; {remedy}", err=True)
     return found if found or None not in each else None
 
@@ -219,14 +207,6 @@ def _wants_slurm(options: list[str]) -> bool:
     named = [two for one, two in zip(options, options[1:]) if one == "--workflow-profile"]
     named += [one.partition("=")[2] for one in options if one.startswith("--workflow-profile=")]
     return any(Path(one).name == "slurm" for one in named)
-
-
-NO_VALUE = {"", "-n", "--dry-run", "--dryrun", "-F", "--forceall", "-f", "--force", "-p", "--printshellcmds", "-k"}
-"""Words after which an argument is not the value of an option: options without value, or none."""
-
-
-def _is_study(argument: str) -> bool:
-    return argument.endswith((".yaml", ".yml")) and not argument.startswith("-")
 
 
 def _meant(path: Path) -> str:
@@ -263,4 +243,7 @@ def _unsolved(path: Path) -> int:
             status = file["status"][()]
     except FileNotFoundError:
         return 0
+    except (OSError, KeyError) as error:
+        why = f"cannot be read ({error}); delete it, and the same command makes it again"
+        raise click.ClickException(f"{path}: {why}") from None
     return int(((status != Status.NOT_REQUESTED) & (status != Status.SOLVED)).sum())

@@ -298,12 +298,12 @@ class Engine(Declared):
                 f"precision: '{setting.precision}' is unknown to engine '{self.name}'; give one of {known}"
             )
         if net is not None:
-            name, lacking = net.header["definition"], _lacking(self, net)
+            lacking = _lacking(self, net)
             if lacking:
                 others = [one.name for one in ENGINES.values() if not _lacking(one, net)]
                 raise EngineError(
-                    f"engine '{self.name}' has no {' and no '.join(lacking)}, and definition '{name}' has; take "
-                    f"another definition, or engine {' or '.join(others) or 'none of these'}"
+                    f"engine '{self.name}' has no {' and no '.join(lacking)}; take another definition, or engine "
+                    f"{' or '.join(others) or 'none of these'}"
                 )
         if self.absent:
             raise EngineAbsentError(self.absent)

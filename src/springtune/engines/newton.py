@@ -60,8 +60,8 @@ def triangle_numbers(net: SpringNet, solver: str) -> dict[str, Any]:
         return {"tri_ke": shear, "tri_ka": first + shear}
     if first > 1e-6 * shear:
         raise EngineError(
-            f"material: Poisson's ratio is {first / (first + 2 * shear):.3g}, and triangles of Newton's Style3D have "
-            "none; take a material of nu = 0, or engine newton-vbd"
+            f"material: Poisson's ratio is {first / (first + 2 * shear):.3g}, Style3D have none; take a "
+            "material of nu = 0"
         )
     return {"tri_aniso_ke": (2 * shear, 2 * shear, shear)}
 
@@ -86,7 +86,7 @@ class _Session:
         if solver == "XPBD" and np.any(net.stiffness < 0):
             raise EngineError(
                 f"definition '{net.header['definition']}': has springs of negative stiffness, which Newton's XPBD "
-                "leaves out; take 'patch' or 'lattice', whose springs all pull, or engine newton-vbd"
+                "leaves out; take 'patch' or 'lattice'"
             )
         middle = (net.points.min(axis=0) + net.points.max(axis=0)) / 2  # small numbers lose least by rounding
         with _quiet():

@@ -53,7 +53,7 @@ class PositionBased(Textbook):
         super().__init__(net, setting, damping)
         self.shares = shares(net, setting)[net.stiffness != 0].astype(self.kind)
 
-    def solve(self, before: np.ndarray, y: np.ndarray) -> np.ndarray:
+    def solve(self, y: np.ndarray) -> np.ndarray:
         """Project the inertial positions: no constraint is compliant."""
         none = np.zeros_like(self.lengths)
         project_springs(y, self.weights, self.springs, self.lengths, self.shares, none, none.copy(), self.iterations)

@@ -52,7 +52,7 @@ class Projective(Textbook):
         matrix = diags_array(free) @ whole @ diags_array(free) + diags_array(1 - free)
         return splu(csc_array(matrix, dtype=self.kind), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, **SUPERLU)
 
-    def solve(self, before: np.ndarray, y: np.ndarray) -> np.ndarray:
+    def solve(self, y: np.ndarray) -> np.ndarray:
         """Iterate from the inertial positions."""
         x = y.copy()
         of_springs = self.springs, self.lengths, self.stiffness

@@ -279,8 +279,7 @@ def in_engine(
     asked = max(MOST_FRAMES, ceil(PERIODS / WINDOW) * window) if frames is None else count(frames, "frames", MOST_WORK)
     if asked * setting.substeps * (setting.iterations if chosen.iterates else 1) > MOST_WORK:
         raise EngineError(
-            f"dt: {asked} frames of {setting} are over {MOST_WORK:.0e} iterations, and {PERIODS} periods of the load's "
-            "motion take as many frames; take a longer dt, or fewer substeps, iterations or frames"
+            f"dt: {asked} frames of {setting} are over {MOST_WORK:.0e} iterations; take a longer dt, or fewer substeps"
         )
     extent = float(np.ptp(net.points, axis=0).max())
     rest = REST[setting.precision] if tolerance is None else number(tolerance, "tolerance")

@@ -70,8 +70,8 @@ class Textbook:
         self.springs = net.springs[there]
         self.lengths, self.stiffness = net.rest_lengths[there].astype(kind), net.stiffness[there].astype(kind)
 
-    def solve(self, before: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return the positions at the end of a step from those before it and the inertial ones, which it may change."""
+    def solve(self, y: np.ndarray) -> np.ndarray:
+        """Return the positions at the end of a step from the inertial ones, which it may change."""
         raise NotImplementedError
 
     def advance(self, frames: int) -> None:
@@ -79,7 +79,7 @@ class Textbook:
         with np.errstate(over="ignore", invalid="ignore"):
             for _ in range(frames * self.substeps):
                 before = self.x
-                self.x = self.solve(before, before + self.h * self.v + self.push)
+                self.x = self.solve(before + self.h * self.v + self.push)
                 self.v = self.kept / self.h * (self.x - before)
 
     def displacements(self) -> np.ndarray:
@@ -92,7 +92,7 @@ def pulling(net: SpringNet, why: str) -> None:
     if np.any(net.stiffness < 0):
         raise EngineError(
             f"definition '{net.header['definition']}': has springs of negative stiffness, and {why}; take 'patch' or "
-            "'lattice', whose springs all pull, or engine 'implicit-cg'"
+            "'lattice', or engine 'implicit-cg'"
         )
 
 

@@ -133,7 +133,7 @@ class _Descent(Textbook):
         pointers = np.searchsorted(cells.ravel()[order], np.arange(len(self.x) + 1))
         return pointers, order, np.ascontiguousarray(cells, np.int64), *(one.astype(self.kind) for one in values)
 
-    def solve(self, before: np.ndarray, y: np.ndarray) -> np.ndarray:
+    def solve(self, y: np.ndarray) -> np.ndarray:
         """Sweep from the guess."""
         x = y.copy()
         if self.adaptive:

@@ -153,7 +153,7 @@ class ExtendedPositionBased(Textbook):
         parts = rest, values.get("rest_slope", np.zeros((0, 3, 2))), law, one.compliance / float(self.h) ** 2
         return BLOCK_KINDS.index(one.kind), one.cells, *(part.astype(self.kind) for part in parts)
 
-    def solve(self, before: np.ndarray, y: np.ndarray) -> np.ndarray:
+    def solve(self, y: np.ndarray) -> np.ndarray:
         """Project the inertial positions."""
         springs = self.weights, self.springs, self.lengths, np.ones_like(self.lengths), self.compliance
         pulls = np.zeros_like(self.lengths)

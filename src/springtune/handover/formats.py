@@ -1,13 +1,12 @@
-"""Files of nets: CSV, JSON, VTU and HDF5, each of which gives back what was written, number by number."""
+"""Files of nets: CSV, JSON and VTU, each of which gives back what was written, number by number."""
 
 import csv
 import io
 import json
 import warnings
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack, redirect_stderr, redirect_stdout
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,10 +15,9 @@ import numpy as np
 from ..mesh.formats import LONGEST_SAID, library
 from ..safe_io.atomic import check_folder, replacing, write_text
 from ..safe_io.escapes import json_line, shown
-from ..safe_io.inputs import DataElsewhere, bounded, check_alone
-from .lammps import lammps
+from ..safe_io.inputs import bounded
 from .mujoco import mjcf
-from .newton import newton_script, newton_usd
+from .newton import newton_script
 from .paraview import comment_of, write_vtu
 from .sofa import sofa_python, sofa_xml
 from .terms import OF_CORNERS, VALUES, Net, Terms
@@ -56,26 +54,30 @@ ARRAYS = {
 CELL_ARRAYS = {3: "triangles", 4: "quads"}
 """Arrays that cells stand in, by their corners."""
 
-COUNTED = {"particles": "points", "springs": "springs", "triangles": "triangles", "quads": "quads"}
-"""Arrays by what the header of a net calls their lengths."""
-
-
 Read = tuple[dict[str, np.ndarray], Iterable[Terms], dict[str, Any]]
 """Content of a file: arrays by the names of `ARRAYS`, energies and header."""
 
 
 def write(path: str | Path, net: Net, mujoco: int | None = None) -> list[Path]:
     """Write a net in the format of a name's ending; files appear whole or not at all."""
-    path = Path(path)
-    check_target(path)
-    form = _format_of(path)
-    if mujoco is not None:
-        if not for_mujoco(path):
-            raise ValueError(
-                f"mujoco: {mujoco!r} is of no use to {path.name}; leave it out, or give a name ending in .xml or .mjcf"
-            )
-        form = _for_simulator("MuJoCo", _as_text(partial(mjcf, version=mujoco)))
-    return form.write(path, replace(net, header=net.header | {"thickness": float(net.thickness)})) or [path]
+    path, ending = Path(path), check_target(path)
+    net = replace(net, header=net.header | {"thickness": float(net.thickness)})
+    if mujoco is not None and ending not in FOR_MUJOCO:
+        raise ValueError(
+            f"mujoco: {mujoco!r} is of no use to {path.name}; leave it out, or give a name ending in .xml or .mjcf"
+        )
+    if ending in NET_FORMATS:
+        return NET_FORMATS[ending][0](path, net) or [path]
+    program, text = SIMULATORS[ending]
+    calibrated = net.header.get("calibrated")
+    if calibrated and ending != AT_SETTING.get(calibrated["engine"]):
+        kept = " or ".join(filter(None, [AT_SETTING.get(calibrated["engine"]), ".csv, .json or .vtu"]))
+        raise ValueError(
+            f"{path}: runs {program} at a step of its own, and the stiffness is for {calibrated['engine']} at "
+            f"{calibrated['setting']}; give a name ending in {kept}"
+        )
+    write_text(path, text(net) if mujoco is None else mjcf(net, mujoco))
+    return [path]
 
 
 NET_MEMORY, MEMORY_SHARE = 3e8, 60.0
@@ -85,9 +87,11 @@ NET_MEMORY, MEMORY_SHARE = 3e8, 60.0
 def read(path: str | Path) -> Net:
     """Read a net."""
     path = Path(path)
-    form = _format_of(path)
+    ending = ending_of(path)
     if not path.is_file():
         raise ValueError(f"{path}: there is no such file; give one that was written by springtune")
+    if ending in SIMULATORS:
+        raise ValueError(f"{path}: it is for {SIMULATORS[ending][0]}; read the springs from {', '.join(ENDINGS)}")
     told = io.StringIO()
     try:
         # meshio prints its errors, and exits.
@@ -95,55 +99,36 @@ def read(path: str | Path) -> Net:
         most = NET_MEMORY + MEMORY_SHARE * sum(one.stat().st_size for one in files)
         with redirect_stdout(told), redirect_stderr(told), warnings.catch_warnings(), bounded(most):
             warnings.simplefilter("ignore")
-            return _checked(*form.read(path))
+            return _checked(*NET_FORMATS[ending][1](path))
     except (Exception, SystemExit) as error:  # libraries raise many kinds of errors for a damaged file
-        if isinstance(error, DataElsewhere) or (isinstance(error, OSError) and error.errno is not None):
+        if isinstance(error, OSError) and error.errno is not None:
             raise
         said = " ".join(str(error).split())[:LONGEST_SAID] or type(error).__name__
         raise ValueError(f"{path}: is damaged, or no net of springtune ({said}); write it again") from None
 
 
-def check_target(path: str | Path) -> None:
-    """Refuse a name whose ending is no format of a net, or whose folder is not there."""
-    _format_of(Path(path))
-    check_folder(path)
-
-
-def for_mujoco(path: Path) -> bool:
-    """Whether the ending of a name is one for MuJoCo."""
-    return _format_of(path) is _MUJOCO
-
-
 def _checked(arrays: dict[str, np.ndarray], energies: Iterable[Terms], header: dict[str, Any]) -> Net:
     """Net whose arrays fit each other."""
-    energies = tuple(energies)
+    energies, rows = tuple(energies), _counts(header)
     for name, about in ARRAYS.items():
         if name in arrays:
-            array: np.ndarray = np.ascontiguousarray(arrays[name], dtype=about.kind)
-            arrays[name] = array
-            if array.shape[1:] != ((about.columns,) if about.columns else ()) or not array.ndim:
-                raise ValueError(f"{name} have the shape {array.shape}")
+            array = arrays[name] = np.ascontiguousarray(arrays[name], dtype=about.kind)
+            count = rows.setdefault(about.of or name, len(array))
+            wanted = (count, about.columns) if about.columns else (count,)
+            if array.shape != wanted:
+                raise ValueError(f"{name} of shape {array.shape} in the place of {wanted}")
+            if about.kind is np.int64 and array.size and not (0 <= array.min() and array.max() < rows["points"]):
+                raise ValueError(f"{name} of particles that it does not have")
         elif name != "masses":
             raise ValueError(f"it has no {name}")
+    if any(values.shape[:1] != (len(terms.cells),) for terms in energies for values in terms.values.values()):
+        raise ValueError("its terms are not as many as cells")
     numbers = [array for name, array in arrays.items() if ARRAYS[name].kind is float]
     numbers += [values for terms in energies for values in terms.values.values()]
     if not all(np.isfinite(array).all() for array in numbers):
         raise ValueError("some of its numbers are not finite")
-    for terms in energies:
-        if any(len(values) != len(terms.cells) for values in terms.values.values()):
-            raise ValueError(f"{terms.kind} terms are not as many as cells")
-    count = len(arrays["points"])
-    for name, about in ARRAYS.items():
-        if about.of and name in arrays and len(arrays[name]) != len(arrays[about.of]):
-            raise ValueError(f"{len(arrays[name])} {name} for {len(arrays[about.of])}")
-    for name in ("springs", "triangles", "quads"):
-        if len(arrays[name]) and not (0 <= arrays[name].min() and arrays[name].max() < count):
-            raise ValueError(f"{name} of particles that it does not have")
     if not isinstance(header.get("thickness"), float):
         raise ValueError("its header has no thickness")
-    for said, length in _counts(header).items():
-        if len(arrays[COUNTED[said]]) != length:
-            raise ValueError(f"{len(arrays[COUNTED[said]])} {said}, and its header says {length}")
     parts: dict[str, Any] = {"masses": None} | arrays
     return Net(**parts, energies=energies, thickness=header["thickness"], header=header)
 
@@ -153,28 +138,26 @@ def arrays_of(net: Net) -> dict[str, np.ndarray]:
     return {name: getattr(net, name) for name in ARRAYS if getattr(net, name) is not None}
 
 
-def _counts(header: Mapping[str, Any]) -> dict[str, Any]:
-    """Numbers of particles, springs and cells by the header; a user's own header may lack them."""
-    mesh = header.get("mesh")
-    return {name: mesh[name] for name in COUNTED if name in mesh} if isinstance(mesh, dict) else {}
+def _counts(header: Mapping[str, Any]) -> dict[str, int]:
+    """Rows of arrays by the header; a user's own header may lack them."""
+    mesh = header.get("mesh") or {}
+    said = {"points": "particles", "springs": "springs", "triangles": "triangles", "quads": "quads"}
+    return {name: mesh[word] for name, word in said.items() if word in mesh}
 
 
 # -- tables of cells: the terms of their energies, column by column ------------------------------------------------
 
 
-def _terms(cells: np.ndarray, columns: Mapping[str, np.ndarray]) -> Iterable[Terms]:
-    """Terms of the columns of cells."""
+def _terms(cells: np.ndarray, columns: Mapping[str, Any]) -> Iterable[Terms]:
+    """Terms of the columns of cells, such as ``area_modulus``."""
     for kind, names in VALUES.items():
-        found = {name: columns[f"{kind}_{name}"] for name in names if f"{kind}_{name}" in columns}
+        found = {
+            name: np.ascontiguousarray(columns[full], float) for name in names if (full := f"{kind}_{name}") in columns
+        }
         if found and len(found) < len(names):
             raise ValueError(f"{kind} terms without {', '.join(sorted(set(names) - set(found)))}")
         if found:
-            yield _terms_of(kind, cells, found)
-
-
-def _terms_of(kind: str, cells: np.ndarray, values: Mapping[str, Any]) -> Terms:
-    """Terms of all values of a kind."""
-    return Terms(kind, cells, {name: np.ascontiguousarray(values[name], float) for name in VALUES[kind]})
+            yield Terms(kind, cells, found)
 
 
 def _by_corners(energies: Iterable[Terms]) -> dict[int, dict[str, np.ndarray]]:
@@ -188,8 +171,31 @@ def _by_corners(energies: Iterable[Terms]) -> dict[int, dict[str, np.ndarray]]:
 
 # -- CSV -----------------------------------------------------------------------------------------------------------
 
-PARTICLE_COLUMNS = ("points", "masses", "held", "forces")
-SPRING_COLUMNS = ("springs", "rest_lengths", "stiffness")
+
+Columns = dict[str, tuple[Sequence[str], str]]
+"""Titles of the columns of arrays in a table, and their unit."""
+
+
+def _of_terms(corners: int) -> Columns:
+    """Columns of all values of terms, one for each corner where corners have their own."""
+    ends = {False: [""], True: [f"_{corner}" for corner in "abcd"[:corners]]}
+    return {
+        f"{kind}_{name}": ([f"{kind}_{name}{end}" for end in ends[name in OF_CORNERS]], unit)
+        for kind, units in VALUES.items()
+        for name, unit in units.items()
+    }
+
+
+def _of_arrays(*names: str) -> Columns:
+    return {name: (ARRAYS[name].titles, ARRAYS[name].unit) for name in names}
+
+
+TABLES = {
+    "": _of_arrays("springs", "rest_lengths", "stiffness"),
+    "particles": _of_arrays("points", "masses", "held", "forces"),
+    "triangles": _of_arrays("triangles") | _of_terms(3),
+    "quads": _of_arrays("quads") | _of_terms(4),
+}
 """Arrays that stand beside each other in a table."""
 
 
@@ -199,12 +205,11 @@ def companions(path: Path) -> dict[str, Path]:
 
 
 def _write_csv(path: Path, net: Net) -> list[Path]:
-    arrays, others = arrays_of(net), companions(path)
-    tables = {others["particles"]: _table(arrays, PARTICLE_COLUMNS)}
-    terms = _by_corners(net.energies)
+    arrays, others, terms = arrays_of(net), companions(path), _by_corners(net.energies)
+    tables = {others["particles"]: _table(arrays, TABLES["particles"])}
     for count, name in CELL_ARRAYS.items():
         if len(arrays[name]):
-            tables[others[name]] = _table(arrays, (name,)) | _corner_columns(terms.get(count, {}), count)
+            tables[others[name]] = _table(arrays | terms.get(count, {}), TABLES[name])
     said = [f"# springs of a network; particles are counted from 0, and stand in {shown(others['particles'].name)}"]
     said += [
         f"# cells of {count} corners, and what energies they have, stand in {shown(others[name].name)}"
@@ -213,7 +218,7 @@ def _write_csv(path: Path, net: Net) -> list[Path]:
     ]
     said += [f"# {json_line(line)}" for line in json.dumps(net.header, indent=1, ensure_ascii=False).split("\n")]
     texts = {other: _csv_text(table) for other, table in tables.items()}
-    texts[path] = "\n".join([*said, ""]) + _csv_text(_table(arrays, SPRING_COLUMNS))
+    texts[path] = "\n".join([*said, ""]) + _csv_text(_table(arrays, TABLES[""]))
     _write_all(texts)
     for other in set(others.values()) - set(tables):
         other.unlink(missing_ok=True)  # left by another net
@@ -227,30 +232,25 @@ def _write_all(texts: Mapping[Path, str]) -> None:
             unfinished.enter_context(replacing(one)).write_text(text, encoding="utf-8")
 
 
-def _titled(titles: Iterable[str], unit: str, values: np.ndarray) -> dict[str, np.ndarray]:
-    """Columns of an array by title."""
-    ending = f" [{unit}]" if unit else ""
-    return {f"{title}{ending}": column for title, column in zip(titles, values.reshape(len(values), -1).T)}
-
-
-def _table(arrays: Mapping[str, np.ndarray], names: Iterable[str]) -> dict[str, np.ndarray]:
-    """Columns of arrays by title."""
+def _table(arrays: Mapping[str, np.ndarray], about: Columns) -> dict[str, np.ndarray]:
+    """Columns of arrays by title, with their units."""
     table: dict[str, np.ndarray] = {}
-    for name in names:
+    for name, (titles, unit) in about.items():
         if name in arrays:
             values = arrays[name].astype(int) if arrays[name].dtype == bool else arrays[name]
-            table |= _titled(ARRAYS[name].titles, ARRAYS[name].unit, values)
+            heads = [f"{title} [{unit}]" if unit else title for title in titles]
+            table |= dict(zip(heads, values.reshape(len(values), -1).T))
     return table
 
 
-def _corner_columns(columns: Mapping[str, np.ndarray], count: int) -> dict[str, np.ndarray]:
-    """Columns of terms by title, one for each corner where corners have their own."""
-    table: dict[str, np.ndarray] = {}
-    for name, values in columns.items():
-        kind, _, value = name.partition("_")
-        titles = [f"{name}_{corner}" for corner in "abcd"[:count]] if values.ndim > 1 else [name]
-        table |= _titled(titles, VALUES[kind][value], values)
-    return table
+def _from_table(table: Mapping[str, Sequence[str]], about: Columns) -> dict[str, np.ndarray]:
+    """Arrays of the columns of a table."""
+    found = {}
+    for name, (titles, _) in about.items():
+        if titles[0] in table:
+            values = np.array([[float(text) for text in table[title]] for title in titles]).T
+            found[name] = values if len(titles) > 1 else values[:, 0]
+    return found
 
 
 def _csv_text(table: Mapping[str, np.ndarray]) -> str:
@@ -265,26 +265,19 @@ def _read_csv(path: Path) -> Read:
     lines = path.read_text(encoding="utf-8").split("\n")  # not at line breaks within names
     comments = [line[2:] for line in lines if line.startswith("#")]
     header = json.loads("\n".join(comments[comments.index("{") :]))
-    others = companions(path)
-    for said, length in _counts(header).items():
-        if length and said in others and not others[said].is_file():
-            raise ValueError(f"{others[said].name}, which has its {length} {said}, is not beside it")
-    tables = {"": _csv_table(lines)} | {
-        name: _csv_table(other.read_text(encoding="utf-8").split("\n"))
-        for name, other in others.items()
-        if other.is_file()
-    }
-    of_table = {"": SPRING_COLUMNS, "particles": PARTICLE_COLUMNS} | {name: (name,) for name in CELL_ARRAYS.values()}
+    others, counts = companions(path), _counts(header)
     arrays: dict[str, np.ndarray] = {"triangles": np.zeros((0, 3)), "quads": np.zeros((0, 4))}
     energies: list[Terms] = []
-    for place, table in tables.items():
-        for name in of_table[place]:
-            about = ARRAYS[name]
-            if about.titles[0] in table:
-                found = np.array([[float(text) for text in table[title]] for title in about.titles]).T
-                arrays[name] = (found if about.columns else found[:, 0]).astype(about.kind)
+    for place, about in TABLES.items():
+        if place and not others[place].is_file():
+            if length := counts.get(next(iter(about))):
+                raise ValueError(f"{others[place].name}, which has its {length} {place}, is not beside it")
+            continue
+        rows = others[place].read_text(encoding="utf-8").split("\n") if place else lines
+        found = _from_table(_csv_table(rows), about)
+        arrays |= {name: values for name, values in found.items() if name in ARRAYS}
         if place in CELL_ARRAYS.values():
-            energies += _terms(arrays[place], _joined(table, ARRAYS[place].columns))
+            energies += _terms(arrays[place].astype(np.int64), found)
     return arrays, energies, header
 
 
@@ -293,19 +286,6 @@ def _csv_table(lines: Iterable[str]) -> dict[str, tuple[str, ...]]:
     titles, *rows = csv.reader(line for line in lines if line and not line.startswith("#"))
     columns = list(zip(*rows)) if rows else [()] * len(titles)
     return {title.partition(" [")[0]: column for title, column in zip(titles, columns, strict=True)}
-
-
-def _joined(table: Mapping[str, tuple[str, ...]], count: int) -> dict[str, np.ndarray]:
-    """Columns of terms, those of the corners together."""
-    found = {}
-    for kind, names in VALUES.items():
-        for name in names:
-            full = f"{kind}_{name}"
-            titles = [f"{full}_{corner}" for corner in "abcd"[:count]] if name in OF_CORNERS else [full]
-            if titles[0] in table:
-                values = np.array([[float(text) for text in table[title]] for title in titles]).T
-                found[full] = values if name in OF_CORNERS else values[:, 0]
-    return found
 
 
 # -- JSON ----------------------------------------------------------------------------------------------------------
@@ -343,7 +323,10 @@ def _read_json(path: Path) -> Read:
         for name, one in ARRAYS.items()
         if found[name] is not None
     }
-    energies = [_terms_of(one["kind"], arrays[one["cells"]], one["values"]) for one in found["energies"]]
+    energies = [
+        Terms(one["kind"], arrays[one["cells"]], {name: np.array(one["values"][name]) for name in VALUES[one["kind"]]})
+        for one in found["energies"]
+    ]
     return arrays, energies, found["header"]
 
 
@@ -411,113 +394,49 @@ def _read_vtu(path: Path) -> Read:
     return arrays, energies, json.loads(comment_of(path))
 
 
-# -- HDF5 ----------------------------------------------------------------------------------------------------------
+# -- formats -------------------------------------------------------------------------------------------------------
 
+NET_FORMATS: dict[str, tuple[Callable[[Path, Net], list[Path] | None], Callable[[Path], Read]]] = {
+    ".csv": (_write_csv, _read_csv),
+    ".json": (_write_json, _read_json),
+    ".vtu": (lambda path, net: write_vtu_with(path, net, {}, {}), _read_vtu),
+}
+"""Functions that write and read a net, by the ending of the name of its file."""
 
-def _write_h5(path: Path, net: Net) -> None:
-    import h5py
+ENDINGS = tuple(NET_FORMATS)
+"""Endings of the names of files that are read."""
 
-    with replacing(path) as unfinished, h5py.File(unfinished, "w", track_order=True) as file:
-        file["header"] = json.dumps(net.header, indent=1)  # names of HDF5 have no slash, and its texts no zero
-        for name, array in arrays_of(net).items():
-            made = file.create_dataset(name, data=array)
-            if ARRAYS[name].unit:
-                made.attrs["units"] = ARRAYS[name].unit
-        for number, terms in enumerate(net.energies):
-            group = file.create_group(f"energies/{number}", track_order=True)
-            group.attrs.update(
-                {"kind": terms.kind, "formula": terms.formula, "cells": f"/{CELL_ARRAYS[terms.cells.shape[1]]}"}
-            )
-            for name, values in terms.values.items():
-                group.create_dataset(name, data=values).attrs["units"] = terms.units[name]
+FOR_MUJOCO = (".xml", ".mjcf")
+"""Endings of files for MuJoCo."""
 
-
-def _read_h5(path: Path) -> Read:
-    import h5py
-
-    check_alone(path)
-    with h5py.File(path) as file:
-        arrays = {name: file[name][()] for name in ARRAYS if name in file}
-        groups = [file["energies"][str(number)] for number in range(len(file.get("energies", ())))]
-        energies = [_terms_of(one.attrs["kind"], arrays[one.attrs["cells"][1:]], one) for one in groups]
-        return arrays, energies, json.loads(file["header"].asstr()[()])
-
-
-# -- simulators ----------------------------------------------------------------------------------------------------
-
-
-def _for_simulator(program: str, write: Callable[[Path, Net], list[Path] | None]) -> "_Format":
-    """Format of a simulator, which is not read."""
-
-    def refuse(path: Path) -> Read:
-        raise ValueError(f"it is for {program}; read the springs from .json, .h5, .csv or .vtu")
-
-    def checked(path: Path, net: Net) -> list[Path] | None:
-        made_for = net.header.get("calibrated")
-        if made_for and not path.name.endswith(AT_SETTING.get(made_for["engine"], "/")):
-            kept = " or ".join(filter(None, [AT_SETTING.get(made_for["engine"]), ".csv, .json, .vtu or .h5"]))
-            raise ValueError(
-                f"{path}: runs {program} at a step of its own, and the stiffness is that for {made_for['engine']} at "
-                f"{made_for['setting']} alone; give a name ending in {kept}"
-            )
-        return write(path, net)
-
-    return _Format(checked, refuse)
-
+SIMULATORS: dict[str, tuple[str, Callable[[Net], str]]] = {
+    **dict.fromkeys(FOR_MUJOCO, ("MuJoCo", mjcf)),
+    ".scn": ("SOFA", sofa_xml),
+    ".py": ("SOFA", sofa_python),
+    ".xpbd.json": ("XPBD", xpbd),
+    ".newton.py": ("Newton", newton_script),
+}
+"""Programs, and the text of a net for them, by the ending of the name of its file."""
 
 AT_SETTING = {"newton-vbd": ".newton.py", "xpbd": ".xpbd.json"}
 """Endings of files that run a calibrated stiffness at the setting that it is for, by engine."""
 
 
-def _as_text(text: Callable[[Net], str]) -> Callable[[Path, Net], None]:
-    """How a net is written that is one text."""
-    return lambda path, net: write_text(path, text(net))
+def check_target(path: str | Path) -> str:
+    """Return the ending of a name to write to, which is refused if it is no format or its folder is not there."""
+    ending = ending_of(path)
+    check_folder(path)
+    return ending
 
 
-def _write_lammps(path: Path, net: Net) -> list[Path]:
-    data = path.with_suffix(".data")
-    script, particles = lammps(net, data.name)
-    _write_all({data: particles, path: script})
-    return [path, data]
-
-
-class _Format(NamedTuple):
-    """How a net is written in a format, and read."""
-
-    write: Callable[[Path, Net], list[Path] | None]
-    read: Callable[[Path], Read]
-
-
-_FORMATS = {
-    ".csv": _Format(_write_csv, _read_csv),
-    ".json": _Format(_write_json, _read_json),
-    ".vtu": _Format(lambda path, net: write_vtu_with(path, net, {}, {}), _read_vtu),
-    ".h5": _Format(_write_h5, _read_h5),
-}
-
-ENDINGS = tuple(_FORMATS)
-"""Endings of the names of files of nets."""
-
-_MUJOCO = _for_simulator("MuJoCo", _as_text(mjcf))
-
-_SIMULATORS = {
-    ".xml": _MUJOCO,
-    ".mjcf": _MUJOCO,
-    ".scn": _for_simulator("SOFA", _as_text(sofa_xml)),
-    ".py": _for_simulator("SOFA", _as_text(sofa_python)),
-    ".lmp": _for_simulator("LAMMPS", _write_lammps),
-    ".xpbd.json": _for_simulator("XPBD", _as_text(xpbd)),
-    ".newton.py": _for_simulator("Newton", _as_text(newton_script)),
-    ".usda": _for_simulator("Newton", _as_text(newton_usd)),
-}
-
-
-def _format_of(path: Path) -> _Format:
+def ending_of(path: str | Path) -> str:
+    """Ending of a name that is a format of springs; others are refused."""
+    path = Path(path)
+    known = {**NET_FORMATS, **SIMULATORS}
     # The longest ending that fits: .xpbd.json is not .json.
-    known = _FORMATS | _SIMULATORS
     ending = max((one for one in known if path.name.lower().endswith(one)), key=len, default="")
     if not ending:
         raise ValueError(f"{path}: '{path.suffix}' is no format of springs; give a name ending in {', '.join(known)}")
     if path.name.lower() == ending:
         raise ValueError(f"'{path}' is an ending alone; give a name before it, such as net{ending}")
-    return known[ending]
+    return ending

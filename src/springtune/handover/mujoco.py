@@ -62,8 +62,7 @@ def model(net: Net, simulation: Simulation, version: int, integrator: str = "Eul
     least = float(simulation.masses[moving].min())
     if least < LEAST_MASS:
         raise ValueError(
-            f"masses: the least one is {least:.3g} kg, and MuJoCo takes {LEAST_MASS:g} kg and more; take larger "
-            "cells or a thicker sheet"
+            f"masses: the least one is {least:.3g} kg, and MuJoCo takes {LEAST_MASS:g} kg and more; take larger cells"
         )
     moved = 0.0 if simulation.displacements is None else simulation.displacements
     seen = np.concatenate([net.points, net.points + moved])
@@ -113,8 +112,8 @@ def elasticity(first: float, second: float, version: int) -> tuple[float, float]
     ratio = first / second
     if version != 3 and ratio > 2 * (1 + 1e-9):
         raise ValueError(
-            f"the sheet is in plane strain and has a Poisson's ratio of {ratio / (2 + ratio):.3g} in its plane, and a "
-            f"flex of MuJoCo {version} takes less than 0.5; take MuJoCo 3, or springs alone such as 'patch'"
+            f"sheet: has a ratio of {ratio / (2 + ratio):.3g} in its plane, and a flex of MuJoCo {version} takes "
+            "less than 0.5; take MuJoCo 3"
         )
     # MuJoCo refuses a half, which plane stress allows in MuJoCo 4.
     poisson = ratio / (4 + 2 * ratio) if version == 3 else min(ratio / (2 + ratio), float(np.nextafter(0.5, 0)))

@@ -24,7 +24,7 @@ import numpy as np
 from .. import __version__
 from ..mechanics.dynamics import masses
 from ..mechanics.integrators import IMPLICIT, INTEGRATORS
-from ..mesh import Mesh
+from ..mesh.cells import Mesh
 from ..problem.compare import error_text, sign_sentence
 from ..problem.geometry import Beam
 from ..problem.loads import LOADS
@@ -37,7 +37,7 @@ from ..scene.motion import stable_steps
 from ..scene.sheet import AnyDefinition, Sheet, check_stiffness, definition_of, named
 from ..scene.single import Scene
 from ..scene.statements import BeamStatement, ShapeStatement
-from ..springs import Definition, DefinitionError, Springs
+from ..springs.base import Definition, DefinitionError, Springs
 from .terms import Net, Terms, terms_of
 
 if TYPE_CHECKING:
@@ -274,11 +274,9 @@ class SpringNet(Tabled, Net):
         ----------
         path : str or Path
             ``.csv`` has the springs as a table, with the header ahead as comments, and particles and cells in tables
-            beside it, such as ``net.particles.csv``; ``.json`` and ``.h5`` (HDF5) have the arrays by their names here;
+            beside it, such as ``net.particles.csv``; ``.json`` has the arrays by their names here;
             ``.vtu`` has springs as lines, for ParaView and meshio. Models that run, and are not read again: ``.xml`` or
-            ``.mjcf`` for MuJoCo, ``.scn`` or ``.py`` for SOFA, ``.newton.py`` or, of `delingette` alone, ``.usda``
-            for Newton, ``.xpbd.json`` for XPBD, ``.lmp`` for LAMMPS, with
-            particles and bonds beside it, such as ``net.data``.
+            ``.mjcf`` for MuJoCo, ``.scn`` or ``.py`` for SOFA, ``.newton.py`` for Newton, ``.xpbd.json`` for XPBD.
         mujoco : int, optional
             Version of MuJoCo that its file is for, 3 or 4; 4 without. Springs alone are the same in both; squared
             lengths (`delingette`) are not, and each version refuses the file for the other.
@@ -297,8 +295,7 @@ class SpringNet(Tabled, Net):
         load = self.header.get("load")
         if load and load.get("prescribed"):
             raise ValueError(
-                f"load {load['name']!r}: prescribes displacements, and a file of springs has forces and directions "
-                "that are held; take a load of forces, or give SpringNet.from_mesh the mesh and the scene's springs"
+                f"load {load['name']!r}: prescribes displacements, which no file of springs has; take a load of forces"
             )
         written: list[Path] = hook("files").write(path, self, mujoco)
         return written
@@ -415,33 +412,27 @@ def _expected_errors(
 ) -> dict[str, float | str]:
     """Error by load, linear kinematics against the reference of small strain; or why it is not computed."""
     # Here, since finite elements take half a second to import.
-    from ..prediction.choices import errors_under, references
+    from ..prediction.choices import errors_under, reference_of
 
     if why := _too_many(sheet):
         return dict.fromkeys(loads, why)
-    errors: dict[str, float | str] = dict.fromkeys(
-        loads, f"{NOT_COMPUTED}: definition '{definition.name}' is not for this load"
-    )
-    # In linear kinematics a load that turns with its side equals the one that does not.
-    steady = {
-        name: next(other for other, one in LOADS.items() if one == replace(LOADS[name], follower=False))
-        for name in loads
-        if LOADS[name].kind.uniaxial or not definition.uniaxial
-    }
-    solved = references(beam, material, steady.values()) if steady else {}
-    for name, other in steady.items():
-        known = {name: solved[other]}
-        statement = BeamStatement(beam, sheet.mesh, material, name, 1.0, "linear")
-        errors |= _in_words(errors_under(statement, sheet, springs, known), known)
+    why = f"{NOT_COMPUTED}: definition '{definition.name}' is not for this load"
+    errors: dict[str, float | str] = dict.fromkeys(loads, why)
+    for name in loads:
+        if LOADS[name].kind.uniaxial or not definition.uniaxial:
+            known = {name: reference_of(beam, material, name)}
+            statement = BeamStatement(beam, sheet.mesh, material, name, 1.0, "linear")
+            errors |= _in_words(errors_under(statement, sheet, springs, known), known)
     return errors
 
 
 def _too_many(sheet: Sheet) -> str:
     """Return why expected errors are not computed on so large a mesh, or an empty string."""
-    from ..prediction.choices import SOLVED
+    from ..prediction.choices import SEARCHED_PARTICLES
 
     count = len(sheet.mesh.points)
-    return f"{NOT_COMPUTED}: {count} particles, and at most {SOLVED} are solved for a header" if count > SOLVED else ""
+    too_many = f"{NOT_COMPUTED}: {count} particles, and at most {SEARCHED_PARTICLES} are solved for a header"
+    return too_many if count > SEARCHED_PARTICLES else ""
 
 
 def _in_words(errors: dict[str, float | str], known: Mapping[str, Any]) -> dict[str, float | str]:

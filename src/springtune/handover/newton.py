@@ -1,4 +1,4 @@
-"""Sheets for Newton (newton-physics): a script of its `ModelBuilder`, and OpenUSD as its importer reads it.
+"""Sheets for Newton (newton-physics): a script of its `ModelBuilder`.
 
 Read and run with Newton 1.8. Springs have our law and [N/m]. A triangle of Newton's solver VBD has Lame's constants of
 plane stress times the thickness h [N/m]
@@ -7,17 +7,11 @@ plane stress times the thickness h [N/m]
 
 and the law of `springtune.mechanics.energies.StableNeoHookeEnergy`. At small strain it is St. Venant-Kirchhoff's, which
 `delingette` is; files have the equilibrium of Newton's law.
-
-Its importer of USD takes tri_ke = E h / (1 - nu^2), tri_ka = 0, which is no material of that E and nu, and neither
-springs, loads nor supports. So scripts have to type them, and files say which.
 """
-
-from typing import Any
 
 import numpy as np
 
 from ..mechanics.energies import Energy, StableNeoHookeEnergy
-from ..problem.materials import Material
 from .simulation import about, filled, lame, simulate
 from .terms import Net
 
@@ -83,26 +77,6 @@ def newton_script(net: Net) -> str:
     >>> [line[:14] for line in path.read_text().splitlines() if line.startswith("TRI_K")]
     ['TRI_KE = 384.6', 'TRI_KA = 329.6']
     """
-    grouped = [group.tolist() for group in colours(net)]
-    return filled("newton.py", **_values(net), there=net.stiffness != 0, colours=grouped)
-
-
-def newton_usd(net: Net) -> str:
-    """Sheet of a net of triangles as OpenUSD's deformable cloth, as Newton's importer reads it."""
-    values = _values(net)
-    if not net.energies or np.any(net.stiffness):
-        raise ValueError(
-            f"definition '{net.header['definition']}': has springs, and deformable cloth of OpenUSD is triangles of a "
-            "material; take 'delingette', or a name ending in .newton.py"
-        )
-    material = net.header["material"]
-    plane = material.get("plane", "stress")
-    sheet = Material(material["young_modulus"], material["poisson_ratio"], plane=plane).in_plane
-    return filled("newton.usda", **values, sheet=sheet, held=np.argwhere(net.held).tolist())
-
-
-def _values(net: Net) -> dict[str, Any]:
-    """Values that both files have; ValueError for what Newton lacks."""
     simulation = simulate(net, "Newton", LAWS, membrane_energies)
     shear, first = membrane(net)
     largest, loaded, damping = simulation.largest_step, simulation.loaded_frequency, simulation.mass_damping
@@ -117,15 +91,18 @@ def _values(net: Net) -> dict[str, Any]:
         step, damping, seconds = (float(calibrated[one]) for one in ("step", "damping", "seconds"))
         iterations = int(calibrated["iterations"])
         said = f"the one here is that of {calibrated['setting']}, for which the stiffness is made"
-    return {
-        "net": net,
-        "simulation": simulation,
-        "promised": float(calibrated["displacement"]) if calibrated else None,
-        "damping": damping,
-        "about": [*about(net, simulation, said), *(LAW if net.energies else ())],
-        "tri_ke": shear,
-        "tri_ka": first,
-        "step": step,
-        "iterations": iterations,
-        "seconds": seconds,
-    }
+    return filled(
+        "newton.py",
+        net=net,
+        simulation=simulation,
+        promised=float(calibrated["displacement"]) if calibrated else None,
+        damping=damping,
+        about=[*about(net, simulation, said), *(LAW if net.energies else ())],
+        tri_ke=shear,
+        tri_ka=first,
+        step=step,
+        iterations=iterations,
+        seconds=seconds,
+        there=net.stiffness != 0,
+        colours=[group.tolist() for group in colours(net)],
+    )

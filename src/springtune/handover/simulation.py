@@ -14,7 +14,7 @@ from ..mechanics.dynamics import Motion
 from ..mechanics.energies import Energy
 from ..mechanics.network import Network
 from ..mechanics.statics import SingularError, StaticProblem
-from ..mesh import Mesh, corner_angles, signed_areas
+from ..mesh.cells import Mesh, corner_angles, signed_areas
 from ..problem.status import Status
 from ..safe_io.escapes import printable, xml_comment
 from .terms import Net, Terms, energies_of
@@ -91,8 +91,8 @@ def simulate(
         try:
             if network.rest_factor.negative_pivots:
                 raise ValueError(
-                    f"definition '{net.header['definition']}': is unstable at rest, without any load, since springs "
-                    f"push where others pull, and would fly apart in {program}; take another definition or mesh"
+                    f"definition '{net.header['definition']}': is unstable at rest, and flies apart in {program}; "
+                    "take another definition or mesh"
                 )
             lowest, loaded = _lowest_frequency(motion), motion.loaded_frequency
             problem = StaticProblem(network, net.forces / force)
@@ -154,11 +154,10 @@ def _lowest_frequency(motion: Motion, displacements: np.ndarray | None = None) -
 def _check(net: Net, program: str, laws: Iterable[str]) -> None:
     """Refuse a net that a simulator cannot represent."""
     name = net.header["definition"]
-    lacking = [WORDS[terms.kind] for terms in net.energies if terms.kind not in laws]
+    lacking = next((WORDS[terms.kind] for terms in net.energies if terms.kind not in laws), "")
     if lacking:
         raise ValueError(
-            f"definition '{name}': has energies of {lacking[0]} besides springs, and {program} has no such law; take a "
-            "definition of springs alone, such as 'patch' or 'lattice'"
+            f"definition '{name}': has energies of {lacking}, and {program} has no such law; take one such as 'patch'"
         )
     if net.masses is None:
         materials = (net.header["material"], *net.header.get("other_materials", {}).values())
@@ -170,14 +169,10 @@ def _check(net: Net, program: str, laws: Iterable[str]) -> None:
     if load and load["follower"]:
         instead = "take 'pressure'" if net.header.get("beam") else "give its pressures 'follower: false'"
         raise ValueError(
-            f"load '{load['name']}': turns with the side that it acts on, and forces in a file for {program} do not; "
-            f"{instead}"
+            f"load '{load['name']}': turns with the side that it acts on, and forces in a file do not; {instead}"
         )
     if load and load["kinematics"] == "linear":
-        raise ValueError(
-            f"kinematics: 'linear', and springs of {program} keep their length law; take 'nonlinear', which is the "
-            "same under small loads"
-        )
+        raise ValueError(f"kinematics: 'linear', and springs of {program} keep their length law; take 'nonlinear'")
 
 
 def network_of(net: Net, reference: float, energies: Callable[[Net, float], list[Energy]] | None = None) -> Network:
@@ -203,14 +198,12 @@ def lame(net: Net, terms: Terms, program: str) -> tuple[float, float]:
     lawful, below = away <= 1e-9 and twice > 0, first <= -1e-9 * twice
     if lawful and below and net.header["definition"] == "delingette":
         raise ValueError(
-            f"material: has a Poisson's ratio below 0, and {program} takes none; take a definition of springs alone, "
-            "such as 'patch'"
+            f"material: has a Poisson's ratio below 0, and {program} takes none; take springs alone, such as 'patch'"
         )
     if not lawful or below:
         raise ValueError(
             f"definition '{net.header['definition']}': its springs of squared lengths are those of no material, and "
-            f"{program} has the law of a material alone; take 'delingette', or a definition of springs alone, such as "
-            "'patch'"
+            f"{program} has the law of a material alone; take 'delingette', or springs alone such as 'patch'"
         )
     return max(first, 0.0), float(twice) / 2
 

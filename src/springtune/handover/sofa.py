@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .simulation import PERIOD, Simulation, about, filled, numbers, simulate
+from .simulation import PERIOD, about, filled, numbers, simulate
 from .terms import Net
 
 BACKWARD_EULER = (
@@ -78,79 +78,50 @@ def sofa_python(net: Net) -> str:
     return filled("sofa.py", scene=_scene(net), plugins=PLUGINS, backward_euler=BACKWARD_EULER, root=SCENE_ROOT)
 
 
-def _scene(net: Net) -> SofaScene:
-    simulation = simulate(net, "SOFA")
-    there = net.stiffness != 0
-    springs = " ".join(
-        f"{first} {second} {stiffness!r} 0 {length!r}"
-        for (first, second), stiffness, length in zip(
-            net.springs[there].tolist(), net.stiffness[there].tolist(), net.rest_lengths[there].tolist()
-        )
-    )
-    size = f"{float(net.rest_lengths.mean()):.6g}"
-    vec3 = {"template": "Vec3"}
-    sheet = [
-        Component("EulerImplicit", {"rayleighStiffness": "0", "rayleighMass": repr(simulation.mass_damping)}),
-        Component("SparseLDLSolver", {}),
-        Component("MechanicalObject", vec3 | {"name": "particles", "position": _positions(net.points)}),
-        Component(
-            "EdgeSetTopologyContainer",
-            {
-                "name": "edges",
-                "position": "@particles.position",
-                "edges": " ".join(map(str, net.springs[there].ravel().tolist())),
-            },
-        ),
-        Component(
-            "DiagonalMass",
-            vec3 | {"vertexMass": numbers(simulation.masses), "topology": "@edges", "geometryState": "@particles"},
-        ),
-        Component("SpringForceField", vec3 | {"name": "springs", "spring": springs}),
-        *_constraints(net),
-        *_forces(net, simulation, size),
-    ]
-    said = (
-        f"the one here is that of backward Euler, a {PERIOD}th of the slowest period that the load excites"
-        if simulation.loaded_frequency
-        else "the one here is below it"
-    )
-    predicted = []
-    if simulation.displacements is not None:
-        shown = {"showObject": "1", "showObjectScale": "4", "showColor": "0.1 0.6 0.2 1"}
-        moved = _positions(net.points + simulation.displacements)
-        predicted = [Component("MechanicalObject", vec3 | {"name": "particles", "position": moved} | shown)]
-    return SofaScene(simulation.implicit_step, about(net, simulation, said), sheet, predicted)
+def _vec3(kind: str, **data: str) -> Component:
+    return Component(kind, {"template": "Vec3", **data})
 
 
 def _positions(points: np.ndarray) -> str:
     return numbers(np.column_stack([points, np.zeros(len(points))]))
 
 
-def _constraints(net: Net) -> list[Component]:
-    """Directions that are held; across the plane all are."""
-    found = []
+def _scene(net: Net) -> SofaScene:
+    simulation = simulate(net, "SOFA")
+    there = net.stiffness != 0
+    edges, lengths = net.springs[there], net.rest_lengths[there].tolist()
+    springs = " ".join(
+        f"{first} {second} {stiffness!r} 0 {length!r}"
+        for (first, second), stiffness, length in zip(edges.tolist(), net.stiffness[there].tolist(), lengths)
+    )
+    sheet = [
+        Component("EulerImplicit", {"rayleighStiffness": "0", "rayleighMass": repr(simulation.mass_damping)}),
+        Component("SparseLDLSolver", {}),
+        _vec3("MechanicalObject", name="particles", position=_positions(net.points)),
+        Component(
+            "EdgeSetTopologyContainer", {"name": "edges", "position": "@particles.position", "edges": numbers(edges)}
+        ),
+        _vec3("DiagonalMass", vertexMass=numbers(simulation.masses), topology="@edges", geometryState="@particles"),
+        _vec3("SpringForceField", name="springs", spring=springs),
+    ]
     for x, y in ((True, True), (True, False), (False, True), (False, False)):
         which = np.flatnonzero((net.held == (x, y)).all(axis=1))
-        if len(which):
-            held = {"template": "Vec3", "indices": " ".join(map(str, which.tolist()))}
-            if x and y:
-                found.append(Component("FixedProjectiveConstraint", held))
-            else:
-                directions = {"fixedDirections": f"{int(x)} {int(y)} 1"}
-                found.append(Component("PartialFixedProjectiveConstraint", held | directions))
-    return found
-
-
-def _forces(net: Net, simulation: Simulation, size: str) -> list[Component]:
+        if len(which) and x and y:
+            sheet.append(_vec3("FixedProjectiveConstraint", indices=numbers(which)))
+        elif len(which):  # across the plane all are held
+            directions = f"{int(x)} {int(y)} 1"
+            sheet.append(_vec3("PartialFixedProjectiveConstraint", indices=numbers(which), fixedDirections=directions))
     loaded = np.flatnonzero((np.where(net.held, 0, net.forces) != 0).any(axis=1))
-    if not len(loaded):
-        return []
-    arrows = float(size) / float(np.abs(net.forces).max())
-    data = {
-        "template": "Vec3",
-        "name": "load",
-        "indices": " ".join(map(str, loaded.tolist())),
-        "forces": _positions(net.forces[loaded]),
-        "showArrowSize": f"{arrows:.6g}",
-    }
-    return [Component("ConstantForceField", data)]
+    if len(loaded):
+        arrows = float(f"{float(net.rest_lengths.mean()):.6g}") / float(np.abs(net.forces).max())
+        data = {"forces": _positions(net.forces[loaded]), "showArrowSize": f"{arrows:.6g}"}
+        sheet.append(_vec3("ConstantForceField", name="load", indices=numbers(loaded), **data))
+    said = "the one here is below it"
+    if simulation.loaded_frequency:
+        said = f"the one here is that of backward Euler, a {PERIOD}th of the slowest period that the load excites"
+    predicted = []
+    if simulation.displacements is not None:
+        shown = {"showObject": "1", "showObjectScale": "4", "showColor": "0.1 0.6 0.2 1"}
+        moved = _positions(net.points + simulation.displacements)
+        predicted = [_vec3("MechanicalObject", name="particles", position=moved, **shown)]
+    return SofaScene(simulation.implicit_step, about(net, simulation, said), sheet, predicted)

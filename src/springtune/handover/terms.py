@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 
 from ..mechanics.energies import AngleEnergy, AreaEnergy, BiquadraticEnergy, Energy, NeoHookeEnergy, YeohEnergy
-from ..mesh import Mesh, corner_angles, signed_areas
-from ..mesh.cells import no_cells, rows_of
-from ..springs import DefinitionError
+from ..mesh.cells import Mesh, corner_angles, no_cells, rows_of, signed_areas
+from ..springs.base import DefinitionError
 
 FORMULAS = {
     "area": "W = 1/2 modulus (A - rest_area)^2 / rest_area of each cell, A its area",

@@ -11,7 +11,7 @@ from ..mechanics.integrators import BackwardEuler
 from ..reference.small_strain import ReferenceNotConvergedError
 from ..safe_io.atomic import check_folder
 from ..scene.single import Result, Scene
-from ..springs import Springs
+from ..springs.base import Springs
 from .formats import check_target, write_vtu_with
 from .net import NOT_COMPUTED, SpringNet
 from .paraview import MOST_PIECES, pieces_of, series
@@ -32,9 +32,7 @@ def write_result(path: str | Path, result: Result, steps: int = 10) -> list[Path
     """Write a deformed network, or the path to it, for ParaView; see `springtune.Result.write`."""
     path, scene = Path(path), result.scene
     if path.suffix.lower() not in (".vtu", ".pvd"):
-        raise ValueError(
-            f"{path}: '{path.suffix}' is no format of a result; give a name ending in .vtu, or, for its path, .pvd"
-        )
+        raise ValueError(f"{path}: '{path.suffix}' is no format of a result; give a name ending in .vtu or .pvd")
     check_folder(path)
     if not np.isfinite(result.displacement):
         raise ValueError(f"there is no equilibrium to write: {result.message}")

@@ -269,16 +269,17 @@ class Motion(Moving):
     ) -> tuple[str, str] | None:
         """Status and message of a failed run; None if it may go on."""
         size = np.abs(u).max()
-        if not np.isfinite(size) or size > self._farthest or not np.isfinite(v).all():
-            return "diverged", self._why(integrator, step, done)
+        extent = np.ptp(self.network.mesh.points, axis=0).max()
+        if not np.isfinite(size) or size > BLOWN_UP * extent or not np.isfinite(v).all():
+            limit = self.step_limit(integrator)
+            why = " though the step is stable about rest; use a smaller step or load"
+            if step > limit:
+                above = f": a step of {step:.3g} s is above the stable one of {limit:.3g} s"
+                why = f"{above}; take at most {0.9 * limit:.2g} s"
+            return "diverged", f"diverged within {done} steps{why}"
         if failed:
             return "diverged", f"{failed} in step {done}; take a smaller step"
         return None
-
-    @cached_property
-    def _farthest(self) -> float:
-        """Displacement beyond which a run has left its model [m]."""
-        return BLOWN_UP * np.ptp(self.network.mesh.points, axis=0).max()
 
     def _good_end(
         self, u: np.ndarray, integrator: str, done: int, at_rest: bool, residual: float | None
@@ -317,20 +318,9 @@ class Motion(Moving):
         if not pivots:
             why = StaticProblem(network, self.load).departure(1.0, displacements)
             return "rest", f"at rest where a load that grows slowly does not lead: {why}" if why else ""
-        many = "s" if pivots > 1 else ""
-        return "unstable", (
-            f"at rest on an unstable equilibrium: the tangent has {pivots} negative pivot{many}, and the least push "
-            f"would end it; push the body sideways, by a force of a thousandth of the load, say, and run again"
-        )
-
-    def _why(self, integrator: str, step: float, done: int) -> str:
-        limit = self.step_limit(integrator)
-        if step > limit:
-            return (
-                f"diverged within {done} steps: a step of {step:.3g} s is above the stable one of {limit:.3g} s; "
-                f"take at most {0.9 * limit:.2g} s"
-            )
-        return f"diverged within {done} steps though the step is stable about rest; use a smaller step or load"
+        why = f"the tangent has {pivots} negative pivot{'s' * (pivots > 1)}, and the least push would end it"
+        remedy = "push the body sideways, by a force of a thousandth of the load, say, and run again"
+        return "unstable", f"at rest on an unstable equilibrium: {why}; {remedy}"
 
 
 def _largest(matrix: sparray, start: np.ndarray | None = None) -> tuple[float, np.ndarray]:
@@ -356,7 +346,6 @@ def relax(
     load: np.ndarray,
     *,
     linear: bool = False,
-    tolerance: float = TOLERANCE,
     max_steps: int = 200_000,
 ) -> Run:
     r"""Find an equilibrium by dynamic relaxation: explicit steps with fictitious masses and damping.
@@ -378,7 +367,7 @@ def relax(
         if found.status == "diverged":
             return replace(found, steps=done, message="dynamic relaxation diverged; use load steps or Newton's method")
         u, v = found.displacements, found.velocities
-        if found.residual <= tolerance:
+        if found.residual <= TOLERANCE:
             if network.inverted(u):
                 status, message = "inverted", "triangles are inverted; use a smaller load"
             else:

@@ -402,10 +402,8 @@ class YeohEnergy(_SheetEnergy):
             return ""
         worst = int(np.argmax(np.where(over, excess, 0.0)))
         end = np.broadcast_to(self.largest, excess.shape)[worst]
-        return (
-            f"extrapolated: {beyond} of {len(excess)} triangles are stretched beyond the test data, to I1 - 3 = "
-            f"{excess[worst]:.3g} where the data end at {end:.3g}"
-        )
+        at = f"to I1 - 3 = {excess[worst]:.3g} where the data end at {end:.3g}"
+        return f"extrapolated: {beyond} of {len(excess)} triangles are stretched beyond the test data, {at}"
 
     def _law(self, distortion: np.ndarray, growth: np.ndarray) -> tuple[np.ndarray, ...]:
         dilation, first_j, second_j = _dilation(growth)

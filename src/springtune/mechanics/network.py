@@ -341,10 +341,9 @@ class Network:
             return ""
         moved = self.expand(more.factorize_tangent().solve(np.random.default_rng(0).standard_normal(self.unknowns)))
         x, y = 1e3 * self.mesh.points[np.square(moved).sum(axis=1).argmax()]
-        return (
-            f"near ({x:.4g}, {y:.4g}) mm a part moves without resistance: {slack.sum()} of {len(slack)} springs have "
-            "no stiffness; take another definition or another mesh"
-        )
+        slack_springs = f"{slack.sum()} of {len(slack)} springs have no stiffness"
+        where = f"near ({x:.4g}, {y:.4g}) mm a part moves without resistance"
+        return f"{where}: {slack_springs}; take another definition or another mesh"
 
     def factorize_tangent(
         self, displacements: np.ndarray | None = None, follower: tuple[float, FollowerPressure] | None = None

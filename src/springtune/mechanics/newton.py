@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -299,18 +299,14 @@ class Newton:
         here, self._factor = self._here, None
         try:
             self._factor = self.problem.factorize_tangent(self.s, here.displacements)
-            refined, error = refine(
-                self.network, here, self._factor, lambda displacements: self.problem.balance(self.s, displacements)
-            )
+            refined, error = refine(self.network, here, self._factor, partial(self.problem.balance, self.s))
             if refined is not here and self.network.largest_change(refined[0] - here[0]) > CORRECTION:
                 self._factor = None
                 self._factor = self.problem.factorize_tangent(self.s, refined.displacements)
         except SingularError:
             return self._failed("singular tangent")
-        reason = uncertainty(error)
-        return Equilibrium(
-            refined.displacements, not reason, self._steps, refined.residual, self._factor, reason, error
-        )
+        (moved, _, residual), reason = refined, uncertainty(error)
+        return Equilibrium(moved, not reason, self._steps, residual, self._factor, reason, error)
 
     def _failed(self, reason: str) -> Equilibrium:
         here = self._here

@@ -171,9 +171,8 @@ class _ExplicitSteps(Stepper):
         rest = network.rest_vectors * np.where(place[network.first] < place[network.second], 1, -1)[:, None]
         dampers = np.zeros(0) if motion.dampers is None else motion.dampers[springs]
         numbers = rest[springs].T, network.rest_lengths[springs], network.stiffness[springs], dampers
-        *of_springs, gain, load = (
-            np.ascontiguousarray(values, dtype=self.kind) for values in (*numbers, gain[order], motion.load[order])
-        )
+        values = *numbers, gain[order], motion.load[order]
+        *of_springs, gain, load = (np.ascontiguousarray(one, dtype=self.kind) for one in values)
         pointers = np.searchsorted(first, np.arange(len(gain) + 1))
         bandwidth = int((second - first).max(initial=1))
         number = load.itemsize
@@ -272,10 +271,8 @@ class _ExplicitSteps(Stepper):
         depth = max(1, -(-steps // (len(self._threads) * rounds)))
         function = self.function
         assert function is not None
-        return [
-            partial(function, number, *arguments, self._u, self._v, steps, depth, progress)
-            for number, arguments in enumerate(self._threads)
-        ], progress
+        state = self._u, self._v, steps, depth, progress
+        return [partial(function, number, *one, *state) for number, one in enumerate(self._threads)], progress
 
     @cached_property
     def threads(self) -> ThreadPoolExecutor:

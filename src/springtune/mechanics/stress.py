@@ -47,9 +47,8 @@ def cell_stresses(network: Network, displacements: np.ndarray, linear: bool) -> 
         x, y = (place[corners] - place[corners[:, :1]]).transpose(2, 0, 1)
         fx, fy = forces.transpose(2, 0, 1)
         # Parts of a body may have energies of their own.
-        total[count][rows_of(mesh.cells[count], corners)] += np.stack(
-            [(x * fx).sum(1), (y * fy).sum(1), 0.5 * (x * fy + y * fx).sum(1)], axis=1
-        )
+        parts = [(x * fx).sum(1), (y * fy).sum(1), 0.5 * (x * fy + y * fx).sum(1)]
+        total[count][rows_of(mesh.cells[count], corners)] += np.stack(parts, axis=1)
     return {count: total[count] / signed_areas(place, corners)[:, None] for count, corners in mesh.cells.items()}
 
 

@@ -3,7 +3,7 @@
 import re
 from collections import defaultdict
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -83,14 +83,15 @@ def read(raw: bytes) -> Content:
 
 
 class _Model:
-    """Points, elements and sets; a set is known by whether it is of the assembly, by its kind and its name."""
+    """Points, elements and sets by kind and name; one of the assembly replaces those of the part with its name."""
 
     def __init__(self) -> None:
         self.points: list[list[float]] = []
         self.elements: list[tuple[str, np.ndarray]] = []
-        self.sets: dict[tuple[bool, str, str], list[np.ndarray]] = defaultdict(list)
+        self.sets: dict[tuple[str, str], list[np.ndarray]] = defaultdict(list)
         self.shown: dict[str, str] = {}
-        self.ranks: dict[tuple[bool, str], int] = {}
+        self.of_assembly: set[str] = set()
+        self.ranks: dict[str, int] = {}
         self.surfaces: list[str] = []
 
     def add(self, one: _Section, above: bool) -> None:
@@ -98,17 +99,21 @@ class _Model:
         kind = "ELSET" if one.keyword in ("ELEMENT", "ELSET") else "NSET"
         name = one.given.get(kind, "")
         if one.keyword.endswith("SECTION"):
-            self.ranks[above, one.given.get("ELSET", "").upper()] = 2
+            self.ranks[one.given.get("ELSET", "").upper()] = 2
         if one.keyword == "SURFACE":
             self.surfaces.append(one.given.get("NAME", ""))
         named = one.keyword in ("NSET", "ELSET") and ("INSTANCE" in one.given or any("." in row for row in one.rows))
         if one.keyword not in ("NODE", "ELEMENT", "NSET", "ELSET") or (above and not named):
             return
         found = {"NODE": self._nodes, "ELEMENT": self._cells}.get(one.keyword, self._members)(one)
-        self.sets[above, kind, name.upper()].append(found)
+        if above and name.upper() not in self.of_assembly:
+            self.of_assembly.add(name.upper())
+            for of_part in ("NSET", "ELSET"):
+                self.sets.pop((of_part, name.upper()), None)
+        self.sets[kind, name.upper()].append(found)
         if name and "INTERNAL" not in one.given:
             self.shown.setdefault(name.upper(), name)
-            self.ranks.setdefault((above, name.upper()), 0 if one.keyword == "ELEMENT" else 1)
+            self.ranks.setdefault(name.upper(), 0 if one.keyword == "ELEMENT" else 1)
 
     def _nodes(self, one: _Section) -> np.ndarray:
         """Add points, and return their numbers."""
@@ -152,8 +157,7 @@ class _Model:
 
     def _named(self, one: _Section, kind: str, name: str) -> np.ndarray:
         """Numbers in a set that stands before."""
-        found = self.sets.get((True, kind, name.upper())) or self.sets.get((False, kind, name.upper()))
-        if not found:
+        if not (found := self.sets.get((kind, name.upper()))):
             raise one.refused(f"has the set '{name}', which is not before it; put it there")
         return np.concatenate(found)
 
@@ -185,37 +189,30 @@ class _Model:
         if len(np.unique(every)) < len(every):
             raise MeshError("elements have one number twice; renumber them")
         body = np.concatenate([tags[:0], *(rows[:, 0] for kind, rows in self.elements if kind != "line")])
-        sets = {key: np.unique(np.concatenate(numbers)) for key, numbers in self.sets.items() if key[2] in self.shown}
-        for above, name in [
-            (above, name) for above, kind, name in sets if kind == "NSET" and (above, "ELSET", name) in sets
-        ]:
-            own, chosen = self._corners(sets[above, "ELSET", name]), sets[above, "NSET", name]
+        sets = {key: np.unique(np.concatenate(numbers)) for key, numbers in self.sets.items() if key[1] in self.shown}
+        for name in [name for kind, name in sets if kind == "NSET" and ("ELSET", name) in sets]:
+            own, chosen = self._corners(sets["ELSET", name]), sets["NSET", name]
             if np.array_equal(chosen, np.unique(np.concatenate([tags[:0], *map(np.ravel, own)]))):
-                del sets[above, "NSET", name]  # all points of a part
+                del sets["NSET", name]  # all points of a part
             elif all((np.isin(ends, chosen).sum(axis=1) > 1).all() for ends in own):
-                del sets[above, "ELSET", name]  # the cells along a side
-        parts = {key: np.intersect1d(chosen, body) for key, chosen in sets.items() if key[1] == "ELSET"}
-        for key, chosen in sets.items():
-            above, kind, name = key
-            # A set of the part gives way to one of the assembly that has its name.
-            hidden = not above and any((True, one, name) in sets for one in ("NSET", "ELSET"))
-            shown = "part." * hidden + self.shown[name]
+                del sets["ELSET", name]  # the cells along a side
+        parts = {name: np.intersect1d(chosen, body) for (kind, name), chosen in sets.items() if kind == "ELSET"}
+        for (kind, name), chosen in sets.items():
+            shown = self.shown[name]
             if not np.isin(chosen, every if kind == "ELSET" else tags).all():
                 content.unusable[shown] = "has what is not in the file; remove this"
             elif kind == "NSET":
                 content.point_sets[shown] = places(tags, [chosen])[0]
+            elif better := [self.shown[one] for one in parts if self._better(name, one, parts, len(body))]:
+                content.unusable[shown] = f"has cells of '{better[0]}', which is a part; use that"
             else:
-                better = [one for one in parts if self._better(key, one, parts, len(body))]
-                if better:
-                    content.unusable[shown] = f"has cells of '{self.shown[better[0][2]]}', which is a part; use that"
-                else:
-                    content.members += [(shown, n, np.flatnonzero(np.isin(ids, chosen))) for n, ids in enumerate(cells)]
+                content.members += [(shown, n, np.flatnonzero(np.isin(ids, chosen))) for n, ids in enumerate(cells)]
         return content
 
-    def _better(self, key: tuple[bool, str, str], other: tuple[bool, str, str], parts: Any, total: int) -> bool:
+    def _better(self, name: str, other: str, parts: dict[str, np.ndarray], total: int) -> bool:
         """Whether another set is what the file means as a part: it has a section, or is no block of elements."""
-        rank, own = (self.ranks[one[0], one[2]] for one in (other, key))
+        rank, own = self.ranks[other], self.ranks[name]
         if rank <= own or len(parts[other]) == total:
             return False
-        shared = np.isin(parts[key], parts[other])
+        shared = np.isin(parts[name], parts[other])
         return bool(shared.any() and (rank == 2 or shared.all()))

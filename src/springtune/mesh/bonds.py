@@ -27,10 +27,8 @@ def bonded(mesh: Mesh, reach: float) -> Mesh:
     pairs = np.sort(pairs, axis=1)
     pairs = pairs[~np.isin(pairs @ [len(mesh.points), 1], known)]
     outline = mesh.points[mesh.edges[mesh.on_outline]]
-    inside = np.concatenate(
-        [_inside(mesh.points[part], outline) for part in np.array_split(pairs, 1 + len(pairs) // 1000)]
-    )
-    return replace(mesh, bonds=pairs[inside])
+    parts = np.array_split(pairs, 1 + len(pairs) // 1000)
+    return replace(mesh, bonds=np.concatenate([part[_inside(mesh.points[part], outline)] for part in parts]))
 
 
 def _inside(bonds: np.ndarray, outline: np.ndarray) -> np.ndarray:

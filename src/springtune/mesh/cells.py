@@ -112,11 +112,9 @@ class Mesh:
             areas = signed_areas(points, corners)
             if not (areas > 0).all():
                 cell = np.argmin(areas > 0)
-                where, wrong = points[corners[cell]].mean(axis=0), int((~(areas > 0)).sum())
-                raise MeshError(
-                    f"cells of {count} corners that are clockwise or have no area: {wrong}, the first one {cell} at "
-                    f"({1e3 * where[0]:.6g}, {1e3 * where[1]:.6g}) mm; turn them, or remove them"
-                )
+                where = "({:.6g}, {:.6g}) mm".format(*1e3 * points[corners[cell]].mean(axis=0))
+                first = f"{(~(areas > 0)).sum()}, the first one {cell} at {where}; turn them, or remove them"
+                raise MeshError(f"cells of {count} corners that are clockwise or have no area: {first}")
 
     @property
     def cells(self) -> dict[int, np.ndarray]:
@@ -129,18 +127,15 @@ class Mesh:
         bonds = [self.bonds] if len(self.bonds) else []
         pairs = np.sort(np.concatenate([joined.reshape(-1, 2) for joined in joins] + bonds), axis=1)
         # One integer per edge sorts ten times faster than rows do.
-        codes, places, counts = np.unique(
-            pairs[:, 0] * len(self.points) + pairs[:, 1], return_inverse=True, return_counts=True
-        )
+        codes = pairs @ [len(self.points), 1]
+        codes, places, counts = np.unique(codes, return_inverse=True, return_counts=True)
         if bonds:
             places = places.ravel()[: len(pairs) - len(self.bonds)]
             counts = np.bincount(places, minlength=len(codes))
         edges = np.stack(np.divmod(codes, len(self.points)), axis=1)
         if counts.max() > 2:
-            first = edges[np.argmax(counts)].tolist()
-            raise MeshError(
-                f"the edge of points {first} has {counts.max()} cells, and a plane has two sides; remove some"
-            )
+            first = f"the edge of points {edges[np.argmax(counts)].tolist()} has {counts.max()} cells"
+            raise MeshError(f"{first}, and a plane has two sides; remove some")
         parts = np.split(places.ravel(), [joins[0].size // 2])
         of_cells = {count: part.reshape(-1, joined.shape[1]) for count, joined, part in zip(self.cells, joins, parts)}
         return edges, counts, of_cells

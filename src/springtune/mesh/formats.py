@@ -8,7 +8,7 @@ import re
 import warnings
 from collections import defaultdict
 from collections.abc import Callable, Iterator
-from contextlib import redirect_stderr, redirect_stdout
+from contextlib import redirect_stderr, redirect_stdout, suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -184,13 +184,6 @@ def assembled(path: str | Path, content: Any, unit: float, most: float = MOST_IN
     return Mesh(points, cells.get(3, no_cells(3)), cells.get(4, no_cells(4))), used
 
 
-def _is_the_machines(error: BaseException, memory: float) -> bool:
-    """Return whether a read failed for the system's reasons, such as a lack of memory."""
-    if isinstance(error, MemoryError) and not isinstance(error, BeyondBound):
-        return float(np.prod(getattr(error, "shape", 0), dtype=float)) * 8 <= memory
-    return isinstance(error, OSError) and (error.errno or 0) > 0  # netCDF has numbers of its own, below
-
-
 def file_content(path: str | Path) -> Any:
     """Read a file by meshio; a MeshError gives the reason for a failure."""
     if fault(path):
@@ -199,19 +192,16 @@ def file_content(path: str | Path) -> Any:
     if size == 0:
         raise MeshError(f"{path}: the file is empty; write the mesh again")
     if size > LARGEST_FILE:
-        most = f"{LARGEST_FILE // 1_000_000} MB"
-        raise MeshError(
-            f"{path}: {size / 1e6:.0f} MB, and at most {most} are read; write a coarser mesh, or binary VTU"
-        )
+        most = f"at most {LARGEST_FILE // 1_000_000} MB are read"
+        raise MeshError(f"{path}: {size / 1e6:.0f} MB, and {most}; write a coarser mesh, or binary VTU")
     content = Path(path).read_bytes()
     ending = Path(path).suffix.lower()
     if ending in COMPANIONS:
         raise MeshError(f"{path}: {IN_OTHER_FILES}")
     if HDF5 in content:
         try:
-            check_alone(path)
-        except OSError:  # meshio says it
-            pass
+            with suppress(OSError):  # meshio says it
+                check_alone(path)
         except DataElsewhere as error:
             raise MeshError(str(error)) from None
     told, memory, package = io.StringIO(), READ_MEMORY + READ_MEMORY_SHARE * size, library()
@@ -223,12 +213,15 @@ def file_content(path: str | Path) -> Any:
                 return _read(path, content, ending)
     except MeshError as error:
         raise MeshError(f"{path}: {error}") from None
+    except MemoryError as error:
+        wanted = np.inf if isinstance(error, BeyondBound) else 8 * np.prod(getattr(error, "shape", 0), dtype=float)
+        if wanted <= memory:
+            raise  # the machine has too little
+        stated = f"it states more points or cells than its {size / 1e3:.3g} kB can hold"
+        raise MeshError(f"{path}: is damaged: {stated}; write it again") from None
     except (Exception, SystemExit) as error:
-        if _is_the_machines(error, memory):
+        if isinstance(error, OSError) and (error.errno or 0) > 0:  # the system's; netCDF has numbers of its own, below
             raise
-        if isinstance(error, MemoryError):
-            stated = f"it states more points or cells than its {size / 1e3:.3g} kB can hold"
-            raise MeshError(f"{path}: is damaged: {stated}; write it again") from None
         said = " ".join(told.getvalue().split() if isinstance(error, SystemExit) else str(error).split())
         said = said.partition("Error: Couldn't read")[0].removeprefix("ReadError:").strip()
         said = said if re.search(r"\w{2} \S", said) else ""  # a key alone says nothing
@@ -291,20 +284,15 @@ def _read_points(path: str | Path, points: np.ndarray, used: np.ndarray) -> np.n
     points = points[used]
     nowhere = ~np.isfinite(points).all(axis=1)
     if nowhere.any():
-        first = used[nowhere][0]
-        raise MeshError(
-            f"{path}: points with coordinates that are no numbers: {nowhere.sum()}, the first one {first}; mend them"
-        )
+        first = f"{nowhere.sum()}, the first one {used[nowhere][0]}"
+        raise MeshError(f"{path}: points with coordinates that are no numbers: {first}; mend them")
     extent = np.ptp(points, axis=0)
     if not np.isfinite(extent**4).all():
         raise MeshError(f"{path}: extends over {extent.max():.3g} m; correct coordinates or the unit")
     if points.shape[1] > 2 and extent[2] > 1e-9 * extent[:2].max():
         away = np.abs(points[:, 2] - points[0, 2])
         first = f"point {used[np.argmax(away > 1e-9 * extent[:2].max())]}"
-        raise MeshError(
-            f"{path}: points leave the plane of x and y, the first one {first}, by up to {1e3 * away.max():.3g} mm; "
-            "give a plane mesh"
-        )
+        raise MeshError(f"{path}: points leave the plane of x and y, the first one {first}; give a plane mesh")
     return points[:, :2].copy()
 
 
@@ -381,47 +369,36 @@ class _Groups:
         self.points: dict[str, np.ndarray] = {}
         self.parts: dict[str, dict[int, np.ndarray]] = {}
         self.unusable: dict[str, str] = dict(getattr(content, "unusable", {}))
+        self.cell_sets = [name for name in content.cell_sets if not name.startswith("gmsh:")]
         self.outline, _ = outline_of(mesh)
-        count = len(mesh.points)
-        self.codes = self.outline @ [count, 1]
-        self.inner = np.unique(np.sort(mesh.edges[~mesh.on_outline], axis=1) @ [count, 1])
+        self.codes = self.outline @ [len(mesh.points), 1]
 
     def grouped(self) -> GroupedMesh:
         """The mesh with what can be groups of it."""
         lines: dict[str, list[np.ndarray]] = defaultdict(list)
         points: dict[str, list[np.ndarray]] = defaultdict(list)
         cells: dict[str, dict[int, np.ndarray]] = {}
-        starts = dict.fromkeys(CELLS.values(), 0)
-        # Cells of one number of corners stand in the mesh in the order of the file's blocks.
-        offsets = []
-        for block in self.content.cells:
-            corners = CELLS.get(block.type, 0)
-            offsets.append(starts.get(corners, 0))
-            if corners:
-                starts[corners] += len(block.data)
+        blocks = self.content.cells
         for name, number, chosen in self._sets():
-            block = self.content.cells[number]
-            if not len(chosen):
+            block = blocks[number] if number >= 0 else None
+            if block is None and len(chosen):
+                points[name].append(chosen)
+            if block is None or not len(chosen):
                 continue
             if not 0 <= chosen.min() <= chosen.max() < len(block.data):
                 self.unusable[name] = "has cells that are not in the file; remove these"
             elif block.type in CELLS:
-                masks = cells.setdefault(
-                    name, {n: np.zeros(len(found), dtype=bool) for n, found in self.mesh.cells.items()}
-                )
-                masks[CELLS[block.type]][offsets[number] + chosen] = True
+                # Cells of one number of corners stand in the mesh in the order of the file's blocks.
+                before = sum(len(other.data) for other in blocks[:number] if other.type == block.type)
+                none = {count: np.zeros(len(corners), dtype=bool) for count, corners in self.mesh.cells.items()}
+                cells.setdefault(name, none)[CELLS[block.type]][before + chosen] = True
             elif block.type in CELL_DIMENSIONS:
                 (lines if block.type == "line" else points)[name].append(np.asarray(block.data)[chosen])
-        for name, nodes in self._point_sets():
-            if len(nodes):
-                points[name].append(nodes)
         for name in {**lines, **points, **cells}:
             if not NAME.fullmatch(name):
                 self.unusable[name] = f"cannot be a name; {NAME_RULE}"
-            given = np.concatenate(
-                [one.ravel() for one in [*lines.get(name, []), *points.get(name, [])]] or [np.zeros(1)]
-            )
-            if not 0 <= given.min() <= given.max() < len(self.numbers):
+            given = [one.ravel() for one in [*lines.get(name, []), *points.get(name, [])]]
+            if any(not 0 <= one.min() <= one.max() < len(self.numbers) for one in given):
                 self.unusable[name] = "has points that are not in the file; remove these"
             if name in self.unusable:
                 continue
@@ -433,58 +410,48 @@ class _Groups:
         for name in [name for name in self.sides if name in self.points]:
             del self.points[name], self.sides[name]
             self.unusable[name] = "names sides and a point in the file; rename one"
-        named = [*self.content.field_data, *self.content.point_sets, *self.content.cell_sets]
-        for name in named:
+        for name in (*self.content.field_data, *self.content.point_sets, *self.content.cell_sets):
             if ":" not in name and name not in {*lines, *points, *cells}:  # others are notes of a format, as of MED
                 self.unusable.setdefault(name, "has nothing in the file; put something in it")
         return GroupedMesh(self.mesh, self.sides, self.points, self.parts, self.unusable)
 
     def _sets(self) -> Iterator[tuple[str, int, np.ndarray]]:
-        """Name, number of the block of cells, and numbers of cells in it, of all sets of cells."""
-        content, blocks = self.content, self.content.cells
+        """Name, number of the block of cells, or -1 for points, and numbers of members in it, of all sets."""
+        content = self.content
         yield from getattr(content, "members", ())
-        named = [name for name in content.cell_sets if not name.startswith("gmsh:")]
-        for name in named:
+        for name in self.cell_sets:
             parts = content.cell_sets[name]
-            if len(parts) != len(blocks):
+            if len(parts) != len(content.cells):
                 self.unusable[name] = "is a set of which meshio does not tell the cells; give it as cells"
                 continue
-            for number, part in enumerate(parts):
-                if part is not None:
-                    yield name, number, np.asarray(part, dtype=np.int64).ravel()
-        tags = {tuple(int(one) for one in value): name for name, value in content.field_data.items() if len(value) == 2}
+            yield from ((name, n, np.ravel(part).astype(np.int64)) for n, part in enumerate(parts) if part is not None)
         for key, arrays in content.cell_data.items():
-            for number, values in enumerate(arrays):
-                values = np.asarray(values)
-                if values.ndim != 1 or values.dtype.kind not in "iub" or blocks[number].type not in CELL_DIMENSIONS:
-                    continue
-                if key in FAMILIES:
-                    for name, chosen in self._families(key, values):
+            for number, (values, block) in enumerate(zip(arrays, content.cells)):
+                if block.type in CELL_DIMENSIONS:
+                    for name, chosen in self._in_data(key, values, arrays, CELL_DIMENSIONS[block.type]):
                         yield name, number, chosen
-                elif key in (*TAGS, PART_NUMBERS):
-                    for tag in np.unique(values[values != 0]).tolist():
-                        group = tag, CELL_DIMENSIONS[blocks[number].type]
-                        name = str(tag) if key == PART_NUMBERS else tags.get(group, str(tag))
-                        if name not in named or key == PART_NUMBERS:
-                            yield name, number, np.flatnonzero(values == tag)
-                elif ":" not in key and self._marks(key, arrays):
-                    yield key, number, np.flatnonzero(values)
+        yield from ((name, -1, np.ravel(nodes).astype(np.int64)) for name, nodes in content.point_sets.items())
+        for key, values in content.point_data.items():
+            yield from ((name, -1, chosen) for name, chosen in self._in_data(key, values, [values]))
 
-    def _point_sets(self) -> Iterator[tuple[str, np.ndarray]]:
-        """Name and points of all sets of points."""
-        for name, nodes in self.content.point_sets.items():
-            yield name, np.asarray(nodes, dtype=np.int64).ravel()
-        for name, values in self.content.point_data.items():
-            values = np.asarray(values)
-            if name in FAMILIES:
-                yield from self._families(name, values)
-            elif values.ndim == 1 and values.dtype.kind in "iub" and ":" not in name and self._marks(name, [values]):
-                yield name, np.flatnonzero(values)
-
-    def _families(self, key: str, values: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
-        """Groups of the families of MED, and what is in them."""
-        for tag, names in getattr(self.content, key, {}).items():
-            yield from ((name, np.flatnonzero(values == tag)) for name in names)
+    def _in_data(
+        self, key: str, given: Any, arrays: list[Any], dimension: int = -1
+    ) -> Iterator[tuple[str, np.ndarray]]:
+        """Groups in an array of data, by families of MED, numbers of groups or marks, and their members."""
+        values = np.asarray(given)
+        if values.ndim != 1 or values.dtype.kind not in "iub":
+            return
+        if key in FAMILIES:
+            found = [(name, tag) for tag, names in getattr(self.content, key, {}).items() for name in names]
+        elif dimension >= 0 and key == PART_NUMBERS:
+            found = [(str(tag), tag) for tag in np.unique(values[values != 0]).tolist()]
+        elif dimension >= 0 and key in TAGS:
+            known = {tuple(map(int, one)): name for name, one in self.content.field_data.items() if len(one) == 2}
+            found = [(known.get((tag, dimension), str(tag)), tag) for tag in np.unique(values[values != 0]).tolist()]
+            found = [(name, tag) for name, tag in found if name not in self.cell_sets]
+        else:
+            found = [(key, 1)] if ":" not in key and self._marks(key, arrays) else []
+        yield from ((name, np.flatnonzero(values == tag)) for name, tag in found)
 
     def _marks(self, name: str, arrays: list[Any]) -> bool:
         """Whether data are zeros and ones."""
@@ -501,19 +468,15 @@ class _Groups:
         ends = self.numbers[lines]
         count = len(self.mesh.points)
         forth, back = np.isin(ends @ [count, 1], self.codes), np.isin(ends @ [1, count], self.codes)
-        known = (ends >= 0).all(axis=1)
-        wrong = ~(known & (forth | back))
+        wrong = (ends < 0).any(axis=1) | ~(forth | back)
         if wrong.any():
-            inside = known & np.isin(np.sort(ends, axis=1) @ [count, 1], self.inner)
-            nowhere = wrong & ~inside
-            where = in_words(self.places[lines[wrong][0]])
-            counts = {"inside the body": inside.sum(), "no edges of cells": nowhere.sum()}
-            what = " and ".join(f"{count} are {place}" for place, count in counts.items() if count)
-            self.unusable[name] = (
-                f"is not on the outline: of its {len(lines)} lines, {what}, the first one at {where}; take these out"
-            )
+            why = f"is not on the outline: of its {len(lines)} lines {wrong.sum()} are no sides"
+            self._refuse(name, why, lines[wrong])
             return
         self.sides[name] = np.unique(np.where(forth[:, None], ends, ends[:, ::-1]), axis=0)
+
+    def _refuse(self, name: str, why: str, nodes: np.ndarray) -> None:
+        self.unusable[name] = f"{why}, the first one at {in_words(self.places[nodes[0]])}; take these out"
 
     def _add_points(self, name: str, nodes: np.ndarray) -> None:
         """A point, or sides of points, by points of the file."""
@@ -521,18 +484,11 @@ class _Groups:
             self.points[name] = self.places[nodes[0]]
             return
         particles = self.numbers[nodes]
-        lost = int((particles < 0).sum())
         edges = self.outline[np.isin(self.outline, particles).all(axis=1)]
-        alone = np.setdiff1d(particles[particles >= 0], edges)
-        if lost or len(alone):
-            at_outline = np.isin(alone, self.outline)
-            counts = {
-                "are inside the body": (~at_outline).sum(),
-                "have no neighbour on the outline that is one": at_outline.sum(),
-                "belong to no cell": lost,
-            }
-            what = " and ".join(f"{count} {reason}" for reason, count in counts.items() if count)
-            self.unusable[name] = f"is neither one point nor sides: of its {len(nodes)} points, {what}; take these out"
+        alone = ~np.isin(particles, edges)
+        if alone.any():
+            what = f"of its {len(nodes)} points {alone.sum()} are at the end of no side"
+            self._refuse(name, f"is neither one point nor sides: {what}", nodes[alone])
             return
         if name in self.sides and {*map(tuple, edges.tolist())} != {*map(tuple, self.sides[name].tolist())}:
             del self.sides[name]
@@ -544,12 +500,8 @@ class _Groups:
         """Parts of the body, where no cell is in two."""
         found = {name: masks for name, masks in found.items() if not all(mask.all() for mask in masks.values())}
         for name, masks in found.items():
-            others = [
-                other
-                for other, their in found.items()
-                if other != name and any((masks[n] & their[n]).any() for n in masks)
-            ]
-            if others:
+            several = {other: any((masks[n] & their[n]).any() for n in masks) for other, their in found.items()}
+            if others := [other for other, shared in several.items() if shared and other != name]:
                 self.unusable[name] = f"has cells that part '{others[0]}' has, too; a cell has one material"
             else:
                 self.parts[name] = masks

@@ -51,9 +51,8 @@ def read(raw: bytes) -> Content:
     cells: dict[str, list[list[int]]] = defaultdict(list)
     for name, *fields in _cards(raw.decode("utf-8-sig", "replace")):
         if name in ("GRID", "GRDSET") and fields[1].strip("0"):
-            raise MeshError(
-                f"{name} {fields[0]} is in coordinate system {fields[1]}; write all in the basic one, CP = 0"
-            )
+            system = f"coordinate system {fields[1]}"
+            raise MeshError(f"{name} {fields[0]} is in {system}; write all in the basic one, CP = 0")
         if name == "GRID":
             points[int(fields[0])] = [_real(field) for field in fields[2:5]]
         elif name in CARDS:

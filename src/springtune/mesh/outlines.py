@@ -4,13 +4,12 @@ import math
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from numbers import Real
 from typing import Any
 
 import numpy as np
 
 from .cells import Mesh, MeshError, signed_areas
-from .free import FITTING, triangulate, upright
+from .free import FITTING, Triangulation, triangulate, upright
 from .groups import GroupedMesh
 from .rows import ROW_HEIGHT
 from .sheets import nearer
@@ -52,41 +51,36 @@ class _Stretch:
         return [replace(self, low=low, high=high) for low, high in zip(parameters, parameters[1:])]
 
 
-def mesh_shape(
-    shape: Outlined, size: float, mesh_type: str = "free", refined: Mapping[str, float] | None = None
-) -> GroupedMesh:
+def mesh_shape(shape: Outlined, size: float, refined: Mapping[str, float] | None = None) -> GroupedMesh:
     """Mesh a shape.
 
     Each side is divided into equal edges no longer than `size`, an arc into at least six edges a full turn with
     particles on the arc; edges are divided further near much shorter ones. Named points are particles. Inside, netgen
     makes near-equilateral triangles. Same input, same mesh.
 
-    Lengths are in m. Only "free" meshes an outline; `refined` has shorter edges at named groups, which grow from there.
+    Lengths are in m. `refined` has shorter edges at named groups, which grow from there.
     """
     what = f"shape '{shape.name}'"
     if not shape.rounds:
         raise MeshError(f"{what}: its mesh is that of the file {shape.file}; read it with springtune.read_shape")
-    if mesh_type != "free":
-        raise MeshError(f"mesh type: {mesh_type!r} fills rectangles, and {what} has an outline of its own; give 'free'")
     sizes = _sizes(shape, size, dict(refined or {}), what)
     stretches, lines, fine = _divided(shape, sizes)
     (left, low), _ = shape.extent
     origin = np.array([left, low])
     regions = [one.inner for one in shape.rounds]
     for _ in range(MOST_ROUNDS):
-        made = _netgen(stretches, lines, fine, sizes, regions, origin, what)
-        arcs_divided = [n for n, found in made.divided.items() if stretches[n].side.arc]
-        if not arcs_divided:
+        made, chains, divided = _netgen(stretches, lines, fine, sizes, regions, origin, what)
+        if not any(stretches[number].side.arc for number in divided):
             break
         again: list[_Stretch] = []
         for number, stretch in enumerate(stretches):
-            shares = made.divided.get(number, []) if stretch.side.arc else []
+            shares = divided.get(number, []) if stretch.side.arc else []
             cuts = [stretch.low + share * (stretch.high - stretch.low) for share in (0.0, *shares)] + [stretch.high]
             again += stretch.cut(cuts)
         stretches = again
     else:
         raise MeshError(f"{what}: netgen divides its arcs on and on at {size:g} m; give another size")
-    return _grouped(shape, made, stretches, regions)
+    return _grouped(shape, made, chains, stretches, regions)
 
 
 def _sizes(shape: Outlined, size: float, refined: dict[str, float], what: str) -> dict[str, float]:
@@ -99,7 +93,7 @@ def _sizes(shape: Outlined, size: float, refined: dict[str, float], what: str) -
     known = {*lengths, *shape.points, *(one.inner for one in shape.rounds)} - {"", None}
     for name, value in {"": size, **refined}.items():
         told = f"refined {name!r}" if name else "mesh size"
-        if not (isinstance(value, Real) and not isinstance(value, bool) and 1e-40 <= value <= 1e40):
+        if not value > 0:
             raise MeshError(f"{told}: {value!r} is not a number above zero; give one in m")
         if name and name not in known:
             there = ", ".join(sorted(map(str, known))) or "none"
@@ -199,17 +193,6 @@ def _lines(shape: Outlined, points: Mapping[Point, float]) -> list[tuple[Point, 
     return found
 
 
-@dataclass(frozen=True, eq=False)
-class _Made:
-    """Result of netgen: points in m, triangles, their regions, and the points in order along each stretch."""
-
-    points: np.ndarray
-    triangles: np.ndarray
-    regions: np.ndarray
-    chains: list[list[int]]
-    divided: dict[int, list[float]]
-
-
 def _netgen(
     stretches: Sequence[_Stretch],
     lines: Sequence[tuple[Point, Point, int]],
@@ -218,8 +201,8 @@ def _netgen(
     regions: Sequence[str | None],
     origin: np.ndarray,
     what: str,
-) -> _Made:
-    """Triangulation inside stretches, by netgen's advancing front."""
+) -> tuple[Triangulation, list[list[int]], dict[int, list[float]]]:
+    """Triangulation inside stretches [m], the points in order along each, and shares where stretches are divided."""
     from scipy.spatial import cKDTree  # here, since studies are read without scipy
 
     # Lengths in units of the edge: netgen's own tolerances are absolute.
@@ -242,11 +225,11 @@ def _netgen(
         grading=GRADING,
         segmentsperedge=EDGES_A_LINE,
     )
-    points, triangles = made.points, made.triangles
+    points = made.points
     given = (np.array(list(numbers)) - origin) / unit
     # Where two are near each other, netgen numbers them otherwise.
     away, order = cKDTree(points).query(given)
-    if not len(triangles) or away.max() > 1e-9 * np.abs(given).max() or len(np.unique(order)) < len(order):
+    if not len(made.triangles) or away.max() > 1e-9 * np.abs(given).max() or len(np.unique(order)) < len(order):
         raise MeshError(f"netgen cannot mesh {what} at {unit:g} m: points are too near each other; give another size")
     pieces: dict[int, list[tuple[int, int]]] = defaultdict(list)
     for line, first, second in made.pieces:
@@ -270,25 +253,26 @@ def _netgen(
         stretch = stretches[number]
         for i, share in zip(chains[number][1:], shares):
             placed[i] = stretch.side.at(stretch.low + share * (stretch.high - stretch.low))
-    return _Made(placed, triangles, made.regions, chains, divided)
+    return made._replace(points=placed), chains, divided
 
 
-def _upright(made: _Made, stretches: Sequence[_Stretch], what: str) -> np.ndarray:
-    """Triangles counter-clockwise, refused where they do not fill the outline."""
+def _grouped(
+    shape: Outlined,
+    made: Triangulation,
+    chains: list[list[int]],
+    stretches: Sequence[_Stretch],
+    regions: Sequence[str | None],
+) -> GroupedMesh:
+    """A mesh with the groups of its shape, refused where triangles do not fill the outline."""
     areas = signed_areas(made.points, made.triangles)
     # About a corner: coordinates far from the origin would cost digits.
-    ends = made.points[[pair for chain in made.chains for pair in zip(chain, chain[1:])]] - made.points[0]
-    senses = [bool(one.inner) - bool(one.outer) for one, chain in zip(stretches, made.chains) for _ in chain[1:]]
+    ends = made.points[[pair for chain in chains for pair in zip(chain, chain[1:])]] - made.points[0]
+    senses = [bool(one.inner) - bool(one.outer) for one, chain in zip(stretches, chains) for _ in chain[1:]]
     within = 0.5 * float((ends[:, 0, 0] * ends[:, 1, 1] - ends[:, 1, 0] * ends[:, 0, 1]) @ senses)
     if abs(np.abs(areas).sum() - within) > 1e-9 * within:
-        raise MeshError(f"netgen does not fill {what}; give another size")
-    return upright(made.points, made.triangles)
-
-
-def _grouped(shape: Outlined, made: _Made, stretches: Sequence[_Stretch], regions: Sequence[str | None]) -> GroupedMesh:
-    """A mesh with the groups of its shape."""
+        raise MeshError(f"netgen does not fill shape '{shape.name}'; give another size")
     sides: dict[str, list[Any]] = defaultdict(list)
-    for stretch, chain in zip(stretches, made.chains):
+    for stretch, chain in zip(stretches, chains):
         if stretch.side.group:
             pairs = list(zip(chain, chain[1:]))
             sides[stretch.side.group] += pairs if stretch.inner else [pair[::-1] for pair in pairs]
@@ -297,7 +281,7 @@ def _grouped(shape: Outlined, made: _Made, stretches: Sequence[_Stretch], region
         if region:
             parts[region] = parts.get(region, False) | (made.regions == number + 1)
     return GroupedMesh(
-        Mesh(made.points, _upright(made, stretches, f"shape '{shape.name}'")),
+        Mesh(made.points, upright(made.points, made.triangles)),
         {name: np.array(edges, dtype=np.int64) for name, edges in sides.items()},
         {name: np.array(point) for name, point in shape.points.items()},
         {name: {3: cells} for name, cells in parts.items()},

@@ -1,12 +1,13 @@
 """Meshes in rows: near-equilateral and other isosceles triangles, and squares with one diagonal or both."""
 
 import math
+from itertools import cycle
 from numbers import Integral, Real
 
 import numpy as np
 
 from .cells import Mesh, MeshError, no_cells
-from .types import MOST_MESHED, check_box, mesh_type, nearest_counts, nearest_whole
+from .types import check_box, mesh_type, nearest_counts, nearest_whole
 
 ROW_HEIGHT = math.sqrt(3) / 2
 """Height of a row of equilateral triangles of unit edge."""
@@ -72,8 +73,7 @@ _declare_isosceles(order=70, poisson_ratio=0.5)
 def _fitted(length: float, height: float, cells: int, rows: int) -> Mesh:
     straight = np.linspace(0.0, length, cells + 1)
     shifted = np.concatenate([[0.0], 0.5 * (straight[:-1] + straight[1:]), [length]])
-    lines = [straight if row % 2 == 0 else shifted for row in range(rows + 1)]
-    mesh = _join(lines, np.linspace(0.0, height, rows + 1))
+    mesh = _join(straight, shifted, np.linspace(0.0, height, rows + 1))
     vars(mesh)["_box_fault"] = ""  # rows fill it once: `springtune.mesh.sheets.box_fault` need not look
     return mesh
 
@@ -87,26 +87,21 @@ def lattice(cells: int, rows: int, size: float = 1.0, row_height: float | None =
     """
     row_height = ROW_HEIGHT * size if row_height is None else row_height
     for name, value in (("cells", cells), ("rows", rows)):
-        if not (isinstance(value, Integral) and 1 <= value <= MOST_MESHED):
+        if not (isinstance(value, Integral) and value >= 1):
             raise MeshError(f"{name}: {value!r} is not a whole number above zero; give one, such as 10")
     check_box(cells * size, rows * row_height, size)
     line = size * np.arange(cells + 1.0)
-    return _join([line + 0.5 * size * (row % 2) for row in range(rows + 1)], row_height * np.arange(rows + 1.0))
+    return _join(line, line + 0.5 * size, row_height * np.arange(rows + 1.0))
 
 
-def _join(lines: list[np.ndarray], heights: np.ndarray) -> Mesh:
-    """Join lines of points, each sorted along x, by triangles: always the next point that is further left."""
-    starts = np.concatenate([[0], np.cumsum([len(line) for line in lines])])
-    points = np.concatenate([np.stack([line, np.full(len(line), y)], axis=1) for line, y in zip(lines, heights)])
-    triangles = []
-    known: dict[tuple[int, int], tuple[np.ndarray, np.ndarray]] = {}  # lines of few kinds alternate
-    for row, (low, high) in enumerate(zip(lines[:-1], lines[1:])):
-        pair = id(low), id(high)
-        if pair not in known:
-            known[pair] = _joined(low, high)
-        corners, above = known[pair]
-        triangles.append(corners + np.where(above, starts[row + 1], starts[row]))
-    return Mesh(points, np.concatenate(triangles))
+def _join(even: np.ndarray, odd: np.ndarray, heights: np.ndarray) -> Mesh:
+    """Join lines of points of two kinds in turn, sorted along x, by triangles: always the next point to the left."""
+    lines = [odd if row % 2 else even for row in range(len(heights))]
+    points = np.concatenate([np.column_stack([line, np.full(len(line), y)]) for line, y in zip(lines, heights)])
+    starts = np.cumsum([0, *map(len, lines[:-1])])
+    joined = cycle([_joined(even, odd), _joined(odd, even)])
+    bands = zip(joined, starts, starts[1:])
+    return Mesh(points, np.concatenate([corners + np.where(above, high, low) for (corners, above), low, high in bands]))
 
 
 def _joined(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

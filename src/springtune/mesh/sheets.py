@@ -30,19 +30,18 @@ def sheet_fault(mesh: Mesh) -> str:
     if fault:
         return fault
     points = mesh.points
-    touching = _touching(points, outline)
+    shortest = np.linalg.norm(np.diff(points[outline], axis=1), axis=2).min()
+    small = min(DIGITS * np.ptp(points, axis=0).max(), 0.01 * shortest)
+    touching = np.union1d(*nearer(points, outline, np.full(len(outline), 0.5 * small))[:2])
     if len(touching):
         count = f"outline edges that meet others without being joined: {len(touching)}"
-        first = edge_in_words(points, outline[touching[0]])
-        return (
-            opening(points, outline[touching], count) or f"cells overlap ({count}, the first one {first}); remove some"
-        )
+        first = f"{count}, the first one {edge_in_words(points, outline[touching[0]])}"
+        return opening(points, outline[touching], count) or f"cells overlap ({first}); remove some"
     again = np.flatnonzero(np.bincount(outline[:, 0]) > 1)
     if len(again):
         where = in_words(points[again[0]])
         return f"cells hang together in a point alone, at {where}; join them by an edge, or part them"
-    rounds = _rounds(outline)
-    for one in rounds:
+    for one in rounds(outline):
         others = outline[~np.isin(outline[:, 0], one)]
         x, y = (points[one] - points[one[0]]).T
         outer = (x * np.roll(y, -1) - np.roll(x, -1) * y).sum() > 0
@@ -107,14 +106,6 @@ def opening(points: np.ndarray, edges: np.ndarray, count: str) -> str:
     return ""
 
 
-def _touching(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """Numbers of edges that come near another one with which they share no end."""
-    shortest = np.linalg.norm(np.diff(points[edges], axis=1), axis=2).min()
-    small = min(DIGITS * np.ptp(points, axis=0).max(), 0.01 * shortest)
-    one, other, _ = nearer(points, edges, np.full(len(edges), 0.5 * small))
-    return np.union1d(one, other)
-
-
 def nearer(points: np.ndarray, edges: np.ndarray, reach: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return pairs of disjoint edges nearer than their reaches together, and their distances [m].
 
@@ -142,8 +133,8 @@ def nearer(points: np.ndarray, edges: np.ndarray, reach: np.ndarray) -> tuple[np
         close = distances <= reach[one] + reach[other]
         found.append((one[close], other[close], distances[close]))
         begin = stop
-    ones, others, apart = (np.concatenate(parts) for parts in zip(*found))
-    return ones, others, apart
+    one, other, distances = (np.concatenate(parts) for parts in zip(*found))
+    return one, other, distances
 
 
 def _apart(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> np.ndarray:
@@ -163,18 +154,18 @@ def _apart(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> np.nda
     return np.where(crossing, 0.0, distance)
 
 
-def _rounds(edges: np.ndarray) -> list[np.ndarray]:
-    """Closed rounds of edges, by the points on each in order; each point has one edge that leaves it."""
+def rounds(edges: np.ndarray) -> list[np.ndarray]:
+    """Return closed rounds of edges, by the points on each in order; each point has one edge that leaves it."""
     following = dict(edges.tolist())
-    rounds = []
+    closed = []
     while following:
         point, after = following.popitem()
         found = [point]
         while after != point:
             found.append(after)
             after = following.pop(after)
-        rounds.append(np.array(found))
-    return rounds
+        closed.append(np.array(found))
+    return closed
 
 
 def _winding(points: np.ndarray, edges: np.ndarray, point: np.ndarray) -> int:

@@ -1,7 +1,6 @@
 """Sides of an outline, straight or arcs: points, lengths and intersections."""
 
 import math
-from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,19 +13,6 @@ SAME = 1e-9
 
 APART = 1e-9
 """Smallest distance of sides over the extent of the shape; nearer ones touch."""
-
-PANELS = 64
-"""Panels of an ellipse's arc on which its length is integrated."""
-
-GAUSS = (
-    (0.5, 64 / 225),
-    *(
-        (0.5 + sign * math.sqrt(5 + root * 2 * math.sqrt(10 / 7)) / 6, (322 - root * 13 * math.sqrt(70)) / 1800)
-        for root in (-1, 1)
-        for sign in (-1, 1)
-    ),
-)
-"""Abscissae and weights of five points on (0, 1): polynomials of degree 9 are exact."""
 
 
 @dataclass(frozen=True)
@@ -54,9 +40,7 @@ class OutlineSide:
 
     def __post_init__(self) -> None:
         if self.start == self.end:
-            raise ValueError(
-                f"from {in_mm(self.start)} to itself; leave it out, and split an entire circle into four arcs"
-            )
+            raise ValueError(f"from {in_mm(self.start)} to itself; leave it out, and split a circle into four arcs")
         _ = self.arc  # refused here, not when it is used
 
     @cached_property
@@ -79,10 +63,9 @@ class OutlineSide:
             determinant = x2 * v2 - u2 * y2
             shares = [(v2 - y2) / determinant, (x2 - u2) / determinant] if abs(determinant) > SAME else [-1.0, -1.0]
             if not min(shares) > 1e-12:
-                raise ValueError(
-                    f"{about}: the ends are {1e3 * first:.9g} and {1e3 * second:.9g} mm from it, and no ellipse with "
-                    "axes along x and y about it goes through both; correct the centre or an end"
-                )
+                ends = f"the ends are {1e3 * first:.9g} and {1e3 * second:.9g} mm from it"
+                why = f"{ends}, and no ellipse with axes along x and y about it goes through both"
+                raise ValueError(f"{about}: {why}; correct the centre")
             across, along = (large / math.sqrt(share) for share in shares)
         begin, finish = math.atan2(y / along, x / across), math.atan2(v / along, u / across)
         turn = math.remainder(finish - begin, 2 * math.pi)
@@ -122,48 +105,30 @@ class OutlineSide:
         norm = math.hypot(x, y)
         return x / norm, y / norm
 
-    def _length(self, low: float, high: float) -> float:
-        """Length between two parameters that are near each other."""
-        return (high - low) * sum(
-            weight * math.hypot(*self.slope(low + where * (high - low))) for where, weight in GAUSS
-        )
-
-    @cached_property
-    def _lengths(self) -> list[float]:
-        """Lengths from the start to the end of each panel of an ellipse's arc."""
-        found = [0.0]
-        for panel in range(PANELS):
-            found.append(found[-1] + self._length(panel / PANELS, (panel + 1) / PANELS))
-        return found
-
     @cached_property
     def length(self) -> float:
         """Length [m]."""
         if self.arc is None:
             return math.dist(self.start, self.end)
-        if self.circular:
-            return self.arc[0] * abs(self.arc[3])
-        return self._lengths[-1]
+        return self.arc[0] * abs(self.arc[3]) if self.circular else self.length_to(1.0)
 
     def length_to(self, parameter: float) -> float:
-        """Length from the start to a parameter [m]."""
+        """Length from the start to a parameter [m], of an ellipse by an elliptic integral."""
         if self.arc is None or self.circular:
             return parameter * self.length
-        panel = min(int(parameter * PANELS), PANELS - 1)
-        return self._lengths[panel] + self._length(panel / PANELS, parameter)
+        from scipy.special import ellipeinc  # here, since few outlines have ellipses
+
+        across, along, begin, turn = self.arc
+        first, last = ellipeinc([begin, begin + parameter * turn], 1 - (across / along) ** 2)
+        return float(along * abs(last - first))
 
     def parameter_of(self, length: float) -> float:
         """Parameter at a length from the start along the side [m]."""
         if self.arc is None or self.circular:
             return length / self.length
-        panel = min(max(bisect_right(self._lengths, length) - 1, 0), PANELS - 1)
-        parameter = (panel + 0.5) / PANELS
-        for _ in range(20):
-            missing = length - self.length_to(parameter)
-            parameter = min(max(parameter + missing / math.hypot(*self.slope(parameter)), 0.0), 1.0)
-            if abs(missing) <= 1e-15 * self.length:
-                break
-        return parameter
+        from scipy.optimize import brentq  # here, as above
+
+        return float(brentq(lambda parameter: self.length_to(parameter) - length, 0.0, 1.0, xtol=1e-16))
 
     def divided(self, count: int, low: float = 0.0, high: float = 1.0) -> list[float]:
         """Parameters that divide it, or a stretch of it, into parts of equal length; both ends are among them."""

@@ -1,9 +1,8 @@
 """Which definition and stiffness to use on a mesh, and how far off it is: solved, with linear kinematics.
 
 All registered definitions that suit the mesh and the materials are solved on the mesh itself under some loads and
-compared with the converged reference of small strain. The best ones are kept, of all and of springs alone; what cannot
-be among them is given up at the first load that says so. A patch test between rollers measures Young's modulus and
-Poisson's ratio of the network.
+compared with the converged reference of small strain. The best ones are kept, of all and of springs alone. A patch test
+between rollers measures Young's modulus and Poisson's ratio of the network.
 """
 
 import time
@@ -17,22 +16,22 @@ import numpy as np
 from ..mechanics.energies import AngleEnergy, AreaEnergy, BiquadraticEnergy, Energy
 from ..mechanics.moduli import PatchTest
 from ..mechanics.statics import SingularError
-from ..mesh import Mesh
+from ..mesh.cells import Mesh
 from ..mesh.groups import GroupedMesh
 from ..problem.compare import error_text, quantity_errors
 from ..problem.geometry import Beam
-from ..problem.loads import LOADS, LoadKind
+from ..problem.loads import LOADS
 from ..problem.materials import AnyMaterial, Material
 from ..problem.quantities import nearest
 from ..problem.shapes import Shape
 from ..problem.status import Status
-from ..reference.small_strain import ReferenceNotConvergedError, ReferenceSolution, solve_small_strain
+from ..reference.small_strain import ReferenceNotConvergedError, ReferenceSolution
 from ..safe_io.tables import Tabled, TabledList
 from ..scene.meshes import A_BEAM, A_MATERIAL, A_MESH, is_a
 from ..scene.motion import stable_steps
 from ..scene.sheet import Sheet, chosen
-from ..scene.statements import BeamStatement, ShapeStatement, Statement
-from ..springs import DEFINITIONS, Definition, DefinitionError, Springs
+from ..scene.statements import BeamStatement, ShapeStatement, Statement, unit_reference
+from ..springs.base import DEFINITIONS, Definition, DefinitionError, Springs
 
 CASES = ("traction", "bending", "shear")
 """Loads that are predicted where none are named."""
@@ -49,17 +48,14 @@ ALIKE = 1e-5
 EQUAL = 1e-11
 """Relative difference below which stiffness matrices count as equal, but for rounding."""
 
-SOLVED, SOLVED_FROM_FILE = 20_000, 100_000
-"""Particles up to which a mesh is solved, in some six seconds; up to which one from a file is, in a minute."""
+SEARCHED_PARTICLES, SOLVED_PARTICLES = 20_000, 100_000
+"""Particles up to which meshes are searched, in some six seconds each; up to which one is solved, in a minute."""
 
 
 ROUNDED = 1e-9
 """Largest error by rounding [1]; references of closed form have a smaller estimate."""
 
 _T = TypeVar("_T")
-
-Number = float | tuple[float, float]
-"""A number, or the two bounds of a band."""
 
 References = dict[str, ReferenceSolution | str]
 """References of 1 N by load, or why one is missing."""
@@ -79,8 +75,6 @@ ShapeReferences = dict[str, QuantityReference | str]
 @dataclass(frozen=True, repr=False)
 class Choice(Tabled):
     """A definition on a mesh: its stiffness, and what it gets wrong there.
-
-    Numbers are those of the mesh. Where it is too large to solve they are bands, pairs of a lower and an upper bound.
 
     Attributes
     ----------
@@ -125,13 +119,13 @@ class Choice(Tabled):
     """
 
     definition: str
-    inside: Number
-    outline: Number
+    inside: float
+    outline: float
     extra: str
     energies: bool
-    errors: dict[str, Number]
-    young_modulus_error: Number
-    poisson_ratio: Number
+    errors: dict[str, float]
+    young_modulus_error: float
+    poisson_ratio: float
     failures: dict[str, str] = field(default_factory=dict)
     tried: tuple[str, ...] = ()
 
@@ -143,13 +137,13 @@ class Choice(Tabled):
     def _rows(self) -> Iterator[tuple[str, str]]:
         yield "definition", self.definition
         for label, value in (("springs inside", self.inside), ("on the outline", self.outline)):
-            yield label, bounds_text(value, "{:.5g} N/m".format, "each its own")
+            yield label, number_text(value, "{:.5g} N/m".format, "each its own")
         for name, error in self.errors.items():
-            yield name, bounds_text(error, error_text, self._missing(name))
+            yield name, number_text(error, error_text, self._missing(name))
         missing = self._missing("patch test")
         if missing != NO_REFERENCE or self.young_modulus_error == self.young_modulus_error:
-            yield "E", bounds_text(self.young_modulus_error, error_text, missing)
-            yield "nu", bounds_text(self.poisson_ratio, lambda ratio: f"{round(ratio, 3) + 0.0:.3f}", missing)
+            yield "E", number_text(self.young_modulus_error, error_text, missing)
+            yield "nu", number_text(self.poisson_ratio, lambda ratio: f"{round(ratio, 3) + 0.0:.3f}", missing)
         yield "besides springs", self.extra
 
     def _missing(self, part: str) -> str:
@@ -164,17 +158,14 @@ class Choice(Tabled):
 NO_REFERENCE = "no reference"
 
 
-def worst_of(errors: Iterable[Number]) -> float:
-    """Largest size of errors or of the bounds of their bands [1]; infinite if all are missing."""
-    sizes = np.abs([np.broadcast_to(error, 2) for error in errors])
-    return inf if np.isnan(sizes).all() else float(np.nanmax(sizes))
+def worst_of(errors: Iterable[float]) -> float:
+    """Largest size of errors [1]; infinite if all are missing."""
+    return max((abs(error) for error in errors if error == error), default=inf)
 
 
-def bounds_text(value: Number, form: Callable[[float], str], missing: str) -> str:
-    """A number, or the bounds of a band, as text."""
-    numbers = value if isinstance(value, tuple) else (value,)
-    texts = [missing if number != number else form(number) for number in numbers]
-    return texts[0] if len(set(texts)) == 1 else " to ".join(texts)
+def number_text(value: float, form: Callable[[float], str], missing: str) -> str:
+    """A number as text, or a word for a missing one."""
+    return form(value) if value == value else missing
 
 
 def check_beam(beam: Beam) -> None:
@@ -224,15 +215,15 @@ def check_names(
 def references(beam: Beam, material: Material, loads: Iterable[str] = CASES) -> References:
     """References of loads."""
     check_beam(beam)
-    found: dict[LoadKind, ReferenceSolution | str] = {}
-    names = check_loads(loads)
-    for kind in (LOADS[load].kind for load in names):
-        if kind not in found:
-            try:
-                found[kind] = solve_small_strain(beam, material, 1.0, kind=kind)
-            except ReferenceNotConvergedError as error:
-                found[kind] = str(error)
-    return {load: found[LOADS[load].kind] for load in names}
+    return {load: reference_of(beam, material, load) for load in check_loads(loads)}
+
+
+def reference_of(beam: Beam, material: Material, load: str) -> ReferenceSolution | str:
+    """Reference of 1 N of any load, or why there is none."""
+    try:
+        return unit_reference(beam, material, LOADS[load].kind, 1.0)
+    except ReferenceNotConvergedError as error:
+        return str(error)
 
 
 def predict(
@@ -432,28 +423,12 @@ def errors_under(
     return dict(quantity_errors({name: values[name] for name in known}, wanted))
 
 
-def contest(
-    names: Iterable[str],
-    measured: Callable[[str, tuple[float, float]], tuple[bool, float] | None],
-    known: References | ShapeReferences,
-    also: Collection[str] = (),
-) -> list[str]:
+def best_of(found: Mapping[str, tuple[bool, float]], known: Mapping[str, Any], also: Collection[str] = ()) -> list[str]:
     """The best definitions of springs alone and of all, and those of `also`, the least worst error first.
 
-    `measured` tells of a definition whether it has energies, and its worst error; None where it has no springs of its
-    own or an error above a limit, the first one of springs alone, the second one of all.
+    `found` tells of a definition whether it has energies, and its worst error.
     """
-    found: dict[str, tuple[bool, float]] = {}
-    equal = as_sure_as(known)
-
-    def limit(energies: bool) -> float:
-        errors = sorted(worst for other, worst in found.values() if energies or not other)
-        return errors[KEPT - 1] + equal if len(errors) >= KEPT else inf
-
-    for name in names:
-        if (one := measured(name, (limit(False), limit(True)))) is not None:
-            found[name] = one
-    order = in_order(found, lambda name: found[name][1], lambda name: (found[name][0], name), equal)
+    order = in_order(found, lambda name: found[name][1], lambda name: (found[name][0], name), as_sure_as(known))
     best = order[:KEPT] + [name for name in order if not found[name][0]][:KEPT]
     return [name for name in order if name in best or name in also]
 
@@ -462,7 +437,7 @@ class Trial:
     """Definitions solved on a mesh, under loads of a beam or a load case of a shape; equal springs once.
 
     `statements` are of one mesh, in linear kinematics; `known` are references by load of a beam or by quantity of a
-    shape; `among` replaces the definitions that suit the mesh, `also` adds some that are not given up.
+    shape; `among` replaces the definitions that suit the mesh, `also` adds some.
 
     `names` are these definitions; `same` has for each one with springs the first one with the same springs;
     `failures` are as of `Choice`, for each definition without.
@@ -478,7 +453,7 @@ class Trial:
         self.statements, self.known, first = statements, known, statements[0]
         self.mesh, self.materials, self.thickness = first.mesh, first.materials, first.thickness
         self._sheet = Sheet(self.mesh, self.thickness, networks=len({one.loading.held.tobytes() for one in statements}))
-        self._errors: dict[str, tuple[dict[str, float | str], list[Statement]]] = {}  # and what is left to solve
+        self._errors: dict[str, dict[str, float | str]] = {}
         self._forces: dict[str, np.ndarray] = {}
         self._moduli: dict[tuple[bytes, ...], tuple[float, float] | str] = {}
         self._test = PatchTest(self.mesh) if isinstance(first, BeamStatement) else None
@@ -511,17 +486,14 @@ class Trial:
                 self._springs.setdefault(self.same[name], springs)
         return self._springs.get(self.same.get(name, ""))
 
-    def errors(self, name: str, limit: float = inf) -> dict[str, float | str]:
-        """Errors of a definition [1] by load or quantity; NaN without a reference, or why the network fails.
-
-        Loads are left out after one with an error above the limit.
-        """
+    def errors(self, name: str) -> dict[str, float | str]:
+        """Errors of a definition [1] by load or quantity; NaN without a reference, or why the network fails."""
         if (name := self.same[name]) not in self._errors:
-            self._errors[name] = self._errors.get(self._alike(name), ({}, [*self.statements]))
-        found, left = self._errors[name]
-        while left and not _exceeds(found, limit):
-            found |= errors_under(left.pop(0), self._sheet, self._springs[name], self.known)
-        return found
+            if (first := self._alike(name)) not in self._errors:
+                each = (errors_under(one, self._sheet, self._springs[name], self.known) for one in self.statements)
+                self._errors[first] = {label: error for one in each for label, error in one.items()}
+            self._errors[name] = self._errors[first]
+        return self._errors[name]
 
     def _alike(self, name: str) -> str:
         """The first definition with the same stiffness matrix, and so the same errors, by its forces on some motion."""
@@ -542,7 +514,8 @@ class Trial:
         Errors that differ by less than the error estimates are equal: then springs alone come first, then names.
         """
         names = [name for name in self.names if name not in without]
-        found = [self.choice(name) for name in contest(names, self.measured, self.known, self._also)]
+        measured = {name: one for name in names if (one := self.measured(name))}
+        found = [self.choice(name) for name in best_of(measured, self.known, self._also)]
         # The patch test is for the best ones alone, and may find one of them unstable.
         failed = {one.definition for one in found if one.failures and {*one.failures} <= {"patch test"}} - {*self._also}
         if failed and len(failed) < len(names):
@@ -554,23 +527,24 @@ class Trial:
         """Definitions that were solved, or have no stable network."""
         return tuple(name for name in self.names if name in self.same or "patch test" in self.failures.get(name, ()))
 
-    def measured(self, name: str, limits: tuple[float, float]) -> tuple[bool, float] | None:
-        """Whether a definition has energies, and its worst error, infinite where it is unstable; see `contest`."""
+    def measured(self, name: str) -> tuple[bool, float] | None:
+        """Whether a definition has energies, and its worst error, infinite where it is unstable; see `best_of`.
+
+        None where it has no springs of its own.
+        """
         springs = self.springs(name)
         if springs is None:
             return None if "springs" in self.failures[name] and name not in self._also else (False, inf)
-        limit = inf if name in self._also else limits[bool(springs.energies)]
-        found = self.errors(name, limit)
-        if self.same[name] != name or _exceeds(found, limit):
-            return None
+        found = self.errors(name)
         errors = [one for one in found.values() if not isinstance(one, str)]
-        return bool(springs.energies), worst_of(errors) if len(errors) == len(found) else inf
+        worst = worst_of(errors) if len(errors) == len(found) else inf
+        return None if self.same[name] != name else (bool(springs.energies), worst)
 
     def choice(self, name: str) -> Choice:
         """Choice of a definition; one without springs has NaN for all numbers."""
         springs = self.springs(name)
         if springs is None:
-            errors: dict[str, Number] = dict.fromkeys(self.known, nan)
+            errors: dict[str, float] = dict.fromkeys(self.known, nan)
             return Choice(name, nan, nan, "", False, errors, nan, nan, self.failures[name])
         found = self.errors(name)
         failures = {label: error for label, error in found.items() if isinstance(error, str)}
@@ -650,10 +624,6 @@ def _common(values: np.ndarray) -> float:
     """The common value of all, NaN where they differ."""
     alike = len(values) and values.any() and np.ptp(values) <= ALIKE * np.abs(values).max()
     return float(np.median(values)) if alike else nan
-
-
-def _exceeds(errors: Mapping[str, float | str], limit: float) -> bool:
-    return any(abs(one) > limit for one in errors.values() if not isinstance(one, str))
 
 
 def _suits(one: Definition, mesh: Mesh, materials: Collection[AnyMaterial]) -> bool:

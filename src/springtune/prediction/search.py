@@ -13,35 +13,37 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import count, takewhile
+from operator import attrgetter
+from typing import cast
 
 import numpy as np
 
-from ..mesh import MESH_TYPES
 from ..mesh.groups import GroupedMesh
 from ..mesh.outlines import mesh_shape
+from ..mesh.types import MESH_TYPES
 from ..problem.compare import error_text
 from ..problem.geometry import Beam
 from ..problem.materials import AnyMaterial, Material
 from ..problem.quantities import quantity
 from ..problem.shapes import Shape
-from ..safe_io.tables import Tabled
-from ..scene.meshes import A_MATERIAL, A_SHAPE, is_a
+from ..safe_io.tables import Tabled, mesh_size_text
+from ..scene.meshes import A_MATERIAL, is_a
 from ..scene.statements import ShapeStatement, Statement
-from .bands import FEWEST_CELLS
 from .choices import (
     CASES,
-    SOLVED,
+    SEARCHED_PARTICLES,
     Choice,
+    QuantityReference,
     References,
     ShapeReferences,
     Trial,
     as_sure_as,
     beam_statements,
-    bounds_text,
     check_beam,
     check_loads,
     check_names,
     in_order,
+    number_text,
     only_load,
     references,
     shape_references,
@@ -63,6 +65,9 @@ tried between two of these, where the coarsest mesh is."""
 
 BETWEEN_DIVISIONS = (0.98, 0.95, 0.9, 0.83, 0.7, 0.56)
 """Sizes between whole divisions that an answer is tried on, over its own."""
+
+FEWEST_CELLS = 4
+"""Cells across a mesh above which errors change regularly with the mesh size."""
 
 FINER = tuple(0.5 ** (step / 120) for step in range(1, 120))
 """Sizes over that of an answer. The two with the most stretched cells are tried, too; every fifth of them where the
@@ -97,7 +102,7 @@ class SolvedMesh:
     --------
     >>> import springtune as st
     >>> beam, steel = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3)
-    >>> coarsest = st.find_mesh(beam, steel, "5 %", mesh_types=["structured"]).tried[0]
+    >>> coarsest = st.find_mesh(beam, steel, "10 %", mesh_types=["structured"], most=200).tried[0]
     >>> coarsest.cells, coarsest.particles, f"{100 * coarsest.worst('patch'):.1f} %"
     (1, 13, '63.3 %')
     """
@@ -155,15 +160,15 @@ class MeshChoice(Tabled):
     --------
     >>> import springtune as st
     >>> beam, steel = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3)
-    >>> best = st.find_mesh(beam, steel, "5 %", mesh_types=["structured"]).best
+    >>> best = st.find_mesh(beam, steel, "10 %", loads=["traction", "bending"], mesh_types=["structured"]).best
     >>> best.size, best.cells, best.particles, best.confirmed
-    (0.006599, 7, 252, True)
+    (0.0231, 2, 31, True)
     >>> [finer.cells for finer in best.finer][:6]
-    [7.141, 7.368, 7.502, 7.777, 8, 8.433]
+    [2.222, 2.447, 2.519, 2.856, 3, 3.174]
     >>> mesh = st.make_mesh(beam, best.mesh_type, best.size)
     >>> scene = st.Scene(beam, mesh, steel, "bending", "1 N", definition=best.choice.definition, kinematics="linear")
-    >>> print(f"{100 * best.choice.errors['bending']:.3f} %, {100 * scene.solve().error:.3f} %")
-    -3.325 %, -3.325 %
+    >>> print(f"{100 * best.choice.errors['bending']:+.3f} %, {100 * scene.solve().error:+.3f} %")
+    +4.487 %, +4.487 %
     """
 
     mesh_type: str
@@ -179,26 +184,15 @@ class MeshChoice(Tabled):
 
     def _rows(self) -> Iterator[tuple[str, str]]:
         yield "mesh", self.mesh_type
-        yield "size", size_text(self.size)
+        yield "size", mesh_size_text(self.size)
         yield "definition", self.choice.definition + ("" if self.confirmed else " *")
         for name in ("cells", "particles", "springs"):
             yield name, f"{getattr(self, name):,}"
         for name, error in self.choice.errors.items():
-            yield name, bounds_text(error, error_text, "")
+            yield name, number_text(error, error_text, "")
         yield "static solve", f"{1e3 * self.seconds:.3g} ms"
         if not math.isnan(self.step_limit):
             yield "largest step", f"{self.step_limit:.3g} s"
-
-
-def size_text(size: float) -> str:
-    """Mesh size [m] as the option takes it.
-
-    Examples
-    --------
-    >>> size_text(0.00308)
-    '3.08 mm'
-    """
-    return f"{1e3 * size:.12g} mm"
 
 
 def answer_text(one: MeshChoice | None) -> str:
@@ -206,7 +200,7 @@ def answer_text(one: MeshChoice | None) -> str:
     if one is None:
         return "none"
     sure = "" if one.confirmed else ", not confirmed by finer meshes"
-    return f"{one.mesh_type} {size_text(one.size)} with {one.choice.definition}, {one.particles:,} particles{sure}"
+    return f"{one.mesh_type} {mesh_size_text(one.size)} with {one.choice.definition}, {one.particles:,} particles{sure}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -235,13 +229,13 @@ class MeshSearch(Tabled):
     --------
     >>> import springtune as st
     >>> beam, steel = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3)
-    >>> search = st.find_mesh(beam, steel, "5 %", mesh_types=["structured", "right"])
+    >>> search = st.find_mesh(beam, steel, "10 %", loads=["traction", "bending"], mesh_types=["structured", "right"])
     >>> search.best.mesh_type, search.best.choice.definition
-    ('structured', 'patch')
+    ('structured', 'patch-fit')
     >>> search.best_springs == search.best
     True
     >>> {name: found and found.choice.definition for name, found in search.springs_by_type.items()}
-    {'structured': 'patch', 'right': None}
+    {'structured': 'patch-fit', 'right': 'van-gelder'}
     """
 
     error: float
@@ -271,15 +265,13 @@ class MeshSearch(Tabled):
         yield "solved", f"{len(self.tried)} meshes, of at most {self.most:,} particles"
 
     def _least(self, found: dict[str, MeshChoice | None]) -> MeshChoice | None:
-        ranks = {name: (not one.confirmed, one.particles, one.springs) for name, one in found.items() if one}
-        least = [one for name, one in found.items() if one and ranks[name] == min(ranks.values())]
-        order = in_order(
-            least,
-            lambda one: one.choice.worst,
-            lambda one: (one.choice.energies, one.choice.definition, one.mesh_type),
-            as_sure_as(self.known),
-        )
-        return order[0] if order else None
+        def rank(one: MeshChoice) -> tuple[bool, int, int]:
+            return not one.confirmed, one.particles, one.springs
+
+        ranked = sorted(filter(None, found.values()), key=rank)
+        alike = [one for one in ranked if rank(one) == rank(ranked[0])]
+        tie = attrgetter("choice.energies", "choice.definition", "mesh_type")
+        return next(iter(in_order(alike, attrgetter("choice.worst"), tie, as_sure_as(self.known))), None)
 
 
 def asked_error(value: float | str, name: str = "error") -> float:
@@ -303,7 +295,8 @@ def find_mesh(
     loads: Iterable[str] = CASES,
     mesh_types: Sequence[str] | None = None,
     load: str | None = None,
-    most: int = SOLVED,
+    make: Callable[[float], GroupedMesh] | None = None,
+    most: int = SEARCHED_PARTICLES,
 ) -> MeshSearch:
     """Coarsest mesh of each type on which a definition keeps an error, found by solving.
 
@@ -321,6 +314,8 @@ def find_mesh(
         Keys of `springtune.MESH_TYPES`, for a beam; all without. Meshes of shapes are free ones.
     load : str, optional
         Load case of a shape; its only one without.
+    make : callable, optional
+        Makes a mesh of a shape of a size [m]; `springtune.mesh_shape` without.
     most : int, optional
         Particles of the largest mesh that may be tried.
 
@@ -352,102 +347,50 @@ def find_mesh(
     --------
     >>> import springtune as st
     >>> beam, steel = st.Beam("200 mm", "40 mm"), st.Material("210 GPa", 0.3, density="7850 kg/m^3")
-    >>> search = st.find_mesh(beam, steel, "2 %", loads=["traction", "bending"], mesh_types=["structured"])
+    >>> search = st.find_mesh(beam, steel, "5 %", loads=["traction", "bending"], mesh_types=["structured"])
     >>> best = search.best
     >>> print(f"{best.mesh_type} {1e3 * best.size:g} mm, {best.choice.definition}: {best.particles} particles")
-    structured 5.774 mm, patch-fit: 328 particles
+    structured 15.4 mm, patch-fit: 58 particles
     >>> print(f"at worst {100 * best.choice.worst:.1f} %, steps up to {1e9 * best.step_limit:.0f} ns")
-    at worst 0.4 %, steps up to 502 ns
-    >>> st.find_mesh(beam, steel, "0.2 %", mesh_types=["right"], most=500).best is None
+    at worst 1.0 %, steps up to 1515 ns
+    >>> st.find_mesh(beam, steel, "0.2 %", mesh_types=["right"], most=100).best is None
     True
     """
+    wanted = asked_error(error)
+    if not (isinstance(most, int) and most > 0):
+        raise ValueError(f"most: {most!r} is no number of particles; give one such as {SEARCHED_PARTICLES}")
+    known: References | ShapeReferences
     if isinstance(beam, Shape):
         if loads is not CASES or mesh_types is not None:
             raise ValueError("loads, mesh types: are of beams alone; leave them out for a shape, and give its load")
-        return find_shape_mesh(beam, material, error, load=load, most=most)
-    if load is not None:
+        load = only_load(beam, load)
+        families = [_shape_family(beam, material, load, make or partial(mesh_shape, beam))]
+        known = shape_references(cast(ShapeStatement, families[0].statements(families[0].side / 4)[0]))
+        what, remedy = f"load {load!r}", "; take it out of the quantities"
+    elif load is not None or make is not None:
         raise ValueError(f"load: {load!r} is of shapes alone; give loads for a beam")
-    check_beam(beam)
-    is_a(material, Material, "material", A_MATERIAL)
-    assert isinstance(material, Material)  # for type checkers
-    asked_error(error)
-    loads = check_loads(loads)
-    given = MESH_TYPES if mesh_types is None else mesh_types
-    names = check_names("mesh types", given, MESH_TYPES, ("structured", "free"), "is unknown")
-    if not (isinstance(most, int) and most > 0):
-        raise ValueError(f"most: {most!r} is no number of particles; give one such as {SOLVED}")
-    known = references(beam, material, loads)
-    for load, found in known.items():
-        if isinstance(found, str):
-            raise ValueError(f"loads: {load!r} has no reference, so no error can be kept: {found}")
-    families = [_beam_family(beam, material, loads, name) for name in names]
-    return _searched(families, known, error, loads, most)
-
-
-def find_shape_mesh(
-    shape: Shape,
-    material: AnyMaterial | Mapping[str, AnyMaterial],
-    error: float | str,
-    *,
-    load: str | None = None,
-    make: Callable[[float], GroupedMesh] | None = None,
-    most: int = SOLVED,
-) -> MeshSearch:
-    """As `find_mesh`, of a shape: all quantities of a load case keep the error.
-
-    `make` makes a mesh of a size [m]; `springtune.mesh_shape` by default.
-    """
-    is_a(shape, Shape, "shape", A_SHAPE)
-    if shape.file:
-        raise ValueError(
-            f"shape {shape.name!r}: has the mesh of its file, so there is none to be found; give an outline, or files "
-            "of finer meshes"
-        )
-    asked_error(error)
-    (left, low), (right, top) = shape.extent
-    side, load = min(right - left, top - low), only_load(shape, load)
-
-    def statement(size: float) -> ShapeStatement:
-        return ShapeStatement(shape, make(size) if make else mesh_shape(shape, size), material, load, 1.0, "linear")
-
-    known = shape_references(statement(side / 4))
+    else:
+        check_beam(beam)
+        is_a(material, Material, "material", A_MATERIAL)
+        assert isinstance(material, Material)  # for type checkers
+        loads = check_loads(loads)
+        given = MESH_TYPES if mesh_types is None else mesh_types
+        names = check_names("mesh types", given, MESH_TYPES, ("structured", "free"), "is unknown")
+        families = [_beam_family(beam, material, loads, name) for name in names]
+        known = references(beam, material, loads)
+        what, remedy = "loads", ""
     for name, one in known.items():
-        if isinstance(one, str) or not one.value:
+        if isinstance(one, str) or isinstance(one, QuantityReference) and not one.value:
             why = one if isinstance(one, str) else "it is zero"
-            raise ValueError(
-                f"load {load!r}: {name!r} has no reference, so no error of it can be kept: {why}; take it "
-                "out of the quantities"
-            )
-    family = _Family(
-        "free", side, side, lambda size: shape.area / (ROW_HEIGHT * size**2), lambda size: [statement(size)]
-    )
-    return _searched([family], known, error, tuple(known), most)
-
-
-def _searched(
-    families: "Sequence[_Family]",
-    known: References | ShapeReferences,
-    error: float | str,
-    loads: tuple[str, ...],
-    most: int,
-) -> MeshSearch:
-    """Search each family of meshes."""
-    wanted = asked_error(error)
+            raise ValueError(f"{what}: {name!r} has no reference, so no error of it can be kept: {why}{remedy}")
     estimates = {name: one.error_estimate for name, one in known.items() if not isinstance(one, str)}
     if wanted <= max(estimates.values()):
         least = f"{200 * max(estimates.values()):.1g} %"
         raise ValueError(f"error: {error!r} is below the error estimate of the reference; give at least {least}")
     searches = [_Search(family, known, estimates, wanted, most) for family in families]
-    for search in searches:
-        search.climb()
+    found, alone = ({one.family.name: one.find(only) for one in searches} for only in (False, True))
     return MeshSearch(
-        wanted,
-        loads,
-        most,
-        known,
-        {search.name: search.found(springs_alone=False) for search in searches},
-        {search.name: search.found(springs_alone=True) for search in searches},
-        tuple(one for search in searches for one in search.solved()),
+        wanted, tuple(known), most, known, found, alone, tuple(one for search in searches for one in search.solved)
     )
 
 
@@ -481,6 +424,28 @@ def _beam_family(beam: Beam, material: Material, loads: tuple[str, ...], name: s
     )
 
 
+def _shape_family(
+    shape: Shape,
+    material: AnyMaterial | Mapping[str, AnyMaterial],
+    load: str,
+    make: Callable[[float], GroupedMesh],
+) -> _Family:
+    """Meshes of a shape under a load case."""
+    if shape.file:
+        raise ValueError(
+            f"shape {shape.name!r}: has the mesh of its file, so there is none to be found; give an outline, or files "
+            "of finer meshes"
+        )
+    side = float(min(np.ptp(shape.extent, axis=0)))
+    return _Family(
+        "free",
+        side,
+        side,
+        lambda size: shape.area / (ROW_HEIGHT * size**2),
+        lambda size: [ShapeStatement(shape, make(size), material, load, 1.0, "linear")],
+    )
+
+
 def _cells(rung: int) -> int:
     """Cells across of the meshes that are tried first: 1, 2, 3, ..., 15, 16, 20, 23, 27, 32, 39, ..."""
     beyond = rung + 1 - EVERY_UP_TO
@@ -494,7 +459,7 @@ def tried_names(solved: Iterable[SolvedMesh], springs_alone: bool = False) -> li
 
 
 class _Search:
-    """Meshes of a family, by the number of cells across; each solved once."""
+    """Search of a family of meshes, from coarse to fine; each mesh is solved once."""
 
     def __init__(
         self,
@@ -504,70 +469,80 @@ class _Search:
         error: float,
         most: int,
     ) -> None:
-        self.family, self.name, self.known, self.error = family, family.name, known, error
-        self._estimates, self._most = estimates, most
-        self._tried: dict[float, SolvedMesh] = {}  # by cells across
-        self._first: dict[bytes, float] = {}  # cells across the first of equal meshes, by its points
-        self._same: dict[float, float] = {}  # and by those across each of them
-        self._found: dict[tuple[int, str], MeshChoice] = {}
-        self._finest = next(cells for cells in map(_cells, count()) if self._particles(cells) > most)
+        self.family, self.known, self._estimates, self._error = family, known, estimates, error
+        rungs = map(_cells, count())
+        self._rungs = [*takewhile(lambda cells: family.particles(self._size(cells)) <= most, rungs)]
+        self._finest = _cells(len(self._rungs))
+        self._meshes: dict[bytes, SolvedMesh] = {}  # by their points
+        self._keys: dict[float, bytes] = {}  # by cells across
+        self._choices: dict[tuple[int, str], MeshChoice] = {}
 
-    def _particles(self, cells: int) -> float:
-        """Particles of a mesh of so many cells across, about."""
-        return self.family.particles(self.size(cells))
+    @property
+    def solved(self) -> list[SolvedMesh]:
+        """All that was solved, from coarse to fine."""
+        return sorted(self._meshes.values(), key=attrgetter("cells"))
 
-    def climb(self) -> None:
-        """Try meshes from coarse to fine until both questions are answered, or no larger one may be."""
-        for rung in count():
-            # Where the first question is answered, the other one is of springs alone.
-            asked = self._names(springs_alone=self._settled(springs_alone=False))
-            if self._settled(springs_alone=True):
+    def find(self, springs_alone: bool) -> MeshChoice | None:
+        """The coarsest mesh with a definition that keeps the error on it and on finer ones; None without one."""
+        for rung in (*self._rungs, None):
+            names = [name for name in tried_names(self.solved, springs_alone) if self._promising(name)]
+            sure = self._settled(springs_alone)
+            if sure or rung is None or self._meshes and not names:
                 break
-            names, cells = [name for name in asked if self._promising(name)], _cells(rung)
-            if self._tried and not names or cells not in self._tried and not self._try(cells, names):
-                break
+            self._solve(rung, names)
+        start = sure or self._start(springs_alone, confirmed=False)
+        return self._choice(*start, springs_alone, sure is not None) if start else None
 
-    def _names(self, springs_alone: bool) -> list[str]:
-        """Definitions that were tried; all of them, or those that need no more than springs."""
-        return tried_names(self._tried.values(), springs_alone)
+    def _settled(self, springs_alone: bool) -> tuple[int, list[str]] | None:
+        """As `_start`, with meshes tried between the answer and the next coarser one, and sizes between divisions."""
+        if (start := self._confirmed(springs_alone)) is None:
+            return None
+        upper, names = start
+        lower = max((rung for rung in self._rungs if rung < upper), default=upper)
+        for step in range(TRIED_BETWEEN, 0, -1):
+            cells = round(lower * (upper / lower) ** (step / (TRIED_BETWEEN + 1)))
+            if names and lower < cells < upper:
+                mesh = self._solve(cells, names)
+                names = [name for name in names if self._keeps(name, mesh)]
+        return self._confirmed(springs_alone)
 
-    def _settled(self, springs_alone: bool) -> bool:
-        """Look for an answer among all meshes up to those that were tried; whether there is one."""
-        if not self._holds(springs_alone):
-            return False
-        self._look_between(springs_alone)
-        return self._holds(springs_alone)
-
-    def _holds(self, springs_alone: bool) -> bool:
-        """Try sizes between whole divisions; whether a mesh is left that keeps the error on all of them."""
+    def _confirmed(self, springs_alone: bool) -> tuple[int, list[str]] | None:
+        """As `_start`, with sizes between whole divisions tried."""
         while start := self._start(springs_alone):
             cells, names = start
-            for between in self._between(cells):
-                if self._check(between, names) and self._start(springs_alone) != start:
-                    break  # it does not: on to the next one
+            for one in self._between(cells):
+                self._solve(one, names, whole=False)
+                if self._start(springs_alone) != start:
+                    break  # it is not kept there: on to the next one
             else:
-                return True
-        return False
+                return start
+        return None
+
+    def _start(self, springs_alone: bool, confirmed: bool = True) -> tuple[int, list[str]] | None:
+        """Coarsest mesh from which on a definition keeps the error, and the definitions that do; None without any."""
+        starts: dict[int, list[str]] = {}
+        for name in tried_names(self.solved, springs_alone):
+            tried = [one for one in self.solved if name in one.errors]
+            failing = max((one.cells for one in tried if not self._keeps(name, one)), default=0)
+            kept = [int(one.cells) for one in self._on(name) if one.cells > failing]
+            # Of those that keep the error on all finer ones, the coarsest with finer ones enough.
+            taken = [cells for cells in kept[:-FEWEST_FINER] if ENOUGH_FINER * cells <= kept[-1]] if confirmed else kept
+            if taken and (not confirmed or self._steady(name)):
+                starts.setdefault(taken[0], []).append(name)
+        return min(starts.items()) if starts else None  # no two have the same cells
 
     def _between(self, cells: int) -> list[float]:
         """Cells across the meshes between whole divisions that an answer is tried on."""
-        size = self.size(cells)
+        size, stretch = self._size(cells), self.family.stretch
         # Errors are irregular on few cells.
-        parts = BETWEEN_DIVISIONS + (FINER[4::5] if cells < FEWEST_CELLS else ())
-        sizes = (*(size * part for part in parts), *self._stretched(size))
-        found = (round(self.family.one_cell / one, ACROSS_DECIMALS) for one in sizes)
-        return [int(one) if one == int(one) else one for one in found]
+        parts = [*BETWEEN_DIVISIONS, *(FINER[4::5] if cells < FEWEST_CELLS else ())]
+        if stretch is not None:
+            # Stretches that differ by rounding are one.
+            stretches = np.round([stretch(size * part) for part in FINER], 9)
+            parts += [FINER[np.argmin(stretches)], FINER[np.argmax(stretches)]]
+        return [round(self.family.one_cell / (size * part), ACROSS_DECIMALS) for part in parts]
 
-    def _stretched(self, size: float) -> list[float]:
-        """Sizes down to half of one whose cells are stretched most."""
-        if self.family.stretch is None:
-            return []
-        sizes = [size * part for part in FINER]
-        # Stretches that differ by rounding are one.
-        stretch = np.round([self.family.stretch(one) for one in sizes], 9)
-        return [sizes[np.argmin(stretch)], sizes[np.argmax(stretch)]]
-
-    def size(self, cells: float) -> float:
+    def _size(self, cells: float) -> float:
         """Mesh size [m] of so many cells across the smaller side, rounded up."""
         exact = self.family.one_cell / cells * 1e3
         digit = 10.0 ** (math.floor(math.log10(exact)) + 1 - SIZE_DIGITS)
@@ -575,83 +550,58 @@ class _Search:
         text = f"{math.ceil(exact / digit * (1 - 1e-9)) * digit:.{SIZE_DIGITS}g} mm"
         return min(self.family.side, quantity(text, "length", "size"))
 
-    def solved(self) -> list[SolvedMesh]:
-        """All that was tried, from coarse to fine."""
-        return [self._tried[cells] for cells in sorted(self._tried)]
-
-    def found(self, springs_alone: bool) -> MeshChoice | None:
-        """The coarsest mesh that counts, with its cost; None without one."""
-        sure = self._start(springs_alone) if self._holds(springs_alone) else None
-        start = sure or self._start(springs_alone, confirmed=False)
-        if start is None:
+    def _solve(self, cells: float, names: Sequence[str], whole: bool = True) -> SolvedMesh | None:
+        """Solve definitions on a mesh, all without names; None for a `whole` division without a mesh of its own."""
+        known = self._meshes.get(self._keys.get(cells, b""))
+        if known and all(name in known.errors for name in names):
+            return known
+        statements = self.family.statements(self._size(cells))
+        mesh = statements[0].mesh
+        # A mesh of its own has more particles than coarser ones and fewer than finer ones.
+        others = [one for one in self.solved if one.cells == int(one.cells) != cells] if whole else []
+        if any((len(mesh.points) > one.particles) != (cells > one.cells) for one in others):
             return None
-        cells, names = start
-        one = self._tried[cells]
+        key = self._keys.setdefault(cells, mesh.points.tobytes())
+        new = SolvedMesh(self.family.name, self._size(cells), cells, len(mesh.points), len(mesh.edges), {}, ())
+        found = self._meshes.get(key, new)
+        errors, energies = dict(found.errors), found.energies
+        left = [name for name in names if name not in errors]
+        tried = Trial(statements, self.known, left if self._meshes else None)
+        for name in tried.names:
+            springs = tried.springs(name)
+            one = dict.fromkeys(self.known, "") if springs is None else tried.errors(name)
+            errors[name] = {load: math.nan if isinstance(error, str) else error for load, error in one.items()}
+            energies += (name,) * bool(springs and springs.energies)
+        self._meshes[key] = replace(found, errors=errors, energies=energies)
+        return self._meshes[key]
+
+    def _choice(self, cells: int, names: list[str], springs_alone: bool, confirmed: bool) -> MeshChoice:
+        """The best of some definitions on a mesh, with its cost."""
+        one = self._meshes[self._keys[cells]]
         name = in_order(names, one.worst, lambda name: (name in one.energies, name), as_sure_as(self.known))[0]
-        if (cells, name) not in self._found:
+        if (cells, name) not in self._choices:
             tried = Trial(self.family.statements(one.size), self.known, [name])
-            self._found[cells, name] = MeshChoice(
-                self.name,
+            self._choices[cells, name] = MeshChoice(
+                self.family.name,
                 one.size,
                 cells,
-                replace(tried.choice(name), tried=tuple(self._names(springs_alone))),
+                replace(tried.choice(name), tried=tuple(tried_names(self.solved, springs_alone))),
                 one.particles,
                 one.springs,
                 *tried.cost(name),
-                tuple(finer for finer in self.solved() if finer.cells > cells and name in finer.errors),
-                sure is not None,
+                tuple(finer for finer in self.solved if finer.cells > cells and name in finer.errors),
+                confirmed,
             )
-        return self._found[cells, name]
+        return self._choices[cells, name]
 
-    def _try(self, cells: int, names: Sequence[str]) -> bool:
-        """Solve definitions on a mesh; whether it is not too large."""
-        if self._particles(cells) > self._most:
-            return False
-        statements = self.family.statements(self.size(cells))
-        particles = len(statements[0].mesh.points)
-        whole = [(other, one.particles) for other, one in self._tried.items() if other == int(other)]
-        # A mesh of its own has more particles than coarser ones and fewer than finer ones.
-        if all((particles > count) == (cells > other) for other, count in whole):
-            self._solve(cells, statements, names)
-        return True
+    def _keeps(self, name: str, mesh: SolvedMesh | None) -> bool:
+        """Whether a definition keeps the error on a mesh, if there is one; the reference's error estimate is added."""
+        errors = mesh.errors[name] if mesh else {}
+        return all(abs(error) + self._estimates[load] <= self._error for load, error in errors.items())  # not NaN
 
-    def _check(self, cells: float, names: Sequence[str]) -> bool:
-        """Solve definitions on a mesh between whole divisions, once on equal ones; whether there was something to."""
-        cells = self._same.get(cells, cells)
-        if cells in self._tried and all(name in self._tried[cells].errors for name in names):
-            return False
-        statements = self.family.statements(self.size(cells))
-        same = self._same[cells] = self._first.setdefault(statements[0].mesh.points.tobytes(), cells)
-        if same != cells:
-            return self._check(same, names)
-        self._solve(cells, statements, names)
-        return True
-
-    def _solve(self, cells: float, statements: Sequence[Statement], names: Sequence[str]) -> None:
-        """Solve the definitions that were not solved on a mesh before."""
-        mesh = statements[0].mesh
-        self._first.setdefault(mesh.points.tobytes(), cells)
-        former = self._tried.get(cells)
-        errors, energies = (dict(former.errors), former.energies) if former else ({}, ())
-        tried = Trial(statements, self.known, [name for name in names if name not in errors] if self._tried else None)
-        for name in tried.names:
-            springs = tried.springs(name)
-            found = dict.fromkeys(self.known, "") if springs is None else tried.errors(name)
-            errors[name] = {load: math.nan if isinstance(one, str) else one for load, one in found.items()}
-            energies += (name,) * bool(springs and springs.energies)
-        self._tried[cells] = SolvedMesh(
-            self.name, self.size(cells), cells, len(mesh.points), len(mesh.edges), errors, energies
-        )
-
-    def _keeps(self, name: str, cells: float) -> bool:
-        """Whether a definition keeps the error on a mesh, even if the reference is off by its estimate."""
-        errors = self._tried[cells].errors[name]
-        return all(abs(error) + self._estimates[load] <= self.error for load, error in errors.items())  # not NaN
-
-    def _on(self, name: str) -> list[int]:
-        """Whole cells across the meshes that a definition was tried on, ascending."""
-        whole = (int(cells) for cells in sorted(self._tried) if cells == int(cells))
-        return [cells for cells in whole if name in self._tried[cells].errors]
+    def _on(self, name: str) -> list[SolvedMesh]:
+        """Meshes of whole divisions that a definition was tried on, from coarse to fine."""
+        return [one for one in self.solved if one.cells == int(one.cells) and name in one.errors]
 
     def _promising(self, name: str) -> bool:
         """Whether a definition may keep the error on the finest mesh, by its last errors.
@@ -661,13 +611,13 @@ class _Search:
         """
         on = self._on(name)
         doubling = self._doubling(name)
-        if doubling is None or ENOUGH_FINER * FEWEST_CELLS > on[-1]:
+        if doubling is None or ENOUGH_FINER * FEWEST_CELLS > on[-1].cells:
             return bool(on)
-        left = LEFT_TO_GO * (1 - on[-1] / self._finest)
+        left = LEFT_TO_GO * (1 - on[-1].cells / self._finest)
         before, last = doubling
         if any(before[load] != before[load] and last[load] != last[load] for load in last):
             return False
-        return not any(abs(last[load]) - left * abs(last[load] - before[load]) > self.error for load in last)
+        return not any(abs(last[load]) - left * abs(last[load] - before[load]) > self._error for load in last)
 
     def _steady(self, name: str) -> bool:
         """Whether a definition would keep the error if it changed once more by as much as over the last doubling."""
@@ -675,40 +625,10 @@ class _Search:
         if doubling is None:
             return False
         before, last = doubling
-        return all(abs(2 * last[load] - before[load]) <= self.error for load in last)
+        return all(abs(2 * last[load] - before[load]) <= self._error for load in last)
 
     def _doubling(self, name: str) -> tuple[dict[str, float], dict[str, float]] | None:
         """Errors on a mesh of half as many cells across as the finest one that was tried, or fewer, and on that."""
         on = self._on(name)
-        coarser = [cells for cells in on if ENOUGH_FINER * cells <= on[-1]]
-        if not coarser:
-            return None
-        return self._tried[coarser[-1]].errors[name], self._tried[on[-1]].errors[name]
-
-    def _start(self, springs_alone: bool, confirmed: bool = True) -> tuple[int, list[str]] | None:
-        """Coarsest mesh from which on a definition keeps the error, and the definitions that do; None without any."""
-        starts: dict[int, list[str]] = {}
-        for name in self._names(springs_alone):
-            tried = (cells for cells, one in self._tried.items() if name in one.errors)
-            failing = max((cells for cells in tried if not self._keeps(name, cells)), default=0)
-            kept = [cells for cells in self._on(name) if cells > failing]
-            # Of those that keep the error on all finer ones, the coarsest with finer ones enough.
-            taken = [cells for cells in kept[:-FEWEST_FINER] if ENOUGH_FINER * cells <= kept[-1]] if confirmed else kept
-            if taken and (not confirmed or self._steady(name)):
-                starts.setdefault(taken[0], []).append(name)
-        return min(starts.items()) if starts else None  # no two have the same cells
-
-    def _look_between(self, springs_alone: bool) -> None:
-        """Try the whole divisions between the coarsest mesh that is taken and the next coarser one."""
-        start = self._start(springs_alone)
-        assert start is not None
-        upper, names = start
-        lower = max(takewhile(lambda cells: cells < upper, map(_cells, count())), default=upper)
-        steps = (round(lower * (upper / lower) ** (step / (TRIED_BETWEEN + 1))) for step in range(TRIED_BETWEEN, 0, -1))
-        for cells in dict.fromkeys(steps):
-            if cells not in self._tried:
-                self._try(cells, names)
-            if cells in self._tried:
-                names = [name for name in names if self._keeps(name, cells)]
-                if not names:
-                    return
+        coarser = [one for one in on if ENOUGH_FINER * one.cells <= on[-1].cells]
+        return (coarser[-1].errors[name], on[-1].errors[name]) if coarser else None

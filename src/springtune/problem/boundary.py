@@ -23,6 +23,9 @@ ON_POINT = 1e-9
 OUTSIDE = 0.25
 """How far outside the nearest cell a point may lie, over its size [1], as next to an arc."""
 
+IN_CELL = 1e-6
+"""How far outside a cell a point counts as in it, over the cell's size [1]: coordinates are rounded."""
+
 MAX_ITERATIONS = 50
 """Newton steps that look for a point in a quadrilateral."""
 
@@ -81,10 +84,9 @@ def supported(grouped: GroupedMesh, case: LoadCase) -> tuple[np.ndarray, np.ndar
             if differ.any():
                 particle = particles[np.argmax(differ)]
                 others = [one.group for one in case.supports if particle in grouped.particles(one.group)]
-                raise ValueError(
-                    f"load {case.name!r}: supports on {others[0]!r} and {support.group!r} move the particle at "
-                    f"{in_words(points[particle])} by different amounts along {'xy'[axis]}; make them agree there"
-                )
+                both, there = f"{others[0]!r} and {support.group!r}", f"the particle at {in_words(points[particle])}"
+                why = f"move {there} by different amounts along {'xy'[axis]}; make them agree there"
+                raise ValueError(f"load {case.name!r}: supports on {both} {why}")
             held[particles, axis] = True
             given[particles, axis] = value
     return held, given
@@ -161,9 +163,9 @@ def displacement_weights(grouped: GroupedMesh, quantity: Quantity) -> np.ndarray
     axis = "xy".index(quantity.component)
     if quantity.of in grouped.sides:
         return even(grouped, quantity.of, axis)
-    particles, shares = interpolation(grouped, quantity.of)
+    count, cell, shares = cell_at(grouped, quantity.of)
     field = np.zeros(grouped.mesh.points.shape)
-    field[particles, axis] = shares
+    field[grouped.mesh.cells[count][cell], axis] = shares
     return field
 
 
@@ -175,12 +177,6 @@ def reaction_weights(grouped: GroupedMesh, case: LoadCase, quantity: Quantity) -
     """
     axis = "xy".index(quantity.component)
     holding = [one for one in case.supports if (one.x, one.y)[axis] is not None]
-    if quantity.of not in [one.group for one in holding]:
-        known = ", ".join(dict.fromkeys(one.group for one in holding)) or "none"
-        raise ValueError(
-            f"load {case.name!r}: quantity {quantity.name!r} is the reaction of {quantity.of!r} along "
-            f"{quantity.component}, and no support holds it so; held along {quantity.component}: {known}"
-        )
     shares = {group: _lengths(grouped, group) for group in dict.fromkeys(one.group for one in holding)}
     by_sides = sum((share for group, share in shares.items() if group in grouped.sides), np.zeros(1))
     for group, share in shares.items():
@@ -204,35 +200,11 @@ def _lengths(grouped: GroupedMesh, group: str) -> np.ndarray:
     return field
 
 
-def interpolation(grouped: GroupedMesh, name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return particles and weights, sum 1, that interpolate a field at a named point; exact at particles.
-
-    Along its edge of the outline, or in its cell: linear in triangles, bilinear in quadrilaterals.
-    """
-    mesh, point = grouped.mesh, np.asarray(grouped.points[name], dtype=float)
-    outline = mesh.edges[mesh.on_outline]
-    ends, tolerance = mesh.points[outline], ON_POINT * np.ptp(mesh.points, axis=0).max()
-    (x, y), (dx, dy) = (point - ends[:, 0]).T, (ends[:, 1] - ends[:, 0]).T
-    squares = dx**2 + dy**2
-    away, along = np.abs(x * dy - y * dx) / np.sqrt(squares), (x * dx + y * dy) / squares
-    met = (away <= tolerance) & (along >= 0) & (along <= 1)
-    if met.any():  # on an edge
-        found = int(np.argmax(met))
-        axis = int(np.argmax(np.abs(ends[found, 1] - ends[found, 0])))
-        first, last = ends[found, :, axis]
-        share = float((point[axis] - first) / (last - first))
-        return outline[found], np.array([1 - share, share])
-    particle = grouped.particle(name)
-    if particle is not None:
-        return np.array([particle]), np.ones(1)
-    count, cell, shares = cell_at(grouped, name)
-    return mesh.cells[count][cell], shares
-
-
 def cell_at(grouped: GroupedMesh, name: str) -> tuple[int, int, np.ndarray]:
-    """Return the cell of a named point and its corners' interpolation weights.
+    """Return the cell of a named point and its corners' interpolation weights, sum 1.
 
-    The nearest cell if a straight edge cuts off the arc that the point is on.
+    Linear in triangles, bilinear in quadrilaterals; exact at particles and along edges. The nearest cell if a straight
+    edge cuts off the arc that the point is on.
     """
     mesh, point = grouped.mesh, np.asarray(grouped.points[name], dtype=float)
     slack, found = ON_POINT * np.ptp(mesh.points, axis=0).max(), None
@@ -248,7 +220,8 @@ def cell_at(grouped: GroupedMesh, name: str) -> tuple[int, int, np.ndarray]:
                 best, found = float(shares.min()), (count, int(cell), shares)
     if found is None:
         raise ValueError(f"point: {name!r} at {in_words(point)} is outside of the mesh; move it, or correct its unit")
-    return found
+    shares = np.where(np.abs(found[2]) <= ON_POINT, 0.0, found[2])
+    return found[0], found[1], shares / shares.sum()
 
 
 def _shares(corners: np.ndarray) -> np.ndarray | None:
@@ -266,11 +239,10 @@ def _shares(corners: np.ndarray) -> np.ndarray | None:
             step = np.linalg.solve(slopes.T, -shares @ corners)
         except np.linalg.LinAlgError:
             return None
-        place = place + step
-        if np.abs(step).max() < 1e-15:
+        if not np.abs(step).max() >= 1e-15:
             break
-    (a, b), (c, d) = 1 - place, place
-    return np.array([a * b, c * b, c * d, a * d]) if np.isfinite(place).all() else None
+        place = place + step
+    return shares if np.isfinite(shares).all() else None
 
 
 def check_case(grouped: GroupedMesh, case: LoadCase) -> None:
@@ -288,18 +260,14 @@ def check_case(grouped: GroupedMesh, case: LoadCase) -> None:
         if name in grouped.points and grouped.particle(name) is None:
             raise ValueError(f"{where}, {what}: point {name!r} is no particle of the mesh; move it to one")
     for quantity in case.quantities:
-        if quantity.of in grouped.points and not _in_body(grouped.mesh, grouped.points[quantity.of]):
+        if quantity.of in grouped.points and not _in_body(grouped, quantity.of):
             raise ValueError(f"{where}, quantity {quantity.name!r}: point {quantity.of!r} is not in the body; move it")
     check_held(grouped.mesh.points, grouped.mesh.edges, supported(grouped, case)[0], where)
 
 
-def _in_body(mesh: Mesh, point: np.ndarray) -> bool:
-    """Whether a point is in a cell, or within rounding of one."""
-    small = 1e-9 * np.ptp(mesh.points, axis=0).max()
-    for corners in mesh.cells.values():
-        here = mesh.points[corners] - point
-        after = np.roll(here, -1, axis=1)
-        lengths = np.linalg.norm(after - here, axis=2)
-        if ((here[..., 0] * after[..., 1] - here[..., 1] * after[..., 0]) >= -small * lengths).all(axis=1).any():
-            return True
-    return False
+def _in_body(grouped: GroupedMesh, name: str) -> bool:
+    """Whether a named point is in a cell, or within rounding of one."""
+    try:
+        return bool(cell_at(grouped, name)[2].min() > -IN_CELL)
+    except ValueError:
+        return False

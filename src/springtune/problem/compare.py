@@ -71,10 +71,8 @@ def quantity_errors(values: Mapping[str, float], known: Mapping[str, float]) -> 
     >>> quantity_errors({"end": 1.1, "side": 0.1}, {"end": 1.0, "side": 0.0})["side"]
     nan
     """
-    return {
-        name: float(deformation_error(value, known[name])) if known.get(name) else np.nan
-        for name, value in values.items()
-    }
+    given = {name: known.get(name) or np.nan for name in values}
+    return {name: float(deformation_error(value, given[name])) for name, value in values.items()}
 
 
 @dataclass(frozen=True)
@@ -169,19 +167,17 @@ def _last_root(
     return None
 
 
-def assured(errors: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Largest error of each mesh size and all finer ones that were run, on both beams [1].
+def assured(errors: np.ndarray) -> np.ndarray:
+    """Largest error of each mesh size and all finer ones that were run [1].
 
-    An error that crosses zero by chance at one size or on one beam promises nothing: finer sizes or the other beam
-    show it. `errors`, `second` and the result have shape (n_approaches, n_sizes), finest size first. NaN at the
-    finest size, and from where a finer one failed or has no second beam.
+    An error that crosses zero by chance at one size promises nothing: finer sizes show it. `errors` and the result have
+    shape (n_approaches, n_sizes), finest size first. NaN at the finest size, and from where a finer one failed.
     """
-    errors, second = np.abs(errors), np.abs(second)
+    errors = np.abs(errors)
     found = np.full(errors.shape, np.nan)
     for i, run_on in enumerate(np.isfinite(errors)):
         for j in np.flatnonzero(run_on)[1:]:
-            finest = int(np.argmax(run_on))
-            found[i, j] = np.maximum(errors[i, finest : j + 1], second[i, finest : j + 1]).max()
+            found[i, j] = errors[i, int(np.argmax(run_on)) : j + 1].max()
     return found
 
 

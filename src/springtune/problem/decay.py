@@ -121,10 +121,8 @@ def fit_decay(times: np.ndarray | str | Path, displacements: np.ndarray | None =
         raise ValueError("displacements: are no swing that decays, over a period or more; give those of one free mode")
     period, decrement = 2 * np.pi / frequency, 2 * np.pi * decay / frequency
     if (points := period * (len(t) - 1) / t[-1]) < (1 - 1e-6) * POINTS_A_PERIOD:
-        raise ValueError(
-            f"times: have {points:.2g} points a period of {period:.3g} s, which a faster swing would give, too (an "
-            f"alias); take {POINTS_A_PERIOD:g} points a period or more"
-        )
+        faster = f"{points:.2g} points a period of {period:.3g} s, which a faster swing would give, too"
+        raise ValueError(f"times: have {faster}; take {POINTS_A_PERIOD:g} points a period or more")
     covariance = 2 * best.cost / (len(t) - 5) * np.linalg.inv(best.jac.T @ best.jac)
     slopes = np.array([[0, -period / frequency], [period, -decrement / frequency]])
     errors = np.sqrt(np.diag(slopes @ covariance @ slopes.T))

@@ -35,10 +35,8 @@ def warn_of_size(sides: Iterable[float], what: str) -> None:
     longer = max(sides)
     if not LEAST_SIDE <= longer <= MOST_SIDE:
         usual = f"more than {MOST_SIDE:g} m" if longer > MOST_SIDE else f"less than {1e6 * LEAST_SIDE:g} um"
-        _warn(
-            f"{what}: its longer side is {longer:.6g} m, {usual}; check the unit: numbers in Python are in m, a text "
-            "such as '200 mm' has its own"
-        )
+        units = "numbers in Python are in m, a text such as '200 mm' has its own"
+        _warn(f"{what}: its longer side is {longer:.6g} m, {usual}; check the unit: {units}")
 
 
 @dataclass(frozen=True)

@@ -85,10 +85,8 @@ class Material:
             raise ValueError(f"plane: {self.plane!r} is unknown; give {' or '.join(map(repr, PLANES))}")
         put(self, young_modulus=positive(self.young_modulus, "stress", "Young's modulus"))
         if not (isinstance(self.poisson_ratio, Real) and -1 < self.poisson_ratio <= 0.5):
-            raise ValueError(
-                f"Poisson's ratio of {self.name!r} is {self.poisson_ratio!r}: isotropic materials have -1 < nu <= 0.5; "
-                "give a number in that range"
-            )
+            given = f"Poisson's ratio of {self.name!r} is {self.poisson_ratio!r}"
+            raise ValueError(f"{given}: isotropic materials have -1 < nu <= 0.5; give a number in that range")
         if self.plane == "strain" and self.poisson_ratio == 0.5:
             raise ValueError(f"Poisson's ratio of {self.name!r} is {INCOMPRESSIBLE}")
 
@@ -211,9 +209,7 @@ class Rubber(Material):
     ) -> None:
         given = list(coefficients)
         if not (1 <= len(given) <= MOST_TERMS and all(isinstance(c, Real) and math.isfinite(c) for c in given)):
-            raise ValueError(
-                f"coefficients: {coefficients!r} is no law of rubber; give 1 to {MOST_TERMS} numbers in Pa"
-            )
+            raise ValueError(f"coefficients: {coefficients!r} is no law; give 1 to {MOST_TERMS} numbers in Pa")
         errors = tuple((_known_test(test), float(error)) for test, error in test_errors)
         put(self, coefficients=tuple(map(float, given)), largest=float(largest), test_errors=errors)
         put(self, young_modulus=6 * self.coefficients[0], poisson_ratio=0.5, density=density, name=name)
@@ -421,10 +417,9 @@ class AnisotropicMaterial:
         if isinstance(poisson_ratio_xy, bool) or not (
             isinstance(poisson_ratio_xy, Real) and abs(poisson_ratio_xy) < bound
         ):
-            raise ValueError(
-                f"material {name!r}: poisson_ratio_xy is {poisson_ratio_xy!r}, and its size must be below "
-                f"sqrt(young_modulus_x / young_modulus_y) = {bound:.6g}; give the ratio for a pull along the fibres"
-            )
+            given = f"material {name!r}: poisson_ratio_xy is {poisson_ratio_xy!r}, and its size must be below"
+            root = f"sqrt(young_modulus_x / young_modulus_y) = {bound:.6g}"
+            raise ValueError(f"{given} {root}; give the ratio for a pull along the fibres")
         nu = float(poisson_ratio_xy)
         if across_the_plane is not None:
             along, across, nu = _strained(along, across, nu, across_the_plane, name)
@@ -549,9 +544,8 @@ class AnisotropicMaterial:
         """
         import numpy as np  # here: making a material needs none
 
-        return np.array(
-            [[self.C11, self.C12, self.C16], [self.C12, self.C22, self.C26], [self.C16, self.C26, self.C66]]
-        )
+        upper = [self.C11, self.C12, self.C16, self.C22, self.C26, self.C66]
+        return np.array(upper)[[[0, 1, 2], [1, 3, 4], [2, 4, 5]]]
 
     def rotated(self, angle: Number) -> AnisotropicMaterial:
         """Return the material, turned counter-clockwise in the sheet.
@@ -658,10 +652,8 @@ def _strained(
     left_x, left_y = 1 - by_x**2 * modulus / along, 1 - by_y**2 * modulus / across
     coupled = nu / along + by_x * by_y * modulus / (along * across)
     if not (left_x > 0 and left_y > 0 and coupled**2 * along * across < left_x * left_y):
-        raise ValueError(
-            f"material {name!r}: across_the_plane is {third!r}, and with the other constants some strain takes no "
-            "work; give smaller Poisson's ratios"
-        )
+        why = f"across_the_plane is {third!r}: some strain takes no work"
+        raise ValueError(f"material {name!r}: {why}; give smaller ratios")
     return along / left_x, across / left_y, coupled * along / left_x
 
 
@@ -688,10 +680,8 @@ def indefinite(c11: float, c22: float, c12: float, c66: float, c16: float = 0.0,
         ratio = c12 / bound
         least = (a * a - 2 * ratio * a * b + b * b) / ((1 - ratio) * (1 + ratio))
     if not c66 > least:
-        return (
-            f"C66 is {c66:.6g} Pa, and with these C16 and C26 it must be above {least:.6g} Pa, {why} it, or the other "
-            "two"
-        )
+        others = f"with these C16 and C26 it must be above {least:.6g} Pa"
+        return f"C66 is {c66:.6g} Pa, and {others}, {why} it, or the other two"
     return ""
 
 
@@ -714,16 +704,15 @@ def of_parts(given: Mapping[str, AnyMaterial], parts: Sequence[str]) -> dict[str
     >>> of_parts({"": steel}, ["core", "rim"])
     Traceback (most recent call last):
     ...
-    ValueError: material: one is given, and the body has the parts 'core', 'rim'; name those of other materials, such \
-as {'': ..., 'core': ...}; a study has them under 'parts', in Python `study.materials_of(shape, material)`
+    ValueError: material: one is given, and the body has the parts 'core', 'rim'; name those of others, such \
+as {'': ..., 'core': ...}, as `study.materials_of` does
     """
     names = ", ".join(map(repr, parts))
     if len(parts) > 1 and not any(given):
         example = next(filter(None, parts))
         raise ValueError(
-            f"material: one is given, and the body has the parts {names}; name those of other materials, such as "
-            f"{{'': ..., {example!r}: ...}}; a study has them under 'parts', in Python "
-            "`study.materials_of(shape, material)`"
+            f"material: one is given, and the body has the parts {names}; name those of others, such as "
+            f"{{'': ..., {example!r}: ...}}, as `study.materials_of` does"
         )
     found = {part: given.get(part, given.get("")) for part in parts}
     for part, one in found.items():
@@ -741,13 +730,10 @@ def only_isotropic(material: AnyMaterial, remedy: str) -> Material:
     >>> only_isotropic(AnisotropicMaterial(9e9, 4e9, 1.5e9, 2e9, name="board"), "take another")
     Traceback (most recent call last):
     ...
-    ValueError: material: 'board' is anisotropic, and beams are of isotropic ones, as their references; take another
+    ValueError: material: 'board' is anisotropic, and beams are of isotropic ones; take another
     """
     if not isinstance(material, Material):
-        raise ValueError(
-            f"material: {material.name!r} is anisotropic, and beams are of isotropic ones, as their references; "
-            f"{remedy}"
-        )
+        raise ValueError(f"material: {material.name!r} is anisotropic, and beams are of isotropic ones; {remedy}")
     return material
 
 

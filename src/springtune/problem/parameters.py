@@ -19,12 +19,6 @@ OF_BODIES = {
 }
 """Variable of a dataset that holds a parameter of beams or materials."""
 
-STATED = {"force": "force", **OF_BODIES}
-"""Variable that holds a parameter where it is not swept; of a force its size, since the load says the direction."""
-
-UNCHANGED = {"stiffness_scale": 1.0}
-"""Values of parameters that are not swept and have no variable."""
-
 MOST_SCENES = 1_000_000
 """Most scenes of a study, those that grids share counted in each, unless `MOST_SCENES_VARIABLE` says more."""
 

@@ -74,11 +74,9 @@ class TensileTest:
         wrong = told & ((stress > 0) != (stretch > 1))
         if wrong.any():
             place = int(np.argmax(wrong))
-            raise TestDataError(
-                f"{self.name}: a stretch of {stretch[place]:g} with a stress of {stress[place]:g} Pa: tension is "
-                "positive, above a stretch of 1; give nominal stress over stretch (1 plus strain), or name the column "
-                "'strain'"
-            )
+            found = f"a stretch of {stretch[place]:g} with a stress of {stress[place]:g} Pa: tension is positive"
+            remedy = "give nominal stress over stretch (1 plus strain), or name the column 'strain'"
+            raise TestDataError(f"{self.name}: {found}; {remedy}")
         if len(np.unique(stretch[told])) < 3:
             raise TestDataError(f"{self.name}: has fewer than three stretches besides 1; give more points")
         put(self, stretch=stretch[told], stress=stress[told])
@@ -97,10 +95,8 @@ class TensileTest:
             raise TestDataError(f"{where[0]}the other column is {heads[1]!r}; {TWO_COLUMNS}")
         x, y = np.array(numbers(path, rows, heads, TestDataError)).reshape(-1, 2).T[order]
         if kind == "strain" and not unit and _may_be_percent(x, y):
-            raise TestDataError(
-                f"{where[order[0]]}its values may be fractions, percent or stretches; name it 'strain [-]', "
-                "'strain [%]' or 'stretch'"
-            )
+            remedy = "name it 'strain [-]', 'strain [%]' or 'stretch'"
+            raise TestDataError(f"{where[order[0]]}may be fractions or percent; {remedy}")
         with np.errstate(over="ignore"):
             stretch, stress = scale * x + (kind == "strain"), factor * y
         for n, what, sizes, (least, most) in (
@@ -109,9 +105,8 @@ class TensileTest:
         ):
             wrong = sizes[(sizes < least) | (sizes > most)]
             if len(wrong) and rows:
-                raise TestDataError(
-                    f"{where[order[n]]}{what.format(wrong[0])} is out of range; correct the head, its unit or the value"
-                )
+                found = f"{where[order[n]]}{what.format(wrong[0])}"
+                raise TestDataError(f"{found} is out of range; correct the head, its unit or the value")
         return cls(stretch, stress, str(path))
 
 
@@ -254,11 +249,8 @@ def fit_rubber(
         raise TestDataError(f"{test.name}: fits a modulus that is not above zero; give points of small stretches, too")
     law = Rubber(found, float(f"{Rubber.excess('uniaxial', test.stretch).max():.{FIT_DIGITS}g}"), (), density, name)
     _check(law, test.name)
-    data = {"uniaxial": test} | {
-        kind: told(other)
-        for kind, other in (("equibiaxial", equibiaxial), ("pure shear", pure_shear))
-        if other is not None
-    }
+    others = {"equibiaxial": equibiaxial, "pure shear": pure_shear}
+    data = {"uniaxial": test} | {kind: told(other) for kind, other in others.items() if other is not None}
     errors = tuple((kind, relative_error(law.stress(kind, one.stretch), one)) for kind, one in data.items())
     return replace(law, test_errors=errors)
 
@@ -270,7 +262,5 @@ def _check(law: Rubber, name: str) -> None:
         q = q[law.excess(test, q) <= law.largest]
         falls = np.flatnonzero(np.diff(q * law.stress(test, q)) <= 0)
         if len(falls):
-            raise TestDataError(
-                f"{name}: the fit of {len(law.coefficients)} terms is unstable: its stress falls in {test} at a "
-                f"stretch of {q[falls[0]]:.3g}; give fewer terms, or more data"
-            )
+            fit = f"the fit of {len(law.coefficients)} terms is unstable in {test} at a stretch of {q[falls[0]]:.3g}"
+            raise TestDataError(f"{name}: {fit}; give fewer terms, or more data")

@@ -149,10 +149,7 @@ class Hole:
         _round(self.outline, what)
         groups = [segment.group for segment in self.outline if segment.group]
         if self.part and groups:
-            raise ValueError(
-                f"{what}: a side has the group {groups[0]!r}, but is inside the body, and groups are of its outline; "
-                "leave the group out"
-            )
+            raise ValueError(f"{what}: a side has the group {groups[0]!r}, but is inside the body; leave the group out")
 
     @classmethod
     def circle(cls, centre: Place, radius: Number, group: str | None = None, part: str = "") -> "Hole":
@@ -461,10 +458,9 @@ class LoadCase:
             if twice:
                 raise ValueError(f"{what}: supports hold {twice[0]!r} along {axis} twice; remove one of them")
         moved = any(support.x or support.y for support in self.supports)
-        if not (self.tractions or self.pressures or any(gravity) or moved):
-            raise ValueError(
-                f"{what}: does nothing; give tractions, pressures, gravity, or a support with a displacement"
-            )
+        if not (moved or self.tractions or self.pressures or any(gravity)):
+            remedy = "give forces, or a support such as {end: {x: 1 mm}}"
+            raise ValueError(f"{what}: neither moves nor pulls the body; {remedy}")
         names = [one.name for one in self.quantities]
         twice = [name for name in names if names.count(name) > 1]
         if twice:
@@ -515,14 +511,11 @@ class LoadCase:
             there = nearest(name, known) if known else "there are none; name some"
             raise ValueError(f"{where}, {what}: no group is named {name!r}; {there}")
         for one in self.quantities:
-            held = [
-                support.group for support in self.supports if getattr(support, one.component[:1] or "x") is not None
-            ]
+            axis = one.component[:1] or "x"
+            held = [support.group for support in self.supports if getattr(support, axis) is not None]
             if one.kind == "reaction" and one.of not in held:
-                raise ValueError(
-                    f"load {self.name!r}, quantity {one.name!r}: no support holds {one.of!r} along {one.component}; "
-                    f"held: {', '.join(held) or 'none'}"
-                )
+                why = f"no support holds {one.of!r} along {one.component}; held: {', '.join(held) or 'none'}"
+                raise ValueError(f"{where}, quantity {one.name!r}: {why}")
 
 
 @dataclass(frozen=True)
@@ -622,7 +615,7 @@ class Shape:
         rounds = [("outline", sides)]
         rounds += [(f"hole {number}", _round(hole.outline, "hole")) for number, hole in enumerate(self.holes, start=1)]
         for what, one in rounds:
-            short = [number for number, side in enumerate(one, start=1) if side.length < ON_SIDE * size]
+            short = [number for number, side in enumerate(one, start=1) if math.dist(*extent([side])) < ON_SIDE * size]
             if short:
                 raise ValueError(f"{what}, side {short[0]}: is shorter than a millionth of the shape; leave it out")
             for before, side in zip((one[-1], *one[:-1]), one):
@@ -633,9 +626,8 @@ class Shape:
         if met:
             (first, i), (second, j), where = met
             if first == second:
-                raise ValueError(
-                    f"{rounds[first][0]}: sides {i + 1} and {j + 1} meet at {in_mm(where, 4)}; move a corner"
-                )
+                both = f"sides {i + 1} and {j + 1} meet"
+                raise ValueError(f"{rounds[first][0]}: {both} at {in_mm(where, 4)}; move a corner")
             raise ValueError(f"{rounds[second][0]} meets {rounds[first][0]} at {in_mm(where, 4)}; keep them apart")
         for what, one in rounds[1:]:
             if not winds_about(sides, one[0].start):

@@ -10,6 +10,7 @@ share it.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +18,30 @@ import numpy as np
 from ..problem.geometry import Beam
 from ..problem.loads import LoadKind
 from ..problem.materials import Material
+
+
+@dataclass(frozen=True)
+class BeamField:
+    """Displacements of a beam that a reference finds.
+
+    - `displacement`: Displacement of the load, see `springtune.problem.loads` [m].
+    - `mean_displacement`: Mean displacement of the loaded side along the force [m].
+    - `error_estimate`: Bound on the relative error of `displacement` [1].
+    - `x`, `y` (n_x,) and (n_y,): Grid of the field at rest [m], denser near the outline.
+    - `displacements` (n_x, n_y, 2): Displacements on the grid [m].
+    """
+
+    displacement: float
+    mean_displacement: float
+    error_estimate: float
+    x: np.ndarray
+    y: np.ndarray
+    displacements: np.ndarray
+
+    def at(self, points: np.ndarray) -> np.ndarray:
+        """Return displacements [m] at rest points (n, 2) [m] of the beam, see `interpolate`."""
+        return interpolate(self.x, self.y, self.displacements, points)
+
 
 MOST_EFFECT = 0.01
 """Largest effect of finite rotation on a displacement, relative, with which a reference of small strain applies."""
@@ -110,7 +135,7 @@ def objection(result: dict[str, Any], force: float, kinematics: str) -> str:
 
 
 if TYPE_CHECKING:
-    from ..mesh import Mesh
+    from ..mesh.cells import Mesh
 
 
 def interpolate(x: np.ndarray, y: np.ndarray, displacements: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -134,9 +159,8 @@ def outline(x: np.ndarray, y: np.ndarray, displacements: np.ndarray) -> tuple[np
 
 def field_error(mesh: "Mesh", displacements: np.ndarray, reference: np.ndarray) -> float:
     """Return the L2 difference of displacement fields (n_points, 2) over the norm of the reference's [1]."""
-    difference, size = (
-        mesh.particle_areas @ (field**2).sum(axis=1) for field in (displacements - reference, reference)
-    )
+    fields = displacements - reference, reference
+    difference, size = (mesh.particle_areas @ (field**2).sum(axis=1) for field in fields)
     return float(np.sqrt(difference / size))
 
 

@@ -167,13 +167,8 @@ class CoarseMesh:
             rows = np.flatnonzero(among.sum(axis=1) > 1)
             if not len(rows):
                 return
-            found = {
-                tuple(sorted(pair))
-                for row in rows
-                for pair in combinations((int(corner) for corner in self.triangles[row][among[row]]), 2)
-            }
-            first, second = min(found)
-            self.bisect(first, second)
+            several = [sorted(self.triangles[row][among[row]].tolist()) for row in rows]
+            self.bisect(*min(pair for corners in several for pair in combinations(corners, 2)))
 
     def grade(self, corners: Iterable[int]) -> None:
         """Cut the triangles at corners, of which no triangle has two, once."""
@@ -259,11 +254,8 @@ def _refined(pieces: list[_Piece], extent: float, largest_turn: float) -> list[_
             apart = np.linalg.norm(samples[near][:, :, None] - at[None, None], axis=3).min(axis=(1, 2))
             clear = apart > SMALLEST * extent
             nearest = apart[clear].min(initial=np.inf)
-            limit = min(
-                extent / FEWEST_ALONG,
-                ELEMENT_GROWTH * nearest,
-                (2 * lengths[near][clear] + apart[clear]).min(initial=np.inf),
-            )
+            others = (2 * lengths[near][clear] + apart[clear]).min(initial=np.inf)
+            limit = min(extent / FEWEST_ALONG, ELEMENT_GROWTH * nearest, others)
             if length > 1.01 * limit or piece.turn > 1.01 * largest_turn or sagitta > LARGEST_SAGITTA * nearest:
                 refined += piece.halves()
             else:

@@ -108,10 +108,8 @@ class _FiniteLevel(Level, Body):
     def __init__(self, problem: Problem, degree: int, levels: _Levels) -> None:
         self.levels, self.kept_degree = levels, levels.kept
         if levels.kept:
-            self.note = (
-                f"triangles at corners keep degree {levels.kept}, as finer ones have no stable equilibrium there; the "
-                "error estimate counts that"
-            )
+            why = "as finer ones have no stable equilibrium there; the error estimate counts that"
+            self.note = f"triangles at corners keep degree {levels.kept}, {why}"
         super().__init__(problem, degree)
 
     def _matrices(self) -> np.ndarray:
@@ -157,11 +155,10 @@ class _FiniteLevel(Level, Body):
         growth = np.linalg.det(last._gradient(last.field) + np.eye(2)).min(axis=1)
         most = int(growth.argmin())
         x, y = 1e3 * last.space.mesh.points[last.space.corners[most]].mean(axis=0)
-        return (
-            f" on triangles of degree {self.space.degree}; those of degree {last.space.degree} carry it all, and are "
-            f"pressed to {growth[most]:.2f} of their area near ({x:.4g}, {y:.4g}) mm: the law gives way there as "
-            "triangles get finer, and the answer need not have a limit. Round that corner, hold it less or load it less"
-        )
+        degrees = f"on triangles of degree {self.space.degree}; those of degree {last.space.degree} carry it all"
+        pressed = f"and are pressed to {growth[most]:.2f} of their area near ({x:.4g}, {y:.4g}) mm"
+        why = "the law gives way there as triangles get finer, and the answer need not have a limit"
+        return f" {degrees}, {pressed}: {why}. Round that corner, hold it less or load it less"
 
     def _laws(self, parts: np.ndarray) -> _PartLaws:
         return _PartLaws(np.array(self.space.mesh.names)[parts], self.levels.laws)

@@ -21,6 +21,7 @@ from functools import cached_property
 from typing import Protocol
 
 import numpy as np
+from scipy.interpolate import krogh_interpolate
 from scipy.sparse import csc_array, csr_array
 from skfem import Basis, ElementQuad2, FacetBasis, MeshQuad
 
@@ -28,7 +29,7 @@ from ..linalg.factors import SingularError, SuperLUFactor
 from ..problem.geometry import Beam
 from ..problem.loads import BOTTOM, FACE, LEFT, LoadKind
 from ..problem.materials import Material, Rubber
-from .answers import interpolate
+from .answers import BeamField
 from .small_strain import ReferenceNotConvergedError
 
 COUNTS = (5, 8)
@@ -62,31 +63,17 @@ class FiniteStrainError(ReferenceNotConvergedError):
 
 
 @dataclass(frozen=True)
-class FiniteStrainSolution:
+class FiniteStrainSolution(BeamField):
     """Displacements of a beam at finite strain.
 
-    - `displacement`: Displacement of the load, see `springtune.problem.loads` [m].
-    - `mean_displacement`: Mean displacement of the loaded side along the force [m].
     - `error_estimate`: Relative difference to the coarser mesh, several times the error, plus the errors of
       Newton's method and rounding. Under pressure twice the larger one of the middle and the mean.
     - `positions`, `profile` (n,): Places on the loaded side over its length [1], ascending, and displacements there
       along the force [m].
-    - `x`, `y` (n_x,) and (n_y,): Grid of the field at rest [m], denser near the corners.
-    - `displacements` (n_x, n_y, 2): Displacements on the grid [m].
     """
 
-    displacement: float
-    mean_displacement: float
-    error_estimate: float
     positions: np.ndarray
     profile: np.ndarray
-    x: np.ndarray
-    y: np.ndarray
-    displacements: np.ndarray
-
-    def at(self, points: np.ndarray) -> np.ndarray:
-        """Return displacements [m] at rest points (n, 2) [m], see `springtune.reference.answers.interpolate`."""
-        return interpolate(self.x, self.y, self.displacements, points)
 
 
 def solve_finite_strain(
@@ -330,7 +317,7 @@ class _Sheet(Body):
         positions = places / places[-1]
         profile = field.take(-1 if kind.loaded.far else 0, axis=kind.normal)[:, kind.axis]
         displacement = float(np.interp(0.5, positions, profile)) if kind.pressed else mean
-        return FiniteStrainSolution(displacement, mean, uncertain, positions, profile, x, y, field)
+        return FiniteStrainSolution(displacement, mean, uncertain, x, y, field, positions, profile)
 
     def _field(self, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Coordinates of a grid over the whole sheet, from 0 on, and displacements there: nodes are those of a grid."""
@@ -408,11 +395,8 @@ def _spread(near: np.ndarray, length: float, count: int, most: int | None = None
 
 def _extrapolated(path: list[tuple[float, np.ndarray]], share: float) -> np.ndarray:
     """Displacements at a share of the load, by the polynomial through those before."""
-    total = np.zeros(path[0][1].shape)
-    for i, (at, moved) in enumerate(path):
-        factors = [(share - other) / (at - other) for j, (other, _) in enumerate(path) if j != i]
-        total = total + np.prod(factors) * moved
-    return total
+    shares, moved = zip(*path)
+    return np.asarray(krogh_interpolate(shares, np.array(moved), share))
 
 
 _Derivatives = tuple[Sequence[np.ndarray], Sequence[np.ndarray]]

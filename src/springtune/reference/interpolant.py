@@ -106,14 +106,9 @@ class Interpolant:
         `aspect_range` and `nu_range` (-1 < nu <= 0.5) are first and last values [1], equal for a function of the
         other alone; `tolerance` is the largest accepted relative error estimate [1].
         """
-        (first, last), (least, largest) = aspect_range, nu_range
-        if not 0 < first <= last < np.inf:
-            raise ValueError(f"a range of aspect ratios is 0 < first <= last, not {first:g} to {last:g}")
-        if not -1 < least <= largest <= 0.5:
-            raise ValueError(f"a range of Poisson's ratios is -1 < first <= last <= 0.5, not {least:g} to {largest:g}")
-        box = _Box(kind, (float(first), float(last)), (float(least), float(largest)), tolerance, most, solve)
+        box = _Box(kind, aspect_range, nu_range, tolerance, most, solve)
         values, error_estimate = box.certified()
-        return cls(kind, box.aspect_range, box.nu_range, values, error_estimate, len(box.solved))
+        return cls(kind, aspect_range, nu_range, values, error_estimate, len(box.solved))
 
     def evaluate(self, aspect_ratio: ArrayLike, nu: ArrayLike) -> Answers:
         """Return the answers at aspect ratios and Poisson's ratios [1], broadcast against each other."""
@@ -121,15 +116,11 @@ class Interpolant:
         places = _place(np.log(aspects), np.log(self.aspect_range)), _place(nus, self.nu_range)
         outside = ~np.all([np.abs(place) <= 1 + ROUNDING for place in places], axis=0)
         if outside.any():
-            aspect, ratio = aspects[outside].flat[0], nus[outside].flat[0]
-            raise ValueError(
-                f"aspect ratio {aspect:.6g} with nu = {ratio:.6g} is outside the interpolant of '{self.kind}', which "
-                f"knows {' to '.join(f'{end:.6g}' for end in self.aspect_range)} with nu = "
-                f"{' to '.join(f'{end:.6g}' for end in self.nu_range)}; build one over what is asked, or solve it"
-            )
-        along, across = (
-            lagrange_values(np.clip(place.ravel(), -1, 1), count) for place, count in zip(places, self.values.shape[1:])
-        )
+            asked = f"aspect ratio {aspects[outside].flat[0]:.6g} with nu = {nus[outside].flat[0]:.6g}"
+            known = f"aspect ratios {_ends(self.aspect_range)} and nu = {_ends(self.nu_range)}"
+            raise ValueError(f"{asked} is outside the interpolant of '{self.kind}' over {known}; solve it")
+        at = [np.clip(place.ravel(), -1, 1) for place in places]
+        along, across = map(lagrange_values, at, self.values.shape[1:])
         found = np.einsum("pa,qan,pn->qp", along, self.values, across, optimize=True).reshape(4, *aspects.shape)
         strain = np.exp(found[3])
         return Answers(np.exp(found[0]), np.exp(found[1]), np.expm1(found[2]) * strain, strain, self.error_estimate)
@@ -217,7 +208,7 @@ class _Box:
             return estimate
         solved, of_checks = self._solve(checks)
         places = np.array(checks).T
-        along, across = (lagrange_values(place, count) for place, count in zip(places, values.shape[1:]))
+        along, across = map(lagrange_values, places, values.shape[1:])
         differences = np.abs(np.einsum("pa,qan,pn->qp", along, values, across) - _well_behaved(solved)).max(axis=1)
         if not differences[2:].max() <= JUDGED_WITHIN:
             raise self._failure(f"rotation and strain differ by {differences[2:].max():.1e} from those of solves")
@@ -225,9 +216,12 @@ class _Box:
         return float(SAFETY * differences[:2].max() + max(estimate, of_checks))
 
     def _failure(self, why: str) -> NotCertifiedError:
-        box = [" to ".join(f"{end:.6g}" for end in ends) for ends in (self.aspect_range, self.nu_range)]
-        over = f"over aspect ratios {box[0]} and nu = {box[1]}"
+        over = f"over aspect ratios {_ends(self.aspect_range)} and nu = {_ends(self.nu_range)}"
         return NotCertifiedError(f"no interpolant of '{self.kind}' {over} within {self.tolerance:.1e}: {why}")
+
+
+def _ends(ends: tuple[float, float]) -> str:
+    return " to ".join(f"{end:.6g}" for end in ends)
 
 
 def _well_behaved(answers: np.ndarray) -> np.ndarray:

@@ -15,7 +15,7 @@ from scipy.sparse import coo_array
 from ..linalg.factors import SingularError, factorize
 from ..mesh.cells import MeshError, signed_areas
 from ..mesh.groups import GroupedMesh
-from ..mesh.sheets import check_held
+from ..mesh.sheets import check_held, in_words
 from ..problem.materials import AnyMaterial
 from ..problem.shapes import LoadCase, Quantity, Shape
 from .answers import most_rotation_and_strain
@@ -88,14 +88,12 @@ class ShapeReference:
 
     def stress_at(self, points: np.ndarray) -> np.ndarray:
         """Return stresses xx, yy and xy [Pa], shape (n, 3), at points of the body, see `at`."""
-        return self._factor * self._level.stresses(points)
+        return self._factor * self._level.at(points, self._level._stresses)
 
     def scaled(self, factor: float) -> "ShapeReference":
         """The solution under so many times the load, prescribed displacements included: small strain is linear."""
-        values = {
-            name: value * (factor**2 if self._kinds[name] == "energy" else factor)
-            for name, value in self.values.items()
-        }
+        by = {name: factor**2 if self._kinds[name] == "energy" else factor for name in self.values}
+        values = {name: value * by[name] for name, value in self.values.items()}
         return replace(
             self,
             values=values,
@@ -160,26 +158,21 @@ def solve_shape(
             why = unmet(estimates[name], accepted, before, last)
             if why and not complaint:
                 shown = repr(name) if name else "the energy"
-                complaint = (
-                    f"{shown}{problem.place(name)}: relative error estimate {estimates[name]:.1e} at degree {degree} "
-                    f"({level.unknowns} unknowns), {why}{problem.reason(name)}"
-                )
+                at = f"{estimates[name]:.1e} at degree {degree} ({level.unknowns} unknowns)"
+                complaint = f"{shown}{problem.place(name)}: relative error estimate {at}, {why}{problem.reason(name)}"
         if not complaint:
             rotation, strain = level.rotation_and_strain()
+            found = {name: values[-1][name] for name in names}
+            least = {name: SMALLEST_SHARE * level.scale(problem.kinds[name]) for name in names}
             return ShapeReference(
-                {
-                    name: values[-1][name] if abs(values[-1][name]) > TOLD_FROM_ZERO * bounds[name] else 0.0
-                    for name in names
-                },
+                {name: one if abs(one) > TOLD_FROM_ZERO * bounds[name] else 0.0 for name, one in found.items()},
                 {name: estimates[name] for name in names},
                 energy=values[-1][""],
                 rotation=rotation,
                 strain=strain,
                 unknowns=level.unknowns,
                 note=level.note,
-                negligible=tuple(
-                    name for name in names if abs(values[-1][name]) < SMALLEST_SHARE * level.scale(problem.kinds[name])
-                ),
+                negligible=tuple(name for name, one in found.items() if abs(one) < least[name]),
                 _level=level,
                 _kinds=problem.kinds,
             )
@@ -249,9 +242,7 @@ class Problem:
             self.points |= {name: np.array(point, dtype=float) for name, point in grouped.points.items()}
         elif not shape.outline:
             raise ValueError(f"shape {shape.name!r} has no outline; give the mesh of its file")
-        used = {*(support.group for support in load.supports), *(traction.group for traction in load.tractions)} & set(
-            self.points
-        )
+        used = ({one.group for one in load.supports} | {one.group for one in load.tractions}) & set(self.points)
         # Small triangles where something is asked for: values at points are the last to converge.
         probed = {quantity.of for quantity in load.quantities} & set(self.points)
         corners = {name: tuple(self.points[name]) for name in sorted(used | probed)}
@@ -271,10 +262,8 @@ class Problem:
         load = self.load
         present = [self.mesh.names[part] for part in np.unique(self.mesh.parts)]
         if missing := [name for name in present if name not in materials]:
-            raise ValueError(
-                f"parts without a material: {', '.join(repr(name) for name in missing)}; there are materials of "
-                f"{', '.join(repr(name) for name in materials)}"
-            )
+            lacking, given = (", ".join(map(repr, names)) for names in (missing, materials))
+            raise ValueError(f"parts without a material: {lacking}; there are materials of {given}")
         absent = np.zeros((3, 3))
         planes = {name: one.in_plane.plane_stress for name, one in materials.items()}
         self.stiffness = np.array([planes[n] if n in present else absent for n in self.mesh.names])
@@ -312,7 +301,7 @@ class Problem:
             return bool(flat[1] and x is None and y is not None or flat[0] and y is None and x is not None)
 
         self.corners = corners_of(
-            self.mesh, condition, lambda side: any(group in supported for group in side.groups), mirror
+            self.mesh, condition, lambda side: not supported.keys().isdisjoint(side.groups), mirror
         )
         at_points = {t.group for t in load.tractions if t.group in self.points and any(t.force)}
         rough = {point for point, corner in self.corners.items() if corner.rough}
@@ -338,30 +327,23 @@ class Problem:
             remedy = "ask for it beside the corner"
             if not self.shape.outline:
                 remedy += ", or give the shape as an outline with arcs rather than as a mesh"
-            raise ValueError(
-                f"quantity {name!r}: the stress at {of!r} is infinite in a continuum, since {corner.what} there: "
-                f"{remedy}"
-            )
+            why = f"the stress at {of!r} is infinite in a continuum, since {corner.what} there"
+            raise ValueError(f"quantity {name!r}: {why}: {remedy}")
         if kind == "stress":
             beside = self.mesh.parts[(self.mesh.triangles == self.mesh.named[of]).any(axis=1)]
             if len(set(beside.tolist())) > 1:
-                raise ValueError(
-                    f"quantity {name!r}: {of!r} is where parts of different materials meet, and the stress has a jump "
-                    "there: ask for it on one side"
-                )
+                why = f"{of!r} is where parts of different materials meet, and the stress has a jump there"
+                raise ValueError(f"quantity {name!r}: {why}: ask for it on one side")
         infinite = {"displacement": "the displacement", "stress": "the stress"}.get(kind)
         if infinite:
             for point in self.loaded_points if of in self.points else ():
                 if np.allclose(self.points[point], self.points[of], rtol=0, atol=1e-9 * np.ptp(self.mesh.points)):
-                    raise ValueError(
-                        f"quantity {name!r}: {infinite} under a point force is infinite in a continuum: spread the "
-                        f"force on {point!r} over a side"
-                    )
+                    why = f"{infinite} under a point force is infinite in a continuum"
+                    raise ValueError(f"quantity {name!r}: {why}: spread the force on {point!r} over a side")
         if kind == "energy" and self.infinite_energy:
-            raise ValueError(
-                f"quantity {name!r}: the energy of a point force is infinite in a continuum: spread the force on "
-                f"{', '.join(sorted(self.loaded_points))} over a side"
-            )
+            why = "the energy of a point force is infinite in a continuum"
+            points = ", ".join(sorted(self.loaded_points))
+            raise ValueError(f"quantity {name!r}: {why}: spread the force on {points} over a side")
 
     def look_at_reactions(self, level: "Level") -> None:
         """Note point supports that carry a force: a continuum's displacements and energy are infinite there."""
@@ -556,11 +538,8 @@ class Level:
 
     def group_sides(self, group: str) -> list[tuple[tuple[int, int], float]]:
         """Sides of a group, and 1 where the body is to the left of them from the lower number, else -1."""
-        return [
-            (ends, 1.0 if self.outlines[ends][0][1] else -1.0)
-            for ends, side in self.space.mesh.sides.items()
-            if group in side.groups
-        ]
+        found = [ends for ends, side in self.space.mesh.sides.items() if group in side.groups]
+        return [(ends, 1.0 if self.outlines[ends][0][1] else -1.0) for ends in found]
 
     def integral(self, group: str, given: Field) -> np.ndarray:
         """Integral over a group of the functions times vectors."""
@@ -568,9 +547,8 @@ class Level:
         for ends, sense in self.group_sides(group):
             values, points, normals, weights = self.space.side_points(ends, sense, self.space.degree + 3)
             lengths = np.linalg.norm(normals, axis=1)
-            total[self.space.on_side(ends)] += values.T @ (
-                given(points, normals / lengths[:, None]) * (weights * lengths)[:, None]
-            )
+            vectors = given(points, normals / lengths[:, None])
+            total[self.space.on_side(ends)] += values.T @ (vectors * (weights * lengths)[:, None])
         return total
 
     def _shares(self, group: str) -> np.ndarray:
@@ -616,12 +594,10 @@ class Level:
                     corners = np.unique(sides)
                 other = np.asarray(held[corners, axis] & (values[corners, axis] != value))
                 if other.any():
-                    where = space.mesh.points[corners[np.argmax(other)]]
-                    raise ValueError(
-                        f"load {problem.load.name!r}: supports prescribe {values[corners, axis][other][0]:g} and "
-                        f"{value:g} m along {'xy'[axis]} at ({1e3 * where[0]:.6g}, {1e3 * where[1]:.6g}) mm; the "
-                        "energy is infinite: leave a gap between them"
-                    )
+                    where = f"along {'xy'[axis]} at {in_words(space.mesh.points[corners[np.argmax(other)]])}"
+                    both = f"supports prescribe {values[corners, axis][other][0]:g} and {value:g} m {where}"
+                    why = "the energy is infinite: leave a gap between them"
+                    raise ValueError(f"load {problem.load.name!r}: {both}; {why}")
                 held[functions, axis], values[corners, axis] = True, value
         where = f"load {problem.load.name!r} of shape {problem.shape.name!r}"
         check_held(space.mesh.points, space.edges, held[: len(space.mesh.points)], where)
@@ -791,13 +767,9 @@ class Level:
 
     def displacements(self, points: np.ndarray) -> np.ndarray:
         """Displacements at points [m], shape (n, 2)."""
-        return self._in_chunks(points, self._displacements)
+        return self.at(points, self._displacements)
 
-    def stresses(self, points: np.ndarray) -> np.ndarray:
-        """Stresses at points [Pa], shape (n, 3)."""
-        return self._in_chunks(points, self._stresses)
-
-    def _in_chunks(self, points: np.ndarray, value: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> np.ndarray:
+    def at(self, points: np.ndarray, value: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> np.ndarray:
         """Values at points, some thousand at a time: what locates them takes memory."""
         points = np.asarray(points, dtype=float)
         chunks = np.array_split(points, max(1, len(points) // 4000))

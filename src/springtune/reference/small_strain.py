@@ -30,7 +30,7 @@ from ..linalg.factors import factorize
 from ..problem.geometry import Beam
 from ..problem.loads import AXIAL, BOTTOM, LEFT, RIGHT, TOP, LoadKind
 from ..problem.materials import Material
-from .answers import interpolate, rotation_and_strain, unit_problem, unit_scales
+from .answers import BeamField, rotation_and_strain, unit_problem, unit_scales
 
 #: First and last level tried. Level p has polynomials of degree p and p layers of elements at a corner.
 FIRST_LEVEL, LAST_LEVEL = 3, 9
@@ -69,29 +69,21 @@ FIELD_POINTS = 3000
 _Values = tuple[np.ndarray, tuple[np.ndarray, ...], np.ndarray, np.ndarray]
 
 
+FOR_BEAM_THEORY = "such slender shapes are for beam theory"
+
+
 class ReferenceNotConvergedError(RuntimeError):
     """The error estimate of a reference stays above its tolerance."""
 
 
 @dataclass(frozen=True)
-class ReferenceSolution:
-    """Converged displacements of a beam.
+class ReferenceSolution(BeamField):
+    """Converged displacements of a beam at small strain.
 
-    - `displacement`: Mean displacement of the loaded side along the force [m]; of a pressed side, its middle's.
-    - `mean_displacement`: Mean displacement of the loaded side along the force [m].
-    - `error_estimate`: Bound on the relative error of `displacement` [1].
-    - `x`, `y` (n_x,) and (n_y,): Grid of the field [m], denser near the outline.
-    - `displacements` (n_x, n_y, 2): Displacements on the grid [m].
     - `rotation`, `strain`: Rotation [rad] and strain [1] that limit its use, see `springtune.reference.answers`.
     - `unknowns`: Unknowns of the finest level, for the solved half.
     """
 
-    displacement: float
-    mean_displacement: float
-    error_estimate: float
-    x: np.ndarray
-    y: np.ndarray
-    displacements: np.ndarray
     rotation: float
     strain: float
     unknowns: int
@@ -101,10 +93,6 @@ class ReferenceSolution:
         names = {"displacement": factor, "mean_displacement": factor, "displacements": factor, "x": length, "y": length}
         names |= {"rotation": abs(factor) / length, "strain": abs(factor) / length}
         return replace(self, **{name: getattr(self, name) * by for name, by in names.items()})
-
-    def at(self, points: np.ndarray) -> np.ndarray:
-        """Return displacements [m] at points (n, 2) [m] of the beam, see `springtune.reference.answers.interpolate`."""
-        return interpolate(self.x, self.y, self.displacements, points)
 
 
 def solve_small_strain(
@@ -169,17 +157,13 @@ def _converge(aspect_ratio: float, nu: float, kind: LoadKind, tolerance: float) 
     for degree in range(FIRST_LEVEL, LAST_LEVEL + 1):
         where = f"{kind} reference, {aspect_ratio:.6g} times as long as high, nu = {nu:g}: relative"
         if slenderness > (most := _most_slender(nu, degree)) * (1 + 1e-9):  # the ratio is rounded
-            raise ReferenceNotConvergedError(
-                f"{where} rounding error is unknown at level {degree} if a body that bends has sides of more than "
-                f"{most:.0f} : 1; such slender shapes are for beam theory"
-            )
+            why = f"is unknown at level {degree} if a body that bends has sides of more than {most:.0f} : 1"
+            raise ReferenceNotConvergedError(f"{where} rounding error {why}; {FOR_BEAM_THEORY}")
         level = UnitLevel(2 * aspect_ratio, nu, degree, kind)  # in half heights
         at = f"at level {degree} ({level.unknowns} unknowns)"
         if not level.round_off <= tolerance:
-            raise ReferenceNotConvergedError(
-                f"{where} rounding error {level.round_off:.1e} {at}, the tolerance is {tolerance:.1e}; such slender "
-                "shapes are for beam theory"
-            )
+            missed = f"rounding error {level.round_off:.1e} {at}, the tolerance is {tolerance:.1e}"
+            raise ReferenceNotConvergedError(f"{where} {missed}; {FOR_BEAM_THEORY}")
         values.append(level.displacement)
         middle, middle_before = level.measured, middle
         if len(values) < 3:
@@ -189,9 +173,8 @@ def _converge(aspect_ratio: float, nu: float, kind: LoadKind, tolerance: float) 
         estimate = float(max(last, abs(middle - middle_before) / middle) + level.round_off + SHARED)
         if estimate <= tolerance and (last <= before / 2 or before <= level.round_off):
             return level, estimate
-    raise ReferenceNotConvergedError(
-        f"{where} error estimate {estimate:.1e} {at}, the last one, the tolerance is {tolerance:.1e}"
-    )
+    missed = f"error estimate {estimate:.1e} {at}, the last one"
+    raise ReferenceNotConvergedError(f"{where} {missed}, the tolerance is {tolerance:.1e}")
 
 
 def _bent(aspect_ratio: float, kind: LoadKind) -> float:

@@ -132,10 +132,8 @@ def numbers(
         found.append([number_of(text) for text in row])
         for name, text, number in zip(names, row, found[-1]):
             if name and not math.isfinite(number):
-                raise refuse(
-                    f"'{path}', line {line}, column {name!r}: {text.strip()!r} is no finite number; correct the line, "
-                    "or remove it"
-                )
+                why = f"{text.strip()!r} is no finite number; correct the line, or remove it"
+                raise refuse(f"'{path}', line {line}, column {name!r}: {why}")
     return found
 
 
@@ -236,43 +234,38 @@ def check_alone(path: str | Path, look: "Callable[[bytes, h5py.h5g.ObjectID], No
 
     def note(name: bytes, info: "h5py.h5l.LinkInfo") -> bool:
         found.append((name, info.type))
-        return len(found) > MOST_OBJECTS
+        return len(found) > MOST_OBJECTS or name.count(b"/") > DEEPEST_GROUP
 
     try:
         with h5py.File(path) as file:
             if file.id.get_create_plist().get_sizes() == (8, 8):
                 _check_heaps(path)
             root = file["/"].id
-            seen, groups = {h5py.h5o.get_info(root).addr}, [(b"", 0, root)]
-            while groups:
-                above, depth, group = groups.pop()
-                start = len(found)
-                group.links.iterate(note, info=True)  # what is raised within is not always passed on
-                if len(found) > MOST_OBJECTS:
-                    raise ValueError(f"it has over {MOST_OBJECTS:,} groups and arrays")
-                for link, kind in found[start:]:
-                    name = above + link
-                    if kind != h5py.h5l.TYPE_HARD:
-                        names[_text(name)] = SOFT_LINK if kind == h5py.h5l.TYPE_SOFT else "an external link"
-                        continue
-                    one = h5py.h5o.open(group, link)
-                    address = h5py.h5o.get_info(one).addr
-                    if address in seen:
-                        raise ValueError(f"{_text(name)!r} is linked twice, or in a circle")
-                    seen.add(address)
-                    if isinstance(one, h5py.h5g.GroupID):
-                        if depth == DEEPEST_GROUP:
-                            raise ValueError(f"{_text(name)[:40]!r} is more than {DEEPEST_GROUP} groups deep")
-                        groups.append((name + b"/", depth + 1, one))
-                    if isinstance(one, h5py.h5d.DatasetID):
-                        stored = one.get_create_plist()
-                        if stored.get_external_count():
-                            outside = _text(stored.get_external(0)[0])
-                            names[_text(name)] = f"stored outside of the file, in {outside!r}"
-                        if stored.get_layout() == h5py.h5d.VIRTUAL:
-                            names[_text(name)] = "a virtual dataset"
-                    if look:
-                        look(name, one)
+            root.links.visit(note, info=True)  # what is raised within is not always passed on
+            if len(found) > MOST_OBJECTS:
+                raise ValueError(f"it has over {MOST_OBJECTS:,} groups and arrays")
+            seen = {h5py.h5o.get_info(root).addr}
+            for name, kind in found:
+                shown = name.decode(errors="replace")
+                if kind != h5py.h5l.TYPE_HARD:
+                    names[shown] = SOFT_LINK if kind == h5py.h5l.TYPE_SOFT else "an external link"
+                    continue
+                if name.count(b"/") > DEEPEST_GROUP:
+                    raise ValueError(f"{shown[:40]!r} is more than {DEEPEST_GROUP} groups deep")
+                one = h5py.h5o.open(root, name)
+                address = h5py.h5o.get_info(one).addr
+                if address in seen:
+                    raise ValueError(f"{shown!r} is linked twice, or in a circle")
+                seen.add(address)
+                if isinstance(one, h5py.h5d.DatasetID):
+                    stored = one.get_create_plist()
+                    if stored.get_external_count():
+                        outside = stored.get_external(0)[0].decode(errors="replace")
+                        names[shown] = f"stored outside of the file, in {outside!r}"
+                    if stored.get_layout() == h5py.h5d.VIRTUAL:
+                        names[shown] = "a virtual dataset"
+                if look:
+                    look(name, one)
             if look:
                 look(b"/", root)
     except (LookupError, RuntimeError, SystemError, TypeError, ValueError) as error:
@@ -298,7 +291,3 @@ def _check_heaps(path: str | Path) -> None:
                     raise ValueError(f"the heap at byte {start} has an object of {size} bytes at byte {at}")
                 at += step
             start = data.find(HEAP, start + 1, most)
-
-
-def _text(name: bytes) -> str:
-    return name.decode(errors="replace")

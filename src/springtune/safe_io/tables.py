@@ -33,6 +33,17 @@ def number_text(number: float, unit: str) -> str:
     return f"{number:.6g}" if unit in ("", "1") else f"{number:.6g} {unit}"
 
 
+def mesh_size_text(size: float) -> str:
+    """Mesh size [m] as options take it.
+
+    Examples
+    --------
+    >>> mesh_size_text(0.00308)
+    '3.08 mm'
+    """
+    return f"{1e3 * size:.12g} mm"
+
+
 def html_table(name: str, rows: Iterable[Sequence[object]], heads: Iterable[object] = ()) -> str:
     """HTML table below a name; the first cell of each row is its head."""
     lines = ["".join(_cell("th", head) for head in heads)]

@@ -5,14 +5,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from ..mesh import Mesh
 from ..mesh.bonds import bonded
+from ..mesh.cells import Mesh
 from ..problem.compare import error_text
 from ..problem.geometry import Beam
 from ..problem.materials import ANY_MATERIAL, AnyMaterial, Material
 from ..problem.quantities import positive
 from ..safe_io.tables import Tabled
-from ..springs import DEFINITIONS, DefinitionError, Springs
+from ..springs.base import DEFINITIONS, DefinitionError, Springs
 from ..springs.best_springs import EVALUATIONS, LoadSpace
 from .meshes import A_MATERIAL, A_MESH, check_filled, is_a
 from .sheet import chosen, named

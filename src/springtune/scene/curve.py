@@ -8,13 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..mechanics.series import LinearPath, StablePath
-from ..mesh import Mesh
 from ..problem.compare import Best, best_stiffness, deformation_error, error_text
 from ..problem.loads import LoadKind
 from ..problem.status import Status
 from ..registry import hook
 from ..safe_io.tables import Tabled
-from ..springs import Springs
+from ..springs.base import Springs
 from ..springs.lattice import COEFFICIENT, predicted_stiffness, uniform
 from .sheet import Sheet
 
@@ -55,13 +54,6 @@ def ending(path: LinearPath | StablePath, force: float, stable: np.ndarray) -> s
         return ""
     reason = path.end or "not followed through its turn"
     return f"{reason}: solved from {abs(force) / path.stable_to:.6g} N/m" if path.stable_to else reason
-
-
-def face_edge(mesh: Mesh) -> float:
-    """Length of an edge on the lower and the upper side of a mesh, by their median [m]."""
-    y = mesh.points[:, 1]
-    faces = np.concatenate([mesh.outline_edges(1, value) for value in (0.0, y.max())])
-    return float(np.median(np.abs(np.diff(mesh.points[faces, 0]))))
 
 
 @dataclass(frozen=True, repr=False)
@@ -188,10 +180,7 @@ def sensitivity(scene: "Scene", stiffness_ratios: ArrayLike | None = None) -> Cu
     if not hasattr(scene, "follower"):
         raise ValueError(f"scene: {scene!r} is not a Scene; give one such as springtune.Scene(beam, mesh, ...)")
     if scene.follower:
-        raise ValueError(
-            f"load: {scene.load!r} turns with its side, and stiffness enters as force over stiffness only where forces "
-            "keep their direction; take 'pressure' or linear kinematics"
-        )
+        raise ValueError(f"load: {scene.load!r} turns with its side, and has no curve; take linear kinematics")
     try:
         ratios = np.sort(np.asarray(RATIOS if stiffness_ratios is None else stiffness_ratios, dtype=float).ravel())
     except (TypeError, ValueError, OverflowError):
@@ -206,6 +195,8 @@ def sensitivity(scene: "Scene", stiffness_ratios: ArrayLike | None = None) -> Cu
         reference, objection = scene.reference_values()["displacement"], scene.objection
     except RuntimeError as error:
         reference, objection = np.nan, f"no reference: {error}"
+    faces = np.concatenate([scene.mesh.outline_edges(1, value) for value in (0.0, scene.mesh.points[:, 1].max())])
+    edge = float(np.median(np.abs(np.diff(scene.mesh.points[faces, 0]))))
     best = meeting(path, force, stiffness, displacement, stable, reference, objection)
     return Curve(
         stiffness,
@@ -216,6 +207,6 @@ def sensitivity(scene: "Scene", stiffness_ratios: ArrayLike | None = None) -> Cu
         best.stiffness,
         best.status,
         best.message,
-        predicted_stiffness(scene.material, beam, face_edge(scene.mesh), scene.load),
+        predicted_stiffness(scene.material, beam, edge, scene.load),
         f"{beam.label}, {scene.load} of {abs(force):g} N",
     )

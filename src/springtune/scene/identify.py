@@ -7,6 +7,7 @@ residuals r and derivatives J, both over the noise and without shifts, the covar
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -189,10 +190,9 @@ class Model:
             if not stay.all():
                 where = ", ".join(f"{1e3 * one:.4g} mm" for one in np.atleast_2d(block.places[~stay])[0])
                 where = f"x, y = {where}" if block.places.ndim > 1 else f"a load of {block.places[~stay][0]:g} N"
-                notes.append(
-                    f"{block.label}: {(~stay).sum()} of {len(stay)} points are left out, the first at {where}: they "
-                    "repeat one value that does not fit, such as 0, or are far from all others"
-                )
+                out = f"{(~stay).sum()} of {len(stay)} points are left out, the first at {where}"
+                why = "they repeat one value that does not fit, such as 0, or are far from all others"
+                notes.append(f"{block.label}: {out}: {why}")
         return self.replaced(kept), notes
 
     def undetermined(self, constants: dict[str, Any], names: Sequence[str]) -> list[str]:
@@ -205,14 +205,10 @@ class Model:
         labels, unknowns = ", ".join(block.label for block in self.blocks), ", ".join(names)
         estimated = any(block.noise is None for block in self.blocks)
         if self.counts.sum() < max(rank, 1) + estimated or self.counts.min() < 1:
-            raise TestDataError(
-                f"{labels}: {max(self.counts.sum(), 0)} numbers besides the shift, for the unknowns {unknowns} and the "
-                "noise; give more rows, or known constants and noise"
-            )
+            count = f"{max(self.counts.sum(), 0)} numbers besides the shift"
+            raise TestDataError(f"{labels}: {count}, for the unknowns {unknowns} and the noise; give more rows")
         if not rank:
-            raise TestDataError(
-                f"{unknowns}: not determined by these data, which have no force; add one, as of a curve or the load"
-            )
+            raise TestDataError(f"{unknowns}: not determined by these data, which have no force; add one")
         return [names[place] for place in np.sort(order[rank:])]
 
     def fit(
@@ -229,36 +225,34 @@ class Model:
         bounds = np.array([(-1.0, 0.5) if name == "nu" else (-30.0, 30.0) for name in names])
         bounds -= [[constants[name] if name == "nu" else 0.0] for name in names]
 
-        last: list[Any] = [b"", []]  # values and slopes are asked for in turn
-
-        def tables(steps: np.ndarray) -> list[np.ndarray]:
-            if last[0] != (asked := (steps.tobytes(), noise.tobytes())):
-                last[:] = asked, new(steps)
-            return list(last[1])
-
-        def new(steps: np.ndarray) -> list[np.ndarray]:
-            tried = varied(constants, names, steps)
+        @lru_cache(maxsize=1)  # values and slopes are asked for in turn
+        def tables(steps: bytes, noise: bytes) -> list[np.ndarray]:
+            tried = varied(constants, names, np.frombuffer(steps))
             if "G12" in tried and tried["nu12"] ** 2 > tried["E1"] / tried["E2"]:  # not positive definite
                 return [np.full((len(block.values), 1), np.inf) for block in self.blocks]  # a shorter step follows
-            return self.residuals(tried, names, noise)
+            return self.residuals(tried, names, np.frombuffer(noise))
 
-        def misfit(steps: np.ndarray) -> np.ndarray:
-            return np.concatenate(tables(steps))[:, 0]
-
-        def slopes(steps: np.ndarray) -> np.ndarray:
-            return np.concatenate(tables(steps))[:, 1:]
+        def table(steps: np.ndarray) -> np.ndarray:
+            return np.concatenate(tables(steps.tobytes(), noise.tobytes()))
 
         steps = np.zeros(len(names))
         for _ in range(20):  # until the noise that is estimated settles
-            steps = least_squares(misfit, steps, slopes, bounds.T, xtol=1e-10, ftol=1e-10).x
-            sums = np.array([table[:, 0] @ table[:, 0] for table in tables(steps)])
+            steps = least_squares(
+                lambda steps: table(steps)[:, 0],
+                steps,
+                lambda steps: table(steps)[:, 1:],
+                bounds.T,
+                xtol=1e-10,
+                ftol=1e-10,
+            ).x
+            sums = squares(tables(steps.tobytes(), noise.tobytes()), np.ones(len(noise)))
             settled = np.maximum(noise * np.sqrt(sums / freedom), LEAST_NOISE * self.sizes)
             before, noise = noise, np.where(given, given, settled)
             if np.allclose(noise, before, rtol=1e-3, atol=0):
                 break
-        deviations = np.linalg.norm(inverse(slopes(steps)), axis=1)
-        half = t.ppf(0.975, freedom[given == 0].sum() or np.inf) * deviations
-        return varied(constants, names, steps), tables(steps), noise, half.clip(max=600)  # exp(700) is infinite
+        half = t.ppf(0.975, freedom[given == 0].sum() or np.inf) * np.linalg.norm(inverse(table(steps)[:, 1:]), axis=1)
+        found = list(tables(steps.tobytes(), noise.tobytes()))
+        return varied(constants, names, steps), found, noise, half.clip(max=600)  # exp(700) is infinite
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -342,8 +336,7 @@ class Identified(Tabled):
         >>> st.identify("config/treloar/uniaxial.csv", "neo-hooke").plot().get_ylabel()
         'Residual over noise [1]'
         """
-        axes: Axes = hook("drawing").draw_residuals(ax, self.residuals, self.places)
-        return axes
+        return hook("drawing").draw_residuals(ax, self.residuals, self.places)
 
 
 def identify(
@@ -456,10 +449,7 @@ def _scale(model: Model, constants: dict[str, Any]) -> float:
         predicted = table[:, 0] + own
         share = predicted @ own / (np.linalg.norm(predicted) * np.linalg.norm(own) or 1)
         if block.places.ndim > 1 and share * np.sqrt(len(own)) < -4:
-            raise TestDataError(
-                f"{block.label}: runs against the load; change the sign of its displacements, or give the load that it "
-                "is of"
-            )
+            raise TestDataError(f"{block.label}: runs against the load; change the sign of its displacements")
         if predicted @ own > 0:
             found.append(np.log(predicted @ predicted / (predicted @ own)))
     return float(np.sum(found) / max(len(found) - 1, 1))
@@ -476,10 +466,8 @@ def _fitted(
         own = block.unshifted(block.values)
         share = left / (own @ own or 1)
         if block.places.ndim > 1 and share > 1 - EXPLAINED and excess(block.by_place(table[:, 0]), block.places) > 0:
-            raise TestDataError(
-                f"{block.label}: the load explains {100 * max(1 - share, 0):.0f} % of it, and the rest is not random; "
-                "give the load and the body that it is of, and check columns and signs"
-            )
+            explained = f"the load explains {100 * max(1 - share, 0):.0f} % of it"
+            raise TestDataError(f"{block.label}: {explained}; check load, columns and signs")
     return lacking, constants, tables, noise, half
 
 
@@ -503,10 +491,8 @@ def _identified(law: str, model: Model, constants: dict[str, Any], free: Sequenc
     if odd or negative:
         odd += _reversed(model, constants, names, squares(tables, noise))
     for name in negative:
-        odd.append(
-            f"{name}: is below zero, as of few materials; if this is none of them, change the sign of v or of the "
-            "transverse displacement, or let y run upwards"
-        )
+        remedy = "if this is none of them, change the sign of v or of the transverse displacement, or let y run upwards"
+        odd.append(f"{name}: is below zero, as of few materials; {remedy}")
     values = {name: float(value) for name, value in constants.items()}
     intervals = {name: (float(low[name]), float(high[name])) for name in constants}
     noises = dict(zip(residuals, noise.tolist()))
@@ -543,16 +529,13 @@ def _checked(
                 columns = block.by_place(np.hstack([table, block.shifts]))
                 found, white = correlated(block.by_place(own), columns, block.places), 1.0
                 least = min(least, found.freedom)
-                notes.append(
-                    f"{block.label}: residuals are not random, but correlated over some {1e3 * found.reach:.2g} mm; "
-                    "intervals are widened as for overlapping subsets, and do not hold if the law, the load or the "
-                    "supports are others"
+                found_over = (
+                    f"but correlated over some {1e3 * found.reach:.2g} mm; intervals are widened as for overlapping"
                 )
+                why = f"{found_over} subsets, and do not hold if the law, the load or the supports are others"
             else:
-                notes.append(
-                    f"{block.label}: residuals are not random, so the intervals are too narrow; leave out where the "
-                    "law does not hold"
-                )
+                why = "so the intervals are too narrow; leave out where the law does not hold"
+            notes.append(f"{block.label}: residuals are not random, {why}")
         own_part = found.sums(block.by_place(table), block.places)
         covariance, errors = covariance + own_part, errors + own_part[:known, :known] / white
     steps, extra = inverse(slopes), basis.shape[1] - known
@@ -560,10 +543,8 @@ def _checked(
     if extra and misfit:
         shares = np.linalg.solve(covariance[known:, known:], along[known:])
         if f.sf(along[known:] @ shares / extra, extra, least) < CHANCE:
-            notes.append(
-                "the law does not fit: residuals follow other constants of elasticity, so the intervals do not hold; "
-                "check the law, the angle, known constants, and the signs of columns"
-            )
+            why = "the law does not fit: residuals follow other constants of elasticity, so the intervals do not hold"
+            notes.append(f"{why}; check the law, the angle, known constants, and the signs of columns")
     return wider.clip(1) * t.ppf(0.975, least) / t.ppf(0.975, freedom), notes
 
 
@@ -572,10 +553,8 @@ def _reversed(model: Model, constants: dict[str, Any], names: Sequence[str], sum
     notes, begin = [], assumed(constants, [name for name in names if name in ASSUMED])
     fields = any(block.places.ndim > 1 for block in model.blocks)
     for component, signs in (("v", (1, -1)), ("u", (-1, 1))) if fields else ():
-        turned = model.replaced(
-            replace(block, values=(block.by_place(block.values) * signs).ravel()) if block.places.ndim > 1 else block
-            for block in model.blocks
-        )
+        values = [block.by_place(block.values) * (signs if block.places.ndim > 1 else 1) for block in model.blocks]
+        turned = model.replaced(replace(block, values=one.ravel()) for block, one in zip(model.blocks, values))
         found, tables, noise, _ = turned.fit(begin, names)
         gain = 0.5 * np.log(sums / squares(tables, noise))
         if model.counts @ gain > max(10, 0.03 * model.counts.sum()) and min(found.get(one, 0) for one in ASSUMED) >= 0:

@@ -70,9 +70,8 @@ class Block:
         own = np.repeat(stay, len(self.values) // len(stay))
         rows = self.rows[own] if self.rows.shape[0] == len(own) else self.rows
         shifts, _ = np.linalg.qr(self.shifts[own])
-        return replace(
-            self, values=self.values[own], factors=self.factors[own], rows=rows, shifts=shifts, places=self.places[stay]
-        )
+        kept = {"values": self.values[own], "factors": self.factors[own], "places": self.places[stay]}
+        return replace(self, rows=rows, shifts=shifts, **kept)
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,10 +132,8 @@ class MeasuredTest:
         columns, lines, missing = _read(self.file)
         put(self, angle=quantity(self.angle, "angle", "angle"), columns=columns, _lines=lines, _missing=missing)
         if (self.force is None) == (isinstance(self.body, Beam) and "u" in columns):
-            raise ValueError(
-                f"force: {self.force!r}; give the force at which '{self.file}' was measured, as '400 N', if it is the "
-                "field of a beam, else none"
-            )
+            given = f"force: {self.force!r}; give that of the field of a beam in '{self.file}'"
+            raise ValueError(f"{given}, such as '400 N', else none")
         for name, value, kind in (("force", self.force, "force"), ("noise", self.noise, "length")):
             put(self, **{name: None if value is None else positive(value, kind, name)})
 
@@ -169,15 +166,11 @@ def _field(test: MeasuredTest, family: Family) -> list[Block]:
     worst = int(np.argmax(apart))
     if apart[worst] > OFF_BODY:
         x, y = 1e3 * points[worst]
-        raise TestDataError(
-            f"'{test.file}', line {test._lines[worst]}: the point x = {x:.6g} mm, y = {y:.6g} mm is outside of the "
-            "body; remove it, or correct the unit or the origin"
-        )
+        where = f"'{test.file}', line {test._lines[worst]}: the point x = {x:.6g} mm, y = {y:.6g} mm"
+        raise TestDataError(f"{where} is outside of the body; correct it")
     if len(points) > 1 and not np.ptp(values, axis=0).any():
-        raise TestDataError(
-            f"'{test.file}': all {len(points)} points have the same displacement, so nothing was measured; give the "
-            "field under the load"
-        )
+        same = f"all {len(points)} points have the same displacement"
+        raise TestDataError(f"'{test.file}': {same}; give the field under the load")
     turned = (points - points.mean(axis=0))[:, ::-1] * [-1, 1] / (np.ptp(points) or 1.0)
     rigid, _ = np.linalg.qr(np.column_stack([np.tile(np.eye(2), (len(points), 1)), turned.ravel()]))
     factors, label = np.full(values.size, test.force or 1.0), f"field of '{test.file}'"
@@ -190,15 +183,10 @@ def _curve(test: MeasuredTest, family: Family, load: LoadCase) -> list[Block]:
     if len(load.tractions) != 1 or load.pressures or any(load.gravity) or moved:
         raise TestDataError(f"{where}: load {test.load!r} is not one force; give a field of points")
     if not np.ptp(loads) > 1e-9 * np.abs(loads).max() and (test.shift or not loads.any()):
-        raise TestDataError(
-            f"{where}, column 'force': all {len(loads)} values are {loads[0]:g} in SI units, so there is no slope; "
-            "give other loads, or switch the shift off if the zero is known"
-        )
+        same = f"all {len(loads)} values are {loads[0]:g} in SI units"
+        raise TestDataError(f"{where}, column 'force': {same}; give others, or no shift")
     if (loads - loads.mean()) @ test.columns["displacement"] < 0:
-        raise TestDataError(
-            f"displacement of {where}: runs against the load; both are positive along the load, so change a column's "
-            "sign"
-        )
+        raise TestDataError(f"displacement of {where}: runs against the load; change a column's sign")
     factors = loads / np.hypot(*load.tractions[0].force)
     shifts = np.full((len(loads), int(test.shift)), len(loads) ** -0.5)
     return [
@@ -250,10 +238,8 @@ def _read(path: str | Path) -> tuple[dict[str, np.ndarray], list[int], int]:
             raise TestDataError(f"'{path}', line {line}: {error} in '[ ]'") from None
         if (far := np.abs(values) > LARGEST_NUMBER / scale).any():
             worst = int(np.argmax(far))
-            raise TestDataError(
-                f"'{path}', line {rows[worst][0]}, column {name!r}: {values[worst]:g} {unit} is beyond all measure; "
-                "correct the line, or remove it"
-            )
+            where = f"'{path}', line {rows[worst][0]}, column {name!r}"
+            raise TestDataError(f"{where}: {values[worst]:g} {unit} is beyond all measure; correct it")
         columns[name] = scale * values
     if not rows:
         raise TestDataError(f"'{path}': has no rows of numbers below its head; {HEADS}")

@@ -4,8 +4,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ..mesh import MESH_TYPES, Mesh, read_beam_mesh
+from ..mesh.cells import Mesh
+from ..mesh.formats import read_beam_mesh
 from ..mesh.sheets import box_fault
+from ..mesh.types import MESH_TYPES
 from ..problem.geometry import Beam
 from ..problem.materials import AnisotropicMaterial, Material, only_isotropic
 from ..problem.quantities import positive
@@ -41,10 +43,8 @@ def check_filled(mesh: Mesh, beam: Beam) -> None:
     remedy = "make it with springtune.make_mesh(beam, ...) or springtune.read_mesh(file, beam)"
     if np.abs(np.concatenate([low, high - box])).max() > FILLED * box.max():
         shown = " x ".join(f"{low_:.6g} to {high_:.6g}" for low_, high_ in zip(1e3 * low, 1e3 * high))
-        raise ValueError(
-            f"mesh: extends over {shown} mm, its beam over {1e3 * beam.length:.6g} x {1e3 * beam.height:.6g} mm "
-            f"from the origin; {remedy}"
-        )
+        wanted = " x ".join(f"{side:.6g}" for side in 1e3 * box)
+        raise ValueError(f"mesh: extends over {shown} mm, its beam over {wanted} mm from the origin; {remedy}")
     wrong = box_fault(mesh)
     if wrong:
         raise ValueError(f"mesh: does not fill its beam: {wrong}; or {remedy}")

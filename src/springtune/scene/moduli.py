@@ -6,9 +6,9 @@ from functools import cached_property
 import numpy as np
 
 from ..mechanics.moduli import PatchTest
-from ..mesh import Mesh
+from ..mesh.cells import Mesh
 from ..problem.materials import ANY_MATERIAL, AnyMaterial, Material
-from ..springs import DefinitionError, Springs
+from ..springs.base import DefinitionError, Springs
 from .meshes import A_MATERIAL, A_MESH, is_a
 from .sheet import AnyDefinition, Sheet, definition_of, named
 
@@ -171,9 +171,6 @@ def moduli(mesh: Mesh, material: AnyMaterial, definition: AnyDefinition) -> Modu
     is_a(material, ANY_MATERIAL, "material", A_MATERIAL)
     definition = definition_of(definition)
     if definition.needs == "stiffness":
-        raise DefinitionError(
-            f"definition {definition.name!r} is told its stiffness and derives none from a material; choose one that "
-            "does, such as 'uniform'"
-        )
+        raise DefinitionError(f"definition {definition.name!r} is told its stiffness; choose one such as 'uniform'")
     with named(definition):
         return MeshModuli(mesh)(material, definition)

@@ -9,7 +9,7 @@ from scipy.sparse.linalg import ArpackError
 from ..mechanics.dynamics import Motion, masses
 from ..mechanics.network import Network
 from ..problem.loads import LoadKind
-from ..springs import Springs
+from ..springs.base import Springs
 from .sheet import Sheet
 
 

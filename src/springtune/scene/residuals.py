@@ -67,8 +67,7 @@ def _tree(places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Distances and numbers of the nearest places of each, itself first; loads of curves are counted."""
     one = places.ndim == 1
     at = np.argsort(np.argsort(places, kind="stable"))[:, None] if one else places
-    near: tuple[np.ndarray, np.ndarray] = KDTree(at).query(at, k=min(len(at), 5 if one else 9))
-    return near
+    return KDTree(at).query(at, k=min(len(at), 5 if one else 9))
 
 
 def excess(residual: np.ndarray, places: np.ndarray) -> float:

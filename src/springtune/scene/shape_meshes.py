@@ -24,9 +24,7 @@ LEAST_COVERED = 0.9
 """Least length of a group's edges over the length of its sides: six chords are 5 % shorter than a circle."""
 
 
-def mesh_shape(
-    shape: Shape, size: float | str, mesh_type: str = "free", refined: Mapping[str, float | str] | None = None
-) -> GroupedMesh:
+def mesh_shape(shape: Shape, size: float | str, refined: Mapping[str, float | str] | None = None) -> GroupedMesh:
     """Mesh a shape, with the groups of its sides, its points and parts.
 
     Each side is divided into equal edges no longer than the size, an arc into at least six edges a full turn with its
@@ -37,8 +35,6 @@ def mesh_shape(
     shape : Shape
     size : float or str
         Length of an edge [m], or a text with its unit.
-    mesh_type : str, optional
-        ``"free"``: no other one meshes an outline.
     refined : mapping of str to float or str, optional
         Shorter edges at groups of sides, at points and in parts, by their name [m]; from there on they grow.
 
@@ -49,7 +45,7 @@ def mesh_shape(
     Raises
     ------
     ValueError
-        If the shape has the mesh of a file, the mesh type is another one, or a size is not above zero, larger than the
+        If the shape has the mesh of a file, or a size is not above zero, larger than the
         shape or absurdly small.
 
     Examples
@@ -62,7 +58,7 @@ def mesh_shape(
     """
     is_a(shape, Shape, "shape", A_SHAPE)
     sizes = {name: positive(value, "length", f"refined {name!r}") for name, value in (refined or {}).items()}
-    return mesh_outlined(shape, positive(size, "length", "mesh size"), mesh_type, sizes)
+    return mesh_outlined(shape, positive(size, "length", "mesh size"), sizes)
 
 
 def read_shape(path: str | Path, unit: float | str = "1 m") -> GroupedMesh:
@@ -115,7 +111,7 @@ def check_meshed(shape: Shape, grouped: GroupedMesh, materials: Mapping[str, Any
     """
     if not shape.outline:
         return
-    remedy = "mesh it with springtune.mesh_shape"
+    what, remedy = f"shape {shape.name!r}", "mesh it with springtune.mesh_shape"
     mesh, (low, high) = grouped.mesh, shape.extent
     small = OFF_SIDE * max(high[0] - low[0], high[1] - low[1])
 
@@ -127,17 +123,12 @@ def check_meshed(shape: Shape, grouped: GroupedMesh, materials: Mapping[str, Any
     particles = np.unique(mesh.edges[mesh.on_outline | _between(grouped, materials)])
     near = np.array([_distances(side, mesh.points[particles]) for side in sides]) <= small
     if not near.any(axis=0).all():
-        first = mesh.points[particles[np.argmin(near.any(axis=0))]]
-        raise ValueError(
-            f"mesh: its outline has a particle at {in_mm(tuple(first), 6)}, on no side of shape {shape.name!r}; "
-            f"{remedy}"
-        )
+        first = in_mm(tuple(mesh.points[particles[np.argmin(near.any(axis=0))]]), 6)
+        raise ValueError(f"mesh: its outline has a particle at {first}, on no side of {what}; {remedy}")
     if near.sum(axis=1).min() < 2:
         side = sides[int(np.argmin(near.sum(axis=1)))]
-        raise ValueError(
-            f"mesh: has no edge on the side of shape {shape.name!r} from {in_mm(side.start, 6)} to "
-            f"{in_mm(side.end, 6)}; {remedy}"
-        )
+        ends = f"from {in_mm(side.start, 6)} to {in_mm(side.end, 6)}"
+        raise ValueError(f"mesh: has no edge on the side of {what} {ends}; {remedy}")
     for name in shape.groups:
         own: Sequence[OutlineSide] = [side for side in sides if side.group == name]
         if name not in grouped.sides or not own:
@@ -146,13 +137,11 @@ def check_meshed(shape: Shape, grouped: GroupedMesh, materials: Mapping[str, Any
         away = np.min([_distances(side, ends.reshape(-1, 2)) for side in own], axis=0)
         share = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum() / sum(side.length for side in own)
         if away.max(initial=0.0) > small or not LEAST_COVERED <= share <= 1 + OFF_SIDE:
-            raise ValueError(f"mesh: its group {name!r} is not the sides {name!r} of shape {shape.name!r}; {remedy}")
+            raise ValueError(f"mesh: its group {name!r} is not the sides {name!r} of {what}; {remedy}")
     for name, point in shape.points.items():
         if name in grouped.points and np.linalg.norm(np.subtract(grouped.points[name], point)) > small:
-            raise ValueError(
-                f"mesh: its point {name!r} is at {in_mm(tuple(grouped.points[name]), 6)}, that of shape "
-                f"{shape.name!r} at {in_mm(point, 6)}; {remedy}"
-            )
+            there = in_mm(tuple(grouped.points[name]), 6)
+            raise ValueError(f"mesh: its point {name!r} is at {there}, that of {what} at {in_mm(point, 6)}; {remedy}")
 
 
 def _between(grouped: GroupedMesh, materials: Mapping[str, AnyMaterial]) -> np.ndarray:

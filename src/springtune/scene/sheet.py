@@ -15,14 +15,14 @@ from ..mechanics.moduli import lateral_forces
 from ..mechanics.network import FollowerPressure, Network
 from ..mechanics.newton import Equilibrium
 from ..mechanics.statics import StaticProblem
-from ..mesh import Mesh
+from ..mesh.cells import Mesh
 from ..mesh.groups import GroupedMesh
 from ..problem.boundary import held, measured, side_edges, weights
 from ..problem.loads import LoadKind
 from ..problem.materials import AnyMaterial
 from ..problem.quantities import nearest
 from ..problem.status import Status
-from ..springs import DEFINITIONS, Definition, DefinitionError, Springs
+from ..springs.base import DEFINITIONS, Definition, DefinitionError, Springs
 from ..springs.identification import Case, patch_cases
 
 NETWORKS = 6
@@ -54,16 +54,11 @@ def chosen(known: Mapping[str, Entry], name: object, what: str) -> Entry:
 
 def check_stiffness(definition: Definition, stiffness: object) -> None:
     """Refuse a definition without the uniform stiffness that it needs, or with one that it does not use."""
-    if (definition.needs == "stiffness") == (stiffness is not None):
-        return
-    if stiffness is None:
-        raise ValueError(
-            f"stiffness: definition {definition.name!r} needs a uniform one; give a stiffness such as '170e6 N/m'"
-        )
-    raise ValueError(
-        f"stiffness: {stiffness!r} is not used, since definition {definition.name!r} derives its own; leave it out, or "
-        "choose 'paper'"
-    )
+    name, needed = definition.name, definition.needs == "stiffness"
+    if needed and stiffness is None:
+        raise ValueError(f"stiffness: definition {name!r} needs a uniform one; give a stiffness such as '170e6 N/m'")
+    if stiffness is not None and not needed:
+        raise ValueError(f"stiffness: {stiffness!r} is not used, definition {name!r} derives its own; leave it out")
 
 
 @contextmanager
@@ -154,7 +149,6 @@ class Sheet:
 
     def __init__(self, mesh: Mesh, thickness: float, networks: int = NETWORKS, like: "Sheet | None" = None) -> None:
         self.mesh, self.thickness, self.deriving = mesh, thickness, 0.0
-        self.held = cache(lambda kind: held(mesh, kind))
         self.weights = cache(lambda kind: weights(mesh, kind))
         self.measured = cache(lambda kind: measured(mesh, kind))
         self.loading = cache(lambda kind, follower=False: box_loading(mesh, kind, follower))
@@ -246,9 +240,8 @@ class Sheet:
         label = loading.key, springs.lateral, None if loading.given is None else springs.reference
         if label not in problems:
             given = None if loading.given is None else springs.reference * loading.given
-            problems[label] = StaticProblem(
-                network, self.pattern(loading, springs), loading.follower, dead=loading.dead, given=given
-            )
+            pattern = self.pattern(loading, springs)
+            problems[label] = StaticProblem(network, pattern, loading.follower, dead=loading.dead, given=given)
         return problems[label]
 
     def solve(

@@ -13,7 +13,7 @@ import numpy as np
 from ..mechanics.network import Network
 from ..mechanics.newton import Equilibrium
 from ..mechanics.statics import SingularError, StaticProblem
-from ..mesh import Mesh
+from ..mesh.cells import Mesh
 from ..mesh.groups import GroupedMesh
 from ..problem.compare import error_text, quantity_errors, sign_word
 from ..problem.geometry import AssumptionWarning, Beam
@@ -24,7 +24,7 @@ from ..problem.shapes import QUANTITY_UNITS, Shape
 from ..problem.status import Status
 from ..registry import hook
 from ..safe_io.tables import Tabled, number_text
-from ..springs import Springs
+from ..springs.base import Springs
 from .meshes import is_a
 from .sheet import AnyDefinition, Sheet, check_stiffness, definition_of, named
 from .statements import BeamStatement, ShapeStatement, Statement
@@ -34,9 +34,7 @@ if TYPE_CHECKING:
 
     from ..mechanics.dynamics import Motion, Run
     from ..mechanics.integrators import BackwardEuler
-    from ..reference.finite_strain import FiniteStrainSolution
-    from ..reference.shapes import ShapeReference
-    from ..reference.small_strain import ReferenceSolution
+    from .statements import AnyReference
 
 
 class Scene(Tabled):
@@ -179,10 +177,9 @@ class Scene(Tabled):
             raise ValueError("sheet: is of another mesh or thickness; give that of a scene like this one, or none")
 
     def __repr__(self) -> str:
-        return (
-            f"Scene({self.statement.body}, {len(self.mesh.points)} particles, {self.statement.named_materials}, "
-            f"{self.statement.label}, {self.definition.name}, {self.kinematics})"
-        )
+        about = self.statement
+        what = f"{about.body}, {len(self.mesh.points)} particles, {about.named_materials}, {about.label}"
+        return f"Scene({what}, {self.definition.name}, {self.kinematics})"
 
     def _rows(self) -> Iterator[tuple[str, str]]:
         about = self.statement
@@ -356,7 +353,7 @@ class Scene(Tabled):
         """Law at finite strain of the reference, or none."""
         return self.statement.law(self.sheet, self.definition)
 
-    def reference(self) -> "ReferenceSolution | FiniteStrainSolution | ShapeReference":
+    def reference(self) -> "AnyReference":
         """Converged finite-element solution under the same force or load case.
 
         In small strain, or at finite strain (`finite_strain`): of a `springtune.Rubber` by its own law, of another
@@ -476,14 +473,10 @@ class Scene(Tabled):
             name = self.statement.named_materials
             raise ValueError(f"density: material {name!r} has none; give a density such as '7850 kg/m^3'")
         if self.problem.given is not None:
-            raise ValueError(
-                f"load: {self.load!r} prescribes displacements, and a motion is under forces; take another load"
-            )
+            raise ValueError(f"load: {self.load!r} prescribes displacements, and motions have forces; take another")
         if self.problem.follower is not None and not released:
-            raise ValueError(
-                f"load: {self.load!r} turns with the side that it acts on, and forces of a motion do not; take one "
-                "that does not follow, or let go of it by released=True"
-            )
+            why = "turns with the side that it acts on, and forces of a motion do not"
+            raise ValueError(f"load: {self.load!r} {why}; take another, or let go of it by released=True")
         from ..mechanics.dynamics import Motion
 
         reference = self.springs.reference
@@ -544,8 +537,7 @@ class Scene(Tabled):
         >>> run.status, len(list(Path("swing").iterdir()))
         ('moving', 21)
         """
-        found: Run = hook("writing").write_motion(path, self, motion, integrator, step, steps, frames, **options)
-        return found
+        return hook("writing").write_motion(path, self, motion, integrator, step, steps, frames, **options)
 
     def buckling_load(self) -> float:
         """Size of the force at which the path from rest bifurcates, or would if it did not bend before.
@@ -603,8 +595,7 @@ class SceneSprings(Springs):
 
     def write(self, path: str | Path, **options: Any) -> list[Path]:
         """Write the springs for another program, see `springtune.SpringNet`."""
-        written: list[Path] = hook("writing").write_springs(path, self.scene, self, **options)
-        return written
+        return hook("writing").write_springs(path, self.scene, self, **options)
 
 
 @dataclass(frozen=True, repr=False)
@@ -714,7 +705,7 @@ class Result(Tabled):
         forces = self.scene.network.spring_forces(self.displacements, self.scene.kinematics == "linear")
         return self.scene.springs.reference * forces
 
-    def reference(self) -> "ReferenceSolution | FiniteStrainSolution | ShapeReference":
+    def reference(self) -> "AnyReference":
         """Converged finite-element solution under the same force, as `Scene.reference`.
 
         Returns
@@ -808,8 +799,7 @@ class Result(Tabled):
         >>> result.write("traction.vtu")[0].name, len(result.write("traction.pvd", steps=4))
         ('traction.vtu', 6)
         """
-        written: list[Path] = hook("writing").write_result(path, self, steps)
-        return written
+        return hook("writing").write_result(path, self, steps)
 
     def plot(self, ax: "Axes | None" = None) -> "Axes":
         """Draw the deformed springs, coloured by their force.

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from ..mechanics.network import FollowerPressure, Network
-from ..mesh import Mesh
+from ..mesh.cells import Mesh
 from ..mesh.groups import GroupedMesh, part_names, parts_of
 from ..problem.boundary import (
     cell_at,
@@ -32,7 +32,7 @@ from ..problem.materials import ANY_MATERIAL, AnyMaterial, Material, of_parts
 from ..problem.quantities import positive
 from ..problem.shapes import LoadCase, Quantity, Shape
 from ..reference.answers import beyond_linear
-from ..springs import Definition, DefinitionError, Springs
+from ..springs.base import Definition, DefinitionError, Springs
 from .meshes import A_BEAM, A_MATERIAL, A_MESH, A_SHAPE, check_filled, is_a
 from .shape_meshes import check_meshed
 from .sheet import Loading, Sheet, Solution, box_loading, chosen, solved
@@ -90,17 +90,13 @@ class Statement(ABC):
     def reference(self, sheet: Sheet, law: str = "") -> "AnyReference":
         """Converged finite-element solution, in small strain or of a law at finite strain."""
 
-    @abstractmethod
     def reference_values(self, sheet: Sheet, law: str = "") -> dict[str, float]:
         """Quantities of interest of the reference."""
+        return dict(cast("ShapeReference", self.reference(sheet, law)).values)
 
     def law(self, sheet: Sheet, definition: Definition) -> str:
         """Law at finite strain of the reference of a definition's network; none of small strain."""
         return definition.law if self.kinematics == "nonlinear" else ""
-
-    @abstractmethod
-    def _unit_field(self, sheet: Sheet) -> np.ndarray:
-        """Displacements of the reference at the particles for a factor of 1, shape (n_points, 2)."""
 
     def objection(self, sheet: Sheet) -> str:
         """Why the small-strain reference does not apply to networks of nonlinear kinematics; empty if it does."""
@@ -109,7 +105,9 @@ class Statement(ABC):
 
     def springs(self, sheet: Sheet, definition: Definition, stiffness: float | None) -> tuple[Springs, float]:
         """Springs of a definition, and the seconds that deriving them took."""
-        case = (self.loading, self.force, self._unit_field(sheet)) if definition.needs == "cases" else None
+        case = None
+        if definition.needs == "cases":
+            case = self.loading, self.force, self.reference(sheet).at(self.mesh.points) / self.force
         return sheet.derive(definition, self.by_part, stiffness, case, self.grouped)
 
     def forces(self, sheet: Sheet, springs: Springs) -> np.ndarray:
@@ -218,9 +216,7 @@ class BeamStatement(Statement):
     def check(self, definition: Definition) -> None:
         """Refuse a definition that is not for the load."""
         if definition.uniaxial and not self.kind.uniaxial:
-            raise ValueError(
-                f"definition: {definition.name!r} is not for {self.load!r}; take it for traction or compression"
-            )
+            raise ValueError(f"definition: {definition.name!r} is not for {self.load!r}; take it for traction")
 
     def masses(self) -> np.ndarray | None:
         """Masses of the particles [kg], shape (n_points,); None without a density."""
@@ -241,9 +237,6 @@ class BeamStatement(Statement):
         """Law of the reference: of beams that of rubber alone."""
         return "rubber" if definition.finite_strain and self.kinematics == "nonlinear" else ""
 
-    def _unit_field(self, sheet: Sheet) -> np.ndarray:
-        return unit_reference(self.beam, self.material, self.kind, 1.0).at(self.mesh.points)
-
 
 class ShapeStatement(Statement):
     """A shape under one of its load cases, times `scale` [1]."""
@@ -261,10 +254,7 @@ class ShapeStatement(Statement):
     ) -> None:
         is_a(shape, Shape, "shape", A_SHAPE)
         if isinstance(grouped, Mesh):
-            raise ValueError(
-                "mesh: is of no groups, and supports and loads of a shape are on groups; give a GroupedMesh such as "
-                f"{A_GROUPED_MESH}"
-            )
+            raise ValueError(f"mesh: is of no groups for supports and loads; give one such as {A_GROUPED_MESH}")
         is_a(grouped, GroupedMesh, "mesh", A_GROUPED_MESH)
         self.shape, self.grouped, self.thickness = shape, grouped, shape.thickness
         self.by_part = _materials(material, grouped)
@@ -279,9 +269,7 @@ class ShapeStatement(Statement):
         self.size = abs(self.scale)
         self.case = scaled(chosen(shape.loads, load, "load"), self.scale)
         if not self.case.quantities:
-            raise ValueError(
-                f"load {load!r}: asks for nothing; give it quantities, of which the first one stands for all"
-            )
+            raise ValueError(f"load {load!r}: asks for nothing; give it quantities, the main one first")
         self.kinematics = kinematics
         factor = "" if self.scale == 1 else f" times {self.scale:g}"
         self.body, self.label = shape.name, f"{load}{factor}"
@@ -296,10 +284,7 @@ class ShapeStatement(Statement):
         all_forces = partial(forces, self.grouped, self.case, self.thickness, densities)
         pattern = all_forces()
         if not (pattern[~held].any() or given.any()):
-            raise ValueError(
-                f"load {self.load!r}: neither pulls what is free nor moves a support; give it a traction, a pressure, "
-                "gravity or a prescribed displacement"
-            )
+            raise ValueError(f"load {self.load!r}: neither pulls what is free nor moves a support; give a force")
         edges, pressure = followed(self.grouped, self.case, self.thickness)
         turning = self.kinematics == "nonlinear" and len(edges) > 0
         return Loading(
@@ -320,37 +305,26 @@ class ShapeStatement(Statement):
         elif one.kind == "stress":
             cell_at(self.grouped, one.of)
             particle = self.grouped.particle(one.of)
-            names = {
-                str(name)
-                for count, labels in part_names(self.grouped).items()
-                for name in labels[(self.mesh.cells[count] == particle).any(axis=1)]
-            }
-            if particle is not None and len({self.by_part[name] for name in names}) > 1:
-                raise ValueError(
-                    f"load {self.load!r}, quantity {one.name!r}: {one.of!r} is where different materials meet, and the "
-                    "stress has a jump there; ask for it on one side"
-                )
+            found = set()
+            for count, labels in part_names(self.grouped).items():
+                found |= {self.by_part[name] for name in labels[(self.mesh.cells[count] == particle).any(axis=1)]}
+            if particle is not None and len(found) > 1:
+                why = f"{one.of!r} is where different materials meet; ask for the stress on one side"
+                raise ValueError(f"load {self.load!r}, quantity {one.name!r}: {why}")
 
     def check(self, definition: Definition) -> None:
         """Refuse a definition that is for beams alone."""
         if definition.uniaxial:
-            raise ValueError(
-                f"definition: {definition.name!r} is for loads that stretch a beam along its length, and "
-                f"{self.shape.name!r} is a shape; choose one for any load, such as 'delingette'"
-            )
+            raise ValueError(f"definition: {definition.name!r} is for loads that stretch a beam; choose another")
         if definition.needs == "cases" and self.loading.given is not None:
-            raise ValueError(
-                f"definition: {definition.name!r} is fitted to displacements under forces, and load {self.load!r} "
-                "prescribes displacements; choose another definition, or a load of forces"
-            )
+            why = f"is for forces, and load {self.load!r} prescribes displacements"
+            raise ValueError(f"definition: {definition.name!r} {why}; choose another definition")
 
     def springs(self, sheet: Sheet, definition: Definition, stiffness: float | None) -> tuple[Springs, float]:
         """Springs of a definition, and the seconds that deriving them took."""
         springs, seconds = super().springs(sheet, definition, stiffness)
         if springs.lateral:
-            raise DefinitionError(
-                "needs a stress on the long faces of a beam, and a shape has none; choose another definition"
-            )
+            raise DefinitionError("needs a stress on the long faces of a beam; choose another definition")
         return springs, seconds
 
     def reference(self, sheet: Sheet, law: str = "") -> "ShapeReference":
@@ -359,33 +333,23 @@ class ShapeStatement(Statement):
         as_read = self.grouped if self.shape.file else None
         # The shape is kept too, so that its id is not used again.
         key = id(self.shape), self.grouped, case, tuple(self.by_part.items()), law
-        if (key, 1.0) not in sheet.references:
+        if key not in sheet.references:
             if law:
                 from ..reference.finite_shapes import solve_finite_shape  # here, as below
 
-                solved = solve_finite_shape(self.shape, case, self.by_part, as_read, law)
+                found = solve_finite_shape(self.shape, case, self.by_part, as_read, law)
             else:
                 from ..reference.shapes import solve_shape  # here, since finite elements take half a second to import
 
-                solved = solve_shape(self.shape, case, self.by_part, as_read)
-            sheet.references[key, 1.0] = self.shape, solved
-        scale = 1.0 if law else self.scale
-        if (key, scale) not in sheet.references:
-            sheet.references[key, scale] = self.shape, sheet.references[key, 1.0][1].scaled(scale)
-        found: ShapeReference = sheet.references[key, scale][1]
-        return found
-
-    def reference_values(self, sheet: Sheet, law: str = "") -> dict[str, float]:
-        """Quantities of interest of the reference."""
-        return dict(self.reference(sheet, law).values)
+                found = solve_shape(self.shape, case, self.by_part, as_read)
+            sheet.references[key] = self.shape, found
+        reference: ShapeReference = sheet.references[key][1]
+        return reference if law or self.scale == 1 else reference.scaled(self.scale)
 
     def law(self, sheet: Sheet, definition: Definition) -> str:
         """Law of the reference; St. Venant and Kirchhoff's only where small strain does not apply."""
         law = super().law(sheet, definition)
         return "" if law == "st-venant" and not self.objection(sheet) else law
-
-    def _unit_field(self, sheet: Sheet) -> np.ndarray:
-        return self.reference(sheet).at(self.mesh.points)
 
 
 def scaled(case: LoadCase, scale: float) -> LoadCase:

@@ -16,7 +16,7 @@ import math
 
 import numpy as np
 
-from ..mesh import Mesh, signed_areas
+from ..mesh.cells import Mesh, signed_areas
 from ..problem.materials import Material
 from .base import Springs, definition, triangles_only
 from .lattice import half_weight

@@ -21,7 +21,7 @@ volume energy the rest. The plane form is derived here.
 
 import numpy as np
 
-from ..mesh import Mesh
+from ..mesh.cells import Mesh
 from ..problem.materials import Material
 from .base import Springs, definition
 from .lattice import COEFFICIENT, half_weight

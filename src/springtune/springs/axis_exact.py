@@ -15,7 +15,8 @@ row edges on the outline halved. In both cases the shear modulus is 2 nu / (1 - 
 
 import numpy as np
 
-from ..mesh import Mesh, row_height, signed_areas
+from ..mesh.cells import Mesh, signed_areas
+from ..mesh.rows import row_height
 from ..problem.materials import Material
 from .base import DefinitionError, Springs, definition, from_rectangles, not_negative, rectangles_only
 

@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ..mesh import Mesh
+from ..mesh.cells import Mesh
 from ..problem.materials import ANY_MATERIAL, AnyMaterial, Material
 from ..problem.quantities import LEAST, MOST
 from ..registry import Declared, Registry

@@ -19,7 +19,7 @@ E and nu are not, since the springs are not isotropic.
 
 import numpy as np
 
-from ..mesh import Mesh
+from ..mesh.cells import Mesh
 from ..problem.materials import Material
 from .base import Springs, definition, from_rectangles, not_negative, rectangles_only
 

@@ -30,7 +30,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..mesh import Mesh
+from ..mesh.cells import Mesh
 from ..problem.materials import Material
 from . import van_gelder
 from .base import DefinitionError, Springs, definition, triangles_only

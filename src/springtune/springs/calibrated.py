@@ -7,7 +7,7 @@ equilibrium is zero. The mean over mesh sizes serves every beam, size and load o
 import math
 from collections.abc import Iterable
 
-from ..mesh import Mesh
+from ..mesh.cells import Mesh
 from ..problem.materials import Material
 from . import paper
 from .base import Springs, definition

@@ -13,7 +13,7 @@ has no source of its own. Assumptions: Delaunay triangles, else a spring is nega
 
 import numpy as np
 
-from ..mesh import Mesh, corner_angles
+from ..mesh.cells import Mesh, corner_angles
 from ..problem.materials import Material
 from .base import Springs, definition, not_negative, triangles_only
 

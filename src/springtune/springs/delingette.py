@@ -24,7 +24,7 @@ e_j``: six coefficients, one to one with the material's six constants.
 
 import numpy as np
 
-from ..mesh import Mesh, corner_angles, signed_areas
+from ..mesh.cells import Mesh, corner_angles, signed_areas
 from ..problem.materials import AnyMaterial, Material
 from .base import Springs, definition, membrane_stiffness, triangles_only
 

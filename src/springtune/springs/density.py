@@ -8,7 +8,7 @@ along it is seen. Assumptions: many directions, no preferred one; nu = 1/3.
 
 import numpy as np
 
-from ..mesh import Mesh
+from ..mesh.cells import Mesh
 from ..problem.materials import Material
 from .base import Springs, definition
 from .lattice import uniform

@@ -11,8 +11,7 @@ from itertools import combinations
 
 import numpy as np
 
-from ..mesh import Mesh, signed_areas
-from ..mesh.cells import DIAGONALS, SIDES
+from ..mesh.cells import DIAGONALS, SIDES, Mesh, signed_areas
 from ..problem.materials import AnyMaterial, Material
 from .base import Springs, definition, membrane_stiffness
 

@@ -20,7 +20,7 @@ the inverse of Young's modulus along the spring. Springs always have C12 = C66 (
 
 import numpy as np
 
-from ..mesh import Mesh, signed_areas
+from ..mesh.cells import Mesh, signed_areas
 from ..problem.materials import AnyMaterial
 from .base import Springs, definition, membrane_stiffness, rectangles_only
 from .element_fit import least_squares

@@ -16,7 +16,7 @@ scatter of moduli. The plane form, by a solve in place of an iteration, is deriv
 
 import numpy as np
 
-from ..mesh import Mesh
+from ..mesh.cells import Mesh
 from ..problem.materials import Material
 from . import lattice
 from .base import Springs, definition, not_negative

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..mesh import Mesh, MeshError
+from ..mesh.cells import Mesh, MeshError
 from ..problem.materials import AnyMaterial, Material
 from . import energy_fit, lattice
 from .base import DefinitionError, Springs, membrane_stiffness

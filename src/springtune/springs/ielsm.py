@@ -29,7 +29,7 @@ import math
 
 import numpy as np
 
-from ..mesh import Mesh, corner_angles, signed_areas
+from ..mesh.cells import Mesh, corner_angles, signed_areas
 from ..problem.materials import Material
 from .base import NO_STIFFNESS, Springs, definition, triangles_only
 

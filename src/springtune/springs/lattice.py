@@ -17,7 +17,7 @@ import math
 
 import numpy as np
 
-from ..mesh import Mesh
+from ..mesh.cells import Mesh
 from ..problem.geometry import Beam
 from ..problem.loads import LOADS
 from ..problem.materials import Material

@@ -12,7 +12,7 @@ Assumptions: nu = 1/3, near-equilateral triangles, squares.
 
 import numpy as np
 
-from ..mesh import Mesh
+from ..mesh.cells import Mesh
 from ..problem.materials import Material
 from . import lattice
 from .base import DefinitionError, Springs, definition, from_rectangles, rectangles_only

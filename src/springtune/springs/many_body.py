@@ -26,7 +26,7 @@ moduli in the plane and the form on triangles are derived here.
 
 import numpy as np
 
-from ..mesh import Mesh, signed_areas
+from ..mesh.cells import Mesh, signed_areas
 from ..problem.materials import Material
 from .base import Springs, definition, triangles_only
 from .lattice import COEFFICIENT, half_weight

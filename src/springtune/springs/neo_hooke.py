@@ -17,7 +17,7 @@ linear triangles of the deformation gradient. At small strain both are linear tr
 
 import numpy as np
 
-from ..mesh import Mesh, corner_angles
+from ..mesh.cells import Mesh, corner_angles
 from ..problem.materials import Material
 from .base import Springs, definition, triangles_only
 

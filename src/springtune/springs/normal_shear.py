@@ -28,7 +28,7 @@ import math
 
 import numpy as np
 
-from ..mesh import Mesh, signed_areas
+from ..mesh.cells import Mesh, signed_areas
 from ..problem.materials import Material
 from .base import Springs, definition, triangles_only
 

@@ -8,7 +8,7 @@ Derived here.
 
 import numpy as np
 
-from ..mesh import Mesh
+from ..mesh.cells import Mesh
 from ..problem.materials import Material
 from .base import DefinitionError, Springs, definition
 from .lattice import uniform

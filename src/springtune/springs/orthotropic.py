@@ -24,7 +24,7 @@ import math
 
 import numpy as np
 
-from ..mesh import Mesh
+from ..mesh.cells import Mesh
 from ..problem.materials import AnyMaterial, rotated
 from .base import DefinitionError, Springs, definition, from_rectangles, membrane_stiffness, rectangles_only
 

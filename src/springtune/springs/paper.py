@@ -4,7 +4,7 @@ The paper chose one stiffness by hand from the sensitivity curve of its 200x30 b
 185e6 N/m on free meshes for steel, 800 N/m for rubber. Springs on the outline have the same stiffness as those inside.
 """
 
-from ..mesh import Mesh
+from ..mesh.cells import Mesh
 from ..problem.materials import AnyMaterial
 from .base import Springs, definition
 from .lattice import uniform

@@ -17,8 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..mesh import Mesh
-from ..mesh.cells import no_cells
+from ..mesh.cells import Mesh, no_cells
 from ..mesh.groups import GroupedMesh, part_names
 from ..problem.materials import AnyMaterial
 from .base import DefinitionError, Springs

@@ -13,7 +13,7 @@ It repairs what disorder costs in tension; bending, shear and nu stay those of t
 
 from dataclasses import replace
 
-from ..mesh import Mesh
+from ..mesh.cells import Mesh
 from ..problem.materials import Material
 from . import area, lattice
 from .base import Springs, definition

@@ -18,7 +18,7 @@ edges on 5 mm in 40 mm a pressed side moves by a quarter to a half too much, see
 
 import numpy as np
 
-from ..mesh import Mesh
+from ..mesh.cells import Mesh
 from ..problem.materials import Material
 from .base import Springs, definition
 

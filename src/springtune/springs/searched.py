@@ -15,7 +15,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..mesh import Mesh
+from ..mesh.cells import Mesh
 from ..problem.materials import AnyMaterial
 from .base import Springs, definition
 from .identification import Case, Misfit, patch_cases

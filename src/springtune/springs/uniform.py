@@ -5,7 +5,7 @@ network is too stiff by ``1 + sqrt(3)/2 a/H`` in tension and by ``1 + 3 sqrt(3)/
 with edge length a and height H. Always nu = 1/3.
 """
 
-from ..mesh import Mesh
+from ..mesh.cells import Mesh
 from ..problem.materials import Material
 from .base import Springs, definition
 from .lattice import COEFFICIENT, uniform

@@ -21,7 +21,7 @@ triangles.
 
 import numpy as np
 
-from ..mesh import Mesh, signed_areas
+from ..mesh.cells import Mesh, signed_areas
 from ..problem.materials import Material
 from .base import Springs, definition, not_negative, triangles_only
 

@@ -14,7 +14,7 @@ message says so.
 
 import numpy as np
 
-from ..mesh import Mesh
+from ..mesh.cells import Mesh
 from ..problem.materials import Material, Rubber
 from .base import DefinitionError, Springs, definition, triangles_only
 

@@ -2,24 +2,22 @@
 
 import math
 import os
-from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
+from collections import Counter, defaultdict
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import Any
 
-from springtune.mesh import MESH_TYPES
-from springtune.mesh.types import MOST_MESHED
+from springtune.mesh.types import MESH_TYPES, MOST_MESHED
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import INCOMPRESSIBLE
 from springtune.problem.parameters import MOST_SCENES, MOST_SCENES_VARIABLE
 from springtune.problem.quantities import nearest
-from springtune.springs import DEFINITIONS
+from springtune.springs.base import DEFINITIONS
 from springtune.springs.lattice import COEFFICIENT
 
-from .combinations import SAME_VALUE, check_groups, count, values_of
-from .messages import Key, Problems
-from .model import Grid, MeshSpec, Reference, SceneSpec
-from .sections import GRID_PARAMETERS, PLAUSIBLE, StatedStiffness, StudyConfig
+from .combinations import SAME_VALUE, factors
+from .messages import Key, Problems, part_of, show
+from .model import Grid, MeshSpec, SceneSpec
+from .sections import PLAUSIBLE, StatedStiffness, StudyConfig
 
 MOST_CELLS = 2_500_000
 """Limit of label combinations over all dimensions, requested or not."""
@@ -29,6 +27,11 @@ MOST_CURVE_POINTS = 10_000_000
 FEWER = "give shorter lists, or split the study into several"
 
 MORE_SCENES = f"or allow more by 'springtune run --max-scenes', or by {MOST_SCENES_VARIABLE} in the environment"
+
+SEPARATE = "give them grids of their own"
+
+
+# -- names -------------------------------------------------------------------------------------------------------------
 
 
 def check_known(
@@ -41,10 +44,9 @@ def check_known(
 
 
 def check_beam_material(problems: Problems, path: Sequence[Key], name: str, config: StudyConfig) -> None:
-    """Check that a beam material is declared and isotropic."""
-    check_known(problems, path, "material", name, config.materials)
-    given = config.materials[name] if name in config.materials else None
-    if given and given.young_modulus is None and given.uniaxial_test is None:
+    """Check that a beam material is isotropic."""
+    given = config.materials[name]
+    if given.young_modulus is None and given.uniaxial_test is None:
         problems.add(
             path,
             f"'{name}' is anisotropic, and beams are of isotropic materials, as their references are; put the sheet "
@@ -52,172 +54,119 @@ def check_beam_material(problems: Problems, path: Sequence[Key], name: str, conf
         )
 
 
-def check_compressible(problems: Problems, path: Sequence[Key], name: str, config: StudyConfig) -> None:
-    """Check that a material, which is asked for with a Poisson's ratio of 0.5, is in plane stress."""
-    if name in config.materials and config.materials[name].plane == "strain":
-        problems.add(path, f"material '{name}' is in plane strain, and this ratio is {INCOMPRESSIBLE}")
-
-
-def check_names(config: StudyConfig, problems: Problems) -> None:
-    """Check the names that refer to declared sections, and the sensitivity range."""
-    mesh_types = mesh_type_names(config)
-    for name, rows in (config.mesh_files or {}).items():
-        if name in MESH_TYPES:
-            problems.add(("mesh_files", name), f"'{name}' is a mesh type that is made; rename yours")
-        for number, one in enumerate(rows):
-            check_known(problems, ("mesh_files", name, number, "beam"), "beam", one.beam, config.beams)
-    for name, grid in config.grids.items():
-        for mesh_type in grid.mesh_type:
-            check_known(problems, ("grids", name, "mesh_type"), "mesh type", mesh_type, mesh_types, "mesh_files")
-        for beam in grid.beam:
-            check_known(problems, ("grids", name, "beam"), "beam", beam, config.beams)
-        for material in grid.material:
-            check_beam_material(problems, ("grids", name, "material"), material, config)
-            if 0.5 in (grid.poisson_ratio or ()):
-                check_compressible(problems, ("grids", name, "poisson_ratio"), material, config)
-        for beam in grid.force or ():
-            if beam is not None:
-                check_known(problems, ("grids", name, "force", beam), "beam", beam, config.beams)
-        if grid.force and None not in grid.force:
-            for beam in grid.beam:
-                if beam not in grid.force:
-                    problems.add(("grids", name, "force"), f"no force for beam '{beam}'; add '{beam}: <force>'")
-    calibrated, paper = config.definitions.calibrated, config.definitions.paper
-    if calibrated:
-        check_known(problems, ("definitions", "calibrated", "beam"), "beam", calibrated.beam, config.beams)
-    seen = set()
-    for number, row in enumerate(paper.stiffness if paper else ()):
-        path = ("definitions", "paper", "stiffness", number)
-        check_known(problems, (*path, "material"), "material", row.material, config.materials)
-        check_known(problems, (*path, "mesh_type"), "mesh type", row.mesh_type, mesh_types, "mesh_files")
-        if (row.mesh_type, row.material) in seen:
-            problems.add(path, f"a second stiffness for {row.mesh_type} meshes of {row.material}; remove one")
-        seen.add((row.mesh_type, row.material))
-    if not config.sensitivity.start < config.sensitivity.stop:
-        start, stop = config.sensitivity.start, config.sensitivity.stop
-        problems.add(("sensitivity", "from"), f"{start:g} is not below 'to', {stop:g}; give a smaller 'from'")
-
-
-def most_scenes() -> int:
-    """Return the limit of scenes, which the environment may change."""
-    text = os.environ.get(MOST_SCENES_VARIABLE) or str(MOST_SCENES)
-    try:
-        found = int(float(text))
-    except (ValueError, OverflowError):
-        found = 0
-    if found < 1:
-        raise ValueError(
-            f"{MOST_SCENES_VARIABLE}: '{text}' is not a number of scenes; give one such as 2000000, or none"
-        )
-    return found
-
-
-def check_counts(config: StudyConfig, content: dict[str, Any], problems: Problems) -> None:
-    """Check the number of scenes and of zipped values before grids are expanded."""
-    for name, grid in config.grids.items():
-        check_groups(name, grid, content["grids"][name], problems)
-    problems.stop()
-    try:
-        most = most_scenes()
-    except ValueError as error:
-        problems.stop_at((), str(error))
-    before = 0
-    for name, grid in config.grids.items():
-        number, lengths = count(grid)
-        if before + number > most:
-            shown = " x ".join(f"{size} {label}" for label, size in lengths.items() if size > 1)
-            beside = f" beside {before} of the grids above" if before else ""
-            problems.add(
-                ("grids", name),
-                f"{_counted(number)} scenes ({shown}){beside}; a study has at most {most}: {FEWER}, {MORE_SCENES}",
-            )
-            return
-        before += number
-    _check_labels(config, problems)
-
-
-def _check_labels(config: StudyConfig, problems: Problems) -> None:
-    """Estimate the size of the dataset before grids are expanded."""
-    if not config.grids or any(grid.exclude for grid in config.grids.values()):
-        return  # exclusions may leave labels out
-    labelled = (name for name in GRID_PARAMETERS if name != "pressure")
-    lists = {name: {value for grid in config.grids.values() for value in values_of(grid, name)} for name in labelled}
-    check_cells(config, {name: values for name, values in lists.items() if values}, False, problems)
+def check_density(config: StudyConfig, name: str, path: Sequence[Key], problems: Problems) -> None:
+    """Check that a declared material has a density."""
+    if config.materials[name].density is None:
+        problems.add(path, f"'{name}' has no density; add one to it under materials, such as density: 7850 kg/m^3")
 
 
 def check_scene(
     problems: Problems, path: Sequence[Key], scene: Any, config: StudyConfig, able: Callable[[str], bool], why: str
 ) -> None:
-    """Check that the beam of a scene is declared, its material, too, with a density, and that its load is able."""
-    check_known(problems, (*path, "beam"), "beam", scene.beam, config.beams)
+    """Check that the material of a scene is isotropic with a density, and that its load is able."""
     check_beam_material(problems, (*path, "material"), scene.material, config)
     check_density(config, scene.material, (*path, "material"), problems)
     if not able(scene.load):
         problems.add((*path, "load"), f"'{scene.load}' {why}; choose of {', '.join(filter(able, LOADS))}")
 
 
-def check_made(
-    problems: Problems, path: Sequence[Key], mesh_type: str, size: float, name: str, config: StudyConfig
-) -> None:
-    """Check that a mesh type that is made has a mesh of a size on a beam, if that is declared."""
-    if beam := config.beams.get(name):
-        refusal = MESH_TYPES[mesh_type].refusal(beam.length, beam.height, size, f"beam '{name}'")
-        if refusal:
-            problems.add(path, f"{in_mm(size)} {refusal}")
+def mesh_type_names(config: StudyConfig) -> list[str]:
+    """Names of all mesh types, generated ones first."""
+    return [*MESH_TYPES, *(config.mesh_files or ())]
+
+
+def stated_rows(config: StudyConfig) -> list[StatedStiffness]:
+    """Rows of stated stiffnesses; empty if the study states none."""
+    return config.definitions.paper.stiffness if config.definitions.paper else []
+
+
+def check_names(config: StudyConfig, problems: Problems) -> None:
+    """Check what declared sections are used for."""
+    for name, grid in config.grids.items():
+        path = ("grids", name)
+        for material in grid.material:
+            check_beam_material(problems, (*path, "material"), material, config)
+            if config.materials[material].plane == "strain" and 0.5 in (grid.poisson_ratio or ()):
+                what = f"material '{material}' is in plane strain, and this ratio is {INCOMPRESSIBLE}"
+                problems.add((*path, "poisson_ratio"), what)
+        if isinstance(grid.force, dict):
+            for beam in dict.fromkeys(grid.beam):
+                if beam not in grid.force:
+                    problems.add((*path, "force"), f"no force for beam '{beam}'; add '{beam}: <force>'")
+    seen = set()
+    for number, row in enumerate(stated_rows(config)):
+        where = ("definitions", "paper", "stiffness", number)
+        if (row.mesh_type, row.material) in seen:
+            problems.add(where, f"a second stiffness for {row.mesh_type} meshes of {row.material}; remove one")
+        seen.add((row.mesh_type, row.material))
+
+
+# -- counts ------------------------------------------------------------------------------------------------------------
+
+
+def most_scenes() -> int:
+    """Return the limit of scenes, which the environment may change."""
+    text = os.environ.get(MOST_SCENES_VARIABLE) or str(MOST_SCENES)
+    try:
+        return int(float(text))
+    except (ValueError, OverflowError):
+        remedy = "give one such as 2000000, or none"
+        raise ValueError(f"{MOST_SCENES_VARIABLE}: '{text}' is not a number of scenes; {remedy}") from None
+
+
+def check_count(
+    problems: Problems,
+    path: Sequence[Key],
+    lists: Mapping[str, Collection[Any]],
+    most: int,
+    what: str = "combinations",
+    remedy: str = FEWER,
+) -> int:
+    """Check the product of the lengths of lists, and return it."""
+    count = math.prod(map(len, lists.values()))
+    if count > most:
+        shown = " x ".join(f"{len(values)} {name}" for name, values in lists.items() if len(values) > 1)
+        problems.add(path, f"{count} {what} ({shown}); a study has at most {most}: {remedy}")
+    return count
 
 
 def check_product(problems: Problems, section: object, path: Sequence[Key], labels: Iterable[str], most: int) -> None:
     """Check the product of a section's lists before it is expanded."""
-    lists = {label: len(getattr(section, label)) for label in labels}
-    count = math.prod(lists.values())
-    if count > most:
-        shown = " x ".join(f"{size} {label}" for label, size in lists.items() if size > 1)
-        problems.add(path, f"{_counted(count)} combinations ({shown}); a study has at most {most}: {FEWER}")
+    check_count(problems, path, {label: getattr(section, label) for label in labels}, most)
 
 
-def check_particles(
-    problems: Problems, path: Sequence[Key], sizes: Iterable[float], length: float, height: float
-) -> None:
-    """Refuse mesh sizes that give too many particles."""
-    if refusal := _too_many(min(sizes), length, height):
-        problems.add(path, f"{in_mm(min(sizes))} gives {refusal}")
+def check_scenes(config: StudyConfig, problems: Problems) -> None:
+    """Check the number of scenes, and of cells, before grids are expanded."""
+    try:
+        left = most_scenes()
+    except ValueError as error:
+        problems.stop_at((), str(error))
+    what = "scenes"
+    labels: dict[str, set[Any]] = defaultdict(set)
+    for name, grid in config.grids.items():
+        parts = factors(grid)
+        lists = {" and ".join(group): rows for group, rows in parts}
+        left -= check_count(problems, ("grids", name), lists, left, what, f"{FEWER}, {MORE_SCENES}")
+        what = "scenes beside those of the grids above"
+        for group, rows in parts:
+            for label, values in zip(group, zip(*rows)):
+                labels[label] |= set(values)
+    problems.stop()
+    if not any(grid.exclude for grid in config.grids.values()):  # which may leave labels out
+        used = {name: values for name, values in labels.items() if name not in ("force", "pressure")}
+        check_cells(config, used, False, problems)
 
 
-def _too_many(size: float, length: float, height: float) -> str:
-    """Return how many particles a mesh has beyond the limit, and the remedy, or an empty string."""
-    particles = length * height / (COEFFICIENT * size**2) if size**2 else math.inf
-    if particles <= MOST_MESHED:
-        return ""
-    least = 1.05e3 * math.sqrt(length * height / COEFFICIENT / MOST_MESHED)
-    return f"{particles:.0e} particles; give {least:.2g} mm or more"
-
-
-def check_labels(problems: Problems, path: Sequence[Key], lists: Mapping[str, set[Any]], further: str = "") -> int:
-    """Check the number of cells that labels have together, and return it."""
-    cells = math.prod(map(len, lists.values()))
-    if cells > MOST_CELLS:
-        shown = " x ".join(f"{len(values)} {label}" for label, values in lists.items() if len(values) > 1)
-        most = f"a dataset has at most {MOST_CELLS}: {FEWER}{further}"
-        problems.add(path, f"{_counted(cells)} cells of all labels together ({shown}); {most}")
-    return cells
-
-
-def check_cells(config: StudyConfig, lists: dict[str, set[Any]], curves: bool, problems: Problems) -> None:
-    """Check the size of the dataset, which has a cell for each combination of labels."""
-    further = "; parameters that change together are better drawn under 'samples'"
-    cells = check_labels(problems, ("grids",), lists, further)
-    if not cells:
-        return  # a study of study kinds alone
-    once = cells // len(lists["definition"]) // len(lists.get("stiffness_scale", "1"))
-    points = once * config.sensitivity.points
-    if curves and points > MOST_CURVE_POINTS:
-        of = f"{config.sensitivity.points} on each of {once} curves"
-        most = f"give at most {MOST_CURVE_POINTS}, or set sensitivity: false in grids that need no curves"
-        problems.add(("sensitivity", "points"), f"{_counted(points)} points, {of}; {most}")
-
-
-def check_numbers(lists: dict[str, set[Any]], problems: Problems) -> None:
-    """Check that numeric labels differ by more than `SAME_VALUE`."""
+def check_cells(config: StudyConfig, lists: Mapping[str, set[Any]], curves: bool, problems: Problems) -> None:
+    """Check the labels of the dataset, which has a cell for each combination of them."""
+    further = "parameters that change together are better drawn under 'samples'"
+    check_count(problems, ("grids",), lists, MOST_CELLS, "cells of all labels together", f"{FEWER}; {further}")
+    if curves:
+        of_curves = {name: one for name, one in lists.items() if name not in ("definition", "stiffness_scale")}
+        of_curves["points"] = set(range(config.sensitivity.points))
+        remedy = "give fewer, or set sensitivity: false in grids that need no curves"
+        path = ("sensitivity", "points")
+        check_count(problems, path, of_curves, MOST_CURVE_POINTS, "points of curves", remedy)
     for name, values in lists.items():
         numbers = sorted(value for value in values if isinstance(value, float))
         for one, other in zip(numbers, numbers[1:]):
@@ -225,8 +174,61 @@ def check_numbers(lists: dict[str, set[Any]], problems: Problems) -> None:
                 problems.add(("grids",), f"{name} has {one!r} and {other!r}, which are one label; write them alike")
 
 
-def _counted(count: int) -> str:
-    return str(count) if count < 1e7 else f"{count:.3g}"
+# -- meshes ------------------------------------------------------------------------------------------------------------
+
+
+def in_mm(length: float) -> str:
+    """Length as messages show it."""
+    return f"{1e3 * length:g} mm"
+
+
+def check_particles(
+    problems: Problems, path: Sequence[Key], sizes: Iterable[float], length: float, height: float, shown: str = ""
+) -> None:
+    """Refuse mesh sizes that give too many particles."""
+    size = min(sizes)
+    particles = length * height / (COEFFICIENT * size**2) if size**2 else math.inf
+    if particles > MOST_MESHED:
+        least = 1.05e3 * math.sqrt(length * height / COEFFICIENT / MOST_MESHED)
+        problems.add(path, f"{shown or in_mm(size)} gives {particles:.0e} particles; give {least:.2g} mm or more")
+
+
+def check_meshes(config: StudyConfig, grids: Iterable[Grid], problems: Problems) -> None:
+    """Check mesh sizes against the size of their beams."""
+    for grid in grids:
+        for mesh in dict.fromkeys(scene.mesh for scene in grid.scenes if scene.mesh.file is None):
+            size, beam = mesh.mesh_size, config.beams[mesh.beam.name]
+            number = config.grids[grid.name].mesh_size.index(size)
+            path, written = part_of(problems.content, ("grids", grid.name, "mesh_size", number))
+            shown = show(written) if isinstance(written, str) else in_mm(size)
+            side = min(beam.length, beam.height)
+            if size > side:
+                most = f"give at most its smaller side, {in_mm(side)}"
+                problems.add(path, f"{shown} is larger than beam '{mesh.beam.name}'; {most}")
+            where = f"{shown} on beam '{mesh.beam.name}'"
+            check_particles(problems, path, [size], beam.length, beam.height, where)
+
+
+def check_files(meshes: Iterable[MeshSpec], scenes: Iterable[SceneSpec], problems: Problems) -> None:
+    """Check that different things do not share a file name."""
+    parts = {(scene.mesh.beam.name, scene.mesh.mesh_type, scene.material.name) for scene in scenes}
+    pairs = {(beam, material) for beam, _, material in parts}
+    sizes = {mesh.mesh_size for mesh in meshes}
+    boxes = {(mesh.beam.length, mesh.beam.height) for mesh in meshes}
+    extents = [f"{1e3 * length:g} x {1e3 * height:g} mm" for length, height in boxes]
+    for path, what, names, remedy in (
+        (("grids",), "mesh sizes", [in_mm(size) for size in sizes], "merge them, names keep six digits"),
+        (("beams",), "extents of beams", extents, "give these beams the same, names keep six digits"),
+        (("materials",), "references", ["_".join(pair) for pair in pairs], "rename a beam or a material"),
+        (("materials",), "scenes", ["_".join(part) for part in parts], "rename a beam or a material"),
+    ):
+        for name, number in Counter(name.casefold() for name in names).most_common(1):
+            if number > 1:
+                problems.add(path, f"{number} different {what} are all named '{name}'; {remedy}")
+                return
+
+
+# -- definitions -------------------------------------------------------------------------------------------------------
 
 
 def check_able(
@@ -252,130 +254,37 @@ def check_for_triangles(names: Iterable[str], path: Sequence[Key], problems: Pro
     check_able(problems, path, names, why, 3)
 
 
-def check_density(config: StudyConfig, name: str, path: Sequence[Key], problems: Problems) -> None:
-    """Check that a declared material has a density."""
-    if name in config.materials and config.materials[name].density is None:
-        problems.add(path, f"'{name}' has no density; add one to it under materials, such as density: 7850 kg/m^3")
-
-
-def mesh_type_names(config: StudyConfig) -> list[str]:
-    """Names of all mesh types, generated ones first."""
-    return [*MESH_TYPES, *(config.mesh_files or ())]
-
-
-def check_meshes(config: StudyConfig, content: dict[str, Any], grids: Iterable[Grid], problems: Problems) -> None:
-    """Check mesh sizes against the size of their beams."""
-    for expanded in grids:
-        name, grid = expanded.name, config.grids[expanded.name]
-        made = {(scene.mesh.mesh_size, scene.mesh.beam.name) for scene in expanded.scenes if scene.mesh.file is None}
-        written = content["grids"][name]["mesh_size"]
-        for number, size in enumerate(grid.mesh_size):
-            listed = isinstance(written, list)
-            shown = f"'{written[number]}'" if listed else f"'{written}'" if isinstance(written, str) else in_mm(size)
-            path = ("grids", name, "mesh_size", number) if listed else ("grids", name, "mesh_size")
-            for beam in dict.fromkeys(grid.beam):
-                if (size, beam) not in made:
-                    continue
-                length, height = config.beams[beam].length, config.beams[beam].height
-                if size > min(length, height):
-                    side = in_mm(min(length, height))
-                    problems.add(path, f"{shown} is larger than beam '{beam}'; give at most its smaller side, {side}")
-                elif refusal := _too_many(size, length, height):
-                    problems.add(path, f"{shown} gives beam '{beam}' {refusal}")
-
-
-def in_mm(length: float) -> str:
-    """Length as messages show it."""
-    return f"{1e3 * length:g} mm"
-
-
-def _check_kinds(grids: Iterable[Grid], problems: Problems) -> None:
-    """Check that definitions fit the cells and loads of their grids."""
+def check_definitions(config: StudyConfig, grids: Sequence[Grid], problems: Problems) -> None:
+    """Check that definitions fit the cells and loads of their grids, and that the study states what they need."""
+    stated = {(row.mesh_type, row.material): (number, row.value) for number, row in enumerate(stated_rows(config))}
     for grid in grids:
-        found: dict[str, None] = {}
-        for name, mesh_type, on in dict.fromkeys((one.definition, one.mesh.mesh_type, one.load) for one in grid.scenes):
-            definition = DEFINITIONS[name]
-            made = MESH_TYPES.get(mesh_type)
+        path = ("grids", grid.name, "definition")
+        for name, mesh_type, load in dict.fromkeys((s.definition, s.mesh.mesh_type, s.load) for s in grid.scenes):
+            definition, made = DEFINITIONS[name], MESH_TYPES.get(mesh_type)
             if made and made.corners not in definition.cells:
                 needs, has = ("triangles", "quadrilaterals") if made.corners == 4 else ("rectangles", "triangles")
-                found[f"'{definition.name}' needs {needs} and mesh type '{mesh_type}' has {has}; {SEPARATE}"] = None
-            if definition.uniaxial and not LOADS[on].kind.uniaxial:
+                problems.add(path, f"'{name}' needs {needs} and mesh type '{mesh_type}' has {has}; {SEPARATE}")
+            if definition.uniaxial and not LOADS[load].kind.uniaxial:
                 kinds = " and ".join(name for name, load in LOADS.items() if load.kind.uniaxial)
-                found[f"'{definition.name}' is for {kinds} and load '{on}' is neither; {SEPARATE}"] = None
-        for message in found:
-            problems.add(("grids", grid.name, "definition"), message)
-
-
-SEPARATE = "give them grids of their own"
-
-
-def check_definitions(config: StudyConfig, content: dict[str, Any], grids: Sequence[Grid], problems: Problems) -> None:
-    """Check that the study states what its definitions need."""
-    _check_kinds(grids, problems)
-    stated = {(row.mesh_type, row.material): row.value for row in stated_rows(config)}
-    sheets: dict[tuple[str, str], dict[tuple[float, float], None]] = {}  # thickness and Young's modulus
-    for grid in grids:
-        lacking = set()
-        for scene in grid.scenes:
-            pair = (scene.mesh.mesh_type, scene.material.name)
-            if scene.definition == "paper":
-                sheets.setdefault(pair, {})[scene.mesh.beam.thickness, scene.material.young_modulus] = None
-                if pair not in stated and pair not in lacking:
-                    lacking.add(pair)
-                    example = f"{{mesh_type: {pair[0]}, material: {pair[1]}, value: <stiffness> N/m}}"
-                    problems.add(
-                        ("grids", grid.name, "definition"),
-                        f"'paper' has no stiffness for {pair[0]} meshes of {pair[1]}; "
-                        f"add {example} to definitions.paper.stiffness",
-                    )
-        if not config.definitions.calibrated and any(scene.definition == "calibrated" for scene in grid.scenes):
-            problems.add(
-                ("grids", grid.name, "definition"),
-                "'calibrated' needs to know on what; add definitions.calibrated with a beam and a load",
-            )
-    for number, row in enumerate(stated_rows(config)):
-        modulus = config.materials[row.material].young_modulus
-        if modulus is None:
-            continue  # there is no E t to judge it by
-        every = {(beam.thickness, modulus): None for beam in config.beams.values()}
-        for thickness, modulus in sheets.get((row.mesh_type, row.material), every):
-            expected = COEFFICIENT * modulus * thickness
-            if not expected / PLAUSIBLE <= row.value <= expected * PLAUSIBLE:
-                written = content["definitions"]["paper"]["stiffness"][number]["value"]
-                other = "" if modulus == config.materials[row.material].young_modulus else f" and of {modulus:.4g} Pa"
+                problems.add(path, f"'{name}' is for {kinds} and load '{load}' is neither; {SEPARATE}")
+            if name == "calibrated" and not config.definitions.calibrated:
+                problems.add(path, "'calibrated' needs to know on what; add definitions.calibrated, a beam and a load")
+        paper = (scene for scene in grid.scenes if scene.definition == "paper")
+        for mesh_type, material, thickness in dict.fromkeys(
+            (scene.mesh.mesh_type, scene.material, scene.mesh.beam.thickness) for scene in paper
+        ):
+            if (mesh_type, material.name) not in stated:
+                example = f"{{mesh_type: {mesh_type}, material: {material.name}, value: <stiffness> N/m}}"
+                lack = f"'paper' has no stiffness for {mesh_type} meshes of {material.name}"
+                problems.add(path, f"{lack}; add {example} to definitions.paper.stiffness")
+                continue
+            number, value = stated[mesh_type, material.name]
+            expected = COEFFICIENT * material.young_modulus * thickness
+            if not expected / PLAUSIBLE <= value <= expected * PLAUSIBLE:
+                place, written = part_of(problems.content, ("definitions", "paper", "stiffness", number, "value"))
+                sheet = f"{material.name}, {1e3 * thickness:g} mm thick and of {material.young_modulus:.4g} Pa"
                 problems.add(
-                    ("definitions", "paper", "stiffness", number, "value"),
-                    f"'{written}' cannot be meant: sqrt(3)/2 E t of {row.material}, {1e3 * thickness:g} mm thick"
-                    f"{other}, is {expected:.4g} N/m; give a stiffness near that, in N/m",
+                    place,
+                    f"{show(written)} cannot be meant: sqrt(3)/2 E t of {sheet}, is {expected:.4g} N/m; give a "
+                    "stiffness near that, in N/m",
                 )
-                break
-
-
-def stated_rows(config: StudyConfig) -> list[StatedStiffness]:
-    """Rows of stated stiffnesses; empty if the study states none."""
-    return config.definitions.paper.stiffness if config.definitions.paper else []
-
-
-def check_files(
-    meshes: Iterable[MeshSpec], scenes: Iterable[SceneSpec], references: Iterable[Reference], problems: Problems
-) -> None:
-    """Check that different things do not share a file name."""
-    parts = {(scene.mesh.beam.name, scene.mesh.mesh_type, scene.material.name) for scene in scenes}
-    pairs = {(reference.beam.name, reference.material.name) for reference in references}
-    flat = {
-        replace(mesh, beam=replace(mesh.beam, thickness=min(mesh.beam.length, mesh.beam.height))) for mesh in meshes
-    }
-    sizes = {mesh.mesh_size for mesh in meshes}
-    boxes = {(mesh.beam.length, mesh.beam.height) for mesh in meshes}
-    extents = [f"{1e3 * length:g} x {1e3 * height:g} mm" for length, height in boxes]
-    for path, what, names, remedy in (
-        (("grids",), "mesh sizes", [f"{1e3 * size:g} mm" for size in sizes], "merge them, names keep six digits"),
-        (("beams",), "extents of beams", extents, "give these beams the same, names keep six digits"),
-        (("beams",), "meshes", [mesh.name for mesh in flat], "rename a beam"),
-        (("materials",), "references", ["_".join(pair) for pair in pairs], "rename a beam or a material"),
-        (("materials",), "scenes", ["_".join(part) for part in parts], "rename a beam or a material"),
-    ):
-        for name, number in Counter(name.casefold() for name in names).most_common(1):
-            if number > 1:
-                problems.add(path, f"{number} different {what} are all named '{name}'; {remedy}")
-                return

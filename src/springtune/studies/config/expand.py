@@ -1,42 +1,40 @@
 """Expand the sections of a study into meshes, scenes and curves."""
 
 import os
+from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
-from springtune.mesh import MESH_TYPES
 from springtune.mesh.formats import LARGEST_FILE
+from springtune.mesh.types import MESH_TYPES
 from springtune.problem.geometry import Beam
 from springtune.problem.loads import KINEMATICS, LOADS
 from springtune.problem.materials import AnyMaterial, Material, Rubber, only_isotropic
 from springtune.problem.parameters import SWEPT
 from springtune.safe_io.escapes import clipped
-from springtune.springs import DEFINITIONS
+from springtune.springs.base import DEFINITIONS
 from springtune.springs.lattice import COEFFICIENT
 
-from .checks import check_cells, check_files, check_numbers, mesh_type_names, stated_rows
+from .checks import check_cells, check_files, mesh_type_names, stated_rows
 from .combinations import combinations, read_printed
 from .fields import RANGE_DIGITS
 from .kind import Kind
 from .messages import Problems
-from .model import FURTHER_REFERENCES, CurveSpec, Grid, MeshFiles, MeshSpec, Reference, SceneSpec, Study, swept_value
+from .model import FURTHER_REFERENCES, CurveSpec, Grid, MeshFiles, MeshSpec, Reference, SceneSpec, Study
 from .sections import StudyConfig
-
-Ranks = dict[str, dict[str, int]]
 
 Item = TypeVar("Item", MeshSpec, SceneSpec, CurveSpec, Reference)
 
 
-def files_of_meshes(config: StudyConfig, folder: Path, problems: Problems) -> MeshFiles:
+def files_of_meshes(config: StudyConfig, beams: Mapping[str, Beam], problems: Problems) -> MeshFiles:
     """Meshes from files by (mesh type, beam's name, mesh size)."""
     found: MeshFiles = {}
-    beams = declared(config, folder).beams
     for name, rows in (config.mesh_files or {}).items():
         for number, row in enumerate(rows):
-            path, label = folder / row.file, (name, row.beam, row.mesh_size)
+            path, label = problems.folder / row.file, (name, row.beam, row.mesh_size)
             where = ("mesh_files", name, number)
             fault = file_fault(path)
             if fault:
@@ -46,22 +44,6 @@ def files_of_meshes(config: StudyConfig, folder: Path, problems: Problems) -> Me
             found[label] = MeshSpec(beams[row.beam], name, row.mesh_size, path, row.unit)
     problems.stop()
     return found
-
-
-def files_of_tests(config: StudyConfig, folder: Path, problems: Problems) -> tuple[Path, ...]:
-    """Check each file of material tests, and return their paths."""
-    found: list[Path] = []
-    for name, material in config.materials.items():
-        own = [getattr(material, key) for key in ("uniaxial_test", "equibiaxial_test", "pure_shear_test")]
-        if not material.uniaxial_test:
-            continue
-        try:
-            material.material(name, folder)
-        except ValueError as error:
-            problems.add(("materials", name), str(error))
-        found += [folder / file for file in own if file is not None]
-    problems.stop()
-    return tuple(found)
 
 
 def file_fault(path: Path) -> str:
@@ -85,16 +67,21 @@ class Declared:
     folder: Path = Path()
 
 
-def declared(config: StudyConfig, folder: Path = Path()) -> Declared:
-    """Bodies and materials that a study declares."""
-    return Declared(
-        {name: Beam(beam.length, beam.height, beam.thickness, name) for name, beam in config.beams.items()},
-        {name: material.material(name, folder) for name, material in config.materials.items()},
-        folder,
-    )
+def declared(config: StudyConfig, problems: Problems) -> Declared:
+    """Bodies and materials that a study declares; files of material tests are read."""
+    beams = {name: Beam(beam.length, beam.height, beam.thickness, name) for name, beam in config.beams.items()}
+    materials = {}
+    for name, material in config.materials.items():
+        try:
+            materials[name] = material.material(name, problems.folder)
+        except ValueError as error:
+            problems.add(("materials", name), str(error))
+    problems.stop()
+    return Declared(beams, materials, problems.folder)
 
 
-def _ranks(config: StudyConfig) -> Ranks:
+def _ranks(config: StudyConfig) -> dict[str, dict[str, int]]:
+    """Rank of each label, by dimension."""
     names: dict[str, Iterable[str]] = {
         "beam": config.beams,
         "mesh_type": mesh_type_names(config),
@@ -106,44 +93,20 @@ def _ranks(config: StudyConfig) -> Ranks:
     return {dimension: {name: rank for rank, name in enumerate(labels)} for dimension, labels in names.items()}
 
 
-def _order(ranks: Ranks) -> Callable[[MeshSpec | SceneSpec | CurveSpec | Reference], tuple[float, ...]]:
-    """Return a sort key for meshes, scenes, curves and references."""
-    beams, mesh_types, materials, loads = (ranks[name] for name in ("beam", "mesh_type", "material", "load"))
-    definitions, kinematics = ranks["definition"], ranks["kinematics"]
-
-    def key(item: MeshSpec | SceneSpec | CurveSpec | Reference) -> tuple[float, ...]:
-        if isinstance(item, MeshSpec):
-            return beams[item.beam.name], mesh_types[item.mesh_type], item.mesh_size, item.beam.thickness
-        material = item.material
-        own = materials[material.name], loads[item.load]
-        moduli = material.young_modulus, material.poisson_ratio
-        if isinstance(item, Reference):
-            return beams[item.beam.name], *own, abs(item.force), item.beam.thickness, *moduli
-        mesh, beam = item.mesh, item.mesh.beam
-        place = beams[beam.name], mesh_types[mesh.mesh_type], mesh.mesh_size
-        law = kinematics[item.kinematics], abs(item.force), beam.thickness
-        if isinstance(item, CurveSpec):
-            return *place, *own, *law, *moduli
-        return *place, *own, definitions[item.definition], *law, *moduli, item.stiffness_scale
-
-    return key
-
-
 def swept(config: StudyConfig) -> tuple[str, ...]:
     """Parameters that are dimensions: the ones given in a grid, and a force with several values."""
     found = {name for grid in config.grids.values() for name in SWEPT if name != "force" and getattr(grid, name)}
-    several = [values for grid in config.grids.values() for values in (grid.force or {}).values()]
-    several += [grid.pressure for grid in config.grids.values() if grid.pressure]
-    if any(len(set(values)) > 1 for values in several):
-        found.add("force")
+    for grid in config.grids.values():
+        forces = grid.force.values() if isinstance(grid.force, dict) else [grid.force or [], grid.pressure or []]
+        if any(len(set(values)) > 1 for values in forces):
+            found.add("force")
     return tuple(name for name in SWEPT if name in found)
 
 
 def _bodies(
-    config: StudyConfig, files: MeshFiles, folder: Path
+    known: Declared, files: MeshFiles
 ) -> tuple[Callable[..., Beam], Callable[..., Material], Callable[..., MeshSpec | None]]:
     """Functions that make each beam, material and mesh of a study once; a mesh is None if its file is missing."""
-    known = declared(config, folder)
 
     @cache
     def beam(name: str, thickness: float | None) -> Beam:
@@ -173,9 +136,9 @@ def _force(pressure: float, beam: Beam) -> float:
     return float(f"{pressure * beam.length * beam.thickness:.{RANGE_DIGITS}g}")
 
 
-def expand(config: StudyConfig, mesh_files: MeshFiles, problems: Problems) -> tuple[Grid, ...]:
+def expand(config: StudyConfig, bodies: Declared, mesh_files: MeshFiles, problems: Problems) -> tuple[Grid, ...]:
     """Expand grids into scenes and curves."""
-    make_beam, make_material, make_mesh = _bodies(config, mesh_files, problems.folder)
+    make_beam, make_material, make_mesh = _bodies(bodies, mesh_files)
     several = "force" in swept(config)
     forces: dict[tuple[Beam, Material, str], tuple[float, str]] = {}
     grids = []
@@ -229,51 +192,53 @@ def _calibrating(config: StudyConfig, scenes: Sequence[SceneSpec], problems: Pro
     calibration = config.definitions.calibrated
     if not calibration:
         return []
-    cells = {
-        (scene.mesh, scene.material, scene.load, scene.force): None
-        for scene in scenes
-        if (scene.mesh.beam.name, scene.load) == (calibration.beam, calibration.load)
-    }
-    needed = {
-        (scene.mesh.mesh_type, scene.material, scene.kinematics): None
-        for scene in scenes
-        if scene.definition == "calibrated"
-    }
-    groups: dict[tuple[str, Material], list[tuple[MeshSpec, Material, str, float]]] = {}
-    for cell in cells:
-        groups.setdefault((cell[0].mesh_type, cell[1]), []).append(cell)
-    for (mesh_type, material), members in groups.items():
-        for what, unit, values in (
-            ("forces", "N", {abs(force) for _, _, _, force in members}),
-            ("thicknesses", "mm", {1e3 * mesh.beam.thickness for mesh, _, _, _ in members}),
-        ):
-            if len(values) > 1 and any((mesh_type, material) == one[:2] for one in needed):
-                listed = ", ".join(f"{value:g} {unit}" for value in sorted(values))
-                problems.add(
-                    ("definitions", "calibrated"),
-                    f"beam '{calibration.beam}' in {calibration.load} on {mesh_type} meshes of {material.name} has "
-                    f"{len(values)} {what} ({clipped(listed)}), and one stiffness is calibrated; give it one value, "
-                    "or calibrate on a beam or load that is not swept",
-                )
+    place = calibration.beam, calibration.load
+    cells: dict[tuple[str, Material], dict[tuple[MeshSpec, Material, str, float], None]] = defaultdict(dict)
+    for one in scenes:
+        if (one.mesh.beam.name, one.load) == place:
+            cells[one.mesh.mesh_type, one.material][one.mesh, one.material, one.load, one.force] = None
+    calibrated = (one for one in scenes if one.definition == "calibrated")
     curves: list[CurveSpec] = []
-    for mesh_type, material, kinematics in needed:
-        found = [CurveSpec(*cell, kinematics) for cell in groups.get((mesh_type, material), ())]
+    for mesh_type, material, kinematics in dict.fromkeys(
+        (one.mesh.mesh_type, one.material, one.kinematics) for one in calibrated
+    ):
+        found = [CurveSpec(*cell, kinematics) for cell in cells[mesh_type, material]]
+        curves += found
+        where = f"beam '{place[0]}' in {place[1]} on {mesh_type} meshes of {material.name}"
         if not found:
             problems.add(
                 ("definitions", "calibrated"),
-                f"no grid has beam '{calibration.beam}' in {calibration.load} on {mesh_type} meshes of {material.name}"
-                ", but scenes there are 'calibrated'; add it to a grid, or calibrate on another beam or load",
+                f"no grid has {where}, but scenes there are 'calibrated'; add it to a grid, or calibrate on another "
+                "beam or load",
             )
-        curves += found
+        for what, unit, values in (
+            ("forces", "N", {abs(curve.force) for curve in found}),
+            ("thicknesses", "mm", {1e3 * curve.mesh.beam.thickness for curve in found}),
+        ):
+            if len(values) > 1:
+                listed = clipped(", ".join(f"{value:g} {unit}" for value in sorted(values)))
+                problems.add(
+                    ("definitions", "calibrated"),
+                    f"{where} has {len(values)} {what} ({listed}), and one stiffness is calibrated; give it one value, "
+                    "or calibrate on a beam or load that is not swept",
+                )
     return curves
 
 
 def build(
-    config: StudyConfig, grids: tuple[Grid, ...], kinds: Sequence[Kind], problems: Problems, about: dict[str, Any]
+    config: StudyConfig,
+    bodies: Declared,
+    grids: tuple[Grid, ...],
+    kinds: Sequence[Kind],
+    problems: Problems,
+    about: dict[str, Any],
 ) -> Study:
     """Build the study with the parts of all study kinds."""
-    ranks = _ranks(config)
-    order = _order(ranks)
+    ranks, names = _ranks(config), swept(config)
+
+    def order(item: Item) -> tuple[Any, ...]:
+        labels = item.labels | {"thickness": item.beam.thickness} if isinstance(item, MeshSpec) else item.labels(names)
+        return tuple([ranks[name][str(label)] if name in ranks else label for name, label in labels.items()])
 
     def in_order(items: Iterable[Item]) -> tuple[Item, ...]:
         return tuple(sorted(dict.fromkeys(items), key=order))
@@ -284,14 +249,16 @@ def build(
     # By their places: hashing a beam and a material for each of 100,000 scenes is slow.
     found = {(id(one.mesh.beam), id(one.material), one.load, one.force): one for one in scenes}
     references = in_order(Reference(one.mesh.beam, one.material, one.load, one.force) for one in found.values())
-    check_files(meshes, scenes, references, problems)
+    check_files(meshes, scenes, problems)
     problems.stop()
-    names = swept(config)
-    used = _used(meshes, scenes, references, names)
-    check_numbers(used, problems)
+    used: dict[str, set[Any]] = {name: set() for name in (*ranks, "mesh_size", *names)}
+    for labels in [mesh.labels for mesh in meshes] + [one.labels(names) for one in references]:
+        for name, label in labels.items():
+            used[name].add(label)
+    for name in {"definition", "kinematics", "stiffness_scale"} & used.keys():
+        used[name] = {getattr(scene, name) for scene in scenes}
     check_cells(config, used, bool(curves), problems)
     problems.stop()
-    bodies = declared(config, problems.folder)
     parts = {kind.name: kind.expand(config, bodies) if kind.wanted(config) else () for kind in kinds}
     if config.printed and names:
         problems.stop_at(
@@ -313,7 +280,6 @@ def build(
         further_references=tuple(name for name in FURTHER_REFERENCES if name in config.further_references),
         materials=bodies.materials,
         parts=parts,
-        limits={"seconds": config.limits.seconds, "memory": config.limits.memory},
         grids=grids,
         stiffness_ratios=tuple(COEFFICIENT * step for step in steps),
         stiffness_table={(row.mesh_type, row.material): row.value for row in stated_rows(config)},
@@ -331,29 +297,8 @@ def build(
     return study
 
 
-def _used(
-    meshes: Iterable[MeshSpec], scenes: Sequence[SceneSpec], references: Sequence[Reference], names: Iterable[str]
-) -> dict[str, set[Any]]:
-    """Labels that scenes use, by dimension."""
-    used: dict[str, set[Any]] = {
-        "beam": {mesh.beam.name for mesh in meshes},
-        "mesh_type": {mesh.mesh_type for mesh in meshes},
-        "mesh_size": {mesh.mesh_size for mesh in meshes},
-        "material": {one.material.name for one in references},
-        "load": {one.load for one in references},
-        "definition": {scene.definition for scene in scenes},
-        "kinematics": {scene.kinematics for scene in scenes},
-    }
-    for name in names:
-        if name == "stiffness_scale":
-            used[name] = {scene.stiffness_scale for scene in scenes}
-        else:
-            used[name] = {swept_value(one, one.beam, name) for one in references}
-    return used
-
-
 def _axes(
-    ranks: Ranks,
+    ranks: Mapping[str, Iterable[str]],
     used: dict[str, set[Any]],
     names: Iterable[str],
     further: Iterable[Mapping[str, Collection[str | float]]],

@@ -1,23 +1,36 @@
 """Types of the values of a study: parsing, and the expected form in words."""
 
 import math
-import re
-from collections.abc import Callable, Collection
-from typing import Annotated, Any
+from collections.abc import Callable, Collection, Mapping
+from typing import Annotated, Any, get_args, get_origin
 
-from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    Field,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    Tag,
+    ValidationError,
+    ValidationInfo,
+    ValidatorFunctionWrapHandler,
+    model_validator,
+)
+from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, core_schema
 
 from springtune import units
-from springtune.mesh import MESH_TYPES
+from springtune.mesh.types import MESH_TYPES
 from springtune.problem.loads import KINEMATICS, LOADS
 from springtune.problem.materials import MOST_TERMS
 from springtune.problem.parameters import PLANES
 from springtune.problem.quantities import beyond, nearest
 from springtune.registry import NAME, NAME_RULE
-from springtune.springs import DEFINITIONS
+from springtune.springs.base import DEFINITIONS
 
-from .messages import refuse, show
+from .messages import Key, refuse, show
 from .model import FURTHER_REFERENCES
 
 MOST_POINTS = 10_001
@@ -25,6 +38,9 @@ MOST_POINTS = 10_001
 LONGEST_TEXT = 1000
 
 MOST_LISTED = 10_000
+
+BEYOND_MEASURE = 1e30
+"""Size of a quantity of either sign from which nothing can be computed with it [SI units]."""
 
 FEW_NAMES = 5
 """Most names that a message lists."""
@@ -55,19 +71,21 @@ def quantity(kind: str, negative: str = "give a size above zero", signed: bool =
     about = units.QUANTITY_KINDS[kind]
 
     def read(value: str) -> float:
+        if signed and value.strip() in ("0", "0.0", "-0"):  # which needs no unit
+            return 0.0
         try:
             number = units.parse(value, kind)
         except units.UnitError as error:
             raise refuse(str(error)) from None
         if not number > 0 and not signed:
             raise refuse(f"{show(value)} is not above zero; {negative}, such as '{about.example}'")
-        if not signed and beyond(number, kind):
+        if not abs(number) < BEYOND_MEASURE if signed else beyond(number, kind):
             raise refuse(f"{show(value)} is beyond all measure; give {about.words}")
-        return number
+        return number + 0.0
 
-    sign = "[+-]" if signed else r"\+"
-    pattern = rf"^\s*{sign}?[0-9.]+([eE][+-]?[0-9]+)?\s*[^0-9\s].*$"
-    return Scalar(read, {"type": "string", "pattern": pattern, "examples": [about.example]}, about.words)
+    pattern = r"^\s*\+?[0-9.]+([eE][+-]?[0-9]+)?\s*[^0-9\s].*$"
+    form = {"type": ["string", "number"]} if signed else {"type": "string", "pattern": pattern}
+    return Scalar(read, form | {"examples": [about.example]}, about.words)
 
 
 def number(words: str, low: float, high: float, *, above: bool = False, whole: bool = False) -> Scalar:
@@ -88,17 +106,6 @@ def number(words: str, low: float, high: float, *, above: bool = False, whole: b
     return Scalar(read, schema, words)
 
 
-_MEMORY = re.compile(r"\+?([0-9]+(?:\.[0-9]*)?)\s*([MGT])B")
-
-
-def _read_memory(value: str) -> float:
-    found = _MEMORY.fullmatch(value.strip())
-    size = float(found[1]) * {"M": 1e6, "G": 1e9, "T": 1e12}[found[2]] if found else 0.0
-    if not 1e8 <= size <= 1e15:
-        raise refuse(f"{show(value)} is no memory that a scene could take; give at least '100 MB', such as '8 GB'")
-    return size
-
-
 def one_of(what: str, names: Collection[str]) -> Scalar:
     """Annotation of a name from a fixed list."""
 
@@ -110,12 +117,6 @@ def one_of(what: str, names: Collection[str]) -> Scalar:
     words = " or ".join(f"'{name}'" for name in names)
     short = f"a name such as '{next(iter(names))}'" if len(names) > FEW_NAMES else words
     return Scalar(read, {"enum": list(names)}, words, short)
-
-
-def _read_flag(value: str) -> bool:
-    if value.lower() not in ("true", "false"):
-        raise refuse(f"{show(value)} is neither true nor false; give one of them")
-    return value.lower() == "true"
 
 
 Length = Annotated[float, quantity("length")]
@@ -131,9 +132,34 @@ PoissonRatio = Annotated[float, POISSON_RATIO]
 Ratio = Annotated[float, number("a number above 0", 0, math.inf, above=True)]
 Terms = Annotated[int, number(f"a whole number from 1 to {MOST_TERMS}", 1, MOST_TERMS, whole=True)]
 Points = Annotated[int, number(f"a whole number from 2 to {MOST_POINTS}, such as 61", 2, MOST_POINTS, whole=True)]
-# Mesh types, beams and materials may be names that a study declares: a type takes any text, `checks` looks it up.
+
+
+def declared(what: str, section: str, beside: Collection[str] = ()) -> AfterValidator:
+    """Annotation of a name that a section of the study declares; the context of validation has its sections."""
+
+    def known(name: str, info: ValidationInfo) -> str:
+        names = () if info.context is None else info.context.get(section, ())
+        if info.context is not None and names is not None and name not in names and name not in beside:
+            raise refuse(f"unknown {what} '{name}'; {nearest(name, [*beside, *names])}; or declare it under {section}")
+        return name
+
+    return AfterValidator(known)
+
+
+FILES = "files that a study names"
+"""Key of their list in the context of validation."""
+
+
+def _noted(name: str, info: ValidationInfo) -> str:
+    if info.context is not None:
+        info.context[FILES].append(name)
+    return name
+
+
 MeshType = Annotated[
-    str, Scalar(str, {"type": "string", "examples": list(MESH_TYPES)}, "a mesh type such as 'structured'")
+    str,
+    Scalar(str, {"type": "string", "examples": list(MESH_TYPES)}, "a mesh type such as 'structured'"),
+    declared("mesh type", "mesh_files", MESH_TYPES),
 ]
 MadeType = Annotated[str, one_of("mesh type", MESH_TYPES)]
 Load = Annotated[str, one_of("load", LOADS)]
@@ -141,19 +167,12 @@ Plane = Annotated[str, one_of("plane", PLANES)]
 FurtherReference = Annotated[str, one_of("reference", FURTHER_REFERENCES)]
 Kinematics = Annotated[str, one_of("kinematics", KINEMATICS)]
 DefinitionName = Annotated[str, one_of("definition", DEFINITIONS)]
-LimitSeconds = Annotated[float, number("a number of seconds from 1, such as 600", 1, 1e9)]
-Memory = Annotated[
-    float,
-    Scalar(
-        _read_memory, {"type": "string", "pattern": _MEMORY.pattern, "examples": ["8 GB"]}, "a memory such as '8 GB'"
-    ),
-]
-_COUNT = number(f"a whole number from 2 to {MOST_LISTED}, such as 9", 2, MOST_LISTED, whole=True)
-Flag = Annotated[bool, Scalar(_read_flag, {"type": "boolean"}, "true or false")]
 Text = Annotated[str, Scalar(str, {"type": "string", "minLength": 1}, "a text")]
-FileName = Annotated[str, Scalar(str, {"type": "string", "minLength": 1}, "the path of a file")]
-BeamName = Annotated[str, Scalar(str, {"type": "string"}, "the name of a beam")]
-MaterialName = Annotated[str, Scalar(str, {"type": "string"}, "the name of a material")]
+FileName = Annotated[str, Scalar(str, {"type": "string", "minLength": 1}, "the path of a file"), AfterValidator(_noted)]
+BeamName = Annotated[str, Scalar(str, {"type": "string"}, "the name of a beam"), declared("beam", "beams")]
+MaterialName = Annotated[
+    str, Scalar(str, {"type": "string"}, "the name of a material"), declared("material", "materials")
+]
 
 
 class Wrapped:
@@ -163,6 +182,34 @@ class Wrapped:
         return core_schema.no_info_wrap_validator_function(self._read, handler(source))
 
     _read: Callable[..., Any]
+
+
+class Words(Wrapped):
+    """Annotation with words for the expected value."""
+
+    def __init__(self, words: str) -> None:
+        self.words = words
+
+    def _read(self, value: object, handler: ValidatorFunctionWrapHandler) -> Any:
+        try:
+            return handler(value)
+        except ValidationError as error:
+            if any(details["type"] == "study" for details in error.errors(include_url=False)):
+                raise
+            raise refuse(f"{show(value)} does not fit; give {self.words}") from None
+
+
+Flag = Annotated[bool, Words("true or false")]
+
+
+def once(values: list[Any], *path: Key) -> list[Any]:
+    """Return the values of a list, whose place in a section is given, if none stands twice."""
+    seen = set()
+    for number, value in enumerate(values):
+        if value in seen:
+            raise refuse("{value} is listed twice; remove one", *path, number)
+        seen.add(value)
+    return values
 
 
 class OneOrMore(Wrapped):
@@ -175,7 +222,7 @@ class OneOrMore(Wrapped):
         array = handler(schema["schema"]) | {"minItems": 1} | ({} if self.repeats else {"uniqueItems": True})
         return {"anyOf": [array["items"], array]}
 
-    def _read(self, value: object, handler: core_schema.ValidatorFunctionWrapHandler) -> Any:
+    def _read(self, value: object, handler: ValidatorFunctionWrapHandler) -> Any:
         listed = [value] if isinstance(value, str) else value
         if not isinstance(listed, list):
             raise refuse(f"{show(value)} instead of a value or a list; write it as [first, second]")
@@ -184,17 +231,82 @@ class OneOrMore(Wrapped):
         if len(listed) > MOST_LISTED:
             raise refuse(f"{len(listed)} values; give at most {MOST_LISTED}, or split the study into several")
         items = handler(listed)
-        seen = set()
-        for number, item in enumerate(items):
-            if item in seen and not self.repeats:
-                raise refuse(f"{show(listed[number])} is listed twice; remove one", number)
-            seen.add(item)
-        return items
+        return items if self.repeats else once(items)
 
 
-SPACINGS = ("linear", "logarithmic")
+def default(value: Any, **options: Any) -> Any:
+    """Field with a default, written as in a study."""
+    return Field(value, validate_default=True, **options)
 
-RANGE_KEYS = ("from", "to", "points", "spacing")
+
+def optional(section: Any, description: str) -> tuple[Any, Any]:
+    """Type and field of a section that a study may leave out."""
+    return section | None, Field(None, description=description)
+
+
+def expected_value(field: FieldInfo) -> str:
+    """Expected value of a field in words, such as ``a length such as '200 mm'``."""
+    # A field that may be absent has its notes one level deeper.
+    for annotation, notes in ((field.annotation, field.metadata), *map(_parts, get_args(field.annotation))):
+        for note in notes:
+            if hasattr(note, "words"):
+                return str(note.words)
+            if isinstance(note, OneOrMore):
+                item = get_args(annotation)[0]
+                return f"{get_args(item)[1].words}, or a list"
+    listed = get_origin(field.annotation) is list
+    return "a list of sections; see below" if listed else "a section; see below"
+
+
+def _parts(annotation: Any) -> tuple[Any, tuple[Any, ...]]:
+    """Type and notes of an `Annotated`; any other annotation has no notes."""
+    if get_origin(annotation) is not Annotated:
+        return annotation, ()
+    inside, *notes = get_args(annotation)
+    return inside, tuple(notes)
+
+
+class Section(BaseModel):
+    """A mapping of known keys in a study; the text below a key is its meaning in the manual."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True, use_attribute_docstrings=True)
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **_: Any) -> None:
+        for field in cls.model_fields.values():
+            field.description = field.description and " ".join(field.description.split())
+
+    @model_validator(mode="before")
+    @classmethod
+    def _known_keys(cls, value: object) -> dict[str, object]:
+        names = {field.alias or name: field for name, field in cls.model_fields.items()}
+        if not isinstance(value, dict):
+            raise refuse(f"{show(value)} instead of keys and values; give the keys {', '.join(names)}")
+        for key in value:
+            if key not in names:
+                raise refuse(f"unknown key {show(key)}; {nearest(key, names)}", key)
+        given = {key: content for key, content in value.items() if content is not None}
+        for name, remedy in cls._needed(given).items():
+            if name not in given:
+                raise refuse(f"'{name}' is missing; give {expected_value(names[name])}{remedy}", name)
+        return given
+
+    @classmethod
+    def _needed(cls, given: Mapping[str, object]) -> dict[str, str]:
+        """Required keys, each with a remedy besides giving it."""
+        return {field.alias or name: "" for name, field in cls.model_fields.items() if field.is_required()}
+
+
+class Range(Section):
+    """Numbers between two ends, both included."""
+
+    first: Annotated[str, Scalar(str, {}, "the first value")] = Field(alias="from")
+    last: Annotated[str, Scalar(str, {}, "the last value")] = Field(alias="to")
+    points: Annotated[int, number(f"a whole number from 2 to {MOST_LISTED}, such as 9", 2, MOST_LISTED, whole=True)]
+    spacing: Annotated[str, one_of("spacing", ("linear", "logarithmic"))] = "linear"
+
+
+RANGE_KEYS = frozenset(field.alias or name for name, field in Range.model_fields.items())
 
 RANGE_DIGITS = 12
 """Significant digits of the inner values of a range, so that 1.5 mm is 1.5e-3 m."""
@@ -221,46 +333,27 @@ class Values(OneOrMore):
 
     def __init__(self, words: str) -> None:
         super().__init__(repeats=True)
-        self.item, self.words = words, f"{words}, a list, or a range"
+        self.words = f"{words}, a list, or a range"
 
     def __get_pydantic_json_schema__(self, schema: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        found = super().__get_pydantic_json_schema__(schema, handler)
-        (item, array), whole = found["anyOf"], {"type": "integer", "minimum": 2, "maximum": MOST_LISTED}
-        keys = {"from": item, "to": item, "points": whole, "spacing": {"enum": list(SPACINGS)}}
-        between = {
-            "type": "object",
-            "properties": keys,
-            "required": list(RANGE_KEYS[:3]),
-            "additionalProperties": False,
-        }
+        item, array = super().__get_pydantic_json_schema__(schema, handler)["anyOf"]
+        between = Range.model_json_schema()
+        between["properties"] |= {"from": item, "to": item}
         return {"anyOf": [item, array, between]}
 
-    def _read(self, value: object, handler: core_schema.ValidatorFunctionWrapHandler) -> Any:
-        return self._read_range(value, handler) if isinstance(value, dict) else super()._read(value, handler)
-
-    def _read_range(self, value: dict[str, Any], handler: core_schema.ValidatorFunctionWrapHandler) -> list[float]:
-        given = {key: text for key, text in value.items() if text is not None}
-        if not set(given) & set(RANGE_KEYS):
+    def _read(self, value: object, handler: ValidatorFunctionWrapHandler) -> Any:
+        if not isinstance(value, dict):
+            return super()._read(value, handler)
+        if RANGE_KEYS.isdisjoint(value):
             raise refuse(f"a mapping instead of {self.words}; a range is {{from: .., to: .., points: 9}}")
-        for key in given:
-            if key not in RANGE_KEYS:
-                raise refuse(f"unknown key {show(key)} of a range; {nearest(key, RANGE_KEYS)}", key)
-        for key in RANGE_KEYS[:3]:
-            if key not in given:
-                raise refuse(f"a range without '{key}'; give from, to and points: {{from: .., to: .., points: 9}}")
-        spacing = given.get("spacing", SPACINGS[0])
-        if spacing not in SPACINGS:
-            raise refuse(f"{show(spacing)} is no spacing; give {' or '.join(SPACINGS)}", "spacing")
-        points = _COUNT.read(given["points"]) if isinstance(given["points"], str) else 0
-        if not points:
-            raise refuse(f"{show(given['points'])} instead of a number; give {_COUNT.words}", "points")
-        first, last = handler([given["from"], given["to"]])
+        ends = Range.model_validate(value)
+        first, last = handler([ends.first, ends.last])
         if not first < last:
             remedy = "exchange them" if last < first else "give that one value, or a larger 'to'"
-            raise refuse(f"{show(given['from'])} is not below 'to', {show(given['to'])}; {remedy}", "from")
-        if spacing != SPACINGS[0] and not first > 0:
-            raise refuse(f"{show(given['from'])} has no logarithm; give a number above zero, or linear spacing", "from")
-        return spaced(first, last, points, spacing)
+            raise refuse(f"{{value}} is not below 'to', {show(ends.last)}; {remedy}", "from")
+        if ends.spacing == "logarithmic" and not first > 0:
+            raise refuse("{value} has no logarithm; give a number above zero, or linear spacing", "from")
+        return spaced(first, last, ends.points, ends.spacing)
 
 
 DefinitionNames = Annotated[list[DefinitionName], OneOrMore()]
@@ -271,32 +364,17 @@ PoissonRatios = Annotated[list[PoissonRatio], Values("a number above -1 and at m
 Ratios = Annotated[list[Ratio], Values("a number above 0")]
 
 
-class PerBeam:
-    """Annotation of forces by beam; forces for all beams have the key None."""
+def _given(forces: dict[str, list[float]]) -> dict[str, list[float]]:
+    if not forces:
+        raise refuse("no force at all; give one for each beam, such as {200x40: 400 kN}")
+    return {beam: once(values, beam) for beam, values in forces.items()}
 
-    words = "a force such as '400 kN', a list, or a range; or these for each beam"
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        single = handler.generate_schema(Forces)
-        each = core_schema.no_info_wrap_validator_function(self._read_each, handler(source))
-        everywhere = core_schema.no_info_after_validator_function(lambda forces: {None: forces}, single)
-        choices: dict[Any, CoreSchema] = {"single": everywhere, "each": each}
-        return core_schema.tagged_union_schema(choices, self._kind)
-
-    @staticmethod
-    def _kind(value: object) -> str:
-        between = isinstance(value, dict) and value and set(value) <= set(RANGE_KEYS)
-        return "each" if isinstance(value, dict) and not between else "single"
-
-    def __get_pydantic_json_schema__(self, schema: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        each = handler(schema["choices"]["each"]["schema"])
-        return {"anyOf": [*each["additionalProperties"]["anyOf"], each | {"minProperties": 1}]}
-
-    @staticmethod
-    def _read_each(value: object, handler: core_schema.ValidatorFunctionWrapHandler) -> Any:
-        if not value:
-            raise refuse("no force at all; give one for each beam, such as {200x40: 400 kN}")
-        return handler(value)
+BeamForces = Annotated[
+    Annotated[Forces, Tag("all")] | Annotated[dict[BeamName, Forces], AfterValidator(_given), Tag("each")],
+    Discriminator(lambda value: "each" if isinstance(value, dict) and not RANGE_KEYS & value.keys() else "all"),
+    Words("a force such as '400 kN', a list, or a range; or these for each beam"),
+]
 
 
 class Named(Wrapped):
@@ -307,12 +385,10 @@ class Named(Wrapped):
         self.words = f"a section for each {what}, by name; see below"
 
     def __get_pydantic_json_schema__(self, schema: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        described = handler(schema["schema"]) | {"minProperties": 1}
-        if self.for_files:
-            described["propertyNames"] = {"pattern": f"^{NAME.pattern}$"}
-        return described
+        names = {"propertyNames": {"pattern": f"^{NAME.pattern}$"}} if self.for_files else {}
+        return handler(schema["schema"]) | {"minProperties": 1} | names
 
-    def _read(self, value: object, handler: core_schema.ValidatorFunctionWrapHandler) -> Any:
+    def _read(self, value: object, handler: ValidatorFunctionWrapHandler) -> Any:
         if not isinstance(value, dict) or not value:
             shown = show(value) if value else f"no {self.what} at all"
             raise refuse(f"{shown}; give at least one {self.what}, its name followed by a colon and its keys")
@@ -325,53 +401,3 @@ class Named(Wrapped):
                 message = f"'{name}' and '{other}' differ in case only, which file systems may ignore; rename one"
                 raise refuse(message, name)
         return handler(value)
-
-
-class Groups:
-    """Annotation of groups of at least two names, each used once; one group may stand alone."""
-
-    words = "a list of parameters such as [mesh_size, force], or several such lists"
-
-    def __init__(self, names: tuple[str, ...]) -> None:
-        self.names = names
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.no_info_plain_validator_function(self._read)
-
-    def __get_pydantic_json_schema__(self, schema: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        group = {"type": "array", "items": {"enum": list(self.names)}, "minItems": 2, "uniqueItems": True}
-        return {"anyOf": [group, {"type": "array", "items": group}]}
-
-    def _read(self, value: object) -> list[list[str]]:
-        groups = [value] if isinstance(value, list) and value and isinstance(value[0], str) else value
-        if not isinstance(groups, list) or not groups:
-            raise refuse(f"{show(value)} instead of parameters that go together; give {self.words}")
-        seen: set[str] = set()
-        for group in groups:
-            if not isinstance(group, list) or len(group) < 2:
-                raise refuse(f"{show(group)} instead of two parameters or more; give {self.words}")
-            for name in group:
-                if not isinstance(name, str) or name not in self.names:
-                    raise refuse(f"unknown parameter {show(name)}; {nearest(str(name), self.names)}")
-                if name in seen:
-                    raise refuse(f"'{name}' is zipped twice; name it once")
-                seen.add(name)
-        return groups
-
-
-class Sections(Wrapped):
-    """Annotation of a list of sections; a single one is a list of one."""
-
-    words = "a section, or a list of sections; see below"
-
-    def __get_pydantic_json_schema__(self, schema: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        array = handler(schema["schema"])
-        return {"anyOf": [array["items"], array]}
-
-    def _read(self, value: object, handler: core_schema.ValidatorFunctionWrapHandler) -> Any:
-        listed = [value] if isinstance(value, dict) else value
-        if not isinstance(listed, list) or not all(isinstance(one, dict) for one in listed):
-            raise refuse(
-                f"{show(value)} instead of keys and values; give those to leave out, such as {{mesh_size: 1 mm}}"
-            )
-        return handler(listed)

@@ -9,7 +9,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from springtune.registry import Extended, imported, plugins
+from springtune.registry import imported
 
 if TYPE_CHECKING:
     from .messages import Problems
@@ -17,14 +17,10 @@ if TYPE_CHECKING:
 
 _PACKAGES = Path(__file__).parents[1] / "kinds"
 
-_FIRST = ("scenes", "moduli", "laying", "stability", "benchmark", "samples", "refinement", "shapes")
+_FIRST = ("scenes", "moduli", "laying", "stability", "benchmark", "samples", "shapes")
 
 KINDS = _FIRST + tuple(sorted({path.parent.name for path in _PACKAGES.glob("*/kind.py")} - {*_FIRST}))
 """Packages of the study kinds, in the order of the dataset's groups; other kinds come last."""
-
-RESERVED: set[str] = set()
-"""Keys of studies and grids that no kind adds; `springtune.studies.config.sections` enters them."""
-
 
 FORMATS = ("png", "pdf")
 """Endings of a figure's files."""
@@ -50,6 +46,8 @@ class Output:
         Name of the job that makes it, by default its own; outputs may share a job.
     tables : callable, optional
         From a study to the file names of its tables.
+    texts : dict of str to str
+        Further tables by the names of their files: ``"module:function"`` of a tree, which returns the text.
     write : str
         ``"module:function"`` of a tree and a folder, which writes the tables and files and returns their names.
     into : str
@@ -69,6 +67,7 @@ class Output:
     plot: str = ""
     job: str = ""
     tables: Callable[[Study], Iterable[str]] = lambda study: []
+    texts: dict[str, str] = field(default_factory=dict)
     write: str = ""
     into: str = "tables"
     page: bool = False
@@ -90,7 +89,7 @@ def needs(part: str, why: str) -> Callable[[Study], str]:
 class Stage:
     """A stage before the dataset; each of its jobs does a bundle of tasks.
 
-    Its module defines one task, see `springtune.studies.runs.driver`. Most stages are made by
+    Its module defines one task, see `springtune.studies.runs.job`. Most stages are made by
     `springtune.studies.runs.stages.stage` from their tasks.
 
     Attributes
@@ -107,8 +106,7 @@ class Stage:
     products : callable
         From that content to the files that a job makes besides its record.
     members : callable, optional
-        From a study and `springtune.studies.runs.plan.Costs` to expected seconds and a value by name; None for a
-        stage with the bundles of another one.
+        From a study to expected seconds and a value by name; None for a stage with the bundles of another one.
     like : str
         Stage whose bundles it shares, and whose job of the same bundle it needs.
     every : tuple of str
@@ -126,7 +124,7 @@ class Stage:
     message: str
     content: Callable[[Study, Path, list[Any]], dict[str, Any] | None]
     products: Callable[[dict[str, Any]], Iterable[Path]]
-    members: Callable[[Study, Any], Mapping[str, tuple[float, Any]]] | None = None
+    members: Callable[[Study], Mapping[str, tuple[float, Any]]] | None = None
     like: str = ""
     every: tuple[str, ...] = ()
     alone: bool = False
@@ -134,12 +132,12 @@ class Stage:
     tasks: Callable[[Study], Iterable[Any]] | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Kind:
     """A study kind.
 
-    Its package has a module ``kind`` with ``KIND``, which imports neither scipy, xarray nor matplotlib. If each task
-    has a cell of the group in the dataset, ``variables`` declare the group; otherwise ``groups(study, folder)`` of a
+    Its package has a module ``kind`` with ``KIND``, which imports neither scipy, xarray nor matplotlib. If results
+    are rows of a group of the dataset, ``variables`` declare the group; otherwise ``groups(study, folder)`` of a
     module ``collect`` returns groups by name. A module ``outputs`` with ``OUTPUTS``, without pydantic, makes drawing
     faster.
 
@@ -147,8 +145,6 @@ class Kind:
     ----------
     name : str
         Name of its package and of its part of a study in `Study.parts`.
-    package : str
-        Package of its modules, for kinds of other packages; modules of stages and outputs then have full names.
     study_fields, grid_fields : dict of str to tuple
         Keys that it adds to a study and to grids, with type and pydantic field.
     alone : dict of str to tuple
@@ -173,17 +169,9 @@ class Kind:
     outputs : tuple of Output
     tables, tables_by : callable and str, optional
         From a study to the stems of its tables on the page; module whose ``tables(tree)`` makes them.
-    costs : dict of str to tuple
-        Seconds of a task by its name in records, fixed and per unit, before any is measured.
-    pieces : callable, optional
-        From a study, `springtune.studies.runs.plan.Costs` and `springtune.studies.kinds.division.Division` to the
-        seconds of each piece that `springtune split` may deal out. A kind without pieces stays in one part.
-    take : callable, optional
-        From a study and names of pieces to the study with only these.
     """
 
     name: str
-    package: str = field(default="", kw_only=True)
     study_fields: dict[str, tuple[Any, Any]] = field(default_factory=dict)
     grid_fields: dict[str, tuple[Any, Any]] = field(default_factory=dict)
     alone: dict[str, tuple[str, ...]] = field(default_factory=dict)
@@ -199,9 +187,6 @@ class Kind:
     outputs: tuple[Output, ...] = ()
     tables: Callable[[Study], list[str]] | None = None
     tables_by: str = "tables"
-    costs: dict[str, tuple[float, float]] = field(default_factory=dict)
-    pieces: Callable[[Study, Any, Any], Mapping[tuple[str | int, ...], float]] | None = None
-    take: Callable[[Study, Collection[tuple[str | int, ...]]], Study] | None = None
 
     def wanted(self, config: Any) -> bool:
         """Return whether a config has one of its sections; a kind without any depends on the grids."""
@@ -209,19 +194,12 @@ class Kind:
 
     def place(self, name: str) -> str:
         """Name of a module of its package."""
-        return f"{self.package or f'studies.kinds.{self.name}'}.{name}"
+        return f"studies.kinds.{self.name}.{name}"
 
     def module(self, name: str) -> ModuleType:
         """A module of its package."""
         found: ModuleType = imported(self.place(name))
         return found
-
-    @property
-    def names(self) -> set[tuple[str, str]]:
-        """What it names, each with what it is; of these no other kind has one."""
-        keys = {("key", key) for key in (*self.study_fields, *self.grid_fields)}
-        made = {("output", one.name) for one in self.outputs} | {("stage", one.name) for one in self.stages}
-        return {("name", self.name)} | keys | made
 
 
 def stem(name: str, selection: Mapping[str, str]) -> str:
@@ -242,36 +220,10 @@ def modules(*names: str) -> list[str]:
     ]
 
 
-def _own_kinds() -> tuple[Kind, ...]:
-    return tuple(imported(f"studies.kinds.{name}.kind:KIND") for name in KINDS)
-
-
-def _adopted(name: str, kind: Any) -> Kind:
-    """Study kind of another package, which shares no name with others."""
-    if not isinstance(kind, Kind) or kind.name != name:
-        raise ValueError(f"{kind!r} is not a springtune.studies.config.kind.Kind of that name")
-    known = {about: other.name for other in (*_own_kinds(), *OTHER_KINDS._entries.values()) for about in other.names}
-    known |= {("key", key): "springtune" for key in RESERVED}
-    for about in sorted(kind.names & known.keys()):
-        raise ValueError(f"{about[0]} '{about[1]}' is of '{known[about]}' already; it needs another")
-    return kind
-
-
-OTHER_KINDS = Extended[Kind]("study kind", "kinds", {}, _adopted)
-"""Study kinds of other packages, by name."""
-
-
 @cache
 def kinds() -> tuple[Kind, ...]:
     """All study kinds."""
-    return (*_own_kinds(), *OTHER_KINDS.values())
-
-
-def further_modules(study: Study) -> list[str]:
-    """Modules that declare and collect the kinds of other packages that a study uses."""
-    used = [kind for kind in OTHER_KINDS.values() if study.parts[kind.name]]
-    found = [one.module for one in plugins()["kinds"] if one.name in {kind.name for kind in used}]
-    return found + [kind.place("collect") for kind in used if not kind.variables]
+    return tuple(imported(f"studies.kinds.{name}.kind:KIND") for name in KINDS)
 
 
 @cache
@@ -279,5 +231,4 @@ def outputs() -> dict[str, Output]:
     """Outputs of all study kinds, by name."""
     apart = {name.split(".")[2]: imported(f"{name}:OUTPUTS") for name in modules("outputs")}
     found = [apart[name] if name in apart else imported(f"studies.kinds.{name}.kind:KIND").outputs for name in KINDS]
-    found += [kind.outputs for kind in OTHER_KINDS.values()]
     return {output.name: output for outputs in found for output in outputs}

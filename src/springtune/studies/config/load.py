@@ -1,129 +1,51 @@
-"""Load a study from YAML: validate it, expand it, remove duplicates and sort.
+"""Load a study from YAML: validate it, expand it, remove duplicates and sort."""
 
-The file of a part has the whole study's text, then a section that names the part.
-"""
-
-import hashlib
-from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
 from springtune.registry import NAME, NAME_RULE
 
-from .checks import check_counts, check_definitions, check_meshes, check_names
-from .combinations import with_rows
-from .expand import build, expand, files_of_meshes, files_of_tests
+from .checks import check_definitions, check_meshes, check_names, check_scenes
+from .combinations import add_rows
+from .expand import build, declared, expand, files_of_meshes
+from .fields import FILES
 from .kind import Kind
-from .messages import Key, Problems, StudyError, read_study, read_yaml, show
-from .model import Part, Study
-from .sections import StudyConfig, study_model
+from .messages import Problems, StudyError, read_study, validated
+from .model import Study
+from .sections import study_model
 
 
-def load(path: str | Path, kinds: Sequence[Kind], beside: Path | None = None) -> Study:
+def load(path: str | Path, kinds: tuple[Kind, ...], beside: Path | None = None) -> Study:
     """Read, validate and expand a study."""
     path, file = Path(path), str(path)
     beside = beside or path.parent
     text, content, lines = read_study(path)
     if not NAME.fullmatch(path.stem):
         raise StudyError(f"{file}: '{path.stem}' cannot name a study; rename the file: {NAME_RULE}")
-    problems = Problems(file, lines, beside)
-    content = with_rows(content, beside, problems)
-    config = _validate(study_model(kinds, content if isinstance(content, dict) else ()), content, problems)
+    problems = Problems(file, lines, content, beside)
+    model = study_model(kinds)
+    if content is None:
+        problems.stop_at((), f"the file is empty; give the keys {', '.join(model.model_fields)}")
+    add_rows(content, problems)
+    # Names that sections refer to; of a section that is no mapping, whose error is enough, nothing is known.
+    given = content.items() if isinstance(content, dict) else ()
+    sections: dict[str, Any] = {key: one if isinstance(one, dict) else None for key, one in given} | {FILES: []}
+    config = validated(model, content, problems, context=sections)
     check_names(config, problems)
-    check_counts(config, content, problems)
+    problems.stop()
+    check_scenes(config, problems)
+    problems.stop()
     for kind in filter(lambda kind: kind.wanted(config), kinds):
         kind.check(config, problems)
     problems.stop()
-    test_files = files_of_tests(config, beside, problems)
-    mesh_files = files_of_meshes(config, beside, problems)
-    grids = expand(config, mesh_files, problems)
-    check_meshes(config, content, grids, problems)
+    bodies = declared(config, problems)
+    mesh_files = files_of_meshes(config, bodies.beams, problems)
+    grids = expand(config, bodies, mesh_files, problems)
+    check_meshes(config, grids, problems)
     problems.stop()
-    check_definitions(config, content, grids, problems)
+    check_definitions(config, grids, problems)
     problems.stop()
     printed_path = beside / config.printed if config.printed else None
     about = {"name": path.stem, "path": path, "text": text, "printed_path": printed_path, "mesh_files": mesh_files}
-    about["row_files"] = tuple(beside / grid.rows for grid in config.grids.values() if grid.rows)
-    about |= {"test_files": test_files, "part": declared_part(config, text, problems)}
-    return build(config, grids, kinds, problems, about)
-
-
-def _validate(model: type[StudyConfig], content: Any, problems: Problems) -> StudyConfig:
-    if content is None:
-        problems.stop_at((), f"the file is empty; give the keys {', '.join(model.model_fields)}")
-    try:
-        return model.model_validate(content)
-    except ValidationError as error:
-        for details in error.errors(include_url=False):
-            path: list[Key] = []
-            place = content
-            # pydantic's path has steps that the file has not: branches of a union, the item of a single value.
-            for step in details["loc"]:
-                if step in place if isinstance(place, dict) else isinstance(place, list) and isinstance(step, int):
-                    path.append(step)
-                    place = place[step]
-            own = details["type"] == "study"
-            path += [step for step in details["ctx"]["path"] if isinstance(place, list | dict)] if own else []
-            message = details["msg"] if own else f"{show(place)}: {details['msg']}; see config/README.md"
-            if details["type"] == "dict_type":
-                message = f"{show(place)} instead of names and their values, such as {{name: value}}; give a mapping"
-            problems.add(path, message)
-        problems.stop()
-        raise
-
-
-PART_BELOW = (
-    "\n# What stands above is the whole study; this file asks for a part of it. Written by `springtune split`.\n"
-)
-
-
-def is_part(text: str) -> bool:
-    """Return whether a text requests a part of a study."""
-    return PART_BELOW in text
-
-
-def whole_text(text: str) -> str:
-    """Text of the whole study without the section ``part``."""
-    return text.rpartition(PART_BELOW)[0] if is_part(text) else text
-
-
-def digest_of(text: str) -> str:
-    """SHA-256 of the text of a study."""
-    return hashlib.sha256(text.encode()).hexdigest()
-
-
-def part_text(text: str, part: Part) -> str:
-    """Text of a file that requests a part of a study."""
-    return f"{text}{PART_BELOW}part: {{number: {part.number}, of: {part.of}, by: {part.by}, study: {part.study}}}\n"
-
-
-def declared_part(config: StudyConfig, text: str, problems: Problems) -> Part | None:
-    """Part that a file requests; None for the whole study."""
-    if config.part is None:
-        return None
-    part = Part(config.part.number, config.part.of, config.part.by, config.part.study)
-    if digest_of(whole_text(text)) != part.study:
-        problems.stop_at(
-            ("part", "study"),
-            "the study above it was changed since it was split, so that its parts no longer fit together; change the "
-            "whole study and split it again, or remove this section",
-        )
-    return part
-
-
-def named_files(text: str, path: Path) -> list[Path]:
-    """Files that a study names under any key."""
-    content, _ = read_yaml(text, str(path))
-    found = {value for value in _texts(content) if value.strip() and len(value) < 255}
-    files = (path.parent / value for value in sorted(found))
-    return [file.resolve() for file in files if file.is_file()]
-
-
-def _texts(content: Any) -> Iterator[str]:
-    if isinstance(content, str):
-        yield content
-    elif isinstance(content, dict | list):
-        for value in content.values() if isinstance(content, dict) else content:
-            yield from _texts(value)
+    about["files"] = tuple(beside / name for name in sections[FILES])
+    return build(config, bodies, grids, kinds, problems, about)

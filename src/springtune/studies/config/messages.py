@@ -2,16 +2,23 @@
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 import yaml
-from pydantic_core import PydanticCustomError
+from pydantic_core import PydanticCustomError, ValidationError
 
 from springtune.safe_io.escapes import UNSEEN, clipped, shown
 from springtune.safe_io.inputs import BeyondSize, read
 
+if TYPE_CHECKING:
+    from pydantic import BaseModel
+
+    Model = TypeVar("Model", bound=BaseModel)
+
 Key = str | int
 """Step of a path into a file: a key or a list index."""
+
+Lines = Mapping[tuple[Key, ...], int]
 
 SHOWN_PROBLEMS = 5
 """Problems that one message lists; the rest are counted."""
@@ -55,8 +62,8 @@ class Problems:
     springtune.studies.config.messages.StudyError: study.yaml:3: beams.small: no length; give one such as '200 mm'
     """
 
-    def __init__(self, file: str, lines: Mapping[tuple[Key, ...], int] | None = None, folder: Path = Path()) -> None:
-        self._file, self._lines, self.folder = file, lines or {}, folder
+    def __init__(self, file: str, lines: Lines | None = None, content: Any = None, folder: Path = Path()) -> None:
+        self._file, self._lines, self.content, self.folder = file, lines or {}, content, folder
         self._places: dict[tuple[Key, ...], str] = {}
         self._found: list[tuple[int, str]] = []
 
@@ -95,8 +102,45 @@ class Problems:
 
 
 def refuse(message: str, *path: Key) -> PydanticCustomError:
-    """Create the error of a validator."""
+    """Create the error of a validator; ``{value}`` in the message stands for what the file has at the path."""
     return PydanticCustomError("study", "{message}", {"message": message, "path": path})
+
+
+def part_of(content: Any, path: Iterable[Key]) -> tuple[tuple[Key, ...], Any]:
+    """Return the steps of a path that a content has, and the value there: a single value has no items.
+
+    Examples
+    --------
+    >>> part_of({"beam": ["a", "b"], "load": "traction"}, ("beam", 1)), part_of({"load": "traction"}, ("load", 0))
+    ((('beam', 1), 'b'), (('load',), 'traction'))
+    """
+    found: list[Key] = []
+    for step in path:
+        if step in content if isinstance(content, dict) else isinstance(content, list) and isinstance(step, int):
+            found.append(step)
+            content = content[step]
+    return tuple(found), content
+
+
+def validated(
+    model: "type[Model]", content: Any, problems: Problems, line: int = 0, context: Mapping[str, Any] | None = None
+) -> "Model":
+    """Return the model of a content; each error of pydantic is a problem with place, value and remedy."""
+    try:
+        return model.model_validate(content, context=context)
+    except ValidationError as error:
+        for details in error.errors(include_url=False):
+            # pydantic's path has steps that the file has not: branches of a union, the item of a single value.
+            path, value = part_of(content, details["loc"])
+            message = f"{show(value)}: {details['msg']}; see config/README.md"
+            if details["type"] == "study":
+                path += details["ctx"]["path"] if isinstance(value, list | dict) else ()
+                message = details["ctx"]["message"].replace("{value}", show(part_of(content, path)[1]))
+            elif details["type"] == "dict_type":
+                message = f"{show(value)} instead of names and their values, such as {{name: value}}; give a mapping"
+            problems.add(path, message, line)
+        problems.stop()
+        raise
 
 
 def show(value: object) -> str:
@@ -132,15 +176,8 @@ MOST_VALUES = 100_000
 DEEPEST = 20
 """Limit of nested lists and mappings."""
 
-_TAGS = frozenset(
-    f"tag:yaml.org,2002:{name}" for name in ("bool", "float", "int", "map", "merge", "null", "seq", "str", "timestamp")
-)
-"""Allowed tags; others, such as sets, need an explicit tag."""
 
-_values = yaml.constructor.SafeConstructor()
-
-
-def read_study(path: str | Path) -> tuple[str, Any, dict[tuple[Key, ...], int]]:
+def read_study(path: str | Path) -> tuple[str, Any, Lines]:
     """Return the text, the content and the line of each key of a study."""
     example = "give the path of a study such as config/paper.yaml"
     try:
@@ -161,7 +198,7 @@ def read_study(path: str | Path) -> tuple[str, Any, dict[tuple[Key, ...], int]]:
     return text, *read_yaml(text, str(path))
 
 
-def read_yaml(text: str, file: str) -> tuple[Any, dict[tuple[Key, ...], int]]:
+def read_yaml(text: str, file: str) -> tuple[Any, Lines]:
     r"""Content of a YAML text as dicts, lists and texts, and the line of each path of keys.
 
     Scalars stay texts: names such as ``1e3`` or ``no`` are not numbers or booleans.
@@ -174,12 +211,10 @@ def read_yaml(text: str, file: str) -> tuple[Any, dict[tuple[Key, ...], int]]:
     >>> lines["beams", "small", "length"]
     3
     """
-    lines: dict[tuple[Key, ...], int] = {}
+    reader = _Reader(file)
     try:
         root = yaml.compose(text, Loader=yaml.SafeLoader)
-        if root is not None:
-            _check_size(root, file)
-        return _content(root, (), lines, file), lines
+        return None if root is None else reader.content(root, ()), reader.lines
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
         line = f":{mark.line + 1}" if mark else ""
@@ -193,97 +228,79 @@ def read_yaml(text: str, file: str) -> tuple[Any, dict[tuple[Key, ...], int]]:
         raise StudyError(f"{file}: {_TOO_DEEP}") from None
 
 
-_TOO_DEEP = "not a study: nested too deeply; see config/README.md for what it may hold"
+_TOO_DEEP = (
+    "not a study: nested too deeply, or an alias (*name) inside of what it stands for; see config/README.md for what a "
+    "study may hold"
+)
 
 
-def _check_size(root: yaml.Node, file: str) -> None:
-    """Refuse content that grows too large when aliases are expanded, without expanding it."""
-    sizes: dict[int, tuple[int, int]] = {}  # values and levels of each node; empty while it is counted
+class _Reader:
+    """Content of the nodes of a YAML file, aliases expanded up to a limit."""
 
-    def count(node: yaml.Node) -> tuple[int, int]:
-        known = sizes.get(id(node))
-        if known:
-            return known
-        if id(node) in sizes:
-            line = node.start_mark.line + 1
-            raise StudyError(f"{file}:{line}: an alias stands for what it is part of; write the values themselves")
-        sizes[id(node)] = ()  # type: ignore[assignment]
-        values, levels = 1, 1
-        if isinstance(node, yaml.CollectionNode):
-            for item in node.value:
-                for part in item if isinstance(item, tuple) else (item,):
-                    more, deep = count(part)
-                    values, levels = values + more, max(levels, deep + 1)
-        if levels > DEEPEST:
-            raise StudyError(f"{file}:{node.start_mark.line + 1}: {_TOO_DEEP}")
-        if values > MOST_VALUES:
-            line = node.start_mark.line + 1
+    def __init__(self, file: str) -> None:
+        self.file, self.values = file, 0
+        self.lines: dict[tuple[Key, ...], int] = {}
+
+    def refuse(self, node: yaml.Node, message: str) -> NoReturn:
+        raise StudyError(f"{self.file}:{node.start_mark.line + 1}: {message}")
+
+    def content(self, node: yaml.Node, path: tuple[Key, ...]) -> Any:
+        self.values += 1
+        if len(path) > DEEPEST:
+            self.refuse(node, _TOO_DEEP)
+        if self.values > MOST_VALUES:
             most = f"more than {MOST_VALUES} values, aliases (*name) as what they stand for"
-            raise StudyError(f"{file}:{line}: {most}; give ranges of fewer values, or split the study into several")
-        sizes[id(node)] = values, levels
-        return values, levels
+            self.refuse(node, f"{most}; give ranges of fewer values, or split the study into several")
+        self.check_tag(node)
+        if node.tag == "tag:yaml.org,2002:null":
+            return None
+        self.lines.setdefault(path, node.start_mark.line + 1)
+        if isinstance(node, yaml.ScalarNode):
+            # The line break that ends a block is not the text's.
+            return self.text(node, path, node.value.rstrip("\n") if node.style in ("|", ">") else node.value)
+        if isinstance(node, yaml.SequenceNode):
+            return [self.content(item, (*path, number)) for number, item in enumerate(node.value)]
+        return self.mapping(node, path)
 
-    count(root)
+    def mapping(self, node: yaml.Node, path: tuple[Key, ...]) -> dict[str, Any]:
+        found: dict[str, Any] = {}
+        merged: dict[str, Any] = {}
+        lines: dict[tuple[Key, ...], int] = {}
+        for key, value in node.value:
+            if not isinstance(key, yaml.ScalarNode):
+                self.refuse(key, "a list or mapping cannot be a key; write a name before the colon")
+            if key.tag == "tag:yaml.org,2002:merge":
+                for base in value.value if isinstance(value, yaml.SequenceNode) else [value]:
+                    inherited = self.content(base, path)
+                    if not isinstance(inherited, dict):
+                        self.refuse(key, "'<<' merges mappings only; give it an alias such as *name")
+                    merged = inherited | merged
+                continue
+            self.check_tag(key)
+            inside, line = (*path, key.value), key.start_mark.line + 1
+            name = self.text(key, inside, key.value)
+            if inside in lines:
+                why = f"'{name}' is given twice, first in line {lines[inside]}; rename or remove one"
+                Problems(self.file).stop_at(inside, why, line)
+            lines[inside] = line
+            found[name] = self.content(value, inside)
+        self.lines |= lines
+        return merged | found
 
-
-def _check_value(node: yaml.Node, file: str) -> None:
-    """Refuse values that YAML, and so Snakemake, would not accept."""
-    line = node.start_mark.line + 1
-    if node.tag == "tag:yaml.org,2002:value":
-        raise StudyError(f"{file}:{line}: not YAML: '=' means nothing by itself; put it in quotes")
-    if node.tag not in _TAGS:
+    def check_tag(self, node: yaml.Node) -> None:
+        """Refuse values that YAML, and so Snakemake, would not accept."""
         tag = node.tag.replace("tag:yaml.org,2002:", "!!")
-        raise StudyError(f"{file}:{line}: a study has no tags such as '{tag}'; remove it")
-    if isinstance(node, yaml.ScalarNode) and node.tag.endswith((":bool", ":float", ":int", ":timestamp")):
+        if node.tag not in yaml.SafeLoader.yaml_constructors:
+            remedy = "remove it, or put the value in quotes"
+            self.refuse(node, f"not YAML: {show(node.value)} has the unknown tag '{tag}'; {remedy}")
         try:
-            _values.construct_object(node)
-        except (ValueError, ArithmeticError, KeyError, IndexError):
-            shown, what = show(node.value), node.tag.removeprefix("tag:yaml.org,2002:")
-            raise StudyError(f"{file}:{line}: not YAML: {shown} is no {what}; put it in quotes") from None
-        finally:
-            _values.constructed_objects.clear()
+            if isinstance(node, yaml.ScalarNode):
+                yaml.constructor.SafeConstructor().construct_object(node)
+        except (ValueError, ArithmeticError, LookupError):
+            self.refuse(node, f"not YAML: {show(node.value)} is no {tag}; put it in quotes")
 
-
-def _check_seen(text: str, path: tuple[Key, ...], node: yaml.Node, file: str) -> None:
-    """Refuse line breaks and control characters in texts."""
-    why = unseen(text)
-    if why:
-        Problems(file).stop_at(path, why, node.start_mark.line + 1)
-
-
-def _content(node: yaml.Node | None, path: tuple[Key, ...], lines: dict[tuple[Key, ...], int], file: str) -> Any:
-    if node is None:
-        return None
-    _check_value(node, file)
-    if node.tag == "tag:yaml.org,2002:null":
-        return None
-    lines.setdefault(path, node.start_mark.line + 1)
-    if isinstance(node, yaml.ScalarNode):
-        # The line break that ends a block is not the text's.
-        text = node.value.rstrip("\n") if node.style in ("|", ">") else node.value
-        _check_seen(text, path, node, file)
+    def text(self, node: yaml.Node, path: tuple[Key, ...], text: str) -> str:
+        """Refuse line breaks and control characters."""
+        if why := unseen(text):
+            Problems(self.file).stop_at(path, why, node.start_mark.line + 1)
         return text
-    if isinstance(node, yaml.SequenceNode):
-        return [_content(item, (*path, number), lines, file) for number, item in enumerate(node.value)]
-    content: dict[str, Any] = {}
-    merged: dict[str, Any] = {}
-    for key, value in node.value:
-        line = key.start_mark.line + 1
-        _check_value(key, file)
-        if not isinstance(key, yaml.ScalarNode):
-            raise StudyError(f"{file}:{line}: a list or mapping cannot be a key; write a name before the colon")
-        if key.tag == "tag:yaml.org,2002:merge":
-            for base in value.value if isinstance(value, yaml.SequenceNode) else [value]:
-                inherited = _content(base, path, {}, file)
-                if not isinstance(inherited, dict):
-                    raise StudyError(f"{file}:{line}: '<<' merges mappings only; give it an alias such as *name")
-                merged = inherited | merged
-            continue
-        inside = (*path, key.value)
-        _check_seen(key.value, inside, key, file)
-        if key.value in content:
-            why = f"'{key.value}' is given twice, first in line {lines[inside]}; rename or remove one"
-            Problems(file).stop_at(inside, why, line)
-        lines[inside] = line
-        content[key.value] = _content(value, inside, lines, file)
-    return merged | content

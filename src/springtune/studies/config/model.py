@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
-from functools import cached_property, wraps
+from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from springtune.problem.geometry import Beam
 from springtune.problem.materials import AnyMaterial, Material
@@ -26,6 +26,10 @@ TESTED_REFERENCE = "yeoh-plane-stress"
 """The same for materials with a uniaxial test, using the fitted law."""
 
 FURTHER_REFERENCES = (FINITE_STRAIN_REFERENCE, STRAINED_REFERENCE, TESTED_REFERENCE)
+
+
+Labels = dict[str, str | float]
+"""Label of a cell of the dataset, by dimension."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +56,7 @@ class MeshSpec:
         return f"{self.beam.name}_{self.mesh_type}_{1e3 * self.mesh_size:g}mm"
 
     @cached_property
-    def labels(self) -> dict[str, str | float]:
+    def labels(self) -> Labels:
         """Labels of its cell of the dataset."""
         return {"beam": self.beam.name, "mesh_type": self.mesh_type, "mesh_size": self.mesh_size}
 
@@ -71,6 +75,12 @@ class SceneSpec:
     definition: str
     kinematics: str
     stiffness_scale: float = 1.0
+
+    def labels(self, swept: Iterable[str]) -> Labels:
+        """Labels of its cell of the dataset."""
+        own = {"material": self.material.name, "load": self.load, "definition": self.definition}
+        values = {name: swept_value(self, self.mesh.beam, name) for name in swept}
+        return {**self.mesh.labels, **own, "kinematics": self.kinematics, **values}
 
     @cached_property
     def _hash(self) -> int:
@@ -93,6 +103,11 @@ class CurveSpec:
     force: float
     kinematics: str
 
+    def labels(self, swept: Iterable[str]) -> Labels:
+        """Labels of its cell of the dataset."""
+        found = self.mesh.labels | {"material": self.material.name, "load": self.load, "kinematics": self.kinematics}
+        return found | {name: swept_value(self, self.mesh.beam, name) for name in swept if name != "stiffness_scale"}
+
 
 @dataclass(frozen=True)
 class Reference:
@@ -102,6 +117,11 @@ class Reference:
     material: Material
     load: str
     force: float
+
+    def labels(self, swept: Iterable[str]) -> Labels:
+        """Labels of its cell of the dataset."""
+        found: Labels = {"beam": self.beam.name, "material": self.material.name, "load": self.load}
+        return found | {name: swept_value(self, self.beam, name) for name in swept if name != "stiffness_scale"}
 
 
 @dataclass(frozen=True)
@@ -113,51 +133,23 @@ class Grid:
     curves: tuple[CurveSpec, ...]
 
 
-@dataclass(frozen=True)
-class PrintedCell:
-    """A printed table cell in SI units; magnitudes only. `remark` names contradictions in the print."""
-
-    table: int
-    beam: str
-    mesh_type: str
-    mesh_size: float
-    material: str
-    load: str
-    force: float
-    stiffness: float
-    reference_displacement: float
-    displacement: float
-    deformation_error: float
-    remark: str
-
-
-@dataclass(frozen=True)
-class Part:
-    """A part of a study; `by` names what stays together (`sections.DEALT_BY`)."""
-
-    number: int
-    of: int
-    by: str
-    study: str
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Study:
-    """A study, ready to run.
+    """A study, ready to run; one is equal to itself alone.
 
     All tuples are free of duplicates and ordered by beam and material as declared, then by mesh type, mesh size, load,
     definition and kinematics, whatever the order of grids and of the lists in them.
 
     `mesh_files` has the `MeshSpec` of meshes from files by mesh type, beam's name and mesh size. `parts` has what study
-    kinds made of it, by their names. `limits` are ``seconds`` of the processor and ``memory`` [byte] of one task.
+    kinds made of it, by their names.
 
     `stiffness_ratios` are k / (E t) along every curve, ascending [1]; `stiffness_table` has the stiffness [N/m] of the
     definition ``paper`` by mesh type and material; the curves of a beam and load, `calibration`, calibrate
     ``calibrated``.
 
     `axes` has the labels of each dimension of the dataset: texts, for ``mesh_size`` numbers [m]. `swept` are parameters
-    of `springtune.problem.parameters.SWEPT` that are dimensions. `test_files` are tests of rubber. A `part` of a study
-    has its own scenes, curves, meshes, references and `parts`; everything else is of the whole study.
+    of `springtune.problem.parameters.SWEPT` that are dimensions. `printed` cells are of
+    `springtune.studies.config.combinations.PrintedCell`, `files` all that it names.
     """
 
     name: str
@@ -173,18 +165,15 @@ class Study:
     further_references: tuple[str, ...]
     materials: dict[str, AnyMaterial]
     parts: dict[str, Any]
-    limits: dict[str, float]
     grids: tuple[Grid, ...]
     stiffness_ratios: tuple[float, ...]
     stiffness_table: dict[tuple[str, str], float]
     calibration: tuple[str, str] | None
-    printed: tuple[PrintedCell, ...]
+    printed: tuple[Any, ...]
     printed_path: Path | None
     axes: dict[str, tuple[str | float, ...]]
     swept: tuple[str, ...] = ()
-    test_files: tuple[Path, ...] = ()
-    row_files: tuple[Path, ...] = ()
-    part: Part | None = None
+    files: tuple[Path, ...] = ()
 
     @property
     def plane_strain(self) -> tuple[str, ...]:
@@ -218,7 +207,7 @@ class Study:
         >>> print(f"{choices[0].definition}: {100 * choices[0].errors['edge']:+.1f} %")
         patch: -0.4 %
         """
-        known = {name: one for part in self.parts.values() for name, one in getattr(part, "declared", {}).items()}
+        known = self.parts["shapes"].shape if self.parts["shapes"] else {}
         if name not in known:
             there = nearest(name, known) if known else "the study has none; add it under 'shapes'"
             raise ValueError(f"shape: '{name}' is unknown; {there}")
@@ -236,31 +225,12 @@ class Study:
         {'': 'third'}
         """
         self.shape(shape)
-        own = next(part.parts[shape] for part in self.parts.values() if shape in getattr(part, "declared", {}))
+        own = self.parts["shapes"].parts[shape]
         return {"": self.material(material)} | {part: self.material(name) for part, name in own.items()}
 
     def labels(self, one: SceneSpec | CurveSpec | Reference) -> dict[str, str | float]:
         """Labels of the dataset cell of a scene, curve or reference."""
-        found: dict[str, str | float]
-        if isinstance(one, Reference):
-            beam = one.beam
-            found = {"beam": beam.name, "material": one.material.name, "load": one.load}
-        else:
-            beam = one.mesh.beam
-            found = one.mesh.labels | {"material": one.material.name, "load": one.load}
-            if isinstance(one, SceneSpec):
-                found["definition"] = one.definition
-            found["kinematics"] = one.kinematics
-        for name in self.swept:
-            if name != "stiffness_scale" or isinstance(one, SceneSpec):
-                found[name] = swept_value(one, beam, name)
-        return found
-
-    def name_of(self, scene: SceneSpec) -> str:
-        """Readable name of a scene, unique in the study."""
-        labels = self.labels(scene) | {"mesh_size": f"{1e3 * scene.mesh.mesh_size:g}mm"}
-        words = (f"{name}={label:.9g}" if isinstance(label, float) else label for name, label in labels.items())
-        return "_".join(words)
+        return one.labels(self.swept)
 
 
 def swept_value(one: SceneSpec | CurveSpec | Reference, beam: Beam, name: str) -> float:
@@ -272,31 +242,8 @@ def swept_value(one: SceneSpec | CurveSpec | Reference, beam: Beam, name: str) -
     return float(getattr(one if name == "stiffness_scale" else one.material, name))
 
 
-MOST_STUDIES = 8
-
-Answer = TypeVar("Answer")
-
-
-def once_a_study(*names: str) -> Callable[[Callable[[Study], Answer]], Callable[[Study], Answer]]:
-    """Cache a function of a study while the named parts are the same objects."""
-
-    def decorate(function: Callable[[Study], Answer]) -> Callable[[Study], Answer]:
-        # Cache by id(): hashing 10,000 scenes is slow. The parts are kept, so that no new object gets their id.
-        known: dict[tuple[int, ...], tuple[Answer, list[Any]]] = {}
-
-        @wraps(function)
-        def answer(study: Study) -> Answer:
-            parts = [getattr(study, name) for name in names]
-            key = tuple(map(id, parts))
-            if key not in known:
-                known[key] = function(study), parts
-                if len(known) > MOST_STUDIES:
-                    del known[next(iter(known))]
-            return known[key][0]
-
-        return answer
-
-    return decorate
+once_a_study = lru_cache(maxsize=8)
+"""Decorator of a function of a study whose last answers are kept."""
 
 
 def keeps_fields(study: Study) -> bool:

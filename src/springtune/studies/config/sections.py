@@ -1,59 +1,20 @@
 """Models of the sections of a study; the JSON schema and the tables of config/README.md are generated from them."""
 
 import json
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
-from types import NoneType
-from typing import Annotated, Any, ClassVar, NamedTuple, Self, get_args, get_origin
+from typing import Annotated, Any, ClassVar, Self
 
-from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
-from pydantic.fields import FieldInfo
+from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, create_model, model_validator
 
-from springtune.mesh import MESH_TYPES
+from springtune.mesh.types import MESH_TYPES
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import INCOMPRESSIBLE, MOST_TERMS, AnisotropicMaterial, AnyMaterial, Material
-from springtune.problem.quantities import nearest
-from springtune.registry import imported
 
-from .fields import (
-    Angle,
-    BeamName,
-    DefinitionName,
-    Density,
-    FileName,
-    Flag,
-    Forces,
-    FurtherReference,
-    Groups,
-    Kinematics,
-    Length,
-    Lengths,
-    LimitSeconds,
-    Load,
-    MaterialName,
-    Memory,
-    MeshType,
-    Named,
-    OneOrMore,
-    OrthotropicRatio,
-    PerBeam,
-    Plane,
-    Points,
-    PoissonRatio,
-    PoissonRatios,
-    Ratio,
-    Ratios,
-    Sections,
-    SignedStress,
-    Stiffness,
-    Stress,
-    Stresses,
-    Terms,
-    Text,
-    number,
-    one_of,
-)
-from .kind import RESERVED, Kind, Output, kinds
+from . import fields
+from .fields import Named, OneOrMore, Section, Words, default, expected_value, once, one_of
+from .kind import Kind, kinds
 from .messages import refuse, show
 
 MOST_PARTS = 1000
@@ -62,81 +23,39 @@ PLAUSIBLE = 20.0
 """Factor on sqrt(3)/2 E t beyond which a stated stiffness counts as an error of units."""
 
 
-def expected_value(field: FieldInfo) -> str:
-    """Expected value of a field in words, such as ``a length such as '200 mm'``."""
-    # A field that may be absent has its notes one level deeper.
-    for annotation, notes in ((field.annotation, field.metadata), *map(_parts, get_args(field.annotation))):
-        for note in notes:
-            if hasattr(note, "words"):
-                return str(note.words)
-            if isinstance(note, OneOrMore):
-                item = get_args(annotation)[0]
-                return f"{get_args(item)[1].words}, or a list"
-    listed = get_origin(field.annotation) is list
-    return "a list of sections; see below" if listed else "a section; see below"
-
-
-def _parts(annotation: Any) -> tuple[Any, tuple[Any, ...]]:
-    """Type and notes of an `Annotated`; any other annotation has no notes."""
-    if get_origin(annotation) is not Annotated:
-        return annotation, ()
-    inside, *notes = get_args(annotation)
-    return inside, tuple(notes)
-
-
-class Section(BaseModel):
-    """A mapping of known keys in a study."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _known_keys(cls, value: object) -> dict[str, object]:
-        names = {field.alias or name: field for name, field in cls.model_fields.items()}
-        if not isinstance(value, dict):
-            raise refuse(f"{show(value)} instead of keys and values; give the keys {', '.join(names)}")
-        for key in value:
-            if key not in names:
-                raise refuse(f"unknown key {show(key)}; {nearest(key, names)}", key)
-        given = {key: content for key, content in value.items() if content is not None}
-        for name, remedy in cls._needed(given).items():
-            if name not in given:
-                raise refuse(f"'{name}' is missing; give {expected_value(names[name])}{remedy}", name)
-        return given
-
-    @classmethod
-    def _needed(cls, given: Mapping[str, object]) -> dict[str, str]:
-        """Required keys, each with a remedy besides giving it."""
-        return {field.alias or name: "" for name, field in cls.model_fields.items() if field.is_required()}
-
-
-def default(value: Any, description: str, **options: Any) -> Any:
-    """Field with a default, written as in a study."""
-    return Field(value, validate_default=True, description=description, **options)
-
-
-def optional(section: Any, description: str) -> tuple[Any, Any]:
-    """Type and field of a section that a study may leave out."""
-    return section | None, Field(None, description=description)
-
-
 class BeamConfig(Section):
     """A rectangular sheet, its length along x."""
 
-    length: Length = Field(description="Extent along x, the direction of the load.")
-    height: Length = Field(description="Extent along y.")
-    thickness: Length = default("1 mm", description="Extent out of the plane.")
+    length: fields.Length
+    """Extent along x, the direction of the load."""
+
+    height: fields.Length
+    """Extent along y."""
+
+    thickness: fields.Length = default("1 mm")
+    """Extent out of the plane."""
 
 
 class StiffnessConfig(Section):
     """Stiffness of a sheet in plane stress, in the order xx, yy and xy with the shear angle; positive definite."""
 
-    C11: Stress = Field(description="Stress along x for a strain along x.")
-    C22: Stress = Field(description="Stress along y for a strain along y.")
-    C12: SignedStress = Field(description="Stress along x for a strain along y.")
-    C66: Stress = Field(description="Shear stress for a shear angle.")
-    C16: SignedStress = default("0 Pa", description="Shear stress for a strain along x.")
-    C26: SignedStress = default("0 Pa", description="Shear stress for a strain along y.")
+    C11: fields.Stress
+    """Stress along x for a strain along x."""
+
+    C22: fields.Stress
+    """Stress along y for a strain along y."""
+
+    C12: fields.SignedStress
+    """Stress along x for a strain along y."""
+
+    C66: fields.Stress
+    """Shear stress for a shear angle."""
+
+    C16: fields.SignedStress = default("0 Pa")
+    """Shear stress for a strain along x."""
+
+    C26: fields.SignedStress = default("0 Pa")
+    """Shear stress for a strain along y."""
 
 
 MATERIAL_FORMS = (
@@ -166,41 +85,51 @@ class MaterialConfig(Section):
 
     model_config = ConfigDict(json_schema_extra=_one_form)
 
-    young_modulus: Stress | None = Field(None, description="Young's modulus E.")
-    poisson_ratio: PoissonRatio | None = Field(None, description="Poisson's ratio nu; 0.5 is allowed in plane stress.")
-    plane: Plane | None = Field(
-        None,
-        description="'stress' of a thin sheet, the default, or 'strain' of a slice of a long body; E and nu are those "
-        "of the material in three dimensions in both. Isotropic materials alone.",
-    )
-    young_modulus_x: Stress | None = Field(None, description="Young's modulus along the fibres.")
-    young_modulus_y: Stress | None = Field(None, description="Young's modulus across the fibres.")
-    poisson_ratio_xy: OrthotropicRatio | None = Field(
-        None, description="Contraction across the fibres over extension along them, when pulled along them."
-    )
-    shear_modulus: Stress | None = Field(None, description="Shear modulus along and across the fibres.")
-    angle: Annotated[list[Angle], OneOrMore(repeats=True)] | None = Field(
-        None,
-        description="Angle of the fibres from the x axis, counter-clockwise; 0 by default. Several angles are the "
-        "plies of a laminate of equal thicknesses and symmetric stacking.",
-    )
-    stiffness: StiffnessConfig | None = Field(None, description="Elastic constants in plane stress.")
-    uniaxial_test: FileName | None = Field(
-        None,
-        description="CSV file of a uniaxial test of rubber, relative to the study's folder: stretch or strain and "
-        "nominal stress under a head such as `stretch,nominal stress [MPa]` or `strain [%],nominal stress [MPa]`. "
-        "Definition `yeoh` uses the fitted law.",
-    )
-    terms: Terms | None = Field(
-        None, description="Number of terms of the fitted law; 3 by default, 1 is the neo-Hookean law."
-    )
-    equibiaxial_test: FileName | None = Field(
-        None, description="CSV file of an equibiaxial test, to compare the fitted law with."
-    )
-    pure_shear_test: FileName | None = Field(
-        None, description="CSV file of a pure-shear test, to compare the fitted law with."
-    )
-    density: Density | None = Field(None, description="Density rho; needed for dynamics and gravity, not for statics.")
+    young_modulus: fields.Stress | None = None
+    """Young's modulus E."""
+
+    poisson_ratio: fields.PoissonRatio | None = None
+    """Poisson's ratio nu; 0.5 is allowed in plane stress."""
+
+    plane: fields.Plane | None = None
+    """'stress' of a thin sheet, the default, or 'strain' of a slice of a long body; E and nu are those of the
+    material in three dimensions in both. Isotropic materials alone."""
+
+    young_modulus_x: fields.Stress | None = None
+    """Young's modulus along the fibres."""
+
+    young_modulus_y: fields.Stress | None = None
+    """Young's modulus across the fibres."""
+
+    poisson_ratio_xy: fields.OrthotropicRatio | None = None
+    """Contraction across the fibres over extension along them, when pulled along them."""
+
+    shear_modulus: fields.Stress | None = None
+    """Shear modulus along and across the fibres."""
+
+    angle: Annotated[list[fields.Angle], OneOrMore(repeats=True)] | None = None
+    """Angle of the fibres from the x axis, counter-clockwise; 0 by default. Several angles are the plies of a
+    laminate of equal thicknesses and symmetric stacking."""
+
+    stiffness: StiffnessConfig | None = None
+    """Elastic constants in plane stress."""
+
+    uniaxial_test: fields.FileName | None = None
+    """CSV file of a uniaxial test of rubber, relative to the study's folder: stretch or strain and nominal stress
+    under a head such as `stretch,nominal stress [MPa]` or `strain [%],nominal stress [MPa]`. Definition `yeoh` uses
+    the fitted law."""
+
+    terms: fields.Terms | None = None
+    """Number of terms of the fitted law; 3 by default, 1 is the neo-Hookean law."""
+
+    equibiaxial_test: fields.FileName | None = None
+    """CSV file of an equibiaxial test, to compare the fitted law with."""
+
+    pure_shear_test: fields.FileName | None = None
+    """CSV file of a pure-shear test, to compare the fitted law with."""
+
+    density: fields.Density | None = None
+    """Density rho; needed for dynamics and gravity, not for statics."""
 
     @model_validator(mode="after")
     def _whole(self) -> Self:
@@ -258,9 +187,13 @@ class MaterialConfig(Section):
 class StatedStiffness(Section):
     """A stated stiffness of one mesh type and material."""
 
-    mesh_type: MeshType = Field(description="Mesh type.")
-    material: MaterialName = Field(description="Material.")
-    value: Stiffness = Field(
+    mesh_type: fields.MeshType
+    """Mesh type."""
+
+    material: fields.MaterialName
+    """Material."""
+
+    value: fields.Stiffness = Field(
         description=f"Stiffness of every spring; refused beyond a factor of {PLAUSIBLE:g} from sqrt(3)/2 E t."
     )
 
@@ -268,9 +201,8 @@ class StatedStiffness(Section):
 class PaperConfig(Section):
     """Parameters of the definition `paper`: stated stiffnesses."""
 
-    stiffness: list[StatedStiffness] = Field(
-        description="One entry for each mesh type and material of the grids with `paper`.", min_length=1
-    )
+    stiffness: list[StatedStiffness] = Field(min_length=1)
+    """One entry for each mesh type and material of the grids with `paper`."""
 
     @model_validator(mode="before")
     @classmethod
@@ -289,64 +221,99 @@ class CalibratedConfig(Section):
     sensitivity curves of one beam and load, over all mesh sizes.
     """
 
-    beam: BeamName = Field(description="Beam whose curves calibrate.")
-    load: Load = Field(description="Load whose curves calibrate.")
+    beam: fields.BeamName
+    """Beam whose curves calibrate."""
+
+    load: fields.Load
+    """Load whose curves calibrate."""
 
 
 class DefinitionsConfig(Section):
     """Parameters of the two definitions that need some; `springtune definitions` lists all definitions."""
 
-    paper: PaperConfig | None = Field(None, description="Stated stiffnesses; needed if a grid uses `paper`.")
-    calibrated: CalibratedConfig | None = Field(
-        None, description="Beam and load to calibrate on; needed if a grid uses `calibrated`."
-    )
+    paper: PaperConfig | None = None
+    """Stated stiffnesses; needed if a grid uses `paper`."""
+
+    calibrated: CalibratedConfig | None = None
+    """Beam and load to calibrate on; needed if a grid uses `calibrated`."""
 
 
 class SensitivityConfig(Section):
     """Equally spaced stiffnesses of every sensitivity curve, as multiples of sqrt(3)/2 E t."""
 
-    start: Ratio = default("0.4", alias="from", description="Smallest stiffness.")
-    stop: Ratio = default("1.6", alias="to", description="Largest stiffness.")
-    points: Points = default("61", description="Number of stiffnesses, both ends included.")
+    start: fields.Ratio = default("0.4", alias="from")
+    """Smallest stiffness."""
 
+    stop: fields.Ratio = default("1.6", alias="to")
+    """Largest stiffness."""
 
-class LimitsConfig(Section):
-    """Limits of one task: a scene, a mesh, a curve or a reference. A task beyond them fails, and the others go on.
+    points: fields.Points = default("61")
+    """Number of stiffnesses, both ends included."""
 
-    Results do not depend on limits. After a change of limits only the tasks that went beyond them are computed again.
-    """
-
-    seconds: LimitSeconds = default(
-        "3600", description="Processor time, which does not depend on other load of the machine."
-    )
-    memory: Memory = default("8 GB", description="Memory in addition to that of the idle job.")
+    @model_validator(mode="after")
+    def _ascending(self) -> Self:
+        if not self.start < self.stop:
+            raise refuse(f"{self.start:g} is not below 'to', {self.stop:g}; give a smaller 'from'", "from")
+        return self
 
 
 class MeshFileConfig(Section):
     """A mesh from a file that meshio reads. It fills its beam; its lower left corner may be anywhere."""
 
-    file: FileName = Field(description="The file, relative to the study's folder.")
-    beam: BeamName = Field(description="Beam that the mesh fills.")
-    mesh_size: Length = Field(description="Length of an edge, which names the mesh in grids and in the dataset.")
-    unit: Length = default("1 m", description="Unit of the coordinates in the file.")
+    file: fields.FileName
+    """The file, relative to the study's folder."""
+
+    beam: fields.BeamName
+    """Beam that the mesh fills."""
+
+    mesh_size: fields.Length
+    """Length of an edge, which names the mesh in grids and in the dataset."""
+
+    unit: fields.Length = default("1 m")
+    """Unit of the coordinates in the file."""
 
 
 class ExcludeConfig(Section):
     """Combinations that a grid leaves out: those with one of the given values of every given parameter."""
 
-    beam: Annotated[list[BeamName], OneOrMore()] | None = Field(None, description="Beams.")
-    mesh_type: Annotated[list[MeshType], OneOrMore()] | None = Field(None, description="Mesh types.")
-    mesh_size: Lengths | None = Field(None, description="Lengths of an edge.")
-    material: Annotated[list[MaterialName], OneOrMore()] | None = Field(None, description="Materials.")
-    load: Annotated[list[Load], OneOrMore()] | None = Field(None, description="Loads.")
-    force: Forces | None = Field(None, description="Magnitudes of the force.")
-    pressure: Stresses | None = Field(None, description="Pressures.")
-    thickness: Lengths | None = Field(None, description="Thicknesses.")
-    young_modulus: Stresses | None = Field(None, description="Young's moduli.")
-    poisson_ratio: PoissonRatios | None = Field(None, description="Poisson's ratios.")
-    stiffness_scale: Ratios | None = Field(None, description="Scales of the stiffness.")
-    definition: Annotated[list[DefinitionName], OneOrMore()] | None = Field(None, description="Definitions.")
-    kinematics: Annotated[list[Kinematics], OneOrMore()] | None = Field(None, description="Kinematics.")
+    beam: Annotated[list[fields.BeamName], OneOrMore()] | None = None
+    """Beams."""
+
+    mesh_type: Annotated[list[fields.MeshType], OneOrMore()] | None = None
+    """Mesh types."""
+
+    mesh_size: fields.Lengths | None = None
+    """Lengths of an edge."""
+
+    material: Annotated[list[fields.MaterialName], OneOrMore()] | None = None
+    """Materials."""
+
+    load: Annotated[list[fields.Load], OneOrMore()] | None = None
+    """Loads."""
+
+    force: fields.Forces | None = None
+    """Magnitudes of the force."""
+
+    pressure: fields.Stresses | None = None
+    """Pressures."""
+
+    thickness: fields.Lengths | None = None
+    """Thicknesses."""
+
+    young_modulus: fields.Stresses | None = None
+    """Young's moduli."""
+
+    poisson_ratio: fields.PoissonRatios | None = None
+    """Poisson's ratios."""
+
+    stiffness_scale: fields.Ratios | None = None
+    """Scales of the stiffness."""
+
+    definition: Annotated[list[fields.DefinitionName], OneOrMore()] | None = None
+    """Definitions."""
+
+    kinematics: Annotated[list[fields.Kinematics], OneOrMore()] | None = None
+    """Kinematics."""
 
     @model_validator(mode="after")
     def _something(self) -> Self:
@@ -357,6 +324,13 @@ class ExcludeConfig(Section):
 
 GRID_PARAMETERS = tuple(ExcludeConfig.model_fields)
 """Keys of a grid whose values are combined."""
+
+
+Parameter = Annotated[str, one_of("parameter", GRID_PARAMETERS)]
+
+
+def _one_group(value: Any) -> Any:
+    return [value] if isinstance(value, list) and value and isinstance(value[0], str) else value
 
 
 def _rows_may_give(schema: dict[str, Any]) -> None:
@@ -379,33 +353,42 @@ class GridConfig(Section):
 
     model_config = ConfigDict(json_schema_extra=_rows_may_give)
 
-    beam: Annotated[list[BeamName], OneOrMore(repeats=True)] = Field(description="Beams, by name.")
-    mesh_type: Annotated[list[MeshType], OneOrMore(repeats=True)] = Field(
+    beam: Annotated[list[fields.BeamName], OneOrMore(repeats=True)]
+    """Beams, by name."""
+
+    mesh_type: Annotated[list[fields.MeshType], OneOrMore(repeats=True)] = Field(
         description="A name under `mesh_files`, or one of these. "
         + " ".join(f"`{name}`: {one.summary}." for name, one in MESH_TYPES.items())
     )
-    mesh_size: Lengths = Field(description="Lengths of an edge, at most the smaller side of each beam.")
-    material: Annotated[list[MaterialName], OneOrMore(repeats=True)] = Field(description="Materials, by name.")
-    load: Annotated[list[Load], OneOrMore(repeats=True)] = Field(
-        description="With the left end clamped, `traction` and `compression` act along x on the right end, `bending` "
-        "along y. With the lower side clamped, `shear` acts along x on the upper side, which stays level, and "
-        "`pressure` and `follower-pressure` act down on it. All are spread evenly."
-    )
-    force: Annotated[dict[str, Forces], PerBeam()] | None = Field(
-        None,
-        description="Magnitude of the force, for all beams or for each; the load gives its sign. Several values make "
-        "the force a dimension. Otherwise a beam, material and load have the same force in all grids.",
-    )
-    pressure: Stresses | None = Field(
-        None,
-        description="Pressure on the upper side instead of `force`, for the loads `pressure` and `follower-pressure`.",
-    )
-    thickness: Lengths | None = Field(None, description="Thicknesses instead of the beams' own.")
-    young_modulus: Stresses | None = Field(None, description="Young's moduli instead of the materials' own.")
-    poisson_ratio: PoissonRatios | None = Field(None, description="Poisson's ratios instead of the materials' own.")
-    stiffness_scale: Ratios | None = Field(
-        None, description="Factors on all stiffnesses of a definition, including its energies."
-    )
+    mesh_size: fields.Lengths
+    """Lengths of an edge, at most the smaller side of each beam."""
+
+    material: Annotated[list[fields.MaterialName], OneOrMore(repeats=True)]
+    """Materials, by name."""
+
+    load: Annotated[list[fields.Load], OneOrMore(repeats=True)]
+    """With the left end clamped, `traction` and `compression` act along x on the right end, `bending` along y. With
+    the lower side clamped, `shear` acts along x on the upper side, which stays level, and `pressure` and
+    `follower-pressure` act down on it. All are spread evenly."""
+
+    force: fields.BeamForces | None = None
+    """Magnitude of the force, for all beams or for each; the load gives its sign. Several values make the force a
+    dimension. Otherwise a beam, material and load have the same force in all grids."""
+
+    pressure: fields.Stresses | None = None
+    """Pressure on the upper side instead of `force`, for the loads `pressure` and `follower-pressure`."""
+
+    thickness: fields.Lengths | None = None
+    """Thicknesses instead of the beams' own."""
+
+    young_modulus: fields.Stresses | None = None
+    """Young's moduli instead of the materials' own."""
+
+    poisson_ratio: fields.PoissonRatios | None = None
+    """Poisson's ratios instead of the materials' own."""
+
+    stiffness_scale: fields.Ratios | None = None
+    """Factors on all stiffnesses of a definition, including its energies."""
 
     @model_validator(mode="after")
     def _one_force(self) -> Self:
@@ -420,97 +403,107 @@ class GridConfig(Section):
                 raise refuse(f"load '{load}' has no pressed side; give 'force', or loads under pressure", "pressure")
         return self
 
-    definition: Annotated[list[DefinitionName], OneOrMore(repeats=True)] = Field(
-        description="Rules for the stiffness of every spring; `springtune definitions` lists them."
-    )
-    kinematics: Annotated[list[Kinematics], OneOrMore(repeats=True)] = default(
-        "nonlinear",
-        description="`nonlinear`: springs keep their length law. `linear`: they keep their tangent at rest.",
-    )
-    zip: Annotated[list[list[str]], Groups(GRID_PARAMETERS)] = Field(
-        [],
-        description="Parameters whose values are paired instead of combined, such as `[mesh_size, force]`: the first "
-        "with the first, and so on. Give a list of such lists for several groups.",
-    )
-    exclude: Annotated[list[ExcludeConfig], Sections()] = Field(
-        [], description="Combinations to leave out, such as `{mesh_type: free, mesh_size: 1 mm}`; a list for several."
-    )
-    rows: FileName | None = Field(
-        None,
-        description="CSV file of combinations, relative to the study's folder: one column for each parameter, named as "
-        "its key, and one row for each combination. Units stand beside the numbers (`5 mm`) or in the head "
-        "(`mesh_size [mm]`). Other parameters of the grid are combined with each row.",
-    )
-    sensitivity: Flag = default(
-        "true",
-        description="Whether each mesh, material, load and kinematics gets a sensitivity curve. "
-        "Curves that `calibrated` needs are always computed.",
-    )
+    definition: Annotated[list[fields.DefinitionName], OneOrMore(repeats=True)]
+    """Rules for the stiffness of every spring; `springtune definitions` lists them."""
 
+    kinematics: Annotated[list[fields.Kinematics], OneOrMore(repeats=True)] = default("nonlinear")
+    """`nonlinear`: springs keep their length law. `linear`: they keep their tangent at rest."""
 
-DEALT_BY = ("mesh", "grid")
-"""What a split of a study keeps together."""
+    zip: Annotated[
+        list[Annotated[list[Parameter], Field(min_length=2)]],
+        BeforeValidator(_one_group, json_schema_input_type=list[Parameter] | list[list[Parameter]]),
+        Words("a list of two parameters or more such as [mesh_size, force], or several such lists"),
+    ] = []
+    """Parameters whose values are paired instead of combined, such as `[mesh_size, force]`: the first with the
+    first, and so on. Give a list of such lists for several groups."""
 
+    exclude: Annotated[
+        list[ExcludeConfig],
+        BeforeValidator(
+            lambda value: [value] if isinstance(value, dict) else value,
+            json_schema_input_type=ExcludeConfig | list[ExcludeConfig],
+        ),
+        Words("keys and values to leave out such as {mesh_size: 1 mm}, or a list of several"),
+    ] = []
+    """Combinations to leave out, such as `{mesh_type: free, mesh_size: 1 mm}`."""
 
-PartNumber = Annotated[int, number("a whole number from 1, such as 2", 1, MOST_PARTS, whole=True)]
-PartCount = Annotated[int, number("a whole number from 2, such as 3", 2, MOST_PARTS, whole=True)]
-DealtBy = Annotated[str, one_of("way to split", DEALT_BY)]
+    rows: fields.FileName | None = None
+    """CSV file of combinations, relative to the study's folder: one column for each parameter, named as its key,
+    and one row for each combination. Units stand beside the numbers (`5 mm`) or in the head (`mesh_size [mm]`).
+    Other parameters of the grid are combined with each row."""
 
+    sensitivity: fields.Flag = default("true")
+    """Whether each mesh, material, load and kinematics gets a sensitivity curve. Curves that `calibrated` needs are
+    always computed."""
 
-class PartConfig(Section):
-    """The part of the study that this file requests; written by `springtune split`, not by hand."""
-
-    number: PartNumber = Field(description="Number of the part.")
-    of: PartCount = Field(description="Number of parts.")
-    by: DealtBy = default(
-        "mesh",
-        description="What a part keeps together: the scenes of a `mesh`, unless they are more than a part, or of a "
-        "`grid`.",
-    )
-    study: Text = Field(description="SHA-256 of the whole study, which stands above the comment of this section.")
+    @property
+    def groups(self) -> list[tuple[str, ...]]:
+        """Groups of zipped parameters, and the others each alone, in the order of `GRID_PARAMETERS`."""
+        zipped = {name: tuple(group) for group in self.zip for name in group}
+        return list(dict.fromkeys(zipped.get(name, (name,)) for name in GRID_PARAMETERS if getattr(self, name)))
 
     @model_validator(mode="after")
-    def _among_them(self) -> Self:
-        if self.number > self.of:
-            raise refuse(f"{self.number} is more than the {self.of} parts; give a number from 1 to {self.of}", "number")
+    def _as_many(self) -> Self:
+        """Zipped lists are of equal lengths; in others no value stands twice."""
+        zipped = [name for group in self.zip for name in group]
+        for name in zipped:
+            if zipped.count(name) > 1:
+                raise refuse(f"'{name}' is zipped twice; name it once", "zip")
+        for group in self.groups:
+            lists = {name: getattr(self, name) for name in group}
+            if len(group) == 1 and isinstance(lists[group[0]], list):
+                once(lists[group[0]], *group)
+            elif None in lists.values():
+                absent = next(name for name, values in lists.items() if values is None)
+                remedy = "give it some, or leave it out of 'zip'"
+                raise refuse(f"'{absent}' is zipped and has no values; {remedy}", "zip")
+            elif len(group) > 1 and isinstance(self.force, dict) and "force" in group:
+                raise refuse("'force' is zipped and has values for each beam; give one list, or zip neither", "zip")
+            elif len(set(map(len, lists.values()))) > 1:
+                shown = ", ".join(f"{len(values)} of '{name}'" for name, values in lists.items())
+                raise refuse(f"{shown} cannot go together; give each as many values", "zip")
         return self
+
+
+def _own_names(files: dict[str, Any]) -> dict[str, Any]:
+    for name in files:
+        if name in MESH_TYPES:
+            raise refuse(f"'{name}' is a mesh type that is made; rename yours", name)
+    return files
 
 
 class StudyConfig(Section):
     """A study."""
 
-    title: Text = Field(description="Title of the study, one line.")
-    beams: Annotated[dict[str, BeamConfig], Named("beam")] = Field(
-        {}, description="Beams that grids and sections name."
-    )
-    materials: Annotated[dict[str, MaterialConfig], Named("material")] = Field(
-        {}, description="Materials that grids and sections name."
-    )
-    definitions: DefinitionsConfig = Field(
-        default_factory=DefinitionsConfig, description="Parameters of the definitions `paper` and `calibrated`."
-    )
-    sensitivity: SensitivityConfig = Field(
-        default_factory=SensitivityConfig, description="Range of stiffness of the sensitivity curves."
-    )
-    mesh_files: Annotated[dict[str, list[MeshFileConfig]], Named("mesh type")] | None = Field(
-        None, description="Your own mesh types: for each a list of files, one for each beam and mesh size."
-    )
+    title: fields.Text
+    """Title of the study, one line."""
+
+    beams: Annotated[dict[str, BeamConfig], Named("beam")] = {}
+    """Beams that grids and sections name."""
+
+    materials: Annotated[dict[str, MaterialConfig], Named("material")] = {}
+    """Materials that grids and sections name."""
+
+    definitions: DefinitionsConfig = Field(default_factory=DefinitionsConfig)
+    """Parameters of the definitions `paper` and `calibrated`."""
+
+    sensitivity: SensitivityConfig = Field(default_factory=SensitivityConfig)
+    """Range of stiffness of the sensitivity curves."""
+
+    mesh_files: Annotated[dict[str, list[MeshFileConfig]], Named("mesh type"), AfterValidator(_own_names)] | None = None
+    """Your own mesh types: for each a list of files, one for each beam and mesh size."""
+
     outputs: list[str] = Field([])
-    further_references: Annotated[list[FurtherReference], OneOrMore()] = Field(
-        [],
-        description="References at finite strain for every beam, material and load, besides the one of small strain. "
-        "The group `/finite_strain` has them and the networks' errors; under pressure `/block` has them, too. Each "
-        "takes seconds. Incompressible materials have none in plane strain. 'yeoh-plane-stress' needs a material with "
-        "a `uniaxial_test` and uses its fitted law.",
-    )
-    limits: LimitsConfig = Field(default_factory=LimitsConfig, description="Limits of one task.")
-    printed: FileName | None = Field(
-        None, description="CSV file of printed values to compare with, relative to the study's folder."
-    )
+    further_references: Annotated[list[fields.FurtherReference], OneOrMore()] = []
+    """References at finite strain for every beam, material and load, besides the one of small strain. The group
+    `/finite_strain` has them and the networks' errors; under pressure `/block` has them, too. Each takes seconds.
+    Incompressible materials have none in plane strain. 'yeoh-plane-stress' needs a material with a `uniaxial_test`
+    and uses its fitted law."""
+
+    printed: fields.FileName | None = None
+    """CSV file of printed values to compare with, relative to the study's folder."""
+
     grids: dict[str, GridConfig] = Field({})
-    part: PartConfig | None = Field(
-        None, description="The part that this file requests; written by `springtune split`."
-    )
 
     alone: ClassVar[dict[str, tuple[str, ...]]] = {}
     """Keys of study kinds that a study may have instead of grids, and the keys that each needs."""
@@ -528,58 +521,35 @@ class StudyConfig(Section):
         return {name: found[name] for name in cls.model_fields if name in found}
 
 
-RESERVED.update(StudyConfig.model_fields, GridConfig.model_fields)
-
 GRIDS_NEED = ("beams", "materials")
 
 
-class Later(NamedTuple):
-    """Type of a field, imported only for studies that use the field: each section costs milliseconds."""
-
-    module: str
-    name: str
-
-    def type(self) -> Any:
-        """The type."""
-        return imported(f"{self.module}:{self.name}")
-
-
-def study_model(kinds: Sequence[Kind], given: Container[object] | None = None) -> type[StudyConfig]:
+@cache
+def study_model(kinds: tuple[Kind, ...]) -> type[StudyConfig]:
     """Model of a study: `StudyConfig` and the keys that study kinds add to it and to its grids."""
-    grid_fields: dict[str, Any] = {}
-    study_fields: dict[str, Any] = {}
-    outputs: list[Output] = []
-    for kind in kinds:
-        grid_fields |= kind.grid_fields
-        for name, (annotation, field) in kind.study_fields.items():
-            absent = given is not None and name not in given and field.default is None
-            if isinstance(annotation, Later) and not absent:
-                annotation = annotation.type()
-            study_fields[name] = NoneType if absent else annotation, field
-        outputs += kind.outputs
-    grid = create_model("GridConfig", __base__=GridConfig, **grid_fields)
-    grid.__doc__ = GridConfig.__doc__
-    meanings = "; ".join(f"`{output.name}`: {output.meaning}" for output in outputs)
-    output_name = Annotated[str, one_of("output", [output.name for output in outputs])]
-    study_fields["outputs"] = (
-        Annotated[list[output_name], OneOrMore()],
-        Field(
-            [output.name for output in outputs if output.usual],
-            description=f"Figures and tables of the dataset: {meanings}. "
-            "Figures of scenes show nonlinear kinematics if a grid has them, otherwise linear ones.",
-        ),
-    )
+    made = [output for kind in kinds for output in kind.outputs]
+    own: dict[str, Any] = {name: field for kind in kinds for name, field in kind.grid_fields.items()}
+    grid = create_model("GridConfig", __base__=GridConfig, __doc__=GridConfig.__doc__, **own)
+    added: dict[str, Any] = {name: field for kind in kinds for name, field in kind.study_fields.items()}
     alone: dict[str, tuple[str, ...]] = {}
     for kind in kinds:
         optional_keys = (name for name, (_, field) in kind.study_fields.items() if field.default is None)
         alone |= kind.alone or dict.fromkeys(optional_keys, GRIDS_NEED)
-    own = ", ".join(f"`{name}`" for name in alone)
-    study_fields["grids"] = (
-        Annotated[dict[str, grid], Named("grid", for_files=False)],
-        Field({}, description=f"Grids of scenes to compute. A study with one of {own} needs none."),
+    meanings = "; ".join(f"`{output.name}`: {output.meaning}" for output in made)
+    added["outputs"] = (
+        Annotated[list[Annotated[str, one_of("output", [output.name for output in made])]], OneOrMore()],
+        Field(
+            [output.name for output in made if output.usual],
+            description=f"Figures and tables of the dataset: {meanings}. "
+            "Figures of scenes show nonlinear kinematics if a grid has them, otherwise linear ones.",
+        ),
     )
-    model = create_model("StudyConfig", __base__=StudyConfig, **study_fields)
-    model.__doc__ = StudyConfig.__doc__
+    listed = ", ".join(f"`{name}`" for name in alone)
+    added["grids"] = (
+        Annotated[dict[str, grid], Named("grid", for_files=False)],
+        Field({}, description=f"Grids of scenes to compute. A study with one of {listed} needs none."),
+    )
+    model = create_model("StudyConfig", __base__=StudyConfig, __doc__=StudyConfig.__doc__, **added)
     model.alone = alone
     ways = {"grids": GRIDS_NEED} | alone
     model.model_config["json_schema_extra"] = {"anyOf": [{"required": [*needed, key]} for key, needed in ways.items()]}

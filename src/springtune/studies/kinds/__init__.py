@@ -39,6 +39,5 @@ def load_study(path: str | Path, beside: Path | None = None) -> "Study":
     (0.001, 0.002, 0.005)
     """
     from ..config.load import load  # here, since pydantic takes a fifth of a second to import
-    from .division import part_of
 
-    return part_of(load(path, kinds(), beside))
+    return load(path, kinds(), beside)

@@ -1,7 +1,6 @@
 """Compare what was solved with its references and gather everything in one dataset."""
 
 import sys
-from collections.abc import Collection
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,12 +10,11 @@ from springtune.registry import imported
 from springtune.safe_io import atomic
 
 from ..config.kind import kinds, outputs
-from ..output import dataset, summary
-from ..runs import provenance, records, rerun
-from ..runs.keys import CODE_FILE, OURS
-from ..runs.plan import COSTS_FILE, plan, remember_costs, usual_costs
-from ..runs.run_tasks import RECORDS, with_repair
-from ..runs.stages import results
+from ..output import dataset, summing_up, text
+from ..runs import job, provenance, rerun
+from ..runs.plan import plan
+from ..runs.stages import rows
+from ..runs.store import DamagedError
 from . import load_study
 
 if TYPE_CHECKING:
@@ -24,28 +22,27 @@ if TYPE_CHECKING:
     from ..config.model import Study
 
 
-def run(study: "Study", config: str | Path, folder: Path, output: Path, untold: Collection[str] = ()) -> list[Path]:
+def run(study: "Study", config: str | Path, folder: Path, output: Path) -> None:
     """Build the dataset of a study from its stored results."""
-    groups = with_repair(lambda: gathered(study, folder), folder)
     try:
-        dataset.write(output, groups, provenance.attributes(study, config, untold))
+        groups = gathered(study, folder)
+        dataset.write(output, groups, provenance.attributes(study, config))
+    except DamagedError as error:
+        job.forget_job_of(error.path, folder)
+        raise SystemExit(str(error)) from None
     except OSError as error:  # the message says it all
         raise SystemExit(str(error)) from None
-    told = output.with_name(summary.FILE)
-    atomic.write_text(told, summary.text(groups, study.title))
-    remember_costs(folder.parent / COSTS_FILE, sorted(folder.glob(f"{RECORDS}/*_*.json")), usual_costs())
-    return [output, told]
+    told = output.with_name(text.FILE)
+    atomic.write_text(told, summing_up.text(groups, study.title))
 
 
-def main(config: str, folder: str, output: str, record: str, digest: str, *untold: str) -> None:
+def main(config: str, folder: str, output: str, record: str, digest: str) -> None:
     """Build a dataset and write the record of it."""
     study = load_study(config)
-    OURS.recall(Path(folder).parent / CODE_FILE)
-    chosen = {option: name in untold for option, name in rerun.BLANKED.items()}
-    if rerun.jobs(study, plan(study, Path(folder), 1), chosen)[rerun.COLLECT].digest != digest:
+    if rerun.jobs(study, plan(study, Path(folder)))[rerun.COLLECT].digest != digest:
         raise SystemExit(f"{config} was changed while the study ran; call the same command again")
-    made = run(study, config, Path(folder), Path(output), untold)
-    records.write(record, digest, made, untold=list(untold))
+    run(study, config, Path(folder), Path(output))
+    atomic.write_json(record, {"digest": digest})
 
 
 def group_of(kind: "Kind") -> dataset.Group:
@@ -55,20 +52,10 @@ def group_of(kind: "Kind") -> dataset.Group:
 
 def _of_tasks(kind: "Kind", study: "Study", folder: Path) -> dict[str, xr.Dataset]:
     """Group of a kind whose tasks have cells of it."""
-    group = group_of(kind)
-    found = dataset.Filler(group.empty(study.axes))
-    found.data.attrs = dict(kind.attributes(study.parts[kind.name]))
-    used = {dimension for dimensions, *_ in kind.variables.values() for dimension in dimensions}
-    for stage in kind.stages:
-        assert stage.tasks
-        labels = next(iter(stage.tasks(study))).labels
-        if used <= {name for name, label in labels.items() if not isinstance(label, list)}:  # a cell a task
-            for task, result in results(stage, study, folder):
-                found.put(result, **task.labels)
-        else:
-            for task, result in results(stage, study, folder, kind.variables):
-                found.put_arrays(result, task.labels)
-    return {group.name: found.data}
+    group, stages = group_of(kind), kind.stages
+    found = group.of_rows(study.axes, (row for stage in stages for row in rows(stage, study, folder)))
+    found.attrs = dict(kind.attributes(study.parts[kind.name]))
+    return {group.name: found}
 
 
 def gathered(study: "Study", folder: Path) -> dict[str, xr.Dataset]:
@@ -77,7 +64,7 @@ def gathered(study: "Study", folder: Path) -> dict[str, xr.Dataset]:
     for kind in kinds():
         if study.parts[kind.name]:
             groups |= _of_tasks(kind, study, folder) if kind.variables else kind.module("collect").groups(study, folder)
-    for made in () if study.part else outputs().values():
+    for made in outputs().values():
         if made.collect and made.name in study.outputs:
             groups |= imported(made.collect).groups(study, folder)
     return groups

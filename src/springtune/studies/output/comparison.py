@@ -2,44 +2,31 @@
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Collection, Hashable, Iterator, Mapping, Sequence
+import math
+from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
-from typing import Any, SupportsInt
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 
 from springtune.problem.quantities import nearest
 
-from .alignment import joined, on_common_axes
 from .dataset import NOT_REQUESTED, flag_words, is_flagged
-from .selection import judged
-from .text import NUMBER, from_json, variable_name, without_numbers
+from .text import NUMBER, from_json, without_numbers
+
+SAME_NUMBER = 1e-9
+"""Relative difference below which two numbers are one label."""
 
 RELATIVE = 1e-6
 """Default relative tolerance."""
 
-MEASURED: tuple[str, ...] = (
-    "seconds", "*_seconds", "seconds_*", "solver", "peak_memory", "machine_load", "pareto", "cost_exponent",
-    "explicit_steps", "spring_updates", "*_bandwidth",
-)  # fmt: skip
+MEASURED = ("seconds", "*_seconds", "seconds_*", "solver", "spring_updates")
 """Variables that depend on the machine."""
 
-NOT_MEASURED = "not measured"
-"""How messages of times begin that a busy machine did not give."""
-
-TOLD_ATTRIBUTES = ("title", "study", "springtune_version", "git_commit", "study_commit")
-
-UNTOLD = {"created", "history", "host", "git_diff", "config", "config_sha256", "software", "inputs", "source"}
-UNTOLD |= {"Conventions", "references", "accepted", "tolerances"}
-
-OF_CELLS = "tolerance"
-"""Variable of relative tolerances by cell."""
-
-AT_ONCE = 2**26
-"""Bytes of an array compared at once."""
+UNTOLD = {"created", "history", "config", "config_sha256", "software", "inputs", "source", "Conventions", "references"}
+"""Attributes that are not told as they are."""
 
 Labels = dict[str, str | float]
 
@@ -66,7 +53,6 @@ class Change:
     group: str
     variable: str
     labels: Labels
-    point: Labels
     before: float | str
     after: float | str
     units: str
@@ -82,7 +68,7 @@ class Change:
 
 @dataclass(frozen=True)
 class VariableChanges:
-    """Changes of one variable."""
+    """Changes of one variable; `rows` are the largest."""
 
     name: str
     compared: int
@@ -94,8 +80,8 @@ class VariableChanges:
 class Alone:
     """Cells of only one dataset: their number, and the labels of the first."""
 
-    count: int
-    rows: list[Labels]
+    count: int = 0
+    rows: Sequence[Labels] = ()
 
 
 @dataclass
@@ -105,10 +91,10 @@ class GroupChanges:
     name: str
     sizes: dict[str, int]
     units: dict[str, str]
-    labels: dict[str, tuple[list[str | float], list[str | float]]]
-    cells: tuple[Alone, Alone] = (Alone(0, []), Alone(0, []))
+    labels: dict[str, tuple[list[str | float], ...]]
+    cells: tuple[Alone, ...] = (Alone(), Alone())
     both: int = 0
-    variables: tuple[list[str], list[str]] = ([], [])
+    variables: tuple[list[str], ...] = ([], [])
     unlike: dict[str, str] = field(default_factory=dict)
     flags: list[VariableChanges] = field(default_factory=list)
     values: list[VariableChanges] = field(default_factory=list)
@@ -116,13 +102,8 @@ class GroupChanges:
     @property
     def different(self) -> bool:
         """Whether the group differs."""
-        return bool(
-            self.labels
-            or any(alone.count for alone in self.cells)
-            or any(self.variables)
-            or self.unlike
-            or any(one.changed for one in (*self.flags, *self.values))
-        )
+        changed = any(one.changed for one in (*self.flags, *self.values)) or any(one.count for one in self.cells)
+        return bool(changed or self.labels or any(self.variables) or self.unlike)
 
 
 @dataclass(frozen=True)
@@ -130,9 +111,8 @@ class Comparison:
     """Differences of two datasets; differing `attributes` do not count as different results."""
 
     groups: list[GroupChanges]
-    alone: tuple[list[str], list[str]]
+    alone: tuple[list[str], ...]
     attributes: dict[str, tuple[str, str]]
-    config: list[str]
 
     @property
     def different(self) -> bool:
@@ -153,331 +133,196 @@ def compare(
     groups: Collection[str] = (),
     ignored: Collection[str] = (),
     most: int | None = None,
-    own: Mapping[str, Tolerance] | None = None,
-    part: bool = False,
-    block: int = AT_ONCE,
 ) -> Comparison:
-    """Compare two datasets by label.
+    """Compare two datasets by label; of each variable so many changes are listed.
 
-    Numeric labels match within `alignment.SAME_NUMBER`; NaN equals NaN. Values of cells that one study does not request
-    are not compared. Numbers inside texts are compared as numbers. `MEASURED` is left out. A parameter that only one
-    study sweeps becomes a dimension of both. `own` holds tolerances by `variable_name`, ``""`` for all others; a
-    variable `OF_CELLS` of the first dataset is the relative tolerance of its cells.
+    Numeric labels match within `SAME_NUMBER`; NaN equals NaN. Values of cells that one study does not request
+    are not compared. Numbers inside texts are compared as numbers. `MEASURED` is left out.
 
     Examples
     --------
-    >>> found = compare(tree, tree)
-    >>> found.different
+    >>> one = xr.DataTree(tree.to_dataset())  # the root alone
+    >>> compare(one, one).different
     False
-    >>> other = tree.copy(deep=True)
+    >>> other = one.copy(deep=True)
     >>> other["stiffness"][0, 0, 0, 0, 0, 0, 0] *= 2
-    >>> [(row.variable, row.labels["beam"], row.after / row.before) for row in compare(tree, other).changes]
+    >>> [(row.variable, row.labels["beam"], row.after / row.before) for row in compare(one, other).changes]
     [('stiffness', '100x20', 2.0)]
     """
-    nodes = [{node.path: node.to_dataset() for node in tree.subtree} for tree in on_common_axes([before, after])]
+    nodes = [{node.path: node.to_dataset() for node in tree.subtree} for tree in (before, after)]
+    nodes[1] |= {path: _spelt(data, nodes[0][path]) for path, data in nodes[1].items() if path in nodes[0]}
     held = sorted({str(name) for side in nodes for data in side.values() for name in data.variables})
     for pattern in ignored:
         if not any(fnmatchcase(name, pattern) for name in held):
             raise ValueError(f"--ignore {pattern}: neither has it; {nearest(pattern, held)}")
+    left_out = {name for name in held if any(fnmatchcase(name, one) for one in (*MEASURED, *ignored))}
     known = sorted({*nodes[0], *nodes[1]})
     wanted = {"/" + name.strip("/") for name in groups} or {*known}
     for name in sorted(wanted - {*known}):
         raise ValueError(f"--group {name.strip('/')}: neither has it; known: {', '.join(known)}")
-    sides = [[path for path in side if path in wanted] for side in nodes]
-    alone = (
-        [path for path in sides[0] if path not in sides[1]],
-        [path for path in sides[1] if path not in sides[0] and not part],
-    )
-    roots = (nodes[0]["/"], nodes[1]["/"])
-    own = own or {}
-    how = _How(tolerance or own.get("", Tolerance()), own, (*MEASURED, *ignored), most, part, block)
-    shared = [path for path in sides[0] if path in sides[1]]
-    found = [_Group(path, (nodes[0][path], nodes[1][path]), roots, how).compared() for path in shared]
-    kept = {name: text for name, text in after.attrs.items() if not part or name in before.attrs}
-    attributes, config = _attributes(before.attrs, kept)
-    return Comparison(found, alone, attributes, config)
-
-
-def compare_definitions(before: xr.DataTree, after: xr.DataTree, groups: Collection[str] = ()) -> list[dict[str, Any]]:
-    """Compare the errors of definitions in two datasets, each over all its solved cells whose reference applies.
-
-    A row has a group, a definition, and before and after the number of absolute errors, their median and the largest.
-    """
-    sides = {"before": _of_definitions(before), "after": _of_definitions(after)}
-    known = dict.fromkeys(key for side in sides.values() for key in side)
-    wanted = {"/" + name.strip("/") for name in groups} or {group for group, _ in known}
-    for name in sorted(wanted - {group for group, _ in known}):
-        raise ValueError(f"--group {name.strip('/')}: neither has errors of definitions there; leave --group out")
-    return [
-        {"group": key[0], "definition": key[1]}
-        | {what: {name: of(side[key]) if key in side else None for name, side in sides.items()} for what, of in JUDGED}
-        for key in known
-        if key[0] in wanted
+    roots = [side["/"] for side in nodes]
+    chosen = [[path for path in side if path in wanted] for side in nodes]
+    found = [
+        _Group(path, [side[path] for side in nodes], roots, tolerance or Tolerance(), most).compared(left_out)
+        for path in chosen[0]
+        if path in chosen[1]
     ]
+    facts = [_facts(tree.attrs) for tree in (before, after)]
+    told = {name: (facts[0].get(name, ""), facts[1].get(name, "")) for name in facts[0] | facts[1]}
+    inputs = [from_json(tree.attrs.get("inputs")) for tree in (before, after)]
+    told |= {name: (inputs[0][name], inputs[1][name]) for name in inputs[0] if name in inputs[1]}
+    return Comparison(found, _only(chosen), {name: (old, new) for name, (old, new) in told.items() if old != new})
 
 
-JUDGED = (
-    ("scenes", len),
-    ("median", lambda errors: float(np.median(errors))),
-    ("worst", lambda errors: float(errors.max())),
-)
-"""Numbers of the errors of a definition."""
+def _spelt(data: xr.Dataset, like: xr.Dataset) -> xr.Dataset:
+    """A dataset with its numeric labels as in another one, where they are the same but for rounding."""
+    for name in data.indexes.keys() & like.indexes.keys():
+        labels, known = data.indexes[name], like.indexes[name].sort_values()
+        for index in (labels, known):
+            if not index.is_unique:
+                twice = index[index.duplicated()][0]
+                raise ValueError(f"dimension '{name}' has the label {twice} twice; run the study again")
+        if labels.dtype.kind in "iuf" and known.dtype.kind in "iuf" and len(known):
+            places = known.get_indexer(labels, "nearest", tolerance=SAME_NUMBER * np.abs(labels))
+            spelt = np.where(places < 0, labels, known.to_numpy()[places])
+            data = data.assign_coords({name: (name, spelt, data[name].attrs)})
+    return data
 
 
-def _of_definitions(tree: xr.DataTree) -> dict[tuple[str, str], np.ndarray]:
-    """Absolute errors by group and definition."""
-    finite = tree["finite_strain"].to_dataset() if "finite_strain" in tree.children else None
-    found = {}
-    for node in tree.subtree:
-        data = node.to_dataset()
-        for name in {"deformation_error", "error"} & {*data} if "status" in data else ():
-            if "definition" not in data[name].dims:
-                continue
-            errors = abs(judged(data, finite if node.path == "/" else None, name))
-            for definition in data.definition.values.tolist():
-                values = errors.sel(definition=definition).values
-                if np.isfinite(values).any():
-                    found[node.path, definition] = values[np.isfinite(values)]
-    return found
+def _only(sides: Sequence[Collection[str]]) -> tuple[list[str], ...]:
+    """Names of each side that the other has not."""
+    one, other = sides
+    return [name for name in one if name not in other], [name for name in other if name not in one]
 
 
-@dataclass(frozen=True)
-class _How:
-    tolerance: Tolerance
-    own: Mapping[str, Tolerance]
-    ignored: Collection[str]
-    most: int | None
-    part: bool
-    block: int
+def _facts(attributes: Mapping[Hashable, object]) -> dict[str, str]:
+    """Attributes to tell, and versions of packages."""
+    found = {str(name): value for name, value in attributes.items()} | from_json(attributes.get("software"))
+    return {name: str(value) for name, value in found.items() if name not in UNTOLD}
 
 
 class _Group:
     """Comparison of a group that both datasets have."""
 
     def __init__(
-        self, path: str, pair: tuple[xr.Dataset, xr.Dataset], roots: tuple[xr.Dataset, xr.Dataset], how: _How
+        self,
+        path: str,
+        pair: Sequence[xr.Dataset],
+        roots: Sequence[xr.Dataset],
+        tolerance: Tolerance,
+        most: int | None,
     ) -> None:
-        self.path, self.how = path, how
-        names = dict.fromkeys(str(one) for own in pair for one in own.sizes)
-        self.sizes = {name: len(joined(name, pair)) for name in names}
-        self.cell_dimensions = cell_dimensions(pair, roots)
-        self.labels = {}
-        for name in self.sizes:
-            if all(data.sizes.get(name) and name in data.indexes for data in pair):
-                one, other = (data.indexes[name] for data in pair)
-                self.labels[name] = (
-                    one.difference(other, sort=False).tolist(),
-                    other.difference(one, sort=False).tolist(),
-                )
-        self.pair = [
-            data.assign_coords({name: np.arange(size) for name, size in data.sizes.items() if name not in data.indexes})
-            for data in pair
-        ]
+        self.path, self.given, self.tolerance, self.most = path, pair, tolerance, most
+        self.cell_dimensions = _cell_dimensions(pair, roots)
+        numbered = [{name: range(size) for name, size in one.sizes.items() if name not in one.indexes} for one in pair]
+        self.pair = [data.assign_coords(numbers) for data, numbers in zip(pair, numbered)]
         self.asked = [_asked(data, root) for data, root in zip(self.pair, roots)]
 
-    def compared(self) -> GroupChanges:
-        units = {
-            name: str(data[name].attrs.get("units", "1"))
-            for data in reversed(self.pair)
-            for name in self.sizes
-            if name in data.dims
-        }
-        labels = {name: both for name, both in self.labels.items() if any(both)}
-        found = GroupChanges(self.path, self.sizes, units, labels)
-        names = [[str(name) for name in data.variables if name not in data.dims] for data in self.pair]
-        left_out = [name for own in names for name in own if any(fnmatchcase(name, one) for one in self.how.ignored)]
-        left_out += [OF_CELLS]
-        found.variables = (
-            [name for name in names[0] if name not in names[1] and name not in left_out],
-            [name for name in names[1] if name not in [*names[0], *left_out] and not self.how.part],
-        )
-        own = all("status" in data for data in self.pair) and self._comparable("status") is None
-        if own:
+    def compared(self, left_out: Collection[str]) -> GroupChanges:
+        """Compare labels, cells and all variables but some."""
+        sizes = {str(name): size for one in self.pair for name, size in one.sizes.items()}
+        units: dict[str, str] = {}
+        labels: dict[str, tuple[list[str | float], ...]] = {}
+        for name in sizes:
+            axes = [data[name] for data in self.pair if name in data.dims]
+            sizes[name] = len(axes[0].to_index().union(axes[-1].to_index(), sort=False))
+            units[name] = str(axes[0].attrs.get("units", "1"))
+            if len(axes) == 2 and all(data.sizes[name] and name in data.indexes for data in self.given):
+                one, other = (axis.to_index() for axis in axes)
+                alone = one.difference(other, sort=False).tolist(), other.difference(one, sort=False).tolist()
+                labels |= {name: alone} if any(alone) else {}
+        found = GroupChanges(self.path, sizes, units, labels)
+        names = [
+            [str(name) for name in data.variables if name not in data.dims and name not in left_out]
+            for data in self.pair
+        ]
+        found.variables = _only(names)
+        if all("status" in data for data in self.pair) and not self._unlike("status"):
             found.cells, found.both = self._cells()
-        for name in names[0]:
-            if name not in names[1] or name in left_out:
-                continue
-            reason = self._comparable(name)
-            if reason:
+        for name in (name for name in names[0] if name in names[1]):
+            if reason := self._unlike(name):
                 found.unlike[name] = reason
                 continue
-            changes = self._variable(name)
-            (found.flags if is_flagged(self.pair[0][name]) else found.values).append(changes)
+            (found.flags if is_flagged(self.pair[0][name]) else found.values).append(self._variable(name))
         return found
 
-    def _comparable(self, name: str) -> str | None:
-        """Return why a variable cannot be compared, or None."""
-        a, b = self._arrays(name)
+    def _unlike(self, name: str) -> str:
+        """Return why a variable cannot be compared, or an empty string."""
+        a, b = (data[name] for data in self.pair)
         if set(a.dims) != set(b.dims):
             said = (f"({', '.join(map(str, one.dims))})" for one in (a, b))
             return "has other dimensions: {} before, {} after".format(*said)
         if (a.dtype.kind in "OUS") != (b.dtype.kind in "OUS"):
             return "is a text in one dataset and a number in the other"
         units = [str(one.attrs["units"]) for one in (a, b) if "units" in one.attrs]
-        if len(set(units)) > 1:
-            return f"has other units: {units[0]} before, {units[1]} after"
-        return None
+        return f"has other units: {units[0]} before, {units[1]} after" if len(set(units)) > 1 else ""
 
-    def _cells(self) -> tuple[tuple[Alone, Alone], int]:
+    def _cells(self) -> tuple[tuple[Alone, ...], int]:
         """Cells requested by one side only, and the number requested by both."""
         masks = [mask for mask in self.asked if mask is not None]
-        names = [str(name) for name in masks[0].dims if name in self.cell_dimensions]
-        asked = [mask.any(set(mask.dims) - set(names)).transpose(*names) for mask in masks]
-
-        # On the labels of one side: the union of all may be the square of either.
-        def there(other: xr.DataArray, one: xr.DataArray) -> xr.DataArray:
-            return other.reindex({name: one.indexes[name] for name in names}, fill_value=False)
-
-        def alone(one: xr.DataArray, other: xr.DataArray) -> Alone:
-            places = np.argwhere((one & ~there(other, one)).values)
-            return Alone(len(places), [_labels(one, names, place) for place in places[: self.how.most]])
-
-        return (alone(*asked), alone(*reversed(asked))), int((asked[0] & there(asked[1], asked[0])).sum())
-
-    def _arrays(self, name: str) -> tuple[xr.DataArray, xr.DataArray]:
-        a, b = self.pair[0][name], self.pair[1][name]
-        if self.how.part and set(b.dims) < set(a.dims):
-            b = b.expand_dims(
-                {one: self.pair[1][one] for one in a.dims if one in self.pair[1].coords and one not in b.dims}
-            )
-        return a, b
+        masks = [mask.any([name for name in mask.dims if name not in self.cell_dimensions]) for mask in masks]
+        alone, both = [], 0
+        for mask, other in zip(masks, masks[::-1]):
+            # On the labels of one side: the union of all may be the square of either.
+            there = other.reindex_like(mask, fill_value=False).transpose(*mask.dims).values
+            places = np.flatnonzero(mask.values & ~there)
+            rows = [_labels(mask, np.unravel_index(place, mask.shape)) for place in places[: self.most]]
+            alone.append(Alone(len(places), rows))
+            both = int((mask.values & there).sum())
+        return tuple(alone), both
 
     def _variable(self, name: str) -> VariableChanges:
-        pair = self._arrays(name)
-        names = sorted(map(str, pair[0].dims), key=lambda one: one not in self.cell_dimensions)  # cells, then points
-        cells = sum(one in self.cell_dimensions for one in names)
-        a, b = (_bare(one).transpose(*names) for one in pair)
-        pair = xr.align(a, b, join="inner", copy=False)
-        if not pair[0].size:
+        """Compare a variable on the labels of both sides; of a curve or field its worst point."""
+        names = sorted(map(str, self.pair[0][name].dims), key=lambda one: one not in self.cell_dimensions)
+        arrays = (_bare(data[name]).transpose(*names) for data in self.pair)
+        one, other = xr.align(*arrays, join="inner", copy=False)
+        if not one.size:
             return VariableChanges(name, 0, 0, [])
-        kind = Values(*pair, self.how.own.get(variable_name(self.path, name), self.how.tolerance))
-        tolerances = self.pair[0].get(OF_CELLS)
-        tolerances = tolerances if tolerances is not None and set(tolerances.dims) <= set(names) else None
-        asked = [None if mask is None else mask.any(set(mask.dims) - set(names)) for mask in self.asked]
-        compared = changed = 0
-        rows: list[Change] = []
-        for part in _blocks(pair[0], cells, self.how.block):
-            here = [one.isel(part) for one in pair]
-            values = [one.values.astype(str) if one.dtype == object else one.values for one in here]
-            if name.endswith("message") and all(one.dtype.kind == "U" for one in values):
-                values = [np.where(np.char.startswith(one, NOT_MEASURED), "", one) for one in values]
-            excess, there = kind.excess(
-                values,
-                [_over(mask, here[0], True) for mask in asked],
-                cells,
-                _over(tolerances, here[0], np.nan),
-            )
-            flat = excess.reshape(*excess.shape[:cells], -1)
-            worst, largest = flat.argmax(axis=-1), flat.max(axis=-1)
-            compared += int(there.reshape(flat.shape).any(axis=-1).sum())
-            beyond = np.argwhere(largest > 1.0)
-            changed += len(beyond)
-            order = np.argsort(-largest[largest > 1.0], kind="stable")[: self.how.most]
-            for at in map(tuple, beyond[order]):
-                point = np.unravel_index(int(worst[at]), excess.shape[cells:]) if names[cells:] else ()
-                where = (*at, *point)
-                rows.append(
-                    Change(
-                        self.path,
-                        name,
-                        _labels(here[0], names[:cells], at),
-                        _labels(here[0], names[cells:], point),
-                        kind.said(0, values[0][where]),
-                        kind.said(1, values[1][where]),
-                        kind.units,
-                        float(largest[at]),
-                    )
-                )
-        rows.sort(key=lambda row: -row.excess)
-        return VariableChanges(name, compared, changed, rows[: self.how.most])
-
-
-def _bare(array: xr.DataArray) -> xr.DataArray:
-    """An array with the labels of its dimensions alone."""
-    return array.drop_vars(set(array.coords) - set(array.dims))
-
-
-def _labels(array: xr.DataArray, names: Sequence[str], place: Sequence[SupportsInt]) -> Labels:
-    found = {name: array.indexes[name][int(at)] for name, at in zip(names, place)}
-    return {name: label if isinstance(label, str | int) else float(label) for name, label in found.items()}
-
-
-def _over(array: xr.DataArray | None, block: xr.DataArray, default: object) -> np.ndarray:
-    """Values of cells, broadcastable to a block; `default` without any."""
-    shared = [name for name in block.dims if array is not None and name in array.dims]
-    if array is None or not shared:
-        return np.array(default)
-    chosen = _bare(array).reindex({name: block.indexes[name] for name in shared})
-    found: np.ndarray = (
-        chosen.expand_dims([name for name in block.dims if name not in shared]).transpose(*block.dims).values
-    )
-    return found
-
-
-class Values:
-    """Comparison of two variables with numbers, flags or texts."""
-
-    def __init__(self, a: xr.DataArray, b: xr.DataArray, tolerance: Tolerance) -> None:
-        self.units = str(a.attrs.get("units", b.attrs.get("units", "1")))
-        self.tolerance = tolerance
-        self.words = [flag_words(one) for one in (a, b)] if is_flagged(a) and is_flagged(b) else None
-        self.text = a.dtype.kind in "OUS"
-
-    def said(self, side: int, value: np.generic) -> float | str:
-        """Value for a report, flags as words."""
-        if self.words is not None:
-            return self.words[side].get(int(value), "")
-        return str(value) if self.text else float(value)
-
-    def missing(self, side: int, values: np.ndarray) -> np.ndarray:
-        """Return where values are missing, or flags say that nothing was requested."""
-        if self.words is not None:
-            values = _as_words(values, self.words[side])
-        return values == "" if values.dtype.kind in "OUS" else np.isnan(values)
-
-    def excess(
-        self, values: Sequence[np.ndarray], asked: Sequence[np.ndarray], cells: int, tolerances: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Difference over tolerance in the values' shape, and where it is defined."""
-        text = self.text or self.words is not None
-        a, b = values if self.words is None else map(_as_words, values, self.words)
-        missing = [self.missing(side, one) for side, one in enumerate(values)]
+        flagged = is_flagged(one) and is_flagged(other)
+        a, b = (_as_words(side) if flagged else side.values for side in (one, other))
+        texts = flagged or one.dtype.kind in "OUS"
+        missing = [values == "" if texts else np.isnan(values) for values in (a, b)]
+        asked = [_on(mask, one) for mask in self.asked]
         unmatched = (missing[0] & ~missing[1] & asked[0]) | (missing[1] & ~missing[0] & asked[1])
         both = ~missing[0] & ~missing[1]
+        differ = both & (a != b)
         excess = np.where(unmatched, np.inf, 0.0)
-        if text:
-            for at in map(tuple, np.argwhere(both & (a != b))):
-                excess[at] = self._of_texts(str(a[at]), str(b[at]))
-            return excess, both | unmatched
-        with np.errstate(invalid="ignore", over="ignore"):
-            difference = np.abs(b - a)
-            size = np.maximum(np.abs(a), np.abs(b))
-        points = tuple(range(cells, a.ndim))
-        if points:
-            size = np.where(both & np.isfinite(size), size, 0.0).max(axis=points, keepdims=True)
-        relative = np.where(np.isnan(tolerances), self.tolerance.relative, tolerances)
-        dimensionless = self.units in ("", "1")
-        least = relative if self.tolerance.absolute is None and dimensionless else self.tolerance.absolute or 0.0
-        allowed = np.maximum(relative * size, least)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            ratio = np.where(allowed > 0, difference / allowed, np.inf)
-        ratio = np.where(np.isfinite(ratio), ratio, np.inf)
-        return np.where(both & (a != b), ratio, excess), both | unmatched
+        points = tuple(range(sum(one in self.cell_dimensions for one in names), one.ndim))
+        units = str(one.attrs.get("units", other.attrs.get("units", "1")))
+        if texts:
+            excess[differ] = [_of_texts(str(x), str(y), self.tolerance.relative) for x, y in zip(a[differ], b[differ])]
+        elif differ.any():
+            excess[differ] = _of_numbers(a, b, both, points, units, self.tolerance)[differ]
+        length = math.prod(one.shape[axis] for axis in points)
+        beyond = np.flatnonzero(excess > 1.0)
+        found = pd.DataFrame({"place": beyond, "cell": beyond // length, "excess": excess.ravel()[beyond]})
+        worst = found.sort_values("excess", ascending=False, kind="stable").drop_duplicates("cell")
+        said = str if texts else float
+        rows = [
+            Change(
+                self.path,
+                name,
+                _labels(one, np.unravel_index(place, one.shape)),
+                said(a.flat[place]),
+                said(b.flat[place]),
+                units,
+                over,
+            )
+            for place, over in worst[["place", "excess"]][: self.most].itertuples(index=False)
+        ]
+        compared = (both | unmatched).reshape(-1, length).any(axis=1).sum()
+        return VariableChanges(name, int(compared), len(worst), rows)
 
-    def _of_texts(self, a: str, b: str) -> float:
-        """Difference over tolerance of texts that differ only in numbers."""
-        allowed = self.tolerance.relative
-        if without_numbers(a) != without_numbers(b) or not allowed:
-            return float("inf")
-        pairs = zip((float(one[0]) for one in NUMBER.finditer(a)), (float(one[0]) for one in NUMBER.finditer(b)))
-        return max((abs(y - x) / (allowed * max(abs(x), abs(y))) for x, y in pairs if x != y), default=0.0)
 
-
-def _as_words(values: np.ndarray, words: Mapping[int, str]) -> np.ndarray:
-    """Flags as words, empty where nothing was requested."""
-    known, back = np.unique(values, return_inverse=True)
-    said = [words.get(int(one), NOT_REQUESTED).replace(NOT_REQUESTED, "") for one in known]
-    return np.array(said, dtype=object)[back.ravel()].reshape(values.shape)
+def _cell_dimensions(pair: Sequence[xr.Dataset], roots: Sequence[xr.Dataset]) -> set[str]:
+    """Dimensions of cells: those of messages, or else of a status, and those with text labels."""
+    found: set[Hashable] = set()
+    for data, root in zip(pair, roots):
+        judged = [name for name in data.data_vars if str(name).endswith("message")] or ["status"]
+        found = found.union(*(data[name].dims for name in judged if name in data))
+        found |= {*root["status"].dims} if "status" in root else set()
+        found |= {name for name in data.indexes if data[name].dtype.kind in "OUS"}
+    return set(map(str, found))
 
 
 def _asked(data: xr.Dataset, root: xr.Dataset) -> xr.DataArray | None:
@@ -490,46 +335,53 @@ def _asked(data: xr.Dataset, root: xr.Dataset) -> xr.DataArray | None:
     return _bare(~status.isin([*silent, np.nan]).compute())
 
 
-def cell_dimensions(pair: Sequence[xr.Dataset], roots: Sequence[xr.Dataset]) -> set[str]:
-    """Dimensions of cells: those of messages, or else of a status, and those with text labels."""
-    found: set[str] = set()
-    for data, root in zip(pair, roots):
-        judged = [data[name] for name in data.data_vars if str(name).endswith("message")]
-        judged = judged or [data["status"] for _ in range("status" in data)]
-        judged += [root["status"] for _ in range("status" in root)]
-        found |= {str(name) for array in judged for name in array.dims}
-        texts = (str(name) for name in data.dims if name in data.coords and data[name].dtype.kind in "OUS")
-        found |= set(texts)
-    return found
+def _on(mask: xr.DataArray | None, array: xr.DataArray) -> np.ndarray:
+    """Mask on the labels of an array, broadcastable to it; true without a common dimension."""
+    shared = [name for name in array.dims if mask is not None and name in mask.dims]
+    if mask is None or not shared:
+        return np.array(True)
+    mask = mask.any([name for name in mask.dims if name not in shared])
+    mask = mask.reindex({name: array.indexes[name] for name in shared}, fill_value=False)
+    values: np.ndarray = mask.broadcast_like(array).transpose(*array.dims).values
+    return values
 
 
-def _blocks(array: xr.DataArray, cells: int, size: int) -> Iterator[dict[Hashable, slice]]:
-    """Parts of an array that are compared at once, along its longest dimension of cells."""
-    if not cells:
-        yield {}
-        return
-    longest = int(np.argmax(array.shape[:cells]))
-    step = max(1, size // max(1, max(8, array.dtype.itemsize) * array.size // array.shape[longest]))
-    for start in range(0, array.shape[longest], step):
-        yield {array.dims[longest]: slice(start, start + step)}
+def _bare(array: xr.DataArray) -> xr.DataArray:
+    """An array with the labels of its dimensions alone."""
+    return array.drop_vars(set(array.coords) - set(array.dims))
 
 
-def _attributes(
-    before: Mapping[Hashable, object], after: Mapping[Hashable, object]
-) -> tuple[dict[str, tuple[str, str]], list[str]]:
-    """Differing attributes, and the diff of the config."""
-    found: dict[str, tuple[str, str]] = {}
-    pairs: list[tuple[str, object, object]] = [
-        (name, before.get(name, ""), after.get(name, "")) for name in TOLD_ATTRIBUTES
-    ]
-    for name in ("software", "inputs"):
-        parts = [from_json(attributes.get(name)) for attributes in (before, after)]
-        names = {*parts[0]} & {*parts[1]} if name == "inputs" else {*parts[0], *parts[1]}
-        pairs += [(one, parts[0].get(one, ""), parts[1].get(one, "")) for one in sorted(names)]
-    further = sorted({str(name) for name in (*before, *after)} - UNTOLD - set(TOLD_ATTRIBUTES))
-    pairs += [(name, before.get(name, ""), after.get(name, "")) for name in further]
-    for name, old, new in pairs:
-        if str(old) != str(new):
-            found[name] = str(old), str(new)
-    texts = [str(attributes.get("config", "")).splitlines() for attributes in (before, after)]
-    return found, list(difflib.unified_diff(texts[0], texts[1], "before", "after", lineterm=""))
+def _labels(array: xr.DataArray, place: Iterable[int]) -> Labels:
+    found = {str(name): array.indexes[name][int(at)] for name, at in zip(array.dims, place)}
+    return {name: label if isinstance(label, str | int) else float(label) for name, label in found.items()}
+
+
+def _as_words(array: xr.DataArray) -> np.ndarray:
+    """Flags as words, empty where nothing was requested."""
+    known, back = np.unique(array.values, return_inverse=True)
+    words = flag_words(array)
+    said = [words.get(int(one), NOT_REQUESTED).replace(NOT_REQUESTED, "") for one in known]
+    return np.array(said, dtype=object)[back.ravel()].reshape(array.shape)
+
+
+def _of_numbers(
+    a: np.ndarray, b: np.ndarray, both: np.ndarray, points: tuple[int, ...], units: str, tolerance: Tolerance
+) -> np.ndarray:
+    """Difference over tolerance of numbers, infinite without one."""
+    with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+        size = np.maximum(np.abs(a), np.abs(b)).astype(float)
+        if points:
+            size = np.where(both & np.isfinite(size), size, 0.0).max(axis=points, keepdims=True)
+        absolute = tolerance.absolute or 0.0
+        if tolerance.absolute is None and units in ("", "1"):
+            absolute = tolerance.relative
+        ratio = np.abs(b - a) / np.maximum(tolerance.relative * size, absolute)
+    return np.where(np.isfinite(ratio), ratio, np.inf)
+
+
+def _of_texts(a: str, b: str, relative: float) -> float:
+    """Difference over tolerance of texts that differ only in numbers; infinite for others."""
+    if without_numbers(a) != without_numbers(b) or not relative:
+        return math.inf
+    pairs = [tuple(float(one[0]) for one in NUMBER.finditer(text)) for text in (a, b)]
+    return max((abs(y - x) / (relative * max(abs(x), abs(y))) for x, y in zip(*pairs) if x != y), default=0.0)

@@ -2,23 +2,22 @@
 
 import os
 import shutil
-from collections.abc import Collection, Hashable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path, PurePosixPath
+from io import BytesIO
+from pathlib import Path
 from typing import Any
 
 import h5netcdf
 import h5py
 import numpy as np
+import pandas as pd
 import xarray as xr
-from xarray.backends import BackendArray
-from xarray.core import indexing
+from xarray.conventions import cf_encoder, encode_dataset_coordinates
 
 from springtune.problem.parameters import SWEPT
 from springtune.problem.status import Status
 from springtune.safe_io.atomic import replacing
-from springtune.safe_io.inputs import BeyondBound, bounded
 
 STATUS = tuple(map(str, Status))
 """Meanings of `status` flags in order of value."""
@@ -80,6 +79,36 @@ class Group:
             coordinates[dimension] = (dimension, values, {"long_name": long_name, "units": units})
         return xr.Dataset(data, coordinates)
 
+    def of_rows(
+        self,
+        axes: Mapping[str, Sequence[Label]],
+        rows: Iterable[Mapping[str, object]] | pd.DataFrame,
+        names: Collection[str] | None = None,
+    ) -> xr.Dataset:
+        """Create the dataset of rows of labels and values; each value goes to the labels that its variable has.
+
+        An array fills the first places along the dimensions that rows have no labels of. Dimensions without an axis
+        have the labels of the rows, in their order.
+        """
+        frame = rows if isinstance(rows, pd.DataFrame) else pd.DataFrame([*rows])
+        needed = {one for dimensions, *_ in self.variables.values() for one in dimensions} - axes.keys()
+        own = {one: frame[one].dropna().unique().tolist() if one in frame else [] for one in needed}
+        data = self.empty({**axes, **own}, names)
+        labels = frame.columns.intersection([*data.dims])
+        found = {name: data.get_index(name).get_indexer(frame[name]) for name in labels}
+        for name in frame.columns.intersection([*data.data_vars]):
+            array, dimensions = data[name].values, [one for one in data[name].dims if one in found]
+            there = frame[[name, *dimensions]].notna().all(axis=1).to_numpy()
+            places, values = [found[one][there] for one in dimensions], frame[name].to_numpy()[there]
+            if any((place < 0).any() for place in places):
+                raise KeyError(f"{name}: rows have labels that the axes have not")
+            if dimensions and len(dimensions) == array.ndim:
+                array[tuple(places)] = values
+                continue
+            for *place, value in zip(*places, values):
+                array[(*place, *map(slice, np.shape(value)))] = value
+        return data
+
     def over(self, further: Mapping[str, Sequence[str]], without: Collection[str] = ()) -> "Group":
         """Copy with further dimensions."""
         variables = {}
@@ -89,48 +118,6 @@ class Group:
             if name not in without:
                 variables[name] = (*shared, *further.get(name, ()), *own), units, long_name, nothing
         return replace(self, variables=variables)
-
-
-class Filler:
-    """Writer of single cells by label."""
-
-    def __init__(self, data: xr.Dataset) -> None:
-        self.data = data
-        # Looking an array up costs more than writing a cell of it.
-        self._arrays = {name: ([str(one) for one in array.dims], array.values) for name, array in data.items()}
-        self._places = {
-            str(name): {label: i for i, label in enumerate(data[name].values.tolist())} for name in data.coords
-        }
-        self._texts: dict[object, object] = {}
-
-    def put(self, values: Mapping[str, Any], **labels: Label) -> None:
-        """Write variables by name into one cell; rows and tables may be shorter than their dimensions."""
-        for name, value in values.items():
-            dimensions, array = self._arrays[name]
-            place = tuple(self._places[dimension][labels[dimension]] for dimension in dimensions if dimension in labels)
-            array[place + tuple(slice(size) for size in np.shape(value))] = value
-
-    def put_each(self, values: Sequence[Mapping[str, object]], labels: Sequence[Mapping[str, Label]]) -> None:
-        """Write many cells, one variable at a time."""
-        places = {
-            dimension: np.array([known[one[dimension]] for one in labels])
-            for dimension, known in self._places.items()
-            if labels and dimension in labels[0]
-        }
-        for name in dict.fromkeys(name for one in values for name in one):
-            dimensions, array = self._arrays[name]
-            cells = [number for number, one in enumerate(values) if name in one]
-            found: list[Any] = [values[number][name] for number in cells]
-            if array.dtype == object:  # texts that are alike are one text
-                found = [self._texts.setdefault(one, one) for one in found]
-            place = tuple(places[dimension][cells] for dimension in dimensions if dimension in places)
-            array[place] = np.array(found, dtype=array.dtype)
-
-    def put_arrays(self, values: Mapping[str, object], labels: Mapping[str, Label | Sequence[Label]]) -> None:
-        """Write arrays into the cells of some labels, one or several of a dimension."""
-        for name, value in values.items():
-            array = self.data[name]
-            array.loc[{dimension: labels[str(dimension)] for dimension in array.dims if dimension in labels}] = value
 
 
 def most_requested(root: xr.Dataset, dimension: str) -> str:
@@ -170,10 +157,10 @@ UNCOMPRESSED = 2**13
 """Most bytes of an uncompressed array; compressing less costs more than it saves."""
 
 
-MOSTLY = 0.75
+MOSTLY_EMPTY = 0.75
 """Share of empty cells above which a large array of texts stores none of them."""
 
-TEXTS = 128
+TEXTS_IN_CHUNK = 128
 """Cells in a chunk of such an array."""
 
 
@@ -181,104 +168,62 @@ def write(path: str | os.PathLike[str], groups: Mapping[str, xr.Dataset], attrib
     """Write a dataset atomically."""
     tree = xr.DataTree.from_dict(groups)
     tree.attrs = dict(attributes)
-    # What groups share with the root is written there alone.
-    own = {node.path: node.to_dataset(inherit=False) for node in tree.subtree}
-    sparse = {group: [name for name in data.data_vars if _mostly_holes(data[name])] for group, data in own.items()}
-    others = xr.DataTree.from_dict({group: data.drop_vars(sparse[group]) for group, data in own.items()})
-    encoding = {
-        group: {name: _encoding(data, name) for name in data.variables if name not in sparse[group]}
-        for group, data in own.items()
-    }
+    content = BytesIO()  # whole, so that HDF5 meets no full disk
+    with h5netcdf.File(content, "w") as file:
+        for node in tree.subtree:
+            above = node.parent.sizes if node.parent else {}  # what groups share with the root is written there
+            _write_group(file.create_group(node.path) if node.parent else file, node.to_dataset(False), above)
     path = Path(path)
     try:
-        with replacing(path, synced=True) as unfinished, _small_cache():
-            _make_texts(unfinished, own, sparse)
-            others.to_netcdf(unfinished, mode="a", engine="netcdf4", encoding=encoding)
-            _order(unfinished, own)
-    except (OSError, RuntimeError) as error:  # HDF5 says of a full disk that there is an error, at times of its own
+        with replacing(path, synced=True) as unfinished:
+            unfinished.write_bytes(content.getbuffer())
+    except OSError as error:
         free = shutil.disk_usage(path.parent).free / 1e6 if path.parent.is_dir() else 0.0
-        reason = getattr(error, "strerror", None) or error
         raise OSError(
-            f"{path}: cannot be written ({reason}; {free:.0f} MB are free there); make room, or see to permissions and "
-            "limits, and run the study again: what is solved is stored, and only this file is made anew"
+            f"{path}: cannot be written ({error.strerror}; {free:.0f} MB are free there); make room, or see to "
+            "permissions and limits, and run the study again: what is solved is stored, and only this file is made anew"
         ) from None
 
 
-@contextmanager
-def _small_cache() -> Iterator[None]:
-    """Limit netCDF's cache to four chunks a variable instead of 64 MB: each is written once."""
-    import netCDF4
-
-    before = netCDF4.get_chunk_cache()
-    netCDF4.set_chunk_cache(4 * CHUNK)
-    try:
-        yield
-    finally:
-        netCDF4.set_chunk_cache(*before)
-
-
-def _mostly_holes(array: xr.DataArray) -> bool:
-    """Return whether an array holds few texts in many cells."""
-    if array.dtype != object or array.nbytes <= CHUNK or set(array.coords) - set(array.dims):
-        return False
-    return float(np.mean(array.values == "")) > MOSTLY
-
-
-def _make_texts(
-    path: str | os.PathLike[str], groups: Mapping[str, xr.Dataset], sparse: Mapping[str, Collection[Hashable]]
-) -> None:
-    """Create a file with the variables of texts of all groups, of which it writes those that are sparse.
-
-    netCDF's own library gives each a fill value, by which it crashes when a file is opened while it is open elsewhere
-    (netcdf4-python, issue 1444), and it writes into a file to read texts that were never stored.
-    """
-    with h5netcdf.File(path, "w") as file:
-        for group, data in groups.items():
-            place = file if group == "/" else file.create_group(group)
-            above = {dim for parent in PurePosixPath(group).parents for dim in groups[str(parent)].sizes}
-            place.dimensions = {dim: size for dim, size in data.sizes.items() if dim not in above}
-            for name, array in data.variables.items():
-                if array.dtype.kind not in "OU":
-                    continue
-                chunks = _block(array.shape) if name in sparse[group] else None
-                variable = place.create_variable(name, array.dims, h5py.string_dtype(), chunks=chunks)
-                if chunks is None:
-                    continue
-                variable.attrs.update(array.attrs)
-                # HDF5 stores a chunk when something is written into it, and says of others that there is no text.
-                for start in np.unique(np.argwhere(array.values != "") // chunks, axis=0).tolist():
-                    cells = tuple(slice(number * size, (number + 1) * size) for number, size in zip(start, chunks))
-                    variable[cells] = array.values[cells]
-
-
-def _order(path: str | os.PathLike[str], groups: Mapping[str, xr.Dataset]) -> None:
-    """Put the variables of a file in order by renaming them: HDF5 lists last what was named last."""
-    with h5py.File(path, "a") as file:
-        for group, data in groups.items():
-            for name in map(str, data.variables):
-                file[group].move(name, f"{name} ")
-                file[group].move(f"{name} ", name)
+def _write_group(group: h5netcdf.Group, data: xr.Dataset, above: Mapping[Hashable, int]) -> None:
+    """Write the variables of a group, encoded by the conventions."""
+    variables, attributes = encode_dataset_coordinates(data)
+    for name, array in variables.items():
+        if str(array.attrs.get("cf_role", "")).endswith("connectivity"):
+            array.encoding = {"_FillValue": NO_NODE}
+        elif name in data.coords:
+            array.encoding = {"_FillValue": None}  # CF: coordinates have no holes
+    variables, attributes = cf_encoder(variables, attributes)
+    group.attrs.update(attributes)
+    group.dimensions = {dim: size for dim, size in data.sizes.items() if above.get(dim) != size}
+    for name, array in variables.items():
+        fill, values = array.attrs.pop("_FillValue", None), array.values
+        texts = values.dtype.kind in "OU"
+        sparse = texts and values.nbytes > CHUNK and np.mean(values == "") > MOSTLY_EMPTY
+        options: dict[str, Any] = {}
+        if sparse:
+            options = {"chunks": _block(array.shape)}
+        elif not texts and values.nbytes > UNCOMPRESSED:
+            options = {"chunks": _chunk(array.shape, values.dtype.itemsize), "compression": "gzip", "shuffle": True}
+        dtype = h5py.string_dtype() if texts else values.dtype
+        variable = group.create_variable(name, array.dims, dtype, fillvalue=fill, **options)
+        variable.attrs.update(array.attrs)
+        if not sparse:
+            variable[...] = values
+            continue
+        chunks = options["chunks"]  # of which only those with a text are stored
+        for start in np.unique(np.argwhere(values != "") // chunks, axis=0).tolist():
+            cells = tuple(slice(number * size, (number + 1) * size) for number, size in zip(start, chunks))
+            variable[cells] = values[cells]
 
 
 def _block(shape: Sequence[int]) -> tuple[int, ...]:
     """Chunk shape of texts, about equal in all dimensions."""
     block = [1] * len(shape)
-    while np.prod(block) < TEXTS and block != list(shape):
+    while np.prod(block) < TEXTS_IN_CHUNK and block != list(shape):
         _, number = min((block[n], -n) for n, length in enumerate(shape) if block[n] < length)
         block[-number] = min(2 * block[-number], shape[-number])
     return tuple(block)
-
-
-def _encoding(data: xr.Dataset, name: Hashable) -> dict[str, object]:
-    """Encoding of a variable."""
-    array = data[name]
-    # CF: coordinates have no holes, and so no value that stands for one.
-    found: dict[str, object] = {"_FillValue": None} if name in data.coords else {}
-    if str(array.attrs.get("cf_role", "")).endswith("connectivity"):
-        found = {"_FillValue": NO_NODE}
-    if array.dtype == object or array.nbytes <= UNCOMPRESSED:
-        return found
-    return found | {"zlib": True, "complevel": 4, "chunksizes": _chunk(array.shape, array.dtype.itemsize)}
 
 
 def _chunk(shape: Sequence[int], itemsize: int) -> tuple[int, ...]:
@@ -288,52 +233,6 @@ def _chunk(shape: Sequence[int], itemsize: int) -> tuple[int, ...]:
         chunk.append(max(1, min(length, room)))
         room //= chunk[-1]
     return tuple(reversed(chunk))
-
-
-# -- open --------------------------------------------------------------------------------------------------------------
-
-
-class _Texts(BackendArray):
-    """Texts of a file, read within bounded memory, since their length is unknown before."""
-
-    dtype = np.dtype(object)
-
-    def __init__(self, path: Path, name: str, shape: tuple[int, ...], most: float) -> None:
-        self.path, self.name, self.shape, self.most = path, name, shape, most
-
-    def __getitem__(self, key: indexing.ExplicitIndexer) -> Any:
-        return indexing.explicit_indexing_adapter(key, self.shape, indexing.IndexingSupport.BASIC, self._read)
-
-    def _read(self, key: tuple[Any, ...]) -> Any:
-        try:
-            with bounded(self.most), h5py.File(self.path) as file:
-                return file[self.name].asstr()[key]
-        except (BeyondBound, OSError, RuntimeError, UnicodeError):  # HDF5 says of missing memory only that it failed
-            raise ValueError(
-                f"{self.path}: its texts '{self.name.rpartition('/')[2]}' are damaged, or take more than "
-                f"{self.most / 1e9:.3g} GB; select what is needed first, or run the study again"
-            ) from None
-
-
-def opened(path: Path, most: float, texts: Collection[str] = ()) -> xr.DataTree:
-    """Open a file, and leave the arrays `texts` in it: xarray reads all texts, at the width of the longest."""
-    with _small_cache():
-        source = xr.open_datatree(path, engine="netcdf4", drop_variables=[*texts])
-    if not texts:
-        return source
-    groups = {}
-    with h5netcdf.File(path) as file:
-        for node in source.subtree:
-            variables = (file if node is source else file[node.path]).variables
-            data = node.to_dataset(inherit=False)
-            for name in set(texts) & set(variables):
-                array = _Texts(path, f"{node.path}/{name}", variables[name].shape, most)
-                lazy = indexing.LazilyIndexedArray(array)
-                data[name] = xr.Variable(variables[name].dimensions, lazy, dict(variables[name].attrs))
-            groups[node.path] = data[[name for name in variables if name in data.data_vars]]
-    tree = xr.DataTree.from_dict(groups)
-    tree.set_close(source.close)
-    return tree
 
 
 # -- flags -------------------------------------------------------------------------------------------------------------
@@ -350,14 +249,3 @@ def flag_words(array: xr.DataArray) -> dict[int, str]:
     """Meanings of flags by value."""
     values = np.atleast_1d(array.attrs.get("flag_values", [])).tolist()
     return dict(zip(map(int, values), str(array.attrs["flag_meanings"]).split()))
-
-
-def nothing(arrays: Sequence[xr.DataArray]) -> tuple[object, np.dtype[Any]]:
-    """Fill value for some arrays, and a type that holds it and all their values."""
-    if arrays[0].dtype.kind in "OUS":
-        return "", np.dtype(object)
-    together = np.result_type(*(array.dtype for array in arrays))
-    if is_flagged(arrays[0]):
-        silent = [value for value, word in flag_words(arrays[0]).items() if word == NOT_REQUESTED]
-        return (silent or [-1])[0], np.dtype("int8") if together.kind == "f" else together
-    return np.nan, together if together.kind == "f" else np.dtype(float)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
-from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.colors import Colormap, LinearSegmentedColormap
 from matplotlib.image import AxesImage
 
 from springtune.problem.compare import sign_sentence
@@ -19,7 +19,7 @@ from .colours import ERROR_COLOURS, ERROR_RANGE
 if TYPE_CHECKING:
     import xarray as xr
 
-    from springtune.mesh import Mesh
+    from springtune.mesh.cells import Mesh
     from springtune.scene.curve import Curve
 
 
@@ -39,7 +39,7 @@ def draw_springs(ax: Axes | None, mesh: "Mesh", displacements: np.ndarray, force
 
     `displacements` has shape (n_points, 2) [m], `forces` (n_edges,) [N].
     """
-    _, ((panel,),) = style.panels(ax, figsize=(style.COLUMN, 2.2), layout="constrained")
+    _, ((panel,),) = style.panels(ax, figsize=(style.COLUMN, 2.2))
     largest = float(np.abs(forces).max()) or 1.0
     outline = mesh.points[mesh.edges[mesh.on_outline]]
     panel.add_collection(LineCollection(1e3 * outline, colors="0.6", linewidths=0.7))
@@ -57,40 +57,35 @@ def draw_springs(ax: Axes | None, mesh: "Mesh", displacements: np.ndarray, force
 @style.styled
 def draw_curve(ax: Axes | None, curve: "Curve") -> Axes:
     """Draw the deformation error over uniform stiffness, and its zero."""
-    with labels.arranged(ax, figsize=(style.COLUMN, 2.5), bottom=0.66) as (axes, _):
-        panel, error = axes[0, 0], 100 * curve.error
-        unit, written = labels.power_of_ten(float(curve.stiffness.max()))
-        panel.axhline(0.0, color="0.6", linewidth=0.7)
-        colour, stiffness = style.line(0)["color"], curve.stiffness / unit
-        panel.plot(stiffness, np.where(curve.stable, error, np.nan), color=colour, label="network")
-        unstable, said = np.where(curve.stable, np.nan, error), []
-        if np.isfinite(unstable).any():
-            panel.plot(stiffness, unstable, color=colour, linewidth=0.5, label="not stable")
-            said.append("thin: not stable")
-        marks = (("dashes", "best", curve.best_stiffness), ("dash-dots", "closed form", curve.predicted_stiffness))
-        for number, (dashes, name, value) in enumerate(marks):
-            if np.isfinite(value):
-                look = style.line(1 + number)
-                panel.axvline(value / unit, color=look["color"], linestyle=look["linestyle"], linewidth=0.9, label=name)
-                said.append(f"{dashes}: {name}, {value / unit:.4g} {written}N/m")
-        panel.set(xlabel=f"Stiffness [{written}N/m]", ylabel="Deformation error [%]", title=curve.title)
-        known = error[np.isfinite(error)]
-        if len(known):  # a beam that buckled errs by thousands
-            panel.set_ylim(
-                max(min(1.1 * known.min(), 0.0), -LARGEST_SHOWN), min(max(1.1 * known.max(), 1.0), LARGEST_SHOWN)
-            )
-    if not len(known):
+    _, ((panel,),) = style.panels(ax, figsize=(style.COLUMN, 2.5))
+    error, said = 100 * curve.error, []
+    unit, written = labels.power_of_ten(float(curve.stiffness.max()))
+    panel.axhline(0.0, color="0.6", linewidth=0.7)
+    colour, stiffness = style.line(0)["color"], curve.stiffness / unit
+    panel.plot(stiffness, np.where(curve.stable, error, np.nan), color=colour, label="network")
+    panel.plot(stiffness, np.where(curve.stable, np.nan, error), color=colour, linewidth=0.5, label="not stable")
+    marks = {"best": curve.best_stiffness, "closed form": curve.predicted_stiffness}
+    for number, (name, value) in enumerate(marks.items(), start=1):
+        if np.isfinite(value):
+            look = style.line(number) | {"marker": "", "linewidth": 0.9}
+            panel.axvline(value / unit, label=f"{name}, {value / unit:.4g} {written}N/m", **look)
+    panel.set(xlabel=f"Stiffness [{written}N/m]", ylabel="Deformation error [%]", title=curve.title)
+    known = error[np.isfinite(error)]
+    if len(known):  # a beam that buckled errs by thousands
+        panel.set_ylim(
+            max(min(1.1 * known.min(), 0.0), -LARGEST_SHOWN), min(max(1.1 * known.max(), 1.0), LARGEST_SHOWN)
+        )
+        said = [sign_sentence({"": float(np.nansum(curve.displacement))})]
+    else:
         labels.say(panel, curve.message or "There is no reference, and so no error.", bare=False)
-    elif np.isfinite(error).any():
-        said.append(sign_sentence({"": float(np.nansum(curve.displacement))}))
-    labels.note(panel, "; ".join(said))
+    labels.finish(panel, said)
     return panel
 
 
 @style.styled
 def draw_residuals(ax: Axes | None, residuals: Mapping[str, np.ndarray], places: Mapping[str, np.ndarray]) -> Axes:
     """Draw residuals over the noise of each column or field, over the largest load or coordinate."""
-    _, ((panel,),) = style.panels(ax, figsize=(style.COLUMN, 2.5), layout="constrained")
+    _, ((panel,),) = style.panels(ax, figsize=(style.COLUMN, 2.5))
     for number, (label, values) in enumerate(residuals.items()):
         where = places[label]
         along = where if where.ndim == 1 else np.repeat(where[:, 0], 2)
@@ -107,12 +102,6 @@ def draw_residuals(ax: Axes | None, residuals: Mapping[str, np.ndarray], places:
 def in_words(flags: "int | Iterable[int] | np.ndarray") -> str:
     """Statuses of cells that were asked for in words, each once."""
     return ", ".join(str(Status(int(flag))).replace("_", " ") for flag in np.unique(np.asarray(flags)) if flag)
-
-
-def fitted(panel: Axes, texts: Iterable[str], size: float = style.SMALL) -> str:
-    """Texts, one a line, wrapped to the width of a panel."""
-    room = panel.get_window_extent().width / panel.figure.dpi
-    return "\n".join(labels.wrapped(text, room, size) for text in texts)
 
 
 def heat_map(panel: Axes, errors: np.ndarray, texts: np.ndarray) -> AxesImage:
@@ -133,17 +122,6 @@ def error_text(error: float, sign: str = "+") -> str:
     return f"{error:{sign}.{0 if size >= 9.95 else 1 if size >= 0.095 else 2}f}".replace("-", "−")
 
 
-def magnification(wanted: float) -> float:
-    """Largest of 1, 2 or 5 times a power of ten that is not above a factor."""
-    power = 10.0 ** math.floor(math.log10(wanted))
-    return max(step for step in (1, 2, 5) if step * power <= wanted * (1 + 1e-9)) * power
-
-
-def largest(values: np.ndarray) -> float:
-    """Largest size of values; 0 where none is known."""
-    return float(np.nanmax(np.abs(values), initial=0.0)) if np.isfinite(values).any() else 0.0
-
-
 def plane(fields: "xr.Dataset", name: str) -> np.ndarray:
     """Vectors in the plane from their components, such as ``"displacement_{}"``, shape (n, 2)."""
     return np.stack([fields[name.format(axis)].values for axis in "xy"], axis=1)
@@ -156,8 +134,52 @@ def extent(places: np.ndarray, nothing: tuple[float, float]) -> tuple[float, flo
     return (float(wide), float(high)) if min(wide, high) > 0 else nothing
 
 
-def spring_ends(fields: "xr.Dataset") -> tuple[np.ndarray, np.ndarray]:
-    """Particles at the ends of the springs of a network, shape (n_springs, 2), and which rows are springs."""
+def magnification(fields: "xr.Dataset") -> float:
+    """Factor on displacements, 1, 2 or 5 times a power of ten, so that the largest is about a fifteenth of the body."""
+    places = np.concatenate([plane(fields, "{}"), plane(fields, "outline_{}")])
+    sizes = np.hypot(fields.reference_displacement_x.values, fields.reference_displacement_y.values)
+    if not np.isfinite(sizes).any():
+        sizes = np.hypot(fields.displacement_x.values, fields.displacement_y.values)
+    largest = np.max(sizes, where=np.isfinite(sizes), initial=0.0)
+    factor = 0.07 * max(extent(places, (0.0, 0.0))) / largest if largest else 0.0
+    if not factor or 0.4 < factor < 2:
+        return 1.0
+    power = 10.0 ** math.floor(math.log10(factor))
+    return max(step for step in (1, 2, 5) if step * power <= factor * (1 + 1e-9)) * power
+
+
+NETWORK_LINE = 0.35
+"""Width of the lines of springs that have one colour [pt]."""
+
+
+def draw_network(
+    panel: Axes, fields: "xr.Dataset", scale: float, most: float = 0.0, cmap: Colormap | None = None
+) -> LineCollection | None:
+    """Draw a deformed network over the outline of its reference in grey, and the outline at rest, dashed.
+
+    Return its lines if they are coloured by their force, up to `most` [N]; None also without displacements.
+    """
+    outline, there = plane(fields, "outline_{}"), plane(fields, "reference_displacement_{}")
+    rounds = fields.outline_round.values if "outline_round" in fields else np.where(np.isfinite(outline[:, 0]), 0, -1)
+    for number in range(int(rounds.max(initial=-1)) + 1):
+        places = np.flatnonzero(rounds == number)
+        closed = np.append(places, places[:1])
+        panel.plot(*1e3 * (outline + scale * there)[closed].T, color="0.7", linewidth=2.0, zorder=1)
+        panel.plot(*1e3 * outline[closed].T, color="0.5", linewidth=0.6, linestyle=(0, (3, 3)), zorder=1)
+    moved = 1e3 * (plane(fields, "{}") + scale * plane(fields, "displacement_{}"))
+    if not np.isfinite(moved).any():
+        return None
     nodes = fields.spring_nodes.transpose("spring", "spring_end").fillna(-1).values.astype(int)
     kept = (nodes >= 0).all(axis=1)
-    return nodes[kept], kept
+    springs = moved[nodes[kept]]
+    panel.set(aspect="equal", adjustable="datalim")
+    if not most:  # one line with gaps: thousands of lines take ten times as long
+        gaps = np.pad(springs, ((0, 0), (0, 1), (0, 0)), constant_values=np.nan)
+        panel.plot(*gaps.reshape(-1, 2).T, color="#0b3c5d", linewidth=NETWORK_LINE)
+        return None
+    width = float(np.clip(18 / np.sqrt(len(springs)), 0.25, 0.9))
+    forces = fields.spring_force.values[kept]
+    lines = LineCollection(springs, array=forces, cmap=cmap, clim=(-most, most), linewidths=width, zorder=2)
+    panel.add_collection(lines)
+    panel.autoscale()
+    return lines

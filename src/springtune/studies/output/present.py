@@ -1,6 +1,5 @@
 """Make a study's outputs: figures in PNG and PDF files, and tables."""
 
-import gc
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,14 +11,10 @@ from springtune.registry import imported
 from springtune.safe_io import atomic
 
 from ..config.kind import outputs
-from ..runs import records
 from .reading import lazily
 
 if TYPE_CHECKING:
     from ..config.kind import Output
-
-MANY_PANELS = 16
-"""Panels above which a figure's memory is freed before the next one."""
 
 
 def run(dataset: str | Path, folder: str | Path, *names: str) -> list[Path]:
@@ -36,15 +31,18 @@ def run(dataset: str | Path, folder: str | Path, *names: str) -> list[Path]:
                 from . import page  # here: few jobs write the page
 
                 made += [into / name for name in page.write(tree, into)]
-            elif output.write:
+            for name, text in output.texts.items():
+                atomic.write_text(into / name, imported(text)(tree))
+                made.append(into / name)
+            if output.write:
                 made += [into / name for name in imported(output.write)(tree, into)]
     return made
 
 
 def main(dataset: str, folder: str, record: str, digest: str, *names: str) -> None:
     """Make outputs and write the record of it."""
-    read = records.checksum(dataset)
-    records.write(record, digest, run(dataset, folder, *names), read=read)
+    run(dataset, folder, *names)
+    atomic.write_json(record, {"digest": digest})
 
 
 def _draw(output: "Output", tree: xr.DataTree, folder: Path) -> Iterator[Path]:
@@ -60,16 +58,10 @@ def _draw(output: "Output", tree: xr.DataTree, folder: Path) -> Iterator[Path]:
             atomic.write_bytes(folder / f"{stem}.{ending}", content)
             yield folder / f"{stem}.{ending}"
         plt.close(figure)
-        panels = len(figure.axes)
-        del figure
-        if panels > MANY_PANELS:
-            gc.collect()
 
 
 if __name__ == "__main__":
     import os
 
     os.environ["MPLBACKEND"] = "Agg"
-    # Collecting the garbage of small figures costs more than it frees; large figures are collected one by one.
-    gc.disable()
     main(*sys.argv[1:])

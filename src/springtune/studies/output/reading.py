@@ -2,16 +2,14 @@
 
 import math
 import os
-import signal
-import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from springtune.registry import NAME, NAME_RULE
 from springtune.safe_io.escapes import clipped
-from springtune.safe_io.inputs import MOST_OBJECTS, BeyondBound, bounded, check_alone
+from springtune.safe_io.inputs import BeyondBound, bounded, check_alone
 
 if TYPE_CHECKING:
     import h5py
@@ -24,7 +22,7 @@ LARGE_ARRAY = 2**20
 
 SPRING_NODES, CELL_NODES = "spring_nodes", "cell_nodes"
 
-REMEDY = "give the dataset.nc of a study, or run the study again"
+REMEDY = "give the dataset.nc of a study; delete a damaged one, and the same run makes it again"
 
 MOST_HELD = 1e9
 """Limit of bytes that opening takes, and of stated content."""
@@ -35,21 +33,8 @@ DEFLATED = 30.0
 BARE_DIMENSION = b"This is a netCDF dimension but not a netCDF variable"
 """Start of the name of a dimension without labels, which is never read."""
 
-MOST_ATTRIBUTES = 100_000
-LARGEST_ATTRIBUTE = 2**20
-"""Limits of attributes of a dataset, and of the bytes of each."""
-
 MOST_CHUNKS = 1_000_000
 """Most chunks of an array."""
-
-PACKING = {"scale_factor", "add_offset"}
-"""Attributes by which numbers are computed from those in a file."""
-
-LINKS = {"DIMENSION_LIST", "REFERENCE_LIST", "_Netcdf4Coordinates", "_Netcdf4Dimid", "CLASS"}
-"""Attributes by which netCDF-4 links arrays and dimensions."""
-
-OPENED_WITHIN = 4
-"""Processor seconds within which a file must open."""
 
 LONGEST_REASON = 200
 
@@ -79,7 +64,7 @@ def open(path: str | os.PathLike[str]) -> "xarray.DataTree":
     >>> import springtune as st
     >>> with st.open("results/mine") as tree:
     ...     sorted(tree.children), dict(tree.sizes)
-    (['benchmark', 'block', 'effects', 'engine_curves', 'engines', 'fields', 'laying', 'moduli', 'refinement',
+    (['benchmark', 'block', 'engine_curves', 'engines', 'fields', 'laying', 'moduli',
     'samples', 'sensitivity', 'shape_fields', 'shapes', 'sobol', 'stability'], {'beam': 2, 'mesh_type': 2,
     'mesh_size': 3, 'material': 2, 'load': 3, 'definition': 2, 'kinematics': 2})
     >>> st.open("results/nothing")
@@ -87,21 +72,43 @@ def open(path: str | os.PathLike[str]) -> "xarray.DataTree":
     FileNotFoundError: results/nothing: there is no such dataset; run the study, or give its results/<study>/dataset.nc
     """
     file = dataset_file(path)
-    texts = check_links(file)
-    from .dataset import opened
-
+    check(file)
     try:
         with bounded(MOST_HELD):
-            tree = opened(file, most_of(file), texts)
+            tree = _opened(file)
     except Exception as error:  # of a damaged file the libraries raise whatever they trip over
-        raise ValueError(f"{file}: cannot be read ({_said(error)}); {REMEDY}") from None
+        raise ValueError(f"{file}: cannot be read ({reason(error)}); {REMEDY}") from None
     try:
         if "springtune_version" not in tree.attrs:
             raise ValueError(f"{file}: is not a dataset of springtune; {REMEDY}")
-        _check_study(file, tree.attrs.get("study", "unknown"))
+        name = tree.attrs.get("study", "unknown")
+        if not (isinstance(name, str) and NAME.fullmatch(name)):  # it becomes part of paths
+            raise ValueError(f"{file}: attribute 'study' is {clipped(repr(name))}; {NAME_RULE}; {REMEDY}")
     except ValueError:
         tree.close()
         raise
+    return tree
+
+
+def _opened(path: Path) -> "xarray.DataTree":
+    """Open a file; large arrays of texts stay in it, since xarray would read them at the width of the longest text."""
+    import h5netcdf
+    import xarray as xr
+    from xarray.backends import CachingFileManager, H5NetCDFStore
+
+    groups = {}
+    with ExitStack() as stack:
+        manager = CachingFileManager(h5netcdf.File, str(path), mode="r", kwargs={"decode_vlen_strings": True})
+        stack.callback(manager.close)
+        for name in ("/", *manager.acquire().groups):
+            store = H5NetCDFStore(manager, group=None if name == "/" else name)
+            variables, attributes = store.load()  # type: ignore[no-untyped-call]
+            for array in variables.values():
+                if array.dtype == object and array.nbytes > LARGE_ARRAY:
+                    del array.encoding["dtype"]
+            groups[name] = xr.decode_cf(xr.Dataset(variables, attrs=attributes))
+        tree = xr.DataTree.from_dict(groups)
+        tree.set_close(stack.pop_all().close)
     return tree
 
 
@@ -127,155 +134,55 @@ def lazily(path: str | os.PathLike[str]) -> "Iterator[xarray.DataTree]":
         yield tree
 
 
-def check_opens(path: str | os.PathLike[str]) -> None:
-    """Open a file in a child process first, since netCDF may crash or hang on damaged files.
-
-    Only for commands: `open` may run in a process with threads. Without fork nothing is checked.
-    """
-    if not hasattr(os, "fork"):
-        return
-    import resource
-
-    import xarray  # noqa: F401  # once, not in the child and again here
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of numpy's threads, which a child that opens a file does not need
-        child = os.fork()
-    if not child:
-        try:
-            used = int(resource.getrusage(resource.RUSAGE_SELF).ru_utime)
-            resource.setrlimit(resource.RLIMIT_CPU, (used + OPENED_WITHIN, used + OPENED_WITHIN))
-            open(path)
-        finally:
-            os._exit(0)
-    status = os.waitpid(child, 0)[1]
-    if os.WIFSIGNALED(status):
-        name = signal.Signals(os.WTERMSIG(status)).name
-        raise ValueError(f"{path}: is damaged (the library of netCDF ends by {name} on it); {REMEDY}")
-
-
-def check_links(path: Path) -> set[str]:
-    """Refuse files on which netCDF would crash, hang or read other files; return names of large arrays of texts.
-
-    HDF5 alone looks at them. The attributes that link arrays and dimensions may be damaged or changed by another
-    program.
-    """
+def check(path: Path) -> None:
+    """Refuse files that read other files, or that are small and state large content."""
     import h5py
 
-    wrong: list[str] = []
-    texts: set[str] = set()
-    held = attributes = 0
+    held = 0.0
 
     def look(name: bytes, one: "h5py.h5g.ObjectID") -> None:
-        nonlocal held, attributes
-        shown = clipped(name.decode(errors="replace"))
-        if isinstance(one, h5py.h5t.TypeID):
-            raise ValueError(f"'{shown}' is a type")
-        attributes += h5py.h5a.get_num_attrs(one)
-        if attributes > MOST_ATTRIBUTES:
-            raise ValueError(f"it has over {MOST_ATTRIBUTES:,} attributes")
-        for number in range(h5py.h5a.get_num_attrs(one)):
-            found = h5py.h5a.open(one, index=number)
-            label, kind = found.name.decode(errors="replace"), found.get_type()
-            of = f"attribute '{clipped(label)}' of '{shown}'"
-            if math.prod(found.shape or ()) * kind.get_size() > LARGEST_ATTRIBUTE:
-                raise ValueError(f"{of} is too large")
-            if label not in LINKS:
-                _check_type(of, kind)
-                if label in PACKING and kind.get_class() == h5py.h5t.STRING:
-                    raise ValueError(f"{of} is a text instead of a number")
-            elif not _links(one, label, kind, found.shape):
-                wrong.append(f"{label} of {shown}")
+        nonlocal held
         if not isinstance(one, h5py.h5d.DatasetID):
             return
-        kind, stored = one.get_type(), one.get_create_plist()
-        _check_type(f"'{shown}'", kind)
-        if one.get_space().get_simple_extent_type() == h5py.h5s.NULL:
+        array, shown = h5py.Dataset(one), clipped(name.decode(errors="replace"))
+        if array.shape is None:
             raise ValueError(f"'{shown}' has no shape")
-        for number in range(stored.get_nfilters()):
-            code, _, _, filter_name = stored.get_filter(number)
-            if code not in {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32}:
-                called = clipped(filter_name.decode(errors="replace"))
-                raise ValueError(f"'{shown}' has the filter {code} ({called}); write it with zlib")
-        size = math.prod(one.shape) * int(kind.get_size())
-        if kind.get_class() == h5py.h5t.STRING and size > LARGE_ARRAY:
-            texts.add(name.decode().rpartition("/")[2])
-        if not h5py.Dataset(one).attrs.get("NAME", b"").startswith(BARE_DIMENSION):
-            chunk = stored.get_chunk() if stored.get_layout() == h5py.h5d.CHUNKED else ()
-            held += max(size, math.prod(chunk) * int(kind.get_size()))
-            pieces = math.prod(-(-length // part) for length, part in zip(one.shape, chunk))
-            if chunk and pieces > MOST_CHUNKS and held <= most_of(path):
-                raise ValueError(f"'{shown}' is in {pieces} pieces, which take too long to read; write larger ones")
+        if array.attrs.get("NAME", b"").startswith(BARE_DIMENSION):
+            return
+        chunk, texts = array.chunks or (), h5py.check_string_dtype(array.dtype)
+        held += max(array.size, math.prod(chunk)) * int(one.get_type().get_size())
+        if texts and texts.length is None:
+            stored = one.get_create_plist()
+            if stored.get_nfilters() or stored.get_layout() == h5py.h5d.COMPACT:
+                raise ValueError(f"'{shown}' has compressed texts, as netCDF does not have; write them as they are")
+            held += _length_of_texts(array, path)
+        pieces = math.prod(-(-length // part) for length, part in zip(array.shape, chunk))
+        if pieces > MOST_CHUNKS and held <= most_of(path):
+            raise ValueError(f"'{shown}' is in {pieces} pieces, which take too long to read; write larger ones")
 
     try:
         with guarded(path), bounded(MOST_HELD):
             check_alone(path, look)
     except OSError as error:
-        raise ValueError(f"{path}: cannot be read ({_said(error)}); {REMEDY}") from None
-    if wrong:
-        raise ValueError(
-            f"{path}: is damaged, or changed by another program ({wrong[0]} is none of netCDF's); {REMEDY}"
-        )
+        raise ValueError(f"{path}: cannot be read ({reason(error)}); {REMEDY}") from None
     if held > most_of(path):
         said = f"it says that it holds {held / 1e9:.3g} GB in {path.stat().st_size / 1e6:.3g} MB"
         raise ValueError(f"{path}: is damaged ({said}); {REMEDY}")
-    return texts
 
 
-def _check_type(of: str, kind: "h5py.h5t.TypeID") -> None:
-    """Refuse types that a dataset of springtune does not have; netCDF ends the process on some of them."""
-    import h5py
+def _length_of_texts(array: "h5py.Dataset", path: Path) -> int:
+    """Length of all texts of an array by their references, 4 bytes of length and 12 of place: many may be one text."""
+    import numpy as np
 
-    t = h5py.h5t
-    if kind.get_class() == t.INTEGER:
-        known = kind.get_size() in (1, 2, 4, 8) and kind.get_precision() == 8 * kind.get_size()
+    if array.chunks:
+        places: list[tuple[int, ...]] = []
+        array.id.chunk_iter(lambda info: places.append(info.chunk_offset))
+        content = b"".join(array.id.read_direct_chunk(place)[1] for place in places)
     else:
-        floats = (t.IEEE_F32LE, t.IEEE_F32BE, t.IEEE_F64LE, t.IEEE_F64BE)
-        known = kind.get_class() == t.STRING or any(kind.equal(one) for one in floats)
-    if not known:
-        raise ValueError(f"{of} has the type {kind.dtype}, and numbers of 8 to 64 bits and texts are read; convert it")
-
-
-def _links(one: "h5py.h5g.ObjectID", label: str, kind: "h5py.h5t.TypeID", shape: tuple[int, ...]) -> bool:
-    """Return whether an attribute of `LINKS` is as netCDF-4 writes it."""
-    import h5py
-
-    t, rank = h5py.h5t, one.rank if isinstance(one, h5py.h5d.DatasetID) else -1
-    if label == "REFERENCE_LIST":
-        members = (
-            [kind.get_member_type(n) for n in range(kind.get_nmembers())] if kind.get_class() == t.COMPOUND else []
-        )
-        return [found.get_class() for found in members] == [t.REFERENCE, t.INTEGER]
-    if label == "DIMENSION_LIST":
-        if not kind.equal(t.vlen_create(t.STD_REF_OBJ)) or shape != (rank,):
-            return False
-        array = h5py.Dataset(one)
-        scales = [array.file[found] for every in array.attrs[label] for found in every]
-        return len(scales) == rank and all(isinstance(one, h5py.Dataset) and "CLASS" in one.attrs for one in scales)
-    expected = t.STRING if label == "CLASS" else t.INTEGER
-    if kind.get_class() != expected or shape != ((rank,) if label == "_Netcdf4Coordinates" else ()):
-        return False
-    return label == "CLASS" or bool((abs(h5py.Dataset(one).attrs[label]) <= MOST_OBJECTS).all())
-
-
-def attributes(path: Path) -> dict[str, str]:
-    """Texts of the attributes of a dataset, without xarray."""
-    import h5py
-
-    check_links(path)
-    with h5py.File(path) as file:  # which gives ASCII as bytes
-        texts = {
-            name: text.decode(errors="replace") if isinstance(text, bytes) else str(text)
-            for name, text in file.attrs.items()
-        }
-    _check_study(path, texts.get("study", "unknown"))
-    return texts
-
-
-def _check_study(path: Path, name: object) -> None:
-    """Refuse a study's name that is no name, since it becomes part of paths; merged studies are joined by ' + '."""
-    if not (isinstance(name, str) and all(map(NAME.fullmatch, name.split(" + ")))):
-        raise ValueError(f"{path}: attribute 'study' is {clipped(repr(name))}; {NAME_RULE}; {REMEDY}")
+        with path.open("rb") as file:
+            file.seek(array.id.get_offset() or 0)
+            content = file.read(array.id.get_storage_size())
+    return int(np.frombuffer(content, "<u4")[::4].sum(dtype=int))
 
 
 def most_of(path: Path) -> float:
@@ -292,17 +199,20 @@ def guarded(path: str | os.PathLike[str]) -> Iterator[None]:
     >>> with guarded("dataset.nc"):
     ...     {}["status"]
     Traceback (most recent call last):
-    ValueError: dataset.nc: is damaged, or not as springtune writes it (KeyError: 'status'); run the study again
+    ValueError: dataset.nc: is damaged, or not as springtune writes it (KeyError: 'status'); delete it, and the
+    same run makes it again
     """
     try:
         yield
     except (AttributeError, ArithmeticError, LookupError, MemoryError, RuntimeError, TypeError) as error:
         raise ValueError(
-            f"{path}: is damaged, or not as springtune writes it ({_said(error)}); run the study again"
+            f"{path}: is damaged, or not as springtune writes it ({reason(error)}); delete it, "
+            "and the same run makes it again"
         ) from error
 
 
-def _said(error: Exception) -> str:
+def reason(error: Exception) -> str:
+    """Return an error as a short line."""
     for_people = isinstance(error, OSError | ValueError | BeyondBound)
     text = str(error) if for_people else f"{type(error).__name__}: {error}"
     return clipped(" ".join(text.split()), LONGEST_REASON)

@@ -1,7 +1,7 @@
 """One style for all figures, readable in grey at a journal's column or page width, and their files."""
 
 import io
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import wraps
 from typing import Any, Literal, ParamSpec, TypeVar
 
@@ -134,51 +134,22 @@ def panels(
     ncols: int = 1,
     *,
     figsize: tuple[float, float],
-    layout: Literal["constrained", "compressed", "tight"] | None = None,
-    sharex: bool = False,
-    sharey: bool = False,
-    ratios: Sequence[float] | None = None,
-    widths: Sequence[float] | None = None,
+    **subplots: Any,
 ) -> tuple[Figure | SubFigure | None, np.ndarray]:
-    """Axes of shape (nrows, ncols) to plot on, and the figure where it is to be arranged."""
+    """Axes of shape (nrows, ncols) to plot on, and the figure where it is to be arranged; `subplots` as there."""
     if ax is None:
         # Here, since pyplot chooses a backend: who only imports, or plots on axes that are there, chooses none.
         import matplotlib.pyplot as plt
 
-        ax = plt.figure(figsize=figsize, layout=layout)
+        ax = plt.figure(figsize=figsize)
+    if isinstance(ax, Figure) and ax.get_layout_engine() is None:
+        ax.set_layout_engine("constrained", wspace=0.02, hspace=0.04)
     if isinstance(ax, Figure | SubFigure):
-        return ax, ax.subplots(
-            nrows, ncols, squeeze=False, sharex=sharex, sharey=sharey, height_ratios=ratios, width_ratios=widths
-        )
+        return ax, ax.subplots(nrows, ncols, squeeze=False, **subplots)
     given = np.asarray(ax, dtype=object)
     if given.size != nrows * ncols:
         raise ValueError(f"the plot has {nrows} x {ncols} panels, ax has {given.size} Axes")
     return None, given.reshape(nrows, ncols)
-
-
-def multiples(
-    ax: Figure | SubFigure | Axes | np.ndarray | None,
-    count: int,
-    columns: int,
-    height: float,
-    *,
-    sharey: bool = False,
-    further: float = 0.0,
-) -> tuple[Figure | SubFigure | None, np.ndarray, np.ndarray, float]:
-    """Panels of small multiples, and the height of a new figure [inch].
-
-    One panel is a column wide, several stand in rows of a page, with `further` height. Returns the figure, all axes,
-    those in use (count,), and the height.
-    """
-    rows = -(-count // columns)
-    figsize = (COLUMN if columns == 1 else PAGE, 0.2 + height * rows + further)
-    if ax is not None and not isinstance(ax, Figure | SubFigure):
-        figure, axes = panels(ax, 1, count, figsize=figsize)
-    else:
-        figure, axes = panels(ax, rows, columns, sharey=sharey, figsize=figsize)
-    for panel in axes.flat[count:]:
-        panel.set_visible(False)
-    return figure, axes, axes.ravel()[:count], figsize[1]
 
 
 def size(figure: Figure | SubFigure) -> tuple[float, float]:
@@ -187,44 +158,13 @@ def size(figure: Figure | SubFigure) -> tuple[float, float]:
     return box.width, box.height
 
 
-def arrange(
-    figure: Figure | SubFigure | None,
-    axes: np.ndarray,
-    *,
-    left: float,
-    right: float,
-    bottom: float,
-    top: float,
-    across: float = 0.0,
-    down: float = 0.0,
-    title: str = "",
-) -> None:
-    """Set margins and gaps between the panels of `axes` (nrows, ncols) [inch], and the title at the upper left."""
-    if figure is None:
-        return
-    width, height = size(figure)
-    margins = {"left": left / width, "right": 1 - right / width, "bottom": bottom / height, "top": 1 - top / height}
-    rows, columns = axes.shape
-    # Gaps are over what is left for a panel; a figure that is too small for its margins keeps a little.
-    one = max((width - left - right - (columns - 1) * across) / columns, 0.1)
-    other = max((height - bottom - top - (rows - 1) * down) / rows, 0.1)
-    figure.subplots_adjust(**_kept(margins), wspace=across / one, hspace=down / other)
-    if title:
-        figure.suptitle(title, x=0.05 / width, y=1 - 0.05 / height, va="top", ha="left")
-
-
-def _kept(margins: dict[str, float]) -> dict[str, float]:
-    """Margins that leave panels a tenth of a figure at least."""
-    for low, high in (("left", "right"), ("bottom", "top")):
-        if margins[high] - margins[low] < 0.1:
-            margins |= {low: 0.2, high: 0.8}
-    return margins
-
-
 def png_and_pdf(figure: Figure) -> dict[str, bytes]:
     """Save a figure in both formats without dates: the same figure gives the same bytes."""
     found = {}
     with matplotlib.rc_context(SETTINGS):
+        if engine := figure.get_layout_engine():
+            engine.execute(figure)
+            figure.set_layout_engine("none")  # once for both
         for ending, options in SAVED_AS.items():
             content = io.BytesIO()
             figure.savefig(content, format=ending, **options)

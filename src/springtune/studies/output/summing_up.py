@@ -1,8 +1,10 @@
-"""Content of a dataset as text: how its scenes ended, its errors, its groups, and where it comes from."""
+"""A dataset as text: solved cells, failures with reasons, errors; its groups, and where it comes from.
+
+The stage `collect` writes `text` beside the dataset; `info` adds what the file is.
+"""
 
 import os
-from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from html import escape
 from itertools import product
 from pathlib import Path
@@ -10,14 +12,148 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from springtune.problem.status import Status
+from springtune.safe_io.escapes import shown
 from springtune.safe_io.tables import aligned
 
 from . import reading
-from .selection import judged
-from .text import bytes_text, from_json, paragraphs, place_text, sign_text, without_numbers
+from .selection import judged, of_own_law
+from .text import HOLES, bytes_text, from_json, paragraphs, place_text, sign_text, without_numbers
 
-REASONS = 5
-"""Most reasons that are listed for a status."""
+NAMED = 3
+"""Cells named for each status; more if fewer than two would remain."""
+
+WORST = 8
+"""Most definitions with a worst error."""
+
+SCENES = "/"
+
+
+FINITE = "/finite_strain"
+"""Group of references for nonlinear kinematics."""
+
+
+REFERRED = {"status", "reference_displacement", "reference_applies", "reference_message"}
+"""Variables of groups that compare scenes with small-strain references."""
+
+
+def text(groups: Mapping[str, xr.Dataset], title: str, most: int | None = WORST) -> str:
+    """Summarise a study's cells, with the errors of at most so many definitions."""
+    states = [state for name, data in groups.items() for state in _states(name, data)]
+    rows = [[what, str(sum(found.values())), _parts(found)] for what, found, _ in states if found]
+    lines = [title, "", aligned(rows, left=2, right=(1,))]
+    lines += _errors(groups[SCENES], groups.get(FINITE), most) if SCENES in groups else ()
+    for name, data in groups.items():
+        if REFERRED <= set(data):
+            lines += _unreferenced(data, "scenes" if name == SCENES else name.strip("/"))
+    holes = [(what, found, lost) for what, found, lost in states if lost]
+    for what, found, lost in holes:
+        for status, cells in lost.items():
+            lines += ["", f"{what}, {_words(status)}: {len(cells)} of {sum(found.values())}", *_named(cells)]
+    if holes:
+        told = "; ".join(
+            f"{sum(map(len, lost.values()))} of {sum(found.values())} {what}" for what, found, lost in holes
+        )
+        lines += ["", f"{HOLES}: {told}. dataset.nc names each, and why: `status`, `message`."]
+    return "\n".join(lines) + "\n"
+
+
+Cells = list[tuple[str, str]]
+
+
+def _states(name: str, data: xr.Dataset) -> Iterator[tuple[str, dict[Status, int], dict[Status, Cells]]]:
+    """For each status variable: its subject, counts by flag, and unsolved cells."""
+    for variable in data.data_vars.values():
+        label = str(variable.name)
+        message = label.removesuffix("status") + "message"
+        if not label.endswith("status") or message not in data or data[message].dims != variable.dims:
+            continue
+        flags = variable.values
+        found = {status: int((flags == status).sum()) for status in Status if status != Status.NOT_REQUESTED}
+        lost: dict[Status, Cells] = {
+            status: [
+                (place_text(data, variable.dims, place), str(data[message].values[tuple(place)]))
+                for place in np.argwhere(flags == status)
+            ]
+            for status, number in found.items()
+            if number and status != Status.SOLVED
+        }
+        part = label.removesuffix("status").strip("_").replace("_", " ")
+        what = "scenes" if name == SCENES else ", ".join(filter(None, (name.strip("/"), part)))
+        yield what, {status: number for status, number in found.items() if number}, lost
+
+
+def _words(status: Status) -> str:
+    return str(status).replace("_", " ")
+
+
+def _parts(found: Mapping[Status, int]) -> str:
+    return ", ".join(f"{number} {_words(status)}" for status, number in found.items())
+
+
+def _named(cells: Cells) -> Iterator[str]:
+    """Some cells, first one for each reason, and the number of others."""
+    reasons: dict[str, Cells] = {}
+    for cell in cells:
+        reasons.setdefault(without_numbers(cell[1]), []).append(cell)
+    order = [*(alike[0] for alike in reasons.values()), *(cell for alike in reasons.values() for cell in alike[1:])]
+    told = order if len(order) <= NAMED + 1 else order[:NAMED]
+    for labels, message in told:
+        yield f"  {shown(': '.join(filter(None, (labels, message))))}"
+    if len(told) < len(order):
+        yield f"  and {len(order) - len(told)} more"
+
+
+def _errors(root: xr.Dataset, finite: xr.Dataset | None, most: int | None) -> Iterator[str]:
+    """Median and worst error of definitions over solved scenes with a valid reference, the worst first."""
+    if "definition" not in root.get("deformation_error", root).dims:
+        return
+    errors = judged(root, finite)
+    by = [name for name in ("definition", "kinematics") if name in errors.dims]
+    found = []
+    for labels in product(*(errors[name].values.tolist() for name in by)):
+        cell = dict(zip(by, labels))
+        own, here = root.sel(cell), errors.sel(cell)
+        sizes = np.abs(here.values)
+        if np.isfinite(sizes).any():
+            place = [int(at) for at in np.unravel_index(np.nanargmax(sizes), sizes.shape)]
+            worst = float(here.values[tuple(place)])
+            numbers = [f"{100 * np.nanmedian(sizes):.3g} %", f"{100 * worst:+.3g} %"]
+            word, where = sign_text(own, worst, here.dims, place), place_text(own, here.dims, place)
+            found.append((abs(worst), [*labels, int(np.isfinite(sizes).sum()), *numbers, word, where]))
+    found.sort(key=lambda row: -row[0])
+    if found:
+        yield from (
+            "",
+            "deformation errors, (network - reference) / |reference|, of solved scenes within the reference",
+        )
+        if finite is not None and of_own_law(finite) is not None:
+            yield "  nonlinear networks against finite strain, linear ones against small strain"
+        heads = [*by, "scenes", "median", "worst", "", "at"]
+        right = range(len(by), len(by) + 3)
+        yield from aligned([heads, *(row for _, row in found[:most])], 2, right).splitlines()
+    if most is not None and len(found) > most:
+        yield f"  and of {len(found) - most} more at most {100 * found[most][0]:.2f} %"
+
+
+def _unreferenced(root: xr.Dataset, called: str) -> Iterator[str]:
+    """Missing or inapplicable references with their scenes."""
+    requested, there = root.status != Status.NOT_REQUESTED, root.reference_displacement.notnull()
+    beyond = root.status.isin((Status.SOLVED, Status.UNSTABLE)) & there & (root.reference_applies == 0)
+    for scenes, what in (
+        (requested & ~there, "without a reference, and so without an error"),
+        (beyond, "beyond small strain, so the error is not the network's alone"),
+    ):
+        if not scenes.any():
+            continue
+        few = scenes.any([dim for dim in scenes.dims if dim not in root.reference_message.dims])
+        few = few.transpose(*root.reference_message.dims)
+        messages = root.reference_message.values
+        cells = [(place_text(root, few.dims, place), str(messages[tuple(place)])) for place in np.argwhere(few.values)]
+        yield from ("", f"{called} {what}: {int(scenes.sum())} of {int(requested.sum())}", *_named(cells))
+
+
+# -- of a file ---------------------------------------------------------------------------------------------------------
 
 
 class Info(str):
@@ -63,82 +199,11 @@ def info(path: str | os.PathLike[str]) -> Info:
 
 def info_text(tree: xr.DataTree, path: Path) -> str:
     """Content of a dataset as text."""
-    parts = [_head(tree, path)]
-    ends = [line for node in tree.subtree for line in _ends(node)]
-    parts += [["how it ended", *ends]] if ends else []
-    errors = _errors(tree)
-    parts += [errors] if errors else []
-    parts += [_groups(tree), _provenance(tree)]
-    return paragraphs(parts)
-
-
-def _head(tree: xr.DataTree, path: Path) -> list[str]:
     made = f", made {tree.attrs['created']}" if "created" in tree.attrs else ""
     study = tree.attrs.get("study", "unknown")
-    return [str(tree.attrs.get("title", study)), f"study {study}: {path}, {bytes_text(path.stat().st_size)}{made}"]
-
-
-def _ends(node: xr.DataTree) -> Iterator[str]:
-    """Lines with the number of cells by status, and the reasons of those not solved."""
-    data = node.to_dataset()
-    for name in (str(name) for name in data.data_vars if str(name).rpartition("_")[2] == "status"):
-        status = data[name]
-        if "flag_meanings" not in status.attrs:
-            continue
-        meanings = dict(zip(status.attrs["flag_values"].tolist(), status.attrs["flag_meanings"].split()))
-        flags = status.values
-        counts = {word: int((flags == flag).sum()) for flag, word in meanings.items() if flag}
-        asked = sum(counts.values())
-        if not asked:
-            continue
-        said = ", ".join(f"{count} {word}" for word, count in counts.items() if count)
-        yield f"  {_path(node, name)}: {asked} asked, {said}"
-        texts = data.get(name.removesuffix("status") + "message")
-        if texts is None or texts.dims != status.dims:
-            continue
-        for flag, word in meanings.items():
-            if word not in ("not_requested", "solved") and counts[word]:
-                yield from _reasons(word, [str(text) for text in texts.values[flags == flag]])
-
-
-def _reasons(status: str, texts: list[str]) -> Iterator[str]:
-    """Lines with the reasons of a status; reasons that differ only in numbers count as one."""
-    alike = defaultdict(list)
-    for text in texts:
-        alike[without_numbers(text)].append(text)
-    kinds = sorted(alike.values(), key=len, reverse=True)
-    for members in kinds[:REASONS]:
-        such = "such as " if len(set(members)) > 1 else ""
-        yield f"    {len(members)} {status}: {such}{members[0] or 'no reason given'}"
-    if len(kinds) > REASONS:
-        yield f"    {status}: and {len(kinds) - REASONS} more reasons"
-
-
-def _path(node: xr.DataTree, name: str) -> str:
-    where = "scenes" if node.path == "/" else node.path
-    return where if name == "status" else f"{where}, {name.removesuffix('_status').replace('_', ' ')}"
-
-
-def _errors(tree: xr.DataTree) -> list[str]:
-    """Median and worst error of each definition, with the cell of the worst."""
-    root = tree.to_dataset()
-    if "deformation_error" not in root or "definition" not in root.deformation_error.dims:
-        return []
-    error = judged(root)
-    by = [name for name in ("definition", "kinematics") if name in error.dims]
-    named = [name for name in by if name == "definition" or error.sizes[name] > 1]
-    rows: list[list[object]] = [["  definition", *named[1:], "cells", "median", "worst", "", "at"]]
-    for labels in product(*(error[name].values for name in by)):
-        here = error.sel(dict(zip(by, labels)))
-        sizes = np.abs(here.values[np.isfinite(here.values)])
-        if len(sizes):
-            worst = tuple(map(int, np.unravel_index(np.nanargmax(np.abs(here.values)), here.shape)))
-            numbers = [len(sizes), f"{100 * np.median(sizes):.3g} %", f"{100 * here.values[worst]:+.3g} %"]
-            place = place_text(root, here.dims, worst)
-            word = sign_text(root, float(here.values[worst]), here.dims, worst)
-            rows.append([f"  {labels[0]}", *labels[1 : len(named)], *numbers, word, place])
-    head = "errors, (network - reference) / |reference|, of scenes that are solved and within their reference's reach"
-    return [head, *aligned(rows, 0, range(len(named), len(named) + 3)).splitlines()] if rows[1:] else []
+    head = [tree.attrs.get("title", study), f"study {study}: {path}, {bytes_text(path.stat().st_size)}{made}"]
+    cells = text({node.path: node.to_dataset() for node in tree.subtree}, "", None).strip("\n")
+    return "\n\n".join(filter(None, [paragraphs([head]), cells, paragraphs([_groups(tree), _provenance(tree)])]))
 
 
 def _groups(tree: xr.DataTree) -> list[str]:
@@ -155,15 +220,11 @@ def _provenance(tree: xr.DataTree) -> list[str]:
     attributes = {str(name): str(value) for name, value in tree.attrs.items()}
     lines = ["made with", f"  springtune {attributes.get('springtune_version', 'unknown')}"]
     if attributes.get("git_commit"):
-        changed = f"\n{attributes.get('git_diff', '')}".count("\ndiff --git ")
-        files = f", {changed} changed files in git_diff" if changed else ""
-        lines.append(f"  commit {attributes['git_commit']}{files}")
+        lines.append(f"  commit {attributes['git_commit']}")
     if attributes.get("study_commit"):
         lines.append(f"  study: commit {attributes['study_commit']}")
     software = from_json(attributes.get("software"))
     if software:
         lines.append("  " + ", ".join(f"{name} {version}" for name, version in software.items() if version != "none"))
-    if attributes.get("host"):
-        lines.append(f"  on {attributes['host']}")
     lines += [f"  sha256 {digest}  {name}" for name, digest in from_json(attributes.get("inputs")).items()]
     return lines

@@ -1,7 +1,5 @@
 """Texts of numbers, labels and tables: for a terminal, CSV files and Markdown."""
 
-import csv
-import io
 import json
 import math
 import re
@@ -14,6 +12,13 @@ from springtune.safe_io.tables import number_text
 
 if TYPE_CHECKING:
     import xarray as xr
+
+
+FILE = "summary.txt"
+"""Summary of a dataset beside it."""
+
+HOLES = "Not everything is solved"
+"""How its last line begins where scenes are not solved."""
 
 
 def paragraphs(parts: Iterable[Iterable[str]]) -> str:
@@ -106,19 +111,9 @@ def from_json(text: object) -> dict[str, Any]:
 
 def csv_text(rows: Sequence[Mapping[str, object]]) -> str:
     """Rows as CSV; missing numbers are empty."""
-    text = io.StringIO()
-    columns = list(dict.fromkeys(name for row in rows for name in row))
-    writer = csv.DictWriter(text, columns, lineterminator="\n")
-    writer.writeheader()
-    for row in rows:
-        writer.writerow({name: _cell(value) for name, value in row.items()})
-    return text.getvalue()
+    import pandas as pd  # here: a plan does without it
 
-
-def _cell(value: object) -> object:
-    if not isinstance(value, float):
-        return value
-    return "" if math.isnan(value) else f"{value:.8g}"
+    return pd.DataFrame(rows).to_csv(index=False, float_format="%.8g", lineterminator="\n")
 
 
 def markdown_section(title: str, *said: str) -> list[str]:

@@ -20,7 +20,6 @@ from pydantic import BaseModel, ConfigDict
 from springtune.safe_io import atomic
 
 from ..output.text import cell_text
-from ..runs import records
 from . import PaperError, check_typst, numbers
 from .numbers import HASH_SHOWN, Dataset, checked, chosen
 
@@ -54,9 +53,8 @@ def run(source: str | Path, folder: str | Path, output: str | Path, *paths: str 
 
 def main(source: str, folder: str, output: str, record: str, digest: str, *paths: str) -> None:
     """Build a paper and write its record."""
-    checksums = [records.checksum(path) for path in paths]
     run(source, folder, output, *paths)
-    records.write(record, digest, [output], read=checksums)
+    atomic.write_json(record, {"digest": digest})
 
 
 def typeset(source: Path, folder: Path) -> bytes:
@@ -209,7 +207,7 @@ def _pdf(drawing: Drawing, datasets: Mapping[str, Dataset], name: str, examples:
         elif drawing.size is None:
             raise PaperError(f"{name}: several panels; give the figure a size, its width and height in inches")
         else:
-            figure = plt.figure(figsize=drawing.size)
+            figure = plt.figure(figsize=drawing.size, layout="constrained")
             rows = -(-len(drawing.panels) // drawing.columns)
             for panel, part in zip(drawing.panels, np.ravel(figure.subfigures(rows, drawing.columns, squeeze=False))):
                 plotted(panel, part)
@@ -248,17 +246,11 @@ def _origin(drawing: Drawing, datasets: Mapping[str, Dataset], name: str) -> str
     """Panel selections by study with hashes of datasets, or the script."""
     if drawing.example:
         return f"none, drawn by examples/{drawing.example}.py"
-    told: dict[str, list[str]] = {}
-    for panel in drawing.panels:
-        place = cell_text(panel.at, {"mesh_size": "m"})
-        if place not in told.setdefault(panel.study, []):
-            told[panel.study].append(place)
     parts = []
-    for study, labels in told.items():
-        selection = "; ".join(filter(None, labels))
-        sha256 = chosen(datasets, study, name).sha256[:HASH_SHOWN]
-        parts.append(f"{study}{': ' if selection else ''}{selection}, sha256 {sha256}")
-    return "; ".join(parts)
+    for panel in drawing.panels:
+        place = ": ".join(filter(None, (panel.study, cell_text(panel.at, {"mesh_size": "m"}))))
+        parts.append(f"{place}, sha256 {chosen(datasets, panel.study, name).sha256[:HASH_SHOWN]}")
+    return "; ".join(dict.fromkeys(parts))
 
 
 # -- sketches of what is loaded and how --------------------------------------------------------------------------------

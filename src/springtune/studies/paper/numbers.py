@@ -14,13 +14,13 @@ import ast
 import hashlib
 import json
 import math
-import operator
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 import yaml
 from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
@@ -211,16 +211,20 @@ def numbers(declared: Mapping[str, Any], printed: Mapping[str, Any], datasets: M
 
 
 def _read(number: Number, found: Mapping[str, Any], datasets: Mapping[str, Dataset], name: str) -> dict[str, Any]:
-    value = _formula(number.formula, found, name) if number.formula else _value(number, datasets, name)
+    if number.formula:
+        value, why = _formula(number.formula, found, name), f"the formula '{number.formula}' has no value"
+    else:
+        cells = _cells(number, datasets, name)
+        value, said = _value(number, cells, name), next((f": {one}" for one in map(str, cells.message) if one), "")
+        why = (
+            f"{datasets[number.study].path} has no value of {number.source()}{said}; run config/{number.study}.yaml "
+            "again with what it needs, or declare the number optional and give the text a branch without it"
+        )
     there = math.isfinite(value)
     if not there and not number.optional:
-        raise PaperError(_lacking(number, datasets, name))
-    return {
-        "text": number.text(value) if there else None,
-        "unit": number.unit,
-        "value": value if there else None,
-        "source": number.source(),
-    }
+        raise PaperError(f"{name}: {why}")
+    shown = {"text": number.text(value), "value": value} if there else {"text": None, "value": None}
+    return shown | {"unit": number.unit, "source": number.source()}
 
 
 def table(declared: Mapping[str, Any], datasets: Mapping[str, Dataset], name: str) -> dict[str, Any]:
@@ -229,15 +233,26 @@ def table(declared: Mapping[str, Any], datasets: Mapping[str, Dataset], name: st
     columns = [checked(Number, entry, name) for entry in made.columns]
     rows, studies = [], set()
     for entry in made.rows:
-        cells = []
+        texts = []
         for column in made.columns:
-            number = _without(checked(Number, _together(made.all, entry, column), name), datasets, name)
+            at = {key: label for part in (made.all, entry, column) for key, label in part.get("at", {}).items()}
+            number = checked(Number, {**made.all, **entry, **column, "at": at}, name)
             studies.add(number.study)
-            value = _value(number, datasets, name)
-            cells.append(number.text(value) + _marks(number, datasets, name) if math.isfinite(value) else "–")
-        rows.append(_head(checked(Number, entry, name)) | {"cells": cells})
+            cells = _cells(number, datasets, name, of_table=True)
+            value = _value(number, cells, name)
+            texts.append(number.text(value) + _marks(number, cells) if math.isfinite(value) else "–")
+        rows.append(_head(checked(Number, entry, name)) | {"cells": texts})
     data = "; ".join(f"{study}, sha256 {datasets[study].sha256[:HASH_SHOWN]}" for study in sorted(studies))
     return {"columns": [_head(one) for one in columns], "rows": rows, "data": data}
+
+
+def _head(number: Number) -> dict[str, str]:
+    """Title and group with labels filled in, mesh sizes in mm."""
+    labels = {name: f"{1e3 * one:g} mm" if name == "mesh_size" else str(one) for name, one in number.at[0].items()}
+    filled = {"title": number.title, "group": number.group}
+    for name, label in labels.items():
+        filled = {key: text.replace(f"{{{name}}}", label) for key, text in filled.items()}
+    return filled | {"unit": number.unit}
 
 
 def checked(model: type[Any], entry: object, name: str) -> Any:
@@ -249,35 +264,11 @@ def checked(model: type[Any], entry: object, name: str) -> Any:
         raise PaperError(f"{name}: {wrong}") from None
 
 
-def _together(*parts: Mapping[str, Any]) -> dict[str, Any]:
-    found: dict[str, Any] = {}
-    at: dict[str, Any] = {}
-    for part in parts:
-        found |= part
-        at |= part.get("at", {})
-    return found | {"at": at}
+def _cells(number: Number, datasets: Mapping[str, Dataset], name: str, of_table: bool = False) -> pd.DataFrame:
+    """Cells of a number: ``value``, ``message``, and its marks by name.
 
-
-def _without(number: Number, datasets: Mapping[str, Dataset], name: str) -> Number:
-    """Drop labels of dimensions that the variable lacks but its dataset has."""
-    data, variable = _group(number, datasets, name)
-    kept = [dimension for dimension in number.at[0] if dimension in data[variable].dims or dimension not in data.dims]
-    return number.model_copy(update={"at": [{dimension: number.at[0][dimension] for dimension in kept}]})
-
-
-def _titled(text: str, number: Number) -> str:
-    """Fill labels into a title, mesh sizes in mm."""
-    for name, label in number.at[0].items():
-        shown = f"{1e3 * label:g} mm" if name == "mesh_size" else f"{label}"
-        text = text.replace(f"{{{name}}}", shown)
-    return text
-
-
-def _head(number: Number) -> dict[str, str]:
-    return {"title": _titled(number.title, number), "group": _titled(number.group, number), "unit": number.unit}
-
-
-def _group(number: Number, datasets: Mapping[str, Dataset], name: str) -> tuple[xr.Dataset, str]:
+    Cells of a table are of labels that their variable may lack.
+    """
     if not number.study or not number.variable:
         raise PaperError(f"{name}: give a study and a variable, or a formula")
     one = chosen(datasets, number.study, name)
@@ -285,62 +276,60 @@ def _group(number: Number, datasets: Mapping[str, Dataset], name: str) -> tuple[
     if group and group not in one.tree.children:
         raise PaperError(f"{name}: {one.path} has no group /{group}; give one that it has, or run the study again")
     data = (one.tree[group] if group else one.tree).to_dataset()
-    for wanted in filter(None, (variable, number.over, _flag(number.where)[0], *number.marks)):
+    flag, _, status = number.where.partition("=")
+    columns = {"value": variable, "over": number.over, "flag": flag.rstrip("!")} | {key: key for key in number.marks}
+    for wanted in filter(None, columns.values()):
         if wanted not in data.variables:
             raise PaperError(f"{name}: {one.path} has no variable '{wanted}' in /{group}; give one that it has")
-    shown, kept = TEXT_UNITS[number.unit][0], _units(number, data, variable, name)
-    if kept and kept != shown and not number.over and number.reduce != "count":
-        raise PaperError(f"{name}: '{variable}' is in {kept}, which '{number.unit}' does not show; give another unit")
-    return data, variable
-
-
-def _units(number: Number, data: xr.Dataset, variable: str, name: str) -> str:
-    """Units of a variable, or of its chosen cells if they differ."""
+    if number.where and status not in STATUS:
+        raise PaperError(f"{name}: '{status}' is no status; give one of {', '.join(STATUS)}")
     array = data[variable]
-    if "units_variable" not in array.attrs:
-        return str(array.attrs.get("units", ""))
-    units = data[array.attrs["units_variable"]]
-    chosen_at = [{key: label for key, label in at.items() if key in units.dims} for at in number.at]
-    found = {str(one) for at in chosen_at for one in np.ravel(_selected(units, at, name, number.optional)) if one}
-    if len(found) > 1:
-        raise PaperError(
-            f"{name}: cells of '{variable}' are in {', '.join(sorted(found))}; choose labels that leave one of them"
-        )
-    return "".join(found)
-
-
-def _selected(array: xr.DataArray, at: Mapping[str, Any], name: str, optional: bool = False) -> xr.DataArray:
-    for dimension, label in at.items():
-        if dimension not in array.dims:
-            raise PaperError(
-                f"{name}: '{array.name}' has no dimension '{dimension}'; it has {', '.join(map(str, array.dims))}"
-            )
-        labels = array[dimension].values.tolist()
-        lacking = [one for one in (label if isinstance(label, list) else [label]) if one not in labels]
-        if lacking and optional:
-            return array.isel({dimension: []})
-        if lacking:
-            raise PaperError(
-                f"{name}: {dimension} {lacking[0]!r} is not in the dataset; it has {', '.join(map(repr, labels))}"
-            )
-        array = array.sel({dimension: label})
-    return array
-
-
-def _value(number: Number, datasets: Mapping[str, Dataset], name: str) -> float:
-    data, variable = _group(number, datasets, name)
-    array = data[variable] / data[number.over] if number.over else data[variable]
-    array = array.rename(variable)
-    if array.dtype.kind not in "fiu":
-        return float(_selected(array, number.at[0], name).size) if number.reduce == "count" else math.nan
-    array = (array - number.minus).rename(variable) if number.minus else array
+    columns["units"] = array.attrs.get("units_variable", "")
+    columns["message"] = "message" if "message" in data and set(data.message.dims) <= set(array.dims) else ""
+    whole = xr.Dataset({key: data[held] for key, held in columns.items() if held})
+    parts = []
+    for place, at in enumerate(number.at):
+        part = whole.expand_dims(place=[place])
+        for dimension, label in at.items():
+            if not of_table or dimension not in data.dims or dimension in array.dims:
+                part = _selected(part, variable, dimension, label, number.optional, name)
+        parts.append(part.to_dataframe())
+    cells = pd.concat(parts)
+    cells = cells.assign(**{key: "" for key in ("units", "message") if key not in cells})
+    if array.dtype.kind not in "fiu":  # texts can only be counted
+        cells["value"] = 0.0 if number.reduce == "count" else math.nan
+    cells["value"] = cells.value / (cells.over if number.over else 1) - number.minus
     if number.where:
-        flag, equal, wanted = _flag(number.where)
-        if wanted not in STATUS:
-            raise PaperError(f"{name}: '{wanted}' is no status; give one of {', '.join(STATUS)}")
-        array = array.where((data[flag] == STATUS.index(wanted)) == equal)
-    values = np.concatenate([np.ravel(_selected(array, at, name, number.optional).values) for at in number.at])
-    values = values[np.isfinite(values)]
+        cells["value"] = cells.value.where((cells.flag == STATUS.index(status)) == (not flag.endswith("!")))
+    units = {*cells.units, str(array.attrs.get("units", "")) if not columns["units"] else ""} - {""}
+    if len(units) > 1:
+        raise PaperError(
+            f"{name}: cells of '{variable}' are in {', '.join(sorted(units))}; choose labels that leave one of them"
+        )
+    if units - {TEXT_UNITS[number.unit][0]} and not number.over and number.reduce != "count":
+        remedy = f"which '{number.unit}' does not show; give another unit"
+        raise PaperError(f"{name}: '{variable}' is in {''.join(units)}, {remedy}")
+    return cells
+
+
+def _selected(data: xr.Dataset, variable: str, dimension: str, label: Any, optional: bool, name: str) -> xr.Dataset:
+    """Cells at a label, or several; none if an optional number lacks it."""
+    array = data["value"]
+    if dimension not in array.dims:
+        known = ", ".join(str(one) for one in array.dims if one != "place")
+        raise PaperError(f"{name}: '{variable}' has no dimension '{dimension}'; it has {known}")
+    labels = array[dimension].values.tolist()
+    lacking = [one for one in (label if isinstance(label, list) else [label]) if one not in labels]
+    if not lacking:
+        return data.sel({dimension: label})
+    if optional:
+        return data.isel({dimension: []})
+    raise PaperError(f"{name}: {dimension} {lacking[0]!r} is not in the dataset; it has {', '.join(map(repr, labels))}")
+
+
+def _value(number: Number, cells: pd.DataFrame, name: str) -> float:
+    """Value of the cells, NaN without any."""
+    values = cells.value[np.isfinite(cells.value)].to_numpy()
     if number.cells is not None and len(values) != number.cells:
         raise PaperError(
             f"{name}: {len(values)} of {number.cells} cells have a value in {number.source()}; run "
@@ -350,90 +339,50 @@ def _value(number: Number, datasets: Mapping[str, Dataset], name: str) -> float:
         return len(values)
     if not len(values):
         return math.nan
-    if number.absolute:
-        values = np.abs(values)
-    if number.reduce:
-        return float(REDUCTIONS[number.reduce](values))
-    if len(values) > 1:
+    if len(values) > 1 and not number.reduce:
         raise PaperError(
             f"{name}: {len(values)} cells are left; choose labels, or reduce them by {', '.join(REDUCTIONS)}"
         )
-    return float(values[0])
+    return float(REDUCTIONS[number.reduce or "mean"](np.abs(values) if number.absolute else values))
 
 
-def _flag(where: str) -> tuple[str, bool, str]:
-    """Split a condition into variable, equality and value."""
-    variable, _, wanted = where.partition("=")
-    return variable.rstrip("!"), not variable.endswith("!"), wanted
+def _marks(number: Number, cells: pd.DataFrame) -> str:
+    """Marks of a cell whose status is not solved, or that has a text."""
+    solved = STATUS.index("solved")
+    marked = {
+        name: (cells[name] != solved).any() if name == "status" else any(map(str, cells[name])) for name in number.marks
+    }
+    return "".join(mark for name, mark in number.marks.items() if marked[name])
 
 
-def _marks(number: Number, datasets: Mapping[str, Dataset], name: str) -> str:
-    data, _ = _group(number, datasets, name)
-    text = ""
-    for variable, mark in number.marks.items():
-        array = data[variable]
-        here = {dimension: label for dimension, label in number.at[0].items() if dimension in array.dims}
-        found = np.ravel(_selected(array, here, name).values)
-        marked = (found != STATUS.index("solved")).any() if variable == "status" else any(map(str, found))
-        text += mark if marked else ""
-    return text
-
-
-def _lacking(number: Number, datasets: Mapping[str, Dataset], name: str) -> str:
-    """Message on a missing number: request, state in the dataset, remedy."""
-    if number.formula:
-        return f"{name}: the formula '{number.formula}' has no value"
-    data, variable = _group(number, datasets, name)
-    said = ""
-    if "message" in data and set(data.message.dims) <= set(data[variable].dims):
-        messages = np.concatenate([np.ravel(_selected(data.message, at, name).values.astype(str)) for at in number.at])
-        said = next((f": {message}" for message in messages if message), "")
-    path = chosen(datasets, number.study, name).path
-    return (
-        f"{name}: {path} has no value of {number.source()}{said}; run config/{number.study}.yaml again with what it "
-        "needs, or declare the number optional and give the text a branch without it"
-    )
-
-
-_OPERATORS: dict[type[ast.AST], Callable[..., float]] = {
-    ast.Add: operator.add,
-    ast.Sub: operator.sub,
-    ast.Mult: operator.mul,
-    ast.Div: operator.truediv,
-    ast.Pow: operator.pow,
-    ast.USub: operator.neg,
-}
-_FUNCTIONS: dict[str, Callable[..., float]] = {"abs": abs, "max": max, "min": min, "sqrt": math.sqrt}
+ARITHMETIC = (
+    ast.Expression,
+    ast.Constant,
+    ast.Name,
+    ast.BinOp,
+    ast.UnaryOp,
+    ast.Call,
+    ast.Load,
+    ast.operator,
+    ast.USub,
+)
+KNOWN_FUNCTIONS = {"abs": abs, "max": max, "min": min, "sqrt": math.sqrt}
 
 
 def _formula(text: str, found: Mapping[str, Any], name: str) -> float:
     """Evaluate arithmetic of earlier numbers; NaN if one is missing."""
-
-    def value(node: ast.AST) -> float:
-        match node:
-            case ast.Expression(body):
-                return value(body)
-            case ast.Constant(int() | float() as number):
-                return number
-            case ast.Name("pi"):
-                return math.pi
-            case ast.Name(other) if other in found:
-                known = found[other]["value"]
-                return math.nan if known is None else known
-            case ast.BinOp(left, kind, right) if type(kind) in _OPERATORS:
-                return _OPERATORS[type(kind)](value(left), value(right))
-            case ast.UnaryOp(kind, operand) if type(kind) in _OPERATORS:
-                return _OPERATORS[type(kind)](value(operand))
-            case ast.Call(ast.Name(function), arguments, []) if function in _FUNCTIONS:
-                return _FUNCTIONS[function](*map(value, arguments))
-        raise PaperError(
-            f"{name}: '{ast.unparse(node)}' of the formula is not known; give a number that is declared above, "
-            f"+ - * / ** or {', '.join(_FUNCTIONS)}"
-        )
-
+    known = {key: math.nan if one["value"] is None else one["value"] for key, one in found.items()}
+    names: dict[str, Any] = {"__builtins__": {}, "pi": math.pi, **known, **KNOWN_FUNCTIONS}
     try:
-        return value(ast.parse(text, mode="eval"))
-    except (SyntaxError, ArithmeticError, ValueError) as error:
+        tree = ast.parse(text, mode="eval")
+        for node in ast.walk(tree):
+            if not isinstance(node, ARITHMETIC) or isinstance(node, ast.Name) and node.id not in names:
+                raise PaperError(
+                    f"{name}: '{ast.unparse(node)}' of the formula is not known; give a number that is declared above, "
+                    f"+ - * / ** or {', '.join(KNOWN_FUNCTIONS)}"
+                )
+        return float(eval(compile(tree, name, "eval"), names))  # noqa: S307  # of these nodes and names alone
+    except (SyntaxError, ArithmeticError, TypeError, ValueError) as error:
         raise PaperError(f"{name}: the formula '{text}' cannot be computed: {error}") from None
 
 

@@ -3,9 +3,8 @@
 Python's minor version counts: sums of floats change with 3.12, and compiled packages differ.
 
 Snakemake does not see edits of imported packages, and the whole package as input would rerun everything. So a module's
-closure is all modules that it imports, directly or not, and their packages. All imports that can run count, also inside
-functions and ``try``; type-checking imports do not. Of an ``__init__`` that only imports, only the requested names are
-followed.
+closure is all modules that it imports, directly or not, by grimp: also inside functions and ``try``, but not for type
+checkers. Import from modules, not from packages: an ``__init__`` brings in all that it imports.
 
 Imports by a name in a text are not seen. Definitions and mesh types are added where they are chosen
 (`definition_closure`, `mesh_type_closure`), and modules of outputs in `rerun`. A template counts with the module that
@@ -14,386 +13,211 @@ has its name, such as ``templates/mujoco.xml.jinja`` with ``mujoco``.
 
 import ast
 import hashlib
-import inspect
 import os
 import sys
-import textwrap
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterator
 from dataclasses import asdict
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from springtune.mesh import MESH_TYPES
-from springtune.registry import Declared, full_name, plugin_packages
-from springtune.springs import DEFINITIONS
+from springtune.mesh.types import MESH_TYPES
+from springtune.registry import Declared, plugin_packages
+from springtune.springs.base import DEFINITIONS
 
-from . import checked_json
-from .checked_json import hash_of
-from .source import PACKAGE
+from .source import PACKAGE, hash_of
 
 if TYPE_CHECKING:
+    from grimp import ImportGraph
+
     from springtune.problem.geometry import Beam
     from springtune.problem.materials import Material
 
-Import = tuple[int, str, str]
-"""Level of a relative import, module, and imported name: empty for a plain import, or an asterisk."""
-
-
-class Source(NamedTuple):
-    """Parsed source.
-
-    `digest` ignores comments, docstrings, formatting and type-checking code. `imports` are all that can run. `face`
-    maps names to imports if the source only imports names, else it is None.
-    """
-
-    digest: str
-    imports: frozenset[Import]
-    face: Mapping[str, Import] | None
-
-
-def read(text: str | bytes, package: str = "") -> Source:
-    r"""Parse source code.
-
-    Examples
-    --------
-    >>> read("def f():\n    return 1").digest == read("def f(): return 1  # one").digest
-    True
-    >>> read("from numpy import pi").imports
-    frozenset({(0, 'numpy', 'pi')})
-    """
-    tree = ast.parse(text)
-    reader = _Reader()
-    reader.read(tree)
-    imports = reader.imports | (_attributes(tree, package) if package else set())
-    digest = hashlib.sha256("\n".join(reader.parts).encode()).hexdigest()
-    return Source(digest, frozenset(imports), _face(tree))
-
-
-def _face(tree: ast.Module) -> dict[str, Import] | None:
-    names: dict[str, Import] = {}
-    for node in tree.body:
-        if isinstance(node, ast.ImportFrom) and node.names[0].name != "*":
-            for alias in node.names:
-                names[alias.asname or alias.name] = (node.level, node.module or "", alias.name)
-        elif not _says_nothing(node) and not (isinstance(node, ast.Assign) and _is_all(node.targets)):
-            return None
-    return names
-
-
-def _is_all(targets: list[ast.expr]) -> bool:
-    return [target.id for target in targets if isinstance(target, ast.Name)] == ["__all__"]
-
-
-def _attributes(tree: ast.Module, package: str) -> set[Import]:
-    """Names used as attributes of a package."""
-    nodes = list(ast.walk(tree))
-    names = {
-        alias.asname or alias.name
-        for node in nodes
-        if isinstance(node, ast.Import)
-        for alias in node.names
-        if alias.name == package
-    }
-    return {
-        (0, package, node.attr)
-        for node in nodes
-        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id in names
-    }
-
-
-def _says_nothing(node: ast.AST) -> bool:
-    """Return whether a statement is a docstring or `pass`."""
-    if isinstance(node, ast.Expr):
-        return isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
-    return isinstance(node, ast.Pass)
-
-
-def _for_type_checkers(node: ast.If) -> bool:
-    test = node.test
-    return "TYPE_CHECKING" in (getattr(test, "id", ""), getattr(test, "attr", ""))
-
-
-class _Reader:
-    """Read a syntax tree as text, and its imports."""
-
-    SKIPPED = ("ctx", "kind", "type_comment")  # follow from the rest, or are said for readers
-
-    def __init__(self) -> None:
-        self.parts: list[str] = []
-        self.imports: set[Import] = set()
-        self.fields: dict[type, tuple[str, ...]] = {}
-
-    def read(self, node: object) -> None:
-        add = self.parts.append
-        kind = node.__class__
-        # The first four are most of what there is.
-        if kind is ast.Name:
-            add(node.id)  # type: ignore[attr-defined]
-        elif kind is ast.Attribute:
-            self.read(node.value)  # type: ignore[attr-defined]
-            add(f".{node.attr}")  # type: ignore[attr-defined]
-        elif kind is ast.Constant:
-            add(f"={node.value!r}")  # type: ignore[attr-defined]
-        elif kind is list:
-            add("[")
-            for one in node:  # type: ignore[attr-defined]
-                self.read(one)
-            add("]")
-        elif isinstance(node, ast.AST):
-            if isinstance(node, ast.stmt):
-                if _says_nothing(node):
-                    return
-                if isinstance(node, ast.If) and _for_type_checkers(node):
-                    for one in node.orelse:
-                        self.read(one)
-                    return
-                if isinstance(node, ast.Import):
-                    self.imports |= {(0, alias.name, "") for alias in node.names}
-                elif isinstance(node, ast.ImportFrom):
-                    self.imports |= {(node.level, node.module or "", alias.name) for alias in node.names}
-            add(f"({kind.__name__}")
-            fields = self.fields.get(kind)
-            if fields is None:
-                fields = self.fields[kind] = tuple(name for name in node._fields if name not in self.SKIPPED)
-            for name in fields:
-                value = getattr(node, name, None)
-                if value is not None and value != []:
-                    add(name)
-                    self.read(value)
-            add(")")
-        else:
-            add(repr(node))
-
-
-NOT_COUNTED = {
-    ("studies/output/browse/page.py", "h5py"): "numbers come out of a dataset as they went in, or not at all",
-    ("safe_io/inputs.py", "h5py"): "it refuses files, and reads none of their numbers",
-    ("safe_io/atomic.py", "psutil"): "it says which processes live",
-    ("handover/simulation.py", "jinja2"): "it puts texts and numbers into files as they are",
-    ("studies/runs/store.py", "h5py"): "numbers come out of a file as they went in, or not at all",
-    ("studies/output/dataset.py", "h5py"): "texts go into a dataset as they are",
-    ("studies/output/reading.py", "h5py"): "it looks at a dataset's links before netCDF opens it",
-    ("mesh/exodus.py", "h5py"): "numbers come out of a file as they went in, or not at all",
-    ("mesh/formats.py", "meshio"): "as of the store; `mesh_file_closure` counts it where a study's own file is read",
-    ("units.py", "pint"): "what a study says with units is in the parameters as numbers",
-}
-"""Packages that do not influence results, and why."""
-
-CODE_FILE = "code.json"
-"""Cache of parsed source, beside the folders of studies."""
+CARRIERS = {"h5py", "jinja2", "markupsafe", "meshio", "pint", "psutil", "pydantic"}
+"""Packages whose versions do not influence results: they carry numbers as they are."""
 
 DISTRIBUTIONS = {"PIL": "pillow", "netgen": "netgen-mesher", "skfem": "scikit-fem", "yaml": "pyyaml"}
 """Distributions with another name than their package; looking one up takes a third of a second."""
 
 
-class Closure(NamedTuple):
-    """Files and packages that a module depends on; `packages` are import names."""
+class _ForComputing(ast.NodeTransformer):
+    """Remove what only readers and type checkers see."""
 
-    files: tuple[Path, ...]
-    packages: tuple[str, ...]
-    digest: str
-
-
-class Code:
-    """Files of code, each parsed once."""
-
-    def __init__(self, package: Path = PACKAGE) -> None:
-        self.package = package
-        self._known: dict[str, list[Any]] = {}
-        self._sources: dict[Path, Source] = {}
-        self._closures: dict[tuple[Path, frozenset[Path], str], Closure] = {}
-        self._taken: dict[Path, tuple[set[Path], set[tuple[str, str]]]] = {}
-
-    @property
-    def files(self) -> frozenset[Path]:
-        """Files of all closures so far."""
-        return frozenset(self._sources)
-
-    def recall(self, path: Path) -> None:
-        """Reuse cached source with the same content; parsing takes half of planning."""
-        note = checked_json.read(path, sources=dict)
-        if note is not None and note.get("reader") == READER:
-            self._known = note["sources"]
-
-    def remember(self, path: Path) -> None:
-        """Write the cache for `recall`."""
-        read_now = {
-            _mark(file.read_bytes()): [source.digest, sorted(source.imports), source.face]
-            for file, source in self._sources.items()
-            if self._has(file)
-        }
-        if not read_now.keys() <= self._known.keys():
-            checked_json.write(path, {"reader": READER, "sources": read_now})
-
-    def closure(self, start: Path, without: frozenset[Path] = frozenset(), counted: str = "") -> Closure:
-        """A file and all its direct and indirect imports."""
-        known = start, without, counted
-        if known not in self._closures:
-            found: set[Path] = set()
-            packages: set[str] = set()
-            waiting = {start}
-            while waiting:
-                path = waiting.pop()
-                found.add(path)
-                if path not in self._taken:
-                    self._taken[path] = self._imported(path, self._source(path).imports)
-                files, taken = self._taken[path]
-                waiting |= files - found - without
-                packages |= {
-                    package for place, package in taken if package == counted or (place, package) not in NOT_COUNTED
-                }
-            self._closures[known] = self._closed(found, packages)
-        return self._closures[known]
-
-    def union(self, closures: Iterable[Closure]) -> Closure:
-        """Union of closures."""
-        found = list(closures)
-        files = {file for one in found for file in one.files}
-        return self._closed(files, {package for one in found for package in one.packages})
-
-    def of_text(self, text: str) -> Closure:
-        """Closure of a text that is in no file."""
-        try:
-            source = read(textwrap.dedent(text), self.package.name)
-        except SyntaxError:
-            source = Source(hashlib.sha256(text.encode()).hexdigest(), frozenset(), None)
-        files, taken = self._imported(Path.cwd() / "text.py", source.imports)
-        found = self.union(map(self.closure, files))
-        return self._closed(set(found.files), {*found.packages, *(package for _, package in taken)}, source.digest)
-
-    def _closed(self, files: set[Path], packages: set[str], text: str = "") -> Closure:
-        digests = sorted(self._source(file).digest for file in files)
-        digest = hashlib.sha256("".join([text, *digests]).encode()).hexdigest()
-        return Closure(tuple(sorted(files)), tuple(sorted(packages)), digest)
-
-    def _source(self, path: Path) -> Source:
-        if path not in self._sources:
-            content, ours = path.read_bytes(), self._has(path)
-            known = self._known.get(_mark(content)) if ours else None
-            if known:
-                digest, imports, face = known
-                names = None if face is None else {name: _import(one) for name, one in face.items()}
-                self._sources[path] = Source(digest, frozenset(map(_import, imports)), names)
-            elif path.suffix == ".jinja":
-                self._sources[path] = Source(_mark(content), frozenset(), None)
-            else:
-                self._sources[path] = read(content, "" if ours else self.package.name)
-        return self._sources[path]
-
-    def _has(self, path: Path) -> bool:
-        return path.is_relative_to(self.package)
-
-    def _imported(self, path: Path, imports: Iterable[Import]) -> tuple[set[Path], set[tuple[str, str]]]:
-        """Imported files, and packages with the importing file as in `NOT_COUNTED`."""
-        packages: set[tuple[str, str]] = set()
-        ours = self._has(path)
-        files = set((path.parent / "templates").glob(f"{path.stem}.*.jinja")) if ours else set()
-        where = path.relative_to(self.package).as_posix() if ours else str(path)
-        for name in () if ours else plugin_packages():
-            place = _own(name)
-            if place and path.with_suffix("").is_relative_to(place):  # its version counts, not only this code
-                packages.add((where, name))
-        for one in imports:
-            for found in self._followed(path, one):
-                if isinstance(found, Path):
-                    files.add(found)
-                elif found not in sys.stdlib_module_names:
-                    packages.add((where, found))
-        return files, packages
-
-    def _followed(self, path: Path, one: Import, faces: frozenset[Path] = frozenset()) -> list[Path | str]:
-        """Files that an import reads through ``__init__`` files, or the name of an external package."""
-        _, module, name = one
-        place = self._place(path, *one[:2])
-        if place is None:
-            return [module.partition(".")[0]]
-        file = _file(place)
-        if not name and place == self.package:
-            return []  # its attributes say what of it
-        if name in ("", "*"):
-            return [file] if file else []
-        face = self._source(file).face if file else {}
-        if file and file not in faces and face is not None and name in face:
-            return self._followed(file, face[name], faces | {file})
-        if file == PACKAGE / "__init__.py" and (lazy := _lazy_names().get(name)):
-            return self._followed(file, (1, lazy, name), faces)
-        below = _file(place / name)
-        # What a face lacks may come from any of its modules.
-        return [found for found in (file if face is None or not below else None, below) if found]
-
-    def _place(self, path: Path, level: int, module: str) -> Path | None:
-        """Path of a module without ending; None for an external package."""
-        parts = module.split(".") if module else []
-        if level:
-            return path.parents[level - 1].joinpath(*parts)
-        if parts[0] == self.package.name:
-            return self.package.joinpath(*parts[1:])
-        if self._has(path) or parts[0] in sys.stdlib_module_names:
+    def visit(self, node: ast.AST) -> Any:
+        if isinstance(node, ast.Pass) or (
+            isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
+        ):
             return None
-        beside = path.parent / parts[0]
-        root = beside if beside.is_dir() or _file(beside) else _own(parts[0])
-        return root and root.joinpath(*parts[1:])
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in (getattr(node.test, one, "") for one in ("id", "attr")):
+            return [kept for one in node.orelse if (kept := self.visit(one))]
+        if isinstance(node, ast.Constant):
+            node.kind = None  # u"" is ""
+        return self.generic_visit(node)
 
 
-def _import(parts: list[Any]) -> Import:
-    level, module, name = parts
-    return level, module, name
+def computing(text: str | bytes) -> ast.Module:
+    """Parse source code without comments, docstrings, `pass` and type-checking code."""
+    tree: ast.Module = _ForComputing().visit(ast.parse(text))
+    return tree
 
 
-def _mark(content: bytes) -> str:
-    return hashlib.sha256(content).hexdigest()
-
-
-READER = _mark(Path(__file__).read_bytes())
-"""Digest of the parser; caches of other parsers are ignored."""
-
-OURS = Code()
-
-
-def modules(*names: str) -> tuple[str, ...]:
-    """Files of modules and all their imports.
+def digest_of(text: str | bytes) -> str:
+    r"""Hash source code as it computes.
 
     Examples
     --------
-    >>> [Path(file).name for file in modules("registry")]
-    ['registry.py']
+    >>> digest_of("def f():\n    return 1") == digest_of("def f(): return 1  # one")
+    True
     """
-    return tuple(sorted({str(file) for name in names for file in OURS.closure(_module(name)).files}))
-
-
-def stage_closure(*names: str, without: tuple[str, ...] = ()) -> Closure:
-    """Closure of modules without the definitions and mesh types that they may choose."""
-    return OURS.union(OURS.closure(_module(name), frozenset(map(_module, without))) for name in names)
-
-
-def definition_closure(name: str, code: Code = OURS) -> Closure:
-    """Closure of a definition, which may be outside this package."""
-    return _declared_closure(DEFINITIONS[name], code)
-
-
-def mesh_type_closure(name: str) -> Closure:
-    """Closure of a mesh type."""
-    return _declared_closure(MESH_TYPES[name], OURS)
-
-
-def mesh_file_closure() -> Closure:
-    """Closure of reading mesh files, with meshio."""
-    return OURS.closure(_module("mesh.formats"), counted="meshio")
+    return hashlib.sha256(ast.dump(computing(text)).encode()).hexdigest()
 
 
 @cache
-def _declared_closure(one: Declared, code: Code) -> Closure:
-    if one.file is not None:
-        return code.closure(one.file)
-    function = inspect.unwrap(one.function)
-    try:  # of a notebook: the function is all that is known
-        return code.of_text(inspect.getsource(function))
-    except OSError:  # a prompt that keeps no text
-        made = function.__code__
-        constants = [value for value in made.co_consts if not hasattr(value, "co_code")]
-        return code.of_text(f"({made.co_code!r}, {made.co_names!r}, {constants!r})")
+def file_digest(path: Path) -> str:
+    """Hash of a file of code as it computes, or of a template."""
+    content = path.read_bytes()
+    return digest_of(content) if path.suffix == ".py" else hashlib.sha256(content).hexdigest()
+
+
+class Closure(NamedTuple):
+    """Files and packages that code depends on; `packages` are import names."""
+
+    files: frozenset[Path] = frozenset()
+    packages: frozenset[str] = frozenset()
+
+    @property
+    def digest(self) -> str:
+        """Hash of the code, wherever it is."""
+        return hash_of(sorted(map(file_digest, self.files)))
+
+    def with_(self, other: "Closure") -> "Closure":
+        """Union of two closures."""
+        return Closure(self.files | other.files, self.packages | other.packages)
+
+
+@cache
+def imports_graph() -> "ImportGraph":
+    """Imports of all modules of this package."""
+    import grimp  # here: a job asks for few keys
+
+    return grimp.build_graph(
+        PACKAGE.name, include_external_packages=True, exclude_type_checking_imports=True, cache_dir=None
+    )
+
+
+@cache
+def closure(*names: str, without: tuple[str, ...] = ()) -> Closure:
+    """Closure of modules of this package, without some modules and what only these import."""
+    graph, left_out = imports_graph(), {full_name(name) for name in without}
+    found, waiting = set[str](), {full_name(name) for name in names}
+    while waiting:
+        found.add(one := waiting.pop())
+        waiting |= graph.find_modules_directly_imported_by(one) - found - left_out
+    ours = {name for name in found if name.partition(".")[0] == PACKAGE.name}
+    files = {file for name in ours for file in _files(name)}
+    return Closure(frozenset(files), frozenset(found - ours - CARRIERS - sys.stdlib_module_names))
+
+
+def full_name(module: str) -> str:
+    """Name under which a module of this package is imported."""
+    return f"{PACKAGE.name}.{module}".rstrip(".")
+
+
+def _files(name: str) -> Iterator[Path]:
+    """File of a module of this package, and the templates of its name."""
+    path = PACKAGE.parent.joinpath(*name.split("."))
+    yield path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+    yield from (path.parent / "templates").glob(f"{path.name}.*.jinja")
+
+
+def definition_closure(name: str) -> Closure:
+    """Closure of a definition, which may be outside this package."""
+    return declared_closure(DEFINITIONS[name])
+
+
+def mesh_type_closure(name: str) -> Closure:
+    """Closure of a mesh type; for a name of mesh files, that of their reader, with meshio."""
+    if name in MESH_TYPES:
+        return declared_closure(MESH_TYPES[name])
+    return closure("mesh.formats").with_(Closure(packages=frozenset({"meshio"})))
+
+
+# -- code outside of this package --------------------------------------------------------------------------------------
+
+
+@cache
+def declared_closure(one: Declared) -> Closure:
+    """Closure of the module of a declared function."""
+    if one.file is None:
+        raise ValueError(f"'{one.name}' was typed, and jobs of a study do not find it; put it into a module of yours")
+    if one.file.is_relative_to(PACKAGE):
+        return closure(".".join(one.file.relative_to(PACKAGE).with_suffix("").parts))
+    return elsewhere(one.file)
+
+
+def elsewhere(path: Path) -> Closure:
+    """Closure of code elsewhere, which follows the files of modules that no distribution has."""
+    files, waiting = {path}, [path]
+    ours, packages = set[str](), plugin_packages() & {*path.with_suffix("").parts}  # a package's version counts, too
+    for place in waiting:
+        for level, name in _imports(computing(place.read_bytes())):
+            top, *parts = name.split(".")
+            if top == PACKAGE.name and not level:
+                ours |= _modules_of(parts)
+                continue
+            root = place.parents[level - 1] if level else _root(place.parent, top)
+            packages |= {top} - sys.stdlib_module_names if root is None else set()
+            found = _files_below(root, [top, *parts]) - files if root else set()
+            waiting += found
+            files |= found
+    return closure(*ours).with_(Closure(frozenset(files), frozenset(packages)))
+
+
+def _imports(tree: ast.AST) -> Iterator[tuple[int, str]]:
+    """Level and name of what code imports, names and all; and what it takes of this package by its attributes."""
+    nodes = [*ast.walk(tree)]
+    aliases = [alias for node in nodes if isinstance(node, ast.Import) for alias in node.names]
+    yield from ((0, alias.name) for alias in aliases)
+    whole = {alias.asname or alias.name for alias in aliases if alias.name == PACKAGE.name}
+    for node in nodes:
+        if isinstance(node, ast.ImportFrom):
+            for alias in node.names:
+                yield node.level, ".".join(filter(None, (node.module, alias.name)))
+        elif isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id in whole:
+            yield 0, f"{PACKAGE.name}.{node.attr}"
+
+
+def _modules_of(parts: list[str]) -> set[str]:
+    """Module of this package with a name below it: the last one on its way, or that of a public name."""
+    places: dict[str, str] = vars(sys.modules[PACKAGE.name])["_PLACES"]
+    if len(parts) == 1 and parts[0] in places:
+        return {places[parts[0]]}
+    ways = (".".join(parts[:size]) for size in range(len(parts), 0, -1))
+    return {next((way for way in ways if full_name(way) in imports_graph().modules), "")} - {""}
+
+
+def _root(folder: Path, package: str) -> Path | None:
+    """Folder of a package that no distribution has, beside code or on PYTHONPATH, or that has entry points."""
+    if package in sys.stdlib_module_names:
+        return None
+    if (folder / package).is_dir() or (folder / f"{package}.py").is_file():
+        return folder
+    if package in plugin_packages() or installed(distribution(package)) == "none":
+        spec = find_spec(package)
+        origin = Path(spec.origin) if spec and spec.origin else Path()
+        if origin.suffix == ".py":
+            return origin.parents[origin.stem == "__init__"]
+    return None
+
+
+def _files_below(root: Path, parts: list[str]) -> set[Path]:
+    """Files of a module and of the packages above it."""
+    places = (root.joinpath(*parts[:size]) for size in range(1, len(parts) + 1))
+    return {file for one in places for file in (one.with_suffix(".py"), one / "__init__.py") if file.is_file()}
+
+
+# -- keys --------------------------------------------------------------------------------------------------------------
 
 
 @cache
@@ -416,37 +240,6 @@ def distribution(package: str) -> str:
     return package
 
 
-def _module(name: str) -> Path:
-    ours = PACKAGE / (name.replace(".", "/") + ".py")
-    spec = None if ours.is_file() else find_spec(full_name(name))
-    return Path(spec.origin) if spec and spec.origin else ours
-
-
-@cache
-def _own(package: str) -> Path | None:
-    """Path of a package without distribution, such as one on PYTHONPATH, or with entry points for springtune."""
-    if package in plugin_packages() or installed(distribution(package)) == "none":
-        spec = find_spec(package)
-        origin = Path(spec.origin) if spec and spec.origin else Path()
-        if origin.suffix == ".py":
-            return origin.parent if origin.stem == "__init__" else origin.with_suffix("")
-    return None
-
-
-@cache
-def _lazy_names() -> dict[str, str]:
-    """Modules of the names that `springtune` imports lazily."""
-    places: dict[str, str] = vars(sys.modules[PACKAGE.name])["_PLACES"]
-    return places
-
-
-def _file(place: Path) -> Path | None:
-    return next((file for file in (place.with_suffix(".py"), place / "__init__.py") if file.is_file()), None)
-
-
-# -- keys --------------------------------------------------------------------------------------------------------------
-
-
 @cache
 def installed(distribution: str) -> str:
     """Version of a distribution; "none" if it is not installed or not wanted."""
@@ -462,7 +255,7 @@ def installed(distribution: str) -> str:
 @cache
 def stage_key(*modules: str, without: tuple[str, ...] = ()) -> str:
     """Key of modules' code and the versions of their packages."""
-    return code_key(stage_closure(*modules, without=without))
+    return code_key(closure(*modules, without=without))
 
 
 def definition_key(name: str) -> str:
@@ -472,13 +265,11 @@ def definition_key(name: str) -> str:
 
 def declared_key(one: Declared) -> str:
     """Key of the code of a declared function, such as an engine."""
-    return code_key(_declared_closure(one, OURS))
+    return code_key(declared_closure(one))
 
 
 def mesh_type_key(name: str) -> str:
-    """Key of a mesh type's code; for mesh files of the reader's."""
-    if name not in MESH_TYPES:
-        return code_key(mesh_file_closure())
+    """Key of a mesh type's code; of mesh files of the reader's."""
     return code_key(mesh_type_closure(name))
 
 

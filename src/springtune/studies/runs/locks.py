@@ -1,29 +1,31 @@
 """Who runs what in a folder, and whose results it holds.
 
-Snakemake's locks do not say which process holds them, and the end of a run removes the locks of all others in its
-folder. So a run notes its process while it lasts. `springtune run` removes the lock of a process that is gone.
+Snakemake's locks do not say which process holds them, and stay after a kill. So a run holds a lock of the system on a
+note in each study's folder, which the system opens when the process ends, however it ends. `springtune run` then
+removes Snakemake's.
 """
 
+import fcntl
 import filecmp
+import json
 import os
-import re
+import platform
 import shlex
 import sys
 import time
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import TextIO
 
-from springtune.safe_io.atomic import lives, this_host
+from springtune.safe_io.atomic import write_json
 
-from . import checked_json
-from .run_tasks import TASKS
+from .job import TASKS
 
-RUNS = Path(".snakemake/springtune")
-"""Notes of processes that run studies, in the folder that they were called in."""
+STUDY_FILE, RUN_FILE = f"{TASKS}/study.json", f"{TASKS}/run.json"
+"""Files in a study's folder: the path of the config that was run last, and the process that runs it."""
 
-STUDY_FILE = f"{TASKS}/study.json"
-"""File in a study's folder: the path of the config that was run last."""
+HELD: list[TextIO] = []
+"""Notes that this process has locked."""
 
 
 class LockedError(ValueError):
@@ -34,15 +36,16 @@ def claim(folder: Path, config: Path) -> None:
     """Note the study that a folder belongs to."""
     place, path = (Path(os.path.abspath(one)) for one in (folder.parent.parent, config))
     note = {"config": str(path.relative_to(place) if path.is_relative_to(place) else path)}
-    if checked_json.read(folder / STUDY_FILE) != note:
-        checked_json.write(folder / STUDY_FILE, note)
+    write_json(folder / STUDY_FILE, note)
 
 
 def claimed(folder: Path) -> Path | None:
     """File of the study that a folder belongs to; None where it is not known or not there."""
-    note = checked_json.read(folder / STUDY_FILE, config=str)
-    path = folder.parent.parent / note["config"] if note else None
-    return path if path and path.is_file() else None
+    try:
+        path = folder.parent.parent / json.loads((folder / STUDY_FILE).read_bytes())["config"]
+    except (OSError, ValueError, LookupError, TypeError):
+        return None
+    return path if path.is_file() else None
 
 
 def check_claim(folder: Path, config: Path) -> None:
@@ -59,62 +62,42 @@ def check_claim(folder: Path, config: Path) -> None:
 
 
 def begin(folders: Iterable[Path]) -> None:
-    """Note that this process computes studies."""
-    import psutil
-
-    process, named = psutil.Process(), {str(folder) for folder in folders}
-    note = {
-        "host": this_host(),
-        "pid": process.pid,
-        "start": process.create_time(),
-        "command": " ".join(sys.argv),
-        "folders": sorted(named),
-    }
-    forget(Path(), named)
-    checked_json.write(_note(), note)
-
-
-def forget(place: Path = Path(), locked: Collection[str] = ()) -> None:
-    """Remove notes of runs that are gone: of this machine, and those on folders that are locked by this process."""
-    for path, note in _notes(place):
-        gone = note["host"] == this_host() and not lives(note["pid"], note["start"])
-        if gone or not {*note["folders"]}.isdisjoint(locked):
-            path.unlink(missing_ok=True)
+    """Note that this process computes studies, and lock the notes until its end."""
+    since, command = time.strftime("%Y-%m-%d %H:%M:%S"), " ".join(sys.argv)
+    said = f"process {os.getpid()} on {platform.node()} computes it since {since} ({command})"
+    for folder in folders:
+        (folder / RUN_FILE).parent.mkdir(parents=True, exist_ok=True)
+        HELD.append((folder / RUN_FILE).open("a+", encoding="utf-8"))
+        _lock(HELD[-1], folder)
+        HELD[-1].truncate(0)
+        HELD[-1].write(f"{said}; wait for its end, or stop it: kill {os.getpid()}")
+        HELD[-1].flush()
 
 
 def end() -> None:
     """Note that this process is at its end."""
-    _note().unlink(missing_ok=True)
-
-
-def _note() -> Path:
-    return RUNS / f"{re.sub('[^0-9A-Za-z-]+', '-', this_host())}_{os.getpid()}.json"
+    while HELD:
+        with HELD.pop() as file:
+            file.truncate(0)
 
 
 def check_idle(folder: Path) -> bool:
-    """Return whether a run of a study was killed and left its note; raise LockedError while a run computes it."""
-    killed = False
-    for _, note in _notes(folder.parent.parent):
-        if Path(folder.parent.name, folder.name) not in map(Path, note["folders"]):
-            continue
-        if note["host"] != this_host():
-            raise LockedError(_told(folder, note, f"on {note['host']}, where this machine cannot look"))
-        if lives(note["pid"], note["start"]):
-            raise LockedError(_told(folder, note, "on this machine"))
-        killed = True
-    return killed
+    """Return, once, whether a run of a study was killed; raise LockedError while a process computes it."""
+    if not (folder / RUN_FILE).is_file():
+        return False
+    with (folder / RUN_FILE).open("a+", encoding="utf-8") as file:
+        killed = _lock(file, folder) and (folder / RUN_FILE).stat().st_size > 0
+        if killed:
+            file.truncate(0)
+        return killed
 
 
-def _told(folder: Path, note: dict[str, Any], where: str) -> str:
-    since = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(note["start"]))
-    remedy = f"wait for its end, or stop it: kill {note['pid']}"
-    if note["host"] != this_host():
-        remedy = f"wait for its end; if it is gone: rm -r {RUNS}, then snakemake --unlock"
-    return f"{folder}: process {note['pid']} {where} computes it since {since} ({note['command']}); {remedy}"
-
-
-def _notes(place: Path) -> Iterator[tuple[Path, dict[str, Any]]]:
-    for path in sorted((place / RUNS).glob("*.json")):
-        note = checked_json.read(path, host=str, pid=int, start=float, folders=list)
-        if note is not None:
-            yield path, note
+def _lock(file: TextIO, folder: Path) -> bool:
+    """Lock a note; return False where the file system has no locks."""
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise LockedError(f"{folder}: {(folder / RUN_FILE).read_text() or 'another process computes it'}") from None
+    except OSError:
+        return False
+    return True

@@ -4,29 +4,26 @@ import hashlib
 import json
 import platform
 import subprocess
-from collections.abc import Collection
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from springtune import __version__
-from springtune.mesh import MESH_TYPES
+from springtune.mesh.types import MESH_TYPES
 from springtune.problem.loads import LOADS
 from springtune.registry import Extended
-from springtune.springs import DEFINITIONS
+from springtune.springs.base import DEFINITIONS
 
-from ..config.kind import OTHER_KINDS, kinds
+from ..config.kind import kinds
 from ..config.model import Study
 from .keys import installed
-from .records import checksum
-from .source import COMMIT_FILE, PACKAGE, clone
+from .source import COMMIT_FILE, PACKAGE, checksum, clone
 
 SOFTWARE = (
     "cvxopt",
     "h5netcdf",
     "h5py",
     "meshio",
-    "netcdf4",
     "netgen-mesher",
     "numba",
     "numpy",
@@ -40,30 +37,20 @@ SOFTWARE = (
 LOCK = Path("requirements/run.txt")
 """Lock file, beside the study or above it."""
 
-COMPARED_WITH_COMMIT = ("src", "Snakefile", "workflow/paper", "workflow/report", "workflow/rules")
-"""Compared files of the checkout; profiles may be a user's own."""
-
 CHANGED = "+changes"
 """Ending of `git_commit` if files differ from the commit."""
-
-LONGEST = 40_000
-"""Most characters of the stored difference."""
 
 PRINTED = {"paper_tables.csv": "the paper Mass-Spring Parameters Definition in 2D for Simulation"}
 """Sources of printed values by file name."""
 
 
-def attributes(
-    study: Study, config: str | Path, untold: Collection[str] = (), package: Path = PACKAGE
-) -> dict[str, str]:
+def attributes(study: Study, config: str | Path, package: Path = PACKAGE) -> dict[str, str]:
     """Attributes of the root of a study's dataset."""
     created = datetime.now(UTC).isoformat(timespec="seconds")
     software = {name: installed(name) for name in (*SOFTWARE, *_plugins(study))}
     software["python"] = platform.python_version()
     folder = Path(config).resolve().parent
     library, own = library_commit(package), study_commit(folder, package)
-    checkouts = ((clone(package), library), (folder, own))
-    changed = [place for place, commit in checkouts if place and commit.endswith(CHANGED)]
     found = {
         "title": study.title,
         "Conventions": "CF-1.11",
@@ -75,33 +62,21 @@ def attributes(
         "inputs": json.dumps(inputs(study, folder), sort_keys=True),
         "springtune_version": __version__,
         "git_commit": library,
-        "git_diff": "" if "git_diff" in untold else git_diff(study, *changed),
         "created": created,
         "software": json.dumps(software, sort_keys=True),
-        "host": "" if "host" in untold else platform.node(),
     }
+    if study.printed_path:
+        name = study.printed_path.name
+        found["references"] = f"paper_*: as printed in {PRINTED.get(name, name)}"
     found |= {"plane_strain": ", ".join(study.plane_strain)} if study.plane_strain else {}
-    return found | ({"study_commit": own} if own else {}) | _references(study)
+    return found | ({"study_commit": own} if own else {})
 
 
 def _plugins(study: Study) -> set[str]:
-    """Distributions of the definitions, mesh types, loads and study kinds of other packages that a study uses."""
-    used = {label for labels in study.axes.values() for label in labels} | {
-        name for name, part in study.parts.items() if part
-    }
-    tables: tuple[Extended[Any], ...] = (DEFINITIONS, MESH_TYPES, LOADS, OTHER_KINDS)
+    """Distributions of the definitions, mesh types and loads of other packages that a study uses."""
+    used = {label for labels in study.axes.values() for label in labels}
+    tables: tuple[Extended[Any], ...] = (DEFINITIONS, MESH_TYPES, LOADS)
     return {package for table in tables for name, package in table.packages.items() if name in used}
-
-
-def _references(study: Study) -> dict[str, str]:
-    """Sources of the printed values that the study uses."""
-    cells = {(one.mesh.beam.name, one.mesh.mesh_type, one.material.name, one.load) for one in study.scenes}
-    if not study.printed_path or not any(
-        (one.beam, one.mesh_type, one.material, one.load) in cells for one in study.printed
-    ):
-        return {}
-    name = study.printed_path.name
-    return {"references": f"paper_*: as printed in {PRINTED.get(name, name)}"}
 
 
 def inputs(study: Study, folder: Path) -> dict[str, str]:
@@ -118,10 +93,7 @@ def _checkout(folder: Path) -> Path | None:
 
 def input_files(study: Study) -> set[Path]:
     """The study's file and all files that it names."""
-    files = {study.path, *study.test_files, *study.row_files}
-    files |= {mesh.file for mesh in study.mesh_files.values() if mesh.file}
-    files |= {study.printed_path} if study.printed_path else set()
-    return files | {file for kind in kinds() for file in kind.files(study.parts[kind.name])}
+    return {study.path, *study.files, *(file for kind in kinds() for file in kind.files(study.parts[kind.name]))}
 
 
 def _name(file: Path, root: Path) -> str:
@@ -147,28 +119,6 @@ def study_commit(folder: Path, package: Path) -> str:
     top, root = git(folder, "rev-parse", "--show-toplevel").removesuffix("\n"), clone(package)
     of_library = folder.is_relative_to(package.resolve()) or (root and root.resolve() == Path(top))
     return git_commit(folder) if top and not of_library else ""
-
-
-def git_diff(study: Study, *folders: Path) -> str:
-    """Differences of checkouts from their commits; a long text is clipped and ends in its SHA-256."""
-    # Whatever files are written in.
-    text = "".join(difference(study, folder) for folder in folders)
-    text = text.encode(errors="surrogateescape").decode(errors="replace").replace("\0", "")
-    if len(text) <= LONGEST:
-        return text
-    digest = hashlib.sha256(text.encode()).hexdigest()
-    kept = text[: text.rfind("\n", 0, LONGEST) + 1]
-    return f"{kept}... cut here; the whole difference has {len(text)} characters and SHA-256 {digest}\n"
-
-
-def difference(study: Study, folder: Path, *options: str) -> str:
-    """Difference of package, rules and the study's files from the commit, without untracked files."""
-    top, root = Path(git(folder, "rev-parse", "--show-toplevel").removesuffix("\n")), _checkout(folder)
-    files = {file.resolve() for file in input_files(study)}
-    files |= {root / name for name in COMPARED_WITH_COMMIT if root}
-    known = [str(file) for file in sorted(files) if file.is_relative_to(top)]
-    command = ("--literal-pathspecs", "diff", "--no-color", "--no-ext-diff", *options, "HEAD", "--")
-    return git(folder, *command, *known) if known else ""
 
 
 def git(folder: Path, *arguments: str) -> str:

@@ -1,6 +1,9 @@
 """Find the workflow: in the source tree around the package, else in the package itself, as a wheel has it."""
 
+import hashlib
+import json
 from pathlib import Path
+from typing import Any
 
 PACKAGE = Path(__file__).parents[2]
 
@@ -33,3 +36,42 @@ def config_file(name: str, beside: Path = CONFIG_FOLDER) -> Path:
     """A study or another file: beside a study, in config/ of the current folder, or in that of the workflow."""
     here = (folder / name for folder in (beside, CONFIG_FOLDER))
     return next(filter(Path.is_file, here), workflow_folder() / CONFIG_FOLDER / name)
+
+
+STATE = "SPRINGTUNE_SOURCE_STATE"
+"""Environment variable with the `source_state` at the begin of a run, for its jobs."""
+
+
+def source_state() -> str:
+    """Hash of sizes and times of the package's files; keys of results are those of the code at the begin of a run."""
+    states = [(str(path), path.stat()) for path in sorted(PACKAGE.rglob("*.py"))]
+    return hash_of([[name, state.st_size, state.st_mtime_ns] for name, state in states])
+
+
+_ENCODER = json.JSONEncoder(sort_keys=True, separators=(",", ":"))
+
+
+def hash_of(*parts: Any) -> str:
+    """Hash values, independent of the order of keys.
+
+    Examples
+    --------
+    >>> hash_of({"a": 1.0, "b": [2]}) == hash_of({"b": [2], "a": 1.0})
+    True
+    """
+    return hashlib.sha256(_ENCODER.encode(parts).encode()).hexdigest()[:24]
+
+
+def read_note(path: Path) -> dict[str, Any]:
+    """Content of a note or a record; empty if it cannot be read."""
+    try:
+        found = json.loads(path.read_bytes())
+    except (OSError, ValueError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def checksum(path: str | Path) -> str:
+    """SHA-256 of a file."""
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

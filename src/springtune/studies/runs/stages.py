@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..config.kind import Stage
-from . import driver, store
-from .checked_json import hash_of
+from . import store
+from .job import JOB
 from .keys import stage_key
+from .source import hash_of
 
 if TYPE_CHECKING:
     from ..config.model import Study
-    from .plan import Costs
 
 
 @dataclass(frozen=True)
@@ -31,8 +31,8 @@ class Task:
         Labels of its cell of the dataset; a label may be several.
     of : object
         Object of the study that it comes from.
-    costs : sequence of tuple
-        Expected costs: name, units and optional count, see `springtune.studies.config.kind.Kind`.
+    seconds : float
+        Expected seconds, for bundles of about equal work.
     name : str
         Tasks of one name are in one bundle; by default a hash of its values.
     file : str
@@ -47,7 +47,7 @@ class Task:
     also: Sequence[object] = ()
     labels: Mapping[str, Any] = field(default_factory=dict)
     of: Any = None
-    costs: Sequence[tuple[str, float] | tuple[str, float, float]] = ()
+    seconds: float = 0.0
     name: str = ""
     file: str = ""
     shared: Mapping[str, Any] = field(default_factory=dict)
@@ -55,11 +55,7 @@ class Task:
 
     def key_of(self, module: str) -> str:
         """Key of its result, computed by a module."""
-        return self.key or hash_of(self.values, stage_key(module, driver.DRIVER), self.also)
-
-    def seconds(self, costs: "Costs") -> float:
-        """Expected seconds."""
-        return sum(costs.of(name, units) * (count[0] if count else 1) for name, units, *count in self.costs)
+        return self.key or hash_of(self.values, stage_key(module, JOB), self.also)
 
 
 def stage(
@@ -68,21 +64,20 @@ def stage(
     """Stage whose bundles and jobs follow from its tasks; it stores in the folder of its name, or in another one."""
     folder = folder or name
 
-    def members(study: "Study", costs: "Costs") -> dict[str, tuple[float, list[Task]]]:
+    def members(study: "Study") -> dict[str, tuple[float, list[Task]]]:
         found: dict[str, list[Task]] = {}
         for task in tasks(study):
             called = task.name or hash_of(task.values)
             if task.name or called not in found:  # else it is one task with two labels
                 found.setdefault(called, []).append(task)
-        return {called: (sum(task.seconds(costs) for task in own), own) for called, own in found.items()}
+        return {called: (sum(task.seconds for task in own), own) for called, own in found.items()}
 
     def content(study: "Study", results: Path, members: list[list[Task]]) -> dict[str, Any]:
         files: dict[str, dict[str, Any]] = {}
         for task in chain.from_iterable(members):
             key = task.key_of(module)
             file = files.setdefault(task.file or key, {"name": task.file or key, **task.shared, "tasks": {}})
-            cost = {"cost": list(task.costs[0][:2])} if task.costs else {}
-            file["tasks"][key] = {"key": key, **cost, **task.values}
+            file["tasks"][key] = {"key": key, **task.values}
         return {
             "folder": str(results / folder),
             "files": [file | {"tasks": list(file["tasks"].values())} for file in files.values()],
@@ -110,3 +105,10 @@ def results(
     found = {name: store.read(folder / stage.folder / f"{name}.h5", held, fields) for name, held in files.items()}
     for task, key in zip(tasks, keys):
         yield task, dict(found[task.file or key][key])
+
+
+def rows(stage: Stage, study: "Study", folder: Path) -> Iterator[dict[str, Any]]:
+    """Rows of the stored results of a stage, each with the labels of its task."""
+    for task, result in results(stage, study, folder):
+        for row in result.get("rows", [result]):
+            yield {**task.labels, **row}

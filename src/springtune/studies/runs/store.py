@@ -1,11 +1,12 @@
 """Stored results: one HDF5 file a mesh and stage, results by the hash of their inputs.
 
 Scalars and texts are one JSON text, since groups with attributes cost more than solving; arrays are datasets. Former
-results stay, so that going back to them is free. A file starts with its checksum and its name in a user block, which
-are compared before HDF5 reads the rest: files whose names were exchanged are made again.
+results stay, so that going back to them is free. HDF5 has checksums of all that it reads: of its own structures in the
+file format ``latest``, and of data by the filter Fletcher-32. A file has its name in it: one that was exchanged with
+another is not read.
 """
 
-import hashlib
+import io
 import json
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -17,84 +18,78 @@ import numpy as np
 
 from springtune.safe_io import atomic
 
-from .checked_json import DamagedError, set_aside
-
 if TYPE_CHECKING:
     import h5py
 
 SCALARS = "scalars"
 
-MAGIC = b"springtune results, SHA-256 of what follows after 512 bytes: "
 
-LIMITS = "limits"
-"""Name under which the failed result of a task beyond its limits has these, in words; readers do not get it."""
+class DamagedError(Exception):
+    """A stored file is damaged or missing."""
 
-USER_BLOCK, CHECKSUM = 512, 64
-"""Length of the block before HDF5's own, and of the checksum in it [bytes]."""
+    @property
+    def path(self) -> Path:
+        """The file."""
+        return Path(self.args[0])
+
+    def __str__(self) -> str:
+        return f"{self.args[0]}: {self.args[1]}; delete it, and call the same command again, which makes it anew"
+
+
+class OtherVersionError(DamagedError):
+    """A sound file of another version of springtune, which has none of the results that are asked for."""
 
 
 @contextmanager
 def _opened(path: str | Path) -> "Iterator[tuple[h5py.File, dict[str, dict[str, Any]]]]":
-    """Context of a file whose checksum is right, and its scalars."""
-    _check(path)
+    """Context of a file, and its scalars."""
     import h5py  # here: a plan reads no results
 
-    with h5py.File(path) as file:
-        yield file, json.loads(file[SCALARS][()])
-
-
-def _check(path: str | Path) -> None:
-    """Compare a file with its checksum."""
+    if not Path(path).exists():
+        raise DamagedError(path, "it is missing")
     try:
-        content = Path(path).read_bytes()
-    except OSError as error:
-        raise DamagedError(path, error.strerror or "cannot be read") from None
-    if not content:
-        raise DamagedError(path, "it is empty")
-    if content[:USER_BLOCK] != (wanted := _user_block(path, content[USER_BLOCK:])):
-        if not content.startswith(MAGIC):
-            raise DamagedError(path, "it is no file of results")
-        sound = content.startswith(wanted[: len(MAGIC) + CHECKSUM])
-        raise DamagedError(path, f"its {'name' if sound else 'checksum'} is not that of its content")
+        with h5py.File(path) as file:
+            content = file[SCALARS][()]
+            if not isinstance(content, np.ndarray):
+                raise OtherVersionError(path, "another version of springtune wrote it")
+            name, scalars = json.loads(content.tobytes())
+            if name != Path(path).name:
+                raise ValueError(f"it is {name}")
+            yield file, scalars
+    except (OSError, RuntimeError, LookupError, ValueError) as error:
+        reason = str(error).strip("'\"").partition("\n")[0]
+        raise DamagedError(path, f"it is damaged ({reason})") from None
 
 
-def _user_block(path: str | Path, image: bytes) -> bytes:
-    return (MAGIC + hashlib.sha256(image).hexdigest().encode() + Path(path).name.encode()).ljust(USER_BLOCK, b"\0")
-
-
-def stored(path: str | Path, limits: str | None = None) -> set[str]:
-    """Keys of stored results; a damaged file is renamed and counts as empty."""
+def stored(path: str | Path) -> set[str]:
+    """Keys of stored results."""
     if not Path(path).exists():
         return set()
     try:
         with _opened(path) as (_, scalars):
-            pass
-    except DamagedError as error:
-        set_aside(error)
+            return set(scalars)
+    except OtherVersionError:
         return set()
-    return {name for name, result in scalars.items() if limits is None or result.get(LIMITS, limits) == limits}
 
 
 def read(path: str | Path, names: Iterable[str], fields: Sequence[str] = ()) -> dict[str, dict[str, Any]]:
     """Read results."""
+    names = list(names)
     with _opened(path) as (file, scalars):
-        names = list(names)
-        lacking = [name for name in names if name not in scalars]
-        if lacking:
-            raise DamagedError(path, f"it lacks {len(lacking)} of {len(names)} results", whole=True)
-        results = {name: {label: value for label, value in scalars[name].items() if label != LIMITS} for name in names}
+        lacking = sum(name not in scalars for name in names)
+        results = {name: dict(scalars[name]) for name in names if name in scalars}
         for name, result in results.items() if fields else ():
             if name in file:
                 result |= {label: file[name][label][()] for label in fields if label in file[name]}
+    if lacking:
+        raise DamagedError(path, f"it lacks {lacking} of {len(names)} results")
     return results
 
 
-def contents(path: str | Path) -> dict[str, dict[str, Any]]:
-    """All stored results, in the form that `add` takes."""
-    with _opened(path) as (file, found):
-        for name, result in found.items():
-            result |= {label: array[()] for label, array in file[name].items()} if name in file else {}
-    return found
+def everything(path: str | Path) -> dict[str, dict[str, Any]]:
+    """Read the scalars of all results of a file."""
+    with _opened(path) as (_, scalars):
+        return scalars
 
 
 def read_one(folder: str | Path, key: str, fields: Sequence[str] = ()) -> dict[str, Any]:
@@ -142,14 +137,14 @@ def add(path: str | Path, results: Mapping[str, Mapping[str, Any]]) -> None:
     """
     if not results:
         return
-    scalars: dict[str, dict[str, Any]] = {}
-    # In memory: what is on the disk is written at once, checksum and all.
     import h5py  # here: a plan reads no results
 
-    with h5py.File("results", "w", driver="core", backing_store=False) as file:
+    scalars: dict[str, dict[str, Any]] = {}
+    # In memory: what is on the disk is written at once. The image of an open file has a stale checksum before HDF5 2.
+    image = io.BytesIO()
+    with h5py.File(image, "w", libver="latest") as file:
         if stored(path):
-            with h5py.File(path) as before:
-                known = json.loads(before[SCALARS][()])
+            with _opened(path) as (before, known):
                 scalars = {name: kept for name, kept in known.items() if name not in results}
                 for name in before:
                     if name in scalars:
@@ -157,11 +152,15 @@ def add(path: str | Path, results: Mapping[str, Mapping[str, Any]]) -> None:
         for name, result in results.items():
             scalars[name] = {}
             for label, value in result.items():
-                if isinstance(value, np.ndarray):
-                    file.create_dataset(f"{name}/{label}", data=value)
+                if isinstance(value, np.ndarray) and value.ndim:
+                    _put(file, f"{name}/{label}", value)
                 else:
-                    scalars[name][label] = value.item() if isinstance(value, np.generic) else value
-        file[SCALARS] = json.dumps(scalars)
-        file.flush()
-        image = file.id.get_file_image()
-    atomic.write_bytes(path, _user_block(path, image) + image)
+                    scalars[name][label] = value.item() if isinstance(value, np.generic | np.ndarray) else value
+        _put(file, SCALARS, np.frombuffer(json.dumps([Path(path).name, scalars]).encode(), np.uint8))
+    atomic.write_bytes(path, image.getvalue())
+
+
+def _put(file: "h5py.File", name: str, array: np.ndarray) -> None:
+    """Store an array in one chunk, with its checksum; an empty one has nothing to check."""
+    chunked = {"chunks": array.shape, "fletcher32": True} if array.size else {}
+    file.create_dataset(name, data=array, **chunked)

@@ -2,13 +2,10 @@
 
 from collections.abc import Iterable, Sequence
 
-from springtune.mesh import MESH_TYPES
-from springtune.springs import DEFINITIONS
+from springtune.mesh.types import MESH_TYPES
+from springtune.springs.base import DEFINITIONS
 
 OTHER_APPROACHES = (
-    "relaxation",
-    "backward-euler",
-    "truncated-backward-euler",
     "linear-triangles",
     "quadratic-triangles",
     "tensor-mass",
@@ -22,12 +19,6 @@ OTHER_APPROACHES = (
 
 PARTS = ("meshing", "assembling", "factorizing", "solving")
 """Parts of the seconds of a case."""
-
-BUSY = "not measured: the machine was busy"
-"""Message of cases whose runs differ too much in their time, or had to wait for the processor."""
-
-CURVE_COUNTS = (1, 11, 61, 201)
-"""Numbers of stiffnesses of the benchmark's sensitivity curves."""
 
 THREAD_COUNTS = (1, 2)
 """Numbers of threads of the benchmark's explicit steps."""

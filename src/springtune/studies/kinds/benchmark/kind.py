@@ -1,40 +1,24 @@
 """Run time against error: a study's section ``benchmark``."""
 
-from dataclasses import asdict, dataclass
 from math import nan
 from typing import Annotated
 
 from pydantic import Field
 
-from springtune.linalg import SOLVERS
 from springtune.mechanics.integrators import PRECISIONS
-from springtune.mesh import MESH_TYPES
-from springtune.problem.geometry import Beam
+from springtune.mesh.types import MESH_TYPES
 from springtune.problem.loads import LOADS
-from springtune.problem.materials import Material
 from springtune.problem.quantities import nearest
 from springtune.reference.calculix import program
-from springtune.springs import DEFINITIONS
+from springtune.springs.base import DEFINITIONS
 
+from ...config import fields
 from ...config.checks import check_able, check_known, check_particles, check_product, check_scene
-from ...config.fields import (
-    BeamName,
-    DefinitionNames,
-    Force,
-    Length,
-    Load,
-    MaterialName,
-    MeshType,
-    Named,
-    OneOrMore,
-    number,
-    one_of,
-)
+from ...config.fields import Named, OneOrMore, Section, default, number, one_of, optional
 from ...config.kind import Kind
-from ...config.sections import Section, default, optional
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key
 from ...runs.stages import Task, stage
-from . import CURVE_COUNTS, OTHER_APPROACHES, THREAD_COUNTS, approach_names
+from . import OTHER_APPROACHES, THREAD_COUNTS, approach_names
 from .outputs import OUTPUTS
 
 MOST_RUNS = 100_000
@@ -47,55 +31,46 @@ Seconds = Annotated[float, number("a number of seconds above 0, such as 0.5", 0,
 class BenchmarkSceneConfig(Section):
     """A scene of the benchmark."""
 
-    beam: BeamName = Field(description="Beam.")
-    material: MaterialName = Field(description="Material, with a density.")
-    load: Load = Field(description="`traction`, `compression`, `bending` or `pressure`.")
-    force: Force = Field(description="Magnitude of the force.")
+    beam: fields.BeamName
+    """Beam."""
+
+    material: fields.MaterialName
+    """Material, with a density."""
+
+    load: fields.Load
+    """`traction`, `compression`, `bending` or `pressure`."""
+
+    force: fields.Force
+    """Magnitude of the force."""
 
 
 class BenchmarkConfig(Section):
     """Run time against error: every definition on every mesh type, and other approaches; one at a time."""
 
-    scenes: Annotated[dict[str, BenchmarkSceneConfig], Named("scene")] = Field(description="Scenes.")
-    second_beam: BeamName | None = Field(
-        None,
-        description="Beam on which every case is solved once more: an approach is the quickest to an error only where "
-        "it keeps that on both. None is called the quickest without.",
-    )
-    definition: DefinitionNames = Field(description="Definitions that derive a stiffness and need no reference.")
-    mesh_type: Annotated[list[MeshType], OneOrMore()] = Field(description="Mesh types of the definitions.")
-    approach: Annotated[list[OtherApproach], OneOrMore()] = Field(
-        list(OTHER_APPROACHES),
-        description="Other approaches: finite elements, CalculiX where it is on the machine, motion to rest, and what "
-        "the paper names: tensor-mass, pre-computed responses, boundary elements, free-form deformation. All without.",
-    )
-    mesh_size: Annotated[list[Length], OneOrMore()] = Field(description="Lengths of an edge.")
-    finest: Length | None = Field(None, description="The shortest of them that most approaches have; all without.")
-    finest_of: dict[str, Length] = Field(
-        default_factory=dict,
-        description="The shortest of them that an approach has, by its name, such as `delingette/structured: 0.5 mm`.",
-    )
-    most_seconds: Seconds = default(
-        "30",
-        description="Seconds of the processor that a run may take; what takes more is a hole that says so, and so are "
-        "finer sizes of it.",
-    )
+    scenes: Annotated[dict[str, BenchmarkSceneConfig], Named("scene")]
+    """Scenes."""
 
+    definition: fields.DefinitionNames
+    """Definitions that derive a stiffness and need no reference."""
 
-@dataclass(frozen=True)
-class Case:
-    """A scene of the benchmark; sizes are edges [m], ``finest`` has one for each approach, tension is positive [N]."""
+    mesh_type: Annotated[list[fields.MeshType], OneOrMore()]
+    """Mesh types of the definitions."""
 
-    name: str
-    beam: Beam
-    material: Material
-    load: str
-    force: float
-    approaches: tuple[str, ...]
-    mesh_sizes: tuple[float, ...]
-    finest: tuple[float, ...]
-    most_seconds: float
-    second_beam: Beam | None
+    approach: Annotated[list[OtherApproach], OneOrMore()] = Field(list(OTHER_APPROACHES))
+    """Other approaches: finite elements, CalculiX where it is on the machine, and what the paper names:
+    tensor-mass, pre-computed responses, boundary elements, free-form deformation. All without."""
+
+    mesh_size: Annotated[list[fields.Length], OneOrMore()]
+    """Lengths of an edge."""
+
+    finest: fields.Length | None = None
+    """Length of an edge below which approaches are not run; without, all sizes are."""
+
+    finest_of: dict[str, fields.Length] = Field(default_factory=dict)
+    """The same of single approaches by their names, such as `delingette/structured: 0.5 mm`."""
+
+    most_seconds: Seconds = default("30")
+    """Seconds after which an approach is not run on finer sizes, which are holes that say so."""
 
 
 def in_benchmark(load: str) -> bool:
@@ -105,14 +80,10 @@ def in_benchmark(load: str) -> bool:
 
 
 def _check(config, problems):
-    if not config.benchmark:
-        return
     section = config.benchmark
     labels = ("scenes", "definition", "mesh_type", "approach", "mesh_size")
     check_product(problems, section, ("benchmark",), labels, MOST_RUNS)
-    if section.second_beam:
-        check_known(problems, ("benchmark", "second_beam"), "beam", section.second_beam, config.beams)
-    for beam in dict.fromkeys([*(scene.beam for scene in section.scenes.values()), section.second_beam]):
+    for beam in dict.fromkeys(scene.beam for scene in section.scenes.values()):
         if beam in config.beams:
             extent, largest = (config.beams[beam].length, config.beams[beam].height), max(section.mesh_size)
             check_particles(problems, ("benchmark", "mesh_size"), section.mesh_size, *extent)
@@ -130,135 +101,75 @@ def _check(config, problems):
         if name not in approaches:
             message = f"'{name}' is no approach of this benchmark; {nearest(name, approaches)}"
             problems.add(("benchmark", "finest_of", name), message)
-    given = {("finest",): section.finest} | {("finest_of", name): size for name, size in section.finest_of.items()}
-    for place, size in given.items():
-        if size is not None and size not in section.mesh_size:
-            known = ", ".join(f"{1e3 * one:g} mm" for one in sorted(section.mesh_size))
-            problems.add(
-                ("benchmark", *place), f"{1e3 * size:g} mm is no mesh size of this benchmark; choose of {known}"
-            )
 
 
 def _expand(config, declared):
+    """Values of each scene by its name; explicit steps are timed on the first one."""
     section = config.benchmark
-    if not section:
-        return ()
     mesh_types = [name for name in MESH_TYPES if name in section.mesh_type]
     definitions = [name for name in DEFINITIONS if name in section.definition]
     others = [name for name in OTHER_APPROACHES if name in section.approach]
-    approaches = approach_names(definitions, mesh_types, others)
-    finest = section.finest or min(section.mesh_size)
-    return tuple(
-        Case(
-            name,
-            declared.beams[scene.beam],
-            declared.materials[scene.material],
-            scene.load,
-            LOADS[scene.load].sign * scene.force,
-            approaches,
-            tuple(sorted(section.mesh_size)),
-            tuple(section.finest_of.get(name, finest) for name in approaches),
-            section.most_seconds,
-            declared.beams[section.second_beam] if section.second_beam else None,
-        )
-        for name, scene in section.scenes.items()
-    )
-
-
-def _axes(cases):
+    approaches, finest = approach_names(definitions, mesh_types, others), section.finest or min(section.mesh_size)
+    shared = {"approaches": approaches, "mesh_sizes": sorted(section.mesh_size), "most_seconds": section.most_seconds}
+    shared["finest"] = [section.finest_of.get(name, finest) for name in approaches]
     return {
-        "mesh_size": {size for one in cases for size in one.mesh_sizes},
-        "scene": tuple(one.name for one in cases),
-        "approach": cases[0].approaches,
-        "curve_count": CURVE_COUNTS,
-        "thread_count": THREAD_COUNTS,
-        "precision": PRECISIONS,
-        "linear_solver": SOLVERS,
+        name: {
+            **shared,
+            "beam": beam_key(declared.beams[scene.beam]),
+            "material": material_key(declared.materials[scene.material], density=True),
+            "load": scene.load,
+            "force": LOADS[scene.load].sign * scene.force,
+            "explicit": name == next(iter(section.scenes)),
+        }
+        for name, scene in section.scenes.items()
     }
 
 
+def _axes(scenes):
+    first = next(iter(scenes.values()))
+    axes = {"mesh_size": set(first["mesh_sizes"]), "scene": tuple(scenes), "approach": first["approaches"]}
+    return axes | {"thread_count": THREAD_COUNTS, "precision": PRECISIONS}
+
+
 def _tasks(study):
-    """Scenes; curves, steps and solvers are timed on the first one."""
-    for place, case in enumerate(study.parts["benchmark"]):
-        values = asdict(case) | {"beam": beam_key(case.beam), "material": material_key(case.material, density=True)}
-        del values["name"]
-        values |= {"second_beam": case.second_beam and beam_key(case.second_beam), "curves": place == 0}
-        labels = {"scene": case.name, "mesh_size": list(case.mesh_sizes)}
-        yield Task(values, _code(case), labels, case, [("benchmark", 0)], case.name)
+    for name, values in study.parts["benchmark"].items():
+        yield Task(values, _code(values["approaches"]), {"scene": name}, name=name)
 
 
-def _code(case):
+def _code(approaches):
     """Keys of what a scene is measured with."""
-    pairs = [approach.split("/") for approach in case.approaches if "/" in approach]
-    definitions, mesh_types = ({pair[place] for pair in pairs} for place in (0, 1))
+    pairs = [approach.split("/") for approach in approaches if "/" in approach]
     # What the approaches do not name is solved and timed on these.
-    definitions, mesh_types = definitions | {"delingette", "lattice"}, mesh_types | {"structured"}
+    definitions = {"delingette", "lattice", *(definition for definition, _ in pairs)}
+    mesh_types = {"structured", *(mesh_type for _, mesh_type in pairs)}
     springs = [definition_key(name) for name in sorted(definitions)]
     meshes = [mesh_type_key(name) for name in sorted(mesh_types)]
-    return springs, meshes, program() if any(name.startswith("calculix") for name in case.approaches) else ""
+    return springs, meshes, program() if any(name.startswith("calculix") for name in approaches) else ""
 
 
 CASE = ("scene", "approach", "mesh_size")
-SOLVER_AXES = ("linear_solver", "mesh_size")
-EXPLICIT_AXES = ("mesh_size", "thread_count", "precision")
 
 VARIABLES = {
     "displacement": (CASE, "m", "displacement of the loaded side along the force", nan),
     "error": (CASE, "1", "signed error of the displacement, over the reference's", nan),
-    "second_error": (CASE, "1", "signed error of the displacement on the second beam", nan),
-    "second_status": (CASE, "1", "what became of the case on the second beam", 0),
-    "second_message": (CASE, "1", "why there is no error on the second beam", ""),
-    "assured_error": (
-        CASE,
-        "1",
-        "largest absolute error of this and all finer mesh sizes that were run, on both beams",
-        nan,
-    ),
+    "assured_error": (CASE, "1", "largest absolute error of this and all finer mesh sizes that were run", nan),
     "seconds": (CASE, "s", "time from nothing to the displacement, median of warm runs", nan),
-    "seconds_spread": (CASE, "s", "longest less shortest of the warm runs", nan),
-    "cold_seconds": (CASE, "s", "time of the first run, imports included", nan),
     "meshing_seconds": (CASE, "s", "time to make the mesh", nan),
     "assembling_seconds": (CASE, "s", "time to derive parameters and assemble", nan),
     "factorizing_seconds": (CASE, "s", "time to factorize, or of what is paid once", nan),
     "solving_seconds": (CASE, "s", "time to solve", nan),
-    "peak_memory": (CASE, "byte", "largest memory of the process above that at its start", nan),
     "unknowns": (CASE, "1", "number of unknowns", nan),
-    "pareto": (CASE, "1", "1 where no approach of the scene is both more accurate and faster", 0),
     "status": (CASE, "1", "what became of the case", 0),
     "message": (CASE, "1", "why there are no numbers", ""),
-    "error_rate": (
-        ("scene", "approach"),
-        "1",
-        "exponent of the error in the mesh size, where it falls with that and keeps its sign",
-        nan,
-    ),
-    "cost_exponent": (("scene", "approach"), "1", "exponent of the seconds in the unknowns, from 3000 on", nan),
     "reference_displacement": (("scene",), "m", "displacement of the converged reference", nan),
     "reference_error_estimate": (("scene",), "1", "estimated relative error of the reference", nan),
     "reference_seconds": (("scene",), "s", "time of the reference", nan),
-    "machine_load": (("scene",), "1", "load of the machine at the start, processes", nan),
-    "solver_seconds": (SOLVER_AXES, "s", "time from a matrix to a solution, its sparsity analysed", nan),
-    "solver_again_seconds": (SOLVER_AXES, "s", "time of the next matrix of that sparsity", nan),
-    "solver_status": (SOLVER_AXES, "1", "what became of the linear system", 0),
-    "solver_message": (SOLVER_AXES, "1", "why there are no seconds", ""),
-    "curve_seconds": (("curve_count",), "s", "time of a sensitivity curve as one path, 9470 particles", nan),
-    "separate_seconds": (("curve_count",), "s", "time of as many nonlinear solves", nan),
-    "nonlinear_seconds": ((), "s", "time of one nonlinear solve there", nan),
-    "linear_seconds": ((), "s", "time of one linear solve there", nan),
-    "curve_status": ((), "1", "what became of the curves", 0),
-    "curve_message": ((), "1", "why there are no seconds of curves", ""),
-    "explicit_steps": (EXPLICIT_AXES, "s-1", "explicit steps a second of nonlinear springs", nan),
-    "spring_updates": (EXPLICIT_AXES, "s-1", "springs that these steps advance, each step counted anew", nan),
-    "explicit_bandwidth": (EXPLICIT_AXES, "byte s-1", "what these steps read and write, be it in a cache", nan),
-    "explicit_error": (
-        ("mesh_size", "precision"),
-        "1",
-        "largest difference of their displacements from those in double precision, over the largest of these",
+    "spring_updates": (
+        ("mesh_size", "thread_count", "precision"),
+        "s-1",
+        "nonlinear springs a second that explicit steps advance, each step counted anew",
         nan,
     ),
-    "explicit_status": (("mesh_size",), "1", "what became of the explicit steps", 0),
-    "explicit_message": (("mesh_size",), "1", "why there are no explicit steps", ""),
-    "copy_bandwidth": (("thread_count",), "byte s-1", "memory that a plain copy reads and writes", nan),
 }
 
 KIND = Kind(
@@ -272,12 +183,9 @@ KIND = Kind(
     dimensions={
         "scene": "scene of the benchmark",
         "approach": "definition / mesh type, or another approach",
-        "linear_solver": "solver of linear systems",
-        "curve_count": "number of stiffnesses of a sensitivity curve",
         "thread_count": "number of threads of explicit steps",
         "precision": "floating-point numbers of explicit steps",
     },
-    attributes=lambda cases: {"second_beam": cases[-1].second_beam.name if cases[-1].second_beam else ""},
     stages=(stage("benchmark", "studies.kinds.benchmark.solve", "Timing approaches", _tasks, alone=True),),
     outputs=OUTPUTS,
 )

@@ -5,17 +5,10 @@ from collections.abc import Sequence
 from ...config.kind import Output, needs
 from ...output.browse import Plot, View
 
-PAGE = "speed.md"
-
 
 def figures(scenes: Sequence[object]) -> dict[str, dict[str, object]]:
     """Figures of the benchmark, by stem."""
-    found: dict[str, dict[str, object]] = {f"benchmark_{scene}": {"scene": scene} for scene in scenes}
-    return found | {
-        "benchmark_rates": {},
-        "benchmark_costs": {"scene": next(iter(scenes), None)},
-        "benchmark_curve": {},
-    }
+    return {f"benchmark_{scene}": {"scene": scene} for scene in scenes}
 
 
 OUTPUTS = (
@@ -24,8 +17,7 @@ OUTPUTS = (
         "figures and the page of the benchmark",
         figures=lambda study: figures(study.axes.get("scene", ())),
         plot="studies.kinds.benchmark.figures:benchmark",
-        tables=lambda study: [PAGE],
-        write="studies.kinds.benchmark.tables:write",
+        texts={"speed.md": "studies.kinds.benchmark.tables:page"},
         lack=needs("benchmark", "shows a benchmark and the study has none; add a section 'benchmark'"),
     ),
 )
@@ -40,11 +32,8 @@ VIEWS = (
             Plot("assured error over seconds", "assured_error", "seconds", "approach", along="mesh_size", log="xy"),
             Plot("seconds over unknowns", "seconds", "unknowns", "approach", along="mesh_size", log="xy"),
             Plot("error over mesh size", "error", "mesh_size", "approach", log="xy"),
-            Plot("memory over unknowns", "peak_memory", "unknowns", "approach", along="mesh_size", log="xy"),
             Plot("what became of the cases", "status", "mesh_size", "approach", "map"),
-            Plot("solvers of linear systems", "solver_seconds", "mesh_size", "linear_solver", log="xy"),
-            Plot("a curve as one path, and as many solves", "curve_seconds", "curve_count", log="xy",
-                 beside=(("curve_count", "separate_seconds", "as many separate solves"),)),
+            Plot("springs a second of explicit steps", "spring_updates", "mesh_size", "thread_count", log="x"),
         ),
     ),
 )  # fmt: skip

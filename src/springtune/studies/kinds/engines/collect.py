@@ -1,24 +1,25 @@
 """Scenes in engines, gathered in the groups ``/engines`` and ``/engine_curves``."""
 
 from collections import defaultdict
+from math import nan
 
 import numpy as np
 
-from ...output.dataset import Filler, Group
+from ...output.dataset import Group
 from ...runs.stages import results
 from . import RUN_ENDS, SETTING
 from .kind import STAGE
 
-NETWORK = ("scene", "definition")
+NETWORK, FACTOR = ("scene", "definition"), "stiffness_factor"
 OF_A_RUN = (*NETWORK, "engine", *SETTING)
 
 RUN_COORDINATES = {
     "scene_beam": (("scene",), "1", "beam", ""),
     "scene_mesh_type": (("scene",), "1", "mesh type", ""),
-    "scene_mesh_size": (("scene",), "m", "asked length of an edge", np.nan),
+    "scene_mesh_size": (("scene",), "m", "asked length of an edge", nan),
     "scene_material": (("scene",), "1", "material", ""),
     "scene_load": (("scene",), "1", "load", ""),
-    "scene_force": (("scene",), "N", "magnitude of the force", np.nan),
+    "scene_force": (("scene",), "N", "magnitude of the force", nan),
     "program": (("engine",), "1", "program that the engine is of", ""),
 }
 """What scenes and engines are."""
@@ -27,22 +28,22 @@ RUN_COORDINATES = {
 def _variables(cell):
     """Variables of runs, of their networks and engines."""
     return {
-        "displacement": (cell, "m", "displacement at rest", np.nan),
+        "displacement": (cell, "m", "displacement at rest", nan),
         "last_displacement": (cell, "m", "displacement that a run ends with that is not at rest, mean where it swings",
-                              np.nan),
-        "error": (cell, "1", "error in the engine, (displacement - reference) / |reference|", np.nan),
-        "solver_error": (cell, "1", "what the engine's solver adds to the errors of definition and law", np.nan),
-        "residual": (cell, "1", "out-of-balance force of the network at rest in the engine, over the load", np.nan),
-        "frame_seconds": (cell, "s", "time of a frame, without the first ones", np.nan),
-        "frames": (cell, "1", "frames that were taken", np.nan),
-        "swing": (cell, "m", "largest amplitude about the mean", np.nan),
+                              nan),
+        "error": (cell, "1", "error in the engine, (displacement - reference) / |reference|", nan),
+        "solver_error": (cell, "1", "what the engine's solver adds to the errors of definition and law", nan),
+        "residual": (cell, "1", "out-of-balance force of the network at rest in the engine, over the load", nan),
+        "frame_seconds": (cell, "s", "time of a frame, without the first ones", nan),
+        "frames": (cell, "1", "frames that were taken", nan),
+        "swing": (cell, "m", "largest amplitude about the mean", nan),
         "status": (cell, "1", "what became of the run", 0),
         "engine_status": (cell, "1", "how the run ended", 0),
         "message": (cell, "1", "why it is not at rest, or not comparable", ""),
-        "network_displacement": (NETWORK, "m", "displacement of the network in equilibrium", np.nan),
-        "reference_displacement": (NETWORK, "m", "displacement of the converged finite elements", np.nan),
-        "definition_error": (NETWORK, "1", "error of the network in equilibrium: that of the definition", np.nan),
-        "particles": (NETWORK, "1", "number of particles", np.nan),
+        "network_displacement": (NETWORK, "m", "displacement of the network in equilibrium", nan),
+        "reference_displacement": (NETWORK, "m", "displacement of the converged finite elements", nan),
+        "definition_error": (NETWORK, "1", "error of the network in equilibrium: that of the definition", nan),
+        "particles": (NETWORK, "1", "number of particles", nan),
         "engine_version": (("engine",), "1", "versions of what the engine needs, as it was run", ""),
         **RUN_COORDINATES,
     }  # fmt: skip
@@ -55,42 +56,35 @@ ENGINE_DIMENSIONS: dict[str, str | tuple[str, str]] = {
     "dt": ("time of a frame", "s"),
     "substeps": "steps of a frame",
     "iterations": "iterations of the solver in a step",
-    "stiffness_factor": "factor on all stiffnesses that are typed",
+    FACTOR: "factor on all stiffnesses that are typed",
 }
 """Own dimensions."""
 
 BEST = {
-    "best_factor": (OF_A_RUN, "1", "factor at which the displacement is the reference's", np.nan),
+    "best_factor": (OF_A_RUN, "1", "factor at which the displacement is the reference's", nan),
     "best_factor_message": (OF_A_RUN, "1", "why no factor is the best", ""),
 }
 
 FLAGS: dict[str, tuple[str, ...]] = {"engine_status": RUN_ENDS}
 
 ENGINE_RUNS = Group("/engines", _variables(OF_A_RUN), ENGINE_DIMENSIONS, FLAGS)
-ENGINE_CURVES = Group("/engine_curves", _variables((*OF_A_RUN, "stiffness_factor")) | BEST, ENGINE_DIMENSIONS, FLAGS)
+ENGINE_CURVES = Group("/engine_curves", _variables((*OF_A_RUN, FACTOR)) | BEST, ENGINE_DIMENSIONS, FLAGS)
 
 
 def groups(study, folder):
     """Groups of a dataset, see `springtune.studies.kinds.scenes.collect.groups`."""
-    found, made = [(task.of, result) for task, result in results(STAGE, study, folder)], {}
-    for group, of_curve in ((ENGINE_RUNS, False), (ENGINE_CURVES, True)):
-        own = [(run, result) for run, result in found if run.of_curve == of_curve]
-        if own:
-            made[group.name] = _gathered(group, study, own)
+    made, found = {}, [(task.of, task.labels | result) for task, result in results(STAGE, study, folder)]
+    for group, wanted in ((ENGINE_RUNS, False), (ENGINE_CURVES, True)):
+        rows = [row for of_curve, row in found if of_curve == wanted]
+        axes = {name: sorted({row[name] for row in rows}) for name in ("dt", "substeps", "iterations", FACTOR)}
+        curves = defaultdict(list)
+        for row in rows if wanted else ():
+            curves[tuple(row[name] for name in OF_A_RUN)].append((row[FACTOR], row))
+        rows += [dict(zip(OF_A_RUN, setting)) | _best(points) for setting, points in curves.items()]
+        if rows:
+            shared = {name: study.axes[name] for name in study.axes.keys() - ENGINE_DIMENSIONS.keys()}
+            made[group.name] = group.of_rows(shared | axes, rows).set_coords([*RUN_COORDINATES])
     return made
-
-
-def _gathered(group, study, found):
-    axes = {name: tuple(dict.fromkeys(run.labels[name] for run, _ in found)) for name in ENGINE_DIMENSIONS}
-    axes |= {name: tuple(sorted(axes[name])) for name in ("dt", "substeps", "iterations", "stiffness_factor")}
-    filler, curves = Filler(group.empty(study.axes | axes)), defaultdict(list)
-    for run, result in found:
-        about = {f"scene_{name}": value for name, value in run.stated} | {"program": run.program}
-        filler.put({name: value for name, value in (result | about).items() if name in group.variables}, **run.labels)
-        curves[tuple(run.labels[name] for name in OF_A_RUN)].append((run.labels["stiffness_factor"], result))
-    for setting, points in curves.items() if group is ENGINE_CURVES else ():
-        filler.put(_best(points), **dict(zip(OF_A_RUN, setting)))
-    return filler.data.set_coords([*RUN_COORDINATES])
 
 
 def _best(points):

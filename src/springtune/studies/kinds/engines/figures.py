@@ -1,14 +1,12 @@
-"""Figures of scenes in engines: error over the time of a frame, settings, sensitivity curves and their best factors."""
-
-from collections import defaultdict
+"""Figures of scenes in engines: error over the time of a frame, settings, and sensitivity curves."""
 
 import numpy as np
 
 from springtune.problem.compare import unbeaten
 
 from ...output import labels, style
-from ...output.drawing import NOT_ASKED, error_text, fitted, heat_map
-from ...output.selection import choose, group, labels_of, records
+from ...output.drawing import NOT_ASKED, error_text, heat_map
+from ...output.selection import choose, group, labels_of
 from ...output.text import cell_text
 from . import RUN_ENDS, SETTING, WITHOUT_RUN
 from .outputs import figures
@@ -19,14 +17,10 @@ FRAME = 1 / 60
 END_SIGNS, NO_RUN = {"swings": "~", "moving": "→", "diverged": "!", "inverted": "↺"}, "∅"
 """On the map of settings: of runs that moved and have no error, and of those that did not begin or end."""
 
-PLACE = {"left": 0.5, "right": 0.08, "bottom": 0.4, "top": 0.3}
-"""Margins of a figure of one panel [inch]."""
-
 
 def engines(tree):
     """Stem, function that plots, and selection of each figure."""
-    every = plot_engine_errors, plot_engine_maps, plot_engine_curves, plot_engine_factors
-    plots = {plot.__name__.removeprefix("plot_engine_"): plot for plot in every}
+    plots = {"errors": plot_engine_errors, "maps": plot_engine_maps, "curves": plot_engine_curves}
     names = "engines", "engine_curves"
     scenes = [labels_of(group(tree, name).status != 0, "scene") if name in tree else [] for name in names]
     for stem, selection in figures(*scenes).items():
@@ -34,45 +28,17 @@ def engines(tree):
 
 
 def _runs(data, name, scene):
-    """Scene of a group, its runs by engine, with the definition where there are several, and which have no error."""
+    """Scene of a group, the rows of its runs by engine, with the definition where there are several, and what lacks."""
     data = group(data, name)
     case = data.sel(choose(data.status != 0, scene=scene))
-    wanted = ("engine_status", "error", "frame_seconds", "best_factor")
-    rows = records(case, case.status != 0, [one for one in wanted if one in case])
-    several, runs, lost = len({row["definition"] for row in rows}) > 1, defaultdict(list), defaultdict(list)
-    for row in rows:
-        engine = f"{row['engine']}, {row['definition']}" if several else row["engine"]
-        runs[engine].append(row)
-        if not np.isfinite(row["error"]):
-            lost[RUN_ENDS[row["engine_status"]].replace("rest", "without a reference")].append(engine)
-    said = ", ".join(f"{len(names)} {end} ({'; '.join(dict.fromkeys(names))})" for end, names in lost.items())
-    return case, runs, said
-
-
-def _varying(rows, names):
-    """Those of some parameters of a setting that have several values."""
-    return [name for name in names if len({row[name] for row in rows}) > 1]
-
-
-def _setting(row, names):
-    """Text of some parameters of a setting."""
-    return cell_text({name: row[name] for name in names}, {"dt": "s"})
-
-
-def _lines(panel, points):
-    """Draw a line a name: the ends of the lines."""
-    ends = []
-    for number, (name, one) in enumerate(points.items()):
-        x, y = np.array(sorted(one.items())).T
-        ends += labels.line(panel, x, y, style.line(number), name)
-    return ends
-
-
-def _across(panel, value, **look):
-    """Draw a line at a value, as far as the panel goes by now: names of lines stand right of it."""
-    limits = panel.get_xlim()
-    panel.hlines(value, *limits, color="0.45", linewidth=0.8, zorder=0, **look)
-    panel.set_xlim(limits)
+    runs = case[["status", "engine_status", "error", "frame_seconds"]].reset_coords(drop=True).to_dataframe()
+    runs = runs[runs.status != 0].reset_index()
+    runs["end"] = [RUN_ENDS[flag] for flag in runs.engine_status]
+    if runs.definition.nunique() > 1:
+        runs["engine"] += ", " + runs.definition
+    lost = runs[runs.error.isna()].replace({"end": {"rest": "without a reference"}}).groupby("end", sort=False).engine
+    said = ", ".join(f"{len(names)} {end} ({'; '.join(names.unique())})" for end, names in lost)
+    return case, dict(list(runs.groupby("engine", sort=False))), said
 
 
 @style.styled
@@ -107,36 +73,33 @@ def plot_engine_errors(data, ax=None, *, scene=None):
     ('sheet', 'Time for 1/60 s of motion [ms]')
     """
     case, runs, lost = _runs(data, "engines", scene)
-    figure, axes = style.panels(ax, figsize=(style.PAGE, 3.6))
-    panel, ends = axes[0, 0], []
+    _, ((panel,),) = style.panels(ax, figsize=(style.PAGE, 3.8))
+    there = False
     for number, (name, rows) in enumerate(runs.items()):
-        errors = 100 * np.abs([row["error"] or np.nan for row in rows])
-        times = 1e3 * FRAME * np.array([row["frame_seconds"] / row["dt"] for row in rows])
+        errors = 100 * rows.error.abs().where(rows.error != 0).values
+        times = 1e3 * FRAME * (rows.frame_seconds / rows.dt).values
         look = style.line(number)
         panel.plot(times, errors, **look | {"linestyle": "", "markersize": 2, "alpha": 0.5}, label="_")
         best = np.flatnonzero(unbeaten(errors, times))
         best = best[np.argsort(times[best], kind="stable")]
-        ends += labels.line(panel, times[best], errors[best], look, name)
-    panel.set(xlabel="Time for 1/60 s of motion [ms]", ylabel="|Error| [%]")
-    panel.set_title(case.scene.item())
+        panel.plot(times[best], errors[best], label=name, **look)
+        there |= bool(len(best))
+    panel.set(xlabel="Time for 1/60 s of motion [ms]", ylabel="|Error| [%]", title=case.scene.item())
     said = [f"not drawn: {lost}"] if lost else []
-    if ends:
+    if there:
+        errors = 100 * np.abs(case.definition_error.sel(definition=labels_of(case.status != 0, "definition")))
+        known = {name: error for name, error in errors.to_series().items() if error > 0}  # NaN is not
+        for error in known.values():
+            panel.axhline(error, color="0.45", linewidth=0.8, zorder=0, linestyle=(0, (1, 1.5)))
+        texts = ", ".join(f"{name} {error:.2g} %" for name, error in known.items())
+        said.insert(0, f"dotted: error of the definition in equilibrium, {texts}")
         panel.set(**style.LOGARITHMIC)
         low, high = panel.get_xlim()
         if low < 1e3 * FRAME < high:
             panel.axvline(1e3 * FRAME, color="0.7", linewidth=0.9, zorder=0)
-            said.insert(0, "right of the grey line: slower than real time")
-        errors = 100 * np.abs(case.definition_error.sel(definition=labels_of(case.status != 0, "definition")))
-        known = {name: error for name, error in errors.to_series().items() if error > 0}  # NaN is not
-        for error in known.values():
-            _across(panel, error, linestyle=(0, (1, 1.5)))
-        if known:
-            texts = ", ".join(f"{name} {error:.2g} %" for name, error in known.items())
-            said.insert(0, f"dotted: error of the definition in equilibrium, {texts}")
+            said.insert(1, "right of the grey line: slower than real time")
         style.plain(panel, "x", "y")
-    why = "" if ends else f"No run is at rest beside a reference: {lost}."
-    drawn = {panel: (ends, fitted(panel, ["; ".join(said)]), why)}
-    labels.finish(figure, axes, PLACE, drawn, 3.6 if ax is None else 0.0)
+    labels.finish(panel, ["; ".join(said)], f"No run is at rest beside a reference: {lost}.")
     return panel
 
 
@@ -171,50 +134,40 @@ def plot_engine_maps(data, ax=None, *, scene=None):
     ['xpbd, paper', 'vbd, paper', 'xpbd, area', 'vbd, area']
     """
     case, runs, lost = _runs(data, "engines", scene)
-    shown = {name: rows for name, rows in runs.items()
-             if any(RUN_ENDS[row["engine_status"]] not in WITHOUT_RUN for row in rows)}  # fmt: skip
-    why = "" if shown else f"Nothing was run: {lost}."
-    ends = {RUN_ENDS[row["engine_status"]] for rows in shown.values() for row in rows if not np.isfinite(row["error"])}
+    shown = {name: rows for name, rows in runs.items() if not rows.end.isin(WITHOUT_RUN).all()}
+    steps = ["precision", "step", "substeps", "dt"]
+    ends = {end for rows in shown.values() for end in rows.end[rows.error.isna()]}
     said = [f"{sign} {end}" for end, sign in END_SIGNS.items() if end in ends]
     said += [f"{NO_RUN} no run"] * bool(ends & {*WITHOUT_RUN})
     title = f"{case.scene.item()}, rows: frame [ms] / substeps; error [%], × displacement over the reference's"
-    title = ", ".join([title, *said])
     absent = ", ".join(name for name in runs if name not in shown)
-    title += f"; not run: {absent}" if absent else ""
-    height = 0.8 + 0.19 * max([3, *(len(_steps(rows)) for rows in shown.values())])
+    title = ", ".join([title, *said]) + (f"; not run: {absent}" if absent else "")
 
     def draw(panel, rows):
-        if rows:
-            _map(panel, rows)
-        return [], "", why
+        if not len(rows):
+            return [], f"Nothing was run: {lost}."
+        texts = [_text(end, 100 * error) for end, error in zip(rows.end, rows.error)]
+        rows = rows.assign(step=rows.dt / rows.substeps, text=texts)  # the smallest step first
+        errors, texts = (rows.pivot(index=steps, columns="iterations", values=name) for name in ("error", "text"))
+        heat_map(panel, 100 * errors.values, texts.fillna(NOT_ASKED).values)
+        several = rows.precision.nunique() > 1
+        panel.set_yticks(range(len(errors)), [
+            f"{one + ', ' if several else ''}{1e3 * dt:.3g} / {count}" for one, _, count, dt in errors.index
+        ])  # fmt: skip
+        panel.set_xticks(range(len(errors.columns)), errors.columns)
+        panel.set(xlabel="Iterations")
+        return [], ""
 
-    return labels.small_multiples(ax, shown or {"": []}, 3, height, title, draw)
+    counts = [len(rows[[*SETTING[:3]]].drop_duplicates()) for rows in shown.values()]
+    return labels.small_multiples(ax, shown or {"": []}, 3, 0.8 + 0.19 * max([3, *counts]), title, draw)
 
 
-def _steps(rows):
-    """Precision, frame and substeps of runs, the smallest step first."""
-    steps = {tuple(row[name] for name in SETTING[:3]) for row in rows}
-    return sorted(steps, key=lambda one: (one[0], one[1] / one[2], one[2]))
-
-
-def _map(panel, rows):
-    """Draw errors of runs at rest with their numbers, and signs of how the others ended."""
-    steps, counts = _steps(rows), sorted({row["iterations"] for row in rows})
-    errors = np.full((len(steps), len(counts)), np.nan)
-    texts = np.full(errors.shape, NOT_ASKED, dtype=object)
-    for row in rows:
-        place = steps.index(tuple(row[name] for name in SETTING[:3])), counts.index(row["iterations"])
-        errors[place] = error = 100 * row["error"]
-        texts[place] = END_SIGNS.get(RUN_ENDS[row["engine_status"]], NO_RUN)
-        if np.isfinite(error):
-            times = 1 + error / 100
-            texts[place] = error_text(error) if error < 100 else f"×{times:.{1 if times < 9.95 else 0}f}"
-    heat_map(panel, errors, texts)
-    several = _varying(rows, ["precision"])
-    names = [f"{precision + ', ' if several else ''}{1e3 * dt:.3g} / {count}" for precision, dt, count in steps]
-    panel.set_yticks(range(len(steps)), names)
-    panel.set_xticks(range(len(counts)), map(str, counts))
-    panel.set(xlabel="Iterations")
+def _text(end, error):
+    """Error of a run at rest [%], or the sign of how it ended."""
+    if not np.isfinite(error):
+        return END_SIGNS.get(end, NO_RUN)
+    times = 1 + error / 100
+    return error_text(error) if error < 100 else f"×{times:.{1 if times < 9.95 else 0}f}"
 
 
 @style.styled
@@ -249,73 +202,22 @@ def plot_engine_curves(data, ax=None, *, scene=None):
     ['xpbd, paper', 'vbd, paper', 'xpbd, area', 'vbd, area']
     """
     case, runs, lost = _runs(data, "engine_curves", scene)
-    shown = {name: rows for name, rows in runs.items() if any(np.isfinite(row["error"]) for row in rows)}
-    why = "" if shown else f"No run of a curve is at rest beside a reference: {lost}."
+    shown = {name: rows for name, rows in runs.items() if rows.error.notna().any()}
 
     def draw(panel, rows):
         panel.set(xlabel="Factor on what is typed", ylabel="Displacement / reference")
-        names, points = _varying(rows, SETTING) or ["iterations"], defaultdict(dict)
-        for row in rows:
-            ratio = 1 + row["error"]
-            points[_setting(row, names)][row["stiffness_factor"]] = ratio if ratio > 0 else np.nan
-            panel.plot(1, 1 + case.definition_error.sel(definition=row["definition"]), "k+", markersize=7, zorder=4)
-        ends = _lines(panel, points)
-        if ends:
-            panel.set(**style.LOGARITHMIC)
-            style.plain(panel, "x", "y")
-            _across(panel, 1)
-        return ends, "", why
+        if not len(rows):
+            return [], f"No run of a curve is at rest beside a reference: {lost}."
+        names = [name for name in SETTING if rows[name].nunique() > 1] or ["iterations"]
+        for number, (values, one) in enumerate(rows.groupby(names, sort=False)):
+            ratio, name = 1 + one.error, cell_text(dict(zip(names, values)), {"dt": "s"})
+            panel.plot(one.stiffness_factor, ratio.where(ratio > 0), label=name, **style.line(number))
+        known = 1 + case.definition_error.sel(definition=rows.definition.iloc[0])
+        panel.plot(1, known, "k+", markersize=7, zorder=4)
+        panel.set(**style.LOGARITHMIC)
+        style.plain(panel, "x", "y")
+        panel.axhline(1, color="0.45", linewidth=0.8, zorder=0)
+        return [], ""
 
     title = f"{case.scene.item()}, +: the network in equilibrium{'; not drawn: ' + lost if lost else ''}"
     return labels.small_multiples(ax, shown or {"": []}, 3, 2.1, title, draw, sharey=True)
-
-
-@style.styled
-def plot_engine_factors(data, ax=None, *, scene=None):
-    """Best factor on what is typed over iterations: a line an engine and step.
-
-    Parameters
-    ----------
-    data : xarray.DataTree or xarray.Dataset
-        A study's dataset, or its group ``/engine_curves``.
-    ax : Axes or Figure, optional
-        Where to plot; by default a new figure.
-    scene : str, optional
-        Scene; may be left out where there is one.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-
-    Raises
-    ------
-    ValueError
-        As `plot_engine_curves`.
-
-    Examples
-    --------
-    >>> import springtune as st  # tree = st.open("results/mine")
-    >>> axes = st.plot_engine_factors(tree, scene="sheet")
-    >>> axes.get_ylabel()
-    'Best factor on what is typed'
-    """
-    case, runs, lost = _runs(data, "engine_curves", scene)
-    every, points = [row for rows in runs.values() for row in rows], defaultdict(dict)
-    for name, rows in runs.items():
-        for row in rows:
-            line = ", ".join(filter(None, (name, _setting(row, _varying(every, SETTING[:3])))))
-            points[line][row["iterations"]] = row["best_factor"]
-    factors = [factor for one in points.values() for factor in one.values()]
-    figure, axes = style.panels(ax, figsize=(style.COLUMN, 2.6))
-    panel = axes[0, 0]
-    ends = _lines(panel, points)
-    panel.set(xlabel="Iterations", ylabel="Best factor on what is typed", title=case.scene.item())
-    if ends:
-        wide = np.nanmax([1.0, *factors]) > 5 * np.nanmin([1.0, *factors])  # on a logarithmic axis
-        panel.set(xscale="log", yscale="log" if wide else "linear")
-        style.plain(panel, "x", *(["y"] if wide else []))
-        _across(panel, 1)
-    none = f"{np.isnan(factors).sum()} of {len(factors)} curves have no such factor"
-    why = "" if ends else f"{none}{lost and ': '}{lost}."
-    labels.finish(figure, axes, PLACE, {panel: (ends, fitted(panel, [none]), why)}, 2.6 if ax is None else 0.0)
-    return panel

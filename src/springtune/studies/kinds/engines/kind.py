@@ -2,23 +2,17 @@
 
 from dataclasses import dataclass
 from itertools import product
-from typing import Annotated
-
-from pydantic import Field
+from typing import Annotated, Any
 
 from springtune.mechanics.integrators import PRECISIONS
-from springtune.mesh import MESH_TYPES
-from springtune.problem.geometry import Beam
+from springtune.mesh.types import MESH_TYPES
 from springtune.problem.loads import LOADS
-from springtune.problem.materials import Material
 from springtune.registry import imported
-from springtune.springs import DEFINITIONS
-from springtune.springs.lattice import COEFFICIENT
+from springtune.springs.base import DEFINITIONS
 
 from ...config import checks, fields
-from ...config.fields import OneOrMore, Scalar, number, one_of
+from ...config.fields import OneOrMore, Scalar, Section, default, number, one_of, optional
 from ...config.kind import Kind
-from ...config.sections import Section, default, optional
 from ...runs.keys import beam_key, declared_key, definition_key, distribution, installed, material_key, mesh_type_key
 from ...runs.stages import Task, stage
 from . import SETTING
@@ -45,65 +39,79 @@ SceneName = Annotated[str, Scalar(str, {"type": "string"}, "the name of a scene"
 class EngineSceneConfig(Section):
     """A scene that is run in engines."""
 
-    beam: fields.BeamName = Field(description="Beam.")
-    mesh_type: fields.MadeType = default("right", description="Generated mesh type.")
-    mesh_size: fields.Length = Field(description="Length of an edge.")
-    material: fields.MaterialName = Field(description="Material, with a density.")
-    load: fields.Load = Field(description="Load whose forces keep their direction.")
-    force: fields.Force = Field(description="Magnitude of the force.")
+    beam: fields.BeamName
+    """Beam."""
+
+    mesh_type: fields.MadeType = default("right")
+    """Generated mesh type."""
+
+    mesh_size: fields.Length
+    """Length of an edge."""
+
+    material: fields.MaterialName
+    """Material, with a density."""
+
+    load: fields.Load
+    """Load whose forces keep their direction."""
+
+    force: fields.Force
+    """Magnitude of the force."""
 
 
 class EngineRunsConfig(Section):
     """Runs in engines: every combination of the values listed, as in a grid."""
 
-    scene: Annotated[list[SceneName], OneOrMore()] | None = Field(None, description="Scenes; all of them without.")
-    definition: fields.DefinitionNames = Field(
-        description="Definitions that need no reference. One whose energy an engine lacks is a hole that says so."
-    )
-    engine: Annotated[list[EngineName], OneOrMore()] = Field(
-        description="Engines, keys of `springtune.ENGINES`. One that is not installed is a hole that says how it is."
-    )
-    iterations: Annotated[list[Count], OneOrMore()] = default(
-        "10", description="Iterations of the engine's solver in a step; 1 where an engine has none."
-    )
-    substeps: Annotated[list[Count], OneOrMore()] = default("1", description="Steps of a frame.")
-    dt: Annotated[list[FrameTime], OneOrMore()] = default("1/60 s", description="Time of a frame, such as 1/60 s.")
-    precision: Annotated[list[Precision], OneOrMore()] = default(
-        OWN_PRECISION, description="Floating-point numbers; `own` is what an engine has by itself."
-    )
-    stiffness_factor: fields.Ratios = default(
-        "1", description="Factors on what is typed; several give a sensitivity curve in the engine, and the right one."
-    )
+    scene: Annotated[list[SceneName], OneOrMore()] | None = None
+    """Scenes; all of them without."""
+
+    definition: fields.DefinitionNames
+    """Definitions that need no reference. One whose energy an engine lacks is a hole that says so."""
+
+    engine: Annotated[list[EngineName], OneOrMore()]
+    """Engines, keys of `springtune.ENGINES`. One that is not installed is a hole that says how it is."""
+
+    iterations: Annotated[list[Count], OneOrMore()] = default("10")
+    """Iterations of the engine's solver in a step; 1 where an engine has none."""
+
+    substeps: Annotated[list[Count], OneOrMore()] = default("1")
+    """Steps of a frame."""
+
+    dt: Annotated[list[FrameTime], OneOrMore()] = default("1/60 s")
+    """Time of a frame, such as 1/60 s."""
+
+    precision: Annotated[list[Precision], OneOrMore()] = default(OWN_PRECISION)
+    """Floating-point numbers; `own` is what an engine has by itself."""
+
+    stiffness_factor: fields.Ratios = default("1")
+    """Factors on what is typed; several give a sensitivity curve in the engine, and the right one."""
 
 
 class EnginesConfig(Section):
     """Scenes in the engines that people run, at the settings that they run them at."""
 
-    scenes: Annotated[dict[str, EngineSceneConfig], fields.Named("scene")] = Field(description="Scenes.")
-    runs: Annotated[dict[str, EngineRunsConfig], fields.Named("set of runs", for_files=False)] = Field(
-        description="Sets of runs."
-    )
-    frames: Count | None = Field(None, description="Most frames of a run; by default as many as its motion needs.")
-    tolerance: Distance | None = Field(
-        None, description="Distance from rest over its displacement that ends a run; 1e-7, in single precision 1e-4."
-    )
+    scenes: Annotated[dict[str, EngineSceneConfig], fields.Named("scene")]
+    """Scenes."""
+
+    runs: Annotated[dict[str, EngineRunsConfig], fields.Named("set of runs", for_files=False)]
+    """Sets of runs."""
+
+    frames: Count | None = None
+    """Most frames of a run; by default as many as its motion needs."""
+
+    tolerance: Distance | None = None
+    """Distance from rest over its displacement that ends a run; 1e-7, in single precision 1e-4."""
 
 
 @dataclass(frozen=True)
 class EngineRun:
-    """A scene in an engine; `labels` are those of its cell, with the time of a frame [s].
+    """A scene in an engine: labels of its cell, with the time of a frame [s] and what they stand for, and values.
 
     Runs `of_curve` have factors on what is typed.
     """
 
     labels: dict[str, str | float]
     of_curve: bool
-    program: str
-    stated: EngineSceneConfig
-    beam: Beam
-    material: Material
-    frames: int | None
-    tolerance: float | None
+    values: dict[str, Any]
 
 
 def _engines():
@@ -116,7 +124,10 @@ def _check(config, problems):
     for name, scene in section.scenes.items():
         place, why = ("engines", "scenes", name), "turns with its side, and forces in engines do not"
         checks.check_scene(problems, place, scene, config, lambda load: not LOADS[load].follower, why)
-        checks.check_made(problems, (*place, "mesh_size"), scene.mesh_type, scene.mesh_size, scene.beam, config)
+        if beam := config.beams.get(scene.beam):
+            made, size = MESH_TYPES[scene.mesh_type], scene.mesh_size
+            if refusal := made.refusal(beam.length, beam.height, size, f"beam '{scene.beam}'"):
+                problems.add((*place, "mesh_size"), f"{checks.in_mm(size)} {refusal}")
     for name, runs in section.runs.items():
         place = "engines", "runs", name
         for engine in runs.engine:
@@ -134,7 +145,8 @@ def _check(config, problems):
                 checks.check_able(problems, (*place, "definition"), runs.definition, why, corners, uniaxial)
         checks.check_product(problems, runs, place, OF_RUNS, MOST_ENGINE_RUNS)
     lists = {name: {value for runs in section.runs.values() for value in getattr(runs, name)} for name in OF_RUNS}
-    checks.check_labels(problems, ("engines", "runs"), lists | {"scene": {*section.scenes}})
+    lists["scene"] = {*section.scenes}
+    checks.check_count(problems, ("engines", "runs"), lists, checks.MOST_CELLS, "cells of all labels together")
 
 
 def _expand(config, declared):
@@ -148,9 +160,12 @@ def _expand(config, declared):
             precision = engine.precisions[0] if precision == OWN_PRECISION else precision
             how = precision, dt, substeps, iterations if engine.iterates else 1, factor
             labels = dict(zip(("scene", *OF_RUNS), (*of, *how)))
-            bodies = declared.beams[stated.beam], declared.materials[stated.material]
-            run = EngineRun(labels, of_curve, engine.program, stated, *bodies, section.frames, section.tolerance)
-            found[*(order.index(name) for order, name in zip(orders, of)), *how, of_curve] = run
+            material = material_key(declared.materials[stated.material], density=True)
+            values = labels | dict(stated) | {"beam": beam_key(declared.beams[stated.beam]), "material": material}
+            values |= {"frames": section.frames, "tolerance": section.tolerance}
+            labels |= {f"scene_{name}": value for name, value in stated} | {"program": engine.program}
+            place = *(order.index(name) for order, name in zip(orders, of)), *how, of_curve
+            found[place] = EngineRun(labels, of_curve, values)
     return tuple(found[place] for place in sorted(found))
 
 
@@ -170,24 +185,11 @@ def _version(engine):
 def _tasks(study):
     """Runs of an engine follow each other in one job, since their seconds are measured."""
     for run in study.parts["engines"]:
-        labels, mesh_size = run.labels, run.stated.mesh_size
-        engine = _engines()[labels["engine"]]
-        values = {name: value for name, value in labels.items() if name != "scene"} | dict(run.stated)
-        values |= {"beam": beam_key(run.beam), "material": material_key(run.material, density=True)}
-        values |= {"engine_version": _version(engine), "frames": run.frames, "tolerance": run.tolerance}
-        also = mesh_type_key(run.stated.mesh_type), definition_key(labels["definition"]), declared_key(engine)
-        particles = run.beam.length * run.beam.height / (COEFFICIENT * mesh_size**2)
-        name = f"engines {run.program.lower()}"
-        cost = name if name in COSTS else "engines", labels["substeps"] * labels["iterations"] * particles
-        yield Task(values, also, labels, run, [cost], engine.name)
-
-
-COSTS = {
-    "engines": (0.2, 5e-6),
-    "engines springtune": (0.1, 2e-6),
-    "engines newton": (1.0, 2e-5),
-}
-"""Seconds of a run by program, and by particles, substeps and iterations."""
+        engine = _engines()[run.labels["engine"]]
+        values = {name: value for name, value in run.values.items() if name != "scene"}
+        also = mesh_type_key(values["mesh_type"]), definition_key(values["definition"]), declared_key(engine)
+        values["engine_version"] = _version(engine)
+        yield Task(values, also, run.labels, run.of_curve, name=engine.name)
 
 
 STAGE = stage("engines", "studies.kinds.engines.solve", "Running scenes in engines", _tasks, alone=True)
@@ -203,5 +205,4 @@ KIND = Kind(
     outputs=OUTPUTS,
     tables=lambda study: ["engines"] if study.parts["engines"] else [],
     tables_by="outputs",
-    costs=COSTS,
 )

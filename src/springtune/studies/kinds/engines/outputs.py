@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 def figures(scenes: Iterable[object], curves: Iterable[object]) -> dict[str, dict[str, object]]:
     """Figures by stem: of scenes that were run, and of those with curves."""
-    shown = {"errors": scenes, "maps": scenes, "curves": curves, "factors": curves}
+    shown = {"errors": scenes, "maps": scenes, "curves": curves}
     return {f"engines_{name}_{scene}": {"scene": scene} for name, own in shown.items() for scene in dict.fromkeys(own)}
 
 
@@ -57,29 +57,27 @@ VIEWS = (
 )
 
 ENGINE_COLUMNS = {
-    "dt": ("dt_ms", 1e3),
-    "displacement": ("displacement_mm", 1e3),
-    "reference_displacement": ("reference_mm", 1e3),
-    "error": ("error_percent", 100),
-    "definition_error": ("definition_error_percent", 100),
-    "solver_error": ("solver_error_percent", 100),
-    "frame_seconds": ("frame_ms", 1e3),
+    "dt_ms": ("dt", 1e3),
+    "displacement_mm": ("displacement", 1e3),
+    "reference_mm": ("reference_displacement", 1e3),
+    "error_percent": ("error", 100),
+    "definition_error_percent": ("definition_error", 100),
+    "solver_error_percent": ("solver_error", 100),
+    "frame_ms": ("frame_seconds", 1e3),
 }
-"""Columns of the table by variable, and the factor on it."""
+"""Columns of the table: variable, and the factor on it."""
 
 
 def tables(tree: "xr.DataTree") -> list[dict[str, Any]]:
     """Tables of the page, see `springtune.studies.kinds.scenes.tables.tables`."""
-    from ...output.selection import records  # here, since a plan does without xarray
+    from ...output.tables import listed  # here, since a plan does without xarray
     from . import RUN_ENDS
 
     if "engines" not in tree:
         return []
     data = tree["engines"].to_dataset()
-    rows = []
-    for one in records(data, data.status != 0, [*ENGINE_COLUMNS, "message", "engine_status"]):
-        row = {name: one[name] for name in ("scene", "definition", "engine", "precision", "substeps", "iterations")}
-        row |= {column: factor * one[name] for name, (column, factor) in ENGINE_COLUMNS.items()}
-        rows.append(row | {"end": RUN_ENDS[one["engine_status"]], "why": one["message"]})
+    names = ("scene", "definition", "engine", "precision", "substeps", "iterations", "engine_status", "message")
+    rows = listed(data, data.status != 0, names, ENGINE_COLUMNS)
+    rows = [row | {"engine_status": RUN_ENDS[row["engine_status"]]} for row in rows]
     note = "Where the load rests, beside finite elements: errors of the definition, in equilibrium, and of the solver."
     return [{"stem": "engines", "title": "Scenes in engines", "note": note, "rows": rows}]

@@ -54,15 +54,10 @@ def plot_laying(data, ax=None, *, loading=None, friction=None):
             laid = laid.sel({name: [label]})
     shown = cells(laid.status != 0, ("loading", "friction"))
     names = labels_of(laid.status != 0, "definition")
-    high = 1.05 + 0.16 * max(len(names), 4)
-    size = (style.PAGE, 0.25 + high * len(shown))
-    figure, axes = style.panels(ax, len(shown), 3, figsize=size, widths=[1.9, 1.0, 1.0])
-    place = {"left": 0.52, "right": 0.1, "top": 0.3, "bottom": 0.74, "down": 0.97}
-    style.arrange(figure, axes, across=0.14 + max(map(labels.width, names), default=0.0), **place)
+    size = (style.PAGE, (1.05 + 0.16 * max(len(names), 4)) * len(shown))
+    _, axes = style.panels(ax, len(shown), 3, figsize=size, width_ratios=[1.9, 1.0, 1.0])
     for row, cell in zip(axes, shown):
         _row(row, laid.sel(cell), cell, names)
-        row[0].apply_aspect()  # its limits
-    labels.settle(figure, axes, place | {"across": 0.06})
     return axes
 
 
@@ -73,7 +68,7 @@ def _row(row, laid, cell, names):
     first = _shape(shape, laid, names)
     shape.set(title=f"{cell['loading']}{friction}", xlabel="x [mm]", ylabel="y [mm]")
     shape.set(aspect="equal", adjustable="datalim")
-    labels.note(shape, first)
+    labels.note(shape, [first])
     known, reference = 100 * float(laid.reference_elongation_error_estimate), 100 * float(laid.reference_elongation)
     if np.isfinite(reference):
         found = ", error unknown"
@@ -81,7 +76,7 @@ def _row(row, laid, cell, names):
             elongation.axvspan(reference - known, reference + known, color="0.87", zorder=0)
             found = f" ± {known:.2g}"
         elongation.axvline(reference, color="0.45", linewidth=1.5)
-        labels.note(elongation, f"grey: finite elements {reference:.2f}{found} %".replace("-", "−"))
+        labels.note(elongation, [f"grey: finite elements {reference:.2f}{found} %".replace("-", "−")])
     area.axvline(0, color="0.45", linewidth=1.5)
     for panel, name in ((area, "area_error"), (elongation, "elongation")):
         _dots(panel, laid, names, name)
@@ -89,7 +84,7 @@ def _row(row, laid, cell, names):
     elongation.set(xlabel="Elongation [%]", title="Lower fibre")
     elongation.tick_params(labelleft=False)
     if ((laid.status == 1).sum("mesh_size") > 1).any():
-        labels.note(area, "filled: finest mesh; hollow: coarser")
+        labels.note(area, ["filled: finest mesh; hollow: coarser"])
 
 
 def _points(laid, name):

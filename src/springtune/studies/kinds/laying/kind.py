@@ -1,19 +1,17 @@
 """Strips laid on a trapezoid: every combination of the values of a study's section ``laying``."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from itertools import product
+from math import nan
 from typing import Annotated
 
-from pydantic import Field
-
 from springtune.problem.geometry import Strip, Trapezoid
-from springtune.problem.materials import Material
-from springtune.springs import DEFINITIONS
+from springtune.springs.base import DEFINITIONS
 
-from ...config.checks import check_beam_material, check_for_triangles, check_known, check_particles, check_product
-from ...config.fields import BeamName, DefinitionNames, Length, MaterialName, OneOrMore, Stress, number, one_of
+from ...config import fields
+from ...config.checks import check_beam_material, check_for_triangles, check_particles, check_product
+from ...config.fields import OneOrMore, Section, default, number, one_of, optional
 from ...config.kind import Kind
-from ...config.sections import Section, default, optional
 from ...runs.keys import definition_key, material_key, mesh_type_key
 from ...runs.stages import Task, stage
 from .outputs import OUTPUTS
@@ -23,6 +21,12 @@ LOADINGS = ("pressure", "gravity", "ends")
 
 REFERENCE_SIZES = (1.0, 1.25, 1.6)
 """Mesh sizes of a reference over the given one; the first gives the answer, all of them its band."""
+
+LAYING_WAY, LAID = ("loading", "friction"), ("definition", "mesh_size")
+OF_STRIP = (*LAID, *LAYING_WAY)
+"""Labels of a strip of springs; a reference has the first ones."""
+
+BAND = "twice its spread over three meshes of finite elements"
 
 MOST_STRIPS = 10_000
 """Most strips that a study lays; each takes seconds."""
@@ -34,9 +38,14 @@ Loading = Annotated[str, one_of("loading", LOADINGS)]
 class TrapezoidConfig(Section):
     """A symmetric trapezoid that stands on its lower base."""
 
-    lower_base: Length = Field(description="Length of the base on the floor.")
-    upper_base: Length = Field(description="Length of the upper base.")
-    height: Length = Field(description="Height.")
+    lower_base: fields.Length
+    """Length of the base on the floor."""
+
+    upper_base: fields.Length
+    """Length of the upper base."""
+
+    height: fields.Length
+    """Height."""
 
 
 class LayingConfig(Section):
@@ -46,53 +55,43 @@ class LayingConfig(Section):
     the band of its error.
     """
 
-    strip: BeamName = Field(description="Beam that is the strip.")
-    trapezoid: TrapezoidConfig = Field(description="Trapezoid below the strip.")
-    material: MaterialName = Field(description="Material of the strip.")
-    support: MaterialName = Field(
-        description="Material of the trapezoid, which is rigid from 1e4 times the strip's modulus on."
-    )
-    definition: DefinitionNames = Field(description="Definitions that derive a stiffness and need no reference.")
-    mesh_size: Annotated[list[Length], OneOrMore()] = Field(description="Lengths of an edge.")
-    reference_size: Length = default("1 mm", description="Length of an edge of the reference's finest mesh.")
-    loading: Annotated[list[Loading], OneOrMore()] = default(
-        "pressure",
-        description="`pressure`: on the upper face, following it; `gravity`: the same force as weight; `ends`: draws "
-        "the ends down to the floor.",
-    )
-    pressure: Stress = Field(description="Pressure, or weight over the upper face.")
-    friction: Annotated[list[Friction], OneOrMore()] = default("0", description="Coulomb's coefficients of friction.")
+    strip: fields.BeamName
+    """Beam that is the strip."""
 
+    trapezoid: TrapezoidConfig
+    """Trapezoid below the strip."""
 
-@dataclass(frozen=True)
-class LayingScene:
-    """A strip to lay on a trapezoid; `pressure` is its pressure, or its weight over its upper face [Pa]."""
+    material: fields.MaterialName
+    """Material of the strip."""
 
-    definition: str
-    mesh_size: float
-    loading: str
-    friction: float
-    strip: Strip
-    trapezoid: Trapezoid
-    material: Material
-    support: Material
-    pressure: float
+    support: fields.MaterialName
+    """Material of the trapezoid, which is rigid from 1e4 times the strip's modulus on."""
 
+    definition: fields.DefinitionNames
+    """Definitions that derive a stiffness and need no reference."""
 
-@dataclass(frozen=True)
-class Laying:
-    """Strips of a study, and those of finite elements that they are compared with, on several meshes."""
+    mesh_size: Annotated[list[fields.Length], OneOrMore()]
+    """Lengths of an edge."""
 
-    strips: tuple[LayingScene, ...]
-    references: tuple[LayingScene, ...]
+    reference_size: fields.Length = default("1 mm")
+    """Length of an edge of the reference's finest mesh."""
+
+    loading: Annotated[list[Loading], OneOrMore()] = default("pressure")
+    """`pressure`: on the upper face, following it; `gravity`: the same force as weight; `ends`: draws the ends down
+    to the floor."""
+
+    pressure: fields.Stress
+    """Pressure, or weight over the upper face."""
+
+    friction: Annotated[list[Friction], OneOrMore()] = default("0")
+    """Coulomb's coefficients of friction."""
 
 
 def _check(config, problems):
-    check_known(problems, ("laying", "strip"), "beam", config.laying.strip, config.beams)
     for key in ("material", "support"):
         check_beam_material(problems, ("laying", key), getattr(config.laying, key), config)
     check_for_triangles(config.laying.definition, ("laying", "definition"), problems)
-    check_product(problems, config.laying, ("laying",), ("definition", "mesh_size", "loading", "friction"), MOST_STRIPS)
+    check_product(problems, config.laying, ("laying",), OF_STRIP, MOST_STRIPS)
     if config.laying.strip in config.beams:
         beam = config.beams[config.laying.strip]
         check_particles(problems, ("laying", "mesh_size"), config.laying.mesh_size, beam.length, beam.height)
@@ -104,56 +103,74 @@ def _check(config, problems):
 
 
 def _expand(config, declared):
+    """Labels and values of strips, and of those of finite elements that they are compared with."""
     section = config.laying
     beam, base = declared.beams[section.strip], section.trapezoid
-    parts = {
-        "strip": Strip(beam.length, beam.height, beam.thickness),
-        "trapezoid": Trapezoid(base.lower_base, base.upper_base, base.height),
-        "material": declared.materials[section.material],
-        "support": declared.materials[section.support],
+    shared = {
+        "strip": asdict(Strip(beam.length, beam.height, beam.thickness)),
+        "trapezoid": asdict(Trapezoid(base.lower_base, base.upper_base, base.height)),
+        "material": material_key(declared.materials[section.material]),
+        "support": material_key(declared.materials[section.support]),
         "pressure": section.pressure,
     }
-    ways = list(product(section.loading, section.friction))
     names = [name for name in DEFINITIONS if name in section.definition]
-    strips = product(names, sorted(section.mesh_size), ways)
-    references = product(ways, [ratio * section.reference_size for ratio in REFERENCE_SIZES])
-    return Laying(
-        tuple(LayingScene(name, size, *way, **parts) for name, size, way in strips),
-        tuple(LayingScene("delingette", size, *way, **parts) for way, size in references),
-    )
-
-
-def _axes(laying):
-    strips = laying.strips
-    return {
-        "definition": {one.definition for one in strips},
-        "mesh_size": {one.mesh_size for one in strips},
-        "loading": tuple(name for name in LOADINGS if any(one.loading == name for one in strips)),
-        "friction": tuple(sorted({one.friction for one in strips})),
-    }
+    ways = [*product([name for name in LOADINGS if name in section.loading], sorted(section.friction))]
+    strips = [dict(zip(OF_STRIP, (*one, *way))) for *one, way in product(names, sorted(section.mesh_size), ways)]
+    found = [(labels, labels["definition"], [labels["mesh_size"]]) for labels in strips]
+    sizes = [ratio * section.reference_size for ratio in REFERENCE_SIZES]
+    found += [(dict(zip(LAYING_WAY, way)), "delingette", sizes) for way in ways]
+    return [(labels, shared | labels | {"definition": name, "mesh_sizes": sizes}) for labels, name, sizes in found]
 
 
 def _tasks(study):
-    laying = study.parts["laying"]
-    for one in (*laying.strips, *laying.references):
-        values = asdict(one) | {"material": material_key(one.material), "support": material_key(one.support)}
+    for labels, values in study.parts["laying"]:
         # The trapezoid is of Delingette's springs.
-        also = mesh_type_key("structured"), definition_key(one.definition), definition_key("delingette")
-        yield Task(values, also, of=one, costs=[("laying", (1e-3 / one.mesh_size) ** 3)])
+        also = mesh_type_key("structured"), definition_key(values["definition"]), definition_key("delingette")
+        yield Task(values, also, labels, seconds=1.5 * (1e-3 / min(values["mesh_sizes"])) ** 3)
 
 
-STAGE = stage("laying", "studies.kinds.laying.solve", "Laying the strips", _tasks)
+def _outline(name, dimensions, whose):
+    """Variables of the points of an outline."""
+    return {f"{name}_{axis}": (dimensions, "m", f"{whose} along {axis}", nan) for axis in "xy"}
+
+
+LAYING_VARIABLES = {
+    "area_under_strip": (OF_STRIP, "m2", "area between the strip and the floor, network", nan),
+    "area_error": (OF_STRIP, "1", "area under the strip over the trapezoid's, less 1", nan),
+    "elongation": (OF_STRIP, "1", "elongation of the strip's lower fibre, network", nan),
+    "penetration": (OF_STRIP, "1", "largest penetration over the mesh size", nan),
+    "contact_force_error": (OF_STRIP, "1", "vertical contact force less the load, over the load", nan),
+    "load_share": (OF_STRIP, "1", "share of the load that was reached", nan),
+    "iterations": (OF_STRIP, "1", "Newton steps", nan),
+    "laying_seconds": (OF_STRIP, "s", "time to lay the strip", nan),
+    "status": (OF_STRIP, "1", "what became of the scene", 0),
+    "message": (OF_STRIP, "1", "why the strip is not laid", ""),
+    "skipped": (OF_STRIP, "1", "what the scene did not need", ""),
+    **_outline("strip", (*OF_STRIP, "outline_point"), "outline of the laid strip"),
+    "reference_area": (LAYING_WAY, "m2", "area between the strip and the floor, finite elements", nan),
+    "reference_area_error_estimate": (
+        LAYING_WAY, "m2", f"band of the area between strip and floor, {BAND}", nan,
+    ),
+    "reference_elongation": (LAYING_WAY, "1", "elongation of the lower fibre, finite elements", nan),
+    "reference_elongation_error_estimate": (
+        LAYING_WAY, "1", f"band of the elongation of the lower fibre, {BAND}", nan,
+    ),
+    **_outline("reference", (*LAYING_WAY, "outline_point"), "outline of the strip of finite elements"),
+    **_outline("trapezoid", ("corner",), "corners of the trapezoid"),
+}  # fmt: skip
+
 
 KIND = Kind(
     "laying",
     study_fields={"laying": optional(LayingConfig, "A strip laid on a trapezoid; it makes the group `/laying`.")},
     check=_check,
     expand=_expand,
-    axes=_axes,
-    summary=lambda part: [["strips", len(part.strips), "laid on a trapezoid"]],
-    stages=(STAGE,),
+    axes=lambda part: {name: {one[name] for one, _ in part if name in one} for name in LAID},
+    summary=lambda part: [["strips", sum("definition" in labels for labels, _ in part), "laid on a trapezoid"]],
+    variables=LAYING_VARIABLES,
+    dimensions={"loading": "what lays the strip", "friction": "Coulomb's coefficient of friction"},
+    stages=(stage("laying", "studies.kinds.laying.solve", "Laying the strips", _tasks),),
     outputs=OUTPUTS,
     tables=lambda study: ["laying"] if study.parts["laying"] else [],
     tables_by="outputs",
-    costs={"laying": (0.0, 1.5)},
 )

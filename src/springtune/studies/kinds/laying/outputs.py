@@ -2,8 +2,6 @@
 
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from ...config.kind import Output, needs
 from ...output.browse import Plot, View
 
@@ -40,33 +38,30 @@ VIEWS = (
 )  # fmt: skip
 
 
+LAYING_COLUMNS = {
+    "mesh_size_mm": ("mesh_size", 1e3),
+    "area_mm2": ("area_under_strip", 1e6),
+    "area_error_percent": ("area_error", 100),
+    "elongation_percent": ("elongation", 100),
+    "reference_elongation_percent": ("reference_elongation", 100),
+    "reference_elongation_known_to_points": ("reference_elongation_error_estimate", 100),
+    "penetration_per_mesh_size": ("penetration", 1),
+}
+"""Columns of the table: variable, and the factor on it."""
+
+
 def tables(tree: "xr.DataTree") -> list[dict[str, Any]]:
     """Tables of the page, see `springtune.studies.kinds.scenes.tables.tables`."""
-    from ...output.selection import records  # here, since a plan does without xarray
+    from ...output.tables import listed  # here, since a plan does without xarray
 
     if "laying" not in tree:
         return []
     laid = tree["laying"].to_dataset()
     present = laid.area_under_strip.notnull().transpose("loading", "friction", "mesh_size", "definition")
-    columns = {
-        "mesh_size_mm": ("mesh_size", 1e3),
-        "area_mm2": ("area_under_strip", 1e6),
-        "area_error_percent": ("area_error", 100),
-        "elongation_percent": ("elongation", 100),
-        "reference_elongation_percent": ("reference_elongation", 100),
-        "reference_elongation_known_to_points": ("reference_elongation_error_estimate", 100),
-        "penetration_per_mesh_size": ("penetration", 1),
-    }
-    rows = [
-        {name: one[name] for name in ("loading", "friction", "definition")}
-        | {column: factor * one[name] for column, (name, factor) in columns.items()}
-        for one in records(laid, present, (name for name, _ in columns.values()))
-    ]
-    x, y = laid.trapezoid_x.values, laid.trapezoid_y.values
-    trapezoid = 0.5e6 * abs(float(np.dot(x, np.roll(y, 1)) - np.dot(y, np.roll(x, 1))))
+    rows = listed(laid, present, ("loading", "friction", "definition"), LAYING_COLUMNS)
     note = (
         "Area between strip and floor and elongation of the strip's lower fibre; the reference's is known to so many "
         "points: twice the spread of three meshes, since the trapezoid's corners catch between a strip's particles, "
-        f"where depends on the mesh. The networks' own scatter as much. The trapezoid has {trapezoid:.4g} mm²."
+        "where depends on the mesh. The networks' own scatter as much."
     )
     return [{"stem": "laying", "title": "Laid strips", "note": note, "rows": rows}]

@@ -20,31 +20,54 @@ import numpy as np
 
 from springtune.mechanics.contact import Body, Contact, ContactError, Obstacle
 from springtune.mechanics.network import FollowerPressure
-from springtune.mesh import MESH_TYPES, Mesh
+from springtune.mesh.cells import Mesh
+from springtune.mesh.types import MESH_TYPES
+from springtune.problem.compare import band
 from springtune.problem.geometry import Strip, Trapezoid
 from springtune.problem.materials import material_of
 from springtune.problem.status import Status
 from springtune.scene.sheet import Sheet
-from springtune.springs import DefinitionError
+from springtune.springs.base import DefinitionError
 
 RIGID = 1e4
 """Ratio of Young's moduli from which the trapezoid counts as rigid."""
 
 
 def solve(task):
-    """Result of a strip; one that is not laid has a status and a message."""
+    """Rows of a strip; of one of finite elements with a band of what several meshes give."""
+    trapezoid, found = Trapezoid(**task["trapezoid"]), [_laid(task, size) for size in task["mesh_sizes"]]
+    first, is_reference = found[0], len(found) > 1
+    points, name = first.pop("outline", np.empty((0, 2))).tolist(), "reference" if is_reference else "strip"
+    rows = [{"outline_point": place, f"{name}_x": x, f"{name}_y": y} for place, (x, y) in enumerate(points)]
+    rows += [{"corner": place, "trapezoid_x": x, "trapezoid_y": y} for place, (x, y) in enumerate(trapezoid.corners)]
+    if not is_reference:
+        return {"rows": [first, *rows]}
+    if first["status"] != Status.SOLVED:
+        return {"rows": rows[len(points) :]}
+    for variable, name in (("reference_area", "area_under_strip"), ("reference_elongation", "elongation")):
+        values = [one.get(name, np.nan) for one in found]
+        first |= {variable: values[0], f"{variable}_error_estimate": band(values)}
+    return {"rows": [first, *rows]}
+
+
+def _laid(task, size):
+    """Result of a strip on a mesh; one that is not laid has a status and a message."""
     made = {
         "strip": Strip(**task["strip"]),
         "trapezoid": Trapezoid(**task["trapezoid"]),
         "material": material_of(task["material"]).in_plane,
         "support": material_of(task["support"]).in_plane,
-        "size": task["mesh_size"],
     }
+    made |= {name: task[name] for name in ("definition", "loading", "pressure", "friction")}
     try:
-        found = lay(**made, **{name: task[name] for name in ("definition", "loading", "pressure", "friction")})
+        found = lay(**made, size=size)
     except DefinitionError as error:
-        return {"status": Status.FAILED, "message": f"{task['definition']}: {error}"}
-    return vars(found) | {"status": Status.NOT_CONVERGED if found.message else Status.SOLVED}
+        return {"status": int(Status.FAILED), "message": f"{task['definition']}: {error}"}
+    if found.message:
+        del found.area_under_strip, found.elongation, found.contact_force_error
+        return vars(found) | {"status": int(Status.NOT_CONVERGED)}
+    area_error = found.area_under_strip / made["trapezoid"].area - 1
+    return vars(found) | {"status": int(Status.SOLVED), "area_error": area_error}
 
 
 def lay(strip, trapezoid, material, support, definition, size, *, loading="pressure", pressure=0.02e6, friction=0.0,

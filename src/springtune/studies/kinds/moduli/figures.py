@@ -6,7 +6,7 @@ from springtune.safe_io.escapes import no_mathematics
 
 from ...output import labels, style
 from ...output.dataset import most_requested
-from ...output.drawing import BEYOND_SMALL_STRAIN, NO_RESULT, NOT_ASKED, error_text, fitted, heat_map
+from ...output.drawing import BEYOND_SMALL_STRAIN, NO_RESULT, NOT_ASKED, error_text, heat_map
 from ...output.selection import choose, group, labelled_beam, labels_of, sign_of_errors, unswept
 from .outputs import figures
 
@@ -34,11 +34,8 @@ def definitions(tree):
 
 
 def _main(root, names, selection):
-    """Labels with most scenes of a study; if a selection has no such scene, those with most of its own scenes."""
-    chosen = selection | {name: most_requested(root, name) for name in names}
-    if (root.status.sel(chosen) != 0).any():
-        return chosen
-    root = root[["status"]].sel({name: [label] for name, label in selection.items()})
+    """A selection, and of further dimensions the labels with most of its scenes."""
+    chosen, root = dict(selection), root[["status"]].sel({name: [label] for name, label in selection.items()})
     for name in names:
         chosen[name] = most_requested(root, name)
         root = root.sel({name: [chosen[name]]})
@@ -46,7 +43,7 @@ def _main(root, names, selection):
 
 
 def _by_mesh_type(ax, present, title, draw):
-    """A panel a mesh type; `draw` returns ends of lines for their names, a note, and what to say without lines."""
+    """A panel a mesh type; `draw` returns notes, and what to say without lines."""
     names = {name: name for name in labels_of(present, "mesh_type")}
     return labels.small_multiples(ax, names, 2, 1.95, title, draw)
 
@@ -109,9 +106,10 @@ def _moduli(panel, here):
     values = np.concatenate([[low, high], *curves.values()])
     bottom, top = np.clip([np.nanmin(values) - 0.03, np.nanmax(values) + 0.03], -0.45, 0.75)
     panel.set_ylim(min(bottom, low - 0.03), max(top, high + 0.03))
-    ends = labels.lines(panel, wanted, curves, 0.012)
-    said = fitted(panel, [f"no moduli: {', '.join(lacking)}"]) if lacking and ends else ""
-    return ends, said, "" if ends else f"No definition has moduli here: {_statuses(here.status.values)}."
+    for number, names in enumerate(labels.alike(curves, 0.012)):
+        panel.plot(wanted, curves[names[0]], label=", ".join(names), **style.line(number))
+    said = [f"no moduli: {', '.join(lacking)}"] if lacking else []
+    return said, f"No definition has moduli here: {_statuses(here.status.values)}."
 
 
 @style.styled
@@ -178,7 +176,7 @@ def _field_errors(panel, error, status):
     panel.set(yscale="log")
     places = dict(zip(curves, labels.sizes_axis(panel, sizes, len(curves))))
     if not curves:
-        return [], "", f"No definition has a field error here: {_statuses(flags)}."
+        return [], f"No definition has a field error here: {_statuses(flags)}."
     together = labels.alike({name: np.log(values) for name, values in curves.items()}, 0.01)
     together.sort(key=lambda one: np.nanmean(np.log(curves[one[0]])))
     base, named = next((one for one in together if BASELINE in one), None), together[:MOST_NAMED]
@@ -187,7 +185,7 @@ def _field_errors(panel, error, status):
     others = [name for one in together if one not in named for name in one]
     for name in others:
         panel.plot(places[name], curves[name], color="0.75", linewidth=0.6, marker=".", markersize=2, zorder=1)
-    ends, order = [], names.tolist()
+    order = names.tolist()
     for one in named:
         values, look = curves[one[0]], style.line(order.index(one[0]))
         there = np.flatnonzero(np.isfinite(values))
@@ -195,15 +193,10 @@ def _field_errors(panel, error, status):
         if len(there) > 1:
             rate = np.polyfit(np.log(sizes[there]), np.log(values[there]), 1)[0]
             label += f" ({rate:.1f})".replace("-0.0", "0.0").replace("-", "−")
-        ends += labels.line(panel, places[one[0]], values, look, label)
-    said = [f"grey: {', '.join(others)}"] if others else []
+        panel.plot(places[one[0]], values, label=label, **look)
     lacking = [str(name) for name, there, flag in zip(names, known, flags) if not there.any() and (flag > 0).any()]
-    said += [f"no error: {', '.join(lacking)}"] if lacking else []
-    for name, there, flag in zip(names, known, flags):
-        without = sizes[~there & (flag > 0)]
-        if there.any() and len(without):
-            said.append(f"no error: {name} at {', '.join(f'{size:g}' for size in without)} mm")
-    return ends, fitted(panel, said), ""
+    said = {"grey": others, "no error": lacking}
+    return [f"{what}: {', '.join(own)}" for what, own in said.items() if own], ""
 
 
 @style.styled
@@ -215,7 +208,7 @@ def plot_definitions_loads(data, ax=None, *, beam=None, mesh_type=None, material
     data : xarray.DataTree or xarray.Dataset
         A study's dataset, or its root.
     ax : Figure or sequence of Axes, optional
-        Where to plot: as many Axes as materials; by default a new figure, with a bar of colours.
+        Where to plot: as many Axes as materials; by default a new figure.
     beam, mesh_type, kinematics : str, optional
         Labels of the scenes. One that is not given must leave no choice.
     materials : sequence of str, optional
@@ -244,63 +237,44 @@ def plot_definitions_loads(data, ax=None, *, beam=None, mesh_type=None, material
     chosen = choose(root.status != 0, beam=beam, mesh_type=mesh_type, kinematics=kinematics)
     root = root.sel(chosen)
     solved = root.status == 1
-    if materials is None:
-        materials = _spread(root, solved)
+    materials = _spread(root, solved) if materials is None else materials
     for material in materials:
         choose(root.status != 0, material=material)
     if solved.any():
         root = root.sel(definition=labels_of(solved, "definition"))
     root = root.sel(load=labels_of(root.status != 0, "load"))
     names, loads = root.definition.values.tolist(), root["load"].values.tolist()
-    left, bottom = 0.12 + max(map(labels.width, names)), 0.32 + max(map(labels.width, loads))
-    room = style.COLUMN - left - 0.62 - 0.08 * (len(materials) - 1)
-    wide = style.COLUMN if room >= CELL_WIDTH * len(loads) * len(materials) else style.PAGE
-    size = wide, 0.62 + bottom + 0.165 * len(names)
-    figure, axes = style.panels(ax, ncols=len(materials), sharey=True, figsize=size)
-    title = f"{labelled_beam(root, chosen['beam'])}, {chosen['mesh_type']}"
-    lines = labels.wrapped(f"{title}: deformation error [%] on the finest mesh solved", wide - 0.1, 8.5)
-    style.arrange(figure, axes, left=left, right=0.62, bottom=bottom, top=0.35 + 0.14 * labels.lines_of(lines),
-                  across=0.08, title=lines)  # fmt: skip
-    doubted = False
-    for panel, material in zip(axes[0], materials):
-        cells = root.sel(material=material)
-        beyond = cells.reference_applies == 0 if "reference_applies" in cells else cells.status < 0
-        beyond = beyond.any([name for name in beyond.dims if name != "load"]).values
-        image = _heat(panel, *(cells[name].transpose("mesh_size", "definition", "load").values
-                               for name in ("deformation_error", "status")), beyond)  # fmt: skip
-        doubted |= bool(beyond.any())
+    place = ("mesh_size", "definition", "load")
+    beyond = root.reference_applies == 0 if "reference_applies" in root else root.status < 0
+
+    def draw(panel, material):
+        cells, error = root.sel(material=material), np.full((len(names), len(loads)), np.nan)
+        doubted = beyond.sel(material=material).any([name for name in beyond.dims if name not in ("material", "load")])
+        for values in 100 * cells.deformation_error.transpose(*place).values[::-1]:  # the finest solved mesh stays
+            error = np.where(np.isfinite(values), values, error)
+        asked = (cells.status != 0).any("mesh_size").transpose(*place[1:]).values
+        texts = np.where(asked, NO_RESULT, NOT_ASKED).astype(object)
+        for row, column in np.argwhere(np.isfinite(error)):
+            texts[row, column] = error_text(error[row, column]) + "*" * bool(doubted[column])
+        heat_map(panel, error, texts)
         panel.set_xticks(range(len(loads)), map(no_mathematics, loads))
         panel.xaxis.set_tick_params(rotation=90, labelsize=style.SMALL)
         panel.set_yticks(range(len(names)), map(no_mathematics, names))
-        ratio = f"ν = {float(cells.material_poisson_ratio):g}"
-        panel.set_title(ratio if material == ratio.replace("ν = ", "nu-") else f"{material}, {ratio}")
-    if figure is not None:
-        width, height = style.size(figure)
-        bar = figure.add_axes([1 - 0.52 / width, bottom / height, 0.1 / width, 1 - (bottom + 0.63) / height])
-        figure.colorbar(image, cax=bar, ticks=[-1, 0, 1, 2]).set_ticklabels(["0.1", "1", "10", "100"])
-        flags = root.status.values
-        said = [f"{NO_RESULT}: no result"] * bool((flags > 1).any())
-        said += [f"{NOT_ASKED}: not asked for"] * bool((flags == 0).any())
-        said += [f"*: {BEYOND_SMALL_STRAIN}"] * doubted
-        words = labels.wrapped("; ".join(filter(None, [sign_of_errors(root), *said])), width - 0.1)
-        figure.text(0.05 / width, 0.05 / height, words, fontsize=style.SMALL, color="0.25")
-    return axes[0]
+        return [], ""
 
-
-CELL_WIDTH = 0.3
-"""Width of the number in a cell [inch]."""
-
-
-def _heat(panel, errors, flags, beyond):
-    """Draw errors by definition and load with their numbers, marked beyond small strain; return the image."""
-    error = np.full(errors.shape[1:], np.nan)
-    for values in 100 * errors[::-1]:  # the finest solved mesh comes last and stays
-        error = np.where(np.isfinite(values), values, error)
-    asked, texts = (flags != 0).any(axis=0), np.full(error.shape, NOT_ASKED, dtype=object)
-    for row, column in np.argwhere(asked):
-        known = np.isfinite(error[row, column])
-        texts[row, column] = error_text(error[row, column]) + "*" * bool(beyond[column]) if known else NO_RESULT
-    return heat_map(panel, error, texts)
+    shown = {}
+    for material in materials:
+        ratio = f"ν = {float(root.material_poisson_ratio.sel(material=material)):g}"
+        shown[ratio if material == ratio.replace("ν = ", "nu-") else f"{material}, {ratio}"] = material
+    flags = root.status.sel(material=materials).values
+    said = [sign_of_errors(root), f"{NO_RESULT}: no result" * bool((flags > 1).any())]
+    said += [f"{NOT_ASKED}: not asked for" * bool((flags == 0).any())]
+    said += [f"*: {BEYOND_SMALL_STRAIN}" * bool(beyond.sel(material=materials).any())]
+    title = (
+        f"{labelled_beam(root, chosen['beam'])}, {chosen['mesh_type']}: deformation error [%] on the finest mesh solved"
+    )
+    said, height = "; ".join(filter(None, said)), 1.2 + 0.165 * len(names)
+    return labels.small_multiples(ax, shown, len(shown), height, title, draw, sharey=True, said=said)
 
 
 def _spread(root, solved):

@@ -6,18 +6,17 @@ from math import nan
 
 from pydantic import Field
 
-from springtune.mesh import MESH_TYPES
+from springtune.mesh.types import MESH_TYPES
 from springtune.problem.geometry import Beam
-from springtune.springs import DEFINITIONS
+from springtune.springs.base import DEFINITIONS
 
 from ...config.checks import check_particles
-from ...config.fields import Flag, Length
+from ...config.fields import Flag, Length, Section, default
 from ...config.kind import Kind
 from ...config.model import MeshSpec
-from ...config.sections import Section, default
 from ...runs.keys import definition_key, mesh_type_key
 from ...runs.stages import Task, stage
-from ..scenes.plan import mesh_key, mesh_parameters, mesh_source, particles
+from ..scenes.plan import expected_seconds, mesh_key, mesh_parameters, mesh_source, particles
 from .outputs import OUTPUTS
 
 
@@ -27,8 +26,11 @@ class PatchConfig(Section):
     Its mesh is that of a beam of this extent: give the extent of the beam to compare with.
     """
 
-    length: Length = default("100 mm", description="Extent along x.")
-    height: Length = default("20 mm", description="Extent along y.")
+    length: Length = default("100 mm")
+    """Extent along x."""
+
+    height: Length = default("20 mm")
+    """Extent along y."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +91,7 @@ def _tasks(study):
             {"definition": one.definition, "poisson_ratio": one.poisson_ratio},
             (mesh_parameters(mesh), mesh_type_key(one.mesh_type), definition_key(one.definition)),
             labels=asdict(one),
-            costs=[("moduli", particles(mesh)), (one.definition, particles(mesh))],
+            seconds=expected_seconds(particles(mesh), one.definition),
             name=name,
             file=name,
             shared={"mesh": mesh_source(mesh)},
@@ -148,5 +150,4 @@ KIND = Kind(
     attributes=_attributes,
     stages=(stage("moduli", "studies.kinds.moduli.solve", "Measuring effective moduli", _tasks),),
     outputs=OUTPUTS,
-    costs={"moduli": (5e-4, 2e-6)},
 )

@@ -9,9 +9,6 @@ from ...output.browse import Plot, View
 if TYPE_CHECKING:
     from ...config.model import Study
 
-TABLES = ("definitions.csv", "moduli.csv", "which_definition.md")
-"""Tables that compare definitions: of scenes, of moduli, and what to use."""
-
 
 def figures(loads: Iterable[object], mesh_types: Iterable[object]) -> dict[str, dict[str, object]]:
     """Figures by stem: moduli, errors against mesh size by load, and heat maps by mesh type, of the scenes of beams."""
@@ -31,8 +28,7 @@ OUTPUTS = (
         "figures and tables that compare definitions",
         figures=_figures,
         plot="studies.kinds.moduli.figures:definitions",
-        tables=lambda study: list(TABLES),
-        write="studies.kinds.moduli.tables:write",
+        texts={"which_definition.md": "studies.kinds.moduli.tables:decision"},
         lack=needs("moduli", "compares moduli and no grid has them; add 'moduli: true' to a grid"),
     ),
 )

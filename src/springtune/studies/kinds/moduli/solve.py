@@ -3,7 +3,7 @@
 from springtune.problem.materials import InPlane, Material
 from springtune.problem.status import Status
 from springtune.scene.moduli import MeshModuli
-from springtune.springs import DefinitionError
+from springtune.springs.base import DefinitionError
 
 from ..scenes.mesh import make
 
@@ -30,10 +30,3 @@ def solve(task, moduli):
         "definition_evaluations": found.springs.evaluations,
         "spring_ratio": found.springs.spring_ratio,
     }
-
-
-def cost(task, moduli, result, seconds):
-    """Seconds of the solves, and those of the definition."""
-    particles, of_definition = len(moduli.sheet.mesh.points), result.get("definition_seconds", 0.0)
-    yield "moduli", particles, seconds - of_definition
-    yield task["definition"], particles, of_definition

@@ -1,10 +1,12 @@
-"""Samples, gathered in the groups ``/samples``, ``/effects`` and ``/sobol``."""
+"""Samples, gathered in the groups ``/samples`` and ``/sobol``."""
 
-from dataclasses import dataclass
-from itertools import product
+from dataclasses import replace
+from itertools import chain, product
+from math import nan
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 
 from springtune.problem.compare import deformation_error
 from springtune.problem.loads import LOADS
@@ -12,13 +14,12 @@ from springtune.problem.status import Status
 from springtune.reference.answers import beyond_linear, unit_scales
 from springtune.springs.lattice import COEFFICIENT
 
-from ...output.dataset import Filler, Group
+from ...output.dataset import Group
 from ...runs import store
 from ..scenes import any_reference
 from .designs import PARAMETERS, SOBOL_INDICES, blocks, roles
 from .interpolate import problem_key
-from .kind import DROP, MOST_SOLVED, UNIFORM, block_key, reference_key, result_key, solved_definitions
-from .outputs import QUANTITIES
+from .kind import MOST_SOLVED, UNIFORM, block_key, reference_key, result_key
 from .solve import DRAWN
 
 OF_REFERENCES = ("sample", "load")
@@ -30,36 +31,20 @@ HOW_FAR = "whether a reference of small strain applies to the network: not where
 SAMPLES = Group(
     "/samples",
     {
-        "displacement": (OF_NETWORKS, "m", "displacement of the loaded side, network", np.nan),
-        "deformation_error": (OF_NETWORKS, "1", "(network - reference) / |reference|, signed", np.nan),
-        "stiffness": (OF_NETWORKS, "N/m", "stiffness of all springs, where they have one", np.nan),
+        "displacement": (OF_NETWORKS, "m", "displacement of the loaded side, network", nan),
+        "deformation_error": (OF_NETWORKS, "1", "(network - reference) / |reference|, signed", nan),
+        "stiffness": (OF_NETWORKS, "N/m", "stiffness of all springs, where they have one", nan),
         "status": (OF_NETWORKS, "1", "what became of the scene", 0),
         "message": (OF_NETWORKS, "1", "why the scene is not solved", ""),
-        "reference_displacement": (OF_REFERENCES, "m", "displacement of the loaded side, finite elements", np.nan),
-        "reference_error_estimate": (OF_REFERENCES, "1", REFERENCE_BOUND, np.nan),
+        "reference_displacement": (OF_REFERENCES, "m", "displacement of the loaded side, finite elements", nan),
+        "reference_error_estimate": (OF_REFERENCES, "1", REFERENCE_BOUND, nan),
         "reference_applies": (OF_REFERENCES, "1", HOW_FAR, np.int8(0)),
         "reference_message": (("load",), "1", "why there is no reference", ""),
-        "best_stiffness": (OF_REFERENCES, "N/m", "uniform stiffness without a deformation error", np.nan),
+        "best_stiffness": (OF_REFERENCES, "N/m", "uniform stiffness without a deformation error", nan),
         "particles": (("sample",), "1", "number of particles", 0),
     },
     dimensions={"sample": "row of the design"},
     further={"reference_applies": {"flag_values": np.array([0, 1], "int8"), "flag_meanings": "no yes"}},
-)
-
-EFFECT = ("quantity", "parameter", "bin", "load", "definition")
-
-EFFECTS = Group(
-    "/effects",
-    {
-        "parameter_value": (("parameter", "bin"), "1", "mean of the parameter in the bin, in its SI unit", np.nan),
-        "main_effect": (EFFECT, "1", "mean of the quantity in the bin, in its SI unit", np.nan),
-        "main_effect_error": (EFFECT, "1", "standard error of the mean, in its SI unit", np.nan),
-    },
-    dimensions={
-        "quantity": "what is looked at",
-        "parameter": "parameter that varies",
-        "bin": "part of the parameter's distribution, each of the same probability",
-    },
 )
 
 INDEX = ("quantity", "parameter", "load", "definition")
@@ -70,16 +55,14 @@ ORDERS = {
     "total": "total-order Sobol index: share that the parameter takes part in",
 }
 
+ENDS = ("", "_low", "_high")
+
 SOBOL = Group(
     "/sobol",
     {
-        f"{order}_order{end}": (INDEX, "1", meaning, np.nan)
+        f"{order}_order{end}": (INDEX, "1", meaning, nan)
         for order, about in ORDERS.items()
-        for end, meaning in (
-            ("", about),
-            ("_low", "lower end of its bootstrap band"),
-            ("_high", "upper end of its bootstrap band"),
-        )
+        for end, meaning in zip(ENDS, (about, "lower end of its bootstrap band", "upper end of its bootstrap band"))
     }
     | {
         "base_samples": (OF_BASE, "1", "base samples that the indices are of", 0),
@@ -88,58 +71,49 @@ SOBOL = Group(
     dimensions={"quantity": "what is looked at", "parameter": "parameter that varies"},
 )
 
-MOST_BINS, BIN_POINTS = 16, 16
-"""Most parts of a parameter's distribution whose means are its main effect, and fewest points of each."""
-
 
 def groups(study, folder):
     """Groups of a dataset, see `springtune.studies.kinds.scenes.collect.groups`."""
     sample = study.parts["samples"]
-    if sample.blocks:  # a part of a study: indices and effects need all rows
-        return {}
     drawn, results = _stored(sample, folder / "samples")
-    points = sample.size * min(2, sample.rows // sample.size)
     axes = study.axes | {
         "sample": tuple(range(sample.rows)),
         "parameter": sample.varied,
-        "quantity": tuple(name for name in QUANTITIES if name != "best_stiffness" or sample.best_stiffness),
-        "bin": tuple(range(min(MOST_BINS, max(4, points // BIN_POINTS)))),
+        "quantity": sample.quantities,
     }
-    filler = Filler(SAMPLES.empty(axes))
     # Without a mesh, as beyond limits, a network has no particles; other definitions may have a mesh.
-    filler.put_arrays({"particles": np.max([found["particles"] for found in results.values()], axis=0)}, {})
-    for load in sample.loads:
-        _put_load(load, sample, filler, drawn, results, folder / "samples")
-    data = _with_coordinates(filler.data, sample, drawn, study.axes)
-    found = {SAMPLES.name: data, EFFECTS.name: _effects(sample, data, drawn, axes)}
+    particles = np.max([results[key]["particles"] for key in results if key != DRAWN], axis=0)
+    group, places = _with_coordinates(sample, drawn, study.axes)
+    frames = [pd.DataFrame(places | {"sample": axes["sample"], "particles": particles})]
+    frames += chain.from_iterable(_of_load(load, sample, drawn, results, folder / "samples") for load in sample.loads)
+    data = group.of_rows(axes, pd.concat(frames)).set_coords([*places])
+    data.attrs = {name: getattr(sample, name) for name in ("design", "size", "seed", "mesh_type", "kinematics")}
+    data.attrs["varied"] = " ".join(sample.varied)
+    found = {SAMPLES.name: data}
     if sample.design == SOBOL_INDICES:
-        found[SOBOL.name] = _indices(sample, data, axes)
+        found[SOBOL.name] = SOBOL.of_rows(axes, pd.concat(_indices(sample, data))).assign_attrs(OF_INDICES)
     return found
 
 
 def _stored(sample, folder):
-    """Parameters of all rows, and results by key: displacement, status, particles and messages by row."""
-    keys = {result_key(sample, load, name) for load in sample.loads for name in solved_definitions(sample)}
-    arrays = {key: ("displacement", "status", "particles") for key in keys}
-    arrays[DRAWN] = tuple(dict.fromkeys([*sample.parameters, "mesh_size"]))
-    parts, messages, before = {key: [] for key in arrays}, {key: {} for key in keys}, 0
-    for ends in blocks(sample.design, sample.size):
-        path = folder / f"{block_key(sample, *ends)}.h5"
-        read = store.read(path, sorted(arrays), sorted({name for names in arrays.values() for name in names}))
-        for key, part in parts.items():
-            part.append(read[key])
-        for key, found in messages.items():
-            found |= {before + int(row): text for row, text in read[key]["messages"].items()}
-        before += len(read[DRAWN]["length"])
-    joined = {
-        key: {name: np.concatenate([part[name] for part in parts[key]]) for name in names}
-        for key, names in arrays.items()
-    }
-    return joined.pop(DRAWN), {key: found | {"messages": messages[key]} for key, found in joined.items()}
+    """Parameters of all rows, and results by key: displacement, status, particles and message of each row."""
+    keys = sorted({result_key(sample, load, name) for load in sample.loads for name in sample.solved})
+    names = [*dict.fromkeys([*sample.drawn, "mesh_size"])]
+    paths = [folder / f"{block_key(sample, *ends)}.h5" for ends in blocks(sample.design, sample.size)]
+    fields = [*names, "displacement", "status", "particles"]
+    read = [store.read(path, [DRAWN, *keys], fields) for path in paths]
+    found = {key: pd.concat([_frame(one[key]) for one in read], ignore_index=True) for key in (DRAWN, *keys)}
+    return {name: found[DRAWN][name].values for name in names}, found
 
 
-def _put_load(load, sample, filler, drawn, results, folder):
-    """Put references, networks, their errors, and the uniform stiffness without an error under a load."""
+def _frame(found):
+    """Arrays of a block, and the message of each row."""
+    frame = pd.DataFrame({name: values for name, values in found.items() if name != "messages"})
+    return frame.assign(message=[found.get("messages", {}).get(str(row), "") for row in frame.index])
+
+
+def _of_load(load, sample, drawn, results, folder):
+    """References, networks, their errors, and the uniform stiffness without an error under a load."""
     kind, sign, is_linear = LOADS[load].kind, LOADS[load].sign, sample.kinematics == "linear"
     body, softness = SimpleNamespace(**drawn), COEFFICIENT * (drawn["young_modulus"] * drawn["thickness"])
     body.in_plane = body  # sheets of samples are in plane stress
@@ -153,11 +127,12 @@ def _put_load(load, sample, filler, drawn, results, folder):
         applies = [np.isfinite(pair).all() and not beyond_linear(*pair) for pair in pairs]
     values = {"reference_displacement": reference, "reference_error_estimate": answers.error_estimate}
     values |= {"reference_applies": applies, "reference_message": why}
-    if sample.best_stiffness:  # the solved one times its displacement over the reference
+    if "best_stiffness" in sample.quantities:  # the solved one times its displacement over the reference
         found = results[result_key(sample, load, UNIFORM)]
         solved = np.where(found["status"] == Status.SOLVED, sign * found["displacement"], np.nan)
         values["best_stiffness"] = softness * (solved / reference)
-    filler.put_arrays(values, {"load": load})
+    rows = {"sample": range(sample.rows), "load": load}
+    yield pd.DataFrame(rows | values)
     for name in sample.definitions:
         found = results[result_key(sample, load, name)]
         there = np.isin(found["status"], (Status.SOLVED, Status.LINEAR_ONLY, Status.UNSTABLE))
@@ -165,8 +140,8 @@ def _put_load(load, sample, filler, drawn, results, folder):
         displacement = np.where(there, (sign if is_linear else 1.0) * found["displacement"], np.nan)
         values = {"displacement": displacement, "deformation_error": deformation_error(displacement, reference)}
         values |= {"status": found["status"], "stiffness": softness if name == UNIFORM else np.nan}
-        values["message"] = [found["messages"].get(row, "") for row in range(sample.rows)]
-        filler.put_arrays(values, {"load": load, "definition": name})
+        values["message"] = found["message"]
+        yield pd.DataFrame(rows | {"definition": name} | values)
 
 
 def _answers(sample, drawn, folder, kind, aspects):
@@ -184,43 +159,27 @@ def _answers(sample, drawn, folder, kind, aspects):
     return answers, f"{len(reasons)} of {len(rows)} points: {reasons[0]}" if reasons else ""
 
 
-def _with_coordinates(data, sample, drawn, dimensions):
-    """The group with the parameters of each row as coordinates."""
-    coordinates = {
+def _with_coordinates(sample, drawn, dimensions):
+    """The group with coordinates of each row, and their values: parameters, base sample, and role in it."""
+    parts, variables, places = roles(sample.design, sample.varied), {}, {}
+    for name, values in drawn.items():
         # A coordinate must not have the name of a dimension that it does not run along, here or in the root.
-        f"sample_{name}" if name in dimensions else name: (
-            "sample",
-            values,
-            {"long_name": PARAMETERS[name][1], "units": PARAMETERS[name][2]},
-        )
-        for name, values in drawn.items()
-    }
-    parts = roles(sample.design, sample.varied)
-    base = np.repeat(np.arange(sample.size, dtype=np.int32), len(parts))
-    about = {"units": "1", "long_name": "base sample that the row belongs to"}
-    coordinates["base"] = ("sample", base, about)
+        own = f"sample_{name}" if name in dimensions else name
+        variables[own], places[own] = (("sample",), PARAMETERS[name][2], PARAMETERS[name][1], np.nan), values
+    variables["base"] = ("sample",), "1", "base sample that the row belongs to", np.int32(0)
+    places["base"] = np.repeat(range(sample.size), sample.each)
     if len(parts) > 1:
-        flags = np.arange(len(parts), dtype="int8")
-        about = {"units": "1", "flag_values": flags, "flag_meanings": " ".join(parts)}
-        about["long_name"] = "part of the base sample: A, B, or A with one parameter of B"
-        coordinates["role"] = ("sample", np.tile(flags, sample.size), about)
-    data = data.assign_coords(coordinates)
-    data.attrs = {name: getattr(sample, name) for name in ("design", "size", "seed", "mesh_type", "kinematics")}
-    data.attrs |= {"failures": _policy(sample), "varied": " ".join(sample.varied)}
-    return data
+        variables["role"] = ("sample",), "1", "part of the base sample: A, B, or A with one parameter of B", 0
+        places["role"] = np.tile(range(len(parts)), sample.size)
+    return replace(SAMPLES, variables=SAMPLES.variables | variables, flags={"role": tuple(parts)}), places
 
 
-def _policy(sample):
-    if sample.design != SOBOL_INDICES:
-        return "scenes without a value are left out of main effects"
-    what = "the whole base sample is left out" if sample.failures == DROP else "there are no indices"
-    return f"where a scene has no value {what}; base_samples_without counts them"
+LEFT_OUT = "where a scene has no value the whole base sample is left out; base_samples_without counts them"
 
 
 def _values(sample, data):
     """Labels of each quantity, load and definition, and values by row, NaN where a scene is not solved stably."""
-    quantities = [name for name in QUANTITIES if name != "best_stiffness" or sample.best_stiffness]
-    for quantity, load, name in product(quantities, sample.loads, sample.definitions):
+    for quantity, load, name in product(sample.quantities, sample.loads, sample.definitions):
         one = data[[quantity, "status"]].sel(load=load, definition=name)
         values = one[quantity].values
         if quantity != "best_stiffness":
@@ -228,46 +187,18 @@ def _values(sample, data):
         yield {"quantity": quantity, "load": load, "definition": name}, values
 
 
-def _effects(sample, data, drawn, axes):
-    """Means over each parameter alone, of rows that are independent of each other."""
-    effects = Filler(EFFECTS.empty(axes))
-    each, bins = sample.rows // sample.size, len(axes["bin"])
-    alone = np.flatnonzero(np.arange(sample.rows) % each < 2)  # A and B
-    for parameter in sample.varied:
-        of, at = {"parameter": parameter}, drawn[parameter][alone]
-        effects.put_arrays({"parameter_value": main_effect(at, at, bins)[0]}, of)
-        for labels, values in _values(sample, data):
-            _, mean, error = main_effect(at, values[alone], bins)
-            effects.put_arrays({"main_effect": mean, "main_effect_error": error}, labels | of)
-    return effects.data
-
-
-def _indices(sample, data, axes):
+def _indices(sample, data):
     """Sobol indices of each quantity, load and definition."""
-    found = Filler(SOBOL.empty(axes))
-    found.data.attrs = {
-        "estimators": "first order: Saltelli et al. 2010; total order: Jansen 1999",
-        "bands": f"between percentiles of {RESAMPLES} bootstrap samples, {100 * LEVEL:g} %",
-        "failures": _policy(sample),
-    }
     for labels, values in _values(sample, data):
         rows = values.reshape(sample.size, -1).T
         there = np.isfinite(rows).all(axis=0)
-        lacking = int((~there).sum())
-        found.put_arrays({"base_samples_without": lacking}, labels)
-        if lacking and sample.failures != DROP:
-            continue
         kept = rows[:, there]
         # A variation below the reference's own error is no variation of the networks' errors.
         known = data.reference_error_estimate.sel(load=labels["load"]).values
         least = float(np.nanmax(known, initial=0.0)) if labels["quantity"] == "deformation_error" else 0.0
-        indices = sobol_indices(kept[0], kept[1], kept[2:], least)
-        found.put_arrays({"base_samples": indices.rows}, labels)
-        for order in ORDERS:
-            low, high = getattr(indices, f"{order}_band")
-            values = {"order": getattr(indices, order), "order_low": low, "order_high": high}
-            found.put_arrays({f"{order}_{name}": value for name, value in values.items()}, labels)
-    return found.data
+        counts = {"base_samples": there.sum(), "base_samples_without": (~there).sum()}
+        yield pd.DataFrame([labels | counts])
+        yield pd.DataFrame(labels | {"parameter": sample.varied} | sobol_indices(kept[0], kept[1], kept[2:], least))
 
 
 RESAMPLES = 1000
@@ -275,32 +206,27 @@ RESAMPLES = 1000
 LEVEL = 0.95
 """Share of bootstrap samples within a band."""
 
-DRAWN_TOGETHER = 1 << 21
-"""Most base samples drawn at once for bootstrap samples: 16 MB."""
-
 NEGLIGIBLE = 1e-12
 """Smallest standard deviation over the largest value that is more than rounding."""
 
 
-@dataclass(frozen=True)
-class Indices:
-    """First- and total-order Sobol indices, shape (n_parameters,), and their bands, shape (2, n_parameters)."""
-
-    first: np.ndarray
-    total: np.ndarray
-    first_band: np.ndarray
-    total_band: np.ndarray
-    rows: int
+OF_INDICES = {
+    "estimators": "first order: Saltelli et al. 2010; total order: Jansen 1999",
+    "bands": f"between percentiles of {RESAMPLES} bootstrap samples, {100 * LEVEL:g} %",
+    "failures": LEFT_OUT,
+}
+"""Attributes of the group."""
 
 
-def sobol_indices(at_a: np.ndarray, at_b: np.ndarray, at_ab: np.ndarray, least: float = 0.0) -> Indices:
-    r"""Return Sobol indices from values at the rows of Saltelli's design; NaN without variation above `least`.
+def sobol_indices(at_a: np.ndarray, at_b: np.ndarray, at_ab: np.ndarray, least: float = 0.0) -> dict[str, np.ndarray]:
+    r"""Return Sobol indices and their bands, from values at the rows of Saltelli's design; NaN without variation.
 
     `at_a` and `at_b` are values at the rows A and B, shape (n,); `at_ab` those at A with each parameter of B in turn,
     shape (n_parameters, n). With the variance V of A and B together, first-order indices are
     :math:`\overline{f_B (f_{AB} - f_A)} / V`, total ones :math:`\tfrac12 \overline{(f_A - f_{AB})^2} / V`: table 2,
     (b) and (f), of Saltelli et al., Comput. Phys. Commun. 181:259 (2010). Bands are percentiles of bootstrap samples of
-    base samples. scipy's ``sobol_indices`` takes only powers of two, and its bootstrap has no seed.
+    base samples. A standard deviation up to `least` is no variation. scipy's ``sobol_indices`` takes only powers of
+    two, and its bootstrap has no seed.
 
     Examples
     --------
@@ -310,15 +236,14 @@ def sobol_indices(at_a: np.ndarray, at_b: np.ndarray, at_ab: np.ndarray, least: 
     >>> a, b = np.split(qmc.Sobol(4, seed=0).random(256), 2, axis=1)
     >>> of = lambda x, y: x + 2 * y
     >>> found = sobol_indices(of(*a.T), of(*b.T), np.array([of(b[:, 0], a[:, 1]), of(a[:, 0], b[:, 1])]))
-    >>> found.first.round(2).tolist(), found.total.round(2).tolist()
+    >>> found["first_order"].round(2).tolist(), found["total_order"].round(2).tolist()
     ([0.2, 0.8], [0.2, 0.8])
     """
     count, rows = at_ab.shape
     both = np.concatenate([at_a, at_b])
     largest = np.abs(both).max(initial=0.0)
     if rows < 2 or not largest > 0 or not np.std(both / largest) > max(NEGLIGIBLE, least / largest):
-        none = np.full(count, np.nan)
-        return Indices(none, none, np.stack([none, none]), np.stack([none, none]), rows)
+        return {f"{order}_order{end}": np.full(count, np.nan) for order in ORDERS for end in ENDS}
     # Standardized: else sums would lose digits, and squares might overflow.
     mean, size = (both / largest).mean(), (both / largest).std()
     at_a, at_b, at_ab = ((values / largest - mean) / size for values in (at_a, at_b, at_ab))
@@ -326,32 +251,9 @@ def sobol_indices(at_a: np.ndarray, at_b: np.ndarray, at_ab: np.ndarray, least: 
     terms = np.concatenate([at_b * (at_ab - at_a), 0.5 * (at_a - at_ab) ** 2, [(at_a + at_b) / 2],
                             [(at_a**2 + at_b**2) / 2]])  # fmt: skip
     random = np.random.default_rng(0)
-    parts, together = [terms.mean(axis=1)[None]], max(1, DRAWN_TOGETHER // rows)
-    for begin in range(0, RESAMPLES, together):
-        resamples = range(begin, min(begin + together, RESAMPLES))
-        drawn = [np.bincount(random.integers(rows, size=rows), minlength=rows) for _ in resamples]
-        parts.append(np.array(drawn, dtype=float) @ terms.T / rows)
-    means = np.concatenate(parts)
+    counts = (np.bincount(random.integers(rows, size=rows), minlength=rows) for _ in range(RESAMPLES))
+    means = np.array([terms.mean(axis=1), *(terms @ count / rows for count in counts)])
     found = means[:, : 2 * count] / (means[:, -1] - means[:, -2] ** 2)[:, None]
-    ends = np.quantile(found[1:], [(1 - LEVEL) / 2, (1 + LEVEL) / 2], axis=0)
-    return Indices(found[0, :count], found[0, count:], ends[:, :count], ends[:, count:], rows)
-
-
-def main_effect(parameter: np.ndarray, values: np.ndarray, bins: int) -> np.ndarray:
-    """Return means of parameter and values, and the standard error of the latter, of bins with as many points each.
-
-    Shape (3, bins). Points have to be independent; their values are NaN where there is none.
-
-    Examples
-    --------
-    >>> x = np.linspace(0, 1, 8)
-    >>> main_effect(x, 2 * x, 2)[:2].round(2).tolist()
-    [[0.21, 0.79], [0.43, 1.57]]
-    """
-    found = np.full((3, bins), np.nan)
-    for place, part in enumerate(np.array_split(np.argsort(parameter, kind="stable"), bins)):
-        there = part[np.isfinite(values[part])]
-        if len(there):
-            found[:2, place] = parameter[there].mean(), values[there].mean()
-            found[2, place] = values[there].std(ddof=1) / np.sqrt(len(there)) if len(there) > 1 else np.nan
-    return found
+    values = found[0], *np.quantile(found[1:], [(1 - LEVEL) / 2, (1 + LEVEL) / 2], axis=0)
+    halves = zip(ORDERS, (slice(count), slice(count, None)))
+    return {f"{order}_order{end}": one[half] for order, half in halves for end, one in zip(ENDS, values)}

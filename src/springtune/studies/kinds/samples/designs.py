@@ -4,7 +4,6 @@ All are extendable: the first half of a sample of twice the size is the sample, 
 """
 
 from collections.abc import Iterable, Mapping
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -24,7 +23,7 @@ PARAMETERS = {
 SOBOL_INDICES = "sobol-indices"
 """The design for Sobol indices: rows of a base sample differ in one parameter."""
 
-DESIGNS = (SOBOL_INDICES, "sobol", "latin-hypercube")
+DESIGNS = (SOBOL_INDICES, "sobol")
 
 SMALLEST_SIZE = 8
 
@@ -32,7 +31,7 @@ BASE_ROWS = 64
 """Most base samples of a task of `SOBOL_INDICES`; they have some hundred rows."""
 
 PLAIN_ROWS = 512
-"""Most base samples of a task of other designs; each is one row."""
+"""Most base samples of a task of plain Sobol points; each is one row."""
 
 
 def blocks(design: str, size: int) -> list[tuple[int, int]]:
@@ -50,44 +49,20 @@ def blocks(design: str, size: int) -> list[tuple[int, int]]:
     return list(zip(ends[:-1], ends[1:]))
 
 
-def points(design: str, size: int, dimensions: int, seed: int, first: int = 0, last: int | None = None) -> np.ndarray:
-    """Draw points `first` to `last` of the unit cube, shape (last - first, dimensions).
-
-    Sobol points are scrambled (Owen 1998, by scipy). A Latin hypercube has one point in each of `size` strata of every
-    dimension. One of twice the size keeps these points: each lies in one half of its stratum, and the other halves are
-    filled in an order of their own (Sallaberry, Helton and Hora, Reliab. Eng. Syst. Saf. 93:1047, 2008, but without
-    correlations).
+def points(dimensions: int, seed: int, first: int, last: int) -> np.ndarray:
+    """Draw scrambled Sobol points `first` to `last` of the unit cube, shape (last - first, dimensions).
 
     Examples
     --------
-    >>> first, more = (points("latin-hypercube", size, 2, seed=1) for size in (8, 16))
-    >>> bool((more[:8] == first).all()), sorted(int(16 * x) for x in more[:, 0]) == list(range(16))
-    (True, True)
+    >>> bool((points(2, 1, 0, 16)[8:] == points(2, 1, 8, 16)).all())
+    True
     """
-    if design == "latin-hypercube":
-        return _latin_hypercube(size, dimensions, seed)[first:last].copy()
     from scipy.stats import qmc  # here: it costs half a second
 
     engine = qmc.Sobol(dimensions, scramble=True, seed=np.random.default_rng(seed))
     if first:
         engine.fast_forward(first)
-    return np.asarray(engine.random((size if last is None else last) - first))
-
-
-@lru_cache(maxsize=1)  # all tasks of a sample ask for parts of the same points
-def _latin_hypercube(size: int, dimensions: int, seed: int) -> np.ndarray:
-    found = np.random.default_rng([seed, 0]).random((1, dimensions))
-    while len(found) < size:
-        count = len(found)
-        random = np.random.default_rng([seed, count])
-        new = np.empty_like(found)
-        for axis in range(dimensions):
-            # Sizes are powers of two, so that products with them are exact.
-            empty = np.setdiff1d(np.arange(2 * count), (2 * count * found[:, axis]).astype(int))
-            places = random.permutation(empty) + random.random(count)
-            new[:, axis] = np.minimum(places, np.nextafter(np.floor(places) + 1.0, 0.0)) / (2 * count)
-        found = np.concatenate([found, new])
-    return found
+    return np.asarray(engine.random(last - first))
 
 
 def quantile(distribution: Mapping[str, Any], shares: np.ndarray) -> np.ndarray:
@@ -143,8 +118,7 @@ def draw(
     """
     names, pair = varied(parameters), design == SOBOL_INDICES
     count = len(names)
-    size = 1 << (last - 1).bit_length()  # a power of two
-    shares = points(design, size, count * (2 if pair else 1), seed, first, last)
+    shares = points(count * (2 if pair else 1), seed, first, last)
     table = np.repeat(shares[:, None, :count], len(roles(design, names)), axis=1)
     if pair:
         table[:, 1] = other = shares[:, count:]

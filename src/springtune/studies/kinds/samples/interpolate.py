@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from ...runs import store
-from ...runs.task_costs import TaskCosts
+from ...runs.job import Attempts
 from ..scenes import unit_references
 from .designs import draw
 
 
-def run(content: dict[str, Any], costs: TaskCosts) -> None:
+def run(content: dict[str, Any], attempts: Attempts) -> None:
     """Build the interpolants that are not there yet."""
     for file in content["files"]:
         (task,), pairs = file["tasks"], set()
@@ -21,14 +21,14 @@ def run(content: dict[str, Any], costs: TaskCosts) -> None:
             pairs = set(zip((drawn["length"] / drawn["height"]).tolist(), drawn["poisson_ratio"].tolist()))
         problems = {problem_key(task["key"], *pair): pair for pair in sorted(pairs)}
         unit_references.make_interpolant(
-            Path(content["folder"]) / f"{task['key']}.h5", task | {"problems": problems}, costs
+            Path(content["folder"]) / f"{task['key']}.h5", task | {"problems": problems}, attempts
         )
 
 
-def gone(content: dict[str, Any], key: str, why: str, limits: str) -> None:
-    """Store the failed result of a reference, or of an interpolant, beyond its limits."""
+def crashed(content: dict[str, Any], key: str, why: str) -> None:
+    """Store the failed result of a reference, or of an interpolant, whose process died."""
     path = Path(content["folder"]) / f"{key.partition(' ')[0]}.h5"
-    store.add(path, {key: unit_references.failed({}, why) | {store.LIMITS: limits}})
+    store.add(path, {key: unit_references.failed({}, why)})
 
 
 def problem_key(interpolant: str, aspect_ratio: float, nu: float) -> str:

@@ -1,155 +1,90 @@
 """Samples: a study's section ``samples``."""
 
-import math
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
 from functools import cache
 from typing import Annotated, Any
 
-from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic import Field, GetCoreSchemaHandler, create_model
 from pydantic_core import CoreSchema, core_schema
 
-from springtune.mesh import MESH_TYPES
-from springtune.mesh.types import MOST_MESHED
+from springtune.mesh.types import MESH_TYPES
 from springtune.problem.geometry import warn_of_size, warn_of_thickness
 from springtune.problem.loads import LOADS
 from springtune.problem.parameters import MOST_SCENES
-from springtune.problem.quantities import LEAST, nearest
-from springtune.springs import DEFINITIONS
+from springtune.safe_io.tables import number_text
+from springtune.springs.base import DEFINITIONS
 
-from ...config.checks import MORE_SCENES, check_able, in_mm, most_scenes
-from ...config.fields import (
-    POISSON_RATIO,
-    DefinitionNames,
-    Flag,
-    Kinematics,
-    Load,
-    OneOrMore,
-    Scalar,
-    number,
-    one_of,
-    quantity,
-)
+from ...config import fields
+from ...config.checks import MORE_SCENES, check_able, check_particles, in_mm, most_scenes
+from ...config.fields import OneOrMore, Scalar, Section, default, number, one_of, optional, quantity
 from ...config.kind import Kind
 from ...config.messages import refuse, show
-from ...config.sections import Section, default, optional
-from ...runs.checked_json import hash_of
 from ...runs.keys import definition_key, mesh_type_key, stage_key
+from ...runs.source import hash_of
 from ...runs.stages import Task, stage
-from ..scenes.plan import expected_solves
 from .designs import DESIGNS, PARAMETERS, SMALLEST_SIZE, SOBOL_INDICES, blocks, roles, varied
-from .outputs import OUTPUTS
+from .outputs import OUTPUTS, QUANTITIES
 
-DISTRIBUTION_KEYS = {
-    "uniform": ("from", "to"),
-    "log-uniform": ("from", "to"),
-    "triangular": ("from", "mode", "to"),
-    "normal": ("mean", "deviation"),
-}
-
-DEVIATIONS = 4.0
-"""Standard deviations from the mean at which a normal distribution ends by default."""
-
-MOST_DEVIATIONS = 8.0
-"""Largest distance of the range of a normal distribution from its mean, in standard deviations."""
-
-LEGAL = {"poisson_ratio": (math.nextafter(-1.0, 0.0), 0.5), "relative_mesh_size": (LEAST, 1.0)}
-"""Range of the parameters that are not just positive."""
+FURTHER_KEYS = {"uniform": (), "log-uniform": (), "triangular": ("mode",), "normal": ("mean", "deviation")}
+"""Keys of each distribution besides its ends."""
 
 _NUMBERS = {
-    "poisson_ratio": POISSON_RATIO,
+    "poisson_ratio": fields.POISSON_RATIO,
     "relative_mesh_size": number("a number above 0 and at most 1, such as 0.2", 0, 1, above=True),
 }
+
+
+class DistributionConfig(Section):
+    """The distribution to draw a parameter from; `Distributed` adds its numbers."""
+
+    distribution: Annotated[str, one_of("distribution", FURTHER_KEYS)] = "uniform"
+
+    @classmethod
+    def _needed(cls, given: Mapping[str, object]) -> dict[str, str]:
+        name = str(given.get("distribution", "uniform"))
+        keys = ("from", "to", *FURTHER_KEYS.get(name, ()))
+        return {key: f": a {name} distribution needs {' and '.join(keys)}" for key in keys}
 
 
 class Distributed:
     """Annotation of a parameter: a value, or the distribution to draw it from."""
 
     def __init__(self, name: str, example: str) -> None:
-        scalar = _NUMBERS.get(name) or quantity(PARAMETERS[name][0])
-        self.name, self.scalar, self.example = name, scalar, example
-        self.words = f"{scalar.words}, or a range such as `{example}`"
+        self.name, self.scalar = name, _NUMBERS.get(name) or quantity(PARAMETERS[name][0])
+        self.words = f"{self.scalar.words}, or a range such as `{example}`"
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        single = handler.generate_schema(Annotated[float, self.scalar])
+        number = Annotated[float, self.scalar]
+        keys: dict[str, Any] = {name: (number, Field(alias=key)) for name, key in (("low", "from"), ("high", "to"))}
+        keys |= {key: (number | None, None) for key in ("mode", "mean", "deviation")}
+        section = create_model(f"{self.name}_distribution", __base__=DistributionConfig, **keys)
         fixed = core_schema.no_info_after_validator_function(
-            lambda value: {"distribution": "fixed", "low": value, "high": value}, single
+            lambda value: {"distribution": "fixed", "low": value, "high": value}, handler.generate_schema(number)
         )
-        choices: dict[Any, CoreSchema] = {
-            "fixed": fixed,
-            "drawn": core_schema.no_info_plain_validator_function(self._read),
-        }
+        drawn = core_schema.no_info_after_validator_function(self._checked, handler.generate_schema(section))
+        choices: dict[Any, CoreSchema] = {"fixed": fixed, "drawn": drawn}
         return core_schema.tagged_union_schema(
             choices, lambda value: "drawn" if isinstance(value, dict | list) else "fixed"
         )
 
-    def __get_pydantic_json_schema__(self, schema: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        value = dict(self.scalar.schema)
-        keys = dict.fromkeys((key for needed in DISTRIBUTION_KEYS.values() for key in needed), value)
-        drawn = {
-            "type": "object",
-            "properties": {"distribution": {"enum": list(DISTRIBUTION_KEYS)}} | keys,
-            "additionalProperties": False,
-        }
-        return {"anyOf": [value, drawn]}
-
-    def _read(self, value: object) -> dict[str, Any]:
-        if not isinstance(value, dict):
-            raise refuse(f"{show(value)}, as in a grid; a sample has a value or a range: give {self.example}")
-        name = value.get("distribution") or "uniform"
-        if not isinstance(name, str) or name not in DISTRIBUTION_KEYS:
-            raise refuse(f"unknown distribution {show(name)}; {nearest(str(name), DISTRIBUTION_KEYS)}", "distribution")
-        needed = DISTRIBUTION_KEYS[name]
-        known = [*dict.fromkeys([*needed, "from", "to"]), "distribution"]
-        for key in value:
-            if key not in known:
-                raise refuse(f"unknown key {show(key)} of a {name} distribution; {nearest(str(key), known)}", key)
-        for key in needed:
-            if value.get(key) is None:
-                raise refuse(f"'{key}' is missing: a {name} distribution needs {' and '.join(needed)}; give them, such "
-                             f"as {self.example}")  # fmt: skip
-        read = {key: self._number(key, one) for key, one in value.items() if key != "distribution" and one is not None}
-        if name == "normal":
-            read = self._ended(read)
-        low, high = read.pop("from"), read.pop("to")
+    def _checked(self, section: DistributionConfig) -> dict[str, Any]:
+        name = section.distribution
+        read = {key: value for key, value in section if key != "distribution" and value is not None}
+        texts = {key: show(number_text(value, PARAMETERS[self.name][2])) for key, value in read.items()}
+        low, high = read["low"], read["high"]
+        for key in read.keys() - {"low", "high", *FURTHER_KEYS[name]}:
+            raise refuse(f"a {name} distribution has no '{key}'; remove it", key)
         if not low < high:
-            ends = f"{show(value.get('from', low))} is not below 'to', {show(value.get('to', high))}"
+            ends = f"{texts['low']} is not below 'to', {texts['high']}"
             raise refuse(f"{ends}; exchange them, or give one value for a parameter that does not vary", "from")
         if name == "log-uniform" and not low > 0:
-            raise refuse(f"{show(value['from'])} has no logarithm; give a 'from' above zero, or a uniform one", "from")
-        if name == "triangular" and not low <= read["mode"] <= high:
-            raise refuse(f"{show(value['mode'])} is not between 'from' and 'to'; give a mode between them", "mode")
-        if name == "normal":
-            most = MOST_DEVIATIONS * read["deviation"]
-            where = (
-                "below 'from'" if read["mean"] + most <= low else "above 'to'" if read["mean"] - most >= high else ""
-            )
-            if where:
-                raise refuse(f"{show(value['mean'])} is far {where}; give ends near the mean", "mean")
-        return {"distribution": name, "low": low, "high": high} | read
-
-    def _number(self, key: str, value: object) -> float:
-        """Read a number of the parameter's own kind; what is wrong with it goes under its key."""
-        if not isinstance(value, str):
-            raise refuse(f"{show(value)} instead of {self.scalar.words}; give {self.scalar.words}", key)
-        try:
-            return float(self.scalar.read(value.strip()))
-        except Exception as error:
-            message = getattr(error, "context", None) or {"message": str(error)}
-            raise refuse(message["message"], key) from None
-
-    def _ended(self, read: dict[str, float]) -> dict[str, float]:
-        """Add the ends of a normal distribution: by default some deviations from the mean, within its legal range."""
-        if not read["deviation"] > 0:
-            raise refuse("'0' is no deviation; give one above zero, or one value", "deviation")
-        least, most = LEGAL.get(self.name, (0.0, float("inf")))
-        below, above = (read["mean"] + sign * DEVIATIONS * read["deviation"] for sign in (-1, 1))
-        if "from" not in read and below <= least and self.name != "poisson_ratio":
-            raise refuse(
-                f"{DEVIATIONS:g} deviations below the mean are not above zero; give where the distribution ends, "
-                "from: <smallest value>",
-                "deviation",
-            )
-        return {"from": max(least, below), "to": min(most, above)} | read
+            raise refuse(f"{texts['low']} has no logarithm; give a 'from' above zero, or a uniform one", "from")
+        for key in {"mode", "mean"} & read.keys():
+            if not low <= read[key] <= high:
+                raise refuse(f"{texts[key]} is not between 'from' and 'to'; give a {key} between them", key)
+        if not read.get("deviation", 1.0) > 0:
+            raise refuse(f"{texts['deviation']} is no deviation; give one above zero, or one value", "deviation")
+        return {"distribution": name} | read
 
 
 MOST_SOLVED = 1024
@@ -160,11 +95,6 @@ UNIFORM = "uniform"
 
 SOLVE, INTERPOLATE = "studies.kinds.samples.solve", "studies.kinds.samples.interpolate"
 
-DROP = "drop"
-
-FAILURES = (DROP, "withhold")
-"""What becomes of indices where scenes have no value."""
-
 Drawn = dict[str, Any]
 
 
@@ -172,32 +102,33 @@ class ParametersConfig(Section):
     """Parameters of sampled scenes: each is a value, or a distribution to draw it from.
 
     `{from: 100 mm, to: 400 mm}` is uniform; `{from: 1 MPa, to: 1 GPa, distribution: log-uniform}` has a uniform
-    logarithm; `{from: 1 mm, mode: 2 mm, to: 5 mm, distribution: triangular}`; `{mean: 40 mm, deviation: 2 mm,
-    distribution: normal}` ends at `from` and `to`, by default 4 deviations from the mean or at the last legal value.
+    logarithm; `{from: 1 mm, mode: 2 mm, to: 5 mm, distribution: triangular}`; `{from: 32 mm, mean: 40 mm,
+    deviation: 2 mm, to: 48 mm, distribution: normal}` is cut off at its ends.
     """
 
-    length: Annotated[Drawn, Distributed("length", "{from: 100 mm, to: 400 mm}")] = Field(
-        description="Extent along x, the direction of the load."
-    )
-    height: Annotated[Drawn, Distributed("height", "{from: 20 mm, to: 80 mm}")] = Field(description="Extent along y.")
-    thickness: Annotated[Drawn, Distributed("thickness", "{from: 1 mm, to: 2 mm}")] = default(
-        "1 mm", description="Extent out of the plane."
-    )
-    mesh_size: Annotated[Drawn, Distributed("mesh_size", "{from: 2 mm, to: 5 mm}")] | None = Field(
-        None, description="Length of an edge; at most the smaller side of any beam. Give this or `relative_mesh_size`."
-    )
-    relative_mesh_size: Annotated[Drawn, Distributed("relative_mesh_size", "{from: 0.1, to: 0.3}")] | None = Field(
-        None, description="Length of an edge over the height."
-    )
-    young_modulus: Annotated[Drawn, Distributed("young_modulus", "{from: 1 GPa, to: 210 GPa}")] = Field(
-        description="Young's modulus E."
-    )
-    poisson_ratio: Annotated[Drawn, Distributed("poisson_ratio", "{from: 0, to: 0.5}")] = Field(
-        description="Poisson's ratio nu."
-    )
-    force: Annotated[Drawn, Distributed("force", "{from: 1 kN, to: 20 kN}")] = Field(
-        description="Magnitude of the force. The load's name carries the sign."
-    )
+    length: Annotated[Drawn, Distributed("length", "{from: 100 mm, to: 400 mm}")]
+    """Extent along x, the direction of the load."""
+
+    height: Annotated[Drawn, Distributed("height", "{from: 20 mm, to: 80 mm}")]
+    """Extent along y."""
+
+    thickness: Annotated[Drawn, Distributed("thickness", "{from: 1 mm, to: 2 mm}")] = default("1 mm")
+    """Extent out of the plane."""
+
+    mesh_size: Annotated[Drawn, Distributed("mesh_size", "{from: 2 mm, to: 5 mm}")] | None = None
+    """Length of an edge; at most the smaller side of any beam. Give this or `relative_mesh_size`."""
+
+    relative_mesh_size: Annotated[Drawn, Distributed("relative_mesh_size", "{from: 0.1, to: 0.3}")] | None = None
+    """Length of an edge over the height."""
+
+    young_modulus: Annotated[Drawn, Distributed("young_modulus", "{from: 1 GPa, to: 210 GPa}")]
+    """Young's modulus E."""
+
+    poisson_ratio: Annotated[Drawn, Distributed("poisson_ratio", "{from: 0, to: 0.5}")]
+    """Poisson's ratio nu."""
+
+    force: Annotated[Drawn, Distributed("force", "{from: 1 kN, to: 20 kN}")]
+    """Magnitude of the force. The load's name carries the sign."""
 
 
 def _read_size(value: str) -> int:
@@ -205,21 +136,15 @@ def _read_size(value: str) -> int:
         size = int(value)
     except ValueError:
         raise refuse(f"{show(value)} is not a whole number; give a power of two such as 1024") from None
-    if size < SMALLEST_SIZE or size & (size - 1):
-        above = max(SMALLEST_SIZE, 1 << max(0, size - 1).bit_length())
-        below = f"{above // 2} or " if above > SMALLEST_SIZE else ""
-        raise refuse(
-            f"{show(value)} is not a power of two from {SMALLEST_SIZE} on, which keeps a sample even and lets it be "
-            f"doubled; give {below}{min(above, MOST_SCENES)}"
-        )
+    if not SMALLEST_SIZE <= size <= MOST_SCENES or size & (size - 1):
+        why = f"is not a power of two from {SMALLEST_SIZE} to {MOST_SCENES}, which keeps a sample even"
+        raise refuse(f"{show(value)} {why} and lets it be doubled; give one such as 1024")
     return size
 
 
 Size = Annotated[int, Scalar(_read_size, {"type": "integer", "minimum": SMALLEST_SIZE}, "a power of two such as 1024")]
 Seed = Annotated[int, number("a whole number from 0, such as 1", 0, 2**31, whole=True)]
 Design = Annotated[str, one_of("design", DESIGNS)]
-MadeType = Annotated[str, one_of("mesh type", MESH_TYPES)]
-FailurePolicy = Annotated[str, one_of("policy", FAILURES)]
 
 
 class SamplesConfig(Section):
@@ -228,81 +153,100 @@ class SamplesConfig(Section):
     A sample of twice the size keeps its scenes and adds as many. Stored scenes are not solved again.
     """
 
-    design: Design = Field(
-        SOBOL_INDICES,
-        description="`sobol-indices`: Saltelli's design for first- and total-order Sobol indices, with `size` x "
-        "(varied parameters + 2) points; `sobol`: scrambled Sobol points; `latin-hypercube`.",
-    )
-    size: Size = Field(description="Number of points: a power of two. For `sobol-indices`, of base samples.")
-    seed: Seed = default("1", description="Seed of the random numbers.")
-    mesh_type: MadeType = default("structured", description="Generated mesh type.")
-    load: Annotated[list[Load], OneOrMore()] = Field(description="Loads; each acts on every point's scene.")
-    definition: DefinitionNames = Field(description="Definitions that need no reference and no stated stiffness.")
-    kinematics: Kinematics = default(
-        "linear",
-        description="`linear` solves scenes once that differ in thickness, Young's modulus and force alone; "
-        "`nonlinear` solves each scene, which takes some ten times as long.",
-    )
-    best_stiffness: Flag = default(
-        "true", description="Whether to find the uniform stiffness without an error, too; with linear kinematics only."
-    )
-    failures: FailurePolicy = Field(
-        DROP,
-        description="If scenes have no value, `drop` leaves their whole base samples out of indices, and `withhold` "
-        "gives no indices. Both count them.",
-    )
-    parameters: ParametersConfig = Field(description="Parameters of the scenes.")
+    design: Design = Field(SOBOL_INDICES)
+    """`sobol-indices`: Saltelli's design for first- and total-order Sobol indices, with `size` x (varied parameters
+    + 2) points; `sobol`: scrambled Sobol points."""
 
+    size: Size
+    """Number of points: a power of two. For `sobol-indices`, of base samples."""
 
-@dataclass(frozen=True)
-class Sample:
-    """What a study samples; `blocks` are the tasks of a part of a study, and empty for a whole study."""
+    seed: Seed = default("1")
+    """Seed of the random numbers."""
 
-    design: str
-    size: int
-    seed: int
-    mesh_type: str
-    loads: tuple[str, ...]
-    definitions: tuple[str, ...]
-    kinematics: str
-    best_stiffness: bool
-    failures: str
-    parameters: dict[str, dict[str, Any]]
-    blocks: tuple[tuple[int, int], ...] = ()
+    mesh_type: fields.MadeType = default("structured")
+    """Generated mesh type."""
+
+    load: Annotated[list[fields.Load], OneOrMore()]
+    """Loads; each acts on every point's scene."""
+
+    definition: fields.DefinitionNames
+    """Definitions that derive a stiffness and need no reference."""
+
+    kinematics: fields.Kinematics = default("linear")
+    """`linear` solves scenes once that differ in thickness, Young's modulus and force alone; `nonlinear` solves
+    each scene, which takes some ten times as long."""
+
+    parameters: ParametersConfig
+    """Parameters of the scenes."""
 
     @property
-    def varied(self) -> tuple[str, ...]:
+    def loads(self) -> list[str]:
+        """Loads in a canonical order."""
+        return [name for name in LOADS if name in self.load]
+
+    @property
+    def definitions(self) -> list[str]:
+        """Definitions in a canonical order."""
+        return [name for name in DEFINITIONS if name in self.definition]
+
+    @property
+    def quantities(self) -> list[str]:
+        """Quantities that are looked at; only answers that scale with the force have a best stiffness."""
+        return [name for name in QUANTITIES if name != "best_stiffness" or self.kinematics == "linear"]
+
+    @property
+    def solved(self) -> list[str]:
+        """Definitions whose networks are solved: uniform springs tell the best stiffness."""
+        also = [UNIFORM] if "best_stiffness" in self.quantities else []
+        return list(dict.fromkeys([*self.definitions, *also]))
+
+    @property
+    def drawn(self) -> dict[str, Drawn]:
+        """Distribution of each given parameter."""
+        given = {name: getattr(self.parameters, name) for name in PARAMETERS}
+        return {name: one for name, one in given.items() if one is not None}
+
+    @property
+    def varied(self) -> list[str]:
         """Parameters that are not fixed."""
-        return tuple(varied(self.parameters))
+        return varied(self.drawn)
+
+    @property
+    def each(self) -> int:
+        """Number of points of a base sample."""
+        return len(roles(self.design, self.varied))
 
     @property
     def rows(self) -> int:
         """Number of points whose scenes are solved."""
-        return self.size * len(roles(self.design, self.varied))
+        return self.size * self.each
 
     @property
     def scenes(self) -> int:
         """Number of scenes."""
-        return self.rows * len(self.loads) * len(self.definitions)
+        return self.rows * len(self.load) * len(self.definition)
 
 
 def _check(config, problems):
-    section = config.samples
-    where, sample = ("samples", "parameters"), _sample(section)
-    if (section.parameters.mesh_size is None) == (section.parameters.relative_mesh_size is None):
-        if section.parameters.mesh_size is not None:
-            problems.add((*where, "relative_mesh_size"), "both this and 'mesh_size'; remove one")
-        else:
-            remedy = "give one such as {from: 2 mm, to: 5 mm}, or a 'relative_mesh_size'"
-            problems.add(where, f"'mesh_size' is missing; {remedy}")
+    sample, where = config.samples, ("samples", "parameters")
+    if not {"mesh_size", "relative_mesh_size"} & sample.drawn.keys():
+        remedy = "give one such as {from: 2 mm, to: 5 mm}, or a 'relative_mesh_size'"
+        problems.add(where, f"'mesh_size' is missing; {remedy}")
+    elif {"mesh_size", "relative_mesh_size"} <= sample.drawn.keys():
+        problems.add((*where, "relative_mesh_size"), "both this and 'mesh_size'; remove one")
     else:
         _check_sizes(sample, problems)
     if not sample.varied:
         problems.add(where, "nothing varies; give at least one parameter a range such as {from: 100 mm, to: 400 mm}")
-    _check_definitions(section, problems)
+    path, why = (
+        ("samples", "definition"),
+        "needs a reference, a stated stiffness, or other cells or loads than this sample has;",
+    )
+    made, uniaxial = MESH_TYPES[sample.mesh_type], all(LOADS[name].kind.uniaxial for name in sample.load)
+    check_able(problems, path, sample.definition, why, made.corners, uniaxial)
     most = most_scenes()
     if sample.scenes > most:
-        each = f"{sample.rows // sample.size} rows x {len(sample.loads)} loads x {len(sample.definitions)} definitions"
+        each = f"{sample.each} rows x {len(sample.load)} loads x {len(sample.definition)} definitions"
         problems.add(
             ("samples", "size"),
             f"{sample.size} points make {sample.scenes} scenes ({each} each); a sample has at most {most}: "
@@ -310,79 +254,39 @@ def _check(config, problems):
         )
 
 
-def _check_definitions(section, problems):
-    path, why = ("samples", "definition"), "needs a reference, a stated stiffness or other cells than those of"
-    corners = MESH_TYPES[section.mesh_type].corners
-    check_able(problems, path, section.definition, f"{why} {section.mesh_type} meshes;", corners)
-    unstretched = [load for load in section.load if not LOADS[load].kind.uniaxial]
-    for name in section.definition:
-        for load in unstretched if DEFINITIONS[name].uniaxial and corners in DEFINITIONS[name].cells else ():
-            why = "is for loads that stretch a beam along its length"
-            problems.add(path, f"'{name}' {why}, and '{load}' does not; remove one")
-
-
 def _check_sizes(sample, problems):
     """Check mesh sizes against the smallest and the largest beam of a sample."""
-    name = "relative_mesh_size" if "relative_mesh_size" in sample.parameters else "mesh_size"
-    path, relative = ("samples", "parameters", name), name == "relative_mesh_size"
-    size, length, height = (sample.parameters[one] for one in (name, "length", "height"))
-    if relative:
-        largest = size["high"] * height["high"]
-        if largest > length["low"]:
-            problems.add(path, f"{size['high']:g} of a height of {in_mm(height['high'])} is {in_mm(largest)}, larger "
-                         f"than a length of {in_mm(length['low'])}; give a smaller 'to', or longer beams")  # fmt: skip
-    else:
-        largest, side = size["high"], min(length["low"], height["low"])
-        if largest > side:
-            problems.add(path, f"up to {in_mm(largest)} is larger than the smallest side of a beam, {in_mm(side)}; "
-                         f"give at most {in_mm(side)}, or a 'relative_mesh_size'")  # fmt: skip
-    box = length["high"], height["low" if relative else "high"]
+    relative = "relative_mesh_size" in sample.drawn
+    path = ("samples", "parameters", "relative_mesh_size" if relative else "mesh_size")
+    size, length, height = (sample.drawn[one] for one in (path[-1], "length", "height"))
+    largest = size["high"] * (height["high"] if relative else 1.0)
+    side = length["low"] if relative else min(length["low"], height["low"])
+    if largest > side:
+        remedy = "a smaller 'to', or longer beams" if relative else f"at most {in_mm(side)}, or a 'relative_mesh_size'"
+        what = f"up to {in_mm(largest)} is larger than the smallest side of a beam, {in_mm(side)}"
+        problems.add(path, f"{what}; give {remedy}")
     smallest = size["low"] * (height["low"] if relative else 1.0)
-    particles = MESH_TYPES[sample.mesh_type].particles(*box, smallest) if smallest**2 else float("inf")
-    if particles > MOST_MESHED:
-        low, beam = f"{size['low']:g}" if relative else in_mm(size["low"]), f"{in_mm(box[0])} x {in_mm(box[1])}"
-        most = f"more than {MOST_MESHED:.0e}"
-        problems.add(path, f"{low} makes {particles:.0e} particles of a beam {beam}, {most}; give a larger 'from'")
-
-
-def _sample(section):
-    given = {name: getattr(section.parameters, name) for name in PARAMETERS}
-    same = ("design", "size", "seed", "mesh_type", "kinematics", "failures")
-    return Sample(
-        **{name: getattr(section, name) for name in same},
-        loads=tuple(name for name in LOADS if name in section.load),
-        definitions=tuple(name for name in DEFINITIONS if name in section.definition),
-        best_stiffness=section.best_stiffness and section.kinematics == "linear",
-        parameters={name: one for name, one in given.items() if one is not None},
-    )
+    check_particles(problems, path, [smallest], length["high"], height["low" if relative else "high"])
 
 
 def _expand(config, declared):
-    sample = _sample(config.samples)
-    sides = [sample.parameters[name] for name in ("length", "height")]
-    smallest = tuple(side["low"] for side in sides)
-    warn_of_size((*smallest, *(side["high"] for side in sides)), "samples")
-    warn_of_thickness(sample.parameters["thickness"]["high"], smallest, "samples")
-    return sample
+    drawn = config.samples.drawn
+    smallest, largest = (tuple(drawn[name][end] for name in ("length", "height")) for end in ("low", "high"))
+    warn_of_size((*smallest, *largest), "samples")
+    warn_of_thickness(drawn["thickness"]["high"], smallest, "samples")
+    return config.samples
 
 
 def _summary(sample):
-    design = {SOBOL_INDICES: "for Sobol indices", "sobol": "Sobol points"}.get(sample.design, "Latin hypercube")
-    each = f"{sample.size} x {sample.rows // sample.size} points" if sample.design == SOBOL_INDICES else "points"
-    times = [f"{len(names)} {what}s" for names, what in ((sample.loads, "load"), (sample.definitions, "definition"))
-             if len(names) > 1]  # fmt: skip
-    return [["samples", sample.scenes, f"scenes, {' x '.join([each, *times])}, {design}: {', '.join(sample.varied)}"]]
-
-
-def solved_definitions(sample):
-    """Definitions whose networks are solved."""
-    wanted = (UNIFORM,) if sample.best_stiffness and UNIFORM not in sample.definitions else ()
-    return (*sample.definitions, *wanted)
+    counts = [(sample.size, "base sample"), (sample.each, "row"), (len(sample.load), "load")]
+    counts += [(len(sample.definition), "definition")]
+    of = " x ".join(f"{count} {what}s" for count, what in counts if count > 1)
+    return [["samples", sample.scenes, f"scenes, {of}, design '{sample.design}': {', '.join(sample.varied)}"]]
 
 
 def reference_box(sample):
     """First and last aspect ratio, and first and last Poisson's ratio."""
-    length, height, ratio = (sample.parameters[name] for name in ("length", "height", "poisson_ratio"))
+    length, height, ratio = (sample.drawn[name] for name in ("length", "height", "poisson_ratio"))
     return [length["low"] / height["high"], length["high"] / height["low"]], [ratio["low"], ratio["high"]]
 
 
@@ -395,7 +299,7 @@ def reference_key(sample, kind):
 def block_key(sample, first, last):
     """Key of the parameters of some base samples, and stem of the file of their results on meshes of any type."""
     code = stage_key("studies.kinds.samples.designs")
-    return hash_of(sample.design, sample.seed, sample.parameters, first, last, code)
+    return hash_of(sample.design, sample.seed, sample.drawn, first, last, code)
 
 
 @cache
@@ -421,12 +325,11 @@ def _references(study):
     sample = study.parts["samples"]
     drawn, box = None, reference_box(sample)
     if sample.rows <= MOST_SOLVED:
-        drawn = {"design": sample.design, "seed": sample.seed, "parameters": sample.parameters}
+        drawn = {"design": sample.design, "seed": sample.seed, "parameters": sample.drawn}
         drawn |= {"first": 0, "last": sample.size}
     for kind in dict.fromkeys(LOADS[name].kind for name in sample.loads):
-        key, costs = reference_key(sample, kind), [("interpolant", expected_solves(box))]
-        values = {"kind": kind.name, "box": box}
-        yield Task(values, costs=costs, name=kind.name, file=key, key=key, shared={"sample": drawn})
+        key, values = reference_key(sample, kind), {"kind": kind.name, "box": box}
+        yield Task(values, seconds=1.0, name=kind.name, file=key, key=key, shared={"sample": drawn})
 
 
 def _blocks(study):
@@ -435,41 +338,15 @@ def _blocks(study):
     scenes = {
         result_key(sample, load, definition): _load_of(sample, load) | {"definition": definition}
         for load in sample.loads
-        for definition in solved_definitions(sample)
+        for definition in sample.solved
     }
-    shared = {
-        **{name: getattr(sample, name) for name in ("design", "seed", "parameters", "mesh_type", "kinematics")},
-        "meshed": hash_of(stage_key(SOLVE), mesh_type_key(sample.mesh_type)),
-        "results": scenes,
-    }
-    for first, last in _drawn(sample):
-        key, costs = block_key(sample, first, last), [("sampled", (last - first) * _scenes_each(sample))]
+    shared = {name: getattr(sample, name) for name in ("design", "seed", "mesh_type", "kinematics")}
+    shared |= {"parameters": sample.drawn, "results": scenes}
+    shared["meshed"] = hash_of(stage_key(SOLVE), mesh_type_key(sample.mesh_type))
+    for first, last in blocks(sample.design, sample.size):
+        key, seconds = block_key(sample, first, last), 6e-4 * (last - first) * sample.each * len(scenes)
         values = {"first": first, "last": last}
-        yield Task(values, costs=costs, name=f"{first}-{last}", file=key, key=key, shared=shared)
-
-
-def _drawn(sample):
-    """First and last base sample of each task: of the whole sample, or of the part that a study asks for."""
-    return sample.blocks or blocks(sample.design, sample.size)
-
-
-def _scenes_each(sample):
-    """Number of networks of a base sample."""
-    return sample.rows // sample.size * len(sample.loads) * len(solved_definitions(sample))
-
-
-def _pieces(study, costs, division):
-    """Seconds of each piece of a sample: of a task's base samples, or of all."""
-    sample = study.parts["samples"]
-    seconds = {ends: costs.of("sampled", (ends[1] - ends[0]) * _scenes_each(sample)) for ends in _drawn(sample)}
-    return division.of_section(seconds)
-
-
-def _take(study, names):
-    """The study with some of its pieces alone. What is estimated from all rows is left to the whole sample."""
-    sample, wanted = study.parts["samples"], set(names)
-    kept = tuple(ends for ends in _drawn(sample) if ends in wanted)
-    return replace(study, parts=study.parts | {"samples": replace(sample, blocks=kept) if kept else ()})
+        yield Task(values, seconds=seconds, name=f"{first}-{last}", file=key, key=key, shared=shared)
 
 
 def _tables(study):
@@ -479,9 +356,7 @@ def _tables(study):
 
 KIND = Kind(
     "samples",
-    study_fields={
-        "samples": optional(SamplesConfig, "Sampled scenes; they make the groups `/samples`, `/effects` and `/sobol`.")
-    },
+    study_fields={"samples": optional(SamplesConfig, "Sampled scenes; they make the groups `/samples` and `/sobol`.")},
     alone={"samples": ()},
     check=_check,
     expand=_expand,
@@ -492,9 +367,6 @@ KIND = Kind(
         stage("sample", SOLVE, "Solving the networks of samples", _blocks, folder="samples"),
     ),
     outputs=OUTPUTS,
-    pieces=_pieces,
-    take=_take,
     tables=_tables,
     tables_by="outputs",
-    costs={"sampled": (0.05, 6e-4)},
 )

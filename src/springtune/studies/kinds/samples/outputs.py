@@ -1,6 +1,5 @@
 """Figures and table of samples, and what the page to browse shows of them."""
 
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from ...config.kind import Output, needs, stem
@@ -17,34 +16,33 @@ QUANTITIES = {
     "deformation_error": "deformation error",
     "best_stiffness": "uniform stiffness without an error",
 }
-"""Quantities that have indices and main effects."""
+"""Quantities that have indices."""
 
 
-_lack = needs("samples", "shows sampled scenes and the study has none; add a section 'samples'")
+_lack_samples = needs("samples", "shows sampled scenes and the study has none; add a section 'samples'")
 
 
-def _lack_indices(study: "Study") -> str:
+def _lack(study: "Study") -> str:
     sample = study.parts["samples"]
     if sample and sample.design != SOBOL_INDICES:
         return f"shows Sobol indices, which a design '{sample.design}' has not; give design: {SOBOL_INDICES}"
-    return _lack(study)
+    return _lack_samples(study)
 
 
-def _each_load(name: str, study: "Study") -> dict[str, dict[str, str]]:
+def _figures(study: "Study") -> dict[str, dict[str, str]]:
     sample = study.parts["samples"]
-    return {stem(name, {"load": load}): {"load": load} for load in sample.loads} if sample else {}
+    return {stem("sobol", {"load": load}): {"load": load} for load in sample.loads} if sample else {}
 
 
-OUTPUTS = tuple(
+OUTPUTS = (
     Output(
-        name,
-        f"the figure of {shown} of samples",
-        figures=partial(_each_load, name),
-        plot=f"studies.kinds.samples.figures:{name}",
+        "sobol",
+        "the figure of Sobol indices of samples",
+        figures=_figures,
+        plot="studies.kinds.samples.figures:sobol",
         job="samples",
-        lack=lack,
-    )
-    for name, shown, lack in (("sobol", "Sobol indices", _lack_indices), ("effects", "main effects", _lack))
+        lack=_lack,
+    ),
 )
 
 OF_ERRORS = {"quantity": "deformation_error"}
@@ -75,33 +73,27 @@ VIEWS = (
             Plot("total order by quantity", "total_order", "parameter", "quantity", "map"),
         ),
     ),
-    View(
-        "/effects",
-        "Main effects",
-        "Means of a quantity over one parameter, whatever the others are.",
-        (Plot("main effect", "main_effect", "parameter_value", "definition", along="bin", selection=OF_ERRORS),),
-    ),
 )  # fmt: skip
 
 
 def tables(tree: "xr.DataTree") -> list[dict[str, Any]]:
     """Tables of the page, see `springtune.studies.kinds.scenes.tables.tables`."""
-    from ...output.selection import records  # here, since a plan does without xarray
-
     if "sobol" not in tree:
         return []
     found = tree["sobol"].to_dataset()
-    rows: dict[tuple[str, ...], dict[str, Any]] = {}
-    orders = [f"{order}_order{end}" for order in ("first", "total") for end in ("", "_low", "_high")]
-    for one in records(found, (found.base_samples > 0) & (found.parameter != ""), (*orders, "base_samples")):
-        if one["quantity"] == "best_stiffness":  # it is the same for all definitions
-            one["definition"] = ""
-        row = {name: one[name] for name in ("quantity", "load", "definition", "parameter", *orders, "base_samples")}
-        rows.setdefault(tuple(row.values())[:4], row)
+    labels = ["quantity", "load", "definition", "parameter"]
+    columns = [
+        *(f"{order}_order{end}" for order in ("first", "total") for end in ("", "_low", "_high")),
+        "base_samples",
+    ]
+    frame = found[columns].to_dataframe(dim_order=labels).reset_index()[[*labels, *columns]]
+    frame = frame[frame.base_samples > 0]
+    frame["definition"] = frame["definition"].mask(frame["quantity"] == "best_stiffness", "")  # one of all definitions
+    rows = frame.drop_duplicates(labels).to_dict("records")
     first, second, third = QUANTITIES.values()
     note = (
         f"{first.capitalize()}, {second} and {third}: shares of their variance by each parameter alone (first order) "
         f"and in all that it takes part in (total order). Bands: {found.attrs['bands']}. "
         f"Failures: {found.attrs['failures']}."
     )
-    return [{"stem": "sobol", "title": "Sobol indices", "note": note, "rows": list(rows.values())}]
+    return [{"stem": "sobol", "title": "Sobol indices", "note": note, "rows": rows}]

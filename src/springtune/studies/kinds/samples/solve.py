@@ -5,18 +5,17 @@ result: rows that differ in these alone are solved once. Meshes with as many cel
 share numbering, sparsity and symbolic factorization.
 """
 
-import time
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from springtune.mesh import MESH_TYPES
+from springtune.mesh.types import MESH_TYPES
 from springtune.problem.loads import LOAD_KINDS
 from springtune.problem.materials import Material
 from springtune.problem.status import Status
 from springtune.scene.sheet import Sheet
-from springtune.springs import DefinitionError
+from springtune.springs.base import DefinitionError
 
 from ...runs import store
 from .designs import draw
@@ -34,31 +33,31 @@ SCALES = 1e-7
 """Largest relative difference of a scaled result from a solved one: rounding."""
 
 
-def run(content, costs, kept_back=store.KEPT_BACK):
+def run(content, attempts):
     """Solve the scenes of a bundle that are not stored yet."""
     waiting = []
     for file in content["files"]:
         path = Path(content["folder"]) / f"{file['name']}.h5"
-        present = store.stored(path, costs.limits)
+        present = store.stored(path)
         if not {DRAWN, *file["results"]} <= present:
-            waiting.append(_Block(file, path, present, costs.limits))
+            waiting.append(_Block(file, path, present))
     count = TOGETHER[content["files"][0]["kinematics"]]
     for begin in range(0, len(waiting), count):
-        _solve_together(waiting[begin : begin + count], costs, kept_back)
+        _solve_together(waiting[begin : begin + count], attempts)
 
 
-def gone(content, key, why, limits):
-    """Store that a network went beyond its limits; its block is then solved without it."""
+def crashed(content, key, why):
+    """Store that the process that solved a network died; its block is then solved without it."""
     name = key.partition(" ")[0]
-    store.add(Path(content["folder"]) / f"{name}.h5", {f"{GONE_NETWORK}{key}": {"message": why, store.LIMITS: limits}})
+    store.add(Path(content["folder"]) / f"{name}.h5", {f"{GONE_NETWORK}{key}": {"message": why}})
 
 
 class _Block:
     """Rows of some base samples, and the results of their scenes so far."""
 
-    def __init__(self, file, path, present, limits):
+    def __init__(self, file, path, present):
         (task,) = file["tasks"]
-        self.file, self.path, self.part = file, path, path.with_stem(f"{path.stem}_part")
+        self.file, self.path = file, path
         self.missing = {key: scene for key, scene in file["results"].items() if key not in present}
         self.is_new = DRAWN not in present
         lost = {name for name in present if name.startswith(GONE_NETWORK)}
@@ -71,41 +70,16 @@ class _Block:
                 "status": np.full(rows, Status.FAILED, dtype=np.int8),
                 "particles": np.zeros(rows, dtype=np.int64),  # of the mesh type, which parameters do not say
                 "messages": {},
-                "limited": "",
             }
             for key in self.missing
         }
-        self.done = np.zeros(rows, dtype=bool)
-        self.is_kept, self.solved, self.seconds = True, 0, 0.0
-        if set(self.missing) <= store.stored(self.part, limits):  # a process ended before the block was done
-            fields = ("displacement", "status", "particles", "done")
-            self.found = store.read(self.part, self.missing, fields)
-            self.done = np.all([one.pop("done") for one in self.found.values()], axis=0)
-
-    def keep_part(self):
-        """Store the results of a block so far."""
-        if not self.is_kept:
-            store.add(self.part, {key: one | {"done": self.done} for key, one in self.results().items()})
-            self.is_kept = True
-
-    def keep_whole(self):
-        """Store the results of a block."""
-        store.add(self.path, self.results() | ({DRAWN: self.drawn} if self.is_new else {}))
-        self.part.unlink(missing_ok=True)
-
-    def results(self):
-        """Results of scenes, as they are stored."""
-        return {
-            key: one | ({store.LIMITS: one["limited"]} if one["limited"] else {}) for key, one in self.found.items()
-        }
 
     def meshes(self):
-        """Rows of each distinct mesh that are not done, by its length, height and mesh size [m]."""
+        """Rows of each distinct mesh, by its length, height and mesh size [m]."""
         found = {}
         boxes = zip(*(self.drawn[name].tolist() for name in ("length", "height", "mesh_size")))
         for row, box in enumerate(boxes):
-            if not self.done[row]:
-                found.setdefault(box, []).append(row)
+            found.setdefault(box, []).append(row)
         return found
 
     def keep(self, key, rows, scale, result):
@@ -115,39 +89,28 @@ class _Block:
         found["status"][rows] = result["status"]
         if result["message"]:
             found["messages"] |= dict.fromkeys(map(str, rows), result["message"])
-        found["limited"] = found["limited"] or result.get(store.LIMITS, "")
 
 
-def _solve_together(blocks, costs, kept_back):
+def _solve_together(blocks, attempts):
     """Solve blocks mesh by mesh; meshes with as many cells follow each other."""
     meshes = [(box, block, rows) for block in blocks for box, rows in block.meshes().items()]
     meshes.sort(key=lambda one: [round(side / one[0][2]) for side in one[0][:2]])
-    like, scaling, since = None, {}, time.perf_counter()
+    like, scaling = None, {}
     for box, block, rows in meshes:
-        begin = time.process_time()  # for the sizes of bundles, whatever else the machine does
-        like = _solve_mesh(block, box, np.array(rows), like, scaling, costs) or like
-        block.seconds += time.process_time() - begin
-        if costs.broken:
-            continue
-        block.done[rows], block.is_kept, block.solved = True, False, block.solved + len(rows)
-        if time.perf_counter() > since + kept_back:
-            for one in blocks:
-                one.keep_part()
-            since = time.perf_counter()
-    for block in blocks:
-        if not costs.broken:
-            block.keep_whole()
-            costs.add("sampled", block.solved * len(block.missing), block.seconds)
+        like = _solve_mesh(block, box, np.array(rows), like, scaling, attempts) or like
+    for block in () if attempts.broken else blocks:
+        store.add(block.path, block.found | ({DRAWN: block.drawn} if block.is_new else {}))
+        attempts.computed += 1
 
 
-def _solve_mesh(block, box, rows, like, scaling, costs):
+def _solve_mesh(block, box, rows, like, scaling, attempts):
     """Solve the scenes of rows of a block that share a mesh; return the meshed sheet, or None."""
 
     def attempt(name, function):
         key = f"{block.file['name']} {rows[0]} {name}"
         if f"{GONE_NETWORK}{key}" in block.lost:
-            return _failed(block.lost[f"{GONE_NETWORK}{key}"], **{store.LIMITS: costs.limits})
-        return costs.attempt(key, function, _failed)
+            return _failed(block.lost[f"{GONE_NETWORK}{key}"])
+        return attempts.attempt(key, function, _failed)
 
     # One network at a time: the next one takes over the symbolic factor.
     mesh_type = MESH_TYPES[block.file["mesh_type"]]
@@ -184,8 +147,8 @@ def _solve_mesh(block, box, rows, like, scaling, costs):
     return sheet
 
 
-def _failed(why, **limits):
-    return limits | {"displacement": np.nan, "status": Status.FAILED, "message": why}
+def _failed(why):
+    return {"displacement": np.nan, "status": Status.FAILED, "message": why}
 
 
 def _objection(sheet, scene, drawn, row):

@@ -4,10 +4,10 @@ from pathlib import Path
 
 from springtune.springs.calibrated import calibrate
 
-from ...runs import checked_json, store
+from ...runs import store
 
 
-def run(content, costs):
+def run(content, attempts):
     """Calibrate from the stored curves."""
     results = {}
     for group in content["groups"]:
@@ -15,7 +15,7 @@ def run(content, costs):
             results[group["name"]] = {"stiffness": calibrate(_best(content, member) for member in group["members"])}
         except ValueError as error:
             results[group["name"]] = {"stiffness": None, "message": str(error)}
-    checked_json.write(content["file"], results)
+    store.add(content["file"], results)
 
 
 def _best(content, member):

@@ -6,7 +6,7 @@ from springtune.problem.parameters import SWEPT
 
 from ...config.kind import distinct
 from ...output import labels, style
-from ...output.drawing import BEYOND_SMALL_STRAIN, fitted, in_words
+from ...output.drawing import BEYOND_SMALL_STRAIN, in_words
 from ...output.selection import at, cells, group, labelled_beam, labels_of, last_swept, of_own_law, sign_of_errors
 from .figures import USUAL, by_beam, each, named, swept_words
 from .outputs import SCENE_LABELS, SWEPT_SHOWN
@@ -46,58 +46,49 @@ def _looks(root):
     return {name: style.line(number) for number, name in enumerate(labels_of(root.status != 0, "definition"))}
 
 
-def _parts(present):
-    """Definitions of a beam, split into parts of at most `MOST_LINES`."""
+def _parts(words, present):
+    """Definitions of a panel's part, at most `MOST_LINES`, by its title."""
     asked = labels_of(present, "definition")
-    return [part.tolist() for part in np.array_split(asked, -(-len(asked) // MOST_LINES))]
+    parts = np.array_split(asked, -(-len(asked) // MOST_LINES))
+    several = len(parts) > 1
+    return {f"{words}, {number} of {len(parts)}" if several else words: part.tolist()
+            for number, part in enumerate(parts, start=1)}  # fmt: skip
 
 
-def _multiples(ax, shown, draw, title, swept, sign):
-    """Small multiples of deformation errors, shape (n_panels,): ``draw`` returns a title, ends of lines and a note.
+def _multiples(ax, shown, draw, title, sign):
+    """Small multiples of deformation errors: `draw` gets a panel and its part; it returns notes."""
 
-    The first note also has the meaning of a ``sign``.
-    """
-    columns = min(3, len(shown)) if len(shown) != 4 else 2
-    figure, axes, flat, height = style.multiples(ax, len(shown), columns, 2.1, sharey=True)
-    place = {"left": 0.55, "right": 0.06, "top": 0.48, "bottom": 0.4, "across": 0.12, "down": 0.7, "title": title}
-    style.arrange(figure, axes, **place)
-    drawn = {}
-    for panel, one in zip(flat, shown):
-        words, ends, said = draw(panel, one)
-        said = fitted(panel, [*([sign] if sign and ends and not drawn else []), *said])
-        drawn[panel] = ends, said, "" if ends else "no errors: " + said.replace("\n", "; ")
-        panel.set_title(fitted(panel, [words], 8))
-    over = labels.TITLE_LINE * (max(labels.lines_of(panel.get_title("left")) for panel in flat) - 1) if swept else 0.0
-    for panel in axes[:, 0]:
+    def drawn(panel, part):
         panel.set_ylabel("Deformation error [%]")
-    place |= {"top": 0.48 + over, "down": 0.7 + over, "across": 0.06}
-    labels.finish(figure, axes, place, drawn, height + len(axes) * over if ax is None else 0.0)
-    return flat
+        said = draw(panel, *part)
+        return said, f"no errors: {'; '.join(said)}"
+
+    return labels.small_multiples(ax, shown, 2 if len(shown) == 4 else 3, 2.1, title, drawn, sharey=True, said=sign)
 
 
 def _lines(panel, places, here, looks, listed, gaps):
-    """Draw a line a definition, hollow where its error is in doubt: ends of lines, and what a note says.
+    """Draw a line a definition, hollow where its error is in doubt; return what a note says.
 
     ``places`` are those along x of each. ``gaps`` says whether cells that were not asked for leave any.
     """
-    ends, said, doubts = [], [], set()
+    said, doubts = [], set()
     for x, (name, look) in zip(places, looks.items()):
         cell = here.sel(definition=name)
         error, flags = 100 * cell.deformation_error.values, cell.status.values
         beyond = np.broadcast_to(cell.beyond.values, error.shape)
         known, drawn = np.isfinite(error), (flags != 0) | gaps
-        ends += labels.line(panel, x[drawn], error[drawn], look, name)
+        panel.plot(x[drawn], error[drawn], label=name, **look)
         doubtful, lost = known & ((flags > 1) | beyond), {}
-        if doubtful.any():
-            panel.plot(x[doubtful], error[doubtful], linestyle="", marker=look["marker"], color=look["color"],
-                       markerfacecolor="white", markersize=4.5, zorder=4)  # fmt: skip
+        hollow = look | {"linestyle": "", "markerfacecolor": "white", "markersize": 4.5, "zorder": 4}
+        panel.plot(x[doubtful], error[doubtful], **hollow)
         doubts |= {in_words(flag) for flag in flags[doubtful] if flag > 1}
         doubts |= {BEYOND_SMALL_STRAIN} if (known & beyond).any() else set()
         for place, flag in zip(np.flatnonzero(~known), flags[~known]):
             if flag:
                 lost.setdefault("no reference" if flag == 1 else in_words(flag), []).append(place)
         said += [f"{name}, {listed(numbers)}: {reason}" for reason, numbers in lost.items()]
-    return ends, [f"hollow: {', '.join(sorted(doubts))}", *said] if doubts else said
+    panel.axhline(0, color="0.3", linewidth=0.7, zorder=1)
+    return [f"hollow: {', '.join(sorted(doubts))}", *said] if doubts else said
 
 
 # -- against mesh size -------------------------------------------------------------------------------------------------
@@ -146,21 +137,16 @@ def plot_size(data, ax=None, *, beam=None, mesh_type=None, material=None, load=N
     looks = _looks(root)
     values = last_swept(root.status != 0, "mesh_size")
     root = at(root, values)
-    parts = {name: _parts(root.status.sel(beam=name) != 0) for name in beams}
-    shown = [(name, number) for name in beams for number in range(len(parts[name]))]
-
-    def draw(panel, one):
-        name, number = one
-        chosen = {definition: looks[definition] for definition in parts[name][number]}
-        drawn = _over_sizes(panel, root.sel(beam=name), chosen, one == shown[0])
-        part = f", {number + 1} of {len(parts[name])}" if len(parts[name]) > 1 else ""
-        here = {parameter: value.sel(beam=name) for parameter, value in values.items()}
-        return ", ".join([labelled_beam(root, name) + part, *swept_words(here)]), *drawn
-
-    return _multiples(ax, shown, draw, compared(root, selection), bool(values), sign_of_errors(root))
+    shown = {}
+    for name in beams:
+        here = root.sel(beam=name)
+        words = [labelled_beam(root, name), *swept_words({one: value.sel(beam=name) for one, value in values.items()})]
+        parts = _parts(", ".join(words), here.status != 0)
+        shown |= {title: (here, {one: looks[one] for one in part}) for title, part in parts.items()}
+    return _multiples(ax, shown, _over_sizes, compared(root, selection), sign_of_errors(root))
 
 
-def _over_sizes(panel, here, looks, first):
+def _over_sizes(panel, here, looks):
     """Draw errors of a beam over mesh size: as `_lines`."""
     here = here.isel(mesh_size=np.flatnonzero((here.status != 0).any("definition").values))
     sizes = 1e3 * here.mesh_size.values
@@ -169,17 +155,13 @@ def _over_sizes(panel, here, looks, first):
     def listed(numbers):
         return f"{', '.join(f'{sizes[number]:g}' for number in numbers)} mm"
 
-    ends, said = _lines(panel, places, here, looks, listed, True)
+    said = _lines(panel, places, here, looks, listed, True)
     if "paper_displacement" in here:
         printed = 100 * (here.paper_displacement.values / here.paper_reference_displacement.values - 1)
         if (here.force < 0).all():  # printed without sign
             printed = -printed
-        if np.isfinite(printed).any():
-            panel.plot(places[0], printed, "x", color="0.35", markersize=4.5, label="as printed")
-            said = ["×: as the paper prints", *said] if first else said
-    if ends:
-        panel.hlines(0, *panel.get_xlim(), color="0.3", linewidth=0.7, zorder=1)  # not below names
-    return ends, said
+        panel.plot(places[0], printed, "x", color="0.35", markersize=4.5, label="as printed")
+    return said
 
 
 # -- against what is swept ---------------------------------------------------------------------------------------------
@@ -259,15 +241,16 @@ def plot_sweep(
     root, beams, selection = by_beam(root, beam, mesh_type, material, load, kinematics)
     looks = _looks(root)
     several = [name for name in beams if _most((root.status != 0).sel(beam=[name]), parameter) > 1]
-    shown = [_of_beam(root, name, parameter, mesh_size) for name in several or beams]
-    shown = [(one, part) for one in shown for part in _parts(one.status != 0)]
+    shown = {}
+    for name in several or beams:
+        here = _of_beam(root, name, parameter, mesh_size)
+        parts = _parts(here.attrs["words"], here.status != 0)
+        shown |= {title: (here, {one: looks[one] for one in part}) for title, part in parts.items()}
 
-    def draw(panel, one):
-        here, definitions = one
-        return here.attrs["words"], *_over_values(panel, here, {name: looks[name] for name in definitions}, parameter)
+    def draw(panel, here, looks):
+        return _over_values(panel, here, looks, parameter)
 
-    sign = sign_of_errors(whole.sel(load=selection["load"]))
-    return _multiples(ax, shown, draw, compared(root, selection), True, sign)
+    return _multiples(ax, shown, draw, compared(root, selection), sign_of_errors(whole.sel(load=selection["load"])))
 
 
 def _most(present, parameter):
@@ -308,12 +291,9 @@ def _over_values(panel, here, looks, parameter):
         several = f"{len(values)} from {min(values):.4g} to {max(values):.4g}"
         return several if len(values) > 1 else f"{values[0]:.4g}"
 
-    # What other beams or grids ask for makes no gaps.
-    ends, said = _lines(panel, [x] * len(looks), here, looks, listed, False)
     panel.set_xlabel(words)
     asked = x[(here.status != 0).any("definition").values]
     if len(asked) > 1 and asked.min() > 0 and asked.max() / asked.min() > WIDE:
         panel.set_xscale("log")
-    if ends:
-        panel.axhline(0, color="0.3", linewidth=0.7, zorder=1)
-    return ends, said
+    # What other beams or grids ask for makes no gaps.
+    return _lines(panel, [x] * len(looks), here, looks, listed, False)

@@ -1,13 +1,14 @@
 """Figures of scenes: sensitivity curves, deformed networks, the pressed block."""
 
 import numpy as np
+from matplotlib.lines import Line2D
 
 from springtune.problem.loads import LOADS
 from springtune.problem.parameters import with_unit
 
 from ...config.kind import distinct
 from ...output import labels, style
-from ...output.drawing import BEYOND_SMALL_STRAIN, extent, fitted, in_words, largest, magnification, plane, spring_ends
+from ...output.drawing import BEYOND_SMALL_STRAIN, draw_network, extent, in_words, magnification, plane
 from ...output.selection import (
     at,
     cells,
@@ -91,17 +92,14 @@ def plot_sensitivity(data, ax=None, *, beam=None, mesh_type=None, material=None,
 
 
 def _sensitivity(curves, root, selection, swept, ax):
-    figure, axes = style.panels(ax, figsize=(style.COLUMN, 2.45))
-    panel, (unit, written) = axes[0, 0], labels.power_of_ten(np.nanmax(curves.stiffness.values, initial=0.0))
-    place = {"left": 0.45, "right": 0.14, "bottom": 0.4, "top": 0.52}
-    style.arrange(figure, axes, **place)
-    ends, seen = [], set()
+    _, ((panel,),) = style.panels(ax, figsize=(style.COLUMN, 2.6))
+    unit, written = labels.power_of_ten(np.nanmax(curves.stiffness.values, initial=0.0))
+    seen = set()
     known = curves.stiffness.values[np.isfinite(curves.stiffness.values)] / unit
     for number, size in enumerate(curves.mesh_size.values):
         curve = curves.isel(mesh_size=number)
         if (curve.status.values != 0).any():
-            end, found = draw_curve(panel, curve, unit, f"{1e3 * size:g} mm", style.line(number), known)
-            ends, seen = [*ends, *end], seen | found
+            seen |= draw_curve(panel, curve, unit, f"{1e3 * size:g} mm", style.line(number), known)
     if root is not None and int(root.get("reference_applies", 1)) == 0:
         seen.add("beyond")
     errors = 100 * np.abs(curves.deformation_error.values)
@@ -114,23 +112,13 @@ def _sensitivity(curves, root, selection, swept, ax):
     panel.set_title(_sensitivity_title(panel, root, selection, swept), pad=12)
     if root is not None and "paper_stiffness" in root:
         _mark_printed(panel, root.paper_stiffness.values, unit)
-    over = labels.TITLE_LINE * max(0, labels.lines_of(panel.get_title("left")) - 2) if swept else 0.0
-    key = [(text, look) for name, (text, look) in KEY.items() if name in seen]
-    rows = -(-len(key) // labels.KEY_COLUMNS)
-    if ax is None:
-        figure.set_size_inches(style.COLUMN, 2.45 + over + labels.KEY_ROW * rows)
-    labels.settle(figure, axes, {**place, "top": place["top"] + over, "bottom": 0.4 + labels.KEY_ROW * rows})
-    if not ends:
-        labels.say(panel, _why_no_curve(curves), bare=False)
-        return panel
-    labels.name_lines(panel, ends)
-    if key:
-        labels.key_below(panel, key)
+    key = [Line2D([], [], color="0.3", label=text, **look) for name, (text, look) in KEY.items() if name in seen]
+    labels.finish(panel, why=_why_no_curve(curves), key=key)
     return panel
 
 
 def draw_curve(panel, curve, unit, name, look, known):
-    """Draw one curve; return where its name goes, and the keys of `KEY` that it needs."""
+    """Draw one curve; return the keys of `KEY` that it needs."""
     marker, colour, seen = look["marker"], look["color"], set()
     line = {"color": colour, "linestyle": look["linestyle"]}
     stiffness, error = curve.stiffness.values, 100 * np.abs(curve.deformation_error.values)
@@ -151,11 +139,7 @@ def draw_curve(panel, curve, unit, name, look, known):
     if np.isfinite(unstable).any():
         seen.add("unstable")
         panel.plot(stiffness / unit, unstable, color=colour, linewidth=0.5)
-    known = np.flatnonzero(np.isfinite(error))
-    if not len(known):
-        return [], seen
-    seen |= {in_words(flag) for flag in flags[np.isnan(error)] if flag > 1}
-    return [(stiffness[known[-1]] / unit, error[known[-1]], name, colour)], seen
+    return seen | {in_words(flag) for flag in flags[np.isnan(error)] if flag > 1 and np.isfinite(error).any()}
 
 
 KEY = {
@@ -174,7 +158,7 @@ def _sensitivity_title(panel, root, selection, swept):
     if root is not None and "beam" in shown:
         shown["beam"] = labelled_beam(root, shown["beam"])
     words = [*named(shown, "beam", "mesh_type", "material", "load"), *swept]
-    first = fitted(panel, [", ".join(words)], 8)
+    first = labels.fitted(panel, [", ".join(words)], 8)
     if root is None:
         return first
     reference = float(root.reference_displacement)
@@ -305,25 +289,14 @@ def plot_deformed(
     room = style.COLUMN - 0.42 - 0.08
     heights = [float(np.clip(1.25 * room * high / wide, 0.45, 1.8)) for wide, high in extents]
     figure, axes = style.panels(
-        ax, nrows=len(beams), figsize=(style.COLUMN, 0.8 + sum(heights) + 0.6 * (len(beams) - 1)), ratios=heights
+        ax, len(beams), figsize=(style.COLUMN, 0.5 + sum(heights) + 0.65 * len(beams)), height_ratios=heights
     )
-    title = ", ".join(named(selection, "mesh_type", "material", "load"))
-    place = {"left": 0.45, "right": 0.08, "bottom": 0.38, "top": 0.58, "down": 0.6, "title": title}
-    style.arrange(figure, axes, **place)
-    grid, axes = axes, axes[:, 0]
-    for panel, name in zip(axes, beams):
+    for panel, name in zip(axes[:, 0], beams):
         words = [labelled_beam(root, name), *swept_words({one: value.sel(beam=name) for one, value in values.items()})]
         _deformed(panel, fields.sel(beam=name), cut.sel(beam=name), selection, ", ".join(words))
-        panel.apply_aspect()  # its limits
-    over = labels.TITLE_LINE * (max(labels.lines_of(panel.get_title("left")) for panel in axes) - 1)
-    if ax is None:
-        figure.set_size_inches(style.COLUMN, style.size(figure)[1] + over * len(axes))
-    labels.settle(figure, grid, place | {"top": 0.58 + over, "down": 0.6 + over})
-    if figure is not None:
-        width, height = style.size(figure)
-        figure.text(0.05 / width, 1 - 0.2 / height, f"lines: network ({definition}); grey: reference; dashed: at rest",
-                    va="top", fontsize=style.SMALL, color="0.25")  # fmt: skip
-    return axes
+    labels.entitle(figure, ", ".join(named(selection, "mesh_type", "material", "load")),
+                   f"lines: network ({definition}); grey: reference; dashed: at rest")  # fmt: skip
+    return axes[:, 0]
 
 
 def _deformed(panel, fields, root, selection, beam):
@@ -333,41 +306,22 @@ def _deformed(panel, fields, root, selection, beam):
         places = np.flatnonzero(known.notnull().any("particle").values)
         if len(places):
             break
-    fields = fields.isel(mesh_size=places[-1] if len(places) else 0)
-    here = fields.sel(load)
-    rest, moved = 1e3 * plane(fields, "{}"), 1e3 * plane(here, "displacement_{}")
-    outline, there = 1e3 * plane(fields, "outline_{}"), 1e3 * plane(here, "reference_displacement_{}")
-    kept = np.isfinite(outline[:, 0])
-    outline, there = outline[kept], there[kept]
-    most = largest(there if np.isfinite(there).any() else moved)
-    scale = magnification(0.06 * np.ptp(outline[:, 0]) / most) if most > 0 and len(outline) else 1
-    lacking = []
-    if np.isfinite(there).any():
-        panel.fill(*(outline + scale * there).T, facecolor="0.82", edgecolor="0.45", linewidth=0.8)
-        lacking += [f"reference {BEYOND_SMALL_STRAIN}"] if int(root.get("reference_applies", 1)) == 0 else []
-    else:
-        lacking.append("no reference")
-    if len(outline):
-        panel.plot(*np.vstack([outline, outline[:1]]).T, color="0.5", linewidth=0.6, linestyle=(0, (3, 3)))
-    ends, _ = spring_ends(fields)
-    flag = int(root.status.sel(mesh_size=fields.mesh_size.values))
+    here = fields.isel(mesh_size=places[-1] if len(places) else 0).sel(load)
+    scale = magnification(here)
+    draw_network(panel, here, scale)
+    referred = np.isfinite(here.reference_displacement_x.values).any()
+    beyond = int(root.get("reference_applies", 1)) == 0
+    lacking = ["no reference"] if not referred else [f"reference {BEYOND_SMALL_STRAIN}"] if beyond else []
+    flag = int(root.status.sel(mesh_size=here.mesh_size.values))
     status = in_words(flag) or "not asked for"
-    panel.set(aspect="equal", adjustable="datalim", xlabel="x [mm]", ylabel="y [mm]")
-    text = f"{beam}, mesh {1e3 * float(fields.mesh_size):g} mm, displaced ×\u00a0{scale:g}"
-    if np.isfinite(moved).any():
-        # One line with gaps: thousands of lines take ten times as long.
-        springs = np.full((len(ends), 3, 2), np.nan)
-        springs[:, :2] = (rest + scale * moved)[ends]
-        panel.plot(*springs.reshape(-1, 2).T, color="#0b3c5d", linewidth=NETWORK_LINE)
-        lacking += [status] if flag not in (0, 1) else []
-    else:
+    if not np.isfinite(here.displacement_x.values).any():
         labels.say(panel, f"no network: {status}" if flag != 1 else "no network stored", bare=False)
-    panel.set_title(fitted(panel, [", ".join([text, *lacking])], 8))
+    elif flag not in (0, 1):
+        lacking.append(status)
+    text = f"{beam}, mesh {1e3 * float(here.mesh_size):g} mm, displaced ×\u00a0{scale:g}"
+    panel.set_title(labels.fitted(panel, [", ".join([text, *lacking])], 8))
+    panel.set(aspect="equal", adjustable="datalim", xlabel="x [mm]", ylabel="y [mm]")
     panel.grid(False)
-
-
-NETWORK_LINE = 0.35
-"""Width of the lines of springs [pt]."""
 
 
 # -- the pressed block -------------------------------------------------------------------------------------------------
@@ -442,47 +396,37 @@ def plot_block(data, ax=None, *, beam=None, mesh_type=None, mesh_size=None, mate
     values = last_swept(here.status != 0)
     words = [labelled_beam(root, chosen["beam"]), f"{chosen['mesh_type']} {size:g} mm", chosen["material"]]
     words += swept_words({name: value.sel(load=load) for name, value in values.items()})
-    place = {"left": 0.45, "right": 0.06, "bottom": 0.4, "top": 0.62, "across": 0.55, "title": ", ".join(words)}
-    style.arrange(figure, axes, **place)
+    labels.entitle(figure, ", ".join(words))
     left, right = axes[0]
     curves = group(data, "sensitivity").sel(chosen) if "sensitivity" in data.children else None
     here, faces = at(here, values), at(faces.sel(chosen), values)
     curves = None if curves is None else at(curves, values)
-    drawn = {left: _stiffness(left, curves, here), right: _profile(right, faces, here, load)}
-    labels.finish(figure, axes, place | {"across": 0.15}, drawn, 3.0 if ax is None else 0.0)
-    if drawn[left][0]:
-        _marks(left, curves, here)
+    labels.finish(left, *_stiffness(left, curves, here))
+    labels.finish(right, *_profile(right, faces, here, load))
     return axes[0]
 
 
 def _stiffness(panel, curves, root):
-    """Draw errors in linear kinematics; return ends of lines, a note, and the reason if there is no curve."""
+    """Draw errors in linear kinematics; return notes, and the reason if there is no curve."""
     panel.set(xlabel="Uniform stiffness [N/m]", ylabel="|Deformation error| [%]")
-    panel.set_title("One stiffness for all loads? (small strain)", pad=13)
+    panel.set_title("One stiffness for all loads? (small strain)")
     if curves is None or "linear" not in curves.kinematics.values:
-        return [], "", "The study has no sensitivity curves in linear kinematics of this mesh and material."
-    curves, said, lines = curves.sel(kinematics="linear"), [], []
+        return [], "The study has no sensitivity curves in linear kinematics of this mesh and material."
+    curves, said = curves.sel(kinematics="linear"), []
     loads = labels_of(curves.status != 0, "load")
-    for load in loads:
-        curve, reference = curves.sel(load=load), float(root.reference_displacement.sel(load=load))
-        softness = (curve.displacement * curve.stiffness).values  # one number: linear networks give as 1/k
-        softness = softness[np.isfinite(softness)]
-        if not len(softness) or not np.isfinite(reference):
-            said.append(f"{load}: {'not solved' if not len(softness) else 'no reference'}")
-            continue
-        stiffness = np.linspace(np.nanmin(curve.stiffness.values), np.nanmax(curve.stiffness.values), 600)
-        lines.append((load, stiffness, 100 * np.abs(softness[0] / stiffness / reference - 1)))
-    if not lines:
-        return [], "", "No uniform stiffness has an error: " + ("; ".join(said) or "the study has no curves") + "."
-    middle, ends = np.sqrt(3) / 2 * _membrane(curves), []
-    low = max(0.7 * middle, min(x.min() for _, x, _ in lines))
-    high = min(1.5 * middle, max(x.max() for _, x, _ in lines))
-    highest = 0.0
-    for number, (load, x, error) in enumerate(lines):
-        look = style.line(number) | {"marker": ""}
-        within = (x >= low) & (x <= high)
-        ends += labels.line(panel, x[within], error[within], look, load)
-        highest = max(highest, error[within].max(initial=0.0))
+    known = curves.stiffness.values[np.isfinite(curves.stiffness.values)]
+    for number, load in enumerate(loads):
+        curve = curves.sel(load=load)
+        if curve.deformation_error.notnull().any():
+            draw_curve(panel, curve, 1.0, load, style.line(number), known)
+        else:
+            said.append(f"{load}: {'not solved' if curve.displacement.isnull().all() else 'no reference'}")
+    if not panel.get_lines():
+        return [], "No uniform stiffness has an error: " + ("; ".join(said) or "the study has no curves") + "."
+    middle = np.sqrt(3) / 2 * _membrane(curves)
+    low, high = max(0.7 * middle, known.min()), min(1.5 * middle, known.max())
+    within = (curves.stiffness >= low) & (curves.stiffness <= high)
+    highest = 100 * float(abs(curves.deformation_error).where(within).max())
     for number, definition in enumerate(name for name in ENERGIES if name in root.definition.values):
         cells = root.sel(definition=definition, kinematics="linear", load=loads)
         errors = 100 * np.abs(cells.deformation_error.values)
@@ -492,12 +436,12 @@ def _stiffness(panel, curves, root):
         if lacking and (flags != 0).any():
             said.append(f"{definition}: {', '.join(lacking)}")
         if known.any():
-            look = style.line(len(lines) + number) | {"marker": ""}
+            look = style.line(len(loads) + number) | {"marker": ""}
             worst = errors[known].max()
-            words = f"{definition}, worst: {worst:.2g} %"
-            ends += labels.line(panel, np.array([low, high]), np.full(2, worst), look, definition, words)
+            panel.plot([low, high], [worst, worst], label=f"{definition}, worst: {worst:.2g} %", **look)
     panel.set(xlim=(low, high), ylim=(0, min(40.0, 1.05 * highest)))
-    return ends, fitted(panel, said), ""
+    _marks(panel, curves, root)
+    return said, ""
 
 
 def _membrane(curves):
@@ -506,7 +450,7 @@ def _membrane(curves):
 
 
 def _marks(panel, curves, root):
-    """Mark stiffnesses by closed form and as stated; call it once the panel has its limits."""
+    """Mark stiffnesses by closed form and as stated."""
     marks, middle = {}, np.sqrt(3) / 2 * _membrane(curves)
     if "paper" in root.definition.values:
         stated = root.stiffness.sel(definition="paper").values
@@ -522,20 +466,14 @@ def _marks(panel, curves, root):
         if abs(held / middle - 1) > 0.02:
             marks[f"of a held block: {held:.4g}"] = held
     low, high = panel.get_xlim()
-    shown = [(text, value) for text, value in marks.items() if low < value < high]
-    for _, value in shown:
-        panel.axvline(value, color="0.35", linewidth=0.7, linestyle=(0, (2, 2)), zorder=1)
-    room = panel.get_window_extent().width / panel.figure.dpi
-    places = labels.spread([room * (value - low) / (high - low) for _, value in shown],
-                           [labels.width(text) + 0.1 for text, _ in shown], 0.0, room)  # fmt: skip
-    for (text, _), place in zip(shown, places):
-        panel.annotate(text, (place / room, 1), xycoords="axes fraction", xytext=(0, 2.5), va="bottom", ha="center",
-                       textcoords="offset points", color="0.25", fontsize=style.SMALL)  # fmt: skip
+    for dash, (text, value) in enumerate(marks.items(), start=1):
+        if low < value < high:
+            panel.axvline(value, color="0.35", linewidth=0.7, linestyle=(0, (dash, dash)), zorder=1, label=text)
 
 
 def _profile(panel, block, root, load):
     """Draw the pressed face over the reference of its kinematics; returns as `_stiffness`."""
-    x, pressed, ends, said, highest = block.face_position.values, block.sel(load=load), [], [], []
+    x, pressed, said, highest = block.face_position.values, block.sel(load=load), [], []
     panel.set(xlabel="Place on the loaded face over its length", ylabel="Displacement along the load [mm]")
     of_networks = pressed.face_profile.notnull().any(["definition", "face_position"])
     law = own_law(pressed, "reference_face_profile")
@@ -545,12 +483,11 @@ def _profile(panel, block, root, load):
         and of_networks.sel(kinematics=of_networks.kinematics != "linear").any()
     )
     kind = law if finite else str(block.reference.values[0])
-    panel.set_title(f"The pressed face ({'finite' if finite else 'small'} strain)", pad=13)
+    panel.set_title(f"The pressed face ({'finite' if finite else 'small'} strain)")
     profile = -1e3 * pressed.reference_face_profile.sel(reference=kind).values
     if np.isfinite(profile).any():
         name = f"reference, {kind.replace('-', ' ')}"
         panel.plot(x, profile, color="0.72", linewidth=3, label=name)
-        ends.append((x[-1], profile[-1], name, "0.35"))
         highest.append(profile)
     order = [name for name in BLOCK_SHOWN if name in block.definition.values]
     order += [name for name in block.definition.values if name not in order]
@@ -569,15 +506,15 @@ def _profile(panel, block, root, load):
             said.append(f"{definition}: {words}")
     for number, (definition, kinematics, profile) in enumerate(shown[:MOST_FACES]):
         look, name = style.line(number) | {"marker": ""}, f"{definition}, {kinematics}"
-        ends += labels.line(panel, x, profile, look, name)
+        panel.plot(x, profile, label=name, **look)
         highest.append(profile)
     if not finite and any(kinematics != "linear" for _, kinematics, _ in shown[:MOST_FACES]):
         said.append("the reference is of small strain, not all networks are: add further_references")
     if len(shown) > MOST_FACES:
         said.append(f"in the dataset, too: {', '.join(name for name, _, _ in shown[MOST_FACES:])}")
-    if not shown and not ends:
-        return [], "", "No network is solved and there is no reference: " + "; ".join(said or ["nothing was asked for"])
+    if not highest:
+        return [], "No network is solved and there is no reference: " + "; ".join(said or ["nothing was asked for"])
     low, high = min(map(np.nanmin, highest)), max(map(np.nanmax, highest))
     panel.set_xlim(x.min() - 0.02, x.max() + 0.02)
     panel.set_ylim(low - 0.08 * (high - low), high + 0.08 * (high - low) if high > low else high + 1)
-    return ends, fitted(panel, said), ""
+    return said, ""

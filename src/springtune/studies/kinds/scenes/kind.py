@@ -3,17 +3,14 @@
 And the summary of a study before it runs.
 """
 
-from math import prod
-
 from springtune.problem.loads import LOADS
 from springtune.reference.answers import unit_problem
 from springtune.safe_io.tables import aligned
-from springtune.springs import DEFINITIONS
 
 from ...config.kind import Kind
 from ...config.model import SceneSpec, Study
 from .outputs import OUTPUTS, stems
-from .plan import STAGES, expected_solves, interpolants, pieces, take
+from .plan import STAGES, expected_solves, interpolants, reference_of
 
 KIND = Kind(
     "scenes",
@@ -22,30 +19,7 @@ KIND = Kind(
     stages=STAGES,
     outputs=OUTPUTS,
     tables=stems,
-    pieces=pieces,
-    take=take,
-    costs={
-        "mesh": (4e-3, 2.5e-5),
-        "linear": (5e-4, 1e-6),
-        "nonlinear": (1.5e-3, 1e-5),
-        "curve": (1.5e-3, 1e-5),
-        "reference": (3e-2, 0.0),
-        "interpolant": (0.0, 3e-2),
-        "finite": (1.0, 0.0),
-        # Definitions that search, on top of their scenes.
-        "adjoint": (0.05, 2e-4),
-        "annealed": (0.05, 1e-3),
-        "evolved": (0.05, 1e-3),
-        "best-springs": (0.05, 5e-3),
-    },
 )
-
-
-SCENE_DIMENSIONS = ("beam", "mesh_type", "mesh_size", "material", "load", "definition", "kinematics")
-"""Dimensions of every dataset."""
-
-SPARSE = 50
-"""So many cells to a scene are worth a word."""
 
 
 def summary(study: Study, further: list[list[object]]) -> str:
@@ -53,83 +27,47 @@ def summary(study: Study, further: list[list[object]]) -> str:
     title = f"{study.name}: {study.title}"
     if not study.scenes:
         return "\n".join([title, "", aligned(further, left=0, right=(1,))])
-    solutions = _solutions(study)
-    networks = _networks(study)
-    requested = sum(len(grid.scenes) for grid in study.grids)
     # Sheets of several thicknesses share a mesh.
     meshes = len({(one.beam.length, one.beam.height, one.mesh_type, one.mesh_size, one.file) for one in study.meshes})
-    users = len(study.scenes) + len(study.curves)
+    each = (len(study.scenes) + len(study.curves)) / meshes
+    requested = sum(len(grid.scenes) for grid in study.grids)
     repeated = requested - len(study.scenes)
     again = f"{requested} asked, {repeated} of them more than once" if repeated else ""
-    if study.part:
-        again = f"part {study.part.number} of {study.part.of} of the study"
+    scaled = "small strain scales with force, E t and size"
     rows: list[list[object]] = [
         ["scenes", len(study.scenes), again],
-        ["meshes", meshes, f"each serves {users / meshes:.3g} scenes and curves on average"],
-        ["references", len(study.references), f"from {solutions}: small strain scales with force, E t and size"],
+        ["meshes", meshes, f"each serves {each:.3g} scenes and curves on average"],
+        ["references", len(study.references), f"from {_solutions(study)}: {scaled}"],
         ["curves", len(study.curves), f"of {len(study.stiffness_ratios)} stiffnesses, each one continuation in F/k"],
-        ["networks", networks, "to factorize at rest, at most: loads and uniform stiffnesses share one a mesh"],
+        *further,
+        *([["printed", len(study.printed), "cells to compare with"]] if study.printed else []),
     ]
-    cells = prod(len(study.axes[name]) for name in (*SCENE_DIMENSIONS, *study.swept))
-    if cells > SPARSE * len(study.scenes):
-        rows.append(["cells", cells, "of all labels together, each held by the dataset: fewer in studies of their own"])
-    rows += further
-    if study.printed:
-        rows.append(["printed", len(study.printed), f"cells to compare with, {_within(study)} of them in this study"])
-    lines = [title, "", aligned(rows, left=0, right=(1,)), ""]
-    return "\n".join([*lines, aligned(_contributions(study), left=0, right=(1, 2, 3, 4, 5))])
+    grids = aligned(_contributions(study), left=0, right=(1, 2, 3, 4, 5))
+    return "\n".join([title, "", aligned(rows, left=0, right=(1,)), "", grids])
 
 
 def _solutions(study: Study) -> str:
     """Number of finite-element solutions of the references, in words."""
-    problems, known = set(), interpolants(study)
-    for one in study.references:
-        kind = LOADS[one.load].kind
-        if (one.beam, one.material, one.load) not in known.get(kind.name, (None, {}))[1]:
-            problems.add(unit_problem(one.beam, one.material, kind))
+    known = interpolants(study)
+    problems = {
+        unit_problem(one.beam, one.material, LOADS[one.load].kind)
+        for one in study.references
+        if "interpolant" not in reference_of(study, one.beam, one.material, one.load)
+    }
     if not known:
-        return _count(len(problems), "solution")
+        return f"{len(problems)} solution{'s' * (len(problems) != 1)}"
     count = len(problems) + sum(expected_solves(box) for box, _ in known.values())
     return f"about {count} solutions and interpolation between them"
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}{'e' if noun.endswith('ch') else ''}s"
-
-
-def _networks(study: Study) -> int:
-    """Number of distinct tangents at rest, at most: uniform networks of a mesh differ by a factor only."""
-    found: set[tuple[object, ...]] = {(curve.mesh, LOADS[curve.load].kind.held, "uniform") for curve in study.curves}
-    for scene in study.scenes:
-        uniform = DEFINITIONS[scene.definition].uniform
-        held = LOADS[scene.load].kind.held
-        found.add(
-            (scene.mesh, held, "uniform" if uniform else (scene.definition, scene.material.in_plane.poisson_ratio))
-        )
-    return len(found)
-
-
-def _within(study: Study) -> int:
-    """Number of printed cells that the study has scenes for."""
-    cells = {(*scene.mesh.labels.values(), scene.material.name, scene.load) for scene in study.scenes}
-    return sum((cell.beam, cell.mesh_type, cell.mesh_size, cell.material, cell.load) in cells for cell in study.printed)
 
 
 def _contributions(study: Study) -> list[list[object]]:
     """Rows of a table of grids; new scenes are those that no grid above has."""
     rows: list[list[object]] = [["grid", "scenes", "new", "meshes", "references", "curves"]]
     seen: set[SceneSpec] = set()
-    own, traced = set(study.scenes), set(study.curves)  # of a part, some
     for grid in study.grids:
-        scenes = [scene for scene in grid.scenes if scene in own]
-        meshes = {scene.mesh for scene in scenes}
+        scenes = set(grid.scenes)
         references = {(scene.mesh.beam, scene.material, scene.load, scene.force) for scene in scenes}
-        new = set(scenes) - seen
-        seen |= new
-        curves = traced.intersection(grid.curves)
-        if scenes or curves or not study.part:
-            rows.append([grid.name, len(scenes), len(new), len(meshes), len(references), len(curves)])
-    extra = set(study.curves) - {curve for grid in study.grids for curve in grid.curves}
-    if extra:
-        rows.append(["(calibration)", "", "", "", "", len(extra)])
+        meshes = {scene.mesh for scene in scenes}
+        rows.append([grid.name, len(scenes), len(scenes - seen), len(meshes), len(references), len(grid.curves)])
+        seen |= scenes
     return rows

@@ -5,10 +5,11 @@ import time
 from functools import partial
 from pathlib import Path
 
-from springtune.mesh import MESH_TYPES, quality, read_beam_mesh
+from springtune.mesh.cells import quality
+from springtune.mesh.formats import read_beam_mesh
 from springtune.mesh.groups import GroupedMesh
+from springtune.mesh.types import MESH_TYPES
 
-from ...runs.driver import REFUSED
 from . import stored
 
 
@@ -27,32 +28,31 @@ def check_unchanged(source):
         raise SystemExit(f"{source['file']} was changed while the study ran; call the same command again")
 
 
-def run(content, costs, make=make, counted="mesh"):
+def run(content, attempts, make=make):
     """Make the missing meshes of a bundle."""
     folder = content["folder"]
     for task in content["files"]:
-        if stored.is_stored(folder, task["name"], task["key"], costs.limits):
+        if stored.is_stored(folder, task["name"], task["key"]):
             continue
         begin = time.perf_counter()
-        made = costs.attempt(task["name"], partial(make, task), _failed)
+        made = attempts.attempt(task["name"], partial(make, task), _failed)
         known = {"mesh_seconds": time.perf_counter() - begin}
         if made is None:
             continue
+        attempts.computed += 1
         if isinstance(made, dict):
             stored.refuse(folder, task["name"], task["key"], made)
-            costs.add(REFUSED, 0, known["mesh_seconds"])
             continue
         grouped = made if isinstance(made, GroupedMesh) else GroupedMesh(made)
         mesh = grouped.mesh
         known |= quality(mesh) | {"particles": len(mesh.points), "springs": len(mesh.edges)}
         stored.write_made(folder, task["name"], task["key"], grouped, known)
-        costs.add(counted, len(mesh.points), time.perf_counter() - begin)
 
 
-def gone(content, name, why, limits):
-    """Store that a mesh is beyond its limits."""
+def crashed(content, name, why):
+    """Store that the process that makes a mesh died."""
     key = next(task["key"] for task in content["files"] if task["name"] == name)
-    stored.refuse(content["folder"], name, key, _failed(why) | {"limits": limits})
+    stored.refuse(content["folder"], name, key, _failed(why))
 
 
 def _failed(why):

@@ -1,18 +1,15 @@
 """Outputs of scenes, and what the page to browse shows of scenes, curves and references."""
 
 from collections.abc import Iterable, Iterator, Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from springtune.problem.loads import LOADS
 
 from ...config.kind import Output, distinct
-from ...config.model import once_a_study, shown, swept_value
+from ...config.model import once_a_study, swept_value
 from ...output.browse import Plot, View, particle_plots
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from ...config.model import CurveSpec, SceneSpec, Study
 
 SENSITIVITY_LABELS = ("beam", "mesh_type", "material", "load")
@@ -32,9 +29,6 @@ SWEPT_SHOWN = {
 
 PLOTS, ERROR_PLOTS = "studies.kinds.scenes.figures", "studies.kinds.scenes.errors"
 
-COLLECTION = "scenes.pvd"
-"""What ParaView opens."""
-
 TABLE = ("load", "mesh_type", "material")
 """What a table of the page is about, as in the paper."""
 
@@ -44,7 +38,7 @@ def stem(selection: Mapping[str, str], number: int | None = None) -> str:
     return f"table_{number}" if number else "_".join(selection[label] for label in TABLE)
 
 
-@once_a_study("scenes", "printed", "further_references")
+@once_a_study
 def stems(study: "Study") -> list[str]:
     """Stems of the tables of a study's scenes."""
     numbers = {(cell.load, cell.mesh_type, cell.material): cell.table for cell in study.printed}
@@ -55,7 +49,7 @@ def stems(study: "Study") -> list[str]:
     return found
 
 
-@once_a_study("scenes")
+@once_a_study
 def pressed(study: "Study") -> bool:
     """Whether a study has scenes under pressure."""
     return any(LOADS[scene.load].kind.pressed for scene in study.scenes)
@@ -82,22 +76,6 @@ def _sweeps(study: "Study") -> dict[str, Mapping[str, str]]:
         several = [dict(zip(SCENE_LABELS, place)) for place, members in values.items() if len(members) > 1]
         found |= distinct(f"sweep_{name}", SCENE_LABELS, several)
     return found
-
-
-def write_paraview(tree: "xr.DataTree", folder: Path) -> list[Path]:
-    """Write a collection of scenes for ParaView, and its files."""
-    from ...output.export import write_scenes  # here, since a plan does without xarray
-
-    folder.mkdir(parents=True, exist_ok=True)
-    return [path.relative_to(folder) for path in write_scenes(tree, folder / COLLECTION)]
-
-
-def _too_many(study: "Study") -> str:
-    from springtune.handover.paraview import MOST_PIECES  # here, since it needs numpy
-
-    count = len(shown(study.scenes, study.swept))
-    remedy = "choose fewer scenes, or `springtune export --select ... --to scenes.pvd` in its place"
-    return "" if count <= MOST_PIECES else f"would write {count} files, and at most {MOST_PIECES} are; {remedy}"
 
 
 OUTPUTS = (
@@ -136,11 +114,10 @@ OUTPUTS = (
         "paraview",
         "deformed networks with displacements, their error, and stiffness and force of each spring, as files for "
         "ParaView (and the group `/fields` behind them)",
-        tables=lambda study: [COLLECTION],
-        write="studies.kinds.scenes.outputs:write_paraview",
+        tables=lambda study: ["scenes.csv"],
+        write="studies.output.scene_files:write",
         into="paraview",
         job="scenes",
-        lack=_too_many,
     ),
     Output("tables", "tables as the paper's, on one page", page=True, job="scenes", usual=True),
     Output(

@@ -2,31 +2,27 @@
 
 import hashlib
 from collections import defaultdict
-from dataclasses import replace
-from functools import cache, lru_cache, partial
+from functools import cache, lru_cache
 from math import ceil, floor, log, log10
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from springtune.problem.loads import LOADS
 from springtune.reference.answers import unit_problem, unit_scales
-from springtune.springs import DEFINITIONS
+from springtune.springs.base import DEFINITIONS
 
 from ...config.kind import Stage
 from ...config.model import keeps_fields, once_a_study, shown
-from ...runs.checked_json import hash_of
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key, stage_key
+from ...runs.source import hash_of
 from ...runs.stages import Task, products, stage
 from . import stored
-from .stored import calibrated_key
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
-
     from springtune.problem.geometry import Beam
     from springtune.problem.materials import Material
 
-    from ...config.model import SceneSpec, Study
+    from ...config.model import Study
 
     Body = tuple[Beam, Material, str]
     Box = tuple[tuple[float, float], tuple[float, float]]
@@ -42,6 +38,15 @@ def particles_in(area, mesh_size):
     return area / (0.866 * mesh_size**2)
 
 
+SEARCHING = {"adjoint", "annealed", "evolved", "best-springs"}
+"""Definitions that search for their springs, which takes about fifty times as long as their scene."""
+
+
+def expected_seconds(particles, definition=""):
+    """Expected seconds of a scene, a curve or a mesh."""
+    return (1e-3 + 1e-5 * particles) * (50 if definition in SEARCHING else 1)
+
+
 def _by_mesh(items):
     groups = defaultdict(list)
     for item in items:
@@ -49,13 +54,13 @@ def _by_mesh(items):
     return dict(groups)
 
 
-@once_a_study("scenes")
+@once_a_study
 def scenes_by_mesh(study):
     """Scenes of a study by their mesh."""
     return _by_mesh(study.scenes)
 
 
-@once_a_study("curves")
+@once_a_study
 def curves_by_mesh(study):
     """Sensitivity curves of a study by their mesh."""
     return _by_mesh(study.curves)
@@ -83,25 +88,23 @@ NU_STEP = 0.05
 """Distance of the ends of ranges of Poisson's ratio [1]."""
 
 
-@once_a_study("grids", "outputs")
+@once_a_study
 def interpolants(study: "Study") -> "dict[str, tuple[Box, dict[Body, tuple[float, float]]]]":
     """Interpolants of a study by kind of load: their box, and the unit problem of each body in it."""
     if "block" in study.outputs or "definitions" in study.outputs:  # which show whole fields of all references
         return {}
-    scenes = [scene for grid in study.grids for scene in grid.scenes]
-    # Bodies are few and shared; comparing them for each of 100,000 scenes is no way to find them.
-    bodies = {(id(one.mesh.beam), id(one.material), one.load): one for one in scenes}
+    bodies = dict.fromkeys((one.beam, one.material, one.load) for one in study.references)
     if len(bodies) <= CHECKS:
         return {}
-    wanted = [one for one in scenes if DEFINITIONS[one.definition].needs == "cases"]
+    wanted = [one for one in study.scenes if DEFINITIONS[one.definition].needs == "cases"]
     if keeps_fields(study):
-        wanted += shown(scenes, study.swept)
+        wanted += shown_scenes(study)
     # Bodies and loads that share a unit problem share its solution, too.
     whole = {unit_problem(one.mesh.beam, one.material, LOADS[one.load].kind) for one in wanted}
     kinds: dict[str, dict[Body, tuple[float, float]]] = {}
-    for one in bodies.values():
-        body = one.mesh.beam, one.material, one.load
-        aspect_ratio, nu, kind = problem = unit_problem(body[0], body[1], LOADS[body[2]].kind)
+    for body in bodies:
+        beam, material, load = body
+        aspect_ratio, nu, kind = problem = unit_problem(beam, material, LOADS[load].kind)
         if problem not in whole and kind.mirrored and -1 < nu <= 0.5:
             kinds.setdefault(kind.name, {})[body] = aspect_ratio, nu
     boxes = {name: box_of(set(problems.values())) for name, problems in kinds.items()}
@@ -243,94 +246,80 @@ def _finite_problem(reference, kind):
     return found | {"beam": beam_key(reference.beam), "material": material_key(reference.material)}
 
 
-def curve_key(study, curve):
-    """Key of a sensitivity curve."""
-    return hash_of(mesh_key(curve.mesh), _curve(study, curve), stage_key("studies.kinds.scenes.sensitivity"))
+@once_a_study
+def scene_tasks(study):
+    """Tasks of a study's scenes by mesh, in the order of `scenes_by_mesh`.
+
+    A task's key is of its scene; `stored.stored_key` is where its result is.
+    """
+    return {mesh: list(_scene_tasks(study, mesh, scenes)) for mesh, scenes in scenes_by_mesh(study).items()}
 
 
-def scene_key(study: "Study", scene: "SceneSpec") -> str:
-    """Key of a scene; results of calibrated scenes are stored under `solved_keys`."""
-    return hash_of(_common(study, scene)[1], _own(study, scene))
+def _scene_tasks(study, mesh, scenes):
+    shared, kept = {}, shown_scenes(study)
+    for scene in scenes:
+        place = scene.material, scene.load, scene.definition, scene.kinematics
+        if place not in shared:
+            shared[place] = _shared(study, mesh, *place)
+        task, key = shared[place]
+        own = {"force": scene.force}
+        if scene.definition == "paper":
+            own["stiffness"] = study.stiffness_table[mesh.mesh_type, scene.material.name]
+        if scene.stiffness_scale != 1:
+            own["stiffness_scale"] = scene.stiffness_scale
+        further = {}
+        if scene.definition == "calibrated":  # stiffness is proportional to thickness
+            group = further["calibration"] = calibration_name(scene)
+            own["thickness_ratio"] = mesh.beam.thickness / _calibrating(study)[group][0].mesh.beam.thickness
+        if scene in kept:
+            further["keep_fields"] = True
+        yield {**task, **own, **further, "key": hash_of(key, own)}
 
 
-def _own(study, scene):
-    """Part of a task that scenes of the same `_common` part differ in."""
-    own = {"force": scene.force}
-    if scene.definition == "paper":
-        own["stiffness"] = study.stiffness_table[scene.mesh.mesh_type, scene.material.name]
-    if scene.stiffness_scale != 1:
-        own["stiffness_scale"] = scene.stiffness_scale
-    if scene.definition == "calibrated":  # stiffness is proportional to thickness
-        own["thickness_ratio"] = scene.mesh.beam.thickness / _calibrating(study)[calibration_name(scene)]
-    return own
+def _shared(study, mesh, material, load, definition, kinematics):
+    """Task, and its key, of scenes of a mesh that differ in force or stiffness alone."""
+    task = {
+        "material": material_key(material),
+        "kind": LOADS[load].kind.name,
+        # In linear kinematics follower forces keep their initial direction.
+        "follower": LOADS[load].follower and kinematics == "nonlinear",
+        "definition": definition,
+        "kinematics": kinematics,
+    }
+    reference = reference_of(study, mesh.beam, material, load)
+    if "interpolant" not in reference:  # which has no field, all that a scene wants of it
+        task["reference"] = reference
+    code = stage_key("studies.kinds.scenes.solve"), definition_key(definition)
+    return task, hash_of(mesh_key(mesh), mesh.beam.thickness, task, code)
 
 
-@once_a_study("scenes", "curves", "grids", "outputs", "stiffness_table", "calibration")
-def scene_keys(study):
-    """Keys of a study's scenes by their mesh, in the order of `scenes_by_mesh`: for tasks and the dataset."""
-    return {mesh: [scene_key(study, scene) for scene in scenes] for mesh, scenes in scenes_by_mesh(study).items()}
+def curve_task(study, curve):
+    """Task of a sensitivity curve; its stiffnesses [N/m] ascend."""
+    membrane = curve.material.in_plane.young_modulus * curve.mesh.beam.thickness
+    task = {
+        "kind": LOADS[curve.load].kind.name,
+        "force": curve.force,
+        "kinematics": curve.kinematics,
+        "stiffnesses": [ratio * membrane for ratio in study.stiffness_ratios],
+        "reference": reference_of(study, curve.mesh.beam, curve.material, curve.load),
+    }
+    return {"key": hash_of(mesh_key(curve.mesh), task, stage_key("studies.kinds.scenes.sensitivity"))} | task
 
 
-def _common(study, scene):
-    """Part of a task, and its key, that scenes share if only force or stiffness factor differ."""
-    # By their places: hashing materials for each of 100,000 scenes is slow.
-    place = id(scene.mesh), id(scene.material), scene.load, scene.definition, scene.kinematics
-    known = _commons(study)
-    if place not in known:
-        load, mesh = LOADS[scene.load], scene.mesh
-        task = {
-            "material": material_key(scene.material),
-            "kind": load.kind.name,
-            # In linear kinematics follower forces keep their initial direction.
-            "follower": load.follower and scene.kinematics == "nonlinear",
-            "definition": scene.definition,
-            "kinematics": scene.kinematics,
-        }
-        reference = reference_of(study, mesh.beam, scene.material, scene.load)
-        if "interpolant" not in reference:  # which has no field, all that a scene wants of it
-            task["reference"] = reference
-        code = stage_key("studies.kinds.scenes.solve"), definition_key(scene.definition)
-        key = hash_of(mesh_key(mesh), mesh.beam.thickness, task, code)
-        known[place] = task, key, scene  # the scene, so that nothing else comes to be in these places
-    return known[place][:2]
-
-
-@once_a_study("grids", "outputs")
-def _commons(study):
-    return {}
-
-
-@once_a_study("grids")
+@once_a_study
 def shown_scenes(study):
     """Scenes whose whole fields are stored, chosen from the whole study."""
-    scenes = study.scenes if study.part is None else {scene for grid in study.grids for scene in grid.scenes}
-    return shown(scenes, study.swept)
+    return shown(study.scenes, study.swept)
 
 
-def solved_keys(study, mesh, calibration):
-    """Keys under which results of a mesh's scenes are stored, given the calibrated stiffnesses by group."""
-    return [
-        calibrated_key(key, calibration[calibration_name(scene)]["stiffness"])
-        if scene.definition == "calibrated"
-        else key
-        for scene, key in zip(scenes_by_mesh(study)[mesh], scene_keys(study)[mesh])
-    ]
-
-
-def stiffnesses(study, curve):
-    """Stiffnesses of a sensitivity curve [N/m], ascending."""
-    membrane = curve.material.in_plane.young_modulus * curve.mesh.beam.thickness
-    return [ratio * membrane for ratio in study.stiffness_ratios]
-
-
-@once_a_study("curves")
+@once_a_study
 def _calibrating(study):
-    """Thickness of the beam that calibrates each group of scenes [m]; a study gives a group one."""
-    return {calibration_name(one): one.mesh.beam.thickness for one in _calibrating_curves(study)}
-
-
-def _calibrating_curves(study):
-    return [one for one in study.curves if (one.mesh.beam.name, one.load) == study.calibration]
+    """Curves that calibrate each group of scenes."""
+    found = defaultdict(list)
+    for one in study.curves:
+        if (one.mesh.beam.name, one.load) == study.calibration:
+            found[calibration_name(one)].append(one)
+    return dict(found)
 
 
 def calibration_name(scene):
@@ -341,18 +330,13 @@ def calibration_name(scene):
 # -- stages ------------------------------------------------------------------------------------------------------------
 
 
-def _mesh_members(study, costs):
-    """Meshes, and the cost of each with all its scenes and curves."""
-    seconds = {stem(mesh): costs.of("mesh", particles(mesh)) for mesh in study.meshes}
+def _mesh_members(study):
+    """Meshes by the stem of their files, and the expected seconds of each with all its scenes and curves."""
+    seconds, members, curves = defaultdict(float), defaultdict(list), curves_by_mesh(study)
     for mesh, scenes in scenes_by_mesh(study).items():
-        name, cost = stem(mesh), cache(partial(costs.of, units=particles(mesh)))
-        for scene in scenes:
-            seconds[name] += cost(scene.kinematics)
-            seconds[name] += cost(scene.definition)
-    for curve in study.curves:
-        seconds[stem(curve.mesh)] += costs.of("curve", particles(curve.mesh))
-    members = defaultdict(list)
-    for mesh in study.meshes:
+        count = particles(mesh)
+        seconds[stem(mesh)] += (1 + len(curves.get(mesh, ()))) * expected_seconds(count)
+        seconds[stem(mesh)] += sum(expected_seconds(count, scene.definition) for scene in scenes)
         members[stem(mesh)].append(mesh)
     return {name: (seconds[name], meshes) for name, meshes in members.items()}
 
@@ -375,28 +359,16 @@ def _reference_tasks(study):
         if "interpolant" not in reference_of(study, *body):
             problem, key = _unit_problem(*body), solved_reference(*body)["key"]
             name = hash_of(problem[0], problem[2])
-            found[key] = Task({"problem": problem}, costs=[("reference", 0)], name=name, key=key)
+            found[key] = Task({"problem": problem}, seconds=3e-2, name=name, key=key)
         for kind in study.further_references:
             values, key = _finite_problem(one, kind), finite_key(one, kind)
-            found[key] = Task(values, costs=[("finite", 0)], name=hash_of(values), key=key)
+            found[key] = Task(values, seconds=1.0, name=hash_of(values), key=key)
     yield from found.values()
-    asked = {(one.beam, one.material, one.load) for one in study.references}
     for kind, (box, problems) in interpolants(study).items():
-        if not asked.isdisjoint(problems):  # a part of a study may ask for none
-            key = interpolant_key(kind, box)
-            keys = {solved_reference(*body)["key"]: problem for body, problem in problems.items()}
-            values = {"kind": kind, "box": box, "problems": keys}
-            yield Task(values, costs=[("interpolant", expected_solves(box))], name=key, key=key)
-
-
-def _curve(study, curve):
-    return {
-        "kind": LOADS[curve.load].kind.name,
-        "force": curve.force,
-        "kinematics": curve.kinematics,
-        "stiffnesses": stiffnesses(study, curve),
-        "reference": reference_of(study, curve.mesh.beam, curve.material, curve.load),
-    }
+        key = interpolant_key(kind, box)
+        keys = {solved_reference(*body)["key"]: problem for body, problem in problems.items()}
+        values = {"kind": kind, "box": box, "problems": keys}
+        yield Task(values, seconds=3e-2 * expected_solves(box), name=key, key=key)
 
 
 def on_meshes(folder, name, files, **more):
@@ -418,7 +390,7 @@ def stage_on_meshes(name, module, message, content, folder, mesh="mesh", every=(
 def _sensitivity(study, folder, members):
     curves = curves_by_mesh(study)
     files = [
-        {"name": stem(mesh), "tasks": [{"key": curve_key(study, one)} | _curve(study, one) for one in curves[mesh]]}
+        {"name": stem(mesh), "tasks": [curve_task(study, one) for one in curves[mesh]]}
         for meshes in members
         for mesh in meshes
         if mesh in curves
@@ -427,137 +399,42 @@ def _sensitivity(study, folder, members):
 
 
 def _solve(study, folder, members):
-    scenes = scenes_by_mesh(study)
+    tasks = scene_tasks(study)
     files = [
-        {"name": stem(mesh), "thickness": mesh.beam.thickness, "tasks": _scenes(study, mesh)}
+        {"name": stem(mesh), "thickness": mesh.beam.thickness, "tasks": tasks[mesh]}
         for meshes in members
         for mesh in meshes
-        if mesh in scenes  # a part of a study may have curves alone
     ]
-    calibration = str(calibration_path(folder)) if calibrated(study) else None
-    return on_meshes(folder, "solutions", files, calibration=calibration)
+    return on_meshes(folder, "solutions", files, calibration=calibration_file(study, folder))
 
 
-def _scenes(study, mesh):
-    """Tasks of a mesh's scenes."""
-    tasks, kept = [], shown_scenes(study)
-    for scene, key in zip(scenes_by_mesh(study)[mesh], scene_keys(study)[mesh]):
-        task = {**_common(study, scene)[0], "key": key, **_own(study, scene)}
-        if scene in kept:
-            task["keep_fields"] = True
-        if scene.definition == "calibrated":
-            task["calibration"] = calibration_name(scene)
-        tasks.append(task)
-    return tasks
+def calibration_file(study, folder):
+    """File of the calibrated stiffnesses of a study, if any scene is calibrated."""
+    any_is = any(scene.definition == "calibrated" for scene in study.scenes)
+    return str(folder / "calibration.h5") if any_is else None
 
 
-@once_a_study("scenes")
-def calibrated(study):
-    """Scenes whose stiffness is calibrated."""
-    return [scene for scene in study.scenes if scene.definition == "calibrated"]
-
-
-def calibration_path(folder):
-    """Where the calibrated stiffnesses of a study are."""
-    return folder / "calibration.json"
-
-
-def _calibrate_members(study, costs):
+def _calibrate_members(study):
     """All groups of scenes that share a calibrated stiffness, in one job."""
-    names = {calibration_name(scene) for scene in calibrated(study)}
+    names = {calibration_name(scene) for scene in study.scenes if scene.definition == "calibrated"}
     return {"all": (0.0, sorted(names))} if names else {}
 
 
 def _calibrate(study, folder, members):
     def named(curve):
-        place = {"mesh": stem(curve.mesh), "curve": curve_key(study, curve)}
+        place = {"mesh": stem(curve.mesh), "curve": curve_task(study, curve)["key"]}
         return place | {"load": curve.load, "force": curve.force}
 
-    tasks = [
-        {"name": name, "members": [named(one) for one in _calibrating_curves(study) if calibration_name(one) == name]}
-        for names in members
-        for name in names
-    ]
     return {
-        "file": str(calibration_path(folder)),
+        "file": calibration_file(study, folder),
         "curves": str(folder / "curves"),
-        "groups": tasks,
+        "groups": [
+            {"name": name, "members": [named(one) for one in _calibrating(study)[name]]}
+            for names in members
+            for name in names
+        ],
         "code": stage_key("studies.kinds.scenes.calibrate"),
     }
-
-
-# -- parts of a study --------------------------------------------------------------------------------------------------
-
-
-def pieces(study, costs, division):
-    """Seconds of each piece: of a mesh's scenes and curves, of a part of them, or of a grid's."""
-    if division.by == "grid":
-        return {("grid", name): sum(_seconds(one, costs) for one in items) for name, items in _by_grid(study).items()}
-    found = {}
-    for name, items in _by_stem(study).items():
-        each = [_seconds(one, costs) for one in items]
-        meshed = costs.of("mesh", particles(items[0].mesh))
-        count = division.pieces(sum(each), len(each))
-        for number in range(count):
-            found[name, number, count] = meshed + sum(_slice(each, number, count))
-    return found
-
-
-def take(study, names):
-    """Study reduced to some pieces and what they need."""
-    by_grid, by_stem = _by_grid(study), _by_stem(study)
-    chosen = set()
-    for first, *rest in names:
-        chosen.update(by_grid[rest[0]] if first == "grid" else _slice(by_stem[first], *map(int, rest)))
-    return of_scenes(study, chosen)
-
-
-def of_scenes(study: "Study", chosen: "Collection[object]") -> "Study":
-    """Study reduced to some scenes and curves and what they need."""
-    scenes = tuple(scene for scene in study.scenes if scene in chosen)
-    groups = {calibration_name(scene) for scene in scenes if scene.definition == "calibrated"}
-    calibrating = {one for one in _calibrating_curves(study) if calibration_name(one) in groups}
-    curves = tuple(one for one in study.curves if one in chosen or one in calibrating)
-    asked: list[Any] = [*scenes, *curves]
-    bodies = {(one.mesh.beam, one.material, one.load, one.force) for one in asked}
-    meshes = {one.mesh for one in asked}
-    return replace(
-        study,
-        scenes=scenes,
-        curves=curves,
-        meshes=tuple(mesh for mesh in study.meshes if mesh in meshes),
-        references=tuple(one for one in study.references if (one.beam, one.material, one.load, one.force) in bodies),
-        parts=study.parts | {"scenes": study.parts["scenes"] if asked else ()},
-    )
-
-
-def _by_grid(study):
-    """Scenes and curves by the first grid that asks for them."""
-    found, seen = {}, set()
-    for grid in study.grids:
-        found[grid.name] = [one for one in dict.fromkeys((*grid.curves, *grid.scenes)) if one not in seen]
-        seen.update(found[grid.name])
-    return {name: asked for name, asked in found.items() if asked}
-
-
-def _by_stem(study):
-    """Scenes and curves by the file of their mesh, which sheets of several thicknesses share."""
-    found = defaultdict(list)
-    for one in (*study.curves, *study.scenes):
-        found[stem(one.mesh)].append(one)
-    return found
-
-
-def _slice(items, number, count):
-    """Piece `number` of `count` of some items."""
-    return items[len(items) * number // count : len(items) * (number + 1) // count]
-
-
-def _seconds(one, costs):
-    """Expected seconds of a scene or a curve."""
-    count = particles(one.mesh)
-    kinds = (one.kinematics, one.definition) if hasattr(one, "definition") else ("curve",)
-    return sum(costs.of(kind, count) for kind in kinds)
 
 
 STAGES = (

@@ -11,7 +11,7 @@ from springtune.problem.geometry import Beam
 from springtune.problem.loads import LOAD_KINDS
 from springtune.problem.materials import Rubber, material_of
 
-from ...runs import driver, store
+from ...runs import job, store
 from .unit_references import failed, make_interpolant, solve_unit_problem
 
 NOT_TESTED = "has no uniaxial_test, and so no law of Yeoh's: its references are neo-Hookean"
@@ -20,23 +20,22 @@ OF_PLANE_STRAIN = "is in plane strain: its reference is 'neo-hooke-plane-strain'
 """Why a material has no reference of another law or plane."""
 
 
-def run(content, costs):
+def run(content, attempts):
     """Solve the missing references of a bundle."""
     interpolants, others = _divided(content)
-    driver.solve_files(sys.modules[__name__], others, costs)
+    job.solve_files(sys.modules[__name__], others, attempts)
     for task in interpolants:
-        make_interpolant(Path(content["folder"]) / f"{task['key']}.h5", task, costs)
+        make_interpolant(Path(content["folder"]) / f"{task['key']}.h5", task, attempts)
 
 
-def gone(content, key, why, limits):
-    """Store the failed result of a reference beyond its limits."""
+def crashed(content, key, why):
+    """Store the failed result of a reference whose process died."""
     interpolants, others = _divided(content)
-    driver.gone_of_files(sys.modules[__name__], others, key, why, limits)
+    job.crashed_of_files(sys.modules[__name__], others, key, why)
     # What an interpolant cannot do goes into its own file.
     for task in interpolants:
         if key in (task["key"], *task["problems"]):
-            noted = failed(task, why) | {store.LIMITS: limits}
-            store.add(Path(content["folder"]) / f"{task['key']}.h5", {key: noted})
+            store.add(Path(content["folder"]) / f"{task['key']}.h5", {key: failed(task, why)})
 
 
 def _divided(content):

@@ -48,11 +48,6 @@ def solve(curve, shared):
     return _result(path, curve, folder) | {"seconds": time.perf_counter() - begin}
 
 
-def cost(curve, shared, result, seconds):
-    """Seconds of a curve by the particles of its mesh."""
-    yield "curve", len(shared[0].mesh.points), result["seconds"]
-
-
 def _result(path, curve, folder):
     force, stiffness = curve["force"], np.array(curve["stiffnesses"])
     displacement, stable = path.values, path.stable

@@ -12,18 +12,18 @@ from springtune.problem.materials import material_of
 from springtune.problem.status import Status
 from springtune.reference.answers import field_error, interpolate
 from springtune.scene.sheet import Sheet, definition_of
-from springtune.springs import DEFINITIONS, DefinitionError
+from springtune.springs.base import DEFINITIONS, DefinitionError
 
-from ...runs import checked_json
+from ...runs import store
 from . import stored
-from .stored import calibrated_key
+from .stored import stored_key
 
 parts = stored.parts
 
 
 def tasks(family, content):
     """Scenes of a mesh under the keys of their results, with their calibrated stiffness."""
-    calibration = checked_json.demand(content["calibration"]) if content["calibration"] else {}
+    calibration = store.everything(content["calibration"]) if content["calibration"] else {}
     if not calibration:
         return family["tasks"]
     return [
@@ -35,7 +35,7 @@ def tasks(family, content):
 def prepare(family, content):
     """Sheet of a mesh, and a function that reads the fields of references on it for 1 N [m].
 
-    ``family`` is a file of the job's content (`springtune.studies.runs.driver`): the scenes of one mesh.
+    ``family`` is a file of the job's content (`springtune.studies.runs.job`): the scenes of one mesh.
     """
     mesh, labels = stored.prepared(content["meshes"], family["name"]).mesh, ("x", "y", "displacements")
 
@@ -64,25 +64,10 @@ def order(scene):
     return ("" if uniform else scene["definition"], scene["material"]["poisson_ratio"], LOAD_KINDS[scene["kind"]].held)
 
 
-def stored_key(scene, calibration):
-    """Key of a scene's result; as in `springtune.studies.kinds.scenes.plan.solved_keys`, from the task."""
-    group = scene.get("calibration")
-    return calibrated_key(scene["key"], calibration[group]["stiffness"]) if group else scene["key"]
-
-
 def solve(scene, shared):
-    """Result of a scene, and the seconds of deriving its springs."""
+    """Result of a scene on what scenes of its bundle share."""
     sheet, field = shared
-    derived = sheet.deriving
-    result = solved(sheet, scene, field)
-    return result | {"deriving": sheet.deriving - derived}
-
-
-def cost(scene, shared, result, seconds):
-    """Seconds of a scene by the particles of its mesh, and those of its definition."""
-    particles = len(shared[0].mesh.points)
-    yield scene["kinematics"], particles, result["seconds"]
-    yield scene["definition"], particles, result.pop("deriving", 0.0)
+    return solved(sheet, scene, field)
 
 
 def solved(sheet, scene, reference=None):

@@ -1,7 +1,7 @@
 """Stored meshes, references and scenes, and how they are read.
 
-A mesh is a VTU file and a note with its key, its checksum, its quality and, of a shape, its groups. A mesh that cannot
-be made has no VTU file, and its note says why.
+A mesh is a VTU file and a stored result with the checksum of that file, its quality and, of a shape, its groups. A mesh
+that cannot be made has no VTU file, and its result says why.
 """
 
 from pathlib import Path
@@ -12,27 +12,29 @@ import numpy as np
 from springtune.mesh.formats import read_stored, write_mesh
 from springtune.mesh.groups import GroupedMesh
 
-from ...runs import checked_json, store
-from ...runs.checked_json import DamagedError, hash_of, set_aside
-from ...runs.driver import RefusedError
-from ...runs.records import checksum
+from ...runs import store
+from ...runs.job import RefusedError
+from ...runs.source import checksum, hash_of
+from ...runs.store import DamagedError
 
 # -- meshes ------------------------------------------------------------------------------------------------------------
 
 
+NOTES = "notes"
+"""Key of the only result of a mesh's file, which has the key of the mesh itself."""
+
+
 def files(folder: str | Path, name: str) -> tuple[Path, Path]:
     """File of a mesh, and that of its notes."""
-    return Path(folder) / f"{name}.vtu", Path(folder) / f"{name}.json"
+    return Path(folder) / f"{name}.vtu", Path(folder) / f"{name}.h5"
 
 
 def write_made(folder: str | Path, name: str, key: str, made: GroupedMesh, known: dict[str, float]) -> None:
     """Store a mesh and its groups."""
     path, notes = files(folder, name)
     path.parent.mkdir(parents=True, exist_ok=True)
-    # The notes name the mesh they belong to, so they go first and come last.
-    notes.unlink(missing_ok=True)
     write_mesh(path, made.mesh)
-    checked_json.write(notes, {"name": name, "key": key, "checksum": checksum(path), **known, "groups": _plain(made)})
+    store.add(notes, {NOTES: {"key": key, "checksum": checksum(path), **known, "groups": _plain(made)}})
 
 
 def _plain(grouped: GroupedMesh) -> dict[str, Any]:
@@ -49,44 +51,31 @@ def _plain(grouped: GroupedMesh) -> dict[str, Any]:
 
 
 def refuse(folder: str | Path, name: str, key: str, why: dict[str, str]) -> None:
-    """Store that a mesh cannot be made: ``message``, and ``limits`` where it went beyond them."""
+    """Store that a mesh cannot be made, with its ``message``."""
     path, notes = files(folder, name)
     path.unlink(missing_ok=True)
-    checked_json.write(notes, {"name": name, "key": key, **why})
+    store.add(notes, {NOTES: {"key": key, **why}})
 
 
-def is_stored(folder: str | Path, name: str, key: str, limits: str) -> bool:
-    """Whether a mesh, or the reason why it cannot be made, is stored; a damaged one is set aside."""
+def is_stored(folder: str | Path, name: str, key: str) -> bool:
+    """Whether a mesh, or the reason why it cannot be made, is stored."""
     path, notes = files(folder, name)
-    if not notes.exists():
+    if NOTES not in store.stored(notes):
         return False
-    try:
-        known = read_notes(folder, name)
-        if known["key"] != key or known.get("limits", limits) != limits:
-            return False
-        if "message" not in known and path.exists():
-            _checked(path, known["checksum"])
-        return "message" in known or path.exists()
-    except DamagedError as error:
-        set_aside(error)
-        return False
+    known = read_notes(folder, name)
+    return bool(known["key"] == key and ("message" in known or path.exists()))
 
 
 def read_notes(folder: str | Path, name: str) -> dict[str, Any]:
-    """Notes of a mesh: its ``name``, ``key``, ``checksum``, seconds and quality."""
-    path = files(folder, name)[1]
-    notes: dict[str, Any] = checked_json.demand(path)
-    if notes.get("name") != name:
-        raise DamagedError(path, "its name is not that of its content")
-    return notes
+    """Notes of a mesh: its ``key``, ``checksum``, seconds and quality."""
+    return store.read(files(folder, name)[1], [NOTES])[NOTES]
 
 
 def prepared(folder: str | Path, name: str) -> GroupedMesh:
     """Mesh by its name, for tasks that need it."""
     if found := read(folder, name):
         return found
-    notes = read_notes(folder, name)
-    raise RefusedError(notes["message"], "limits" in notes)
+    raise RefusedError(read_notes(folder, name)["message"])
 
 
 def read(folder: str | Path, name: str) -> GroupedMesh | None:
@@ -113,12 +102,10 @@ def _checked(path: Path, wanted: str) -> None:
     if not path.exists():
         raise DamagedError(path, "it is missing")
     if checksum(path) != wanted:
-        raise DamagedError(path, "its checksum is not that of its content")
+        raise DamagedError(path, "it is damaged (its checksum is another one)")
 
 
 # -- references --------------------------------------------------------------------------------------------------------
-
-SCALED = ("displacement", "mean_displacement", "displacements")
 
 
 def read_reference(folder: str | Path, reference: dict[str, Any], fields: tuple[str, ...] = ()) -> dict[str, Any]:
@@ -131,7 +118,8 @@ def read_reference(folder: str | Path, reference: dict[str, Any], fields: tuple[
 
 def scaled(found: dict[str, Any], reference: dict[str, Any]) -> dict[str, Any]:
     """Answer of a unit problem at the size of a beam and for 1 N."""
-    scales = dict.fromkeys(SCALED, reference["displacement"]) | dict.fromkeys("xy", reference["length"])
+    scales = dict.fromkeys(("displacement", "mean_displacement", "displacements"), reference["displacement"])
+    scales |= dict.fromkeys("xy", reference["length"])
     scales |= dict.fromkeys(("rotation", "strain"), reference["displacement"] / reference["length"])
     return {name: value * scales[name] if name in scales else value for name, value in found.items()}
 
@@ -141,13 +129,11 @@ def scaled(found: dict[str, Any], reference: dict[str, Any]) -> dict[str, Any]:
 FIELD_ARRAYS = {"displacements": "f8", "spring_stiffnesses": "f4", "spring_forces": "f4"}
 """Arrays of all particles and springs, and their types."""
 
-PACKED = "fields"
-"""What they are stored as: one array, since three take as long to write as the scene to solve."""
 
-
-def calibrated_key(key: str, stiffness: float | None) -> str:
-    """Key of a scene with a calibrated stiffness [N/m], or None."""
-    return hash_of(key, stiffness)
+def stored_key(scene: dict[str, Any], calibration: dict[str, Any]) -> str:
+    """Key of a scene's result, which depends on the stiffness that calibrates it [N/m], if any."""
+    group = scene.get("calibration")
+    return hash_of(scene["key"], calibration[group]["stiffness"]) if group else str(scene["key"])
 
 
 def fields_key(key: str) -> str:
@@ -157,33 +143,8 @@ def fields_key(key: str) -> str:
 
 def parts(task: dict[str, Any], result: dict[str, Any]) -> dict[str, dict[str, Any]]:
     """Stored parts of a result by key: its numbers and, if they are kept, its fields."""
-    fields = {fields_key(task["key"]): packed(result)} if task.get("keep_fields") else {}
-    return fields | {task["key"]: {name: value for name, value in result.items() if name not in FIELD_ARRAYS}}
-
-
-def packed(result: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Fields of a result as they are stored; empty without any."""
-    if not FIELD_ARRAYS.keys() <= result.keys():
-        return {}
-    arrays = [result[name].astype(kind).ravel() for name, kind in FIELD_ARRAYS.items()]
-    lengths = np.array([len(array) for array in arrays])
-    return {PACKED: np.concatenate([array.view("u1") for array in (lengths, *arrays)])}
-
-
-def unpacked(stored: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Fields of a stored result: the inverse of `packed`.
-
-    Examples
-    --------
-    >>> fields = {"displacements": np.ones((2, 2)), "spring_stiffnesses": np.ones(3), "spring_forces": np.zeros(3)}
-    >>> {name: array.shape for name, array in unpacked(packed(fields)).items()}
-    {'displacements': (2, 2), 'spring_stiffnesses': (3,), 'spring_forces': (3,)}
-    """
-    if PACKED not in stored:
-        return {}
-    head = 8 * len(FIELD_ARRAYS)
-    lengths = stored[PACKED][:head].view("i8")
-    sizes = [length * np.dtype(kind).itemsize for length, kind in zip(lengths, FIELD_ARRAYS.values())]
-    parts = np.split(stored[PACKED][head:], np.cumsum(sizes)[:-1])
-    found = {name: part.view(kind) for part, (name, kind) in zip(parts, FIELD_ARRAYS.items())}
-    return found | {"displacements": found["displacements"].reshape(-1, 2)}
+    found = {task["key"]: {name: value for name, value in result.items() if name not in FIELD_ARRAYS}}
+    if task.get("keep_fields"):
+        kept = {name: result[name].astype(kind) for name, kind in FIELD_ARRAYS.items() if name in result}
+        found[fields_key(task["key"])] = kept
+    return found

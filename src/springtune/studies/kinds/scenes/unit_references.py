@@ -15,23 +15,23 @@ from springtune.reference.small_strain import ReferenceNotConvergedError, solve_
 from ...runs import store
 
 if TYPE_CHECKING:
-    from ...runs.task_costs import TaskCosts
+    from ...runs.job import Attempts
 
 REFERENCE_TOLERANCE = 1e-4
 """Largest error estimate of an interpolant that stands for references that are solved by themselves [1]: theirs."""
 
 
-def make_interpolant(path: Path, task: dict[str, Any], costs: "TaskCosts") -> None:
+def make_interpolant(path: Path, task: dict[str, Any], attempts: "Attempts") -> None:
     """Build a missing interpolant; if it meets no tolerance, solve its unit problems one by one."""
-    if task["key"] not in store.stored(path, costs.limits):
+    if task["key"] not in store.stored(path):
         begin = time.perf_counter()
-        result = costs.attempt(task["key"], partial(_built, task), partial(failed, task))
+        result = attempts.attempt(task["key"], partial(_built, task), partial(failed, task))
         if result is None:
             return
         result["seconds"], result["asked"] = time.perf_counter() - begin, len(task["problems"])
         store.add(path, {task["key"]: result})
-        costs.add("interpolant", result.get("solves", 0), result["seconds"])
-    known = store.stored(path, costs.limits)
+        attempts.computed += 1
+    known = store.stored(path)
     if "solves" in store.read(path, [task["key"]])[task["key"]]:
         return
     missing = [key for key in task["problems"] if key not in known]
@@ -40,11 +40,10 @@ def make_interpolant(path: Path, task: dict[str, Any], costs: "TaskCosts") -> No
         for key in sorted(missing, key=lambda key: task["problems"][key]):
             begin = time.perf_counter()
             problem = {"problem": (*task["problems"][key], task["kind"])}
-            result = costs.attempt(key, partial(solve_unit_problem, problem, fields=False), partial(failed, task))
+            result = attempts.attempt(key, partial(solve_unit_problem, problem, fields=False), partial(failed, task))
             if result is None:
                 continue
             keeper[key] = result | {"seconds": time.perf_counter() - begin}
-            costs.add("interpolant", 1, time.perf_counter() - begin, 0)
 
 
 def _built(task: dict[str, Any]) -> dict[str, Any]:

@@ -6,12 +6,12 @@ from springtune.problem.compare import deformation_error
 from springtune.problem.shapes import QUANTITY_UNITS
 from springtune.reference.answers import beyond_linear
 
-from ...output.dataset import OF_PARTICLES, OF_SPRINGS, UGRID, Filler
+from ...output.dataset import OF_PARTICLES, OF_SPRINGS, UGRID
 from ...runs import store
 from ..scenes import stored
 from ..scenes import variables as shared
-from ..scenes.collect import fields_on, put_outline, with_objection
-from ..scenes.stored import PACKED, fields_key, unpacked
+from ..scenes.collect import displaced, fields_of_rows, mesh_row, outline_row, with_objection
+from ..scenes.stored import FIELD_ARRAYS, fields_key
 from ..scenes.variables import declared, topology
 from . import kind
 from .expand import law_of
@@ -101,82 +101,73 @@ looked at, their displacements and forces with seven digits."""
 def groups(study, folder):
     """Groups of a dataset, see `springtune.studies.kinds.scenes.collect.groups`."""
     part = study.parts["shapes"]
-    found = Filler(SHAPES.empty(study.axes))
-    _quantities(part, found)
-    references = _references(study, part, folder, found)
-    for scenes in kind.by_mesh(part).values():
-        _mesh(scenes[0], folder, found)
-        keys = {one: kind.scene_task(part, one)["key"] for one in scenes}
-        results = store.read(folder / "solutions" / f"{kind.file_name(scenes[0])}.h5", set(keys.values()))
-        for one, key in keys.items():
-            _scene(part, one, results[key], references, found)
-    drawn = DRAWING in study.outputs and not study.part
-    finite = {AT_FINITE_STRAIN.name: _finite_strain(study, part, folder, found.data.value)} if part.finite else {}
-    return {SHAPES.name: found.data} | finite | (_fields(study, folder) if drawn else {})
+    answers = {case: _answer(part, folder, *case) for case in part.referred}
+    rows = [*_quantities(part), *_references(study.axes, part, answers), *_scenes(part, folder, answers)]
+    data = SHAPES.of_rows(study.axes, rows)
+    finite = {AT_FINITE_STRAIN.name: _finite_strain(study, part, folder, data.value)} if part.finite else {}
+    return {SHAPES.name: data} | finite | (_fields(study, folder) if DRAWING in study.outputs else {})
 
 
-def _quantities(part, found):
-    """Write what quantities are."""
+def _answer(part, folder, *case, arrays=()):
+    """Stored result of a reference: of a shape, material and load, and a law at finite strain."""
+    return store.read_one(folder / "shape_references", kind.reference_task(part, *case)["key"], arrays)
+
+
+def _quantities(part):
+    """Rows of what quantities are."""
     for shape, load in dict.fromkeys((one.shape, one.load) for one in part.scenes):
-        found.put({"shape_thickness": part.shape[shape].thickness}, shape=shape)
+        yield {"shape": shape, "shape_thickness": part.shape[shape].thickness}
         for one in part.shape[shape].loads[load].quantities:
-            values = {f"quantity_{name}": getattr(one, name) for name in ("kind", "component", "of")}
-            values |= {"quantity_units": QUANTITY_UNITS[one.kind], "source": one.source}
-            if one.expected is not None:
-                values["expected_value"] = one.expected
-            found.put(values, shape=shape, load=load, quantity=one.name)
+            about = {f"quantity_{name}": getattr(one, name) for name in ("kind", "component", "of")}
+            about |= {"quantity_units": QUANTITY_UNITS[one.kind], "source": one.source, "expected_value": one.expected}
+            yield {"shape": shape, "load": load, "quantity": one.name} | about
 
 
-def _references(study, part, folder, found):
-    """Write references; return result and objections by shape, material and load."""
-    answers = {}
-    for shape, material, load in part.referred:
-        task = kind.reference_task(part, shape, material, load)
-        result = store.read_one(folder / "shape_references", task["key"])
+def _whys(part, shape, load, result):
+    """Why a reference, or a quantity of it, is missing, in the names of the study."""
+    whys = (result["message"], *result.get("lacking", {}).values())
+    return [named(why, part.shape[shape], part.shape[shape].loads[load]) for why in whys if why]
+
+
+def _objection(result, kinematics):
+    """Why a reference does not apply to networks of some kinematics."""
+    return "" if result["message"] or kinematics == "linear" else beyond_linear(result["rotation"], result["strain"])
+
+
+def _references(axes, part, answers):
+    """Rows of references."""
+    for (shape, material, load), result in answers.items():
         labels = {"shape": shape, "material": material, "load": load}
-        case = part.shape[shape].loads[load]
-        message, objections = named(result["message"], part.shape[shape], case), {}
-        values = {"reference_seconds": result["seconds"]}
-        if not message:
-            values |= {f"reference_{name}": result[name] for name in ("unknowns", "rotation", "strain")}
-            objections = {"linear": "", "nonlinear": beyond_linear(result["rotation"], result["strain"])}
-            for kinematics in study.axes["kinematics"]:
-                found.put({"reference_applies": not objections[kinematics]}, kinematics=kinematics, **labels)
-            for one in case.quantities:
-                row = _value(result, one)
-                row |= {"reference_expected_error": _error(row["reference_value"], one.expected)}
-                found.put(row, quantity=one.name, **labels)
-            lacking = (named(why, part.shape[shape], case) for why in result["lacking"].values())
-            message = "; ".join(filter(None, (*lacking, objections["nonlinear"])))
-        values["reference_message"] = message
-        found.put(values, **labels)
-        answers[shape, material, load] = result, objections
-    return answers
+        whys = [*_whys(part, shape, load, result), _objection(result, "nonlinear")]
+        yield labels | {"reference_seconds": result["seconds"], "reference_message": "; ".join(filter(None, whys))}
+        if result["message"]:
+            continue
+        yield labels | {f"reference_{name}": result[name] for name in ("unknowns", "rotation", "strain")}
+        for kinematics in axes["kinematics"]:
+            yield labels | {"kinematics": kinematics, "reference_applies": not _objection(result, kinematics)}
+        for one in part.shape[shape].loads[load].quantities:
+            row = labels | {"quantity": one.name} | _value(result, one)
+            yield row | {"reference_expected_error": _error(row["reference_value"], one.expected)}
 
 
 def _finite_strain(study, part, folder, values):
     """Group of references at finite strain, and the errors of the networks with their law."""
-    laws = tuple(dict.fromkeys(law for *_, law in part.finite))
-    found = Filler(AT_FINITE_STRAIN.empty(study.axes | {"law": laws}))
-    references = {}
+    rows, references = [], {}
     for shape, material, load, law in part.finite:
-        task = kind.reference_task(part, shape, material, load, law)
-        result = store.read_one(folder / "shape_references", task["key"])
+        result = _answer(part, folder, shape, material, load, law)
         labels = {"shape": shape, "material": material, "load": load, "law": law}
-        case = part.shape[shape].loads[load]
         references[shape, material, load, law] = result.get("values", {})
-        whys = (result["message"], *result.get("lacking", {}).values())
-        why = "; ".join(named(one, part.shape[shape], case) for one in whys if one)
-        found.put({"reference_message": why}, **labels)
-        for one in case.quantities if not result["message"] else ():
-            found.put(_value(result, one), quantity=one.name, **labels)
+        rows.append(labels | {"reference_message": "; ".join(_whys(part, shape, load, result))})
+        for one in part.shape[shape].loads[load].quantities if not result["message"] else ():
+            rows.append(labels | {"quantity": one.name} | _value(result, one))
     for one in part.scenes:
         reference = references.get((one.shape, one.material, one.load, law_of(one)), {})
         for quantity in part.shape[one.shape].loads[one.load].quantities if reference else ():
             labels = vars(one) | {"quantity": quantity.name}
             error = _error(float(values.sel(labels)), reference.get(quantity_key(quantity), np.nan))
-            found.put({"error": error}, **labels)
-    return found.data
+            rows.append(labels | {"error": error})
+    laws = tuple(dict.fromkeys(law for *_, law in part.finite))
+    return AT_FINITE_STRAIN.of_rows(study.axes | {"law": laws}, rows)
 
 
 def _value(result, quantity):
@@ -186,31 +177,35 @@ def _value(result, quantity):
     return {name: result[stored_as].get(key, np.nan) for name, stored_as in names.items()}
 
 
-def _mesh(one, folder, found):
-    notes = stored.read_notes(folder / "meshes", kind.file_name(one))
-    labels = {"shape": one.shape, "mesh_type": one.mesh_type, "mesh_size": one.mesh_size}
-    found.put({name: notes[name] for name in shared.MESH_ROWS if name in notes}, **labels)
+def _scenes(part, folder, answers):
+    """Rows of meshes and scenes."""
+    for scenes in kind.by_mesh(part).values():
+        file = kind.file_name(scenes[0])
+        notes = stored.read_notes(folder / "meshes", file)
+        labels = {name: getattr(scenes[0], name) for name in MESH_AXES}
+        yield labels | {name: notes[name] for name in shared.MESH_ROWS if name in notes}
+        keys = {one: kind.scene_task(part, one)["key"] for one in scenes}
+        results = store.read(folder / "solutions" / f"{file}.h5", set(keys.values()))
+        for one, key in keys.items():
+            yield from _scene(part, one, results[key], answers.get((one.shape, one.material, one.load)))
 
 
-def _scene(part, one, result, references, found):
-    labels = vars(one)
-    reference, objections = references.get((one.shape, one.material, one.load), ({}, {}))
-    values = {name: result[name] for name in shared.SCENE_ROWS if name in result} | {"solve_seconds": result["seconds"]}
-    case = part.shape[one.shape].loads[one.load]
-    whys = [reference.get("message", ""), *reference.get("lacking", {}).values()]
-    whys = [f"no reference: {named(why, part.shape[one.shape], case)}" for why in whys if why]
-    why = "; ".join(filter(None, (*whys, objections.get(one.kinematics, ""))))
-    values["message"] = with_objection(result, named(result.get("message", ""), part.shape[one.shape], case), why)
-    found.put(values, **labels)
+def _scene(part, one, result, reference):
+    """Rows of a scene."""
+    labels, case, whys = vars(one), part.shape[one.shape].loads[one.load], []
+    if reference:
+        whys = [f"no reference: {why}" for why in _whys(part, one.shape, one.load, reference)]
+        whys.append(_objection(reference, one.kinematics))
+    message = named(result.get("message", ""), part.shape[one.shape], case)
+    message = with_objection(result, message, "; ".join(filter(None, whys)))
+    values = {name: result[name] for name in shared.SCENE_ROWS if name in result}
+    yield labels | values | {"solve_seconds": result["seconds"], "message": message}
+    known = (reference or {}).get("values", {})
     for quantity in case.quantities:
         key = quantity_key(quantity)
         value = result.get("values", {}).get(key, np.nan)
-        compared = {
-            "value": value,
-            "error": _error(value, reference.get("values", {}).get(key, np.nan)),
-            "expected_error": _error(value, quantity.expected),
-        }
-        found.put(compared, quantity=quantity.name, **labels)
+        errors = {"error": _error(value, known.get(key, np.nan)), "expected_error": _error(value, quantity.expected)}
+        yield labels | {"quantity": quantity.name, "value": value} | errors
 
 
 def _error(value, reference):
@@ -218,50 +213,32 @@ def _error(value, reference):
     return deformation_error(value, reference) if reference else np.nan
 
 
-OUTLINE_ARRAYS = ("outline_points", "outline_displacements", "outline_lengths")
-
-
 def _fields(study, folder):
     """Group of the drawn networks."""
     part = study.parts["shapes"]
-    cases = {}
-    drawn = kind.shown(part)
+    drawn, cases = kind.shown(part), {}
     for one in (one for one in part.scenes if one in drawn):
-        cases.setdefault((one.shape, one.load), []).append(one)
-    meshes = {case: stored.read(folder / "meshes", kind.file_name(scenes[0])) for case, scenes in cases.items()}
-    outlines = {case: _outline(part, scenes[0], folder) for case, scenes in cases.items()}
-    there = [({"case": ", ".join(case)}, found.mesh) for case, found in meshes.items() if found]
-    axes = study.axes | {"case": tuple(map(", ".join, cases))}
-    found = fields_on(SHAPE_FIELDS, axes, there, [points for points, *_ in outlines.values()])
-    for case, scenes in cases.items():
-        label, one = ", ".join(case), scenes[0]
-        about = {"shape_name": one.shape, "load_name": one.load, "material_name": one.material}
-        about |= {"kinematics_name": one.kinematics, "mesh_type_name": one.mesh_type, "case_mesh_size": one.mesh_size}
-        found.put(about, case=label)
-        points, moved, rounds = outlines[case]
-        put_outline(found, points, moved, case=label)
-        found.put({"outline_round": rounds}, case=label)
-        if not meshes[case]:
-            continue
-        path = folder / "solutions" / f"{kind.file_name(one)}.h5"
-        keys = {scene: fields_key(kind.scene_task(part, scene)["key"]) for scene in scenes}
-        results = store.read(path, set(keys.values()), [PACKED])
-        for scene, key in keys.items():
-            kept = unpacked(results[key])
-            if kept:
-                x, y = kept["displacements"].T
-                values = {"displacement_x": x, "displacement_y": y, "spring_force": kept["spring_forces"]}
-                found.put(values, case=label, definition=scene.definition)
-    return {SHAPE_FIELDS.name: found.data}
+        cases.setdefault(f"{one.shape}, {one.load}", []).append(one)
+    rows = [{"case": case} | row for case, scenes in cases.items() for row in _drawn(part, folder, scenes)]
+    return {SHAPE_FIELDS.name: fields_of_rows(SHAPE_FIELDS, study.axes | {"case": tuple(cases)}, rows)}
 
 
-def _outline(part, one, folder):
-    """Points of the outline, their displacements in the reference, and the number of their round."""
-    case = one.shape, one.material, one.load
-    if case in part.referred:
-        key = kind.reference_task(part, *case)["key"]
-        found = store.read_one(folder / "shape_references", key, OUTLINE_ARRAYS)
+def _drawn(part, folder, scenes):
+    """Rows of a case: its labels, outline, mesh and networks."""
+    one, file = scenes[0], kind.file_name(scenes[0])
+    about = {f"{name}_name": getattr(one, name) for name in (*CASE_AXES, "kinematics", "mesh_type")}
+    yield about | {"case_mesh_size": one.mesh_size}
+    body = one.shape, one.material, one.load
+    if body in part.referred:
+        found = _answer(part, folder, *body, arrays=("outline_points", "outline_displacements", "outline_lengths"))
         if not found["message"]:
-            points, moved, sizes = (found[name] for name in OUTLINE_ARRAYS)
-            return points, moved, np.repeat(np.arange(len(sizes)), sizes)
-    return np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0, dtype=int)
+            sizes = found["outline_lengths"]
+            rounds = {"outline_round": np.repeat(np.arange(len(sizes)), sizes)}
+            yield rounds | outline_row(found["outline_points"], found["outline_displacements"])
+    if grouped := stored.read(folder / "meshes", file):
+        yield mesh_row(grouped.mesh)
+        keys = {scene: fields_key(kind.scene_task(part, scene)["key"]) for scene in scenes}
+        results = store.read(folder / "solutions" / f"{file}.h5", set(keys.values()), [*FIELD_ARRAYS])
+        for scene, key in keys.items():
+            if results[key]:
+                yield {"definition": scene.definition} | displaced(results[key])

@@ -3,25 +3,24 @@
 import re
 import warnings
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import product
 from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
 
-from springtune.mesh import MeshError
+from springtune.mesh.cells import MeshError
+from springtune.mesh.sheets import free_motion
 from springtune.problem.geometry import AssumptionWarning, size_text
 from springtune.problem.loads import KINEMATICS
-from springtune.problem.materials import Material
+from springtune.problem.materials import AnyMaterial
 from springtune.problem.quantities import nearest
 from springtune.problem.shapes import Hole, LoadCase, Pressure, Quantity, Segment, Shape, Support, Traction
-from springtune.springs import DEFINITIONS
+from springtune.springs.base import DEFINITIONS
 
-from ...config.checks import FEWER, check_density, check_for_triangles, check_known, check_particles
+from ...config.checks import FEWER, check_density, check_for_triangles, check_particles
 from ...config.expand import file_fault
-from .outputs import OWN_FILE, mesh_name
-from .sections import OUTLINED
+from .outputs import MADE, OWN_FILE, mesh_name
 
 
 @dataclass(frozen=True)
@@ -44,11 +43,10 @@ class ShapeScene:
 
 @dataclass(frozen=True)
 class Shapes:
-    """Shapes of a study, their scenes, the materials of parts, refinements, and mesh files by size."""
+    """Shapes and materials of a study by name, scenes, the materials of parts, refinements, and mesh files by size."""
 
-    declared: dict[str, Shape]
-    shapes: tuple[Shape, ...]
-    materials: tuple[Material, ...]
+    shape: dict[str, Shape]
+    material: dict[str, AnyMaterial]
     parts: dict[str, dict[str, str]]
     scenes: tuple[ShapeScene, ...]
     referred: tuple[tuple[str, str, str], ...]
@@ -56,17 +54,7 @@ class Shapes:
     refined: dict[str, dict[str, float]]
     files: dict[str, dict[float, str]]
 
-    @cached_property
-    def shape(self) -> dict[str, Shape]:
-        """Shapes by name."""
-        return {one.name: one for one in self.shapes}
-
-    @cached_property
-    def material(self) -> dict[str, Material]:
-        """Materials by name."""
-        return {one.name: one for one in self.materials}
-
-    def materials_of(self, shape: str, material: str) -> dict[str, Material]:
+    def materials_of(self, shape: str, material: str) -> dict[str, AnyMaterial]:
         """Material of each part of a shape, that of the main part under ``""``."""
         own = {part: self.material[name] for part, name in self.parts[shape].items()}
         return {"": self.material[material]} | own
@@ -120,8 +108,8 @@ def _scenes(config):
         for name in grid.shape:
             shape = config.shapes[name]
             own = [(OWN_FILE, one.mesh_size) for one in shape.file or ()]
-            meshes = own or product(grid.mesh_type or OUTLINED, grid.mesh_size)
-            for mesh, material, load in product(list(meshes), grid.material, grid.load or shape.loads):
+            meshes = own or [(MADE, size) for size in grid.mesh_size]
+            for mesh, material, load in product(meshes, grid.material, grid.load or shape.loads):
                 if grid.reference:
                     referred[name, material, load] = None
                 for definition, kinematics in product(grid.definition, grid.kinematics):
@@ -147,7 +135,7 @@ def expand(config, declared):
     found, referred, finite = _scenes(config)
     known = {
         "shape": [*config.shapes],
-        "mesh_type": [*OUTLINED, OWN_FILE],
+        "mesh_type": [MADE, OWN_FILE],
         "material": [*config.materials],
         "definition": [*DEFINITIONS],
         "kinematics": [*KINEMATICS],
@@ -159,19 +147,14 @@ def expand(config, declared):
         return shape, mesh_type, one.mesh_size, material, load, *rest
 
     scenes = sorted(found, key=order)
-    names = dict.fromkeys(one.shape for one in scenes)
-    parts = {name: dict(one.parts) for name, one in config.shapes.items()}
-    used = {one.material for one in scenes} | {other for name in names for other in parts[name].values()}
-    all_shapes = {name: shape_of_config(name, one, declared.folder) for name, one in config.shapes.items()}
     return Shapes(
-        all_shapes,
-        tuple(all_shapes[name] for name in names),
-        tuple(material for name, material in declared.materials.items() if name in used),
-        parts,
+        {name: shape_of_config(name, one, declared.folder) for name, one in config.shapes.items()},
+        declared.materials,
+        {name: one.parts for name, one in config.shapes.items()},
         tuple(scenes),
         tuple(dict.fromkeys(key for one in scenes for key in [(one.shape, one.material, one.load)] if key in referred)),
         tuple(dict.fromkeys(key for one in scenes for key in [_finite(one)] if key in finite)),
-        {name: dict(one.refined) for name, one in config.shapes.items()},
+        {name: one.refined for name, one in config.shapes.items()},
         {name: files_of(one, declared.folder) for name, one in config.shapes.items()},
     )
 
@@ -193,32 +176,85 @@ def check(config, problems):
     for name, shape in (config.shapes or {}).items():
         path = "shapes", name
         for part, material in shape.parts.items():
-            check_known(problems, (*path, "parts", part), "material", material, config.materials)
             if any(any(case.gravity) for case in shape.loads.values()):
                 check_density(config, material, (*path, "parts", part), problems)
-        for load, case in shape.loads.items():
-            _check_something(case, (*path, "loads", load), problems)
-        if shape.file is not None:
-            extents = {}
-            for file in files_of(shape, problems.folder).values():
-                if fault := file_fault(Path(file)):
-                    problems.add((*path, "file"), f"'{file}' {fault}")
-                elif problems.nothing:
-                    _check_file(name, shape, Path(file), path, problems, extents)
+        if shape.file is None:
+            _check_outline(name, shape, path, problems)
             continue
-        _check_outlines(shape, path, problems)
-        _check_names(shape, path, problems)
-        if problems.nothing:
-            try:
-                made = shape_of_config(name, shape, problems.folder)
-            except ValueError as error:  # what sides do to each other
-                message = str(error).removeprefix(f"shape '{name}': ")
-                problems.add((*path, *_place(message)), message)
-            else:
-                _check_held(made, path, problems)
+        extents = {}
+        for file in files_of(shape, problems.folder).values():
+            if fault := file_fault(Path(file)):
+                problems.add((*path, "file"), f"'{file}' {fault}")
+            elif problems.nothing:
+                _check_file(name, shape, Path(file), path, problems, extents)
     _check_stems(config, problems)
     for name, grid in (config.shape_grids or {}).items() if problems.nothing else ():
         _check_grid(config, grid, ("shape_grids", name), problems)
+
+
+def _check_outline(name, shape, path, problems):
+    """Check the parts, the geometry, the names of groups and the supports of a shape with an outline."""
+    parts = {hole.part for hole in shape.holes if hole.part}
+    for part in sorted(parts - set(shape.parts)):
+        problems.add((*path, "holes"), f"part '{part}' has no material; add it under 'parts'")
+    for part in sorted(set(shape.parts) - parts):
+        what = f"{nearest(part, parts)}; or give it to what fills a hole" if parts else "no hole has a 'part'; add it"
+        problems.add((*path, "parts", part), f"unknown part '{part}'; {what}")
+    made = _made(name, shape, path, problems) if problems.nothing else None
+    if made is None:
+        return
+    known = [*made.groups, *made.points, *made.parts]
+    for refined in shape.refined:
+        if refined not in known:
+            message = f"unknown group, point or part '{refined}'; {nearest(refined, known)}"
+            problems.add((*path, "refined", refined), message)
+    for load, case in made.loads.items():
+        points, held = [], []
+        for support in case.supports:
+            places = [made.points[support.group]] if support.group in made.points else []
+            sides = [side for one in made.rounds for side in one.sides if side.group == support.group]
+            places += [side.at(share) for side in sides for share in (0.0, 0.5, 1.0)]
+            points += places
+            held += [(support.x is not None, support.y is not None)] * len(places)
+        if free := free_motion(np.array(points), np.array(held)):
+            message = f"leave the body free to {free}; hold it, such as {{left: fixed}}"
+            problems.add((*path, "loads", load, "supports"), message)
+
+
+def _made(name, shape, path, problems):
+    """Shape of a section; None where it is refused."""
+    try:
+        made = shape_of_config(name, shape, problems.folder)
+    except ValueError as error:
+        _add_fault(problems, path, str(error).removeprefix(f"shape '{name}': "))
+        return None
+    for load, case in made.loads.items():
+        moved = any(one.x or one.y for one in case.supports) or any(case.gravity)
+        if not (moved or any(any(one.force) for one in case.tractions) or any(one.pressure for one in case.pressures)):
+            message = "neither moves nor pulls the body; give a force, or a support such as {end: {x: 1 mm}}"
+            problems.add((*path, "loads", load), message)
+    return made
+
+
+ABOUT_A_LOAD = re.compile(r"load '([^']+)'(?:, (support|traction|pressure|quantity)(?: '([^']+)')?)?: (.*)", re.DOTALL)
+"""Messages on a load: its name, the kind of what is wrong, the name of a quantity, and the rest."""
+
+KEYS = {"support": "supports", "traction": "forces", "pressure": "pressures", "quantity": "quantities"}
+"""Keys of a load's section by the kind of what messages are about."""
+
+
+def _add_fault(problems, path, message):
+    """Add a message on the geometry or a load of a shape at its keys."""
+    keys = ("outline",) if message.startswith("outline") else ("holes",) if message.startswith("hole") else ()
+    if found := ABOUT_A_LOAD.fullmatch(message):
+        load, kind, quantity, message = found.groups()
+        group = re.search("'([^']+)'", message) if kind else None
+        keys = "loads", load, *([KEYS[kind], quantity or group[1]] if kind else [])
+    elif found := re.match(r"point '([^']+)'|'([^']+)' names a point", message):
+        keys = "points", found[1] or found[2]
+    elif found := re.match(r"(hole |outline, side )(\d+)\b", message):
+        keys = "holes" if found[1] == "hole " else "outline", int(found[2]) - 1
+    problems.add((*path, *keys), message)
 
 
 def _check_file(name, shape, file, path, problems, extents):
@@ -256,36 +292,12 @@ def _check_file(name, shape, file, path, problems, extents):
     for part in sorted(set(shape.parts) - set(grouped.parts)):
         there = nearest(part, grouped.parts) if grouped.parts else "the file has none"
         problems.add((*path, "parts", part), f"unknown part '{part}'; {there}")
-    try:
-        made = shape_of_config(name, shape, problems.folder)
-    except ValueError as error:
-        problems.add(path, str(error).removeprefix(f"shape '{name}': "))
-        return
-    for label, case in made.loads.items():
+    made = _made(name, shape, path, problems)
+    for case in made.loads.values() if made else ():
         try:
             check_case(grouped, case)
         except ValueError as error:
-            problems.add((*path, "loads", label), str(error).removeprefix(f"load '{label}', "))
-
-
-def _check_something(case, path, problems):
-    """Check that a load moves or pulls the body."""
-    moved = any(one.x or one.y for one in case.supports.values())
-    pressed = any(one.pressure for one in case.pressures.values())
-    if not (moved or pressed or any(case.gravity) or any(map(any, case.forces.values()))):
-        problems.add(path, "nothing moves or pulls the body; give it forces, pressures, gravity, or a support that is "
-                     "moved, such as {end: {x: 1 mm}}")  # fmt: skip
-
-
-def _place(message):
-    """Keys in the section of a shape that a message on its geometry is about."""
-    if found := re.match(r"point '([^']+)'", message):
-        return "points", found[1]
-    if found := re.match(r"hole (\d+)\b", message):
-        return "holes", int(found[1]) - 1
-    if found := re.match(r"outline, side (\d+)", message):
-        return "outline", int(found[1]) - 1
-    return ("outline",) if message.startswith("outline") else ()
+            _add_fault(problems, path, str(error))
 
 
 def _check_stems(config, problems):
@@ -302,125 +314,33 @@ def _check_stems(config, problems):
                 problems.add(("shapes", name, "loads", load), message)
 
 
-def _check_held(shape, path, problems):
-    """Check that supports hold a body against all rigid motions."""
-    (left, low), (right, top) = shape.extent
-    size = max(right - left, top - low)
-    for name, case in shape.loads.items():
-        rows = []
-        for support in case.supports:
-            places = [shape.points[support.group]] if support.group in shape.points else []
-            sides = [side for one in shape.rounds for side in one.sides if side.group == support.group]
-            places += [side.at(share) for side in sides for share in (0.0, 0.5, 1.0)]
-            for x, y in places:
-                x, y = (x - left) / size, (y - low) / size
-                rows += [(1.0, 0.0, -y)] * (support.x is not None) + [(0.0, 1.0, x)] * (support.y is not None)
-        if not rows or np.linalg.matrix_rank(np.array(rows), tol=1e-9) < 3:
-            message = "leave the body free to move, or to turn; hold it against both, such as {left: fixed}"
-            problems.add((*path, "loads", name, "supports"), message)
-
-
-def _check_outlines(shape, path, problems):
-    """Check the numbers of sides, and the parts."""
-    rounds = [((*path, "outline"), shape.outline)]
-    rounds += [
-        ((*path, "holes", number, "outline"), hole.outline) for number, hole in enumerate(shape.holes) if hole.outline
-    ]
-    for place, segments in rounds:
-        if len(segments) < (2 if any(one.centre for one in segments) else 3):
-            problems.add(place, f"{len(segments)} sides are no outline; give three or more, or two with an arc")
-    parts = {hole.part for hole in shape.holes if hole.part}
-    for part in sorted(parts - set(shape.parts)):
-        problems.add((*path, "holes"), f"part '{part}' has no material; add it under 'parts'")
-    for part in sorted(set(shape.parts) - parts):
-        what = f"{nearest(part, parts)}; or give it to what fills a hole" if parts else "no hole has a 'part'; add it"
-        problems.add((*path, "parts", part), f"unknown part '{part}'; {what}")
-
-
-def _groups(shape):
-    """Groups of sides of a shape with an outline, without those of parts in its holes."""
-    sides = [*shape.outline]
-    found = [hole.group for hole in shape.holes if hole.circle and not hole.part]
-    for hole in shape.holes:
-        sides += hole.outline if hole.outline and not hole.part else []
-    return list(dict.fromkeys(filter(None, [*(side.group for side in sides), *found])))
-
-
-def _check_names(shape, path, problems):
-    """Check the groups and points that supports, loads and quantities name."""
-    groups, points = _groups(shape), list(shape.points)
-    for number, hole in enumerate(shape.holes):
-        if hole.part and (hole.group or any(side.group for side in hole.outline or ())):
-            message = f"part '{hole.part}' is inside of the body, and groups are of its outline; leave the group out"
-            problems.add((*path, "holes", number), message)
-    for point in points:
-        if point in groups:
-            problems.add((*path, "points", point), f"'{point}' is a group of sides, too; rename one")
-
-    def check(place, what, name, known):
-        if name in known:
-            return
-        if known:
-            why = f"unknown {what} '{name}'; {nearest(name, known)}"
-        else:
-            why = f"unknown {what} '{name}', and the shape has none; give one a name by 'group', or under 'points'"
-        problems.add((*path, *place), why)
-
-    for name in shape.refined:
-        check(("refined", name), "group, point or part", name, [*groups, *points, *shape.parts])
-    for load, case in shape.loads.items():
-        place = "loads", load
-        for key, what, known in (
-            ("supports", "group or point", [*groups, *points]),
-            ("forces", "group or point", [*groups, *points]),
-            ("pressures", "group", groups),
-        ):
-            for name in getattr(case, key):
-                check((*place, key, name), what, name, known)
-        for name, quantity in case.quantities.items():
-            if quantity.at is not None:
-                check((*place, "quantities", name, "at"), "point", quantity.at, points)
-            if quantity.of is not None:
-                held = [one for one in case.supports if one in groups or one in points]
-                known, what = (held, "support") if quantity.reaction else (groups, "group")
-                check((*place, "quantities", name, "of"), what, quantity.of, known)
-
-
 def _check_grid(config, grid, path, problems):
-    for material in grid.material:
-        check_known(problems, (*path, "material"), "material", material, config.materials)
     check_for_triangles(grid.definition, (*path, "definition"), problems)
     for name in grid.definition:
         if DEFINITIONS[name].uniaxial:
             problems.add((*path, "definition"), f"'{name}' is for beams that are stretched alone; choose another one")
-    shapes = {}
-    for name in grid.shape:
-        check_known(problems, (*path, "shape"), "shape", name, config.shapes)
-        if name in config.shapes:
-            shapes[name] = config.shapes[name]
+    shapes = {name: config.shapes[name] for name in grid.shape}
+    weighs = False
     for name, shape in shapes.items():
-        for load in grid.load or ():
+        for load in grid.load or shape.loads:
             if load not in shape.loads:
                 problems.add((*path, "load"), f"shape '{name}' has no load '{load}'; {nearest(load, shape.loads)}")
-    if any(any(shape.loads[load].gravity) for shape in shapes.values() for load in grid.load or shape.loads
-           if load in shape.loads):  # fmt: skip
-        for material in grid.material:
-            check_density(config, material, (*path, "material"), problems)
+            elif any(shape.loads[load].gravity):
+                weighs = True
+        if shape.file is not None and grid.mesh_size:
+            message = f"shape '{name}' is a mesh file, which has its own; remove it, or give '{name}' a grid of its own"
+            problems.add((*path, "mesh_size"), message)
+    for material in grid.material if weighs else ():
+        check_density(config, material, (*path, "material"), problems)
     made = {name: shape for name, shape in shapes.items() if shape.file is None}
     if made and grid.mesh_size is None:
         problems.add((*path, "mesh_size"), "'mesh_size' is missing; give a length such as '5 mm', a list, or a range")
-    elif made and problems.nothing:
-        for name, shape in made.items():
-            (left, low), (right, top) = shape_of_config(name, shape, Path()).extent
-            wide, high = right - left, top - low
-            if max(grid.mesh_size) > min(wide, high) > 0:
-                most = f"{1e3 * min(wide, high):.4g} mm"
-                problems.add((*path, "mesh_size"), f"is larger than shape '{name}'; give at most {most}")
-            check_particles(problems, (*path, "mesh_size"), grid.mesh_size, wide, high)
-    for name in shapes.keys() - made.keys() if grid.mesh_size or grid.mesh_type else ():
-        key = "mesh_size" if grid.mesh_size else "mesh_type"
-        problems.add((*path, key), f"shape '{name}' is a mesh file, which has its own; remove it, or give '{name}' a "
-                     "grid of its own")  # fmt: skip
+    for name, shape in made.items() if problems.nothing else ():
+        wide, high = np.ptp(shape_of_config(name, shape, Path()).extent, axis=0)
+        if max(grid.mesh_size) > min(wide, high) > 0:
+            most = f"{1e3 * min(wide, high):.4g} mm"
+            problems.add((*path, "mesh_size"), f"is larger than shape '{name}'; give at most {most}")
+        check_particles(problems, (*path, "mesh_size"), grid.mesh_size, wide, high)
     count = len(grid.definition) * len(grid.kinematics) * len(grid.material) * len(grid.mesh_size or "1")
     count *= sum(len(grid.load or shape.loads) for shape in shapes.values())
     if count > MOST_SHAPE_SCENES:

@@ -1,7 +1,6 @@
 """Figures of shapes: errors of their quantities over particles and seconds, and their deformed networks."""
 
 import numpy as np
-from matplotlib.collections import LineCollection
 from matplotlib.colors import LinearSegmentedColormap
 
 from springtune.safe_io.escapes import no_mathematics
@@ -77,13 +76,12 @@ def plot_shape_errors(data, ax=None, *, shape=None, load=None, material=None, ki
     points = {name: {one: _points(cut, name, one) for one in definitions} for name in names}
     if not all(line[3].all() for lines in points.values() for line in lines.values()):
         title += "; hollow: unstable, or beyond the linear reference"
-    size = (style.PAGE, 0.35 + tall * rows)
-    place = {"bottom": 0.42, "top": 0.52, "across": 0.2, "down": 0.72, "title": title}
-    with labels.arranged(ax, rows, 2, figsize=size, **place) as (axes, ends):
-        for panels, name in zip(axes, names):
-            ends.update(zip(panels, _errors_of(panels, cut, name, points[name])))
-        for panel in axes.flat if not names else ():
-            labels.say(panel, "No quantity was asked for.")
+    figure, axes = style.panels(ax, rows, 2, figsize=(style.PAGE, 0.35 + tall * rows))
+    labels.entitle(figure, title)
+    for panels, name in zip(axes, names):
+        _errors_of(panels, cut, name, points[name])
+    for panel in axes.flat if not names else ():
+        labels.say(panel, "No quantity was asked for.")
     return axes
 
 
@@ -134,38 +132,35 @@ def _against(cut, name):
 
 
 def _errors_of(panels, cut, name, points):
-    """Draw lines of a quantity over particles and over seconds; return their ends in both panels."""
-    one, ends = cut.sel(quantity=name), ([], [])
+    """Draw lines of a quantity over particles and over seconds, with names beside the latter."""
+    one = cut.sel(quantity=name)
     estimate, difference = (
         100 * abs(float(one[f"reference_{error}"])) for error in ("error_estimate", "expected_error")
     )
     for number, (definition, (*places, errors, counted)) in enumerate(points.items()):
         look = style.line(number)
-        for panel, along, found in zip(panels, places, ends):
-            found += labels.line(panel, along, errors, look, definition)
-            hollow = look | {"linestyle": "", "markerfacecolor": "white"}
-            panel.plot(along[~counted], errors[~counted], **hollow)
+        for panel, along in zip(panels, places):
+            panel.plot(along, errors, label=definition, **look)
+            panel.plot(along[~counted], errors[~counted], **look | {"linestyle": "", "markerfacecolor": "white"})
+    there = any(len(errors) for _, _, errors, _ in points.values())
+    against = "Error" if _against(cut, name) == "error" else "Difference to expected"
     for panel, words in zip(panels, ("Particles", "Seconds, springs and solve")):
-        against = "error" if _against(cut, name) == "error" else "difference to expected"
-        panel.set(xlabel=words, ylabel=f"|{against[0].upper()}{against[1:]}| [%]")
-        if not ends[0]:
+        panel.set(xlabel=words, ylabel=f"|{against}| [%]")
+        if not there:
             labels.say(panel, _why(cut))
             continue
         panel.set(xscale="log", yscale="log")
-        if estimate > 0:
-            low = panel.get_ylim()[0]
-            if estimate > low:
-                panel.axhspan(low, estimate, color="0.92", zorder=0)
-                panel.set_ylim(low, None)
+        low = panel.get_ylim()[0]
+        if estimate > low:
+            panel.axhspan(low, estimate, color="0.92", zorder=0)
+            panel.set_ylim(low, None)
         style.plain(panel, "x", "y")
+    panels[1].set_ylabel("")
+    labels.finish(panels[1])
     panels[0].set_title(f"{name}: {described(cut, name)}")
-    said = []
-    if difference > 0:
-        said.append(f"{difference:.2g} % from expected")
-    if estimate > 0:
-        said.append(f"known to {estimate:.1g} %")
+    said = [f"{difference:.2g} % from expected"] if difference > 0 else []
+    said += [f"known to {estimate:.1g} %"] if estimate > 0 else []
     panels[1].set_title(f"reference: {', '.join(said)}" if said else "over seconds", fontsize=style.SMALL)
-    return ends
 
 
 def _why(cut):
@@ -222,11 +217,7 @@ def plot_shapes(data, ax=None, *, material=None, kinematics=None):
         errors = np.column_stack([errors, references])
         own = [drawing.error_text(one, "") if np.isfinite(one) else "" for one in references]
         texts = [[*row, one] for row, one in zip(texts, own)]
-    under = 0.3 + max(map(labels.width, heads), default=0.5)
-    figure, axes = style.panels(ax, figsize=(style.PAGE, 0.25 + under + 0.17 * max(len(rows), 3)))
-    panel = axes[0, 0]
-    left = 0.15 + max((labels.width(row["name"]) for row in rows), default=0.5)
-    style.arrange(figure, axes, left=left, right=0.08, bottom=under, top=0.25)
+    _, ((panel,),) = style.panels(ax, figsize=(style.PAGE, 1.4 + 0.17 * max(len(rows), 3)))
     panel.set_title("|Error| on the finest mesh [%]")
     if not np.isfinite(errors).any():
         labels.say(panel, "No quantity has an error: see status and message.")
@@ -237,7 +228,7 @@ def plot_shapes(data, ax=None, *, material=None, kinematics=None):
     panel.tick_params(length=0)
     said = {drawing.NO_RESULT: "no result that counts", drawing.NOT_ASKED: "not asked for"}
     shown = {text for row in texts for text in row}
-    labels.note(panel, "; ".join(f"{mark}: {word}" for mark, word in said.items() if mark in shown), under - 0.18)
+    panel.set_xlabel("; ".join(f"{mark}: {word}" for mark, word in said.items() if mark in shown))
     return panel
 
 
@@ -321,42 +312,37 @@ def plot_shape(data, ax=None, *, shape=None, load=None, definition=None):
     width, height = drawing.extent(
         np.concatenate([drawing.plane(case, "{}"), drawing.plane(case, "outline_{}")]), (1.0, 1.0)
     )
-    columns = min(NETWORK_COLUMNS, len(wanted))
+    columns = len(wanted) if isinstance(ax, np.ndarray) else min(NETWORK_COLUMNS, len(wanted))
     page = style.COLUMN if columns == 1 else style.PAGE
-    room = (page - 0.5 - 0.25 * columns) / columns
-    tall = float(np.clip(room * height / width * 1.12, 0.8, 3.2))
-    figure, axes, flat, _ = style.multiples(ax, len(wanted), columns, tall + 0.3)
-    rows = axes.shape[0]
-    if ax is None:
-        figure.set_size_inches(page, 0.5 + 0.75 + (tall + 0.3) * rows)
-    networks = case.sel(definition=[name for name in wanted if name in case.definition.values])
-    scale = _scale(case, networks, max(width, height))
+    tall = float(np.clip((page - 0.5 - 0.25 * columns) / columns * height / width * 1.12, 0.8, 3.2))
+    rows = -(-len(wanted) // columns)
+    figure, axes = style.panels(ax, rows, columns, figsize=(page, 1.2 + (tall + 0.35) * rows))
+    flat = axes.ravel()[: len(wanted)]
+    for panel in axes.ravel()[len(wanted) :]:
+        panel.remove()
+    networks = case.reindex(definition=wanted)
+    scale = drawing.magnification(networks)
     size = "mesh of the file" if not mesh["mesh_size"] else f"mesh {1e3 * mesh['mesh_size']:g} mm"
     said = [*about.values(), f"{size}, {float(cut.particles):.0f} particles", f"displaced × {scale:g}"]
     lost = [name for name in asked if STATUS[int(cut.status.sel(definition=name))] != "solved" and name not in wanted]
     said += [f"not solved: {', '.join(lost)}"] if lost and definition is None else []
-    title = labels.wrapped(", ".join(said), page - 0.2, 8.5)
-    left = 0.45 + 0.07 * max(0, len(f"{1e3 * max(width, height):.0f}") - 2)
-    place = {"left": left, "right": 0.08, "bottom": 0.9, "top": 0.42 + 0.13 * labels.lines_of(title)}
-    place |= {"down": 0.3, "across": 0.1, "title": title}
-    style.arrange(figure, axes, **place)
+    there = np.isfinite(case.reference_displacement_x.values).any()
+    below = "grey: outline of the reference, displaced; dashed: at rest" if there else "no reference"
+    labels.entitle(figure, ", ".join(said), below)
     most = _largest_force(networks)
-    drawn = [_network(panel, case, cut, name, scale, most) for panel, name in zip(flat, wanted)]
+    drawn = [_network(panel, networks.sel(definition=name), cut.sel(definition=name), scale, most)
+             for panel, name in zip(flat, wanted)]  # fmt: skip
     for number, panel in enumerate(flat):
-        panel.set(aspect="equal", adjustable="datalim")
+        panel.set(aspect="equal", adjustable="datalim", xlabel="x [mm]", ylabel="" if number % columns else "y [mm]")
         panel.set_title(panel.get_title("left") or wanted[number])
         panel.grid(False)
-        if number % columns:
-            panel.tick_params(labelleft=False)
-        else:
-            panel.set_ylabel("y [mm]")
-        if number + columns >= len(wanted):
-            panel.set_xlabel("x [mm]")
-        else:
-            panel.tick_params(labelbottom=False)
     lines = next((one for one in drawn if one is not None), None)
-    if figure is not None:
-        _bar(figure, lines, case)
+    if figure is not None and lines is not None:
+        bar = figure.colorbar(lines, ax=flat.tolist(), location="bottom", extend="both", aspect=50, fraction=0.06)
+        bar.set_label("Spring force [N], tension positive", fontsize=style.SMALL)
+        bar.formatter.set_powerlimits((-2, 4))  # long numbers would run into each other
+        bar.update_ticks()
+        bar.outline.set_linewidth(0.5)
     return flat
 
 
@@ -367,15 +353,6 @@ def _few(cut, asked):
     return [name for name in asked if name in order[:MOST_NETWORKS]]
 
 
-def _scale(case, networks, extent):
-    """Factor on displacements: the largest is about a twelfth of the body."""
-    sizes = np.hypot(case.reference_displacement_x.values, case.reference_displacement_y.values)
-    if not np.isfinite(sizes).any():
-        sizes = np.hypot(networks.displacement_x.values, networks.displacement_y.values)
-    factor = 0.08 * extent / (drawing.largest(sizes) or np.inf)
-    return 1.0 if 0.4 < factor < 2 or not factor else drawing.magnification(factor)
-
-
 def _largest_force(networks):
     """Force at the ends of the colour scale [N]; 3 % of the springs are beyond."""
     forces = networks.spring_force.values
@@ -383,52 +360,13 @@ def _largest_force(networks):
     return float(np.quantile(forces, 0.97)) if len(forces) and forces.max() > 0 else 1.0
 
 
-def _network(panel, case, cut, name, scale, most):
+def _network(panel, one, state, scale, most):
     """Draw one network; return its lines, or None."""
-    one = case.sel(definition=name) if name in case.definition.values else None
-    drawn = one is not None and bool(np.isfinite(one.displacement_x.values).any())
-    outline, there = drawing.plane(case, "outline_{}"), drawing.plane(case, "reference_displacement_{}")
-    for number in range(int(case.outline_round.values.max(initial=-1)) + 1):
-        places = np.flatnonzero(case.outline_round.values == number)
-        closed = np.append(places, places[:1])
-        panel.plot(*1e3 * outline[closed].T, color="0.6", linewidth=0.6, linestyle=(0, (3, 3)), zorder=1)
-        if drawn:
-            panel.plot(*1e3 * (outline + scale * there)[closed].T, color="black", linewidth=0.9, zorder=3)
-    flag = int(cut.status.sel(definition=name))
-    lines = None
-    if drawn:
-        springs, kept = drawing.spring_ends(case)
-        forces = one.spring_force.values[kept]
-        width = float(np.clip(18 / np.sqrt(len(springs)), 0.25, 0.9))
-        lines = LineCollection(
-            1e3 * (drawing.plane(case, "{}") + scale * drawing.plane(one, "displacement_{}"))[springs],
-            array=forces,
-            cmap=FORCES,
-            clim=(-most, most),
-            linewidths=width,
-            zorder=2,
-        )
-        panel.add_collection(lines)
-        panel.autoscale()
-        if not np.abs(forces).max() > 0:
-            panel.set_title(f"{name}: forces in an energy")
+    lines = drawing.draw_network(panel, one, scale, most, FORCES)
+    if lines is not None and not np.abs(lines.get_array()).max() > 0:
+        panel.set_title(f"{one.definition.item()}: forces in an energy")
+    flag = int(state.status)
     if flag != STATUS.index("solved"):
-        message = str(cut.message.sel(definition=name).item())
-        text = f"{drawing.in_words(flag)}: {message[:120]}" if lines is None else STATUS[flag]
+        text = f"{drawing.in_words(flag)}: {str(state.message.item())[:120]}" if lines is None else STATUS[flag]
         labels.say(panel, text, bare=False)
     return lines
-
-
-def _bar(figure, lines, case):
-    """Draw the colour scale and explain the lines below all panels."""
-    width, height = style.size(figure)
-    if lines is not None:
-        place = figure.add_axes((0.45 / width, 0.36 / height, min(3.0, 0.45 * width) / width, 0.08 / height))
-        bar = figure.colorbar(lines, cax=place, orientation="horizontal", extend="both")
-        bar.set_label("Spring force [N], tension positive", fontsize=style.SMALL)
-        bar.formatter.set_powerlimits((-2, 4))  # long numbers would run into each other
-        bar.update_ticks()
-        bar.outline.set_linewidth(0.5)
-    there = np.isfinite(case.reference_displacement_x.values).any()
-    text = "black: outline of the reference, displaced\ndashed: at rest" if there else "no reference"
-    figure.text(1 - 0.1 / width, 0.4 / height, text, ha="right", va="center", fontsize=style.SMALL, color="0.25")

@@ -5,26 +5,31 @@ are imported where one has.
 """
 
 from collections import Counter, defaultdict
-from dataclasses import replace
 from operator import attrgetter
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+import numpy as np
 from pydantic import Field
 
+from springtune.mesh.cells import MeshError
+from springtune.problem.geometry import size_text
+
 from ...config.kind import Kind
-from ...config.sections import Later
-from ...runs import driver
-from ...runs.checked_json import hash_of
+from ...runs.job import JOB
 from ...runs.keys import definition_key, material_key, mesh_type_key, stage_key
+from ...runs.source import hash_of
 from ...runs.stages import Task, stage
-from ..scenes.plan import file_source, mesh_stage, on_meshes, parameters, particles_in, stage_on_meshes
+from ..scenes.plan import (
+    expected_seconds,
+    file_source,
+    mesh_stage,
+    on_meshes,
+    parameters,
+    particles_in,
+    stage_on_meshes,
+)
 from .outputs import DRAWING, OUTPUTS, OWN_FILE, mesh_name, stems
-
-if TYPE_CHECKING:
-    from collections.abc import Collection
-
-    from ...config.model import Study
+from .sections import NAMED_GRIDS, NAMED_SHAPES
 
 MOST_DRAWN = 1500
 """Particles, about, of the largest mesh that is drawn where a coarser one is there."""
@@ -60,7 +65,7 @@ def mesh_source(part, one):
     if "file" in source:
         return source
     refined = {name: share * one.mesh_size for name, share in part.refined[one.shape].items()}
-    return source | {"mesh_type": one.mesh_type, "mesh_size": one.mesh_size, "refined": refined}
+    return source | {"mesh_size": one.mesh_size, "refined": refined}
 
 
 def mesh_key(part, one):
@@ -89,7 +94,7 @@ def reference_task(part, shape, material, name, law=""):
     """Task of a reference of small strain, or of a law at finite strain."""
     task = {"shape": _source(part.shape[shape])} | _case(part, shape, material, name) | ({"law": law} if law else {})
     without = () if law else ("reference.finite_shapes", "reference.finite_strain")
-    code = stage_key("studies.kinds.shapes.reference", driver.DRIVER, without=without), _reader(part.shape[shape])
+    code = stage_key("studies.kinds.shapes.reference", JOB, without=without), _reader(part.shape[shape])
     key = hash_of(task | {"shape": parameters(task["shape"])}, code)
     return {"key": key} | task
 
@@ -130,19 +135,13 @@ def by_mesh(part):
 # -- stages ------------------------------------------------------------------------------------------------------------
 
 
-def _mesh_members(study, costs):
-    """Meshes with their scenes, and the cost of both."""
+def _mesh_members(study):
+    """Meshes with their scenes, and the expected seconds of both."""
     part = study.parts["shapes"]
-    members = {}
-    for name, scenes in by_mesh(part).items():
-        seconds = costs.of("shape_mesh", particles(part, scenes[0]))
-        members[name] = seconds + sum(_seconds(part, one, costs) for one in scenes), scenes
-    return members
-
-
-def _seconds(part, one, costs):
-    count = particles(part, one)
-    return costs.of("shape_scene", count) + costs.of(one.definition, count)
+    return {
+        name: (sum(expected_seconds(particles(part, one), one.definition) for one in scenes), scenes)
+        for name, scenes in by_mesh(part).items()
+    }
 
 
 def _meshes(study, folder, members):
@@ -157,7 +156,7 @@ def _reference_tasks(study):
     part = study.parts["shapes"]
     for one in (*part.referred, *part.finite):
         task = reference_task(part, *one)
-        yield Task(task, costs=[("shape_reference", 0)], name="/".join(one), key=task["key"])
+        yield Task(task, seconds=2.0, name="/".join(one), key=task["key"])
 
 
 def _solve(study, folder, members):
@@ -172,44 +171,6 @@ def _solve(study, folder, members):
         for scenes in members
     ]
     return on_meshes(folder, "solutions", files)
-
-
-# -- parts of a study --------------------------------------------------------------------------------------------------
-
-
-def pieces(study, costs, division):
-    """Seconds of each piece: of a shape under a load, which says what of it is drawn, or of all grids."""
-    part = study.parts["shapes"]
-    found = defaultdict(float)
-    for one in part.scenes:
-        found[one.shape, one.load] += _seconds(part, one, costs)
-    for shape, _, load, *_ in (*part.referred, *part.finite):
-        found[shape, load] += costs.of("shape_reference")
-    return division.of_section(found)
-
-
-def take(study, names):
-    """Study reduced to some pieces."""
-    wanted = set(names)
-    return of_shape_scenes(study, {one for one in study.parts["shapes"].scenes if (one.shape, one.load) in wanted})
-
-
-def of_shape_scenes(study: "Study", chosen: "Collection[object]") -> "Study":
-    """Study reduced to some scenes of shapes and what they need."""
-    part = study.parts["shapes"]
-    scenes = tuple(scene for scene in part.scenes if scene in chosen) if part else ()
-    if not scenes:
-        return replace(study, parts=study.parts | {"shapes": ()})
-    cases = {(one.shape, one.material, one.load) for one in scenes}
-    names = {one.shape for one in scenes}
-    found = replace(
-        part,
-        shapes=tuple(shape for shape in part.shapes if shape.name in names),
-        scenes=scenes,
-        referred=tuple(case for case in part.referred if case in cases),
-        finite=tuple(case for case in part.finite if case[:3] in cases),
-    )
-    return replace(study, parts=study.parts | {"shapes": found})
 
 
 STAGES = (
@@ -250,46 +211,47 @@ def _axes(part):
 
 def _size(shape, file):
     """Extents of a shape in words, or of a mesh file of it."""
-    import numpy as np  # here, as those below: few studies have files
-
-    from springtune.mesh import MeshError
-    from springtune.mesh.formats import read_shape
-    from springtune.problem.geometry import size_text
+    if not file:
+        return size_text(*np.ptp(shape.extent, axis=0))
+    from springtune.mesh.formats import read_shape  # here: few studies have files
 
     try:
-        (left, low), (right, top) = shape.extent
-        sides = np.ptp(read_shape(file, shape.unit).mesh.points, axis=0) if file else (right - left, top - low)
+        sides = np.ptp(read_shape(file, shape.unit).mesh.points, axis=0)
     except MeshError as error:
         return str(error)
-    return size_text(*sides) + (f", {Path(file).name} in units of {shape.unit:g} m" if file else "")
+    return f"{size_text(*sides)}, {Path(file).name} in units of {shape.unit:g} m"
 
 
 def _summary(part):
-    meshes = {(one.shape, one.mesh_type, one.mesh_size) for one in part.scenes}
+    sizes = Counter((one.shape, one.mesh_size * (one.mesh_type == OWN_FILE)) for one in part.scenes)
     cases = {(one.shape, one.load) for one in part.scenes}
     quantities = sum(len(part.shape[shape].loads[load].quantities) for shape, load in cases)
-    shapes = f"{len(part.shapes)} shape{'s' * (len(part.shapes) > 1)}"
-    rows = [["shape scenes", len(part.scenes), f"of {shapes} on {len(meshes)} meshes, {quantities} quantities"]]
-    counts = Counter((one.shape, part.files[one.shape].get(one.mesh_size, "")) for one in part.scenes)
-    rows += [[f"  {name}", count, _size(part.shape[name], file)] for (name, file), count in counts.items()]
+    used = {one.shape for one in part.scenes}
+    shapes = f"{len(used)} shape{'s' * (len(used) > 1)} on {len(by_mesh(part))} meshes"
+    rows = [["shape scenes", len(part.scenes), f"of {shapes}, {quantities} quantities"]]
+    rows += [
+        [f"  {name}", count, _size(part.shape[name], part.files[name].get(size, ""))]
+        for (name, size), count in sizes.items()
+    ]
     if count := len(part.referred) + len(part.finite):
         rows.append(["shape references", count, "finite elements on the shapes themselves"])
     return rows
 
 
 def _files(part):
-    return [Path(file) for shape in part.shapes for file in part.files[shape.name].values()] if part else []
+    used = dict.fromkeys(one.shape for one in part.scenes) if part else ()
+    return [Path(file) for shape in used for file in part.files[shape].values()]
 
 
 KIND = Kind(
     "shapes",
     study_fields={
         "shapes": (
-            Later("studies.kinds.shapes.sections", "NAMED_SHAPES"),
+            NAMED_SHAPES,
             Field(None, description="Shapes: bodies of any outline, or those of mesh files, and their loads."),
         ),
         "shape_grids": (
-            Later("studies.kinds.shapes.sections", "NAMED_GRIDS"),
+            NAMED_GRIDS,
             Field(None, description="What is to be computed of the shapes; it makes the group `/shapes`."),
         ),
     },
@@ -303,7 +265,4 @@ KIND = Kind(
     outputs=OUTPUTS,
     tables=stems,
     tables_by="outputs",
-    pieces=pieces,
-    take=take,
-    costs={"shape_mesh": (2e-2, 2.5e-5), "shape_reference": (2.0, 0.0), "shape_scene": (5e-3, 2e-5)},
 )

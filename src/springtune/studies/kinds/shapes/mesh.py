@@ -12,9 +12,9 @@ from .task_values import shape_of
 def make(source):
     """Mesh with its groups."""
     if "file" not in source:
-        return mesh_shape(shape_of(source), source["mesh_size"], source["mesh_type"], source["refined"])
+        return mesh_shape(shape_of(source), source["mesh_size"], source["refined"])
     mesh.check_unchanged(source)
     return read_shape(source["file"], source["unit"])
 
 
-run, gone = partial(mesh.run, make=make, counted="shape_mesh"), mesh.gone
+run, crashed = partial(mesh.run, make=make), mesh.crashed

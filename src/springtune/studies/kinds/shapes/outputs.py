@@ -15,6 +15,9 @@ CASE_AXES = ("shape", "material", "load")
 SCENE_AXES = (*MESH_AXES, "material", "load", "definition", "kinematics")
 """Dimensions of the group ``/shapes``."""
 
+MADE = "free"
+"""Mesh type of shapes with an outline: Delaunay triangles inside it."""
+
 OWN_FILE = "file"
 """Mesh type of a shape whose mesh is that of its file."""
 
@@ -112,21 +115,20 @@ def tables(tree: "xr.DataTree") -> list[dict[str, Any]]:
     # Here, since a plan does without xarray.
     from ...output.dataset import STATUS
     from ...output.selection import records
+    from ...output.tables import listed
 
     if "shapes" not in tree:
         return []
     data = tree["shapes"].to_dataset()
     present = (data.status != 0).transpose(*SCENE_AXES) & (data.quantity_kind != "")
-    values = ("value", "reference_value", "expected_value", "quantity_units", *ERRORS_SHOWN, "status", "message")
-    rows, sources = [], dict[str, None]()
-    for one in records(data, present.transpose(*SCENE_AXES, "quantity"), ("particles", "source", *values)):
-        if one["source"]:
-            sources[f"{one['shape']}, {one['quantity']}: {one['source']}"] = None
-        row = {name: one[name] for name in LABEL_COLUMNS} | {"mesh_size_mm": 1e3 * one["mesh_size"]}
-        row |= {"particles": one["particles"], "value": one["value"], "reference": one["reference_value"]}
-        row |= {"expected": one["expected_value"], "units": one["quantity_units"]}
-        row |= {f"{error}_percent": 100 * one[error] for error in ERRORS_SHOWN}
-        rows.append(row | {"status": STATUS[int(one["status"])], "message": one["message"]})
+    present = present.transpose(*SCENE_AXES, "quantity")
+    columns = {"mesh_size_mm": ("mesh_size", 1e3), "particles": ("particles", 1), "value": ("value", 1)}
+    columns |= {"reference": ("reference_value", 1), "expected": ("expected_value", 1), "units": ("quantity_units", 1)}
+    columns |= {f"{name}_percent": (name, 100) for name in ERRORS_SHOWN}
+    columns |= {name: (name, 1) for name in ("status", "message")}
+    rows = [row | {"status": STATUS[row["status"]]} for row in listed(data, present, LABEL_COLUMNS, columns)]
+    cited = (one for one in records(data, present, ["source"]) if one["source"])
+    sources = dict.fromkeys(f"{one['shape']}, {one['quantity']}: {one['source']}" for one in cited)
     strained = tree.attrs.get("plane_strain")
     note = (
         "Quantities of interest of the networks, in SI units; the reference is small-strain plane stress "

@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 
 from springtune.mesh.groups import parts_of
+from springtune.mesh.sheets import outline_of, rounds
 from springtune.problem.materials import of_parts
 from springtune.reference.shapes import solve_each
 
@@ -47,8 +48,8 @@ def _solved(task):
     for one in found:
         values |= by_key(one.values, case)
         estimates |= by_key(one.error_estimates, case)
-    rounds = _rounds(shape, grouped)
-    points = np.concatenate(rounds)
+    outlines = _outlines(shape, grouped)
+    points = np.concatenate(outlines)
     return {
         "message": "",
         "values": values,
@@ -60,36 +61,14 @@ def _solved(task):
         "strain": float(found[0].strain),
         "outline_points": points,
         "outline_displacements": found[0].at(points),
-        "outline_lengths": np.array([len(one) for one in rounds]),
+        "outline_lengths": np.array([len(one) for one in outlines]),
     }
 
 
-def _rounds(shape, grouped):
+def _outlines(shape, grouped):
     """Points around the outline and around each hole [m]."""
     if grouped is None:
-        outlines = [one.sides for one in shape.rounds if one.inner is None or one.outer is None]
-        return [np.array([side.at(i / ALONG) for side in sides for i in range(ALONG)]) for sides in outlines]
+        outer = [one.sides for one in shape.rounds if one.inner is None or one.outer is None]
+        return [np.array([side.at(i / ALONG) for side in sides for i in range(ALONG)]) for sides in outer]
     mesh = grouped.mesh
-    return [mesh.points[one] for one in rounds_of(mesh.edges[mesh.on_outline])]
-
-
-def rounds_of(edges):
-    """Closed rounds of points from edges, shape (n, 2); each point has two edges."""
-    beside = {}
-    for one, other in edges.tolist():
-        beside.setdefault(one, []).append(other)
-        beside.setdefault(other, []).append(one)
-    found = []
-    while beside:
-        start = here = next(iter(beside))
-        one = [here]
-        while beside[here]:
-            there = beside[here].pop()
-            beside[there].remove(here)
-            if there == start:
-                break
-            one.append(there)
-            here = there
-        beside = {point: others for point, others in beside.items() if others}
-        found.append(np.array(one))
-    return found
+    return [mesh.points[one] for one in rounds(outline_of(mesh)[0])]

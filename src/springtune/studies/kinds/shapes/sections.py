@@ -1,115 +1,49 @@
 """Sections of a study that describe shapes, and how their values are read."""
 
-from typing import Annotated, Any, NamedTuple, Self
+from typing import Annotated, Any, Self
 
-from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, model_validator
-from pydantic_core import CoreSchema, core_schema
+from pydantic import Field, GetJsonSchemaHandler, ValidatorFunctionWrapHandler, model_validator
+from pydantic_core import PydanticCustomError
 
 from springtune import units
 
-from ...config.fields import (
-    DefinitionName,
-    FileName,
-    Flag,
-    Kinematics,
-    Length,
-    Lengths,
-    MaterialName,
-    Named,
-    OneOrMore,
-    Ratio,
-    Scalar,
-    Text,
-    Wrapped,
-    one_of,
-)
+from ...config import fields
+from ...config.fields import Named, OneOrMore, Scalar, Section, Words, default, one_of, quantity
 from ...config.messages import refuse, show
-from ...config.sections import Section, default
-
-OUTLINED = {"free": "Delaunay triangles inside of the outline"}
-"""Mesh types of outlines, and what they are."""
-
-
-class QuantityKind(NamedTuple):
-    """A kind of quantity of interest: ``places`` are ``at`` a point or ``of`` a group."""
-
-    unit_kind: str
-    places: tuple[str, ...] = ()
-    example: str = ""
-
 
 KINDS_OF_QUANTITY = {
-    "displacement": QuantityKind("length", ("at", "of"), "at: a point, or of: a group"),
-    "stress": QuantityKind("stress", ("at",), "at: a point"),
-    "reaction": QuantityKind("force", ("of",), "of: a group that is held"),
-    "area": QuantityKind("area"),
-    "energy": QuantityKind("energy"),
+    "displacement": "length",
+    "stress": "stress",
+    "reaction": "force",
+    "area": "area",
+    "energy": "energy",
 }
-"""Kinds of quantity by name, as `springtune.problem.shapes.QUANTITY_KINDS` has them."""
+"""Kinds of units by kind of quantity."""
 
-BEYOND_MEASURE = 1e30
-"""Size of a coordinate, force or pressure from which it is beyond all measure [SI units]."""
-
-
-def signed(kind: str) -> Scalar:
-    """Annotation of a quantity of either sign, or zero, which needs no unit."""
-    about = units.QUANTITY_KINDS[kind]
-    schema = {"type": ["string", "number"], "examples": [about.example]}
-    return Scalar(lambda text: _signed(text, kind), schema, about.words)
+PLACES = {"displacement": {"at": "a point", "of": "a group"}, "stress": {"at": "a point"}}
+PLACES |= {"reaction": {"of": "a group that is held"}, "area": {}, "energy": {}}
+"""Keys for the place of a quantity, and what they name, by kind of quantity."""
 
 
-def _signed(text: str, kind: str) -> float:
-    if text.strip() in ("0", "0.0", "-0"):
-        return 0.0
-    try:
-        value = units.parse(text, kind)
-    except units.UnitError as error:
-        raise refuse(str(error)) from None
-    if not abs(value) < BEYOND_MEASURE:
-        raise refuse(f"{show(text)} is beyond all measure; give one such as '{units.QUANTITY_KINDS[kind].example}'")
-    return value + 0.0
-
-
-class Vector:
+def both(kind: str) -> Words:
     """Annotation of two quantities, along x and along y."""
-
-    def __init__(self, kind: str) -> None:
-        self.item = signed(kind)
-        example = units.QUANTITY_KINDS[kind].example
-        pair = f"0, {example}" if example.startswith("-") else f"{example}, 0"
-        self.words = f"{kind}s along x and y, such as [{pair}]"
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.no_info_plain_validator_function(self._read)
-
-    def __get_pydantic_json_schema__(self, schema: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        return {"type": "array", "items": dict(self.item.schema), "minItems": 2, "maxItems": 2}
-
-    def _read(self, value: object) -> tuple[float, float]:
-        if not isinstance(value, list) or len(value) != 2:
-            raise refuse(f"{show(value)} instead of {self.words}; give {self.words}")
-        x, y = (self.item._read(one) for one in value)
-        return x, y
+    example = units.QUANTITY_KINDS[kind].example
+    pair = f"0, {example}" if example.startswith("-") else f"{example}, 0"
+    return Words(f"{kind}s along x and y, such as [{pair}]")
 
 
-class Words:
-    """Annotation with words for the expected value of a list or mapping."""
-
-    def __init__(self, words: str) -> None:
-        self.words = words
-
-
-Place = Annotated[tuple[float, float], Vector("length")]
-ForceVector = Annotated[tuple[float, float], Vector("force")]
-Gravity = Annotated[tuple[float, float], Vector("acceleration")]
-Displacement = Annotated[float, signed("length")]
-PressureValue = Annotated[float, signed("stress")]
+Displacement = Annotated[float, quantity("length", signed=True)]
+PressureValue = Annotated[float, quantity("stress", signed=True)]
+SignedForce = Annotated[float, quantity("force", signed=True)]
+Acceleration = Annotated[float, quantity("acceleration", signed=True)]
+Place = Annotated[tuple[Displacement, Displacement], both("length")]
+ForceVector = Annotated[tuple[SignedForce, SignedForce], both("force")]
+Gravity = Annotated[tuple[Acceleration, Acceleration], both("acceleration")]
 GroupName = Annotated[str, Scalar(str, {"type": "string", "minLength": 1}, "the name of a group")]
 PointName = Annotated[str, Scalar(str, {"type": "string", "minLength": 1}, "the name of a point")]
 PartName = Annotated[str, Scalar(str, {"type": "string", "minLength": 1}, "the name of a part")]
-ShapeName = Annotated[str, Scalar(str, {"type": "string"}, "the name of a shape")]
+ShapeName = Annotated[str, Scalar(str, {"type": "string"}, "the name of a shape"), fields.declared("shape", "shapes")]
 LoadName = Annotated[str, Scalar(str, {"type": "string"}, "the name of a load of the shape")]
-MadeType = Annotated[str, one_of("mesh type", OUTLINED)]
 Axis = Annotated[str, one_of("component", ("x", "y"))]
 StressComponent = Annotated[str, one_of("component", ("xx", "yy", "xy"))]
 Anything = Annotated[str, Scalar(str, {"type": ["string", "number"]}, "a value with its unit")]
@@ -130,13 +64,15 @@ def _or_text(*texts: str) -> Any:
 class SegmentConfig(Section):
     """A side of an outline, from its corner to that of the next one."""
 
-    start: Place = Field(alias="from", description="Its corner.")
-    centre: Place | None = Field(
-        None,
-        description="Centre of the arc that it is, the way of less than half a turn: of a circle, or of an ellipse "
-        "with its axes along x and y where its ends are not equally far from it. It is straight without.",
-    )
-    group: GroupName | None = Field(None, description="Group that it belongs to, for supports, loads and quantities.")
+    start: Place = Field(alias="from")
+    """Its corner."""
+
+    centre: Place | None = None
+    """Centre of the arc that it is, the way of less than half a turn: of a circle, or of an ellipse with its axes
+    along x and y where its ends are not equally far from it. It is straight without."""
+
+    group: GroupName | None = None
+    """Group that it belongs to, for supports, loads and quantities."""
 
 
 SIDE_WORDS = Words("a list of sections; see below")
@@ -145,23 +81,27 @@ SIDE_WORDS = Words("a list of sections; see below")
 class CircleConfig(Section):
     """A circle."""
 
-    centre: Place = Field(description="Centre.")
-    radius: Length = Field(description="Radius.")
+    centre: Place
+    """Centre."""
+
+    radius: fields.Length
+    """Radius."""
 
 
 class HoleConfig(Section):
     """A hole, or what fills it: a circle, or an outline."""
 
-    circle: CircleConfig | None = Field(None, description="Where it is round.")
-    outline: Annotated[list[SegmentConfig], SIDE_WORDS] | None = Field(
-        None, description="Where it is not: a round of sides, in either sense."
-    )
-    group: GroupName | None = Field(
-        None, description="Group that the circle belongs to; sides of an outline have their own."
-    )
-    part: PartName | None = Field(
-        None, description="Part of the body that fills it, of a material under `parts`; nothing fills it without."
-    )
+    circle: CircleConfig | None = None
+    """Where it is round."""
+
+    outline: Annotated[list[SegmentConfig], SIDE_WORDS] | None = None
+    """Where it is not: a round of sides, in either sense."""
+
+    group: GroupName | None = None
+    """Group that the circle belongs to; sides of an outline have their own."""
+
+    part: PartName | None = None
+    """Part of the body that fills it, of a material under `parts`; nothing fills it without."""
 
     @model_validator(mode="after")
     def _one_form(self) -> Self:
@@ -178,8 +118,11 @@ class SupportConfig(Section):
 
     model_config = {"json_schema_extra": _or_text("fixed")}
 
-    x: Displacement | None = Field(None, description="Along x; free without.")
-    y: Displacement | None = Field(None, description="Along y; free without.")
+    x: Displacement | None = None
+    """Along x; free without."""
+
+    y: Displacement | None = None
+    """Along y; free without."""
 
     @model_validator(mode="before")
     @classmethod
@@ -202,8 +145,11 @@ class PressureConfig(Section):
 
     model_config = {"json_schema_extra": _or_text()}
 
-    pressure: PressureValue = Field(description="Pressure.")
-    follower: Flag = default("false", description="Whether it turns and grows with the sides, in nonlinear kinematics.")
+    pressure: PressureValue
+    """Pressure."""
+
+    follower: fields.Flag = default("false")
+    """Whether it turns and grows with the sides, in nonlinear kinematics."""
 
     @model_validator(mode="before")
     @classmethod
@@ -216,19 +162,32 @@ class QuantityConfig(Section):
 
     model_config = {"json_schema_extra": _or_text("area", "energy")}
 
-    displacement: Axis | None = Field(
-        None, description="Displacement along it: `at` a point, or the mean one `of` a group of sides, by length."
-    )
-    stress: StressComponent | None = Field(None, description="Stress `at` a point, recovered from the cells around it.")
-    reaction: Axis | None = Field(None, description="Force of the supports `of` a group along it.")
-    area: Flag | None = Field(None, description="Growth of the area of the body; `area` alone says so.")
-    energy: Flag | None = Field(None, description="Strain energy; `energy` alone says so.")
-    at: PointName | None = Field(None, description="Point.")
-    of: GroupName | None = Field(None, description="Group of sides.")
-    expected: Anything | None = Field(
-        None, description="Value that others give, with its unit: the dataset has errors against it, too."
-    )
-    source: Text | None = Field(None, description="Who gives it.")
+    displacement: Axis | None = None
+    """Displacement along it: `at` a point, or the mean one `of` a group of sides, by length."""
+
+    stress: StressComponent | None = None
+    """Stress `at` a point, recovered from the cells around it."""
+
+    reaction: Axis | None = None
+    """Force of the supports `of` a group along it."""
+
+    area: fields.Flag | None = None
+    """Growth of the area of the body; `area` alone says so."""
+
+    energy: fields.Flag | None = None
+    """Strain energy; `energy` alone says so."""
+
+    at: PointName | None = None
+    """Point."""
+
+    of: GroupName | None = None
+    """Group of sides."""
+
+    expected: Anything | None = None
+    """Value that others give, with its unit: the dataset has errors against it, too."""
+
+    source: fields.Text | None = None
+    """Who gives it."""
 
     @model_validator(mode="before")
     @classmethod
@@ -246,22 +205,22 @@ class QuantityConfig(Section):
         if len(given) != 1:
             what = f"{' and '.join(given)} at once" if given else "no quantity"
             raise refuse(f"{what}; give one of {', '.join(KINDS_OF_QUANTITY)}, such as {{displacement: y, at: tip}}")
-        kind = KINDS_OF_QUANTITY[given[0]]
+        [kind] = given
         places = [name for name in ("at", "of") if getattr(self, name) is not None]
         if len(places) > 1:
             raise refuse("both a point and a group; give 'at' or 'of'", "of")
-        if not places and kind.places:
-            raise refuse(f"a {given[0]} of nothing; give {kind.example}", given[0])
-        for name in places:
-            if name not in kind.places:
-                raise refuse(f"a {given[0]} has no '{name}'; give {kind.example}", name)
+        known = ", or ".join(f"{name}: {what}" for name, what in PLACES[kind].items())
+        if known and not places:
+            raise refuse(f"a {kind} of nothing; give {known}", kind)
+        if set(places) - set(PLACES[kind]):
+            remedy = f"give {known}" if known else "remove it"
+            raise refuse(f"a {kind} has no '{places[0]}'; {remedy}", places[0])
         if self.source and self.expected is None:
             raise refuse("a source of no value; give 'expected', too, or remove it", "source")
-        if self.expected is not None:
-            try:
-                _signed(self.expected, kind.unit_kind)
-            except Exception as error:
-                raise refuse(str(error), "expected") from None
+        try:
+            self.expected_value  # noqa: B018
+        except PydanticCustomError as error:
+            raise refuse(str(error), "expected") from None
         return self
 
     @property
@@ -278,43 +237,46 @@ class QuantityConfig(Section):
     @property
     def expected_value(self) -> float | None:
         """In SI units."""
-        return None if self.expected is None else _signed(self.expected, KINDS_OF_QUANTITY[self.kind].unit_kind)
+        unit = KINDS_OF_QUANTITY[self.kind]
+        return None if self.expected is None else quantity(unit, signed=True).read(self.expected)
 
 
 class ShapeLoadConfig(Section):
     """What is done to a shape, and what is asked of it."""
 
-    supports: Annotated[dict[str, SupportConfig], Named("support", for_files=False)] = Field(
-        description="What is held, by group or point: `fixed`, or displacements such as `{y: 0 mm}`."
-    )
-    forces: Annotated[dict[str, ForceVector], Words("forces such as [10 kN, 0], by group or point")] = Field(
-        {}, description="Forces along x and y, by group or point: of a group the total one, spread evenly by length."
-    )
-    pressures: Annotated[dict[str, PressureConfig], Words("a stress, or a section, by group; see below")] = Field(
-        {}, description="Pressures, by group; positive towards the body."
-    )
-    gravity: Gravity = default(
-        ["0", "0"], description="Acceleration along x and y, such as `[0, -9.81 m/s^2]`; needs densities."
-    )
-    quantities: Annotated[dict[str, QuantityConfig], Named("quantity")] = Field(
-        description="Quantities of interest, by name; the first one stands for all where one is wanted."
-    )
+    supports: Annotated[dict[str, SupportConfig], Named("support", for_files=False)]
+    """What is held, by group or point: `fixed`, or displacements such as `{y: 0 mm}`."""
+
+    forces: Annotated[dict[str, ForceVector], Words("forces such as [10 kN, 0], by group or point")] = {}
+    """Forces along x and y, by group or point: of a group the total one, spread evenly by length."""
+
+    pressures: Annotated[dict[str, PressureConfig], Words("a stress, or a section, by group; see below")] = {}
+    """Pressures, by group; positive towards the body."""
+
+    gravity: Gravity = default(["0", "0"])
+    """Acceleration along x and y, such as `[0, -9.81 m/s^2]`; needs densities."""
+
+    quantities: Annotated[dict[str, QuantityConfig], Named("quantity")]
+    """Quantities of interest, by name; the first one stands for all where one is wanted."""
 
 
 class ShapeFileConfig(Section):
     """A mesh file of a shape that has several."""
 
-    file: FileName = Field(description="The file, relative to the study's folder.")
-    mesh_size: Length = Field(description="Length of an edge, which names the mesh in the dataset.")
+    file: fields.FileName
+    """The file, relative to the study's folder."""
+
+    mesh_size: fields.Length
+    """Length of an edge, which names the mesh in the dataset."""
 
 
-class OneFileOrMore(Words, Wrapped):
+class OneFileOrMore(Words):
     """Annotation of a list of mesh files; a path alone is a list of one, of no mesh size."""
 
     def __get_pydantic_json_schema__(self, schema: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         return {"anyOf": [{"type": "string", "minLength": 1}, handler(schema["schema"]) | {"minItems": 1}]}
 
-    def _read(self, value: object, handler: core_schema.ValidatorFunctionWrapHandler) -> Any:
+    def _read(self, value: object, handler: ValidatorFunctionWrapHandler) -> Any:
         if isinstance(value, str):
             return [ShapeFileConfig.model_construct(file=value, mesh_size=0.0)]
         if not isinstance(value, list) or not value:
@@ -332,30 +294,35 @@ SHAPE_FILES = OneFileOrMore("the path of a file, or a list such as [{file: fine.
 class ShapeConfig(Section):
     """A body of any outline, or that of a mesh file, with named groups of its sides and points."""
 
-    thickness: Length = default("1 mm", description="Extent out of the plane.")
-    outline: Annotated[list[SegmentConfig], SIDE_WORDS] | None = Field(
-        None, description="Round of its sides, counter-clockwise."
-    )
-    holes: list[HoleConfig] = Field([], description="Holes, and parts of other materials.")
-    file: Annotated[list[ShapeFileConfig], SHAPE_FILES] | None = Field(
-        None,
-        description="Mesh file in the place of an outline, of a format that meshio reads, its path relative to the "
-        "study's folder; its groups are the shape's. Or a list of several with their mesh sizes: the finest one is the "
-        "geometry of the reference.",
-    )
-    unit: Length = default("1 m", description="Unit of the coordinates in the file.")
-    points: Annotated[dict[str, Place], Words("places such as [48 mm, 52 mm], by name")] = Field(
-        {}, description="Named points of an outline or inside of it: particles of every mesh."
-    )
-    refined: Annotated[dict[str, Ratio], Words("numbers above 0, by group, point or part")] = Field(
-        {},
-        description="Where the mesh is finer: mesh size over that of the rest, by group, point or part, such as "
-        "`{hole: 0.25}`; from there on it grows.",
-    )
-    parts: Annotated[dict[str, MaterialName], Words("names of materials, by part")] = Field(
-        {}, description="Materials of the parts, by name; the rest is of the grid's material."
-    )
-    loads: Annotated[dict[str, ShapeLoadConfig], Named("load")] = Field(description="Loads, by name.")
+    thickness: fields.Length = default("1 mm")
+    """Extent out of the plane."""
+
+    outline: Annotated[list[SegmentConfig], SIDE_WORDS] | None = None
+    """Round of its sides, counter-clockwise."""
+
+    holes: list[HoleConfig] = []
+    """Holes, and parts of other materials."""
+
+    file: Annotated[list[ShapeFileConfig], SHAPE_FILES] | None = None
+    """Mesh file in the place of an outline, of a format that meshio reads, its path relative to the study's folder;
+    its groups are the shape's. Or a list of several with their mesh sizes: the finest one is the geometry of the
+    reference."""
+
+    unit: fields.Length = default("1 m")
+    """Unit of the coordinates in the file."""
+
+    points: Annotated[dict[str, Place], Words("places such as [48 mm, 52 mm], by name")] = {}
+    """Named points of an outline or inside of it: particles of every mesh."""
+
+    refined: Annotated[dict[str, fields.Ratio], Words("numbers above 0, by group, point or part")] = {}
+    """Where the mesh is finer: mesh size over that of the rest, by group, point or part, such as `{hole: 0.25}`;
+    from there on it grows."""
+
+    parts: Annotated[dict[str, fields.MaterialName], Words("names of materials, by part")] = {}
+    """Materials of the parts, by name; the rest is of the grid's material."""
+
+    loads: Annotated[dict[str, ShapeLoadConfig], Named("load")]
+    """Loads, by name."""
 
     @model_validator(mode="after")
     def _one_geometry(self) -> Self:
@@ -376,34 +343,30 @@ class ShapeGridConfig(Section):
     A single value stands for a list of one. A scene that two grids ask for is solved once.
     """
 
-    shape: Annotated[list[ShapeName], OneOrMore()] = Field(description="Shapes, by name.")
-    mesh_size: Lengths | None = Field(
-        None, description="Lengths of an edge; not of shapes from files, whose mesh is that of the file."
-    )
-    mesh_type: Annotated[list[MadeType], OneOrMore()] | None = Field(
-        None,
-        description="`free`: " + OUTLINED["free"] + ", which it is without. Shapes from files have the type `file`.",
-    )
-    material: Annotated[list[MaterialName], OneOrMore()] = Field(description="Materials, by name.")
-    load: Annotated[list[LoadName], OneOrMore()] | None = Field(
-        None, description="Loads of the shapes, by name; all of each shape without."
-    )
-    definition: Annotated[list[DefinitionName], OneOrMore()] = Field(
-        description="Definitions that derive a stiffness on triangles and need no reference."
-    )
-    kinematics: Annotated[list[Kinematics], OneOrMore()] = default(
-        "nonlinear", description="Whether springs keep their length law or their tangent at rest."
-    )
-    reference: Flag = default(
-        "true",
-        description="Whether there is a converged reference; else errors are those against `expected` values alone.",
-    )
-    finite_strain: Flag = default(
-        "false",
-        description="Whether nonlinear scenes of 'neo-hooke', 'yeoh' and 'delingette' are also compared with a "
-        "reference of their law at finite strain. The group `/shapes_finite_strain` has it and the errors. Each takes "
-        "seconds.",
-    )
+    shape: Annotated[list[ShapeName], OneOrMore()]
+    """Shapes, by name."""
+
+    mesh_size: fields.Lengths | None = None
+    """Lengths of an edge of triangles; not of shapes from files, whose mesh is that of the file."""
+
+    material: Annotated[list[fields.MaterialName], OneOrMore()]
+    """Materials, by name."""
+
+    load: Annotated[list[LoadName], OneOrMore()] | None = None
+    """Loads of the shapes, by name; all of each shape without."""
+
+    definition: Annotated[list[fields.DefinitionName], OneOrMore()]
+    """Definitions that derive a stiffness on triangles and need no reference."""
+
+    kinematics: Annotated[list[fields.Kinematics], OneOrMore()] = default("nonlinear")
+    """Whether springs keep their length law or their tangent at rest."""
+
+    reference: fields.Flag = default("true")
+    """Whether there is a converged reference; else errors are those against `expected` values alone."""
+
+    finite_strain: fields.Flag = default("false")
+    """Whether nonlinear scenes of 'neo-hooke', 'yeoh' and 'delingette' are also compared with a reference of their
+    law at finite strain. The group `/shapes_finite_strain` has it and the errors. Each takes seconds."""
 
 
 NAMED_SHAPES = Annotated[dict[str, ShapeConfig], Named("shape")] | None

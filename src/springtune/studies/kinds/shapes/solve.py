@@ -7,9 +7,9 @@ import numpy as np
 from springtune.problem.boundary import check_case
 from springtune.problem.status import Status
 from springtune.scene.single import Scene
-from springtune.springs import DefinitionError
+from springtune.springs.base import DefinitionError
 
-from ...runs.checked_json import hash_of
+from ...runs.source import hash_of
 from ..scenes import stored
 from .task_values import ONE_LOAD, by_key, materials_of, shape_of
 
@@ -37,7 +37,6 @@ def solve(task, family):
     shape = shape_of(described, task["thickness"], task["load"])
     chosen = {"definition": task["definition"], "kinematics": task["kinematics"]}
     sheet = sheets.get(shape.thickness)
-    derived = sheet.deriving if sheet else 0.0
     try:
         check_case(grouped, shape.loads[ONE_LOAD])
         scene = Scene(shape, grouped, materials_of(task["materials"]), ONE_LOAD, sheet=sheet, **chosen)
@@ -54,7 +53,6 @@ def solve(task, family):
         "message": found.message,
         "seconds": found.seconds,
         "definition_seconds": found.definition_seconds,
-        "deriving": scene.sheet.deriving - derived,
         "negative_pivots": found.negative_pivots,
         "values": by_key(found.values, shape.loads[ONE_LOAD]),
     }
@@ -65,10 +63,3 @@ def solve(task, family):
             "spring_forces": found.spring_forces,
         }
     return result
-
-
-def cost(task, family, result, seconds):
-    """Seconds of the network, and of deriving its springs in the scene that asked first."""
-    particles, deriving = len(family[1].mesh.points), result.pop("deriving", 0.0)
-    yield "shape_scene", particles, seconds - deriving
-    yield task["definition"], particles, deriving

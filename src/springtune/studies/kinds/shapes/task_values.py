@@ -5,9 +5,11 @@ from dataclasses import asdict, replace
 from math import isfinite
 from typing import Any
 
+from pydantic import TypeAdapter
+
 from springtune.problem.geometry import AssumptionWarning
 from springtune.problem.materials import AnyMaterial, material_of
-from springtune.problem.shapes import Hole, LoadCase, Pressure, Quantity, Segment, Shape, Support, Traction
+from springtune.problem.shapes import LoadCase, Quantity, Shape
 
 UNNAMED, ONE_LOAD = "shape", "load"
 """Names of a shape and of its load in tasks."""
@@ -43,17 +45,17 @@ def load(case: LoadCase) -> dict[str, Any]:
     return asdict(replace(case, name=ONE_LOAD, quantities=tuple(plain)))
 
 
+_SHAPE = TypeAdapter(Shape)
+"""Reader of what `asdict` makes of a shape."""
+
+
 def shape_of(described: dict[str, Any], thickness: float = 1.0, case: dict[str, Any] | None = None) -> Shape:
     """Shape from its `geometry` and thickness [m]."""
-    described = _frozen(described)
-    holes = (Hole(_segments(hole["outline"]), hole["part"]) for hole in described["holes"])
-    loads = {} if case is None else {ONE_LOAD: load_of(case)}
-    file = described.get("file", "")
+    own = {name: described[name] for name in ("outline", "holes", "points")}
+    own |= {"name": UNNAMED, "thickness": thickness, "file": described.get("file", "")}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", AssumptionWarning)  # whoever read the study said it
-        return Shape(
-            UNNAMED, thickness, _segments(described["outline"]), tuple(holes), described["points"], loads, file
-        )
+        return _SHAPE.validate_python(own | {"loads": {ONE_LOAD: case} if case else {}})
 
 
 def by_key(values: dict[str, float], case: LoadCase) -> dict[str, float]:
@@ -70,24 +72,6 @@ def named(message: str, shape: Shape, case: LoadCase) -> str:
     for plain, name in names.items():
         message = message.replace(plain, name)
     return message
-
-
-def load_of(described: dict[str, Any]) -> LoadCase:
-    """Load case, the inverse of `load`."""
-    kinds = {"supports": Support, "tractions": Traction, "pressures": Pressure, "quantities": Quantity}
-    parts = {name: tuple(kind(**one) for one in _frozen(described[name])) for name, kind in kinds.items()}
-    return LoadCase(**(_frozen(described) | parts))
-
-
-def _segments(sides: Any) -> tuple[Segment, ...]:
-    return tuple(Segment(**side) for side in sides)
-
-
-def _frozen(value: Any) -> Any:
-    """Value with tuples for lists: JSON has no tuples."""
-    if isinstance(value, dict):
-        return {name: _frozen(one) for name, one in value.items()}
-    return tuple(map(_frozen, value)) if isinstance(value, list | tuple) else value
 
 
 def materials_of(described: dict[str, dict[str, Any]]) -> dict[str, AnyMaterial]:

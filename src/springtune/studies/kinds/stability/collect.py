@@ -1,11 +1,11 @@
 """Experiments on stability, gathered in the group ``/stability``."""
 
-import numpy as np
+from math import nan
 
 from springtune.mechanics.integrators import BEHAVIOURS
 
-from ...output.dataset import Filler, Group
-from ...runs.stages import results
+from ...output.dataset import Group
+from ...runs.stages import rows
 from .kind import STAGE
 
 SCHEME = ("definition", "mesh_size", "integrator", "damper", "damping_ratio")
@@ -30,67 +30,62 @@ def _judged(name, dimensions, long_name):
 STABILITY = Group(
     "/stability",
     {
-        "dt_limit_predicted": (SCHEME, "s", "largest stable step, predicted", np.nan),
-        "dt_limit_measured": (SCHEME, "s", "largest step that does not grow noise, by bisection of runs", np.nan),
-        "dt_particle_bound": (("definition", "mesh_size"), "s", "safe step from each particle's springs alone", np.nan),
-        "omega_max": (("definition", "mesh_size"), "rad/s", "highest frequency at rest", np.nan),
+        "dt_limit_predicted": (SCHEME, "s", "largest stable step, predicted", nan),
+        "dt_limit_measured": (SCHEME, "s", "largest step that does not grow noise, by bisection of runs", nan),
+        "dt_particle_bound": (("definition", "mesh_size"), "s", "safe step from each particle's springs alone", nan),
+        "omega_max": (("definition", "mesh_size"), "rad/s", "highest frequency at rest", nan),
         "behaviour": (("integrator", "step_ratio", "map_damping_ratio"), "1", "what a run makes of noise", -1),
         "step_ratio_predicted": (
             ("integrator", "map_damping_ratio"),
             "1",
             "largest stable step over 2 / omega_max, predicted; 1000 where there is none",
-            np.nan,
+            nan,
         ),
-        "energy_drift": (("integrator",), "1", "mean energy of the last tenth of a run over that of the first", np.nan),
-        "energy_swing": (("integrator",), "1", "largest less smallest energy of a run over the first", np.nan),
-        "energy": (("integrator", "sample"), "1", "energy over that at the start, undamped", np.nan),
-        "momentum_drift": (("integrator",), "1", "change of momentum over the sum of its parts", np.nan),
-        "steps_to_rest": (("critical_ratio",), "1", "steps to rest within 0.1 %, central difference", np.nan),
-        "loaded_frequency": ((), "rad/s", "lowest frequency that the load excites", np.nan),
+        "energy_drift": (("integrator",), "1", "mean energy of the last tenth of a run over that of the first", nan),
+        "energy_swing": (("integrator",), "1", "largest less smallest energy of a run over the first", nan),
+        "energy": (("integrator", "sample"), "1", "energy over that at the start, undamped", nan),
+        "momentum_drift": (("integrator",), "1", "change of momentum over the sum of its parts", nan),
+        "steps_to_rest": (("critical_ratio",), "1", "steps to rest within 0.1 %, central difference", nan),
+        "loaded_frequency": ((), "rad/s", "lowest frequency that the load excites", nan),
         "truncated_error": (
             ("mesh_size", "cg_iterations", "implicit_steps"),
             "1",
             "distance of backward Euler from the static solution over its largest displacement",
-            np.nan,
+            nan,
         ),
-        "relaxation_error": (("mesh_size",), "1", "distance of dynamic relaxation from the static solution", np.nan),
-        "relaxation_steps": (("mesh_size",), "1", "steps of dynamic relaxation", np.nan),
+        "relaxation_error": (("mesh_size",), "1", "distance of dynamic relaxation from the static solution", nan),
+        "relaxation_steps": (("mesh_size",), "1", "steps of dynamic relaxation", nan),
         **_judged("sliver", SLIVER, "a mesh with a sliver"),
-        "sliver_negative_pivots": (SLIVER, "1", "negative pivots of the tangent with a sliver", np.nan),
-        "sliver_step_limit": (SLIVER, "s", "largest stable step with a sliver", np.nan),
-        "sliver_error": (SLIVER, "1", "displacement with a sliver over that without, less 1", np.nan),
+        "sliver_negative_pivots": (SLIVER, "1", "negative pivots of the tangent with a sliver", nan),
+        "sliver_step_limit": (SLIVER, "s", "largest stable step with a sliver", nan),
+        "sliver_error": (SLIVER, "1", "displacement with a sliver over that without, less 1", nan),
         **_judged("contrast", CONTRAST, "a network with stiff and soft parts"),
-        "contrast_negative_pivots": (CONTRAST, "1", "negative pivots of the tangent with a contrast", np.nan),
-        "contrast_error": (CONTRAST, "1", "error of the linear solution, against extended precision", np.nan),
-        "contrast_estimate": (CONTRAST, "1", "its estimate, by which it is judged", np.nan),
+        "contrast_negative_pivots": (CONTRAST, "1", "negative pivots of the tangent with a contrast", nan),
+        "contrast_error": (CONTRAST, "1", "error of the linear solution, against extended precision", nan),
+        "contrast_estimate": (CONTRAST, "1", "its estimate, by which it is judged", nan),
         **_judged("poisson", STRESSED, "a material near the incompressible one"),
-        "poisson_negative_pivots": (STRESSED, "1", "negative pivots of the tangent", np.nan),
-        "poisson_modulus_error": (STRESSED, "1", "error of Young's modulus along x", np.nan),
-        "poisson_step_limit": (STRESSED, "s", "largest stable step", np.nan),
-        "scaled_step_limit": (("scale",), "s/m", "largest stable step over the mesh size", np.nan),
-        "precision_error": (("scale", "precision"), "1", "error of a run to rest, against the static solution", np.nan),
+        "poisson_negative_pivots": (STRESSED, "1", "negative pivots of the tangent", nan),
+        "poisson_modulus_error": (STRESSED, "1", "error of Young's modulus along x", nan),
+        "poisson_step_limit": (STRESSED, "s", "largest stable step", nan),
+        "scaled_step_limit": (("scale",), "s/m", "largest stable step over the mesh size", nan),
+        "precision_error": (("scale", "precision"), "1", "error of a run to rest, against the static solution", nan),
         **_judged("strain", STRAINED, "a large strain"),
-        "negative_pivots": (STRAINED, "1", "negative pivots of the tangent; 0 where the equilibrium is stable", np.nan),
-        "strain_displacement": (STRAINED, "m", "mean displacement of the loaded side along the force", np.nan),
-        "strain_load_share": (STRAINED, "1", "largest share of the load with a good equilibrium", np.nan),
+        "negative_pivots": (STRAINED, "1", "negative pivots of the tangent; 0 where the equilibrium is stable", nan),
+        "strain_displacement": (STRAINED, "m", "mean displacement of the loaded side along the force", nan),
+        "strain_load_share": (STRAINED, "1", "largest share of the load with a good equilibrium", nan),
         **_judged("perturbed", PERTURBED, "a mesh with particles moved"),
-        "perturbed_negative_pivots": (PERTURBED, "1", "negative pivots of the tangent", np.nan),
-        "perturbed_error": (PERTURBED, "1", "displacement with particles moved over that without, less 1", np.nan),
-        "perturbed_step_limit": (PERTURBED, "s", "largest stable step with particles moved", np.nan),
-        "inverted_starts_right": (
-            OF_DEFINITION,
-            "1",
-            "share of inverted starts that end in the right solution",
-            np.nan,
-        ),
-        "inverted_starts_wrong": (OF_DEFINITION, "1", "share of inverted starts that end as solved elsewhere", np.nan),
-        "buckling_load": (SLENDER, "N", "buckling load of a column twenty times as long as high", np.nan),
+        "perturbed_negative_pivots": (PERTURBED, "1", "negative pivots of the tangent", nan),
+        "perturbed_error": (PERTURBED, "1", "displacement with particles moved over that without, less 1", nan),
+        "perturbed_step_limit": (PERTURBED, "s", "largest stable step with particles moved", nan),
+        "inverted_starts_right": (OF_DEFINITION, "1", "share of inverted starts that end in the right solution", nan),
+        "inverted_starts_wrong": (OF_DEFINITION, "1", "share of inverted starts that end as solved elsewhere", nan),
+        "buckling_load": (SLENDER, "N", "buckling load of a column twenty times as long as high", nan),
         "buckling_message": (SLENDER, "1", "what restricts the buckling load, or why there is none", ""),
-        "euler_load": (OF_DEFINITION, "N", "its load by Euler", np.nan),
-        "arch_load": (ARCH, "N", "force on the middle of a shallow arch along its path", np.nan),
-        "arch_deflection": (ARCH, "m", "its deflection", np.nan),
-        "arch_negative_pivots": (ARCH, "1", "negative pivots of the tangent there", np.nan),
-        "experiment_seconds": (("experiment", "definition"), "s", "time of an experiment", np.nan),
+        "euler_load": (OF_DEFINITION, "N", "its load by Euler", nan),
+        "arch_load": (ARCH, "N", "force on the middle of a shallow arch along its path", nan),
+        "arch_deflection": (ARCH, "m", "its deflection", nan),
+        "arch_negative_pivots": (ARCH, "1", "negative pivots of the tangent there", nan),
+        "experiment_seconds": (("experiment", "definition"), "s", "time of an experiment", nan),
         "experiment_message": (("experiment", "definition"), "1", "why an experiment has no results", ""),
     },
     dimensions={
@@ -121,9 +116,6 @@ STABILITY = Group(
 
 def groups(study, folder):
     """Groups of a dataset, see `springtune.studies.kinds.scenes.collect.groups`."""
-    found = list(results(STAGE, study, folder, STABILITY.variables))
-    names = {name for _, result in found for name in result} | {"experiment_seconds", "experiment_message"}
-    filler = Filler(STABILITY.empty(study.axes, names))
-    for task, result in found:
-        filler.put_arrays(result, task.labels)
-    return {STABILITY.name: filler.data}
+    found = list(rows(STAGE, study, folder))
+    names = {name for row in found for name in row} | {"experiment_seconds", "experiment_message"}
+    return {STABILITY.name: STABILITY.of_rows(study.axes, found, names)}

@@ -1,16 +1,16 @@
 """Experiments on numerical stability: a study's section ``stability``."""
 
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from typing import Annotated
 
 from pydantic import Field
 
-from springtune.mesh import MESH_TYPES
+from springtune.mesh.types import MESH_TYPES
 
-from ...config.checks import check_beam_material, check_density, check_for_triangles, check_known, check_particles
-from ...config.fields import BeamName, DefinitionNames, Force, Length, MaterialName, MeshType, OneOrMore, one_of
+from ...config import fields
+from ...config.checks import check_beam_material, check_density, check_for_triangles, check_particles
+from ...config.fields import OneOrMore, Section, default, one_of, optional
 from ...config.kind import Kind
-from ...config.sections import Section, default, optional
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key
 from ...runs.stages import Task, stage
 from . import AXES, EXPERIMENTS, ONCE, Experiment
@@ -22,17 +22,25 @@ ExperimentName = Annotated[str, one_of("experiment", EXPERIMENTS)]
 class StabilityConfig(Section):
     """Experiments on numerical stability: a beam in traction, in motion and under stress far beyond the study's own."""
 
-    beam: BeamName = Field(description="Beam.")
-    material: MaterialName = Field(description="Material, with a density.")
-    force: Force = Field(description="Traction on the right end.")
-    definition: DefinitionNames = Field(
-        description="Definitions that derive a stiffness and need no reference; the first one stands for all where an "
-        "experiment is not about definitions."
-    )
-    mesh_type: MeshType = default("structured", description="Mesh type of triangles.")
-    mesh_size: Annotated[list[Length], OneOrMore()] = Field(
-        description="Lengths of an edge; most experiments take the coarsest."
-    )
+    beam: fields.BeamName
+    """Beam."""
+
+    material: fields.MaterialName
+    """Material, with a density."""
+
+    force: fields.Force
+    """Traction on the right end."""
+
+    definition: fields.DefinitionNames
+    """Definitions that derive a stiffness and need no reference; the first one stands for all where an experiment
+    is not about definitions."""
+
+    mesh_type: fields.MeshType = default("structured")
+    """Mesh type of triangles."""
+
+    mesh_size: Annotated[list[fields.Length], OneOrMore()]
+    """Lengths of an edge; most experiments take the coarsest."""
+
     experiment: Annotated[list[ExperimentName], OneOrMore()] = Field(
         list(EXPERIMENTS),
         description="; ".join(f"`{name}`: {text}" for name, text in EXPERIMENTS.items()) + ". All of them without.",
@@ -41,7 +49,6 @@ class StabilityConfig(Section):
 
 def _check(config, problems):
     section = config.stability
-    check_known(problems, ("stability", "beam"), "beam", section.beam, config.beams)
     check_beam_material(problems, ("stability", "material"), section.material, config)
     check_density(config, section.material, ("stability", "material"), problems)
     check_for_triangles(section.definition, ("stability", "definition"), problems)
@@ -83,22 +90,8 @@ def _tasks(study):
     for one in study.parts["stability"]:
         own = {"beam": beam_key(one.beam), "material": material_key(one.material, density=True)}
         also = mesh_type_key(one.mesh_type), definition_key(one.definition)
-        labels = {"experiment": one.name, "definition": one.definition, "mesh_size": list(one.mesh_sizes)}
-        yield Task(asdict(one) | own, also, labels, one, [(one.name, 0)])
-
-
-def _pieces(study, costs, division):
-    seconds = {_piece(task.of): task.seconds(costs) for task in _tasks(study)}
-    return division.of_section(seconds)
-
-
-def _take(study, names):
-    chosen = tuple(one for one in study.parts["stability"] if _piece(one) in set(names))
-    return replace(study, parts=study.parts | {"stability": chosen})
-
-
-def _piece(one):
-    return one.name, one.definition
+        labels = {"experiment": one.name, "definition": one.definition}
+        yield Task(asdict(one) | own, also, labels, one, seconds=3.0)
 
 
 STAGE = stage("stability", "studies.kinds.stability.solve", "Experiments on stability", _tasks)
@@ -114,19 +107,4 @@ KIND = Kind(
     summary=lambda part: [["experiments", len(part), "on numerical stability"]],
     stages=(STAGE,),
     outputs=OUTPUTS,
-    pieces=_pieces,
-    take=_take,
-    costs={
-        "limits": (10.0, 0.0),
-        "maps": (8.0, 0.0),
-        "drift": (9.0, 0.0),
-        "rest": (2.0, 0.0),
-        "sizes": (3.0, 0.0),
-        "strains": (2.0, 0.0),
-        "buckling": (5.0, 0.0),
-        "slivers": (0.1, 0.0),
-        "contrast": (0.1, 0.0),
-        "poisson": (0.3, 0.0),
-        "perturbation": (0.5, 0.0),
-    },
 )

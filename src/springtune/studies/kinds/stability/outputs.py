@@ -5,24 +5,10 @@ from collections.abc import Collection
 from ...config.kind import Output, needs
 from ...output.browse import Plot, View
 
-PAGE = "stability.md"
-
-
-NEEDED = {
-    "limits": "limits",
-    "maps": "maps",
-    "energy": "drift",
-    "rest": "rest",
-    "meshes": "slivers",
-    "strains": "strains",
-    "buckling": "buckling",
-}
-"""The experiment that each figure needs."""
-
 
 def figures(experiments: Collection[str]) -> dict[str, dict[str, object]]:
     """Figures of experiments, by stem."""
-    return {f"stability_{name}": {} for name, needed in NEEDED.items() if needed in experiments}
+    return {f"stability_{name}": {} for name in ("maps", "strains") if name in experiments}
 
 
 OUTPUTS = (
@@ -31,8 +17,7 @@ OUTPUTS = (
         "figures and the page of the experiments on stability",
         figures=lambda study: figures({one.name for one in study.parts["stability"]}),
         plot="studies.kinds.stability.figures:stability",
-        tables=lambda study: [PAGE],
-        write="studies.kinds.stability.tables:write",
+        texts={"stability.md": "studies.kinds.stability.tables:page"},
         lack=needs("stability", "shows experiments and the study has none; add a section 'stability'"),
     ),
 )

@@ -1,7 +1,7 @@
 """Stage `stability`: stress tests of numerical stability, whose results are the group ``/stability`` of a dataset.
 
-Each takes a `Setup` and returns arrays by the names of `STABILITY` in `collect`, over the dimensions there that are not
-``definition``; their values are `AXES`.
+Each takes a `Setup` and yields rows of labels, values of `AXES` and mesh sizes, and results by the names of `STABILITY`
+in `collect`.
 """
 
 import time
@@ -18,7 +18,8 @@ from springtune.mechanics.dynamics import Motion, relax
 from springtune.mechanics.integrators import BEHAVIOURS, EXPLICIT, INTEGRATORS, BackwardEuler
 from springtune.mechanics.moduli import PatchTest
 from springtune.mechanics.statics import SingularError, StaticProblem
-from springtune.mesh import MESH_TYPES, Mesh, corner_angles
+from springtune.mesh.cells import Mesh, corner_angles
+from springtune.mesh.types import MESH_TYPES
 from springtune.problem.boundary import weights
 from springtune.problem.geometry import Beam
 from springtune.problem.loads import AXIAL, FACE
@@ -26,7 +27,7 @@ from springtune.problem.materials import Material, material_of
 from springtune.problem.status import Status
 from springtune.scene.motion import motion_of
 from springtune.scene.sheet import Sheet
-from springtune.springs import DefinitionError, Springs
+from springtune.springs.base import DefinitionError, Springs
 
 from . import AXES, Experiment
 
@@ -45,10 +46,11 @@ def solve(task):
     made["mesh_sizes"] = tuple(task["mesh_sizes"])
     setup = Setup(**{one.name: task[one.name] for one in fields(Setup)} | made)
     begin = time.perf_counter()
-    found = {name: np.asarray(values) for name, values in RUN[task["name"]](setup).items()}
-    # Texts are no arrays of a file.
-    found = {name: values.tolist() if values.dtype.kind == "O" else values for name, values in found.items()}
-    return found | {"experiment_seconds": time.perf_counter() - begin}
+    rows = [
+        {name: value.item() if isinstance(value, np.generic) else value for name, value in row.items()}
+        for row in RUN[task["name"]](setup)
+    ]
+    return {"rows": [*rows, {"experiment_seconds": time.perf_counter() - begin}]}
 
 
 class Setup(Experiment):
@@ -104,11 +106,6 @@ def changed(motion, **options):
     return Motion(motion.network, motion.inertia[:, 0], **(kept | {"linear": motion.linear} | options))
 
 
-def _blank(*axes):
-    """Array of NaN over the values of some axes, or over so many values."""
-    return np.full([len(AXES[one]) if isinstance(one, str) else one for one in axes], np.nan)
-
-
 def _displacement(found, pattern):
     return float(np.tensordot(found.displacements, pattern, axes=2))
 
@@ -123,22 +120,19 @@ def _noise(motion, size=1e-6, seed=0):
 
 def limits(setup):
     """Largest stable step of every explicit scheme, predicted and measured, over mesh sizes and damping."""
-    places = setup.mesh_sizes, INTEGRATORS, AXES["damper"], AXES["damping_ratio"]
-    predicted, measured = np.full((2, *map(len, places)), np.nan)
-    omega, bound = np.zeros((2, len(setup.mesh_sizes)))
-    for i, size in enumerate(setup.mesh_sizes):
+    for size in setup.mesh_sizes:
         motion = setup.motion(setup.mesh(size), load=None)
-        omega[i], bound[i] = motion.omega_max, 2 / motion.particle_bound
-        for (j, integrator), (k, kind), (n, ratio) in product(*map(enumerate, (EXPLICIT, *places[2:]))):
-            damped = changed(motion, **_damping(motion, kind, ratio))
-            predicted[i, j, k, n] = damped.step_limit(integrator)
-            measured[i, j, k, n] = measured_limit(damped, integrator)
-    return {
-        "dt_limit_predicted": predicted,
-        "dt_limit_measured": measured,
-        "dt_particle_bound": bound,
-        "omega_max": omega,
-    }
+        yield {"mesh_size": size, "omega_max": motion.omega_max, "dt_particle_bound": 2 / motion.particle_bound}
+        for integrator, damper, ratio in product(EXPLICIT, AXES["damper"], AXES["damping_ratio"]):
+            damped = changed(motion, **_damping(motion, damper, ratio))
+            yield {
+                "mesh_size": size,
+                "integrator": integrator,
+                "damper": damper,
+                "damping_ratio": ratio,
+                "dt_limit_predicted": damped.step_limit(integrator),
+                "dt_limit_measured": measured_limit(damped, integrator),
+            }
 
 
 def _damping(motion, kind, ratio):
@@ -180,16 +174,13 @@ def measured_limit(motion, integrator, resolution=2e-3):
 def maps(setup):
     """What noise becomes over step and damping, in every scheme."""
     motion = setup.motion(setup.coarse, load=None)
-    steps, ratios = AXES["step_ratio"], AXES["map_damping_ratio"]
-    behaviour = np.zeros((len(INTEGRATORS), len(steps), len(ratios)), dtype=np.int8)
-    predicted = np.zeros((len(INTEGRATORS), len(ratios)))
-    for i, integrator in enumerate(INTEGRATORS):
-        for k, ratio in enumerate(ratios):
-            damped = changed(motion, mass_damping=2 * ratio * motion.omega_max)
-            predicted[i, k] = min(damped.step_limit(integrator) * motion.omega_max / 2, 1e3)
-            for j, step in enumerate(steps):
-                behaviour[i, j, k] = _behaviour(damped, integrator, 2 * step / motion.omega_max)
-    return {"behaviour": behaviour, "step_ratio_predicted": predicted}
+    for integrator, ratio in product(INTEGRATORS, AXES["map_damping_ratio"]):
+        damped, labels = changed(motion, mass_damping=2 * ratio * motion.omega_max), {"map_damping_ratio": ratio}
+        predicted = min(damped.step_limit(integrator) * motion.omega_max / 2, 1e3)
+        yield labels | {"integrator": integrator, "step_ratio_predicted": predicted}
+        for step in AXES["step_ratio"]:
+            behaviour = _behaviour(damped, integrator, 2 * step / motion.omega_max)
+            yield labels | {"integrator": integrator, "step_ratio": step, "behaviour": behaviour}
 
 
 def _behaviour(motion, integrator, step):
@@ -212,25 +203,23 @@ def drift(setup):
     pulled = (problem.linear if motion.linear else problem.nonlinear)(motion.load.sum()).displacements
     free = changed(motion, load=np.zeros_like(motion.load))
     step = 0.5 * free.step_limit("central-difference")
-    samples = len(AXES["sample"])
-    energies = _blank("integrator", "sample")
-    drifts, swings, lost = _blank(3, "integrator")
     unheld = setup.sheet(setup.coarse).network(np.zeros_like(motion.network.held), setup.springs(setup.coarse))
     floating = Motion(unheld, motion.inertia[:, 0], linear=motion.linear)
     kick = np.random.default_rng(1).standard_normal(motion.load.shape)
-    for i, integrator in enumerate(INTEGRATORS):
+    for integrator in INTEGRATORS:
         steps = 100_000 if integrator in EXPLICIT else 4_000
-        found = free.run(integrator, step, steps, pulled, sample=max(10, steps // 10_000))
-        energy = found.samples[:, 1]
+        energy = free.run(integrator, step, steps, pulled, sample=max(10, steps // 10_000)).samples[:, 1]
         tenth = max(1, len(energy) // 10)
-        drifts[i] = energy[-tenth:].mean() / energy[:tenth].mean() - 1
-        swings[i] = np.ptp(energy) / energy[0]
-        places = np.linspace(0, len(energy) - 1, samples).round().astype(int)
-        energies[i] = energy[places] / energy[0]
         momentum = floating.run(integrator, step, 500, velocities=1e-3 * kick, sample=100).samples[:, 2:]
-        size = np.abs(floating.inertia * 1e-3 * kick).sum()
-        lost[i] = np.abs(momentum - momentum[0]).max() / size
-    return {"energy_drift": drifts, "energy_swing": swings, "energy": energies, "momentum_drift": lost}
+        yield {
+            "integrator": integrator,
+            "energy_drift": energy[-tenth:].mean() / energy[:tenth].mean() - 1,
+            "energy_swing": np.ptp(energy) / energy[0],
+            "momentum_drift": np.abs(momentum - momentum[0]).max() / np.abs(floating.inertia * 1e-3 * kick).sum(),
+        }
+        places = np.linspace(0, len(energy) - 1, len(AXES["sample"])).round().astype(int)
+        for sample, value in zip(AXES["sample"], energy[places] / energy[0]):
+            yield {"integrator": integrator, "sample": sample, "energy": value}
 
 
 def rest(setup):
@@ -238,72 +227,45 @@ def rest(setup):
     motion = setup.motion(setup.coarse)
     omega = motion.loaded_frequency
     step = 0.9 * motion.step_limit("central-difference")
-    counts = _blank("critical_ratio")
-    for i, ratio in enumerate(AXES["critical_ratio"]):
-        damped = changed(motion, mass_damping=2 * ratio * omega)
-        found = damped.run("central-difference", step, 100_000, rest=1e-3)
-        counts[i] = found.steps if found.status == "rest" else np.nan
-    errors = _blank(len(setup.mesh_sizes), "cg_iterations", "implicit_steps")
-    relaxed, relax_steps = _blank(2, len(setup.mesh_sizes))
-    for i, size in enumerate(setup.mesh_sizes):
+    yield {"loaded_frequency": omega}
+    for ratio in AXES["critical_ratio"]:
+        found = changed(motion, mass_damping=2 * ratio * omega).run("central-difference", step, 100_000, rest=1e-3)
+        yield {"critical_ratio": ratio, "steps_to_rest": found.steps if found.status == "rest" else np.nan}
+    for size in setup.mesh_sizes:
         mesh = setup.mesh(size)
         motion = setup.motion(mesh)
-        static = setup.problem(mesh)[0].linear(motion.load.sum())
-        largest = np.abs(static.displacements).max()
-        for j, iterations in enumerate(AXES["cg_iterations"]):
-            u = v = None
-            done = 0
-            for k, steps in enumerate(AXES["implicit_steps"]):
+        static = setup.problem(mesh)[0].linear(motion.load.sum()).displacements
+        largest = np.abs(static).max()
+        for iterations in AXES["cg_iterations"]:
+            u, v, done, labels = None, None, 0, {"mesh_size": size, "cg_iterations": iterations}
+            for steps in AXES["implicit_steps"]:
                 found = motion.run(BackwardEuler(iterations=iterations or None), 0.01, steps - done, u, v)
                 u, v, done = found.displacements, found.velocities, steps
-                errors[i, j, k] = np.abs(u - static.displacements).max() / largest
+                yield labels | {"implicit_steps": steps, "truncated_error": np.abs(u - static).max() / largest}
         found = relax(motion.network, motion.load, linear=True)
-        relaxed[i] = np.abs(found.displacements - static.displacements).max() / largest
-        relax_steps[i] = found.steps
-    return {
-        "steps_to_rest": counts,
-        "loaded_frequency": omega,
-        "truncated_error": errors,
-        "relaxation_error": relaxed,
-        "relaxation_steps": relax_steps,
-    }
+        error = np.abs(found.displacements - static).max() / largest
+        yield {"mesh_size": size, "relaxation_error": error, "relaxation_steps": found.steps}
 
 
-class _Equilibria:
-    """What became of equilibria over the values of some axes, and `further` numbers of each."""
+@contextmanager
+def _judging(name, **labels):
+    """Row of an equilibrium, and a function that judges it and returns whether it is good; errors go into the row."""
 
-    def __init__(self, name, axes, *further):
-        self.name, blank = name, _blank(*axes)
-        self.values = {"status": np.zeros(blank.shape, dtype=np.int8), "message": np.full(blank.shape, "", object)}
-        self.values |= {number: blank.copy() for number in ("negative_pivots", *further)}
+    def note(status, message, pivots=np.nan):
+        values = {"status": int(status), "message": message, "negative_pivots": pivots}
+        labels.update({f"{name}_{key}": value for key, value in values.items()})
 
-    def __getitem__(self, name):
-        return self.values[name]
+    def judge(problem, s, solution):
+        status, *others = problem.judge(s, solution)
+        note(status, *others)
+        return status in (Status.SOLVED, Status.UNSTABLE)
 
-    def note(self, place, status, message, pivots=np.nan):
-        """Note what became of an equilibrium."""
-        for name, value in {"status": status, "message": message, "negative_pivots": pivots}.items():
-            self.values[name][place] = value
-
-    @contextmanager
-    def judged(self, place):
-        """Context with a function that judges and notes an equilibrium, and returns it if it is good."""
-
-        def judge(problem, s, solution):
-            status, *others = problem.judge(s, solution)
-            self.note(place, status, *others)
-            return solution if status in (Status.SOLVED, Status.UNSTABLE) else None
-
-        try:
-            yield judge
-        except DefinitionError as error:
-            self.note(place, Status.FAILED, str(error))
-        except (SingularError, ArithmeticError, ValueError) as error:
-            self.note(place, Status.FAILED, f"{type(error).__name__}: {error}")
-
-    def by_name(self):
-        """Arrays by their names in the dataset."""
-        return {f"{self.name}_{name}": values for name, values in self.values.items()}
+    try:
+        yield labels, judge
+    except DefinitionError as error:
+        note(Status.FAILED, str(error))
+    except (SingularError, ArithmeticError, ValueError) as error:
+        note(Status.FAILED, f"{type(error).__name__}: {error}")
 
 
 # -- meshes and numbers ------------------------------------------------------------------------------------------------
@@ -321,18 +283,17 @@ def slivers(setup):
     first, second = (mesh.points[corner] for corner in triangle if corner != moved)
     middle, side = 0.5 * (first + second), np.linalg.norm(second - first)
     away = mesh.points[moved] - middle
-    found = _Equilibria("sliver", ("sliver_angle",), "step_limit", "error")
-    for place, angle in enumerate(AXES["sliver_angle"]):
+    for angle in AXES["sliver_angle"]:
         points = mesh.points.copy()
         points[moved] = middle + away / np.linalg.norm(away) * 0.5 * side * np.tan(np.radians(angle))
         drawn = Mesh(points, mesh.triangles)
         assert np.degrees(corner_angles(points, drawn.triangles).min()) <= angle * (1 + 1e-9)
-        with found.judged(place) as judge:
+        with _judging("sliver", sliver_angle=angle) as (row, judge):
             problem, s = setup.loaded(drawn)
-            found["step_limit"][place] = setup.motion(drawn).step_limit("central-difference")
-            if solution := judge(problem, s, problem.linear(s)):
-                found["error"][place] = _displacement(solution, pattern) / answer - 1
-    return found.by_name()
+            row["sliver_step_limit"] = setup.motion(drawn).step_limit("central-difference")
+            if judge(problem, s, solution := problem.linear(s)):
+                row["sliver_error"] = _displacement(solution, pattern) / answer - 1
+        yield row
 
 
 MOST_LOST = 1e-2
@@ -348,20 +309,19 @@ def contrast(setup):
     soft = (middle / setup.beam.height + 1e-9) // 1 % 2 == 0  # what lies between two parts is the right one's
     sure = MOST_LOST / (np.finfo(float).eps * len(setup.coarse.points))
     base = network.stiffness if network.stiffness.any() else 0.5 * setup.coarse.cells_per_edge
-    found = _Equilibria("contrast", ("stiffness_contrast",), "error", "estimate")
-    for place, ratio in enumerate(AXES["stiffness_contrast"]):
+    for ratio in AXES["stiffness_contrast"]:
         stiffer = Springs(reference, base * np.where(soft, 1.0, ratio))
         problem = setup.sheet(setup.coarse).problem(AXIAL, stiffer)
         solution = problem.linear(s)
-        with found.judged(place) as judge:
+        with _judging("contrast", stiffness_contrast=ratio) as (row, judge):
             judge(problem, s, solution)
         if ratio > sure:  # the same status and message on every processor
             why = f"ill-conditioned: rounding may leave no digit beyond a contrast of {sure:.0e}"
-            found.note(place, Status.NOT_CONVERGED, why)
+            row |= {"contrast_status": int(Status.NOT_CONVERGED), "contrast_message": why}
+            row["contrast_negative_pivots"] = np.nan
         exact = _refined(problem, s, solution.displacements)
-        found["error"][place] = np.abs(solution.displacements - exact).max() / np.abs(exact).max()
-        found["estimate"][place] = solution.error_estimate
-    return found.by_name()
+        error = float(np.abs(solution.displacements - exact).max() / np.abs(exact).max())
+        yield row | {"contrast_error": error, "contrast_estimate": solution.error_estimate}
 
 
 def _refined(problem, s, displacements):
@@ -386,36 +346,34 @@ def _refined(problem, s, displacements):
 def poisson(setup):
     """Young's modulus and step limit up to an incompressible material."""
     test, given = PatchTest(setup.coarse), setup.material
-    found = _Equilibria("poisson", ("stressed_poisson_ratio",), "modulus_error", "step_limit")
-    for place, ratio in enumerate(AXES["stressed_poisson_ratio"]):
+    for ratio in AXES["stressed_poisson_ratio"]:
         # Of the modulus and density alone: rubber of a test has no other ratio than its own.
         one = replace(setup, material=Material(given.young_modulus, ratio, given.density, given.name))
-        with found.judged(place) as judge:
+        with _judging("poisson", stressed_poisson_ratio=ratio) as (row, judge):
             problem, s = one.loaded(one.coarse)
-            found["step_limit"][place] = one.motion(one.coarse).step_limit("central-difference")
+            row["poisson_step_limit"] = one.motion(one.coarse).step_limit("central-difference")
             springs, membrane = one.springs(one.coarse), one.material.young_modulus * one.beam.thickness
-            found["modulus_error"][place] = test.axial(springs)[0] * springs.reference / membrane - 1
+            row["poisson_modulus_error"] = test.axial(springs)[0] * springs.reference / membrane - 1
             judge(problem, s, problem.linear(s))
-    return found.by_name()
+        yield row
 
 
 def sizes(setup):
     """The same beam from micrometres to centimetres of mesh size, in double and single precision."""
-    limits, errors = _blank("scale"), _blank("scale", "precision")
-    for i, size in enumerate(AXES["scale"]):
+    for size in AXES["scale"]:
         ratio = size / setup.mesh_sizes[-1]
         sides = {name: getattr(setup.beam, name) * ratio for name in ("length", "height", "thickness")}
         beam = replace(setup.beam, **sides)
         one = replace(setup, beam=beam, force=setup.force * ratio**2, mesh_sizes=(size,))
         motion = one.motion(one.coarse, linear=False)
         motion = changed(motion, mass_damping=motion.loaded_frequency)
-        static = one.problem(one.coarse)[0].nonlinear(motion.load.sum())
-        limits[i] = motion.step_limit("central-difference") / size
-        for j, kind in enumerate(AXES["precision"]):
-            found = motion.run("central-difference", 0.9 * limits[i] * size, 60_000, precision=kind)
-            wrong = np.abs(found.displacements - static.displacements).max()
-            errors[i, j] = wrong / np.abs(static.displacements).max()
-    return {"scaled_step_limit": limits, "precision_error": errors}
+        static = one.problem(one.coarse)[0].nonlinear(motion.load.sum()).displacements
+        limit = motion.step_limit("central-difference") / size
+        yield {"scale": size, "scaled_step_limit": limit}
+        for kind in AXES["precision"]:
+            found = motion.run("central-difference", 0.9 * limit * size, 60_000, precision=kind)
+            error = np.abs(found.displacements - static).max() / np.abs(static).max()
+            yield {"scale": size, "precision": kind, "precision_error": error}
 
 
 # -- equilibria --------------------------------------------------------------------------------------------------------
@@ -424,19 +382,19 @@ def sizes(setup):
 def strains(setup):
     """Nonlinear equilibria under loads that would strain a linear beam by up to 300 %."""
     mesh, membrane = setup.coarse, setup.material.young_modulus * setup.beam.thickness
-    found = _Equilibria("strain", ("strain_load", "strain"), "displacement", "load_share")
-    for i, load in enumerate(AXES["strain_load"]):
+    for load in AXES["strain_load"]:
         kind, side = (AXIAL, setup.beam.height) if load == "axial" else (FACE, setup.beam.length)
         pattern = weights(mesh, kind)
-        for j, strain in enumerate(AXES["strain"]):
-            with found.judged((i, j)) as judge:
+        for strain in AXES["strain"]:
+            with _judging("strain", strain_load=load, strain=strain) as (row, judge):
                 problem, reference = setup.problem(mesh, kind, load != "axial")
                 s = strain * membrane * side / reference
                 solution = problem.nonlinear(s)
-                found["load_share"][i, j] = solution.load_share
+                row["strain_load_share"] = solution.load_share
                 if judge(problem, s, solution):
-                    found["displacement"][i, j] = _displacement(solution, pattern)
-    return {"negative_pivots": found.values.pop("negative_pivots")} | found.by_name()
+                    row["strain_displacement"] = _displacement(solution, pattern)
+            row["negative_pivots"] = row.pop("strain_negative_pivots")
+            yield row
 
 
 def perturbation(setup):
@@ -448,17 +406,17 @@ def perturbation(setup):
     unmoved, load = setup.loaded(mesh)
     whole = unmoved.nonlinear(load)
     answer = _displacement(whole, pattern) if whole.converged else np.nan
-    found = _Equilibria("perturbed", ("perturbation",), "error", "step_limit")
-    for place, share in enumerate(AXES["perturbation"]):
+    for share in AXES["perturbation"]:
         points = mesh.points + share * size * random
-        with found.judged(place) as judge:
+        with _judging("perturbed", perturbation=share) as (row, judge):
             if mesh.inverted(points):
                 raise DefinitionError("triangles of the mesh are inverted; move its particles less")
             moved = Mesh(points, mesh.triangles)
             problem, s = setup.loaded(moved)
-            found["step_limit"][place] = setup.motion(moved).step_limit("central-difference")
-            if solution := judge(problem, s, problem.nonlinear(s)):
-                found["error"][place] = _displacement(solution, pattern) / answer - 1
+            row["perturbed_step_limit"] = setup.motion(moved).step_limit("central-difference")
+            if judge(problem, s, solution := problem.nonlinear(s)):
+                row["perturbed_error"] = _displacement(solution, pattern) / answer - 1
+        yield row
     right, wrong, trials = 0, 0, 20
     for seed in range(trials):
         start = _noise(setup.motion(mesh), size, seed)  # an edge's length: half of the triangles are inverted
@@ -466,7 +424,7 @@ def perturbation(setup):
         near = end.converged and np.abs(end.displacements - whole.displacements).max() <= 1e-6 * abs(answer)
         right += near
         wrong += end.converged and not near and unmoved.judge(load, end)[0] is Status.SOLVED
-    return found.by_name() | {"inverted_starts_right": right / trials, "inverted_starts_wrong": wrong / trials}
+    yield {"inverted_starts_right": right / trials, "inverted_starts_wrong": wrong / trials}
 
 
 def buckling(setup):
@@ -474,27 +432,21 @@ def buckling(setup):
     height = 0.05 * setup.beam.length
     euler = np.pi**2 * setup.material.young_modulus * setup.beam.thickness * height**3 / 12
     euler /= 4 * setup.beam.length**2
-    loads, messages = _blank("rows"), np.full(len(AXES["rows"]), "", dtype=object)
-    for i, rows in enumerate(AXES["rows"]):
-        mesh = MESH_TYPES[setup.mesh_type](setup.beam.length, height, height / rows)
+    yield {"euler_load": euler}
+    for rows in AXES["rows"]:
+        mesh, row = MESH_TYPES[setup.mesh_type](setup.beam.length, height, height / rows), {"rows": rows}
         try:
             problem, reference = setup.problem(mesh)
-            load, messages[i] = critical_load(problem, -euler / reference)
-            loads[i] = -load * reference
+            load, row["buckling_message"] = critical_load(problem, -euler / reference)
+            row["buckling_load"] = -load * reference
         except (DefinitionError, SingularError) as error:
-            messages[i] = str(error)
-    path, deflection, reference = _arch(setup)
-    found = {name: _blank("arch_point") for name in ("arch_load", "arch_deflection", "arch_negative_pivots")}
-    if path is not None:
-        size = min(len(AXES["arch_point"]), len(path.loads))
-        found["arch_load"][:size] = -path.loads[:size] * reference
-        found["arch_deflection"][:size] = -deflection[:size]
-        found["arch_negative_pivots"][:size] = path.negative_pivots[:size]
-    return {"buckling_load": loads, "buckling_message": messages, "euler_load": euler} | found
+            row["buckling_message"] = str(error)
+        yield row
+    yield from _arch(setup)
 
 
 def _arch(setup):
-    """Path of a shallow arch, clamped at both ends and pushed down in its middle: it snaps."""
+    """Rows of the path of a shallow arch, clamped at both ends and pushed down in its middle: it snaps."""
     length, height = setup.beam.length, 0.01 * setup.beam.length
     flat = MESH_TYPES[setup.mesh_type](length, height, 0.4 * height)
     rise = 0.04 * length
@@ -511,14 +463,16 @@ def _arch(setup):
     try:
         springs = setup.springs(mesh)
     except DefinitionError:
-        return None, None, np.nan
+        return
     network = setup.sheet(mesh).network(directions, springs)
     inertia = setup.material.young_modulus * setup.beam.thickness * height**3
     s = -40 * inertia * rise / length**3 / springs.reference
     problem = StaticProblem(network, pattern)
     increment = 0.05 * rise * np.sqrt(network.unknowns)
     path = follow(problem, 10 * s, increment=increment, most_points=200, limit=1.8 * rise * np.sqrt(network.unknowns))
-    return path, path.displacements[:, middle, 1], springs.reference
+    found = -path.loads * springs.reference, -path.displacements[:, middle, 1], path.negative_pivots
+    names = "arch_point", "arch_load", "arch_deflection", "arch_negative_pivots"
+    yield from (dict(zip(names, values)) for values in zip(AXES["arch_point"], *found))
 
 
 RUN = {

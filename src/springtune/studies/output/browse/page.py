@@ -25,13 +25,12 @@ import numpy as np
 from markupsafe import Markup
 
 from springtune.registry import imported
-from springtune.safe_io.atomic import write_text
+from springtune.safe_io.atomic import write_json, write_text
 from springtune.safe_io.inputs import bounded
 
 from ...config.kind import modules
-from ...runs import records
 from ..colours import ERROR_COLOURS, ERROR_RANGE
-from ..reading import REMEDY, check_links, dataset_file, guarded, most_of
+from ..reading import REMEDY, check, dataset_file, guarded, most_of, reason
 from . import View
 
 SCRIPTS = ("payload", "words", "charts", "table", "cells", "shape", "explorer", "main")
@@ -49,15 +48,13 @@ def views() -> dict[str, View]:
 def page(dataset: str | os.PathLike[str], files: Iterable[str] = ()) -> str:
     """Page of a dataset."""
     path = dataset_file(dataset)
+    check(path)
     try:
-        check_links(path)
         with guarded(path), bounded(most_of(path)), h5py.File(path) as opened:
-            # Read first: if h5netcdf itself fails here, the file that it leaves open raises a warning later.
-            opened.attrs.get("_nc3_strict")
             with h5netcdf.File(opened, decode_vlen_strings=True) as file:
                 groups, contents = packed(file)
-    except OSError as error:
-        raise ValueError(f"{path}: cannot be read ({error}); {REMEDY}") from None
+    except (OSError, ValueError) as error:
+        raise ValueError(f"{path}: cannot be read ({reason(error)}); {REMEDY}") from None
     attributes = groups[0]["attributes"]
     if "springtune_version" not in attributes:
         raise ValueError(f"{path}: is not a dataset of springtune; {REMEDY}")
@@ -279,9 +276,8 @@ def _rows(row: dict[str, Any], values: np.ndarray, present: np.ndarray) -> tuple
 
 def main(dataset: str, output: str, record: str, digest: str, *files: str) -> None:
     """Write the page of a dataset, and the record of it."""
-    read = records.checksum(dataset)
     write_text(output, page(dataset, files))
-    records.write(record, digest, [output], read=read)
+    write_json(record, {"digest": digest})
 
 
 if __name__ == "__main__":

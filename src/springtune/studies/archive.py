@@ -1,0 +1,92 @@
+"""Pack the results of a study into one zip file, an RO-Crate, to be cited and handed on."""
+
+import json
+import shutil
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+
+from springtune.safe_io.atomic import replacing
+from springtune.safe_io.escapes import shown
+
+from .config.model import Study
+from .output import reading
+from .runs.provenance import input_files
+from .runs.source import checksum
+
+SUMS, INSTALLED, README = "SHA256SUMS", "versions.json", "README.md"
+
+PRODUCTS = ("dataset.nc", "index.html", "summary.txt", "figures/*", "tables/*")
+"""Files of `results/<study>` that are packed; what the stages stored is not, since the study makes it again."""
+
+AGAIN = """# {title}
+
+A study by springtune {version}. `dataset.nc` has all results, `index.html` shows them.
+
+Compute it again with the packages of `versions.json`:
+
+    pip install springtune=={version}
+    springtune run {study}
+
+`sha256sum --check SHA256SUMS` compares the files with what was packed.
+"""
+
+
+def pack(study: Study, folder: Path, target: Path) -> list[str]:
+    """Write an archive of a finished study, and return the names of its files.
+
+    Parameters
+    ----------
+    study : Study
+    folder : Path
+        Its results.
+    target : Path
+        Zip file to write; one that is there is replaced when all is written.
+
+    Raises
+    ------
+    ValueError
+        If the dataset is missing, or of another text of the study.
+    """
+    from rocrate.rocrate import ROCrate  # here: an extra
+
+    with reading.open(folder) as tree:
+        about = {name: shown(str(tree.attrs.get(name, ""))) for name in ("title", "springtune_version", "created")}
+        if tree.attrs.get("config") != study.text:
+            raise ValueError(
+                f"{folder}: the dataset is of another text of {study.path}; run the study, then archive it"
+            )
+        versions = json.dumps(json.loads(tree.attrs["software"]), indent=1)
+    files = {path.relative_to(folder).as_posix(): path for name in PRODUCTS for path in sorted(folder.glob(name))}
+    files |= _inputs(study)
+    texts = {
+        README: AGAIN.format(title=about["title"], version=about["springtune_version"], study=study.path.name),
+        INSTALLED: f"{versions}\n",
+    }
+    with tempfile.TemporaryDirectory() as made:
+        for name, text in texts.items():
+            files[name] = Path(made, name)
+            files[name].write_text(text, encoding="utf-8")
+        sums = Path(made, SUMS)
+        sums.write_text("".join(f"{checksum(path)}  {name}\n" for name, path in files.items()), encoding="utf-8")
+        crate = ROCrate()
+        crate.name, crate.description = about["title"], f"Study by springtune {about['springtune_version']}"
+        crate.datePublished = about["created"]
+        for name, path in (*files.items(), (SUMS, sums)):
+            crate.add_file(path, name)
+        written = Path(made, "archive.zip")
+        crate.write_zip(written)
+        with replacing(target) as unfinished:
+            shutil.copyfile(written, unfinished)
+    return [*files, SUMS]
+
+
+def _inputs(study: Study) -> Mapping[str, Path]:
+    """The study and the files that it names, by their names from its folder."""
+    beside = study.path.resolve().parent
+    found = {}
+    for path in sorted(file.resolve() for file in input_files(study)):
+        if not path.is_relative_to(beside):
+            raise ValueError(f"{study.path}: names {path.name} outside of its folder; move it there, for an archive")
+        found[path.relative_to(beside).as_posix()] = path
+    return found

@@ -1,1 +1,0 @@
-"""Archives of studies, their parts at several sites, object storage, and checks of what is stored."""

@@ -1,1 +1,0 @@
-"""Refinement: values of a parameter added where the deformation error changes its sign or crosses a tolerance."""
