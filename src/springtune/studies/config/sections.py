@@ -17,8 +17,6 @@ from .fields import Named, OneOrMore, Section, Words, default, expected_value, o
 from .kind import Kind, kinds
 from .messages import refuse, show
 
-MOST_PARTS = 1000
-
 PLAUSIBLE = 20.0
 """Factor on sqrt(3)/2 E t beyond which a stated stiffness counts as an error of units."""
 

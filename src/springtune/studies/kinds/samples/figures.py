@@ -9,21 +9,12 @@ PARAMETER_WORDS = {"relative_mesh_size": "mesh size / height", "young_modulus": 
 PARAMETER_WORDS |= {"poisson_ratio": "Poisson's ratio"}
 """Names of parameters on an axis, where they are not their own."""
 
-SHOWN_QUANTITIES = ("deformation_error", "displacement", "best_stiffness")
-"""Quantities in the order of their panels."""
-
 INDEX_ENDS = -0.3, 1.5
 """Ends of the axis of Sobol indices at most, whose bands may go farther."""
 
 
 def _words(name):
     return PARAMETER_WORDS.get(name, name.replace("_", " "))
-
-
-def _titled(samples, load, what):
-    """Title of a figure."""
-    words = f"{load.capitalize()}, {samples.attrs['mesh_type']} meshes, {samples.attrs['kinematics']} kinematics"
-    return f"{words}: {what}"
 
 
 @style.styled
@@ -62,7 +53,7 @@ def plot_sobol(data, ax=None, *, load=None):
     load = choose(asked.any("quantity"), load=load)["load"]
     found, asked = found.sel(load=load), asked.sel(load=load)
     names, order, shown = found.parameter.values.tolist(), found["definition"].values.tolist(), {}
-    for quantity in (name for name in SHOWN_QUANTITIES if name in found["quantity"].values):
+    for quantity in sorted(found["quantity"].values.tolist(), key=lambda name: name != "deformation_error"):
         for definition in labels_of(asked.sel(quantity=[quantity]), "definition"):
             alone = quantity == "best_stiffness"  # of uniform springs alone
             title = quantity.replace("_", " ") + ("" if alone else f", {definition}")
@@ -94,7 +85,8 @@ def plot_sobol(data, ax=None, *, load=None):
     size, lost = samples.attrs["size"], int(found.base_samples_without.max())
     note += f"; {size} base samples" + f", up to {lost} left out: a scene has no value" * bool(lost)
     columns = max(1, min(4, len(order)))
-    title, height = _titled(samples, load, "Sobol indices"), 0.21 * len(names) + 0.8
+    title = f"{load.capitalize()}, {samples.attrs['mesh_type']} meshes, {samples.attrs['kinematics']} kinematics"
+    title, height = f"{title}: Sobol indices", 0.21 * len(names) + 0.8
     return labels.small_multiples(ax, shown, columns, height, title, draw, sharey=True, said=note)
 
 
