@@ -34,7 +34,6 @@ def started(one, name, setting):
 
 
 NEWTON = {
-    "newton-semi-implicit": (0.05, st.Setting(1e-3, 20), 0.01),
     "newton-xpbd": (0.1, st.Setting(1e-3, 5, 20), 0.01),
     "newton-vbd": (0.3, st.Setting(1e-3, 5, 60), 0.01),
 }
@@ -44,8 +43,7 @@ NEWTON = {
 @pytest.mark.parametrize(
     "name",
     [
-        "newton-semi-implicit",
-        pytest.param("newton-xpbd", marks=pytest.mark.slow),  # compiles for 20 s, which test_newton.py does meanwhile
+        "newton-xpbd",
         pytest.param("newton-vbd", marks=pytest.mark.slow),
     ],
 )

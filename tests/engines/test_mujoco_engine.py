@@ -13,7 +13,7 @@ from springtune.handover.mujoco import elasticity
 from engine_scenes import TEN, scene
 
 RELEASE = release(mujoco.__version__)
-EXPLICIT = ("mujoco-euler", "mujoco-implicitfast", "mujoco-implicit", "mujoco-rk4")
+EXPLICIT = ("mujoco-euler", "mujoco-implicitfast", "mujoco-rk4")
 STRIP = next(case for case in TEN if case[0] == "strip" and case[2] == "bending")
 
 discrete = pytest.mark.skipif(RELEASE < (3, 13), reason="MuJoCo has no integrator 'discrete' before 3.13")
@@ -22,6 +22,8 @@ discrete = pytest.mark.skipif(RELEASE < (3, 13), reason="MuJoCo has no integrato
 def ended(case, definition, engine):
     """A scene in an engine, in stable steps."""
     one = scene(*case, definition)
+    if one.springs.energies and RELEASE < (4,):
+        pytest.skip("a flex needs MuJoCo 4")
     if engine == "mujoco-discrete":
         substeps = np.ceil(50 * one.motion().loaded_frequency / 2 / np.pi / 60)
     else:
@@ -64,11 +66,10 @@ def test_few_iterations_of_discrete_leave_it_on_its_way():
     assert abs(found[0].solver_error) > 1e-2 > 100 * abs(found[1].solver_error)
 
 
-@pytest.mark.parametrize("engine", ["mujoco-implicit", "mujoco-implicitfast"])
-def test_no_flex_in_implicit_integrators(engine):
+def test_no_flex_in_implicitfast():
     """MuJoCo 3.13 and later refuse it."""
     with pytest.raises(st.EngineError, match="has no squared lengths; .*or engine .*mujoco-euler"):
-        st.in_engine(scene(*STRIP, "delingette"), engine)
+        st.in_engine(scene(*STRIP, "delingette"), "mujoco-implicitfast")
 
 
 def test_what_is_not_a_material_is_refused():
@@ -78,14 +79,11 @@ def test_what_is_not_a_material_is_refused():
 
 @pytest.mark.parametrize("nu", [0.0, 0.3, 0.45])
 def test_constants_of_a_flex_are_those_of_the_material(nu):
-    """In MuJoCo 4; MuJoCo 3 means others by the same names, for which the formulas of the parameters stand."""
     first, second = 5e6 * 1e-3 * nu / (1 - nu**2), 5e6 * 1e-3 / 2 / (1 + nu)
-    assert elasticity(first, second, 4) == pytest.approx((5e3, nu))
-    assert elasticity(first, second, 3) == pytest.approx((2 * 5e3 * (2 + nu) / (1 + nu), nu / 2))
+    assert elasticity(first, second) == pytest.approx((5e3, nu))
     case = ("strip", "free", "traction", "rubber")
     typed = st.ENGINES["mujoco-euler"].typed(st.SpringNet.from_scene(scene(*case, "delingette"), errors=False))
-    if RELEASE[0] == 4:
-        assert typed == pytest.approx({"young": 1e6, "poisson": 0.45, "thickness": 1e-3})
+    assert typed == pytest.approx({"young": 1e6, "poisson": 0.45, "thickness": 1e-3})
     assert set(typed) <= set(st.ENGINES["mujoco-euler"].parameters)
 
 
@@ -95,12 +93,3 @@ def test_an_integrator_that_came_later_is_absent_by_name(monkeypatch):
     with pytest.raises(EngineAbsentError, match="needs mujoco>=3.13"):
         st.in_engine(scene(*STRIP, "patch"), "mujoco-discrete")
     assert not st.ENGINES["mujoco-euler"].absent
-
-
-def test_where_mujoco_is_not_installed_the_constants_are_those_of_its_last_version(monkeypatch):
-    def absent(name):
-        raise metadata.PackageNotFoundError(name)
-
-    monkeypatch.setattr(metadata, "version", absent)
-    net = st.SpringNet.from_scene(scene("strip", "free", "traction", "rubber", "delingette"), errors=False)
-    assert st.ENGINES["mujoco-euler"].typed(net) == pytest.approx({"young": 1e6, "poisson": 0.45, "thickness": 1e-3})

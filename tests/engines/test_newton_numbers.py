@@ -15,30 +15,14 @@ def net(definition="delingette", nu=NU):
     return st.SpringNet.from_scene(one, errors=False)
 
 
-def test_triangles_of_vbd_and_of_the_semi_implicit_solver_have_one_law_but_other_numbers():
+def test_triangles_of_vbd_have_lame_constants():
     shear, first = E * H / (2 * (1 + NU)), E * H * NU / (1 - NU**2)
     assert st.ENGINES["newton-vbd"].typed(net()) == pytest.approx({"tri_ke": shear, "tri_ka": first})
-    typed = st.ENGINES["newton-semi-implicit"].typed(net())
-    assert typed == pytest.approx({"tri_ke": shear, "tri_ka": first + shear})
-    assert typed["tri_ka"] == pytest.approx(E * H / (2 * (1 - NU)))  # as `parameters` says
 
 
-def test_style3d_is_a_material_without_contraction():
-    typed = st.ENGINES["newton-style3d"].typed(net(nu=0.0))
-    assert typed["tri_aniso_ke"] == pytest.approx((E * H, E * H, E * H / 2))
-    with pytest.raises(
-        st.EngineError, match=r"Poisson's ratio is 0\.3, .*Style3D have none; take a material of nu = 0"
-    ):
-        st.ENGINES["newton-style3d"].typed(net())
-
-
-@pytest.mark.parametrize(
-    "engine, definition, lacks",
-    [("newton-xpbd", "delingette", "squared lengths"), ("newton-style3d", "patch", "springs")],
-)
-def test_a_solver_says_what_it_lacks(engine, definition, lacks):
-    with pytest.raises(st.EngineError, match=rf"engine '{engine}' has no .*{lacks}.*newton-vbd"):
-        st.ENGINES[engine].check(st.Setting(), net(definition))
+def test_a_solver_says_what_it_lacks():
+    with pytest.raises(st.EngineError, match="engine 'newton-xpbd' has no .*squared lengths.*newton-vbd"):
+        st.ENGINES["newton-xpbd"].check(st.Setting(), net())
 
 
 def test_xpbd_refuses_springs_that_it_leaves_out():

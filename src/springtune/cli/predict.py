@@ -270,11 +270,6 @@ def _unfitted(why: str) -> "SpringNet":
 @click.option("--force", help="Size of the force on a beam, such as '400 kN'.")
 @click.option("--scale", type=float, default=1.0, show_default=True, help="Factor on the load of a shape.")
 @click.option(
-    "--mujoco",
-    type=int,
-    help="Version of MuJoCo that .xml is for: 3, or 4, the newest, without. Springs alone are the same in both.",
-)
-@click.option(
     "--out",
     "target",
     required=True,
@@ -288,7 +283,6 @@ def springs(
     load: str | None,
     force: str | None,
     scale: float,
-    mujoco: int | None,
     target: Path,
 ) -> None:
     """Write the springs of a mesh: their rest lengths and stiffnesses, masses, and energies besides them.
@@ -304,8 +298,8 @@ def springs(
     net = _net(asked(sheet, load), definition, stiffness=stiffness, force=force, scale=scale)
     with writing("--out", target), warnings.catch_warnings(record=True) as heard:
         warnings.simplefilter("always", EquilibriumWarning)
-        written = net.write(target, mujoco=mujoco)
-    click.echo(written_text(net, written, mujoco))
+        written = net.write(target)
+    click.echo(written_text(net, written))
     for one in heard:
         click.echo(str(one.message))
 

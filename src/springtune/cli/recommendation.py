@@ -219,7 +219,7 @@ def budget_text(search: "BudgetSearch") -> str:
     return f"{search!r}\n\nchosen, the least error at worst:\n{fit_text(search.best.fit, search.best.mesh)}"
 
 
-def written_text(net: "SpringNet", written: Iterable[Path], mujoco: int | None = None) -> str:
+def written_text(net: "SpringNet", written: Iterable[Path]) -> str:
     """Written files and their expected errors, as text."""
     from ..handover.formats import FOR_MUJOCO, ending_of
     from ..handover.mujoco import for_versions
@@ -231,7 +231,7 @@ def written_text(net: "SpringNet", written: Iterable[Path], mujoco: int | None =
     counts = [*extent, f"{len(net.points)} particles", springs, *besides]
     lines = [f"{first}: {', '.join(counts)} of definition {header['definition']}"]
     lines += [f"beside it: {', '.join(map(str, others))}"] if others else []
-    lines += [for_versions(net.energies, mujoco)] if ending_of(first) in FOR_MUJOCO else []
+    lines += [for_versions(net.energies)] if ending_of(first) in FOR_MUJOCO else []
     errors, what = header["expected_error"], "error of the displacement" if header["beam"] else "errors"
     if isinstance(errors, dict):
         known = [f"{load} {100 * error:+.3g} %" for load, error in errors.items() if isinstance(error, float)]

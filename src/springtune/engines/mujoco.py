@@ -1,7 +1,7 @@
 """MuJoCo: springs as tendons, triangles of a material as a flex; one engine for each integrator.
 
-The model is that of `springtune.handover.mujoco`, with the step and the integrator of a setting. `Euler`, `implicit`
-and `implicitfast` are implicit in dampers alone: as with `RK4`, springs need steps below the stable one. `discrete`,
+The model is that of `springtune.handover.mujoco`, with the step and the integrator of a setting. `Euler` and
+`implicitfast` are implicit in dampers alone: as with `RK4`, springs need steps below the stable one. `discrete`,
 since MuJoCo 3.13, is implicit in springs, too, by one linear system a step: `iterations` are those of its conjugate
 gradients, of which MuJoCo allows 100 where nothing is said; they stop at a ten-thousandth of the load. The others do
 not iterate without contacts. MuJoCo computes in double precision.
@@ -13,42 +13,37 @@ the beginning by default; that is turned off here, so that it is seen.
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib import metadata
 from typing import Any
 
 import numpy as np
 
-from ..handover.mujoco import VERSIONS, elasticity, model
+from ..handover.mujoco import elasticity, model
 from ..handover.net import SpringNet
 from ..handover.simulation import Simulation, lame
 from .base import DASHPOT, SPRING, EngineError, Parameter, Session, Setting, engine, release
 
-FLEX_SINCE = (3, 3, 7)
-"""Version of MuJoCo that first has the law of a flex."""
+FLEX_SINCE = 4
+"""Version of MuJoCo from which on a flex has the law of plane stress."""
 
 TYPED = {
     "stiffness": SPRING,
-    "young": Parameter("Pa", "E; for MuJoCo 3 it is 2 E (2 + nu) / (1 + nu)"),
-    "poisson": Parameter("1", "nu; for MuJoCo 3 it is nu / 2"),
+    "young": Parameter("Pa", "E"),
+    "poisson": Parameter("1", "nu"),
     "thickness": Parameter("m", "h"),
 }
 """Stiffness of a tendon; or what an ``elastic2d="stretch"`` flex has."""
 
 JOINTS = {"joint damping": Parameter("N s/m", "alpha m, one for each particle")}  # MuJoCo 4 refuses it on a flex
 STIFF = {"tendon damping": DASHPOT, "flex damping": Parameter("s", "beta of triangles")}
-"""Dampers over stiffness. `implicit` and `implicitfast` leave out what a tendon between two bodies does to the other
-one, so that it slows them as a mass does: there, joints alone damp as they should."""
+"""Dampers over stiffness. `implicitfast` leaves out what a tendon between two bodies does to the other one, so that it
+slows them as a mass does: there, joints alone damp as they should."""
 
 
 def typed(net: SpringNet) -> dict[str, Any]:
-    """Stiffness of each tendon, or the constants of the flex in the version that is installed."""
+    """Stiffness of each tendon, or the constants of the flex."""
     if not net.energies:
         return {"stiffness": net.stiffness}
-    try:
-        series = release(metadata.version("mujoco"))[0]
-    except metadata.PackageNotFoundError:
-        series = VERSIONS[-1]
-    young, poisson = elasticity(*lame(net, net.energies[0], "MuJoCo's flex"), series)
+    young, poisson = elasticity(*lame(net, net.energies[0], "MuJoCo's flex"))
     return {"young": young / net.thickness, "poisson": poisson, "thickness": net.thickness}
 
 
@@ -71,15 +66,14 @@ class _Session:
     def __init__(self, net: SpringNet, setting: Setting, damping: float, integrator: str) -> None:
         import mujoco
 
-        found = release(mujoco.__version__)
-        if found[0] not in VERSIONS or net.energies and found < FLEX_SINCE:
-            raise EngineError(f"MuJoCo {mujoco.__version__}: models are for 3.3.7 to 4; install one of these")
+        if net.energies and release(mujoco.__version__)[0] < FLEX_SINCE:
+            raise EngineError(f"MuJoCo {mujoco.__version__}: a flex needs MuJoCo {FLEX_SINCE}; install it")
         assert net.masses is not None  # of a scene that moves
         loaded = float(np.any(net.forces))
         moves = Simulation(net.masses, loaded, setting.step, setting.step, 0.0, 0.0, 0.0, None, "")
         with _no_log():
             try:
-                self.model = mujoco.MjModel.from_xml_string(model(net, moves, found[0], integrator))
+                self.model = mujoco.MjModel.from_xml_string(model(net, moves, integrator))
             except ValueError as error:
                 raise EngineError(f"MuJoCo {mujoco.__version__} refuses the net: {error}") from None
         self.model.opt.iterations = setting.iterations
@@ -123,7 +117,6 @@ def _declare(order: float, integrator: str, summary: str, **declared: Any) -> No
 
 _declare(110, "Euler", "springs explicit", dampers=JOINTS | STIFF)
 _declare(111, "implicitfast", "springs explicit, dampers implicit", laws=(), dampers=JOINTS)
-_declare(112, "implicit", "springs explicit, dampers implicit", laws=(), dampers=JOINTS)
 _declare(113, "RK4", "springs explicit, of fourth order", dampers=JOINTS | STIFF)
 _declare(
     114,

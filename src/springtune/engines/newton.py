@@ -1,25 +1,22 @@
-"""Newton (newton-physics) on the processor: springs, and triangles of a material, in four of its solvers.
+"""Newton (newton-physics) on the processor: springs, and triangles of a material, in its solvers VBD and XPBD.
 
 All formulas are from the kernels of Newton 1.8. mu and lambda are Lame's constants of plane stress, h is the thickness.
 
-Springs follow Hooke's law in VBD, XPBD and the semi-implicit solver. XPBD corrects all springs at once, so that it
-diverges above the largest step of explicit schemes, at any number of iterations; it resets its multipliers in each
-step. It has no triangles, and ignores springs of negative stiffness.
+Springs follow Hooke's law. XPBD corrects all springs at once, so that it diverges above the largest step of explicit
+schemes, at any number of iterations; it resets its multipliers in each step. It has no triangles, and ignores springs
+of negative stiffness.
 
-Triangles of VBD and of the semi-implicit solver have one law, which is typed in two ways:
+Triangles of VBD have the law
 
     W = A_0 [mu h/2 (tr C - 2 J) + (lambda + mu) h/2 (J - 1)^2]
 
-``tri_ke = mu h`` in both, but ``tri_ka = lambda h`` in VBD and ``(lambda + mu) h`` in the semi-implicit solver. At
-small strain it is Hooke's law. At a strain e, displacements differ by some 2 e from those by St. Venant-Kirchhoff's
-law, which `delingette` has, and by less than e from those of small strain. Style3D has stiffnesses along, across and in
-shear, and no contraction across: a material of nu = 0. It has no springs.
+with ``tri_ke = mu h`` and ``tri_ka = lambda h``. At small strain it is Hooke's law. At a strain e, displacements differ
+by some 2 e from those by St. Venant-Kirchhoff's law, which `delingette` has, and by less than e from those of small
+strain.
 
 What is set besides, because Newton's defaults differ: gravity 0 and no ground; radius of particles 0, so that they do
-not touch; ``tri_kd`` (10 by default) and ``kd`` 0; no limit of velocities (1e5 m/s); contacts of Style3D off. VBD has
-the colours of `ModelBuilder.color`, as other scripts do, and its own by springs, which that does not see. Left as they
-are: Style3D multiplies velocities by 0.998 in each step, and takes 10 iterations of conjugate gradients in each of its
-iterations.
+not touch; ``tri_kd`` (10 by default) and ``kd`` 0; no limit of velocities (1e5 m/s). VBD has the colours of
+`ModelBuilder.color`, as other scripts do, and its own by springs, which that does not see.
 
 Positions are of single precision, and absolute: what a step moves below the last place of a position is lost. So nets
 are centred at zero, which leaves XPBD's and VBD's slender bending 2e-4 off in place of 6e-3. Do the same in Newton.
@@ -37,33 +34,21 @@ import numpy as np
 
 from ..handover.net import SpringNet
 from ..handover.newton import colours, membrane, membrane_energies
-from .base import DASHPOT, MASS_DAMPING, SPRING, EngineError, Parameter, Session, Setting, engine
+from .base import DASHPOT, SPRING, EngineError, Parameter, Session, Setting, engine
 
 FASTEST = 1e30
 """Largest velocity [m/s]: none. By default Newton has 1e5."""
 
-TRI_KE = Parameter("N/m", "mu h = E h / (2 (1 + nu))")
-TRI_KD = Parameter("N s/m", "beta tri_ke / 2 of triangles")
-VBD = {"ke": SPRING, "tri_ke": TRI_KE, "tri_ka": Parameter("N/m", "lambda h = E h nu / (1 - nu^2)")}
-SEMI_IMPLICIT = {"ke": SPRING, "tri_ke": TRI_KE, "tri_ka": Parameter("N/m", "(lambda + mu) h = E h / (2 (1 - nu))")}
-STYLE3D = {"tri_aniso_ke": Parameter("N/m", "(E h, E h, E h / 2) along, across, in shear; for nu = 0 alone")}
+TRIANGLES = {
+    "tri_ke": Parameter("N/m", "mu h = E h / (2 (1 + nu))"),
+    "tri_ka": Parameter("N/m", "lambda h = E h nu / (1 - nu^2)"),
+}
 
 
-def triangle_numbers(net: SpringNet, solver: str) -> dict[str, Any]:
-    """Return numbers to type for the triangles of a net; empty where it has springs alone."""
-    if not net.energies:
-        return {}
-    shear, first = membrane(net)
-    if solver == "VBD":
-        return {"tri_ke": shear, "tri_ka": first}
-    if solver == "SemiImplicit":
-        return {"tri_ke": shear, "tri_ka": first + shear}
-    if first > 1e-6 * shear:
-        raise EngineError(
-            f"material: Poisson's ratio is {first / (first + 2 * shear):.3g}, Style3D have none; take a "
-            "material of nu = 0"
-        )
-    return {"tri_aniso_ke": (2 * shear, 2 * shear, shear)}
+def typed(net: SpringNet) -> dict[str, Any]:
+    """Stiffness of each spring, and the constants of the triangles of a net that has them."""
+    found = {"ke": net.stiffness} if np.any(net.stiffness) else {}
+    return found | dict(zip(TRIANGLES, membrane(net))) if net.energies else found
 
 
 @contextmanager
@@ -92,12 +77,8 @@ class _Session:
         with _quiet():
             import newton
 
-            self.model = _model(replace(net, points=net.points - middle), solver)
-            made = getattr(newton.solvers, f"Solver{solver}")
-            taken: dict[str, Any] = {} if solver == "SemiImplicit" else {"iterations": setting.iterations}
-            self.solver = made(self.model, **({"config": made.Config(**taken)} if solver == "Style3D" else taken))
-            if solver == "Style3D":
-                self.solver.collision = None
+            self.model = _model(replace(net, points=net.points - middle))
+            self.solver = getattr(newton.solvers, f"Solver{solver}")(self.model, iterations=setting.iterations)
             self.now, self.next, self.control = self.model.state(), self.model.state(), self.model.control()
         self.step, self.substeps = setting.step, setting.substeps
         self.kept = np.float32(1 / (1 + damping * setting.step))
@@ -110,7 +91,7 @@ class _Session:
         """Take a number of frames."""
         with _quiet(), np.errstate(over="ignore", invalid="ignore"):
             for _ in range(frames * self.substeps):
-                self.now.particle_f.numpy()[:] = self.forces  # a view; the semi-implicit solver adds its own to them
+                self.now.particle_f.numpy()[:] = self.forces
                 self.solver.step(self.now, self.next, self.control, None, self.step)
                 self.now, self.next = self.next, self.now
                 places, velocities = self.now.particle_q.numpy(), self.now.particle_qd.numpy()
@@ -123,7 +104,7 @@ class _Session:
         return (self.now.particle_q.numpy() - self.rest)[:, :2].astype(float)
 
 
-def _model(net: SpringNet, solver: str) -> Any:
+def _model(net: SpringNet) -> Any:
     """Model of a net; particles without mass are held."""
     import newton
     from warp import vec3
@@ -131,8 +112,6 @@ def _model(net: SpringNet, solver: str) -> Any:
     assert net.masses is not None  # of a scene that moves
     count = len(net.points)
     builder = newton.ModelBuilder(gravity=(0.0, 0.0, 0.0))
-    if solver == "Style3D":
-        newton.solvers.SolverStyle3D.register_custom_attributes(builder)
     masses = np.where(net.held.all(axis=1), 0, net.masses)
     places = [vec3(x, y, 0.0) for x, y in net.points.tolist()]
     builder.add_particles(places, [vec3(0.0)] * count, masses.tolist(), radius=[0.0] * count)
@@ -142,18 +121,8 @@ def _model(net: SpringNet, solver: str) -> Any:
     builder.spring_rest_length = net.rest_lengths[there].tolist()
     if net.energies:
         cells = net.energies[0].cells
-        numbers = dict.fromkeys(("tri_ke", "tri_ka", "tri_kd", "tri_drag", "tri_lift"), 0.0)
-        numbers |= triangle_numbers(net, solver)
-        each = {name: [value] * len(cells) for name, value in numbers.items()}
-        own = {f"style3d:{name}": each.pop(name) for name in STYLE3D if name in each}
-        builder.add_triangles(*cells.T.tolist(), custom_attributes=own, **each)
-        if own:
-            edges = net.points[cells[:, 1:]] - net.points[cells[:, :1]]
-            builder.tri_poses = np.linalg.inv(np.swapaxes(edges, 1, 2)).tolist()  # along and across are x and y
-            # The collision of Style3D, though off, wants an edge: one without bending.
-            first, second = map(int, cells[0, :2])
-            free = {"style3d:edge_rest_area": 1.0}
-            builder.add_edge(-1, -1, first, second, rest=0.0, edge_ke=0.0, edge_kd=0.0, custom_attributes=free)
+        numbers = dict(zip(TRIANGLES, membrane(net))) | dict.fromkeys(("tri_kd", "tri_drag", "tri_lift"), 0.0)
+        builder.add_triangles(*cells.T.tolist(), **{name: [value] * len(cells) for name, value in numbers.items()})
     if there.any():
         builder.set_coloring(colours(net))
     else:
@@ -172,74 +141,43 @@ BESIDES = (
 """What a script sets besides, as runs here do."""
 
 
-def _declared(solver: str, **own: Any) -> dict[str, Any]:
-    """What the declaration of a solver has, besides its name, order and parameters."""
-
-    def typed(net: SpringNet) -> dict[str, Any]:
-        return ({"ke": net.stiffness} if np.any(net.stiffness) else {}) | triangle_numbers(net, solver)
-
-    in_common = {
-        "program": "Newton",
-        "needs": ("newton", "warp"),
-        "extra": "newton",
-        "precisions": ("float32",),
-        "laws": ("biquadratic",),
-        "dampers": {"kd": DASHPOT} | ({"tri_kd": TRI_KD} if solver == "VBD" else {}),
-        "besides": BESIDES,
-        "measured": "1e-3, ten scenes, by the law that it has",
-        "source": "Newton 1.8, newton.solvers",
-    }
-    return in_common | {"typed": typed} | own
-
-
-COLOURS = "builder.color() before finalize(), of springs builder.set_coloring(groups that no spring joins); "
+IN_COMMON: dict[str, Any] = {
+    "program": "Newton",
+    "needs": ("newton", "warp"),
+    "extra": "newton",
+    "precisions": ("float32",),
+    "implicit": True,
+    "typed": typed,
+    "source": "Newton 1.8, newton.solvers",
+}
 
 
 @engine(
     "newton-vbd",
     order=150,
-    parameters=VBD,
-    **_declared("VBD", implicit=True, law=membrane_energies, besides=COLOURS + BESIDES),
+    laws=("biquadratic",),
+    law=membrane_energies,
+    parameters={"ke": SPRING} | TRIANGLES,
+    dampers={"kd": DASHPOT, "tri_kd": Parameter("N s/m", "beta tri_ke / 2 of triangles")},
+    besides="builder.color() before finalize(), of springs builder.set_coloring(groups that no spring joins); "
+    + BESIDES,
+    measured="1e-3, ten scenes, by the law that it has",
+    **IN_COMMON,
 )
 def vbd(net: SpringNet, setting: Setting, damping: float) -> Session:
     """Newton's solver VBD: implicit steps by vertex block descent."""
     return _Session(net, setting, damping, "VBD")
 
 
-XPBD_MEASURED = "1e-3, nine of ten scenes; 8e-3 near buckling, by rounding: the same steps in double are 5e-4 off"
-
-
 @engine(
     "newton-xpbd",
     order=151,
     parameters={"ke": SPRING},
-    **_declared("XPBD", implicit=True, laws=(), measured=XPBD_MEASURED),
+    dampers={"kd": DASHPOT},
+    besides=BESIDES,
+    measured="1e-3, nine of ten scenes; 8e-3 near buckling, by rounding: the same steps in double are 5e-4 off",
+    **IN_COMMON,
 )
 def xpbd(net: SpringNet, setting: Setting, damping: float) -> Session:
     """Newton's solver XPBD: springs alone, all at once in an iteration."""
     return _Session(net, setting, damping, "XPBD")
-
-
-@engine(
-    "newton-semi-implicit",
-    order=152,
-    parameters=SEMI_IMPLICIT,
-    **_declared("SemiImplicit", iterates=False, law=membrane_energies),
-)
-def semi_implicit(net: SpringNet, setting: Setting, damping: float) -> Session:
-    """Newton's solver SemiImplicit: explicit steps."""
-    return _Session(net, setting, damping, "SemiImplicit")
-
-
-STYLE = {
-    "springs": False,
-    "implicit": True,
-    "dampers": MASS_DAMPING,
-    "measured": "1e-3, nine of ten scenes, by the law that it has; 2e-3 in slender bending",
-}
-
-
-@engine("newton-style3d", order=153, parameters=STYLE3D, **_declared("Style3D", **STYLE))
-def style3d(net: SpringNet, setting: Setting, damping: float) -> Session:
-    """Newton's solver Style3D: implicit steps by projective dynamics."""
-    return _Session(net, setting, damping, "Style3D")

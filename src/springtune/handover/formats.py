@@ -58,14 +58,10 @@ Read = tuple[dict[str, np.ndarray], Iterable[Terms], dict[str, Any]]
 """Content of a file: arrays by the names of `ARRAYS`, energies and header."""
 
 
-def write(path: str | Path, net: Net, mujoco: int | None = None) -> list[Path]:
+def write(path: str | Path, net: Net) -> list[Path]:
     """Write a net in the format of a name's ending; files appear whole or not at all."""
     path, ending = Path(path), check_target(path)
     net = replace(net, header=net.header | {"thickness": float(net.thickness)})
-    if mujoco is not None and ending not in FOR_MUJOCO:
-        raise ValueError(
-            f"mujoco: {mujoco!r} is of no use to {path.name}; leave it out, or give a name ending in .xml or .mjcf"
-        )
     if ending in NET_FORMATS:
         return NET_FORMATS[ending][0](path, net) or [path]
     program, text = SIMULATORS[ending]
@@ -76,7 +72,7 @@ def write(path: str | Path, net: Net, mujoco: int | None = None) -> list[Path]:
             f"{path}: runs {program} at a step of its own, and the stiffness is for {calibrated['engine']} at "
             f"{calibrated['setting']}; give a name ending in {kept}"
         )
-    write_text(path, text(net) if mujoco is None else mjcf(net, mujoco))
+    write_text(path, text(net))
     return [path]
 
 

@@ -7,16 +7,13 @@ control added to it: in the viewer the net moves, and a slider changes the load.
 joints, which MuJoCo's integrator Euler takes implicitly; else it is `symplectic-euler`, and so is its largest step.
 
 Coupled springs of squared lengths (definition `delingette`) are the St. Venant-Kirchhoff energy of linear triangles,
-and so is MuJoCo's flex of two dimensions (3.3.7 and later); young and poisson mean other constants in version 3. Its
-shear modulus and Lame's first constant, times the thickness t, are
+and so is the flex of two dimensions of MuJoCo 4. Its shear modulus and Lame's first constant, times the thickness t,
 
-    MuJoCo 3: mu t = t young / (8 (1 + poisson)), lambda t = t young poisson / (2 (1 + poisson) (1 - 2 poisson));
-    MuJoCo 4: mu t = t young / (2 (1 + poisson)), lambda t = t young poisson / (1 - poisson^2), those of plane stress,
+    mu t = t young / (2 (1 + poisson)), lambda t = t young poisson / (1 - poisson^2), those of plane stress,
 
-as single triangles in MuJoCo 3.3.7, 3.5.0, 3.17.0 and 4.0.0 have it, to rounding. No pair of values serves both, so a
-file with a flex is for one version, and the other refuses it. Bodies of a flex may have no damping in their joints, so
-a fixed tendon for each joint has it. Before 3.15.0 forces were wrong on bodies of a flex that move along y alone: a
-file for version 3 that has such bodies is refused there.
+are those of single triangles in MuJoCo 4.0.0, to rounding. In MuJoCo 3 young and poisson mean other constants: it
+refuses a file with a flex, by an attribute that it does not know. Bodies of a flex may have no damping in their joints,
+so a fixed tendon for each joint has it.
 """
 
 from collections.abc import Sequence
@@ -28,9 +25,6 @@ from ..safe_io.escapes import printable
 from .simulation import Simulation, about, filled, lame, load_in_words, numbers, simulate
 from .terms import Net, Terms
 
-VERSIONS = (3, 4)
-"""Versions of MuJoCo that files are written for; the last one where none is asked for."""
-
 LEAST_MASS = 1e-15
 """Mass below which MuJoCo takes no body that moves [kg]."""
 
@@ -38,7 +32,7 @@ LARGEST_ACCELERATION = 1e9
 """Acceleration beyond which MuJoCo may take a run for a diverged one, a tenth of its limit [m/s2]."""
 
 
-def mjcf(net: Net, version: int = VERSIONS[-1]) -> str:
+def mjcf(net: Net) -> str:
     """Model of a net for MuJoCo.
 
     Examples
@@ -50,13 +44,10 @@ def mjcf(net: Net, version: int = VERSIONS[-1]) -> str:
     >>> next(line for line in path.read_text().splitlines() if "<spatial" in line).strip()
     '<spatial stiffness="90932667.39736606" springlength="0.02"><site site="p0"/><site site="p1"/></spatial>'
     """
-    if version not in VERSIONS:
-        known = " or ".join(map(str, VERSIONS))
-        raise ValueError(f"mujoco: {version!r} is no version of MuJoCo that files are written for; give {known}")
-    return model(net, simulate(net, "MuJoCo", ("biquadratic",)), version)
+    return model(net, simulate(net, "MuJoCo", ("biquadratic",)))
 
 
-def model(net: Net, simulation: Simulation, version: int, integrator: str = "Euler") -> str:
+def model(net: Net, simulation: Simulation, integrator: str = "Euler") -> str:
     """Model of a net that moves as a simulation says, by one of MuJoCo's integrators."""
     moving = ~net.held.all(axis=1)
     least = float(simulation.masses[moving].min())
@@ -78,53 +69,46 @@ def model(net: Net, simulation: Simulation, version: int, integrator: str = "Eul
     return filled(
         "mujoco.xml",
         title=printable(title),
-        about=[*about(net, simulation, said), f"Written {for_versions(net.energies, version)}."],
+        about=[*about(net, simulation, said), f"Written {for_versions(net.energies)}."],
         simulation=simulation,
         integrator=integrator,
-        version=version,
         fast=accelerations.max() > LARGEST_ACCELERATION,
         centre=tuple((low + high) / 2),
         extent=0.6 * float(np.hypot(*(high - low))),
         size=float(net.rest_lengths.mean()),
         particles=list(zip(range(len(free)), net.points.tolist(), free, masses.tolist(), dampers.tolist())),
-        flex=_flex(net, version),
+        flex=_flex(net),
         springs=list(zip(net.springs.tolist(), net.stiffness.tolist(), net.rest_lengths.tolist())),
         shares=[(joint, share) for joint, share in zip(joints, shares.tolist()) if share],
-        first_joint=joints[0],
         of_beam=load and "force" in load,
         predicted=None if simulation.displacements is None else numbers(simulation.displacements[~net.held]),
-        along_y=free.index("y") if "y" in free else None,
     )
 
 
-def for_versions(energies: Sequence[Terms], version: int | None = None) -> str:
+def for_versions(energies: Sequence[Terms]) -> str:
     """Which versions of MuJoCo a file is for."""
     if not energies:
-        return f"for MuJoCo {' and '.join(map(str, VERSIONS))}: springs are the same in both"
-    version = version or VERSIONS[-1]
-    [other] = set(VERSIONS) - {version}
-    refused = f"MuJoCo {other}, whose flex has other constants, refuses it"
-    return f"for MuJoCo {version}; {refused}: write one with mujoco {other} for that"
+        return "for MuJoCo 3 and 4"
+    return "for MuJoCo 4; MuJoCo 3, whose flex has other constants, refuses it"
 
 
-def elasticity(first: float, second: float, version: int) -> tuple[float, float]:
+def elasticity(first: float, second: float) -> tuple[float, float]:
     """Young [N/m] and poisson [1] of a flex of thickness 1 that has two Lame constants, times the thickness [N/m]."""
     ratio = first / second
-    if version != 3 and ratio > 2 * (1 + 1e-9):
+    if ratio > 2 * (1 + 1e-9):
         raise ValueError(
-            f"sheet: has a ratio of {ratio / (2 + ratio):.3g} in its plane, and a flex of MuJoCo {version} takes "
-            "less than 0.5; take MuJoCo 3"
+            f"sheet: has a ratio of {ratio / (2 + ratio):.3g} in its plane, and a flex of MuJoCo takes less than 0.5; "
+            "take springs alone, such as 'patch'"
         )
-    # MuJoCo refuses a half, which plane stress allows in MuJoCo 4.
-    poisson = ratio / (4 + 2 * ratio) if version == 3 else min(ratio / (2 + ratio), float(np.nextafter(0.5, 0)))
-    return (8 if version == 3 else 2) * (1 + poisson) * second, poisson
+    poisson = min(ratio / (2 + ratio), float(np.nextafter(0.5, 0)))  # MuJoCo refuses a half
+    return 2 * (1 + poisson) * second, poisson
 
 
-def _flex(net: Net, version: int) -> dict[str, Any] | None:
+def _flex(net: Net) -> dict[str, Any] | None:
     """Triangles whose sides are coupled, as a flex: where all have one pair of Lame constants."""
     for terms in net.energies:
         first, second = lame(net, terms, "MuJoCo's flex")
-        young, poisson = elasticity(first, second, version)
+        young, poisson = elasticity(first, second)
         cells = terms.cells.ravel().tolist()
         return {"first": first, "second": second, "young": young, "poisson": poisson, "cells": cells}
     return None

@@ -267,7 +267,7 @@ class SpringNet(Tabled, Net):
                 header["expected_error"] = _expected_errors(sheet, chosen, springs, beam, material, said)
         return cls(**parts)
 
-    def write(self, path: str | Path, *, mujoco: int | None = None) -> list[Path]:
+    def write(self, path: str | Path) -> list[Path]:
         """Write the net in the format that the ending of a name says; files appear whole or not at all.
 
         Parameters
@@ -277,9 +277,6 @@ class SpringNet(Tabled, Net):
             beside it, such as ``net.particles.csv``; ``.json`` has the arrays by their names here;
             ``.vtu`` has springs as lines, for ParaView and meshio. Models that run, and are not read again: ``.xml`` or
             ``.mjcf`` for MuJoCo, ``.scn`` or ``.py`` for SOFA, ``.newton.py`` for Newton, ``.xpbd.json`` for XPBD.
-        mujoco : int, optional
-            Version of MuJoCo that its file is for, 3 or 4; 4 without. Springs alone are the same in both; squared
-            lengths (`delingette`) are not, and each version refuses the file for the other.
 
         Returns
         -------
@@ -289,15 +286,15 @@ class SpringNet(Tabled, Net):
         Raises
         ------
         ValueError
-            If the name has another ending, its folder is not there, the version is unknown or the file is not for
-            MuJoCo, or the load prescribes displacements, which no such file tells.
+            If the name has another ending, its folder is not there, or the load prescribes displacements, which no
+            such file tells.
         """
         load = self.header.get("load")
         if load and load.get("prescribed"):
             raise ValueError(
                 f"load {load['name']!r}: prescribes displacements, which no file of springs has; take a load of forces"
             )
-        written: list[Path] = hook("files").write(path, self, mujoco)
+        written: list[Path] = hook("files").write(path, self)
         return written
 
     @classmethod

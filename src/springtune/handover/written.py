@@ -20,12 +20,10 @@ FRAMES = 50
 """Files of a series, where no number is given."""
 
 
-def write_springs(
-    path: str | Path, scene: Scene, springs: Springs, *, mujoco: int | None = None, **options: Any
-) -> list[Path]:
+def write_springs(path: str | Path, scene: Scene, springs: Springs, **options: Any) -> list[Path]:
     """Write springs of a scene, see `springtune.handover.net.SpringNet.write`."""
     check_target(path)
-    return SpringNet.from_scene(scene, springs=springs, **options).write(path, mujoco=mujoco)
+    return SpringNet.from_scene(scene, springs=springs, **options).write(path)
 
 
 def write_result(path: str | Path, result: Result, steps: int = 10) -> list[Path]:
