@@ -114,11 +114,11 @@ class TestPage:
         from springtune.studies.kinds.samples.designs import PARAMETERS
         from springtune.studies.kinds.scenes.variables import BLOCK, FIELDS, FINITE_STRAIN, ROOT, SENSITIVITY
         from springtune.studies.kinds.shapes.collect import AT_FINITE_STRAIN, SHAPE_FIELDS, SHAPES
-        from springtune.studies.kinds.stability.collect import STABILITY
+        from springtune.studies.kinds.stability.kind import KIND as STABILITY
         from springtune.studies.output.browse.page import views
 
-        groups = (ROOT, SENSITIVITY, FINITE_STRAIN, BLOCK, FIELDS, STABILITY, ENGINE_RUNS, ENGINE_CURVES)
-        groups += tuple(map(group_of, (MODULI, BENCHMARK, LAYING)))
+        groups = (ROOT, SENSITIVITY, FINITE_STRAIN, BLOCK, FIELDS, ENGINE_RUNS, ENGINE_CURVES)
+        groups += tuple(map(group_of, (MODULI, BENCHMARK, LAYING, STABILITY)))
         groups += (SAMPLES, SOBOL, SHAPES, SHAPE_FIELDS, AT_FINITE_STRAIN)
         coordinates = {"/samples": {*PARAMETERS, "sample_mesh_size"}}
         known = {group.name: group for group in groups}

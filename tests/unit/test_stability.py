@@ -5,14 +5,17 @@ import pytest
 from springtune.mechanics.integrators import BEHAVIOURS
 from springtune.problem.geometry import Beam
 from springtune.problem.materials import Material
+from springtune.studies.kinds.collect import group_of
 from springtune.studies.kinds.stability import AXES, EXPERIMENTS, ONCE
 from springtune.studies.kinds.stability import solve as stability
-from springtune.studies.kinds.stability.collect import STABILITY
+from springtune.studies.kinds.stability.kind import KIND
 from springtune.studies.output.dataset import DIMENSIONS
 from springtune.studies.runs import job, store
 from springtune.studies.runs import keys as code
 
 from tables import STUDIES
+
+STABILITY = group_of(KIND)
 
 
 def test_experiments_are_one_a_definition_or_one_in_all(load):

@@ -7,14 +7,14 @@ import pytest
 import xarray as xr
 
 from springtune.problem.compare import assured
-from springtune.studies.kinds.benchmark import tables as benchmark
+from springtune.studies.kinds.benchmark import figures as benchmark
 from springtune.studies.kinds.benchmark.kind import KIND as BENCHMARK
 from springtune.studies.kinds.collect import group_of
-from springtune.studies.kinds.moduli import tables as definitions
+from springtune.studies.kinds.moduli import figures as definitions
 from springtune.studies.kinds.moduli.kind import KIND as MODULI
 from springtune.studies.kinds.scenes.variables import ROOT
-from springtune.studies.kinds.stability import tables as stability
-from springtune.studies.kinds.stability.collect import STABILITY
+from springtune.studies.kinds.stability import figures as stability
+from springtune.studies.kinds.stability.kind import KIND as STABILITY
 from springtune.studies.output import page as tables_page
 from springtune.studies.output.text import decimals, number
 
@@ -182,7 +182,7 @@ def stressed():
         "strain_load": ("axial", "follower-pressure"), "strain": (-0.1, 0.1),
     }  # fmt: skip
     used = [name for name, one in STABILITY.variables.items() if set(one[0]) <= set(axes)]
-    strains = STABILITY.empty(axes, used)
+    strains = group_of(STABILITY).empty(axes, used)
     strains["strain_status"].values[:], strains["strain_load_share"].values[:] = 1, 1.0
     strains["negative_pivots"].values[:] = 0.0
     place = {"definition": "area", "strain_load": "follower-pressure", "strain": 0.1}

@@ -289,10 +289,13 @@ def build(
         swept=names,
         **about,
     )
-    for output in (output for kind in kinds for output in kind.outputs if output.name in study.outputs):
-        lack = output.lack(study)
-        if lack:
-            problems.add(("outputs",), f"'{output.name}' {lack}")
+    for kind in kinds:
+        for output in (one for one in kind.outputs if one.name in study.outputs):
+            lack = output.lack(study)
+            if output.shows and not parts[kind.name]:
+                lack = f"shows {output.shows} and the study has none; add a section '{kind.name}'"
+            if lack:
+                problems.add(("outputs",), f"'{output.name}' {lack}")
     problems.stop()
     return study
 

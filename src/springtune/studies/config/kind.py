@@ -42,6 +42,8 @@ class Output:
         Module with ``groups(study, folder)``, the groups of the dataset for this output; a name within the package.
     plot : str
         ``"module:function"`` that yields the figures of a dataset's tree: stem, plotting function and selection.
+    draw : callable, optional
+        Draws on Axes the dataset's group of the output's name: a figure of one panel, of that name.
     job : str
         Name of the job that makes it, by default its own; outputs may share a job.
     tables : callable, optional
@@ -54,8 +56,10 @@ class Output:
         Folder of the tables, within the study's folder.
     page : bool
         Whether it is the page of all tables, see `springtune.studies.output.page`.
+    shows : str
+        What it shows of its kind's part of a study, for the refusal where the study has none.
     lack : callable, optional
-        From a study to what it lacks for this output, with the remedy; an empty string if nothing.
+        From a study to what else it lacks for this output, with the remedy; an empty string if nothing.
     usual : bool
         Whether it is made by default.
     """
@@ -71,18 +75,16 @@ class Output:
     write: str = ""
     into: str = "tables"
     page: bool = False
+    draw: Callable[[Any, Any], object] | None = None
+    shows: str = ""
     lack: Callable[[Study], str] = lambda study: ""
     usual: bool = False
 
     @property
     def module(self) -> str:
         """Module that draws the figures."""
-        return self.plot.partition(":")[0]
-
-
-def needs(part: str, why: str) -> Callable[[Study], str]:
-    """`Output.lack` of an output that needs a part of a study."""
-    return lambda study: "" if study.parts[part] else why
+        own = self.draw.__module__.partition(".")[2] if self.draw else ""
+        return own or self.plot.partition(":")[0]
 
 
 @dataclass(frozen=True)
@@ -163,12 +165,17 @@ class Kind:
         From that part to rows of `springtune scenes`: name, number and remark.
     variables, dimensions : dict
         Variables and own dimensions of its group, see `springtune.studies.output.dataset.Group`.
+    flags : dict of str to tuple
+        Meanings of its flags, see `springtune.studies.output.dataset.Group`.
+    sparse : bool
+        Whether variables that no result has are left out of its group.
     attributes : callable, optional
         From that part to the attributes of its group.
     stages : tuple of Stage
     outputs : tuple of Output
-    tables, tables_by : callable and str, optional
-        From a study to the stems of its tables on the page; module whose ``tables(tree)`` makes them.
+    tables : callable, optional
+        From a study to the stems of its tables on the page, which ``tables(tree)`` of a module ``outputs`` or
+        ``tables`` makes.
     """
 
     name: str
@@ -182,11 +189,12 @@ class Kind:
     summary: Callable[[Any], list[list[object]]] = lambda part: []
     variables: dict[str, tuple[tuple[str, ...], str, str, Any]] = field(default_factory=dict)
     dimensions: dict[str, str | tuple[str, str]] = field(default_factory=dict)
+    flags: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    sparse: bool = False
     attributes: Callable[[Any], Mapping[str, object]] = lambda part: {}
     stages: tuple[Stage, ...] = ()
     outputs: tuple[Output, ...] = ()
     tables: Callable[[Study], list[str]] | None = None
-    tables_by: str = "tables"
 
     def wanted(self, config: Any) -> bool:
         """Return whether a config has one of its sections; a kind without any depends on the grids."""

@@ -47,15 +47,14 @@ def main(config: str, folder: str, output: str, record: str, digest: str) -> Non
 
 def group_of(kind: "Kind") -> dataset.Group:
     """Group of a kind whose tasks have cells of it."""
-    return dataset.Group(f"/{kind.name}", kind.variables, kind.dimensions)
+    return dataset.Group(f"/{kind.name}", kind.variables, kind.dimensions, kind.flags)
 
 
 def _of_tasks(kind: "Kind", study: "Study", folder: Path) -> dict[str, xr.Dataset]:
     """Group of a kind whose tasks have cells of it."""
-    group, stages = group_of(kind), kind.stages
-    found = group.of_rows(study.axes, (row for stage in stages for row in rows(stage, study, folder)))
-    found.attrs = dict(kind.attributes(study.parts[kind.name]))
-    return {group.name: found}
+    group, found = group_of(kind), [row for stage in kind.stages for row in rows(stage, study, folder)]
+    names = {name for row in found for name in row} if kind.sparse else None
+    return {group.name: group.of_rows(study.axes, found, names).assign_attrs(kind.attributes(study.parts[kind.name]))}
 
 
 def gathered(study: "Study", folder: Path) -> dict[str, xr.Dataset]:

@@ -9,9 +9,10 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
+from springtune.registry import imported
 from springtune.safe_io.atomic import write_text
 
-from ..config.kind import kinds
+from ..config.kind import modules
 from .selection import sign_of_errors
 from .text import csv_text, decimals, number
 
@@ -23,7 +24,8 @@ COLUMN_UNITS = {"mm2": "mm²", "mm": "mm", "percent": "%", "points": "points", "
 
 def write(tree: xr.DataTree, folder: str | Path) -> list[str]:
     """Write a CSV file for each table, and a page with all."""
-    tables = [table for kind in kinds() if kind.tables for table in kind.module(kind.tables_by).tables(tree)]
+    found = (getattr(imported(name), "tables", None) for name in modules("outputs", "tables"))
+    tables = [table for of_kind in found if of_kind for table in of_kind(tree)]
     written = {f"{table['stem']}.csv": csv_text(table["rows"]) for table in tables}
     written["index.html"] = html(tables, tree)
     for name, text in written.items():

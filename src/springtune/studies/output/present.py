@@ -3,7 +3,7 @@
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
@@ -14,6 +14,8 @@ from ..config.kind import outputs
 from .reading import lazily
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
     from ..config.kind import Output
 
 
@@ -24,7 +26,7 @@ def run(dataset: str | Path, folder: str | Path, *names: str) -> list[Path]:
     # Arrays are read on demand: most are not shown.
     with lazily(dataset) as tree:
         for output in (outputs()[name] for name in names):
-            if output.plot:
+            if output.module:
                 made += _draw(output, tree, figures)
             into = Path(folder) / output.into
             if output.page:
@@ -50,14 +52,26 @@ def _draw(output: "Output", tree: xr.DataTree, folder: Path) -> Iterator[Path]:
     import matplotlib.pyplot as plt
     import numpy as np
 
-    from .style import png_and_pdf
+    from . import style
 
-    for stem, plot, selection in imported(output.plot)(tree):
+    single = [(output.name, style.styled(_single), {"output": output})]
+    drawn: Any = single if output.draw else imported(output.plot)(tree)
+    for stem, plot, selection in drawn:
         figure = np.ravel(plot(tree, **selection))[0].figure
-        for ending, content in png_and_pdf(figure).items():
+        for ending, content in style.png_and_pdf(figure).items():
             atomic.write_bytes(folder / f"{stem}.{ending}", content)
             yield folder / f"{stem}.{ending}"
         plt.close(figure)
+
+
+def _single(tree: xr.DataTree, output: "Output") -> "Axes":
+    """Draw the figure of an output that draws on one panel."""
+    from . import style
+
+    assert output.draw
+    _, ((panel,),) = style.panels(None, figsize=(style.COLUMN, 2.4))
+    output.draw(panel, tree[output.name].to_dataset())
+    return panel
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..config.kind import FORMATS, kinds, modules, outputs
+from ..config.kind import FORMATS, modules, outputs
 from .job import RECORDS, TASKS
 from .keys import stage_key
 from .plan import Plan, plan, table_files
@@ -97,10 +97,9 @@ def _present_digest(members: "Iterable[Output]", files: list[str]) -> str:
     used = ["studies.output.present", *modules("outputs")]
     templates = []
     for one in members:
-        used += filter(None, (name.partition(":")[0] for name in (one.plot, one.write, *one.texts.values())))
+        used += filter(None, (name.partition(":")[0] for name in (one.module, one.write, *one.texts.values())))
         if one.page:
-            used += ["studies.output.page", *modules("kind")]
-            used += [kind.place(kind.tables_by) for kind in kinds() if kind.tables]
+            used += ["studies.output.page", *modules("tables")]
             templates.append(checksum(PACKAGE / "studies/output/page.html"))
     return hash_of(files, [stage_key(name) for name in dict.fromkeys(used)], templates)
 

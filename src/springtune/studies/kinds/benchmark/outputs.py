@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from ...config.kind import Output, needs
+from ...config.kind import Output
 from ...output.browse import Plot, View
 
 
@@ -17,8 +17,8 @@ OUTPUTS = (
         "figures and the page of the benchmark",
         figures=lambda study: figures(study.axes.get("scene", ())),
         plot="studies.kinds.benchmark.figures:benchmark",
-        texts={"speed.md": "studies.kinds.benchmark.tables:page"},
-        lack=needs("benchmark", "shows a benchmark and the study has none; add a section 'benchmark'"),
+        texts={"speed.md": "studies.kinds.benchmark.figures:page"},
+        shows="a benchmark",
     ),
 )
 

@@ -204,5 +204,4 @@ KIND = Kind(
     stages=(STAGE,),
     outputs=OUTPUTS,
     tables=lambda study: ["engines"] if study.parts["engines"] else [],
-    tables_by="outputs",
 )

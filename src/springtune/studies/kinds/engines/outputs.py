@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
-from ...config.kind import Output, needs
+from ...config.kind import Output
 from ...output.browse import Plot, View
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ OUTPUTS = (
         "figures of scenes in engines: error over the time of a frame, maps of settings, sensitivity curves",
         figures=lambda study: figures(*_scenes(study.parts["engines"])),
         plot="studies.kinds.engines.figures:engines",
-        lack=needs("engines", "shows scenes in engines and the study has none; add a section 'engines'"),
+        shows="scenes in engines",
     ),
 )
 

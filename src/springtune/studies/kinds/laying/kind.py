@@ -172,5 +172,4 @@ KIND = Kind(
     stages=(stage("laying", "studies.kinds.laying.solve", "Laying the strips", _tasks),),
     outputs=OUTPUTS,
     tables=lambda study: ["laying"] if study.parts["laying"] else [],
-    tables_by="outputs",
 )

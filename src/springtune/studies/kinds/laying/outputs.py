@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING, Any
 
-from ...config.kind import Output, needs
+from ...config.kind import Output
 from ...output.browse import Plot, View
 
 if TYPE_CHECKING:
@@ -15,7 +15,7 @@ OUTPUTS = (
         "the figure of laid strips",
         figures=lambda study: {"laying": {}},
         plot="studies.kinds.laying.figures:laying",
-        lack=needs("laying", "shows laid strips and the study has none; add a section 'laying'"),
+        shows="laid strips",
     ),
 )
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from ...config.kind import Output, needs
+from ...config.kind import Output
 from ...output.browse import Plot, View
 
 if TYPE_CHECKING:
@@ -22,14 +22,18 @@ def _figures(study: "Study") -> dict[str, dict[str, object]]:
     return figures(loads, dict.fromkeys(scene.mesh.mesh_type for scene in study.scenes))
 
 
+def _lack(study: "Study") -> str:
+    return "" if study.parts["moduli"] else "compares moduli and no grid has them; add 'moduli: true' to a grid"
+
+
 OUTPUTS = (
     Output(
         "definitions",
         "figures and tables that compare definitions",
         figures=_figures,
         plot="studies.kinds.moduli.figures:definitions",
-        texts={"which_definition.md": "studies.kinds.moduli.tables:decision"},
-        lack=needs("moduli", "compares moduli and no grid has them; add 'moduli: true' to a grid"),
+        texts={"which_definition.md": "studies.kinds.moduli.figures:decision"},
+        lack=_lack,
     ),
 )
 

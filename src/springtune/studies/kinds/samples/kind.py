@@ -368,5 +368,4 @@ KIND = Kind(
     ),
     outputs=OUTPUTS,
     tables=_tables,
-    tables_by="outputs",
 )

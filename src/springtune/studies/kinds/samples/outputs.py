@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING, Any
 
-from ...config.kind import Output, needs, stem
+from ...config.kind import Output, stem
 from ...output.browse import Plot, View
 from .designs import SOBOL_INDICES
 
@@ -19,14 +19,11 @@ QUANTITIES = {
 """Quantities that have indices."""
 
 
-_lack_samples = needs("samples", "shows sampled scenes and the study has none; add a section 'samples'")
-
-
 def _lack(study: "Study") -> str:
     sample = study.parts["samples"]
     if sample and sample.design != SOBOL_INDICES:
         return f"shows Sobol indices, which a design '{sample.design}' has not; give design: {SOBOL_INDICES}"
-    return _lack_samples(study)
+    return ""
 
 
 def _figures(study: "Study") -> dict[str, dict[str, str]]:
@@ -41,6 +38,7 @@ OUTPUTS = (
         figures=_figures,
         plot="studies.kinds.samples.figures:sobol",
         job="samples",
+        shows="sampled scenes",
         lack=_lack,
     ),
 )

@@ -264,5 +264,4 @@ KIND = Kind(
     stages=STAGES,
     outputs=OUTPUTS,
     tables=stems,
-    tables_by="outputs",
 )

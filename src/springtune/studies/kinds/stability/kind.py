@@ -1,10 +1,12 @@
 """Experiments on numerical stability: a study's section ``stability``."""
 
 from dataclasses import asdict
+from math import nan
 from typing import Annotated
 
 from pydantic import Field
 
+from springtune.mechanics.integrators import BEHAVIOURS
 from springtune.mesh.types import MESH_TYPES
 
 from ...config import fields
@@ -94,7 +96,108 @@ def _tasks(study):
         yield Task(asdict(one) | own, also, labels, one, seconds=3.0)
 
 
-STAGE = stage("stability", "studies.kinds.stability.solve", "Experiments on stability", _tasks)
+SCHEME = ("definition", "mesh_size", "integrator", "damper", "damping_ratio")
+SLIVER = ("definition", "sliver_angle")
+CONTRAST = ("stiffness_contrast",)
+STRESSED = ("definition", "stressed_poisson_ratio")
+STRAINED = ("definition", "strain_load", "strain")
+PERTURBED = ("definition", "perturbation")
+ARCH = ("definition", "arch_point")
+SLENDER = ("definition", "rows")
+OF_DEFINITION = ("definition",)
+
+
+def _judged(name, dimensions, long_name):
+    """Variables that say what became of solves."""
+    return {
+        f"{name}_status": (dimensions, "1", f"what became of {long_name}", 0),
+        f"{name}_message": (dimensions, "1", f"why it is not solved: {long_name}", ""),
+    }
+
+
+VARIABLES = {
+    "dt_limit_predicted": (SCHEME, "s", "largest stable step, predicted", nan),
+    "dt_limit_measured": (SCHEME, "s", "largest step that does not grow noise, by bisection of runs", nan),
+    "dt_particle_bound": (("definition", "mesh_size"), "s", "safe step from each particle's springs alone", nan),
+    "omega_max": (("definition", "mesh_size"), "rad/s", "highest frequency at rest", nan),
+    "behaviour": (("integrator", "step_ratio", "map_damping_ratio"), "1", "what a run makes of noise", -1),
+    "step_ratio_predicted": (
+        ("integrator", "map_damping_ratio"),
+        "1",
+        "largest stable step over 2 / omega_max, predicted; 1000 where there is none",
+        nan,
+    ),
+    "energy_drift": (("integrator",), "1", "mean energy of the last tenth of a run over that of the first", nan),
+    "energy_swing": (("integrator",), "1", "largest less smallest energy of a run over the first", nan),
+    "energy": (("integrator", "sample"), "1", "energy over that at the start, undamped", nan),
+    "momentum_drift": (("integrator",), "1", "change of momentum over the sum of its parts", nan),
+    "steps_to_rest": (("critical_ratio",), "1", "steps to rest within 0.1 %, central difference", nan),
+    "loaded_frequency": ((), "rad/s", "lowest frequency that the load excites", nan),
+    "truncated_error": (
+        ("mesh_size", "cg_iterations", "implicit_steps"),
+        "1",
+        "distance of backward Euler from the static solution over its largest displacement",
+        nan,
+    ),
+    "relaxation_error": (("mesh_size",), "1", "distance of dynamic relaxation from the static solution", nan),
+    "relaxation_steps": (("mesh_size",), "1", "steps of dynamic relaxation", nan),
+    **_judged("sliver", SLIVER, "a mesh with a sliver"),
+    "sliver_negative_pivots": (SLIVER, "1", "negative pivots of the tangent with a sliver", nan),
+    "sliver_step_limit": (SLIVER, "s", "largest stable step with a sliver", nan),
+    "sliver_error": (SLIVER, "1", "displacement with a sliver over that without, less 1", nan),
+    **_judged("contrast", CONTRAST, "a network with stiff and soft parts"),
+    "contrast_negative_pivots": (CONTRAST, "1", "negative pivots of the tangent with a contrast", nan),
+    "contrast_error": (CONTRAST, "1", "error of the linear solution, against extended precision", nan),
+    "contrast_estimate": (CONTRAST, "1", "its estimate, by which it is judged", nan),
+    **_judged("poisson", STRESSED, "a material near the incompressible one"),
+    "poisson_negative_pivots": (STRESSED, "1", "negative pivots of the tangent", nan),
+    "poisson_modulus_error": (STRESSED, "1", "error of Young's modulus along x", nan),
+    "poisson_step_limit": (STRESSED, "s", "largest stable step", nan),
+    "scaled_step_limit": (("scale",), "s/m", "largest stable step over the mesh size", nan),
+    "precision_error": (("scale", "precision"), "1", "error of a run to rest, against the static solution", nan),
+    **_judged("strain", STRAINED, "a large strain"),
+    "negative_pivots": (STRAINED, "1", "negative pivots of the tangent; 0 where the equilibrium is stable", nan),
+    "strain_displacement": (STRAINED, "m", "mean displacement of the loaded side along the force", nan),
+    "strain_load_share": (STRAINED, "1", "largest share of the load with a good equilibrium", nan),
+    **_judged("perturbed", PERTURBED, "a mesh with particles moved"),
+    "perturbed_negative_pivots": (PERTURBED, "1", "negative pivots of the tangent", nan),
+    "perturbed_error": (PERTURBED, "1", "displacement with particles moved over that without, less 1", nan),
+    "perturbed_step_limit": (PERTURBED, "s", "largest stable step with particles moved", nan),
+    "inverted_starts_right": (OF_DEFINITION, "1", "share of inverted starts that end in the right solution", nan),
+    "inverted_starts_wrong": (OF_DEFINITION, "1", "share of inverted starts that end as solved elsewhere", nan),
+    "buckling_load": (SLENDER, "N", "buckling load of a column twenty times as long as high", nan),
+    "buckling_message": (SLENDER, "1", "what restricts the buckling load, or why there is none", ""),
+    "euler_load": (OF_DEFINITION, "N", "its load by Euler", nan),
+    "arch_load": (ARCH, "N", "force on the middle of a shallow arch along its path", nan),
+    "arch_deflection": (ARCH, "m", "its deflection", nan),
+    "arch_negative_pivots": (ARCH, "1", "negative pivots of the tangent there", nan),
+    "experiment_seconds": (("experiment", "definition"), "s", "time of an experiment", nan),
+    "experiment_message": (("experiment", "definition"), "1", "why an experiment has no results", ""),
+}
+
+DIMENSIONS: dict[str, str | tuple[str, str]] = {
+    "integrator": "time integrator",
+    "damper": "damping in proportion to mass, or of dampers along springs",
+    "damping_ratio": "damping ratio of the highest mode",
+    "step_ratio": "time step over 2 / omega_max",
+    "map_damping_ratio": "damping ratio of the highest mode, damping in proportion to mass",
+    "sample": "number of the sample in time",
+    "critical_ratio": "damping over that critical for the lowest loaded mode",
+    "cg_iterations": "conjugate-gradient iterations a step of backward Euler; 0 is a direct solver",
+    "implicit_steps": "steps of backward Euler",
+    "sliver_angle": ("smallest angle of the drawn triangle", "degree"),
+    "stiffness_contrast": "stiffness of the stiff parts over that of the soft ones",
+    "stressed_poisson_ratio": "Poisson's ratio",
+    "scale": ("length of an edge of the scaled beam", "m"),
+    "precision": "floating-point numbers of an explicit run",
+    "strain_load": "axial load, or a follower pressure on a long face, its force taken for the strain",
+    "strain": "force over E t times the loaded side",
+    "perturbation": "largest move of an inner particle over the mesh size",
+    "rows": "triangles over the height of the column",
+    "arch_point": "point of the arch's path",
+    "experiment": "experiment on stability",
+}
+
 
 KIND = Kind(
     "stability",
@@ -105,6 +208,10 @@ KIND = Kind(
     expand=_expand,
     axes=_axes,
     summary=lambda part: [["experiments", len(part), "on numerical stability"]],
-    stages=(STAGE,),
+    variables=VARIABLES,
+    dimensions=DIMENSIONS,
+    flags={"behaviour": BEHAVIOURS},
+    sparse=True,
+    stages=(stage("stability", "studies.kinds.stability.solve", "Experiments on stability", _tasks),),
     outputs=OUTPUTS,
 )

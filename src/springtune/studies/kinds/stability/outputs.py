@@ -2,7 +2,7 @@
 
 from collections.abc import Collection
 
-from ...config.kind import Output, needs
+from ...config.kind import Output
 from ...output.browse import Plot, View
 
 
@@ -17,8 +17,8 @@ OUTPUTS = (
         "figures and the page of the experiments on stability",
         figures=lambda study: figures({one.name for one in study.parts["stability"]}),
         plot="studies.kinds.stability.figures:stability",
-        texts={"stability.md": "studies.kinds.stability.tables:page"},
-        lack=needs("stability", "shows experiments and the study has none; add a section 'stability'"),
+        texts={"stability.md": "studies.kinds.stability.figures:page"},
+        shows="experiments",
     ),
 )
 

@@ -37,7 +37,7 @@ GROWTH_STEPS = 2000
 
 def failed(task, why):
     """Result of an experiment that fails."""
-    return {"experiment_message": why}
+    return {"experiment_seconds": np.nan, "experiment_message": why}
 
 
 def solve(task):
@@ -50,7 +50,7 @@ def solve(task):
         {name: value.item() if isinstance(value, np.generic) else value for name, value in row.items()}
         for row in RUN[task["name"]](setup)
     ]
-    return {"rows": [*rows, {"experiment_seconds": time.perf_counter() - begin}]}
+    return {"rows": [*rows, {"experiment_seconds": time.perf_counter() - begin, "experiment_message": ""}]}
 
 
 class Setup(Experiment):
