@@ -1,4 +1,4 @@
-"""A shape from a mesh file: a quarter of a ring in Gmsh's format, with named groups, under inner pressure.
+"""A shape from a mesh file: a quarter of a ring in VTU, with named groups, under inner pressure.
 
 Lame's solution: the inner rim moves outwards by p a / E ((b^2 + a^2) / (b^2 - a^2) + nu).
 """
@@ -30,7 +30,7 @@ def main():
         quantities=[st.Quantity("rim", "displacement", "rim", "x")],
     )
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "ring.msh"
+        path = Path(folder) / "ring.vtu"
         mesher(path, inner, outer)
         ring = st.Shape("ring", "1 mm", loads={"press": press}, file=str(path))
         mesh = st.read_shape(path)

@@ -124,8 +124,6 @@ def shape_files():
     with tempfile.TemporaryDirectory() as name, redirect_stdout(io.StringIO()):
         folder = Path(name)
         write_mesh(folder / "shape.vtu", grouped)
-        write_mesh(folder / "shape.msh", grouped)
-        meshio.read(folder / "shape.msh").write(folder / "text.msh", file_format="gmsh22", binary=False)
         points = {side: np.unique(edges) for side, edges in grouped.sides.items()}
         cells = {"core": [np.flatnonzero(grouped.parts["core"][3])]}
         blocks = [("triangle", grouped.mesh.triangles)]

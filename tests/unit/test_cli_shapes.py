@@ -22,7 +22,7 @@ def folder(tmp_path_factory):
     """A folder with a study, and the mesh file that it names."""
     folder = tmp_path_factory.mktemp("study")
     plate = st.Shape.rectangle("40 mm", "20 mm", holes=[st.Hole.circle(("20 mm", "10 mm"), "4 mm")])
-    write_mesh(folder / "own.msh", st.mesh_shape(plate, "4 mm"))
+    write_mesh(folder / "own.vtu", st.mesh_shape(plate, "4 mm"))
     (folder / "study.yaml").write_text(STUDY.replace("{supports: {a: fixed}", "{supports: {a: fixed, b: {y: 0}}"))
     return folder
 
@@ -73,9 +73,9 @@ class TestPredict:
 
     def test_a_shape_of_a_file_has_the_mesh_of_it(self, here, tmp_path):
         result = run("predict", *OWN, "--write", tmp_path / "net.json", "--springs-alone")
-        assert result.exit_code == 0 and result.stdout.startswith("own, load pull, own.msh: ")
+        assert result.exit_code == 0 and result.stdout.startswith("own, load pull, own.vtu: ")
         net = st.SpringNet.read(tmp_path / "net.json")
-        assert len(net.points) == len(st.read_shape("own.msh").mesh.points)
+        assert len(net.points) == len(st.read_shape("own.vtu").mesh.points)
         assert net.forces.sum(axis=0) == pytest.approx([10, 0]) and net.header["shape"] == "own"
 
 

@@ -146,7 +146,7 @@ def test_unreadable_file_is_refused(tmp_path):
 
 FORMATS = {
     **{name: name for name in ("vtu", "vtk", "med", "hmf", "mdpa", "ply")},
-    **{"gmsh22": "msh", "abaqus": "inp", "exodus": "e", "medit": "mesh", "nastran": "bdf", "permas": "post"},
+    **{"gmsh22": "msh", "abaqus": "inp", "medit": "mesh", "permas": "post"},
     **{"avsucd": "avs", "netgen": "vol"},
 }
 """Ending of formats that hold lines, triangles and quadrilaterals."""

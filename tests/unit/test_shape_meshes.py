@@ -224,7 +224,7 @@ def write_abaqus(path, grouped):
     by_meshio(grouped, point_sets=sets, cell_sets=cells).write(path)
 
 
-FILES = {"own.vtu": write_mesh, "own.msh": write_mesh, "marks.vtu": write_vtu, "sets.inp": write_abaqus}
+FILES = {"own.vtu": write_mesh, "marks.vtu": write_vtu, "sets.inp": write_abaqus}
 
 
 @pytest.mark.usefixtures("mesh_library")
@@ -238,23 +238,16 @@ def test_groups_come_back_from_files(tmp_path, name, shape):
 
 
 @pytest.mark.usefixtures("mesh_library")
-@pytest.mark.parametrize("ending", ["vtu", "msh"])
-def test_squares_and_points_between_particles_come_back(tmp_path, ending):
+def test_squares_and_points_between_particles_come_back(tmp_path):
     grouped = squares()
-    write_mesh(tmp_path / f"own.{ending}", grouped)
-    found = read_shape(tmp_path / f"own.{ending}")
+    write_mesh(tmp_path / "own.vtu", grouped)
+    found = read_shape(tmp_path / "own.vtu")
     assert same(grouped, found) and found.particle("between") is None and len(found.particles("between")) == 0
 
 
 @pytest.mark.usefixtures("mesh_library")
-def test_numbers_name_what_has_no_name(tmp_path):
+def test_numbers_of_parts_are_their_names(tmp_path):
     grouped = mesh_shape(plate(), 5e-3)
-    write_mesh(tmp_path / "own.msh", grouped)
-    # VTU by meshio keeps the numbers of physical groups and loses their names.
-    meshio.read(tmp_path / "own.msh").write(tmp_path / "own.vtu")
-    found = read_shape(tmp_path / "own.vtu")
-    assert len(found.sides) == len(grouped.sides) and len(found.points) == 3 and len(found.parts) == 1
-    assert all(name.isdigit() for name in [*found.sides, *found.points, *found.parts])
     part = {"part": [np.where(grouped.parts["core"][3], 7, 0)]}
     by_meshio(grouped, cell_data=part).write(tmp_path / "part.vtu")
     assert list(read_shape(tmp_path / "part.vtu").parts) == ["7"]
@@ -328,13 +321,8 @@ def test_names_that_cannot_be_used_are_told(tmp_path):
 @pytest.mark.parametrize(
     ("write", "says"),
     [
-        (lambda g: write_mesh("a.vtk", g), "give a name that ends in .vtu or .msh"),
-        (lambda g: write_mesh("a.msh", g.mesh), "give a name that ends in .vtu"),
+        (lambda g: write_mesh("a.vtk", g), "give a name that ends in .vtu"),
         (lambda g: write_mesh("a.vtu", GroupedMesh(g.mesh, {"part": g.sides["left"]})), "is named 'part', by which"),
-        (
-            lambda g: write_mesh("a.msh", GroupedMesh(g.mesh, {"core": g.sides["left"]}, {}, g.parts)),
-            "'core' names groups of two kinds",
-        ),
     ],
 )
 def test_files_that_cannot_hold_a_group_are_not_written(tmp_path, monkeypatch, write, says):

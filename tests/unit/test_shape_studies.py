@@ -220,7 +220,7 @@ PLATE = yaml.safe_load(STUDIES["shape_plate"])
 @pytest.fixture
 def plate(tmp_path):
     grouped = st.mesh_shape(st.Shape.rectangle("100 mm", "40 mm"), "10 mm")
-    write_mesh(tmp_path / "plate.msh", grouped)
+    write_mesh(tmp_path / "plate.vtu", grouped)
     return grouped
 
 
@@ -234,11 +234,11 @@ def test_a_file_is_the_mesh_and_the_geometry(load, plate, tmp_path):
     part = study.parts["shapes"]
     before = mesh_key(part, part.scenes[0])
     (tmp_path / "elsewhere").mkdir()
-    (tmp_path / "plate.msh").rename(tmp_path / "elsewhere/plate.msh")
-    moved = PLATE | {"shapes": {"plate": PLATE["shapes"]["plate"] | {"file": "elsewhere/plate.msh"}}}
+    (tmp_path / "plate.vtu").rename(tmp_path / "elsewhere/plate.vtu")
+    moved = PLATE | {"shapes": {"plate": PLATE["shapes"]["plate"] | {"file": "elsewhere/plate.vtu"}}}
     part = load(yaml.safe_dump(moved), "moved.yaml").parts["shapes"]
     assert mesh_key(part, part.scenes[0]) == before
-    write_mesh(tmp_path / "elsewhere/plate.msh", st.mesh_shape(st.Shape.rectangle("100 mm", "40 mm"), "8 mm"))
+    write_mesh(tmp_path / "elsewhere/plate.vtu", st.mesh_shape(st.Shape.rectangle("100 mm", "40 mm"), "8 mm"))
     assert mesh_key(part, part.scenes[0]) != before
 
 
@@ -247,7 +247,7 @@ def test_a_file_is_the_mesh_and_the_geometry(load, plate, tmp_path):
     [
         ("right", "rihgt", ["shapes.plate.loads.pull", "no group is named 'rihgt'; did you mean 'right'?"]),
         ("left: fixed", "left: {x: 0}", ["supports leave the body free to"]),
-        ("plate.msh", "no.msh", ["is not a file; give its path relative to the study's folder"]),
+        ("plate.vtu", "no.vtu", ["is not a file; give its path relative to the study's folder"]),
         ("definition:", "mesh_size: 5 mm\n    definition:", ["'plate' is a mesh file, which has its own; remove it"]),
         ("    file:", "    parts: {core: steel}\n    file:", ["unknown part 'core'; the file has none"]),
     ],
@@ -263,21 +263,21 @@ STRETCH = 1e3 / (0.04 * 1e-3) * (0.05 / 210e9 + 0.05 / 2e9)
 
 
 @pytest.mark.parametrize(
-    ("ending", "whole", "parts", "material"),
+    ("whole", "parts", "material"),
     [
-        ("msh", True, {"hard": "steel", "soft": "polymer"}, "other"),
-        ("vtu", True, {"hard": "steel"}, "polymer"),
-        ("vtu", True, {"soft": "polymer"}, "steel"),
-        ("msh", False, {"hard": "steel"}, "polymer"),
+        (True, {"hard": "steel", "soft": "polymer"}, "other"),
+        (True, {"hard": "steel"}, "polymer"),
+        (True, {"soft": "polymer"}, "steel"),
+        (False, {"hard": "steel"}, "polymer"),
     ],
 )
-def test_each_part_of_a_file_has_its_material(load, refusal, tmp_path, monkeypatch, ending, whole, parts, material):
+def test_each_part_of_a_file_has_its_material(load, refusal, tmp_path, monkeypatch, whole, parts, material):
     mesh = st.make_mesh(st.Beam("100 mm", "40 mm"), "right", "10 mm")
     left = mesh.points[mesh.triangles, 0].mean(axis=1) < 0.05
     sides = {"left": mesh.outline_edges(0, 0), "right": mesh.outline_edges(0, 0.1), "lower": mesh.outline_edges(1, 0)}
     both = {"hard": {3: left}} | ({"soft": {3: ~left}} if whole else {})
-    write_mesh(tmp_path / f"plate.{ending}", st.GroupedMesh(mesh, sides, {}, both))
-    shape = TWO["shapes"]["plate"] | {"file": f"plate.{ending}", "parts": parts}
+    write_mesh(tmp_path / "plate.vtu", st.GroupedMesh(mesh, sides, {}, both))
+    shape = TWO["shapes"]["plate"] | {"file": "plate.vtu", "parts": parts}
     grid = TWO["shape_grids"]["plate"] | {"material": material, "kinematics": "linear"}
     text = yaml.safe_dump(TWO | {"shapes": {"plate": shape}, "shape_grids": {"plate": grid}})
     study = load(text)
@@ -286,7 +286,7 @@ def test_each_part_of_a_file_has_its_material(load, refusal, tmp_path, monkeypat
     np.testing.assert_allclose(tree["shapes"].value.values.ravel(), STRETCH, rtol=1e-9)
     np.testing.assert_allclose(tree["shapes"].reference_value.values.ravel(), STRETCH, rtol=1e-9)
 
-    body, mesh = study.shape("plate"), st.read_shape(tmp_path / f"plate.{ending}")
+    body, mesh = study.shape("plate"), st.read_shape(tmp_path / "plate.vtu")
     with pytest.raises(ValueError, match="material: one is given, and the body has the parts"):
         st.Scene(body, mesh, study.material(material), "pull")
     materials = study.materials_of("plate", material)
@@ -309,12 +309,10 @@ def test_each_part_of_a_file_has_its_material(load, refusal, tmp_path, monkeypat
     assert said.exit_code == 0 and "stretch +" in said.output, said.output
     del shape["parts"]
     text = yaml.safe_dump(TWO | {"shapes": {"plate": shape}, "shape_grids": {"plate": grid}})
-    assert f"plate.{ending} has parts 'hard'" in refusal(text)
-    path = tmp_path / f"plate.{ending}"  # too large to be looked at as the study is read
-    if ending == "msh":
-        path.write_bytes(
-            b"$Comments\n" + READ_AT_ONCE // 10 * b"nothing at all\n" + b"$EndComments\n" + path.read_bytes()
-        )
+    assert "plate.vtu has parts 'hard'" in refusal(text)
+    path = tmp_path / "plate.vtu"  # too large to be looked at as the study is read
+    if whole:
+        path.write_bytes(path.read_bytes() + b"<!--" + READ_AT_ONCE // 10 * b"nothing at all\n" + b"-->\n")
         cell = scenes(load(text), tmp_path / "results/large")
         assert STATUS[int(cell.status)] == "failed" and "the body has the parts" in cell.message.item()
 
@@ -322,14 +320,14 @@ def test_each_part_of_a_file_has_its_material(load, refusal, tmp_path, monkeypat
 def test_files_of_several_sizes_show_convergence(load, refusal, tmp_path, monkeypatch):
     beam, files = st.Shape.rectangle("100 mm", "40 mm"), []
     for size in (20, 10, 5):
-        write_mesh(tmp_path / f"{size}.msh", st.mesh_shape(beam, f"{size} mm"))
-        files.append({"file": f"{size}.msh", "mesh_size": f"{size} mm"})
+        write_mesh(tmp_path / f"{size}.vtu", st.mesh_shape(beam, f"{size} mm"))
+        files.append({"file": f"{size}.vtu", "mesh_size": f"{size} mm"})
     text = yaml.safe_dump(PLATE | {"shapes": {"plate": PLATE["shapes"]["plate"] | {"file": files}}})
     study = load(text)
     tree, _ = done(study, tmp_path / "results/study")
     data = tree["shapes"].to_dataset().squeeze(drop=True)
     assert data.mesh_size.values.tolist() == [0.005, 0.01, 0.02] and study.axes["mesh_type"] == ("file",)
-    meshes = [st.read_shape(tmp_path / f"{size}.msh").mesh for size in (5, 10, 20)]
+    meshes = [st.read_shape(tmp_path / f"{size}.vtu").mesh for size in (5, 10, 20)]
     assert data.particles.values.tolist() == [len(mesh.points) for mesh in meshes]
     assert np.all(np.diff(np.abs(data.error)) > 0) and np.abs(data.error[0]) < 0.003
     line = st.plot_shape_errors(tree, shape="plate")[0, 0].lines[0]
@@ -342,31 +340,31 @@ def test_files_of_several_sizes_show_convergence(load, refusal, tmp_path, monkey
     assert "100 x 40 mm, steel" in CliRunner().invoke(main, [*predict, "--size", "20 mm"]).output
     message = refusal(text.replace("mesh_size: 10 mm", "mesh_size: 20 mm"))
     assert "shapes.plate.file[1]" in message and "another file has this mesh size" in message
-    write_mesh(tmp_path / "10.msh", st.mesh_shape(st.Shape.rectangle("100 mm", "80 mm"), "10 mm"))
-    assert "10.msh is 100 x 80 mm, and 5.msh 100 x 40 mm; give files of one body and unit" in refusal(text)
+    write_mesh(tmp_path / "10.vtu", st.mesh_shape(st.Shape.rectangle("100 mm", "80 mm"), "10 mm"))
+    assert "10.vtu is 100 x 80 mm, and 5.vtu 100 x 40 mm; give files of one body and unit" in refusal(text)
 
 
 @pytest.mark.filterwarnings("default::springtune.problem.geometry.AssumptionWarning")
 @pytest.mark.parametrize(("unit", "warned"), [({}, True), ({"unit": "1 m"}, False), ({"unit": "1 mm"}, False)])
 def test_extents_are_in_sight(tmp_path, monkeypatch, unit, warned):
     """A file in mm that is read in m."""
-    write_mesh(tmp_path / "plate.msh", st.mesh_shape(st.Shape.rectangle(80, 60), 10))
-    shape = PLATE["shapes"]["plate"] | {"file": "plate.msh"} | unit
+    write_mesh(tmp_path / "plate.vtu", st.mesh_shape(st.Shape.rectangle(80, 60), 10))
+    shape = PLATE["shapes"]["plate"] | {"file": "plate.vtu"} | unit
     (tmp_path / "study.yaml").write_text(yaml.safe_dump(PLATE | {"shapes": {"plate": shape}}))
     monkeypatch.chdir(tmp_path)
     asked = ["--study", "study.yaml", "--material", "steel"]
     for command in (["scenes", "study.yaml"], ["predict", *asked], ["springs", *asked, "--out", "net.csv"]):
         said = CliRunner().invoke(main, command)
         assert ("80 x 60 mm," if unit.get("unit") == "1 mm" else "80 x 60 m,") in said.stdout
-        message = "'plate': 80 x 60 m, since numbers in plate.msh are read in m; give their unit, such as 'unit: 1 mm'"
+        message = "'plate': 80 x 60 m, since numbers in plate.vtu are read in m; give their unit, such as 'unit: 1 mm'"
         assert (message in said.stderr) == warned
 
 
 def test_a_large_file_costs_its_own_scenes(load, plate, tmp_path):
     """What is too large to be looked at as the study is read is looked at by its stages."""
-    comment = b"$Comments\n" + READ_AT_ONCE // 10 * b"nothing at all\n" + b"$EndComments\n"
-    path = tmp_path / "plate.msh"
-    path.write_bytes(comment + path.read_bytes())
+    comment = b"<!--" + READ_AT_ONCE // 10 * b"nothing at all\n" + b"-->\n"
+    path = tmp_path / "plate.vtu"
+    path.write_bytes(path.read_bytes() + comment)
     cell = scenes(load(yaml.safe_dump(PLATE).replace("right", "rihgt")), tmp_path / "results/study")
     assert STATUS[int(cell.status)] == "failed" and "no group is named 'rihgt'" in cell.message.item()
     path.write_bytes(comment + b"$MeshFormat\n")

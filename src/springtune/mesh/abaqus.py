@@ -8,10 +8,19 @@ from typing import NamedTuple
 import numpy as np
 
 from .cells import MeshError
-from .content import IN_OTHER_FILES, Content, places
+from .content import IN_OTHER_FILES, Block, Content, places
 
-MAKERS = re.compile(r"N(GEN|FILL|COPY|MAP)|EL(GEN|COPY)|SYSTEM|PARAMETER|IMPORT|SYMMETRICMODEL\w*|MODELCHANGE")
-"""Keywords that make, move or remove points or cells."""
+KEYWORDS_NOT_READ = {
+    r"N(GEN|FILL|COPY|MAP)|EL(GEN|COPY)|SYSTEM|PARAMETER|IMPORT|SYMMETRICMODEL\w*|MODELCHANGE": (
+        "is not supported; mesh the part in the program and write all nodes and elements"
+    ),
+    "PART|ASSEMBLY|INSTANCE": (
+        "is not supported; write one flat model: in Abaqus/CAE, Model > Edit Attributes > "
+        "Do not use parts and assemblies in input files"
+    ),
+    "INCLUDE": IN_OTHER_FILES,
+}
+"""Keywords that make, move, remove or import points or cells, and why they are refused."""
 
 PLANE_ELEMENTS = re.compile(r"(?:CPS|CPEG?|S?FM3D|M3D|S|STRI|DS|DC2D|R3D|CAX(?=4P$))([34])[A-Z0-9]*")
 """Types of elements in the plane, and their number of points; meshio writes R3D3 and CAX4P."""
@@ -57,76 +66,52 @@ def _sections(text: str) -> Iterator[_Section]:
 
 
 def read(raw: bytes) -> Content:
-    """Read a file of Abaqus: one part, which an instance may move."""
-    sections = list(_sections(raw.decode("utf-8-sig", "replace")))
-    for one in sections:
-        if MAKERS.fullmatch(one.keyword):
-            raise one.refused("is not supported; mesh the part in the program and write all nodes and elements")
-        if one.keyword == "INCLUDE" or ("INPUT" in one.given and one.keyword in ("NODE", "ELEMENT", "NSET", "ELSET")):
-            raise MeshError(IN_OTHER_FILES)
-    instances = [one for one in sections if one.keyword == "INSTANCE"]
-    parts = instances or [one for one in sections if one.keyword == "PART"]
-    if len(parts) > 1:
-        raise parts[1].refused("is a second one, and one is read; write a file for each, or merge the parts")
+    """Read a flat file of Abaqus, without parts and instances."""
     model = _Model()
-    owner, above = None, False
-    for one in sections:
-        if one.keyword in ("ASSEMBLY", "ENDASSEMBLY"):
-            above = one.keyword == "ASSEMBLY"
-        elif one.keyword in ("PART", "INSTANCE", "ENDPART", "ENDINSTANCE"):
-            owner = None if one.keyword.startswith("END") else one
-        elif not (instances and owner and owner.keyword == "PART") or (
-            owner.given.get("NAME", "").upper() == instances[0].given.get("PART", "").upper()
-        ):
-            model.add(one, above and owner is None)
-    return model.content(instances[0] if instances else None)
+    for one in _sections(raw.decode("utf-8-sig", "replace")):
+        for keywords, why in KEYWORDS_NOT_READ.items():
+            if re.fullmatch(keywords, one.keyword):
+                raise one.refused(why)
+        model.add(one)
+    return model.content()
 
 
 class _Model:
-    """Points, elements and sets by kind and name; one of the assembly replaces those of the part with its name."""
+    """Points, elements and sets by kind and name."""
 
     def __init__(self) -> None:
         self.points: list[list[float]] = []
         self.elements: list[tuple[str, np.ndarray]] = []
         self.sets: dict[tuple[str, str], list[np.ndarray]] = defaultdict(list)
         self.shown: dict[str, str] = {}
-        self.of_assembly: set[str] = set()
         self.ranks: dict[str, int] = {}
         self.surfaces: list[str] = []
 
-    def add(self, one: _Section, above: bool) -> None:
-        """Add a section; points of the assembly itself are for reference only."""
-        kind = "ELSET" if one.keyword in ("ELEMENT", "ELSET") else "NSET"
-        name = one.given.get(kind, "")
+    def add(self, one: _Section) -> None:
+        """Add a section."""
         if one.keyword.endswith("SECTION"):
             self.ranks[one.given.get("ELSET", "").upper()] = 2
         if one.keyword == "SURFACE":
             self.surfaces.append(one.given.get("NAME", ""))
-        named = one.keyword in ("NSET", "ELSET") and ("INSTANCE" in one.given or any("." in row for row in one.rows))
-        if one.keyword not in ("NODE", "ELEMENT", "NSET", "ELSET") or (above and not named):
+        reader = {"NODE": self._nodes, "ELEMENT": self._cells, "NSET": self._members, "ELSET": self._members}
+        if one.keyword not in reader:
             return
-        found = {"NODE": self._nodes, "ELEMENT": self._cells}.get(one.keyword, self._members)(one)
-        if above and name.upper() not in self.of_assembly:
-            self.of_assembly.add(name.upper())
-            for of_part in ("NSET", "ELSET"):
-                self.sets.pop((of_part, name.upper()), None)
-        self.sets[kind, name.upper()].append(found)
+        if "INPUT" in one.given:
+            raise MeshError(IN_OTHER_FILES)
+        kind = "ELSET" if one.keyword in ("ELEMENT", "ELSET") else "NSET"
+        name = one.given.get(kind, "")
+        self.sets[kind, name.upper()].append(reader[one.keyword](one))
         if name and "INTERNAL" not in one.given:
             self.shown.setdefault(name.upper(), name)
             self.ranks.setdefault(name.upper(), 0 if one.keyword == "ELEMENT" else 1)
 
     def _nodes(self, one: _Section) -> np.ndarray:
         """Add points, and return their numbers."""
-        system = one.given.get("SYSTEM", "R")[:1].upper()
-        if system not in ("R", "C"):
-            raise one.refused(f"has SYSTEM={system}; write x and y")
-        numbers = ([float(item.upper().replace("D", "E") or 0) for item in row[:4]] for row in one.items())
-        rows = np.array([(row + [0.0] * 3)[:4] for row in numbers]).reshape(-1, 4)
-        if system == "C":
-            spun = rows[:, 1] * np.exp(1j * np.radians(rows[:, 2]))
-            rows[:, 1], rows[:, 2] = spun.real, spun.imag
-        self.points.extend(rows.tolist())
-        return rows[:, 0].astype(np.int64)
+        if one.given.get("SYSTEM", "R").upper() != "R":
+            raise one.refused(f"has SYSTEM={one.given['SYSTEM']}; write x and y")
+        rows = [[float(item.upper().replace("D", "E") or 0) for item in (row + ["", ""])[:4]] for row in one.items()]
+        self.points += [(row + [0.0])[:4] for row in rows]
+        return np.array([row[0] for row in rows], dtype=np.int64)
 
     def _cells(self, one: _Section) -> np.ndarray:
         """Add elements, and return their numbers."""
@@ -142,50 +127,36 @@ class _Model:
         return self.elements[-1][1][:, 0]
 
     def _members(self, one: _Section) -> np.ndarray:
-        """Numbers of points or cells in a set, by numbers, ranges and names of sets."""
+        """Numbers of points or cells in a set, by numbers, ranges and names of sets before it."""
         found = [np.zeros(0, dtype=np.int64)]
-        if one.keyword == "NSET" and "ELSET" in one.given:
-            found += map(np.ravel, self._corners(self._named(one, "ELSET", one.given["ELSET"])))
-        for items in one.items():
-            row = [item.rpartition(".")[2] for item in items]  # without the instance's name
+        wanted = [("ELSET", one.given["ELSET"])] if one.keyword == "NSET" and "ELSET" in one.given else []
+        for row in one.items():
             numbers = [int(item) for item in row if item.isdigit()]
             if "GENERATE" in one.given:
                 numbers = [*range(numbers[0], numbers[1] + 1, (*numbers, 1)[2])]
             found.append(np.array(numbers, dtype=np.int64))
-            found += [self._named(one, one.keyword, item) for item in row if item and not item.isdigit()]
-        return np.concatenate(found)
-
-    def _named(self, one: _Section, kind: str, name: str) -> np.ndarray:
-        """Numbers in a set that stands before."""
-        if not (found := self.sets.get((kind, name.upper()))):
-            raise one.refused(f"has the set '{name}', which is not before it; put it there")
+            wanted += [(one.keyword, item) for item in row if item and not item.isdigit()]
+        for kind, name in wanted:
+            if not (before := self.sets.get((kind, name.upper()))):
+                raise one.refused(f"has the set '{name}', which is not before it; put it there")
+            members = np.concatenate(before)
+            found += [members] if kind == one.keyword else map(np.ravel, self._corners(members))
         return np.concatenate(found)
 
     def _corners(self, cells: np.ndarray) -> list[np.ndarray]:
         """Points of elements, by block."""
         return [rows[np.isin(rows[:, 0], cells), 1:] for _, rows in self.elements]
 
-    def content(self, instance: _Section | None) -> Content:
+    def content(self) -> Content:
         """Return all of it."""
         table = np.array(self.points).reshape(-1, 4)
-        tags, points = table[:, 0].astype(np.int64), table[:, 1:]
-        moved = [[float(item or 0) for item in row] for row in instance.items()] if instance else []
-        if moved:
-            points = points + moved[0][:3]
-        if len(moved) > 1:
-            from scipy.spatial.transform import Rotation
-
-            start, end, angle = np.array(moved[1][:3]), np.array(moved[1][3:6]), np.radians(moved[1][6])
-            axis = (end - start) / np.linalg.norm(end - start)
-            points = start + Rotation.from_rotvec(angle * axis).apply(points - start)
-        content = Content(points)
+        tags = table[:, 0].astype(np.int64)
+        corners = places(tags, [rows[:, 1:] for _, rows in self.elements])
+        content = Content(table[:, 1:], [Block(kind, found) for (kind, _), found in zip(self.elements, corners)])
         for name in self.surfaces:
             if name.upper() not in self.shown:
                 content.unusable[name] = "is a `*SURFACE`, which is not read; give a set of its points"
-        for (kind, _), corners in zip(self.elements, places(tags, [rows[:, 1:] for _, rows in self.elements])):
-            content.add(kind, corners)
-        cells = [rows[:, 0] for _, rows in self.elements]
-        every = np.concatenate([tags[:0], *cells])
+        every = np.concatenate([tags[:0], *(rows[:, 0] for _, rows in self.elements)])
         if len(np.unique(every)) < len(every):
             raise MeshError("elements have one number twice; renumber them")
         body = np.concatenate([tags[:0], *(rows[:, 0] for kind, rows in self.elements if kind != "line")])
@@ -198,15 +169,15 @@ class _Model:
                 del sets["ELSET", name]  # the cells along a side
         parts = {name: np.intersect1d(chosen, body) for (kind, name), chosen in sets.items() if kind == "ELSET"}
         for (kind, name), chosen in sets.items():
-            shown = self.shown[name]
-            if not np.isin(chosen, every if kind == "ELSET" else tags).all():
+            shown, known = self.shown[name], every if kind == "ELSET" else tags
+            if not np.isin(chosen, known).all():
                 content.unusable[shown] = "has what is not in the file; remove this"
             elif kind == "NSET":
-                content.point_sets[shown] = places(tags, [chosen])[0]
+                content.point_groups[shown] += places(tags, [chosen])
             elif better := [self.shown[one] for one in parts if self._better(name, one, parts, len(body))]:
                 content.unusable[shown] = f"has cells of '{better[0]}', which is a part; use that"
             else:
-                content.members += [(shown, n, np.flatnonzero(np.isin(ids, chosen))) for n, ids in enumerate(cells)]
+                content.cell_groups[shown] = [np.flatnonzero(np.isin(every, chosen))]
         return content
 
     def _better(self, name: str, other: str, parts: dict[str, np.ndarray], total: int) -> bool:

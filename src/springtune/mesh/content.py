@@ -1,7 +1,8 @@
-"""What a mesh file has: points, cells and sets of both. Readers of single formats return it."""
+"""What a mesh file has: points, cells and groups of both. Readers of single formats return it."""
 
+from collections import defaultdict
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,23 +24,21 @@ class Block(NamedTuple):
 
 @dataclass
 class Content:
-    """Content of a mesh file, with the names of meshio's `Mesh`; `members` are set, number of block and cells in it."""
+    """Content of a mesh file.
+
+    `cell_groups` are numbers of cells, counted through all blocks, and `point_groups` numbers of points, in one or more
+    arrays; `unusable` are reasons why other groups of the file are left out.
+    """
 
     points: np.ndarray
-    cells: list[Block] = field(default_factory=list)
-    members: list[tuple[str, int, np.ndarray]] = field(default_factory=list)
-    point_sets: dict[str, np.ndarray] = field(default_factory=dict)
-    point_data: dict[str, np.ndarray] = field(default_factory=dict)
-    cell_data: dict[str, list[np.ndarray]] = field(default_factory=dict)
-    cell_sets: dict[str, Any] = field(default_factory=dict)
-    field_data: dict[str, tuple[int, ...]] = field(default_factory=dict)
+    cells: list[Block]
+    cell_groups: dict[str, list[np.ndarray]] = field(default_factory=lambda: defaultdict(list))
+    point_groups: dict[str, list[np.ndarray]] = field(default_factory=lambda: defaultdict(list))
     unusable: dict[str, str] = field(default_factory=dict)
 
-    def add(self, kind: str, corners: np.ndarray, *names: str) -> int:
-        """Add a block whose cells are in these sets, and return its number."""
-        self.cells.append(Block(kind, corners))
-        self.members += [(name, len(self.cells) - 1, np.arange(len(corners))) for name in names]
-        return len(self.cells) - 1
+    def starts(self) -> list[int]:
+        """Number of the first cell of each block, and of all cells."""
+        return [0, *np.cumsum([len(block.data) for block in self.cells]).tolist()]
 
 
 def places(tags: np.ndarray, wanted: list[np.ndarray]) -> list[np.ndarray]:

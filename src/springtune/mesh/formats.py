@@ -1,4 +1,4 @@
-"""Mesh files: Gmsh's, Abaqus', Nastran's and Exodus by readers of their own, all others by meshio.
+"""Mesh files: Gmsh's 4.1 and Abaqus' by readers of their own, all others by meshio.
 
 Groups are Gmsh's physical groups, sets of Abaqus and others, and marks in VTU.
 """
@@ -7,10 +7,9 @@ import io
 import re
 import warnings
 from collections import defaultdict
-from collections.abc import Callable, Iterator
 from contextlib import redirect_stderr, redirect_stdout, suppress
-from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -18,9 +17,9 @@ import numpy as np
 from ..registry import NAME, NAME_RULE
 from ..safe_io.atomic import check_folder, replacing
 from ..safe_io.inputs import BeyondBound, DataElsewhere, bounded, check_alone, fault
-from . import abaqus, exodus, gmsh, nastran, vtu
+from . import abaqus, gmsh
 from .cells import Mesh, MeshError, no_cells, signed_areas
-from .content import IN_OTHER_FILES, LINEAR
+from .content import IN_OTHER_FILES, LINEAR, Block, Content
 from .groups import GroupedMesh, part_names
 from .sheets import DIGITS, box_fault, in_words, on_sides, outline_of, sheet_fault
 
@@ -33,24 +32,23 @@ CELL_DIMENSIONS = {"vertex": 0, "line": 1, "triangle": 2, "quad": 2}
 PART_NUMBERS = "part"
 """Cell data whose whole numbers are parts of the body; 0 is the main one."""
 
-PHYSICAL = "gmsh:physical"
-"""Cell data in which meshio gives numbers of Gmsh's physical groups; 0 is none."""
-
-TAGS = (PHYSICAL, "medit:ref", "avsucd:material", "su2:tag", "ugrid:ref", "netgen:index")
-"""Cell data in which meshio gives numbers of groups; 0 is none."""
+TAGS = (PART_NUMBERS, "gmsh:physical", "medit:ref", "avsucd:material", "su2:tag", "ugrid:ref", "netgen:index")
+"""Cell data with numbers of groups; 0 is none."""
 
 FAMILIES = ("cell_tags", "point_tags")
 """Data in which meshio gives families of MED, and attributes with the groups of each."""
 
-READERS: dict[str, Callable[[bytes], Any]] = {
-    ".inp": abaqus.read,
-    **dict.fromkeys((".bdf", ".nas", ".fem"), nastran.read),
-    **dict.fromkeys((".e", ".exo", ".ex2"), exodus.read),
-}
-"""Readers of a file's bytes, by ending."""
+COPIED = ("vtkGhostType", "vtkGhostLevels")
+"""Data in which what belongs to other files is not 0."""
 
-COMPANIONS = (".xdmf", ".xmf", ".node", ".ele", ".pvtu", ".pvd", ".vtm")
-"""Endings of files that hold only a part of a mesh."""
+ENDINGS_NOT_READ = {
+    **dict.fromkeys((".xdmf", ".xmf", ".node", ".ele", ".pvtu", ".pvd", ".vtm"), IN_OTHER_FILES),
+    **dict.fromkeys(
+        (".bdf", ".nas", ".fem"), "is of Nastran, which is not read; export it as .msh, .inp, .med or .vtu"
+    ),
+    **dict.fromkeys((".e", ".exo", ".ex2"), "is of Exodus, which is not read; export it as .msh, .inp, .med or .vtu"),
+}
+"""Why files are refused by their ending: meshio would not see parts of them, or their groups."""
 
 LARGEST_FILE = 60_000_000
 """Bytes of the largest file that is read: formats in text take a second for some megabytes."""
@@ -79,17 +77,14 @@ def library() -> Any:
 
 
 def write_mesh(path: str | Path, mesh: Mesh | GroupedMesh) -> None:
-    """Write a mesh atomically, with its groups.
+    """Write a mesh atomically as ``.vtu``, with its groups as cell data of zeros and ones.
 
-    Sides become lines and points vertices. ``.vtu`` has cell data of zeros and ones for each group, ``.msh`` (Gmsh
-    format 2.2) physical groups. `springtune.read_shape` reads both.
+    Sides become lines and points vertices. `springtune.read_shape` reads them.
     """
     if not isinstance(mesh, Mesh | GroupedMesh):
         raise MeshError(f"mesh: {type(mesh).__name__} is not a Mesh; give a springtune.Mesh")
-    kinds = {".vtu": "vtu", **({".msh": "gmsh22"} if isinstance(mesh, GroupedMesh) else {})}
-    ending = Path(path).suffix
-    if ending not in kinds:
-        raise MeshError(f"{path}: is not to end in '{ending}'; give a name that ends in {' or '.join(kinds)}")
+    if Path(path).suffix != ".vtu":
+        raise MeshError(f"{path}: is not to end in '{Path(path).suffix}'; give a name that ends in .vtu")
     check_folder(path)
     grouped = mesh if isinstance(mesh, GroupedMesh) else GroupedMesh(mesh)
     mesh = grouped.mesh
@@ -97,51 +92,29 @@ def write_mesh(path: str | Path, mesh: Mesh | GroupedMesh) -> None:
         raise MeshError(f"{path}: a mesh file has no place for {len(mesh.bonds)} bonds; write the springs of a scene")
     # A named point that is no particle becomes a point of its own.
     places: list[np.ndarray] = []
-    blocks: list[tuple[str, np.ndarray, list[str]]] = []
+    blocks: list[tuple[str, np.ndarray, str]] = []
     labels = part_names(grouped)
     for name, count in CELLS.items():
         for part in ("", *grouped.parts) if count in labels else ():
             mask = labels[count] == part
             if mask.any():
-                blocks.append((name, mesh.cells[count][mask], [part] * bool(part)))
-    blocks += [("line", edges, [side]) for side, edges in grouped.sides.items()]
+                blocks.append((name, mesh.cells[count][mask], part))
+    blocks += [("line", edges, side) for side, edges in grouped.sides.items()]
     for point, place in grouped.points.items():
         number = grouped.particle(point)
         if number is None:
             number = len(mesh.points) + len(places)
             places.append(np.asarray(place))
-        blocks.append(("vertex", np.array([[number]]), [point]))
-    points = np.concatenate([mesh.points, np.reshape(places, (-1, 2))])
-    points = np.column_stack([points, np.zeros(len(points))])
-    data, fields = (_vtu_marks if ending == ".vtu" else _gmsh_tags)(path, blocks)
-    cells = [(kind, corners) for kind, corners, _ in blocks]
-    content = library().Mesh(points, cells, cell_data=data, field_data=fields)
-    with replacing(path) as unfinished:
-        content.write(unfinished, file_format=kinds[ending])
-
-
-def _vtu_marks(
-    path: str | Path, blocks: list[tuple[str, np.ndarray, list[str]]]
-) -> tuple[dict[str, list[np.ndarray]], dict[str, np.ndarray]]:
-    """Cell data of zeros and ones by group, and no field data."""
-    names = dict.fromkeys(name for *_, names in blocks for name in names)
+        blocks.append(("vertex", np.array([[number]]), point))
+    names = dict.fromkeys(group for *_, group in blocks if group)
     if PART_NUMBERS in names:
         raise MeshError(f"{path}: a group is named '{PART_NUMBERS}', by which VTU files number parts; rename it")
-    return {name: [np.full(len(corners), name in of, dtype=np.int8) for _, corners, of in blocks] for name in names}, {}
-
-
-def _gmsh_tags(
-    path: str | Path, blocks: list[tuple[str, np.ndarray, list[str]]]
-) -> tuple[dict[str, list[np.ndarray]], dict[str, np.ndarray]]:
-    """Numbers of physical groups, and their names."""
-    fields: dict[str, np.ndarray] = {}
-    tags = []
-    for kind, corners, names in blocks:
-        for name in names:
-            if fields.setdefault(name, np.array([len(fields) + 1, CELL_DIMENSIONS[kind]]))[1] != CELL_DIMENSIONS[kind]:
-                raise MeshError(f"{path}: '{name}' names groups of two kinds, and Gmsh's are of one; write .vtu")
-        tags.append(np.full(len(corners), fields[names[0]][0] if names else 0))
-    return {PHYSICAL: tags, "gmsh:geometrical": tags}, fields
+    points = np.concatenate([mesh.points, np.reshape(places, (-1, 2))])
+    points = np.column_stack([points, np.zeros(len(points))])
+    data = {name: [np.full(len(corners), name == own, dtype=np.int8) for _, corners, own in blocks] for name in names}
+    content = library().Mesh(points, [(kind, corners) for kind, corners, _ in blocks], cell_data=data)
+    with replacing(path) as unfinished:
+        content.write(unfinished, file_format="vtu")
 
 
 def read_mesh(path: str | Path, unit: float = 1.0) -> Mesh:
@@ -165,52 +138,61 @@ def read_mesh(path: str | Path, unit: float = 1.0) -> Mesh:
         If the file is unreadable or too large, has no linear triangles or quadrilaterals or other cells, cells with
         missing points, points that are not finite or not in one plane, or cells without area.
     """
-    return assembled(path, file_content(path), unit)[0]
+    return _assembled(path, _file_content(path), unit)[0]
 
 
 def read_stored(path: str | Path) -> Mesh:
     """Read a mesh that `write_mesh` wrote and whose checksum was compared: of any size."""
-    return assembled(path, library().read(path), 1.0, np.inf)[0]
+    return _assembled(path, _by_meshio(library().read(path)), 1.0, np.inf)[0]
 
 
-def assembled(path: str | Path, content: Any, unit: float, most: float = MOST_IN_FILE) -> tuple[Mesh, np.ndarray]:
-    """Return the mesh of meshio's data, and its particles' numbers in the file; `unit` in m."""
-    cells = _read_cells(path, content)
-    used = np.unique(np.concatenate([corners.ravel() for corners in cells.values()]))
+def _assembled(path: str | Path, content: Content, unit: float, most: float = MOST_IN_FILE) -> tuple[Mesh, np.ndarray]:
+    """Return the mesh of a file, and its particles' numbers in the file; `unit` in m."""
+    if len(content.points) > most:
+        raise MeshError(f"{path}: {len(content.points)} points, and at most {most} are read; write a coarser mesh")
+    cells: dict[int, list[np.ndarray]] = defaultdict(list)
+    for kind, corners in content.cells:
+        if kind not in CELL_DIMENSIONS:
+            raise MeshError(f"{path}: has cells '{kind}'; {LINEAR}")
+        if kind in CELLS and len(corners):
+            cells[CELLS[kind]].append(corners)
+    if not cells:
+        raise MeshError(f"{path}: no cell block 'triangle' or 'quad'; write the mesh with triangles or quadrilaterals")
+    joined = {count: np.concatenate(blocks).astype(np.int64) for count, blocks in cells.items()}
+    used = np.unique(np.concatenate([corners.ravel() for corners in joined.values()]))
     with np.errstate(over="ignore"):  # what is too far away is refused
-        points = _read_points(path, unit * coordinates(path, content, most), used)
-    for count, corners in cells.items():
-        cells[count] = _counter_clockwise(path, points, np.searchsorted(used, corners))
-    return Mesh(points, cells.get(3, no_cells(3)), cells.get(4, no_cells(4))), used
+        points = _read_points(path, unit * content.points, used)
+    for count, corners in joined.items():
+        joined[count] = _counter_clockwise(path, points, np.searchsorted(used, corners))
+    return Mesh(points, joined.get(3, no_cells(3)), joined.get(4, no_cells(4))), used
 
 
-def file_content(path: str | Path) -> Any:
-    """Read a file by meshio; a MeshError gives the reason for a failure."""
+def _file_content(path: str | Path) -> Content:
+    """Read a file; a MeshError gives the reason for a failure."""
     if fault(path):
         raise MeshError(f"{path}: there is no such file; give the path of a mesh file")
-    size = Path(path).stat().st_size
+    size, ending = Path(path).stat().st_size, Path(path).suffix.lower()
     if size == 0:
         raise MeshError(f"{path}: the file is empty; write the mesh again")
     if size > LARGEST_FILE:
         most = f"at most {LARGEST_FILE // 1_000_000} MB are read"
         raise MeshError(f"{path}: {size / 1e6:.0f} MB, and {most}; write a coarser mesh, or binary VTU")
-    content = Path(path).read_bytes()
-    ending = Path(path).suffix.lower()
-    if ending in COMPANIONS:
-        raise MeshError(f"{path}: {IN_OTHER_FILES}")
-    if HDF5 in content:
+    if ending in ENDINGS_NOT_READ:
+        raise MeshError(f"{path}: {ENDINGS_NOT_READ[ending]}")
+    raw = Path(path).read_bytes()
+    if HDF5 in raw:
         try:
             with suppress(OSError):  # meshio says it
                 check_alone(path)
         except DataElsewhere as error:
             raise MeshError(str(error)) from None
-    told, memory, package = io.StringIO(), READ_MEMORY + READ_MEMORY_SHARE * size, library()
+    told, memory = io.StringIO(), READ_MEMORY + READ_MEMORY_SHARE * size
     try:
         # meshio tells people of what it leaves out, and exits where it does not know the format.
         with redirect_stdout(told), redirect_stderr(told), warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
             with bounded(memory, READ_SECONDS + READ_SECONDS_SHARE * size):
-                return _read(path, content, ending)
+                return _read(path, raw, ending)
     except MeshError as error:
         raise MeshError(f"{path}: {error}") from None
     except MemoryError as error:
@@ -227,53 +209,93 @@ def file_content(path: str | Path) -> Any:
         said = said if re.search(r"\w{2} \S", said) else ""  # a key alone says nothing
         shown = f" ({said[:LONGEST_SAID]}{'...' * (len(said) > LONGEST_SAID)})" if said else ""
         why = f"it is damaged, or has what is not supported{shown}; write it again, in text, or as .vtu"
-        if ending not in {**package.extension_to_filetypes, **READERS}:
+        if ending not in library().extension_to_filetypes:
             why = f"unknown format '{Path(path).suffix}'; convert it to .vtu or .msh"
         raise MeshError(f"{path}: cannot be read: {why}") from None
 
 
-def _read(path: str | Path, content: bytes, ending: str) -> Any:
+def _read(path: str | Path, raw: bytes, ending: str) -> Content:
     """Content of a file, by the reader of its format."""
-    if ending in READERS:
-        return READERS[ending](content)
+    if ending == ".inp":
+        return abaqus.read(raw)
     if ending == ".vtu":
-        return vtu.read(path, content, library().read)
-    if ending == ".msh" and content.lstrip()[:1] == b"$":  # others are of Ansys
-        return gmsh.read(content, partial(library().read, path))
-    return library().read(path)
+        return _read_vtu(raw)
+    if ending == ".msh" and raw.lstrip()[:1] == b"$":  # others are of Ansys
+        return gmsh.read(raw) or gmsh.check_once(_by_meshio(library().read(path)))
+    return _by_meshio(library().read(path))
 
 
-def coordinates(path: str | Path, content: Any, most: float = MOST_IN_FILE) -> np.ndarray:
-    """Coordinates of all points, shape (n_points, 2 or 3)."""
+def _read_vtu(raw: bytes) -> Content:
+    """Content of a VTU file of one piece, with all of its mesh."""
+    head, mark, tail = raw.partition(b"<AppendedData")
+    if re.search(rb"compressor\s*=\s*.vtkLZ4", head):
+        raise MeshError("is compressed by LZ4, which is not read; write it with ZLib, or without compression")
+    if re.search(rb"type\s*=\s*.P(Unstr|Poly)", head):
+        raise MeshError(IN_OTHER_FILES)
+    pieces = len(re.findall(rb"<Piece\b", head))
+    if pieces > 1:
+        raise MeshError(f"has {pieces} pieces, and one is read; join them, in ParaView by the filter Clean to Grid")
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "piece.vtu"
+        # Version 2 tells copies and polyhedra in another way, cells alike; meshio knows version 1.
+        file.write_bytes(re.sub(rb"(<VTKFile[^>]*version\s*=\s*.)2\.\d", rb"\g<1>1.0", head) + mark + tail)
+        found = library().read(file)
+    if any(np.any(array) for key in COPIED for array in found.cell_data.get(key, ())):
+        raise MeshError(IN_OTHER_FILES)
+    return _by_meshio(found)
+
+
+def _by_meshio(found: Any) -> Content:
+    """Content of what meshio read: its groups are sets, numbers in cell data, and marks of zeros and ones."""
     try:
-        points = np.asarray(content.points, dtype=float)
+        points = np.asarray(found.points, dtype=float)
     except (TypeError, ValueError, OverflowError):
-        raise MeshError(f"{path}: coordinates that are no numbers; write the mesh again") from None
+        raise MeshError("coordinates that are no numbers; write the mesh again") from None
     if points.ndim != 2 or points.shape[1] not in (2, 3):
         shape = " x ".join(map(str, points.shape))
-        raise MeshError(f"{path}: coordinates of points are {shape}, not 2 or 3 for each; write the mesh again")
-    if len(points) > most:
-        raise MeshError(f"{path}: {len(points)} points, and at most {most} are read; write a coarser mesh")
-    return points
+        raise MeshError(f"coordinates of points are {shape}, not 2 or 3 for each; write the mesh again")
+    content = Content(points, [Block(block.type, np.asarray(block.data)) for block in found.cells])
+    for kind, corners in content.cells:
+        if kind in CELLS and len(corners) and (corners.shape[1:] != (CELLS[kind],) or corners.dtype.kind not in "iu"):
+            shape = f"numbers {corners.dtype} of shape {corners.shape}"
+            raise MeshError(f"cells '{kind}' by {shape}; write the mesh again")
+    starts = content.starts()
+    for name in found.field_data:
+        content.cell_groups[name] = []
+    for name, blocks in found.cell_sets.items():
+        content.cell_groups[name] = [np.ravel(own).astype(int) + start for own, start in zip(blocks, starts)]
+    for name, nodes in found.point_sets.items():
+        content.point_groups[name].append(np.ravel(nodes).astype(np.int64))
+    dimensions = np.repeat([CELL_DIMENSIONS.get(kind, 3) for kind, _ in content.cells], np.diff(starts))
+    names = {tuple(map(int, one)): name for name, one in found.field_data.items() if len(one) == 2}
+    for key, arrays in found.cell_data.items():
+        values = np.concatenate(arrays)
+        if key in TAGS and values.dtype.kind in "iu":
+            for tag, dimension in np.unique(np.stack([values, dimensions])[:, values != 0], axis=1).T.tolist():
+                name = names.get((tag, dimension), str(tag))
+                content.cell_groups[name].append(np.flatnonzero((values == tag) & (dimensions == dimension)))
+        else:
+            _add_marked(found, content, key, values, content.cell_groups)
+    for key, values in found.point_data.items():
+        _add_marked(found, content, key, np.asarray(values), content.point_groups)
+    return content
 
 
-def _read_cells(path: str | Path, content: Any) -> dict[int, np.ndarray]:
-    """Corner indices of what meshio read, by number of corners; refused where cells are of other types."""
-    cells: dict[int, list[np.ndarray]] = {}
-    for block in content.cells:
-        if block.type in CELLS:
-            data = np.asarray(block.data)
-            if not len(data):
-                continue
-            if data.ndim != 2 or data.shape[1] != CELLS[block.type] or data.dtype.kind not in "iu":
-                shape = f"numbers {data.dtype} of shape {data.shape}"
-                raise MeshError(f"{path}: cells '{block.type}' by {shape}; write the mesh again")
-            cells.setdefault(CELLS[block.type], []).append(data)
-        elif block.type not in CELL_DIMENSIONS:
-            raise MeshError(f"{path}: has cells '{block.type}'; {LINEAR}")
-    if not cells:
-        raise MeshError(f"{path}: no cell block 'triangle' or 'quad'; write the mesh with triangles or quadrilaterals")
-    return {count: np.concatenate(blocks).astype(np.int64) for count, blocks in cells.items()}
+def _add_marked(
+    found: Any, content: Content, key: str, values: np.ndarray, groups: dict[str, list[np.ndarray]]
+) -> None:
+    """Add groups by data of cells or points: families of MED, or a mark."""
+    if values.ndim != 1 or values.dtype.kind not in "iub":
+        return
+    if key in FAMILIES:
+        for tag, names in getattr(found, key, {}).items():
+            for name in names:
+                groups[name].append(np.flatnonzero(values == tag))
+    elif ":" not in key and np.isin(values, (0, 1)).all() and values.any():
+        groups[key].append(np.flatnonzero(values))
+    elif ":" not in key:
+        what = "has other values than 0 and 1" if values.any() else "is 0 all over"
+        content.unusable[key] = f"{what} in the file; mark what belongs to it by 1"
 
 
 def _read_points(path: str | Path, points: np.ndarray, used: np.ndarray) -> np.ndarray:
@@ -350,158 +372,93 @@ def read_shape(path: str | Path, unit: float = 1.0) -> GroupedMesh:
     MeshError
         As `read_mesh`, and if the cells are not a conforming plane sheet.
     """
-    content = file_content(path)
-    mesh, used = assembled(path, content, unit)
+    content = _file_content(path)
+    mesh, used = _assembled(path, content, unit)
     fault = sheet_fault(mesh)
     if fault:
         raise MeshError(f"{path}: {fault}")
-    return _Groups(mesh, used, unit * coordinates(path, content)[:, :2], content).grouped()
+    return _Groups(mesh, used, unit * content.points[:, :2]).grouped(content)
 
 
 class _Groups:
-    """Groups of a file, by what meshio read."""
+    """Groups of a mesh by numbers of points in its file."""
 
-    def __init__(self, mesh: Mesh, used: np.ndarray, places: np.ndarray, content: Any):
-        self.mesh, self.places, self.content = mesh, places, content
-        self.numbers = np.full(len(places), -1)
-        self.numbers[used] = np.arange(len(used))
-        self.sides: dict[str, np.ndarray] = {}
-        self.points: dict[str, np.ndarray] = {}
-        self.parts: dict[str, dict[int, np.ndarray]] = {}
-        self.unusable: dict[str, str] = dict(getattr(content, "unusable", {}))
-        self.cell_sets = [name for name in content.cell_sets if not name.startswith("gmsh:")]
+    def __init__(self, mesh: Mesh, used: np.ndarray, places: np.ndarray):
+        self.mesh, self.places = mesh, places
+        self.particles = np.full(len(places), -1)
+        self.particles[used] = np.arange(len(used))
         self.outline, _ = outline_of(mesh)
-        self.codes = self.outline @ [len(mesh.points), 1]
 
-    def grouped(self) -> GroupedMesh:
-        """The mesh with what can be groups of it."""
-        lines: dict[str, list[np.ndarray]] = defaultdict(list)
-        points: dict[str, list[np.ndarray]] = defaultdict(list)
-        cells: dict[str, dict[int, np.ndarray]] = {}
-        blocks = self.content.cells
-        for name, number, chosen in self._sets():
-            block = blocks[number] if number >= 0 else None
-            if block is None and len(chosen):
-                points[name].append(chosen)
-            if block is None or not len(chosen):
+    def grouped(self, content: Content) -> GroupedMesh:
+        """Return the mesh with its groups, and the reasons why others are not usable."""
+        sides, points, parts = {}, {}, {}
+        unusable = dict(content.unusable)
+        for name in {**content.cell_groups, **content.point_groups}:
+            if ":" in name or name in unusable:  # others are notes of a format, as of MED
                 continue
-            if not 0 <= chosen.min() <= chosen.max() < len(block.data):
-                self.unusable[name] = "has cells that are not in the file; remove these"
-            elif block.type in CELLS:
-                # Cells of one number of corners stand in the mesh in the order of the file's blocks.
-                before = sum(len(other.data) for other in blocks[:number] if other.type == block.type)
-                none = {count: np.zeros(len(corners), dtype=bool) for count, corners in self.mesh.cells.items()}
-                cells.setdefault(name, none)[CELLS[block.type]][before + chosen] = True
-            elif block.type in CELL_DIMENSIONS:
-                (lines if block.type == "line" else points)[name].append(np.asarray(block.data)[chosen])
-        for name in {**lines, **points, **cells}:
-            if not NAME.fullmatch(name):
-                self.unusable[name] = f"cannot be a name; {NAME_RULE}"
-            given = [one.ravel() for one in [*lines.get(name, []), *points.get(name, [])]]
-            if any(not 0 <= one.min() <= one.max() < len(self.numbers) for one in given):
-                self.unusable[name] = "has points that are not in the file; remove these"
-            if name in self.unusable:
+            try:
+                lines, nodes, cells = self._members(name, content)
+                edges = self._sides(lines, nodes)
+            except MeshError as error:
+                unusable[name] = str(error)
                 continue
-            if name in lines:
-                self._add_lines(name, np.unique(np.concatenate(lines[name]).reshape(-1, 2), axis=0))
-            if name in points and name not in self.unusable:
-                self._add_points(name, np.unique(np.concatenate(points[name])))
-        self._add_parts({name: masks for name, masks in cells.items() if name not in self.unusable})
-        for name in [name for name in self.sides if name in self.points]:
-            del self.points[name], self.sides[name]
-            self.unusable[name] = "names sides and a point in the file; rename one"
-        for name in (*self.content.field_data, *self.content.point_sets, *self.content.cell_sets):
-            if ":" not in name and name not in {*lines, *points, *cells}:  # others are notes of a format, as of MED
-                self.unusable.setdefault(name, "has nothing in the file; put something in it")
-        return GroupedMesh(self.mesh, self.sides, self.points, self.parts, self.unusable)
+            if len(edges):
+                sides[name] = edges
+            elif len(nodes):
+                points[name] = self.places[nodes[0]]
+            if any(mask.any() for mask in cells.values()) and not all(mask.all() for mask in cells.values()):
+                parts[name] = cells
+        for name, cells in parts.items():
+            others = (one for one in parts if one != name and any((cells[n] & parts[one][n]).any() for n in cells))
+            if other := next(others, ""):
+                unusable[name] = f"has cells that part '{other}' has, too; a cell has one material"
+        parts = {name: cells for name, cells in parts.items() if name not in unusable}
+        return GroupedMesh(self.mesh, sides, points, parts, unusable)
 
-    def _sets(self) -> Iterator[tuple[str, int, np.ndarray]]:
-        """Name, number of the block of cells, or -1 for points, and numbers of members in it, of all sets."""
-        content = self.content
-        yield from getattr(content, "members", ())
-        for name in self.cell_sets:
-            parts = content.cell_sets[name]
-            if len(parts) != len(content.cells):
-                self.unusable[name] = "is a set of which meshio does not tell the cells; give it as cells"
-                continue
-            yield from ((name, n, np.ravel(part).astype(np.int64)) for n, part in enumerate(parts) if part is not None)
-        for key, arrays in content.cell_data.items():
-            for number, (values, block) in enumerate(zip(arrays, content.cells)):
-                if block.type in CELL_DIMENSIONS:
-                    for name, chosen in self._in_data(key, values, arrays, CELL_DIMENSIONS[block.type]):
-                        yield name, number, chosen
-        yield from ((name, -1, np.ravel(nodes).astype(np.int64)) for name, nodes in content.point_sets.items())
-        for key, values in content.point_data.items():
-            yield from ((name, -1, chosen) for name, chosen in self._in_data(key, values, [values]))
+    def _members(self, name: str, content: Content) -> tuple[np.ndarray, np.ndarray, dict[int, np.ndarray]]:
+        """Lines (n, 2) and points of a group, by points of the file, and masks of its cells by number of corners."""
+        starts = content.starts()
+        mask = np.zeros(starts[-1], dtype=bool)
+        chosen = np.concatenate([[], *content.cell_groups.get(name, [])]).astype(np.int64)
+        if len(chosen) and not 0 <= chosen.min() <= chosen.max() < len(mask):
+            raise MeshError("has cells that are not in the file; remove these")
+        mask[chosen] = True
+        cells = [(kind, corners, own) for (kind, corners), own in zip(content.cells, np.split(mask, starts[1:-1]))]
+        lines = [corners[own] for kind, corners, own in cells if kind == "line"]
+        vertices = [corners[own].ravel() for kind, corners, own in cells if kind == "vertex"]
+        masks = {n: np.concatenate([own for kind, _, own in cells if CELLS.get(kind) == n]) for n in self.mesh.cells}
+        edges = np.unique(np.concatenate([np.zeros((0, 2), dtype=np.int64), *lines]), axis=0)
+        nodes = np.unique(np.concatenate([[], *vertices, *content.point_groups.get(name, [])]).astype(np.int64))
+        if not NAME.fullmatch(name):
+            raise MeshError(f"cannot be a name; {NAME_RULE}")
+        if not mask.any() and not len(nodes):
+            raise MeshError("has nothing in the file; put something in it")
+        if any(len(own) and not 0 <= own.min() <= own.max() < len(self.places) for own in (edges, nodes)):
+            raise MeshError("has points that are not in the file; remove these")
+        return edges, nodes, masks
 
-    def _in_data(
-        self, key: str, given: Any, arrays: list[Any], dimension: int = -1
-    ) -> Iterator[tuple[str, np.ndarray]]:
-        """Groups in an array of data, by families of MED, numbers of groups or marks, and their members."""
-        values = np.asarray(given)
-        if values.ndim != 1 or values.dtype.kind not in "iub":
-            return
-        if key in FAMILIES:
-            found = [(name, tag) for tag, names in getattr(self.content, key, {}).items() for name in names]
-        elif dimension >= 0 and key == PART_NUMBERS:
-            found = [(str(tag), tag) for tag in np.unique(values[values != 0]).tolist()]
-        elif dimension >= 0 and key in TAGS:
-            known = {tuple(map(int, one)): name for name, one in self.content.field_data.items() if len(one) == 2}
-            found = [(known.get((tag, dimension), str(tag)), tag) for tag in np.unique(values[values != 0]).tolist()]
-            found = [(name, tag) for name, tag in found if name not in self.cell_sets]
-        else:
-            found = [(key, 1)] if ":" not in key and self._marks(key, arrays) else []
-        yield from ((name, np.flatnonzero(values == tag)) for name, tag in found)
-
-    def _marks(self, name: str, arrays: list[Any]) -> bool:
-        """Whether data are zeros and ones."""
-        if any(((np.asarray(values) != 0) & (np.asarray(values) != 1)).any() for values in arrays):
-            self.unusable[name] = "has other values than 0 and 1 in the file; mark what belongs to it by 1"
-            return False
-        if not any(np.any(values) for values in arrays):
-            self.unusable[name] = "is 0 all over in the file; mark what belongs to it by 1"
-            return False
-        return True
-
-    def _add_lines(self, name: str, lines: np.ndarray) -> None:
-        """Sides of lines, by points of the file."""
-        ends = self.numbers[lines]
-        count = len(self.mesh.points)
-        forth, back = np.isin(ends @ [count, 1], self.codes), np.isin(ends @ [1, count], self.codes)
+    def _sides(self, lines: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+        """Edges of the outline that are lines, or join points; none of them for one point."""
+        if len(lines) and len(nodes) == 1:
+            raise MeshError("names sides and a point in the file; rename one")
+        base = len(self.places)
+        codes, ends = self.outline @ [base, 1], self.particles[lines]
+        forth, back = np.isin(ends @ [base, 1], codes), np.isin(ends @ [1, base], codes)
         wrong = (ends < 0).any(axis=1) | ~(forth | back)
         if wrong.any():
             why = f"is not on the outline: of its {len(lines)} lines {wrong.sum()} are no sides"
-            self._refuse(name, why, lines[wrong])
-            return
-        self.sides[name] = np.unique(np.where(forth[:, None], ends, ends[:, ::-1]), axis=0)
-
-    def _refuse(self, name: str, why: str, nodes: np.ndarray) -> None:
-        self.unusable[name] = f"{why}, the first one at {in_words(self.places[nodes[0]])}; take these out"
-
-    def _add_points(self, name: str, nodes: np.ndarray) -> None:
-        """A point, or sides of points, by points of the file."""
-        if len(nodes) == 1:
-            self.points[name] = self.places[nodes[0]]
-            return
-        particles = self.numbers[nodes]
-        edges = self.outline[np.isin(self.outline, particles).all(axis=1)]
-        alone = ~np.isin(particles, edges)
+            raise self._refusal(why, lines[wrong][0])
+        sides = np.unique(np.where(forth[:, None], ends, ends[:, ::-1]), axis=0)
+        if len(nodes) < 2:
+            return sides
+        edges = self.outline[np.isin(self.outline, self.particles[nodes]).all(axis=1)]
+        alone = ~np.isin(self.particles[nodes], edges)
         if alone.any():
             what = f"of its {len(nodes)} points {alone.sum()} are at the end of no side"
-            self._refuse(name, f"is neither one point nor sides: {what}", nodes[alone])
-            return
-        if name in self.sides and {*map(tuple, edges.tolist())} != {*map(tuple, self.sides[name].tolist())}:
-            del self.sides[name]
-            self.unusable[name] = "is lines and points in the file that are not the same sides; rename one"
-            return
-        self.sides[name] = edges
+            raise self._refusal(f"is neither one point nor sides: {what}", nodes[alone])
+        if len(lines) and set(edges @ [base, 1]) != set(sides @ [base, 1]):
+            raise MeshError("is lines and points in the file that are not the same sides; rename one")
+        return edges
 
-    def _add_parts(self, found: dict[str, dict[int, np.ndarray]]) -> None:
-        """Parts of the body, where no cell is in two."""
-        found = {name: masks for name, masks in found.items() if not all(mask.all() for mask in masks.values())}
-        for name, masks in found.items():
-            several = {other: any((masks[n] & their[n]).any() for n in masks) for other, their in found.items()}
-            if others := [other for other, shared in several.items() if shared and other != name]:
-                self.unusable[name] = f"has cells that part '{others[0]}' has, too; a cell has one material"
-            else:
-                self.parts[name] = masks
+    def _refusal(self, why: str, nodes: np.ndarray) -> MeshError:
+        return MeshError(f"{why}, the first one at {in_words(self.places[nodes[0]])}; take these out")

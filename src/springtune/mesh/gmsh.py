@@ -1,13 +1,12 @@
 """Read Gmsh's MSH files, where an entity may be in several physical groups."""
 
 import re
-from collections.abc import Callable, Iterator
-from typing import Any
+from collections.abc import Iterator
 
 import numpy as np
 
 from .cells import MeshError
-from .content import LINEAR, Content, places
+from .content import LINEAR, Block, Content, places
 
 ELEMENT_TYPES = {15: ("vertex", 1), 1: ("line", 2), 2: ("triangle", 3), 3: ("quad", 4)}
 """Name and number of points of elements that are read, by Gmsh's number."""
@@ -16,7 +15,10 @@ OTHER_ELEMENTS = {4: "tetra", 5: "hexahedron", 8: "line3", 9: "triangle6", 10: "
 """Names of elements that are refused."""
 
 
-NOT_READ = {b"ParametricNodes": "Mesh.SaveParametric = 0", b"PartitionedEntities": "the mesh before it is partitioned"}
+SECTIONS_NOT_READ = {
+    b"ParametricNodes": "Mesh.SaveParametric = 0",
+    b"PartitionedEntities": "the mesh before it is partitioned",
+}
 """Sections that are not read, with the remedy."""
 
 
@@ -48,15 +50,15 @@ class _Numbers:
         return count
 
 
-def read(raw: bytes, by_meshio: Callable[[], Any]) -> Content:
-    """Read a file of version 4.1, and one of 2.2 by meshio."""
+def read(raw: bytes) -> Content | None:
+    """Read a file of version 4.1; None for 2.2, which meshio reads."""
     sections = dict(re.findall(rb"\$(\w+)[ \t]*\r?\n(.*?)\$End\1\b", raw, flags=re.DOTALL))
     if b"MeshFormat" not in sections and not raw.lstrip().startswith(b"$NOD"):
         raise ValueError("no $MeshFormat")
     version, binary, size, *rest = sections.get(b"MeshFormat", b"1 0 8").split(maxsplit=3)
     if version not in (b"2", b"2.0", b"2.1", b"2.2", b"4.1"):
         raise MeshError(f"is MSH of version {version.decode()}; write 4.1 or 2.2: Mesh.MshFileVersion = 4.1")
-    for name, remedy in NOT_READ.items():
+    for name, remedy in SECTIONS_NOT_READ.items():
         if name in sections:
             raise MeshError(f"has ${name.decode()}, which are not read; write {remedy}")
     named = re.findall(rb'(\d+)\s+(\d+)\s+"([^"\n]*)"', sections.get(b"PhysicalNames", b""))
@@ -65,7 +67,7 @@ def read(raw: bytes, by_meshio: Callable[[], Any]) -> Content:
         parted = re.findall(rb"^\d+ \d+ 4 -?\d+ -?\d+ 1 (\d+) ", sections[b"Elements"], flags=re.MULTILINE)
         if len(set(parted)) == 1:
             raise MeshError("is one of several partitions; write all into one file: Mesh.PartitionSplitMeshFiles = 0")
-        return _once(by_meshio(), names)
+        return None
     order = (">" if rest[0][:1] == b"\0" else "<") if binary == b"1" else ""
     nodes, elements = (_Numbers(sections[name], order, int(size)) for name in (b"Nodes", b"Elements"))
     tags, points = (np.concatenate(arrays) for arrays in zip(*_points(nodes)))
@@ -81,9 +83,24 @@ def read(raw: bytes, by_meshio: Callable[[], Any]) -> Content:
         found.append((ELEMENT_TYPES[kind][0], corners, own))
     if [len(tags), sum(len(corners) for _, corners, _ in found)] != [nodes.total, elements.total]:
         raise ValueError("it states other numbers of points or cells than it has")
-    content = Content(points, field_data=dict.fromkeys(names.values(), ()))
-    for (kind, _, own), corners in zip(found, places(tags, [corners for _, corners, _ in found])):
-        content.add(kind, corners, *own)
+    placed = places(tags, [corners for _, corners, _ in found])
+    content = Content(points, [Block(kind, own) for (kind, *_), own in zip(found, placed)])
+    for name in names.values():
+        content.cell_groups[name] = []
+    starts = content.starts()
+    for (*_, own), start, stop in zip(found, starts, starts[1:]):
+        for name in own:
+            content.cell_groups[name].append(np.arange(start, stop))
+    return content
+
+
+def check_once(content: Content) -> Content:
+    """Return the content of a file of version 2.2, refused where it repeats a cell for each of its groups."""
+    for kind in ("triangle", "quad"):
+        cells = [np.sort(corners) for own, corners in content.cells if own == kind]
+        if cells and len(np.unique(np.concatenate(cells), axis=0)) < sum(map(len, cells)):
+            why = "has cells twice, as version 2.2 repeats those of two physical groups"
+            raise MeshError(f"{why}; write 4.1: Mesh.MshFileVersion = 4.1")
     return content
 
 
@@ -107,21 +124,3 @@ def _groups(file: _Numbers) -> dict[tuple[int, int], list[int]]:
             if dimension:
                 file.take("i", file.one("u"))
     return groups
-
-
-def _once(mesh: Any, names: dict[tuple[int, int], str]) -> Content:
-    """Join the elements that version 2.2 has once for each of their groups."""
-    content = Content(mesh.points, field_data=dict.fromkeys(names.values(), ()))
-    tags = mesh.cell_data.get("gmsh:physical", [np.zeros(len(block.data), int) for block in mesh.cells])
-    for kind in dict.fromkeys(block.type for block in mesh.cells):
-        chosen = [number for number, block in enumerate(mesh.cells) if block.type == kind]
-        corners = np.concatenate([mesh.cells[number].data for number in chosen])
-        groups = np.abs(np.concatenate([tags[number] for number in chosen]))
-        _, first, same = np.unique(np.sort(corners, axis=1), axis=0, return_index=True, return_inverse=True)
-        if len(np.unique([same.ravel(), groups], axis=1).T) < len(groups):  # twice in one group: a fault of the file
-            first = same = np.arange(len(groups))
-        number, place = content.add(kind, corners[np.sort(first)]), np.argsort(np.argsort(first))[same.ravel()]
-        for tag in np.unique(groups[groups > 0]).tolist():
-            name = names.get(({"vertex": 0, "line": 1}.get(kind, 2), tag), str(tag))
-            content.members.append((name, number, place[groups == tag]))
-    return content

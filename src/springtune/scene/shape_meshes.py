@@ -87,8 +87,8 @@ def read_shape(path: str | Path, unit: float | str = "1 m") -> GroupedMesh:
     >>> import springtune as st
     >>> from springtune.mesh import write_mesh
     >>> plate = st.Shape.rectangle("100 mm", "40 mm", holes=[st.Hole.circle(("50 mm", "20 mm"), "8 mm")])
-    >>> write_mesh("plate.msh", st.mesh_shape(plate, "4 mm"))
-    >>> sorted(st.read_shape("plate.msh").sides)
+    >>> write_mesh("plate.vtu", st.mesh_shape(plate, "4 mm"))
+    >>> sorted(st.read_shape("plate.vtu").sides)
     ['hole', 'left', 'lower', 'right', 'upper']
     """
     return read_grouped(path, positive(unit, "length", "unit"))
