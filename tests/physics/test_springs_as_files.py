@@ -1,5 +1,6 @@
 """Springs as other programs get them: forces from a file alone, what its header says, and series for ParaView."""
 
+import json
 import os
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
@@ -13,7 +14,7 @@ from click.testing import CliRunner
 import springtune as st
 from mechanics import angle_forces, area_forces, area_of, spring_forces
 from springtune.cli import main
-from springtune.handover.formats import ENDINGS
+from springtune.handover.formats import READERS
 from springtune.handover.newton import membrane
 from springtune.mechanics.energies import AngleEnergy, AreaEnergy
 from springtune.mechanics.integrators import EXPLICIT, IMPLICIT
@@ -121,7 +122,7 @@ SCENES = {
 }
 
 
-@pytest.mark.parametrize("ending", ENDINGS)
+@pytest.mark.parametrize("ending", READERS)
 @pytest.mark.parametrize(("definition", "mesh_type"), SCENES.values(), ids=SCENES)
 def test_a_file_alone_balances_the_scene(definition, mesh_type, ending, tmp_path):
     """By its own formulas, to the rounding of differences of positions: digits are lost by the strain, a thousandth."""
@@ -136,8 +137,7 @@ def test_a_file_alone_balances_the_scene(definition, mesh_type, ending, tmp_path
     assert unbalanced(net, net.points + 1.001 * found.displacements) > 1e-5
 
 
-@pytest.mark.usefixtures("mesh_library")
-@pytest.mark.parametrize("ending", ENDINGS)
+@pytest.mark.parametrize("ending", READERS)
 @pytest.mark.parametrize(("definition", "mesh_type"), [("delingette", "free"), ("flechon", "braced")])
 def test_what_is_read_is_what_was_written(definition, mesh_type, ending, tmp_path):
     net = st.SpringNet.from_scene(scene_of(definition, mesh_type), 'own: "graded" -- 5 mm')
@@ -159,7 +159,28 @@ def test_what_is_read_is_what_was_written(definition, mesh_type, ending, tmp_pat
     assert [path.read_bytes() for path in written] == first
 
 
-@pytest.mark.parametrize("ending", ENDINGS)
+@pytest.mark.usefixtures("mesh_library")
+@pytest.mark.parametrize(("definition", "mesh_type"), [("delingette", "free"), ("flechon", "braced")])
+def test_paraview_has_the_arrays(definition, mesh_type, tmp_path):
+    net = net_of(scene_of(definition, mesh_type))
+    [path] = net.write(tmp_path / "net.vtu")
+    grid = meshio.read(path)
+    [springs, cells] = [block.data for block in grid.cells]
+    assert (grid.points[:, :2] == net.points).all() and (springs == net.springs).all()
+    for name, values in {"mass": net.masses, "held": net.held, "load": net.forces}.items():
+        found = grid.point_data[name]
+        assert ((found[:, :2] if found.ndim > 1 else found) == values).all()
+    for name, values in {"rest_length": net.rest_lengths, "stiffness": net.stiffness}.items():
+        assert (grid.cell_data[name][0] == values).all()
+    for terms in net.energies:
+        assert (cells == terms.cells).all()
+        for name, values in terms.values.items():
+            assert (grid.cell_data[f"{terms.kind}_{name}"][1] == values).all()
+    comment = path.read_text(encoding="utf-8", errors="replace").partition("<!--\n")[2].partition("\n-->")[0]
+    assert json.loads(comment) == net.header | {"thickness": 2e-3}
+
+
+@pytest.mark.parametrize("ending", READERS)
 def test_cells_of_both_kinds(ending, tmp_path):
     """A square and two triangles beside it; in numbers that binary fractions do not hold."""
     x, y = np.array([0, 1, 1, 0, 2, 2]) / 30, np.array([0, 0, 1, 1, 0, 1]) / 30
@@ -180,6 +201,11 @@ def test_cells_of_both_kinds(ending, tmp_path):
     for given, found in zip(net.energies, back.energies):
         assert all((found.values[name] == values).all() for name, values in given.values.items())
     assert (back.quads == quads).all() and (back.triangles == triangles).all()
+    [path] = net.write(tmp_path / "net.vtu")
+    of_springs, of_triangles, of_quads = meshio.read(path).cell_data["area_modulus"]
+    assert np.isnan(of_springs).all()
+    assert of_triangles.tolist() == net.energies[0].values["modulus"].tolist()
+    assert of_quads.tolist() == net.energies[1].values["modulus"].tolist()
     moved = back.points * [1.01, 0.99]
     assert np.array_equal(forces_of(back, moved), forces_of(net, moved))
 
@@ -350,7 +376,7 @@ class TestMotion:
 
 
 class TestFiles:
-    @pytest.mark.parametrize("ending", ENDINGS)
+    @pytest.mark.parametrize("ending", READERS)
     def test_a_damaged_file_is_refused(self, ending, tmp_path):
         path = tmp_path / f"net{ending}"
         net_of(scene_of("area")).write(path)
@@ -379,7 +405,7 @@ class TestFiles:
             st.SpringNet.read(tmp_path / "net.csv")
         assert f" {net.header['mesh'][table]} {table}, " in str(error.value)
 
-    @pytest.mark.parametrize("ending", ENDINGS)
+    @pytest.mark.parametrize("ending", READERS)
     def test_a_file_with_fewer_cells_than_its_header_says_is_refused(self, ending, tmp_path):
         net = net_of(scene_of("lattice"))
         replace(net, triangles=net.triangles[:-1]).write(tmp_path / f"net{ending}")
@@ -420,7 +446,7 @@ class TestCommand:
     def run(self, *arguments):
         return CliRunner().invoke(main, ["springs", *map(str, arguments)])
 
-    @pytest.mark.parametrize("ending", ENDINGS)
+    @pytest.mark.parametrize("ending", READERS)
     def test_writes_what_the_library_has(self, ending, tmp_path):
         path = tmp_path / f"net{ending}"
         asked = ("--thickness", "2 mm", "--density", "7850 kg/m^3", "--load", "traction", "--force", "20 kN")

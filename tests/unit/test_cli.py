@@ -23,7 +23,7 @@ import springtune
 from counting import counted
 from springtune.cli import COMMANDS, Commands, Shown, main
 from springtune.cli.recommendation import beam_subject, prediction_text
-from springtune.handover.formats import ENDINGS
+from springtune.handover.formats import NET_FORMATS
 from springtune.handover.simulation import simulate
 from springtune.mesh import MESH_TYPES, Mesh, braced, write_mesh
 from springtune.mesh.types import MeshType
@@ -471,7 +471,7 @@ class TestPredictAMesh:
     @pytest.mark.parametrize("command", ["predict", "springs"])
     def test_help_has_the_ending_of_every_format(self, command):
         said = run(command, "--help").stdout
-        for ending in (*ENDINGS, ".xml", ".mjcf", ".scn", ".py", ".newton.py", ".xpbd.json"):
+        for ending in (*NET_FORMATS, ".xml", ".mjcf", ".scn", ".py", ".newton.py", ".xpbd.json"):
             assert re.search(rf"(?<!\w){re.escape(ending)}\b", said), ending
 
     def test_work_is_counted(self):

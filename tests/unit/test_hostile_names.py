@@ -64,7 +64,7 @@ def test_no_name_is_read_by_a_program(ending, name, plain, tmp_path):
 
 
 @pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("ending", formats.ENDINGS)
+@pytest.mark.parametrize("ending", formats.READERS)
 def test_data_give_a_name_back(ending, name, plain, tmp_path):
     net = replace(plain, header=renamed(plain.header, NAMES[name]))
     net.write(tmp_path / f"net{ending}")
@@ -73,7 +73,7 @@ def test_data_give_a_name_back(ending, name, plain, tmp_path):
     assert print(back) is None and back._repr_html_()  # as a notebook has it
 
 
-@pytest.mark.parametrize("ending", formats.ENDINGS)
+@pytest.mark.parametrize("ending", formats.READERS)
 def test_a_file_may_have_any_name(ending, plain, tmp_path):
     path = tmp_path / f"a\nb\r\u2028c # {ending}"
     plain.write(path)

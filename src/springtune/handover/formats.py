@@ -1,51 +1,48 @@
-"""Files of nets: CSV, JSON and VTU, each of which gives back what was written, number by number."""
+"""Files of nets: CSV and JSON, which give back what was written, number by number; VTU; and models that run."""
 
-import csv
-import io
 import json
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import ExitStack, redirect_stderr, redirect_stdout
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 
-from ..mesh.formats import LONGEST_SAID, library
+from ..mesh.formats import LONGEST_SAID
 from ..safe_io.atomic import check_folder, replacing, write_text
 from ..safe_io.escapes import json_line, shown
-from ..safe_io.inputs import bounded
 from .mujoco import mjcf
 from .newton import newton_script
-from .paraview import comment_of, write_vtu
+from .paraview import write_vtu
 from .sofa import sofa_python, sofa_xml
 from .terms import OF_CORNERS, VALUES, Net, Terms
 from .xpbd import xpbd
 
 
 class Array(NamedTuple):
-    """An array of a net: type, titles of its columns in a table, unit, and the array that it has a row for each of."""
+    """An array of a net: type, heads of its columns in a table, and the array that it has a row for each of."""
 
     kind: type
-    titles: tuple[str, ...]
-    unit: str = ""
+    heads: tuple[str, ...]
     of: str = ""
 
     @property
-    def columns(self) -> int:
-        """Columns, 0 for an array of one dimension."""
-        return len(self.titles) if len(self.titles) > 1 else 0
+    def shape(self) -> tuple[int, ...]:
+        """Shape of a row."""
+        return (len(self.heads),) if len(self.heads) > 1 else ()
 
 
 ARRAYS = {
-    "points": Array(float, ("x", "y"), "m"),
-    "masses": Array(float, ("mass",), "kg", of="points"),
+    "points": Array(float, ("x [m]", "y [m]")),
+    "masses": Array(float, ("mass [kg]",), of="points"),
     "held": Array(bool, ("held_x", "held_y"), of="points"),
-    "forces": Array(float, ("force_x", "force_y"), "N", of="points"),
+    "forces": Array(float, ("force_x [N]", "force_y [N]"), of="points"),
     "springs": Array(np.int64, ("first", "second")),
-    "rest_lengths": Array(float, ("rest_length",), "m", of="springs"),
-    "stiffness": Array(float, ("stiffness",), "N/m", of="springs"),
+    "rest_lengths": Array(float, ("rest_length [m]",), of="springs"),
+    "stiffness": Array(float, ("stiffness [N/m]",), of="springs"),
     "triangles": Array(np.int64, ("a", "b", "c")),
     "quads": Array(np.int64, ("a", "b", "c", "d")),
 }
@@ -63,7 +60,7 @@ def write(path: str | Path, net: Net) -> list[Path]:
     path, ending = Path(path), check_target(path)
     net = replace(net, header=net.header | {"thickness": float(net.thickness)})
     if ending in NET_FORMATS:
-        return NET_FORMATS[ending][0](path, net) or [path]
+        return NET_FORMATS[ending](path, net)
     program, text = SIMULATORS[ending]
     calibrated = net.header.get("calibrated")
     if calibrated and ending != AT_SETTING.get(calibrated["engine"]):
@@ -76,27 +73,19 @@ def write(path: str | Path, net: Net) -> list[Path]:
     return [path]
 
 
-NET_MEMORY, MEMORY_SHARE = 3e8, 60.0
-"""Bytes that reading a net may take, and for each byte of its files."""
-
-
 def read(path: str | Path) -> Net:
     """Read a net."""
     path = Path(path)
     ending = ending_of(path)
     if not path.is_file():
         raise ValueError(f"{path}: there is no such file; give one that was written by springtune")
-    if ending in SIMULATORS:
-        raise ValueError(f"{path}: it is for {SIMULATORS[ending][0]}; read the springs from {', '.join(ENDINGS)}")
-    told = io.StringIO()
+    if ending not in READERS:
+        program, _ = SIMULATORS.get(ending, ("ParaView", None))
+        raise ValueError(f"{path}: it is for {program}; read the springs from {', '.join(READERS)}")
     try:
-        # meshio prints its errors, and exits.
-        files = [one for one in (path, *companions(path).values()) if one.is_file()]
-        most = NET_MEMORY + MEMORY_SHARE * sum(one.stat().st_size for one in files)
-        with redirect_stdout(told), redirect_stderr(told), warnings.catch_warnings(), bounded(most):
-            warnings.simplefilter("ignore")
-            return _checked(*NET_FORMATS[ending][1](path))
-    except (Exception, SystemExit) as error:  # libraries raise many kinds of errors for a damaged file
+        with warnings.catch_warnings(action="ignore"):
+            return _checked(*READERS[ending](path))
+    except Exception as error:  # pandas and json raise many kinds of errors for a damaged file
         if isinstance(error, OSError) and error.errno is not None:
             raise
         said = " ".join(str(error).split())[:LONGEST_SAID] or type(error).__name__
@@ -110,7 +99,7 @@ def _checked(arrays: dict[str, np.ndarray], energies: Iterable[Terms], header: d
         if name in arrays:
             array = arrays[name] = np.ascontiguousarray(arrays[name], dtype=about.kind)
             count = rows.setdefault(about.of or name, len(array))
-            wanted = (count, about.columns) if about.columns else (count,)
+            wanted = (count, *about.shape)
             if array.shape != wanted:
                 raise ValueError(f"{name} of shape {array.shape} in the place of {wanted}")
             if about.kind is np.int64 and array.size and not (0 <= array.min() and array.max() < rows["points"]):
@@ -168,22 +157,22 @@ def _by_corners(energies: Iterable[Terms]) -> dict[int, dict[str, np.ndarray]]:
 # -- CSV -----------------------------------------------------------------------------------------------------------
 
 
-Columns = dict[str, tuple[Sequence[str], str]]
-"""Titles of the columns of arrays in a table, and their unit."""
+Heads = dict[str, Sequence[str]]
+"""Heads of the columns of arrays in a table."""
 
 
-def _of_terms(corners: int) -> Columns:
-    """Columns of all values of terms, one for each corner where corners have their own."""
+def _of_arrays(*names: str) -> Heads:
+    return {name: ARRAYS[name].heads for name in names}
+
+
+def _of_terms(corners: int) -> Heads:
+    """Heads of all values of terms, one for each corner where corners have their own."""
     ends = {False: [""], True: [f"_{corner}" for corner in "abcd"[:corners]]}
     return {
-        f"{kind}_{name}": ([f"{kind}_{name}{end}" for end in ends[name in OF_CORNERS]], unit)
+        f"{kind}_{name}": [f"{kind}_{name}{end} [{unit}]" for end in ends[name in OF_CORNERS]]
         for kind, units in VALUES.items()
         for name, unit in units.items()
     }
-
-
-def _of_arrays(*names: str) -> Columns:
-    return {name: (ARRAYS[name].titles, ARRAYS[name].unit) for name in names}
 
 
 TABLES = {
@@ -202,59 +191,35 @@ def companions(path: Path) -> dict[str, Path]:
 
 def _write_csv(path: Path, net: Net) -> list[Path]:
     arrays, others, terms = arrays_of(net), companions(path), _by_corners(net.energies)
-    tables = {others["particles"]: _table(arrays, TABLES["particles"])}
+    texts = {others["particles"]: _csv_text(arrays, TABLES["particles"])}
     for count, name in CELL_ARRAYS.items():
         if len(arrays[name]):
-            tables[others[name]] = _table(arrays | terms.get(count, {}), TABLES[name])
+            texts[others[name]] = _csv_text(arrays | terms.get(count, {}), TABLES[name])
     said = [f"# springs of a network; particles are counted from 0, and stand in {shown(others['particles'].name)}"]
     said += [
         f"# cells of {count} corners, and what energies they have, stand in {shown(others[name].name)}"
         for count, name in CELL_ARRAYS.items()
-        if others[name] in tables
+        if others[name] in texts
     ]
     said += [f"# {json_line(line)}" for line in json.dumps(net.header, indent=1, ensure_ascii=False).split("\n")]
-    texts = {other: _csv_text(table) for other, table in tables.items()}
-    texts[path] = "\n".join([*said, ""]) + _csv_text(_table(arrays, TABLES[""]))
-    _write_all(texts)
-    for other in set(others.values()) - set(tables):
-        other.unlink(missing_ok=True)  # left by another net
-    return [path, *tables]
-
-
-def _write_all(texts: Mapping[Path, str]) -> None:
-    """Write files whole, or none of them."""
+    texts[path] = "\n".join([*said, ""]) + _csv_text(arrays, TABLES[""])
     with ExitStack() as unfinished:  # the last one gets its name first: if that fails, none gets one
         for one, text in texts.items():
             unfinished.enter_context(replacing(one)).write_text(text, encoding="utf-8")
+    for other in set(others.values()) - set(texts):
+        other.unlink(missing_ok=True)  # left by another net
+    *tables, _ = texts
+    return [path, *tables]
 
 
-def _table(arrays: Mapping[str, np.ndarray], about: Columns) -> dict[str, np.ndarray]:
-    """Columns of arrays by title, with their units."""
-    table: dict[str, np.ndarray] = {}
-    for name, (titles, unit) in about.items():
+def _csv_text(arrays: Mapping[str, np.ndarray], heads: Heads) -> str:
+    """Table of some arrays."""
+    columns = []
+    for name, titles in heads.items():
         if name in arrays:
             values = arrays[name].astype(int) if arrays[name].dtype == bool else arrays[name]
-            heads = [f"{title} [{unit}]" if unit else title for title in titles]
-            table |= dict(zip(heads, values.reshape(len(values), -1).T))
-    return table
-
-
-def _from_table(table: Mapping[str, Sequence[str]], about: Columns) -> dict[str, np.ndarray]:
-    """Arrays of the columns of a table."""
-    found = {}
-    for name, (titles, _) in about.items():
-        if titles[0] in table:
-            values = np.array([[float(text) for text in table[title]] for title in titles]).T
-            found[name] = values if len(titles) > 1 else values[:, 0]
-    return found
-
-
-def _csv_text(table: Mapping[str, np.ndarray]) -> str:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(table)
-    writer.writerows(zip(*(column.tolist() for column in table.values())))
-    return text.getvalue()
+            columns.append(pd.DataFrame(values.reshape(len(values), -1), columns=[*titles]))
+    return str(pd.concat(columns, axis=1).to_csv(index=False, lineterminator="\n"))
 
 
 def _read_csv(path: Path) -> Read:
@@ -264,32 +229,25 @@ def _read_csv(path: Path) -> Read:
     others, counts = companions(path), _counts(header)
     arrays: dict[str, np.ndarray] = {"triangles": np.zeros((0, 3)), "quads": np.zeros((0, 4))}
     energies: list[Terms] = []
-    for place, about in TABLES.items():
+    for place, heads in TABLES.items():
         if place and not others[place].is_file():
-            if length := counts.get(next(iter(about))):
+            if length := counts.get(next(iter(heads))):
                 raise ValueError(f"{others[place].name}, which has its {length} {place}, is not beside it")
             continue
-        rows = others[place].read_text(encoding="utf-8").split("\n") if place else lines
-        found = _from_table(_csv_table(rows), about)
+        table = pd.read_csv(others.get(place, path), comment="#", float_precision="round_trip")
+        found = {name: table[[*titles]].to_numpy() for name, titles in heads.items() if titles[0] in table}
+        found = {name: values if values.shape[1] > 1 else values[:, 0] for name, values in found.items()}
         arrays |= {name: values for name, values in found.items() if name in ARRAYS}
         if place in CELL_ARRAYS.values():
-            energies += _terms(arrays[place].astype(np.int64), found)
+            energies += _terms(arrays[place], found)
     return arrays, energies, header
-
-
-def _csv_table(lines: Iterable[str]) -> dict[str, tuple[str, ...]]:
-    """Columns of a table, without their units."""
-    titles, *rows = csv.reader(line for line in lines if line and not line.startswith("#"))
-    columns = list(zip(*rows)) if rows else [()] * len(titles)
-    return {title.partition(" [")[0]: column for title, column in zip(titles, columns, strict=True)}
 
 
 # -- JSON ----------------------------------------------------------------------------------------------------------
 
 
-def as_json(net: Net) -> dict[str, Any]:
-    """Net as JSON has it: lists, numbers, texts."""
-    return {
+def _write_json(path: Path, net: Net) -> list[Path]:
+    content = {
         "header": net.header,
         **dict.fromkeys(ARRAYS),
         **{name: array.tolist() for name, array in arrays_of(net).items()},
@@ -304,18 +262,15 @@ def as_json(net: Net) -> dict[str, Any]:
             for terms in net.energies
         ],
     }
-
-
-def _write_json(path: Path, net: Net) -> None:
-    # An array a line: rows of their own would make most of the file blanks.
-    parts = [f" {json.dumps(key)}: {json.dumps(value)}" for key, value in as_json(net).items()]
+    parts = [f" {json.dumps(key)}: {json.dumps(value)}" for key, value in content.items()]
     write_text(path, "{\n" + ",\n".join(parts) + "\n}\n")
+    return [path]
 
 
 def _read_json(path: Path) -> Read:
     found = json.loads(path.read_text(encoding="utf-8"))
     arrays: dict[str, np.ndarray] = {
-        name: np.array(found[name], dtype=one.kind).reshape((-1, one.columns) if one.columns else -1)
+        name: np.array(found[name], dtype=one.kind).reshape(-1, *one.shape)
         for name, one in ARRAYS.items()
         if found[name] is not None
     }
@@ -370,37 +325,19 @@ def _numbers(header: Mapping[str, Any]) -> dict[str, float]:
     return found
 
 
-def _read_vtu(path: Path) -> Read:
-    grid = library().read(path)
-    arrays: dict[str, np.ndarray] = {"points": grid.points[:, :2]}
-    for old, new in POINT_NAMES.items():
-        if new in grid.point_data:
-            values = grid.point_data[new]
-            arrays[old] = values[:, :2] if values.ndim > 1 else values
-    blocks = {block.data.shape[1]: number for number, block in enumerate(grid.cells)}
-    for count, name in ({2: "springs"} | CELL_ARRAYS).items():
-        arrays[name] = grid.cells[blocks[count]].data if count in blocks else np.zeros((0, count))
-    for old, new in LINE_NAMES.items():
-        arrays[old] = grid.cell_data[new][blocks[2]]
-    energies: list[Terms] = []
-    for count in (count for count in CELL_ARRAYS if count in blocks):
-        columns = {name: parts[blocks[count]] for name, parts in grid.cell_data.items()}
-        there = {name: values for name, values in columns.items() if not np.isnan(values).all()}
-        energies += _terms(arrays[CELL_ARRAYS[count]], there)
-    return arrays, energies, json.loads(comment_of(path))
-
-
 # -- formats -------------------------------------------------------------------------------------------------------
 
-NET_FORMATS: dict[str, tuple[Callable[[Path, Net], list[Path] | None], Callable[[Path], Read]]] = {
-    ".csv": (_write_csv, _read_csv),
-    ".json": (_write_json, _read_json),
-    ".vtu": (lambda path, net: write_vtu_with(path, net, {}, {}), _read_vtu),
-}
-"""Functions that write and read a net, by the ending of the name of its file."""
 
-ENDINGS = tuple(NET_FORMATS)
-"""Endings of the names of files that are read."""
+def _write_vtu(path: Path, net: Net) -> list[Path]:
+    write_vtu_with(path, net, {}, {})
+    return [path]
+
+
+NET_FORMATS = {".csv": _write_csv, ".json": _write_json, ".vtu": _write_vtu}
+"""Functions that write a net, by the ending of the name of its file."""
+
+READERS = {".csv": _read_csv, ".json": _read_json}
+"""Functions that read one."""
 
 FOR_MUJOCO = (".xml", ".mjcf")
 """Endings of files for MuJoCo."""

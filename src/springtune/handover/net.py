@@ -304,7 +304,7 @@ class SpringNet(Tabled, Net):
         Parameters
         ----------
         path : str or Path
-            As of `write`.
+            Ending in ``.csv`` or ``.json``, as `write` wrote it.
 
         Returns
         -------

@@ -64,12 +64,6 @@ def write_vtu(
         unfinished.write_bytes(unfinished.read_bytes().replace(grid_tag.encode(), begin.encode(), 1))
 
 
-def comment_of(path: str | Path) -> str:
-    """Comment of a file that `write_vtu` wrote; empty where it has none."""
-    found = re.search(rb"<!--\n(.*?)\n--><UnstructuredGrid>", Path(path).read_bytes(), re.DOTALL)
-    return found.group(1).decode() if found else ""
-
-
 MOST_PIECES = 10_000
 """Most files of a collection: more are slow in ParaView and file systems."""
 
