@@ -187,7 +187,7 @@ class TestSwept:
 
     def test_moduli_are_those_of_the_swept_ratios(self, load):
         study = load(poisson_ratio=["0.1", "0.2"], moduli="true")
-        assert [one.poisson_ratio for one in study.parts["moduli"].measurements] == [0.1, 0.2]
+        assert [labels["poisson_ratio"] for labels in study.parts["moduli"][1]] == [0.1, 0.2]
 
     def test_printed_cells_are_not_swept(self, load, tmp_path):
         (tmp_path / "printed.csv").write_text("")

@@ -22,7 +22,6 @@ from springtune.studies.config.kind import kinds, outputs
 from springtune.studies.config.messages import StudyError
 from springtune.studies.config.model import CurveSpec, MeshSpec, Reference, SceneSpec
 from springtune.studies.kinds import load_study
-from springtune.studies.kinds.moduli.kind import Measurement
 
 from tables import STUDIES, refused_files, study_text
 
@@ -277,15 +276,16 @@ class TestMeshFiles:
 class TestDefinitions:
     def test_moduli_of_every_pair(self, load):
         study = load(study_text("small moduli"))
-        assert len(study.parts["moduli"].measurements) == 2 * 2 * 2 * 2
-        assert study.parts["moduli"].measurements[0] == Measurement("area", "right", 0.002, 0.3)
+        box, cells = study.parts["moduli"]
+        assert len(cells) == 2 * 2 * 2 * 2
+        assert [*cells[0].values()] == ["area", "right", 0.002, 0.3]
         assert study.axes["poisson_ratio"] == (0.3, 0.5)
-        assert (study.parts["moduli"].patch.length, study.parts["moduli"].patch.height) == (0.1, 0.02)
+        assert (box.length, box.height) == (0.1, 0.02)
         assert study.outputs == ("definitions",)
 
     def test_stated_stiffness_has_no_moduli(self, load):
         study = load(changed(("    kinematics: [nonlinear, linear]\n", "    moduli: true\n")))
-        assert {one.definition for one in study.parts["moduli"].measurements} == {"lattice"}
+        assert {labels["definition"] for labels in study.parts["moduli"][1]} == {"lattice"}
 
     def test_no_moduli_without_asking(self, load):
         study = load(SMALL)

@@ -9,6 +9,8 @@ from dataclasses import replace
 from functools import lru_cache, partial
 
 import numpy as np
+from scipy.sparse import diags_array
+from scipy.sparse.linalg import LinearOperator, cg
 
 from springtune.linalg.factors import factorize
 from springtune.mesh.rows import structured
@@ -132,31 +134,23 @@ def tensor_mass(scene, size, clock):
         load = scene.force * weights(mesh, scene.kind) * moving
         diagonal = np.einsum("nii->ni", of_particles)
 
-    def forces(u):
+    def forces(flat):
+        u = flat.reshape(load.shape)
         total = np.einsum("nij,nj->ni", of_particles, u)
         to_first = np.einsum("nij,nj->ni", of_edges, u[second])
         to_second = np.einsum("nji,nj->ni", of_edges, u[first])
         for axis in range(2):
             total[:, axis] += np.bincount(first, to_first[:, axis], len(u))
             total[:, axis] += np.bincount(second, to_second[:, axis], len(u))
-        return total * moving
+        return (total * moving).ravel()
 
     with clock("solving"):
-        u, missing = np.zeros(load.shape), load.copy()
-        better = missing / diagonal
-        direction, weight = better, float((missing * better).sum())
-        for _ in range(20 * len(load)):
-            pushed = forces(direction)
-            length = weight / float((direction * pushed).sum())
-            u, missing = u + length * direction, missing - length * pushed
-            if np.linalg.norm(missing) <= 1e-8 * np.linalg.norm(load):
-                break
-            better = missing / diagonal
-            weight, before = float((missing * better).sum()), weight
-            direction = better + weight / before * direction
-        else:
+        shape = (load.size, load.size)
+        stiffness, inverse = LinearOperator(shape, forces), diags_array(1 / diagonal.ravel())
+        u, left = cg(stiffness, load.ravel(), rtol=1e-8, maxiter=20 * len(load), M=inverse)
+        if left:
             raise ArithmeticError("conjugate gradients did not end")
-    return float(np.tensordot(u, measured(mesh, scene.kind), axes=2)), int(moving.sum())
+    return float(np.tensordot(u.reshape(load.shape), measured(mesh, scene.kind), axes=2)), int(moving.sum())
 
 
 def condensation(scene, size, clock):

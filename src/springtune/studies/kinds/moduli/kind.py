@@ -1,6 +1,5 @@
 """Effective moduli of definitions: a flag of a grid, and the box on whose meshes they are measured."""
 
-from dataclasses import asdict, dataclass
 from itertools import product
 from math import nan
 
@@ -33,22 +32,7 @@ class PatchConfig(Section):
     """Extent along y."""
 
 
-@dataclass(frozen=True)
-class Measurement:
-    """Effective moduli of a definition on a patch, for a wanted Poisson's ratio."""
-
-    definition: str
-    mesh_type: str
-    mesh_size: float
-    poisson_ratio: float
-
-
-@dataclass(frozen=True)
-class Measurements:
-    """Measurements of a study, and the box of their meshes; its thickness does not matter."""
-
-    patch: Beam
-    measurements: tuple[Measurement, ...]
+PATCH = ("definition", "mesh_type", "mesh_size", "poisson_ratio")
 
 
 def _check(config, problems):
@@ -60,7 +44,7 @@ def _check(config, problems):
 
 
 def _expand(config, declared):
-    """Moduli of definitions that derive a stiffness, on every grid that asks for them."""
+    """Box of the patches, whose thickness does not matter, and labels of each definition that derives a stiffness."""
     found = {}
     for grid in config.grids.values():
         if grid.moduli:
@@ -71,47 +55,42 @@ def _expand(config, declared):
     if not found:
         return None
     box = Beam(config.patch.length, config.patch.height, min(config.patch.length, config.patch.height), "patch")
-    return Measurements(box, tuple(Measurement(*labels) for labels in sorted(found)))
+    return box, [dict(zip(PATCH, labels)) for labels in sorted(found)]
 
 
 def _axes(moduli):
-    return {"poisson_ratio": tuple(sorted({one.poisson_ratio for one in moduli.measurements}))}
+    return {"poisson_ratio": tuple(sorted({labels["poisson_ratio"] for labels in moduli[1]}))}
 
 
 def _summary(moduli):
-    patches = {(one.mesh_type, one.mesh_size) for one in moduli.measurements}
+    patches = {(labels["mesh_type"], labels["mesh_size"]) for labels in moduli[1]}
     on = "1 patch" if len(patches) == 1 else f"{len(patches)} patches"
-    return [["moduli", len(moduli.measurements), f"measured on {on}"]]
+    return [["moduli", len(moduli[1]), f"measured on {on}"]]
 
 
 def _tasks(study):
-    for one in study.parts["moduli"].measurements:
-        mesh, name = _mesh_of(study, one), f"{one.mesh_type}_{1e3 * one.mesh_size:g}mm"
-        yield Task(
-            {"definition": one.definition, "poisson_ratio": one.poisson_ratio},
-            (mesh_parameters(mesh), mesh_type_key(one.mesh_type), definition_key(one.definition)),
-            labels=asdict(one),
-            seconds=expected_seconds(particles(mesh), one.definition),
-            name=name,
-            file=name,
-            shared={"mesh": mesh_source(mesh)},
-        )
+    box, cells = study.parts["moduli"]
+    for labels in cells:
+        definition, mesh_type, size, ratio = labels.values()
+        mesh, name = _mesh_of(study, box, mesh_type, size), f"{mesh_type}_{1e3 * size:g}mm"
+        also = mesh_parameters(mesh), mesh_type_key(mesh_type), definition_key(definition)
+        values = {"definition": definition, "poisson_ratio": ratio}
+        seconds = expected_seconds(particles(mesh), definition)
+        yield Task(values, also, labels, None, seconds, name, name, {"mesh": mesh_source(mesh)})
 
 
-def _mesh_of(study, one):
+def _mesh_of(study, box, mesh_type, size):
     """Mesh of a patch test: of the box, or from the file of the shortest beam."""
-    if one.mesh_type in MESH_TYPES:
-        return MeshSpec(study.parts["moduli"].patch, one.mesh_type, one.mesh_size)
-    found = [mesh for label, mesh in study.mesh_files.items() if label[::2] == (one.mesh_type, one.mesh_size)]
+    if mesh_type in MESH_TYPES:
+        return MeshSpec(box, mesh_type, size)
+    found = [mesh for label, mesh in study.mesh_files.items() if label[::2] == (mesh_type, size)]
     return min(found, key=lambda mesh: (mesh.beam.length, mesh.beam.height, mesh_key(mesh)))
 
 
-PATCH = ("definition", "mesh_type", "mesh_size", "poisson_ratio")
-
-
 def _attributes(moduli):
-    box = {"patch_length": moduli.patch.length, "patch_height": moduli.patch.height}
-    return {"comment": "of the mesh that a beam of this length and height [m] gets"} | box
+    box, _ = moduli
+    comment = "of the mesh that a beam of this length and height [m] gets"
+    return {"comment": comment, "patch_length": box.length, "patch_height": box.height}
 
 
 KIND = Kind(

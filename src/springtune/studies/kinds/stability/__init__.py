@@ -1,26 +1,8 @@
-"""Experiments on numerical stability: what they share, their names and the values of their own dimensions."""
-
-from dataclasses import dataclass
+"""Experiments on numerical stability: their names and the values of their own dimensions."""
 
 import numpy as np
 
 from springtune.mechanics.integrators import INTEGRATORS
-from springtune.problem.geometry import Beam
-from springtune.problem.materials import Material
-
-
-@dataclass(frozen=True)
-class Experiment:
-    """An experiment on numerical stability, under a traction [N], on ascending edge lengths [m]."""
-
-    name: str
-    beam: Beam
-    material: Material
-    force: float
-    definition: str
-    mesh_type: str
-    mesh_sizes: tuple[float, ...]
-
 
 EXPERIMENTS = {
     "limits": "largest stable step of the explicit schemes, predicted and measured",

@@ -1,6 +1,5 @@
 """Experiments on numerical stability: a study's section ``stability``."""
 
-from dataclasses import asdict
 from math import nan
 from typing import Annotated
 
@@ -15,7 +14,7 @@ from ...config.fields import OneOrMore, Section, default, one_of, optional
 from ...config.kind import Kind
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key
 from ...runs.stages import Task, stage
-from . import AXES, EXPERIMENTS, ONCE, Experiment
+from . import AXES, EXPERIMENTS, ONCE
 from .outputs import OUTPUTS
 
 ExperimentName = Annotated[str, one_of("experiment", EXPERIMENTS)]
@@ -68,32 +67,30 @@ def _check(config, problems):
 
 
 def _expand(config, declared):
-    """Experiments: one a definition, or one in all."""
+    """Values of the experiments by name and definition: one a definition, or one in all."""
     section = config.stability
-    beam, material = declared.beams[section.beam], declared.materials[section.material]
-    sizes = tuple(sorted(section.mesh_size))
-    return tuple(
-        Experiment(name, beam, material, section.force, definition, section.mesh_type, sizes)
-        for name in EXPERIMENTS
-        if name in section.experiment
-        for definition in (section.definition[:1] if name in ONCE else section.definition)
-    )
+    shared = {
+        "beam": beam_key(declared.beams[section.beam]),
+        "material": material_key(declared.materials[section.material], density=True),
+        "force": section.force,
+        "mesh_type": section.mesh_type,
+        "mesh_sizes": sorted(section.mesh_size),
+    }
+    names = [name for name in EXPERIMENTS if name in section.experiment]
+    pairs = [(name, one) for name in names for one in section.definition[: 1 if name in ONCE else None]]
+    return {pair: shared | dict(zip(("name", "definition"), pair)) for pair in pairs}
 
 
 def _axes(experiments):
-    shared = {
-        "definition": {one.definition for one in experiments},
-        "mesh_size": {size for one in experiments for size in one.mesh_sizes},
-    }
-    return shared | AXES | {"experiment": tuple(dict.fromkeys(one.name for one in experiments))}
+    names, definitions = (tuple(dict.fromkeys(found)) for found in zip(*experiments))
+    sizes = next(iter(experiments.values()))["mesh_sizes"]
+    return AXES | {"definition": set(definitions), "mesh_size": set(sizes), "experiment": names}
 
 
 def _tasks(study):
-    for one in study.parts["stability"]:
-        own = {"beam": beam_key(one.beam), "material": material_key(one.material, density=True)}
-        also = mesh_type_key(one.mesh_type), definition_key(one.definition)
-        labels = {"experiment": one.name, "definition": one.definition}
-        yield Task(asdict(one) | own, also, labels, one, seconds=3.0)
+    for (name, definition), values in study.parts["stability"].items():
+        also = mesh_type_key(values["mesh_type"]), definition_key(definition)
+        yield Task(values, also, {"experiment": name, "definition": definition}, seconds=3.0)
 
 
 SCHEME = ("definition", "mesh_size", "integrator", "damper", "damping_ratio")

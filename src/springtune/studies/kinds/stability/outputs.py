@@ -15,7 +15,7 @@ OUTPUTS = (
     Output(
         "stability",
         "figures and the page of the experiments on stability",
-        figures=lambda study: figures({one.name for one in study.parts["stability"]}),
+        figures=lambda study: figures({name for name, _ in study.parts["stability"]}),
         plot="studies.kinds.stability.figures:stability",
         texts={"stability.md": "studies.kinds.stability.figures:page"},
         shows="experiments",

@@ -1,12 +1,12 @@
 """Stage `stability`: stress tests of numerical stability, whose results are the group ``/stability`` of a dataset.
 
-Each takes a `Setup` and yields rows of labels, values of `AXES` and mesh sizes, and results by the names of `STABILITY`
-in `collect`.
+Each takes a `Setup` and yields rows of labels, values of `AXES` and mesh sizes, and results by the names of `VARIABLES`
+in `kind`.
 """
 
 import time
 from contextlib import contextmanager
-from dataclasses import fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import product
 
@@ -29,7 +29,7 @@ from springtune.scene.motion import motion_of
 from springtune.scene.sheet import Sheet
 from springtune.springs.base import DefinitionError, Springs
 
-from . import AXES, Experiment
+from . import AXES
 
 GROWTH_STEPS = 2000
 """Steps of each run that measures a limit."""
@@ -43,8 +43,7 @@ def failed(task, why):
 def solve(task):
     """Result of an experiment."""
     made = {"beam": Beam(**task["beam"]), "material": material_of(task["material"]).in_plane}
-    made["mesh_sizes"] = tuple(task["mesh_sizes"])
-    setup = Setup(**{one.name: task[one.name] for one in fields(Setup)} | made)
+    setup = Setup(**{name: value for name, value in task.items() if name not in ("key", "name")} | made)
     begin = time.perf_counter()
     rows = [
         {name: value.item() if isinstance(value, np.generic) else value for name, value in row.items()}
@@ -53,8 +52,16 @@ def solve(task):
     return {"rows": [*rows, {"experiment_seconds": time.perf_counter() - begin, "experiment_message": ""}]}
 
 
-class Setup(Experiment):
-    """An experiment with its meshes, springs and problems."""
+@dataclass(frozen=True)
+class Setup:
+    """A beam under a traction [N], with its meshes on ascending edge lengths [m], springs and problems."""
+
+    beam: Beam
+    material: Material
+    force: float
+    definition: str
+    mesh_type: str
+    mesh_sizes: list[float]
 
     @cached_property
     def coarse(self):
