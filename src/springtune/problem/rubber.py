@@ -3,13 +3,12 @@
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import cast
 
 import numpy as np
 
 from ..safe_io.inputs import csv_rows, numbers
 from .materials import MOST_TERMS, RUBBER_TESTS, Rubber
-from .quantities import LONGEST_WORD, Number, positive, put
+from .quantities import Number, positive, put
 
 LEAST_SHARE = 0.05
 """Share of the largest stress below which errors are relative to it: small stresses are read off coarsely."""
@@ -25,23 +24,14 @@ TWO_COLUMNS = (
     "[MPa]' or 'strain [%],nominal stress [MPa]'"
 )
 
-LITTLE = 0.1
-"""Strains up to which rubber is nearly linear."""
-
 STRETCHES, STRESSES = (0.01, 50.0), (0.1, 1e12)
 """Stretches [1] and largest stresses [Pa] that are read."""
 
-_WORDS = r"engineering|eng\.?|nominal|tensile|uniaxial|equibiaxial|biaxial|(?:first|1st) piola.kirchhoff|pk1|[λεσ]"
-_HEAD = re.compile(
-    rf"((?:[\s_]*(?:{_WORDS}|stretch[\s_]ratio|stretch|strain|stress(?:[\s_]p)?)(?![^\W_]))*)(.*)", re.I | re.DOTALL
-)
-_UNIT = re.compile(r"[\s_]*(?:in |[/,])?\s*[\[(]?\s*(.*?)\s*[\])]?\s*", re.DOTALL)
-_STRAIN_UNITS = (
-    dict.fromkeys(("", "-", "1", "fraction", "dimensionless"), 1.0)
-    | dict.fromkeys(("%", "pct", "percent", "per cent"), 1e-2)
-    | dict.fromkeys(("‰", "permille", "per mille"), 1e-3)
-    | dict.fromkeys(("microstrain", "µε", "με"), 1e-6)
-)
+_HEAD = re.compile(r"(?:(?:engineering|nominal)[ _])?(stretch|strain|stress) *(?:[\[(](.{0,20})[\])])?", re.IGNORECASE)
+"""Head of a column: its kind, and its unit in brackets."""
+
+_RATIOS = dict.fromkeys(("-", "1", "m/m", "mm/mm"), 1.0) | {"%": 1e-2}
+"""Size of units of stretch and strain."""
 
 
 class TestDataError(ValueError):
@@ -90,13 +80,10 @@ class TensileTest:
             raise TestDataError(f"{where[0]}the file has {len(heads)} columns; {TWO_COLUMNS}")
         read = list(map(_column, heads, where))
         order = [0, 1] if read[1][0] == "stress" else [1, 0]
-        (kind, scale, unit), (other, factor, _) = (read[n] for n in order)
+        (kind, scale), (other, factor) = (read[n] for n in order)
         if kind == "stress" or other != "stress":
             raise TestDataError(f"{where[0]}the other column is {heads[1]!r}; {TWO_COLUMNS}")
         x, y = np.array(numbers(path, rows, heads, TestDataError)).reshape(-1, 2).T[order]
-        if kind == "strain" and not unit and _may_be_percent(x, y):
-            remedy = "name it 'strain [-]', 'strain [%]' or 'stretch'"
-            raise TestDataError(f"{where[order[0]]}may be fractions or percent; {remedy}")
         with np.errstate(over="ignore"):
             stretch, stress = scale * x + (kind == "strain"), factor * y
         for n, what, sizes, (least, most) in (
@@ -110,41 +97,21 @@ class TensileTest:
         return cls(stretch, stress, str(path))
 
 
-def _column(head: str, where: str) -> tuple[str, float, str]:
-    """Return whether a head is of stretch, strain or stress, the size of its unit, and the unit as written."""
-    name, rest = cast("re.Match[str]", _HEAD.fullmatch(head)).groups()
-    kinds = re.findall("stretch|strain|stress", name.lower())
-    if len(kinds) != 1 or len(head) > LONGEST_WORD:
+def _column(head: str, where: str) -> tuple[str, float]:
+    """Return whether a head is of stretch, strain or stress, and the size of its unit."""
+    found = _HEAD.fullmatch(head.strip())
+    if not found:
         raise TestDataError(f"{where}is neither stretch, engineering strain nor nominal stress; {TWO_COLUMNS}")
-    unit = cast("re.Match[str]", _UNIT.fullmatch(rest)).group(1)
+    kind, unit = found[1].lower(), found[2] or ""
+    if kind == "strain" and not unit:
+        raise TestDataError(f"{where}may be fractions or percent; name it 'strain [-]', 'strain [%]' or 'stretch'")
     try:
-        if kinds == ["stress"]:
-            return "stress", positive(f"1 {unit}", "stress", "unit"), unit
-        size = _STRAIN_UNITS.get(unit) or _ratio(unit)
-        if kinds == ["stretch"] and size != 1:
-            raise ValueError
-    except ValueError:
-        raise TestDataError(f"{where}{rest.strip()!r} is no unit of {kinds[0]}; {TWO_COLUMNS}") from None
-    return kinds[0], size, unit
-
-
-def _ratio(unit: str) -> float:
-    """Size of a unit of strain such as mm/m."""
-    above, _, below = unit.partition("/")
-    return positive(f"1 {above}", "length", "unit") / positive(f"1 {below}", "length", "unit")
-
-
-def _may_be_percent(strain: np.ndarray, stress: np.ndarray) -> bool:
-    """Whether strains without a unit reach 1, or the stress over them bends less than half as much as rubber's."""
-    order = np.argsort(np.abs(strain), kind="stable")
-    ends = order[strain[order] != 0][[0, -1]] if strain.any() else order[:0]
-    x, y = strain[ends], stress[ends]
-    if not x.any() or not LITTLE <= abs(x[1]) < 1:
-        return bool((np.abs(x) >= 1).any())
-    law = stress_columns(1 + x, 1)[:, 0]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        bends = [np.divide(*(one / x)[::-1]) - 1 for one in (y, law)]
-    return bool(abs(bends[0]) < abs(bends[1]) / 2)
+        size = positive(f"1 {unit}", "stress", "unit") if kind == "stress" else _RATIOS[unit or "-"]
+    except (KeyError, ValueError):
+        size = 0.0
+    if not size or (kind == "stretch" and size != 1):
+        raise TestDataError(f"{where}{unit!r} is no unit of {kind}; {TWO_COLUMNS}")
+    return kind, size
 
 
 def told(test: TensileTest | str | Path) -> TensileTest:
