@@ -5,7 +5,7 @@ from scipy.sparse import csc_array
 from scipy.spatial import Delaunay
 
 from springtune.linalg.factors import SingularError, SuperLUFactor
-from springtune.mechanics.moduli import unit_fields
+from springtune.mechanics.moduli import unit_fields, work_of
 from springtune.mechanics.network import Network
 from springtune.mesh import Mesh, signed_areas
 
@@ -53,3 +53,14 @@ def periodic_stiffness(mesh, copied, springs):
         raise SingularError("the network is unstable at rest")
     moved = fields - moves @ factor.solve(moves.T @ (matrix @ fields))
     return moved.T @ (matrix @ moved) / mesh.area
+
+
+def affine_stiffness(mesh, springs):
+    """Return the plane-stress stiffness if all particles followed an even strain (Cauchy and Born).
+
+    For springs ``C_ijkl t = 1/A sum k L^2 n_i n_j n_k n_l``, with C12 = C66; an upper bound of `PatchTest.stiffness` in
+    its shape and unit, which a lattice attains.
+    """
+    network = Network(mesh, np.ones(mesh.points.shape, dtype=bool), springs.relative, springs.energies)
+    fields = unit_fields(mesh)
+    return work_of(fields, [network.linear_forces(field) for field in fields], mesh)

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from springtune.mechanics.moduli import PatchTest, affine_stiffness
+from periodic import affine_stiffness
+from springtune.mechanics.moduli import PatchTest
 from springtune.mesh import MESH_TYPES, Mesh, lattice, signed_areas
 from springtune.mesh.groups import GroupedMesh
 from springtune.prediction.choices import predict

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial import Delaunay
 
-from periodic import periodic_delaunay, periodic_stiffness
+from periodic import affine_stiffness, periodic_delaunay, periodic_stiffness
 from springtune.linalg.factors import SingularError
 from springtune.mechanics.moduli import (
     PatchTest,
-    affine_stiffness,
     free_body,
     mean_gradient,
     outline_forces,

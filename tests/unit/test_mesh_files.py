@@ -256,8 +256,8 @@ def test_sets_that_are_left_out_have_a_reason(tmp_path):
     (tmp_path / "a.inp").write_text(text)
     assert read_shape(tmp_path / "a.inp", 1e-3).unusable == {
         "top": "is a `*SURFACE`, which is not read; give a set of its points",
-        "Surface1": "has cells of 'hard', which is a part; use that",
-        "Surface2": "has cells of 'soft', which is a part; use that",
+        "Surface1": "is no part, as others have a `*SOLID SECTION` or an `*ELSET`; use these",
+        "Surface2": "is no part, as others have a `*SOLID SECTION` or an `*ELSET`; use these",
     }
 
 

@@ -218,17 +218,6 @@ class PatchTest:
         return float((network.linear_forces(self._relaxed(network, given)) * given).sum()) / self.mesh.area
 
 
-def affine_stiffness(mesh: Mesh, springs: Elastic) -> np.ndarray:
-    """Return the plane-stress stiffness if all particles followed an even strain (Cauchy and Born).
-
-    For springs ``C_ijkl t = 1/A sum k L^2 n_i n_j n_k n_l``, with C12 = C66; an upper bound of `PatchTest.stiffness` in
-    its shape and unit, which a lattice attains.
-    """
-    network = Network(mesh, np.ones(mesh.points.shape, dtype=bool), springs.relative, springs.energies)
-    fields = unit_fields(mesh)
-    return work_of(fields, [network.linear_forces(field) for field in fields], mesh)
-
-
 def lateral_forces(mesh: Mesh) -> np.ndarray:
     """Forces of a unit stress [N/m] that pulls outwards on the lower and the upper face, shape (n_points, 2)."""
     forces = np.zeros(mesh.points.shape)

@@ -167,23 +167,17 @@ class _Model:
                 del sets["NSET", name]  # all points of a part
             elif all((np.isin(ends, chosen).sum(axis=1) > 1).all() for ends in own):
                 del sets["ELSET", name]  # the cells along a side
-        parts = {name: np.intersect1d(chosen, body) for (kind, name), chosen in sets.items() if kind == "ELSET"}
+        cells = {name: np.intersect1d(chosen, body) for (kind, name), chosen in sets.items() if kind == "ELSET"}
+        parts = {name for name, chosen in cells.items() if 0 < len(chosen) < len(body)}
+        best = max((self.ranks[name] for name in parts), default=0)
         for (kind, name), chosen in sets.items():
             shown, known = self.shown[name], every if kind == "ELSET" else tags
             if not np.isin(chosen, known).all():
                 content.unusable[shown] = "has what is not in the file; remove this"
             elif kind == "NSET":
                 content.point_groups[shown] += places(tags, [chosen])
-            elif better := [self.shown[one] for one in parts if self._better(name, one, parts, len(body))]:
-                content.unusable[shown] = f"has cells of '{better[0]}', which is a part; use that"
+            elif name in parts and self.ranks[name] < best:
+                content.unusable[shown] = "is no part, as others have a `*SOLID SECTION` or an `*ELSET`; use these"
             else:
                 content.cell_groups[shown] = [np.flatnonzero(np.isin(every, chosen))]
         return content
-
-    def _better(self, name: str, other: str, parts: dict[str, np.ndarray], total: int) -> bool:
-        """Whether another set is what the file means as a part: it has a section, or is no block of elements."""
-        rank, own = self.ranks[other], self.ranks[name]
-        if rank <= own or len(parts[other]) == total:
-            return False
-        shared = np.isin(parts[name], parts[other])
-        return bool(shared.any() and (rank == 2 or shared.all()))

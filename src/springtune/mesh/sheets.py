@@ -83,12 +83,9 @@ def opening(points: np.ndarray, edges: np.ndarray, count: str) -> str:
 
     small = DIGITS * np.ptp(points, axis=0).max()
     ends = np.unique(edges)
-    distances, nearest = cKDTree(points[ends]).query(points[ends], k=2)
-    twins = np.flatnonzero(distances[:, 1] <= small)
-    if len(twins):
-        # Of points at one place the nearest may be the point itself.
-        partner = np.where(nearest[:, 1] == np.arange(len(ends)), nearest[:, 0], nearest[:, 1])
-        one, other = points[ends[[twins[0], partner[twins[0]]]]]
+    twins = sorted(cKDTree(points[ends]).query_pairs(small))
+    if twins:
+        one, other = points[ends[[*twins[0]]]]
         distance = np.linalg.norm(other - one)
         apart = f", {1e3 * distance:.3g} mm apart" if distance else ""
         return f"two points at {in_words(one)}{apart}, do not join their cells ({count}); merge duplicate points"

@@ -25,13 +25,11 @@ have entry points in the group ``springtune.loads``.
 import hashlib
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..registry import NAME, NAME_RULE, Extended
 from .geometry import Beam
-
-if TYPE_CHECKING:
-    from .shapes import LoadCase
+from .shapes import LoadCase, Quantity, Support, Traction
 
 MIDDLE = "middle"
 """Name of the middle of a pressed side, as a group."""
@@ -142,10 +140,8 @@ class LoadKind:
         return (*((side, axes) for side, axes in self.held if side != self.cut), (self.cut, (1 - self.axis,)))
 
     @cached_property
-    def case(self) -> "LoadCase":
+    def case(self) -> LoadCase:
         """The kind as any load of a shape, whose groups are the sides of the rectangle; its force is 1 N."""
-        from .shapes import LoadCase, Quantity, Support, Traction  # here: reading a study of beams needs none
-
         zeros = {side.name: [0.0 if axis in axes else None for axis in range(2)] for side, axes in self.held}
         supports = (Support(side, *held) for side, held in zeros.items())
         force = (1.0, 0.0) if self.axis == 0 else (0.0, 1.0)

@@ -20,14 +20,12 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from numbers import Real
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
 
 from .parameters import PLANES
 from .quantities import Number, positive, put, quantity
-
-if TYPE_CHECKING:
-    import numpy as np
-
 
 INCOMPRESSIBLE = (
     "0.5: in plane strain an incompressible material has no finite stiffness; give a ratio below 0.5 such as 0.49, or "
@@ -122,8 +120,6 @@ class Material:
         >>> (st.Material("210 GPa", 0.3).plane_stress / 1e9).round(2).tolist()
         [[230.77, 69.23, 0.0], [69.23, 230.77, 0.0], [0.0, 0.0, 80.77]]
         """
-        import numpy as np  # here: making a material needs none
-
         modulus, nu = self.young_modulus, self.poisson_ratio
         diagonal, coupling, shear = modulus / (1 - nu**2), modulus * nu / (1 - nu**2), modulus / (2 * (1 + nu))
         return np.array([[diagonal, coupling, 0.0], [coupling, diagonal, 0.0], [0.0, 0.0, shear]])
@@ -254,8 +250,6 @@ class Rubber(Material):
         >>> [round(float(st.Rubber.excess(test, 2.0)), 3) for test in ("uniaxial", "equibiaxial", "pure shear")]
         [2.0, 5.062, 2.25]
         """
-        import numpy as np  # here: making a material needs none
-
         q = np.asarray(stretch, float)
         other = {"uniaxial": q**-0.5, "equibiaxial": q, "pure shear": np.ones_like(q)}[_known_test(test)]
         return np.asarray(q**2 + other**2 + (q * other) ** -2 - 3)
@@ -287,8 +281,6 @@ class Rubber(Material):
         >>> [round(float(rubber.stress(test, 1 + 1e-6)), 3) for test in ("uniaxial", "equibiaxial", "pure shear")]
         [1.0, 2.0, 1.333]
         """
-        import numpy as np  # here: making a material needs none
-
         q, excess = np.asarray(stretch, float), self.excess(test, stretch)
         slope = np.zeros(q.shape)
         for n, c in enumerate(self.coefficients, 1):
@@ -468,11 +460,9 @@ class AnisotropicMaterial:
         >>> [f"{one.young_modulus_x / 1e9:.1f} GPa, {one.poisson_ratio_xy:.3f}" for one in constants]
         ['54.1 GPa, 0.311', '54.1 GPa, 0.311', '54.1 GPa, 0.311']
         """
-        import numpy as np  # here: making a material needs none
-
         parts: list[tuple[AnyMaterial, np.ndarray, float]] = []
         for number, ply in enumerate(plies):
-            if not (isinstance(ply, tuple | list) and len(ply) == 3 and isinstance(ply[0], ANY_MATERIAL)):
+            if not (isinstance(ply, tuple | list) and len(ply) == 3 and isinstance(ply[0], AnyMaterial)):
                 raise ValueError(f"ply {number}: {ply!r} is none; give a material, an angle and a thickness")
             material, angle, thickness = ply
             turned = rotated(material.plane_stress, quantity(angle, "angle", f"angle of ply {number}"))
@@ -512,8 +502,6 @@ class AnisotropicMaterial:
         >>> st.AnisotropicMaterial.of(st.Material("1 MPa", 0.0).plane_stress).C66
         500000.0
         """
-        import numpy as np  # here: making a material needs none
-
         given = np.asarray(stiffness, dtype=float)
         if given.shape != (3, 3) or not np.allclose(given, given.T, rtol=1e-9, atol=1e-12 * np.abs(given).max()):
             raise ValueError(f"stiffness: {stiffness!r} is no symmetric array of shape (3, 3); give one in Pa")
@@ -542,8 +530,6 @@ class AnisotropicMaterial:
         >>> st.AnisotropicMaterial(3.0, 2.0, 0.5, 1.0, C16=0.1).plane_stress.tolist()
         [[3.0, 0.5, 0.1], [0.5, 2.0, 0.0], [0.1, 0.0, 1.0]]
         """
-        import numpy as np  # here: making a material needs none
-
         upper = [self.C11, self.C12, self.C16, self.C22, self.C26, self.C66]
         return np.array(upper)[[[0, 1, 2], [1, 3, 4], [2, 4, 5]]]
 
@@ -604,8 +590,6 @@ class AnisotropicMaterial:
         10 deg: E = 79.8 GPa, nu = 0.378
         45 deg: E = 13.2 GPa, nu = 0.321
         """
-        import numpy as np  # here: making a material needs none
-
         turn = quantity(angle, "angle", "angle")
         compliance = np.linalg.inv(rotated(self.plane_stress, -turn) if turn else self.plane_stress)
         (along, coupled, sheared), across, shear = compliance[0].tolist(), compliance[1, 1], compliance[2, 2]
@@ -617,9 +601,6 @@ CONSTANTS = ("C11", "C22", "C12", "C66", "C16", "C26")
 
 AnyMaterial = Material | AnisotropicMaterial
 """What a sheet can be of."""
-
-ANY_MATERIAL = (Material, AnisotropicMaterial)
-"""Classes of `AnyMaterial`."""
 
 
 class EngineeringConstants(NamedTuple):
@@ -659,8 +640,6 @@ def _strained(
 
 def rotated(stiffness: np.ndarray, angle: float) -> np.ndarray:
     """Return a stiffness in plane stress (3, 3) turned counter-clockwise by `angle` [rad]."""
-    import numpy as np  # here: making a material needs none
-
     c, s = math.cos(angle), math.sin(angle)
     # Strains along the turned axes of strains along x and y; the energy is the same.
     strains = np.array([[c * c, s * s, c * s], [s * s, c * c, -c * s], [-2 * c * s, 2 * c * s, c * c - s * s]])

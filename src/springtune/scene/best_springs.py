@@ -9,7 +9,7 @@ from ..mesh.bonds import bonded
 from ..mesh.cells import Mesh
 from ..problem.compare import error_text
 from ..problem.geometry import Beam
-from ..problem.materials import ANY_MATERIAL, AnyMaterial, Material
+from ..problem.materials import AnyMaterial, Material
 from ..problem.quantities import positive
 from ..safe_io.tables import Tabled
 from ..springs.base import DEFINITIONS, DefinitionError, Springs
@@ -185,7 +185,7 @@ def best_springs(
     (['energy-fit', 'lattice', 'van-gelder'], True)
     """
     is_a(mesh, Mesh, "mesh", A_MESH)
-    is_a(material, ANY_MATERIAL, "material", A_MATERIAL)
+    is_a(material, AnyMaterial, "material", A_MATERIAL)
     if not isinstance(material, Material):
         raise DefinitionError("material: best springs are of isotropic ones; take definition 'energy-fit' for others")
     thickness = positive(thickness, "length", "thickness")

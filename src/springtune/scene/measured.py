@@ -127,7 +127,7 @@ class MeasuredTest:
     _missing: int = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        is_a(self.body, (Beam, Shape), "body", A_BEAM)
+        is_a(self.body, Beam | Shape, "body", A_BEAM)
         chosen(self.body.loads if isinstance(self.body, Shape) else LOADS, self.load, "load")
         columns, lines, missing = _read(self.file)
         put(self, angle=quantity(self.angle, "angle", "angle"), columns=columns, _lines=lines, _missing=missing)

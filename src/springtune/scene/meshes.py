@@ -1,6 +1,7 @@
 """Meshes of beams: made, or from a file."""
 
 from pathlib import Path
+from typing import Any, get_args
 
 import numpy as np
 
@@ -17,12 +18,12 @@ FILLED = 1e-6
 """Largest gap between a mesh and its beam, over the beam's extent."""
 
 
-def is_a(value: object, wanted: type | tuple[type, ...], name: str, example: str) -> None:
+def is_a(value: object, wanted: Any, name: str, example: str) -> None:
     """Refuse an argument of another type."""
     if wanted is Material and isinstance(value, AnisotropicMaterial):
         only_isotropic(value, "give a springtune.Shape, whose reference takes any material")
     if not isinstance(value, wanted):
-        first = wanted[0] if isinstance(wanted, tuple) else wanted
+        first, *_ = get_args(wanted) or [wanted]
         raise ValueError(f"{name}: {value!r} is not a {first.__name__}; give one such as {example}")
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..mechanics.moduli import PatchTest
 from ..mesh.cells import Mesh
-from ..problem.materials import ANY_MATERIAL, AnyMaterial, Material
+from ..problem.materials import AnyMaterial, Material
 from ..springs.base import DefinitionError, Springs
 from .meshes import A_MATERIAL, A_MESH, is_a
 from .sheet import AnyDefinition, Sheet, definition_of, named
@@ -168,7 +168,7 @@ def moduli(mesh: Mesh, material: AnyMaterial, definition: AnyDefinition) -> Modu
     '0.000000 0.3333 0.000000'
     """
     is_a(mesh, Mesh, "mesh", A_MESH)
-    is_a(material, ANY_MATERIAL, "material", A_MATERIAL)
+    is_a(material, AnyMaterial, "material", A_MATERIAL)
     definition = definition_of(definition)
     if definition.needs == "stiffness":
         raise DefinitionError(f"definition {definition.name!r} is told its stiffness; choose one such as 'uniform'")

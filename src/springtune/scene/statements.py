@@ -28,7 +28,7 @@ from ..problem.boundary import (
 )
 from ..problem.geometry import Beam, warn_of_size, warn_of_thickness
 from ..problem.loads import LOADS, LoadKind
-from ..problem.materials import ANY_MATERIAL, AnyMaterial, Material, of_parts
+from ..problem.materials import AnyMaterial, Material, of_parts
 from ..problem.quantities import positive
 from ..problem.shapes import LoadCase, Quantity, Shape
 from ..reference.answers import beyond_linear
@@ -375,7 +375,7 @@ def _materials(material: AnyMaterial | Mapping[str, AnyMaterial], grouped: Group
     parts = parts_of(grouped)
     given = dict(material) if isinstance(material, Mapping) else {"": material}
     for name, one in given.items():
-        if not isinstance(one, ANY_MATERIAL):
+        if not isinstance(one, AnyMaterial):
             of = f" of part {name!r}" if name else ""
             raise ValueError(f"material{of}: {one!r} is not a Material; give one such as {A_MATERIAL}")
     for name in given:

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ..mesh.cells import Mesh
-from ..problem.materials import ANY_MATERIAL, AnyMaterial, Material
+from ..problem.materials import AnyMaterial, Material
 from ..problem.quantities import LEAST, MOST
 from ..registry import Declared, Registry
 
@@ -180,7 +180,7 @@ class Definition(Declared):
         """
         if not isinstance(mesh, Mesh):
             raise DefinitionError(f"mesh: {mesh!r} is not a Mesh; give a springtune.Mesh")
-        if not isinstance(material, ANY_MATERIAL):
+        if not isinstance(material, AnyMaterial):
             raise DefinitionError(f"material: {material!r} is not a Material; give a springtune.Material")
         if not (material.isotropic or self.anisotropic):
             able = [name for name, one in DEFINITIONS.items() if one.anisotropic and not one.needs]

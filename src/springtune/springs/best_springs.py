@@ -26,7 +26,7 @@ The weights are chosen by the errors of six free meshes of 5 mm under loads that
 
 import math
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
@@ -36,10 +36,6 @@ from . import van_gelder
 from .base import DefinitionError, Springs, definition, triangles_only
 from .identification import SPAN, tested_body
 from .patch_fit import NU, polynomial_tests
-
-if TYPE_CHECKING:
-    from ..linalg.factors import Factor
-    from ..mechanics.network import Network
 
 STRETCH_WEIGHT, DISPLACEMENT_WEIGHT, START_WEIGHT = 0.1, 0.1, 1e-3
 """Weights w_s, w_u and lambda against the squared misfit of the energies [1]."""
@@ -111,7 +107,7 @@ class LoadSpace:
         moved = self._roots * np.stack([field.ravel() for field in fields], axis=1)
         return np.asarray(moved - self._rigid @ (self._rigid.T @ moved))
 
-    def _factorized(self, stiffness: np.ndarray) -> "tuple[Network, Factor]":
+    def _factorized(self, stiffness: np.ndarray) -> tuple[Any, Any]:
         from ..linalg.factors import SingularError
         from ..mechanics.network import Network
 

@@ -6,8 +6,6 @@ space ``E = k sum L^2 / (6 V)``). Only the average direction of the outline ente
 along it is seen. Assumptions: many directions, no preferred one; nu = 1/3.
 """
 
-import numpy as np
-
 from ..mesh.cells import Mesh
 from ..problem.materials import Material
 from .base import Springs, definition
@@ -20,5 +18,5 @@ def springs(mesh: Mesh, material: Material, thickness: float) -> Springs:
 
     Source: Kot, Nagahashi and Szymczak, The Visual Computer 31:1339, 2015 (abstract, derived).
     """
-    total = float(np.sum(mesh.edge_lengths**2))
+    total = float((mesh.edge_lengths**2).sum())
     return Springs(3 * material.young_modulus * thickness * mesh.area / total, uniform(mesh))

@@ -13,7 +13,7 @@ with equal materials they give nearly what one material gives.
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -21,9 +21,6 @@ from ..mesh.cells import Mesh, no_cells
 from ..mesh.groups import GroupedMesh, part_names
 from ..problem.materials import AnyMaterial
 from .base import DefinitionError, Springs
-
-if TYPE_CHECKING:
-    from ..mechanics.energies import Energy
 
 
 def derive_by_parts(
@@ -76,7 +73,7 @@ def _sum(mesh: Mesh, found: list[tuple[Springs, np.ndarray, dict[int, np.ndarray
     """Springs of all parts over the first one's reference stiffness."""
     reference, count = found[0][0].reference, len(mesh.edges)
     relative, linear, owners = np.zeros(count), np.zeros(count), np.zeros(count)
-    energies: dict[tuple[object, ...], list[tuple[Energy, np.ndarray, float]]] = {}
+    energies: dict[tuple[object, ...], list[tuple[Any, np.ndarray, float]]] = {}
     for springs, edges, cells in found:
         scale = springs.reference / reference
         relative[edges] += scale * springs.relative
@@ -100,7 +97,7 @@ def _sum(mesh: Mesh, found: list[tuple[Springs, np.ndarray, dict[int, np.ndarray
     )
 
 
-def _law(energy: "Energy") -> tuple[object, ...]:
+def _law(energy: Any) -> tuple[object, ...]:
     """Return what energies of one kind must share to be joined: numbers of cells, and values a cell.
 
     Rubber laws may differ in their terms and in their range of data.
@@ -109,7 +106,7 @@ def _law(energy: "Energy") -> tuple[object, ...]:
     return tuple(value.shape[1:] if isinstance(value, np.ndarray) else value for value in values if value is not None)
 
 
-def _joined(mesh: Mesh, parts: "list[tuple[Energy, np.ndarray, float]]") -> "Energy":
+def _joined(mesh: Mesh, parts: list[tuple[Any, np.ndarray, float]]) -> Any:
     """One energy of those of several parts: each with its cells in the whole mesh, and the factor on its moduli."""
     first = parts[0][0]
     if any(len(energy.corners) != len(where) for energy, where, _ in parts):
