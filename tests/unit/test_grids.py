@@ -1,4 +1,4 @@
-"""Grids: ranges, parameters that go together, what is left out, rows of a file, and what is swept."""
+"""Grids: ranges, rows of a file, and what is swept."""
 
 import itertools
 import math
@@ -92,10 +92,13 @@ NUMBERS = {
 
 class TestCombinations:
     @given(st.permutations(list(NUMBERS)), st.integers(0, 3))
-    def test_what_is_zipped_goes_together_and_the_rest_is_a_product(self, tmp_path_factory, names, number):
-        zipped = names[:number] if number > 1 else []
-        path = tmp_path_factory.mktemp("grid") / "study.yaml"
-        grid = GRID | NUMBERS | ({"zip": zipped} if zipped else {})
+    def test_rows_go_together_and_the_rest_is_a_product(self, tmp_path_factory, names, number):
+        path, rows = tmp_path_factory.mktemp("grid") / "study.yaml", names[:number]
+        grid = GRID | {key: values for key, values in NUMBERS.items() if key not in rows}
+        if rows:
+            grid = {key: value for key, value in grid.items() if key not in rows} | {"rows": "rows.csv"}
+            lines = [rows, *zip(*(NUMBERS[name] for name in rows))]
+            path.with_name("rows.csv").write_text("".join(f"{','.join(line)}\n" for line in lines))
         path.write_text(HEAD + grid_text(grid))
         found = {(scene.mesh.mesh_size, scene.force, scene.mesh.beam.thickness) for scene in load_study(path).scenes}
         places = itertools.product(range(3), repeat=3)
@@ -104,14 +107,9 @@ class TestCombinations:
             tuple([2e-3, 5e-3, 10e-3][p] if n == "mesh_size" else [1e0, 2e0, 3e0][p] * (1e-3 if n == "thickness" else 1)
                   for n, p in zip(order, place))
             for place in places
-            if len({place[order.index(name)] for name in zipped}) <= 1
+            if len({place[order.index(name)] for name in rows}) <= 1
         }  # fmt: skip
         assert found == wanted
-
-    def test_a_value_may_stand_twice_where_it_is_zipped_alone(self, load, refusal):
-        twice = {"mesh_size": ["5 mm", "5 mm"], "force": ["1 N", "2 N"]}
-        assert len(load(**twice, zip=["mesh_size", "force"]).scenes) == 2
-        assert "grids.one.mesh_size[1]: '5 mm' is listed twice; remove one" in refusal(**twice)
 
     def test_forces_of_each_beam_go_with_it(self, load):
         forces = {"long": {"from": "1 N", "to": "3 N", "points": "3"}, "short": "10 N"}
@@ -121,19 +119,6 @@ class TestCombinations:
         }  # fmt: skip
         assert study.swept == ("force",)
         assert study.axes["force"] == (1.0, 2.0, 3.0, 10.0)
-
-    def test_left_out(self, load):
-        grid = {"mesh_size": ["2 mm", "5 mm"], "definition": ["lattice", "area"], "force": ["1 N", "2 N"]}
-        study = load(
-            **grid, exclude=[{"mesh_size": "2 mm", "definition": "area"}, {"force": "2 N", "mesh_size": "5 mm"}]
-        )
-        assert {(one.mesh.mesh_size, one.definition, one.force) for one in study.scenes} == {
-            (2e-3, "lattice", 1.0), (2e-3, "lattice", 2.0), (5e-3, "lattice", 1.0), (5e-3, "area", 1.0)
-        }  # fmt: skip
-
-    def test_a_size_too_large_for_a_beam_may_be_left_out(self, load):
-        grid = {"beam": ["long", "short"], "mesh_size": ["5 mm", "25 mm"], "force": "1 N"}
-        assert len(load(**grid, exclude={"beam": "short", "mesh_size": "25 mm"}).scenes) == 3
 
     def test_too_many_are_refused_before_they_are_made(self, refusal, monkeypatch):
         many = {"mesh_size": {"from": "2 mm", "to": "5 mm", "points": "10000"}}
@@ -392,12 +377,12 @@ def test_forces_of_equal_products_are_one_label(here):
     assert study.axes["force"] == (140.0, 210.0, 315.0)
 
 
-def test_what_is_zipped_with_the_mesh_size_is_shown_on_its_own_meshes(here):
-    grid = {"load": "traction", "mesh_size": ["10 mm", "5 mm"], "force": ["1 kN", "10 kN"]}
-    grid["zip"] = ["mesh_size", "force"]
-    path = of_grids(here, "zipped", [grid], outputs=["deformed", "size", "sweep"])
+def test_what_goes_with_the_mesh_size_is_shown_on_its_own_meshes(here):
+    (here / "rows.csv").write_text("mesh_size,force\n10 mm,1 kN\n5 mm,10 kN\n")
+    grid = {"load": "traction", "rows": "rows.csv", "mesh_size": None}
+    path = of_grids(here, "paired", [grid], outputs=["deformed", "size", "sweep"])
     Campaign(path).finish()
-    with springtune.open("results/zipped") as tree:
+    with springtune.open("results/paired") as tree:
         assert np.isfinite(tree["fields"].displacement_x.values).any()
         (panel,) = springtune.plot_size(tree, kinematics="linear")
         errors = tree.deformation_error.squeeze(drop=True)

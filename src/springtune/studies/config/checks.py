@@ -152,9 +152,8 @@ def check_scenes(config: StudyConfig, problems: Problems) -> None:
             for label, values in zip(group, zip(*rows)):
                 labels[label] |= set(values)
     problems.stop()
-    if not any(grid.exclude for grid in config.grids.values()):  # which may leave labels out
-        used = {name: values for name, values in labels.items() if name not in ("force", "pressure")}
-        check_cells(config, used, False, problems)
+    used = {name: values for name, values in labels.items() if name not in ("force", "pressure")}
+    check_cells(config, used, False, problems)
 
 
 def check_cells(config: StudyConfig, lists: Mapping[str, set[Any]], curves: bool, problems: Problems) -> None:

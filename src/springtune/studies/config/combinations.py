@@ -1,19 +1,18 @@
 """Combinations of a grid's parameters, from lists and CSV files; printed values to compare with, from CSV files."""
 
-import math
 from collections.abc import Iterator, Sequence
 from decimal import Decimal
 from itertools import chain, product
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from springtune.problem.quantities import nearest
 from springtune.safe_io.inputs import Rows, csv_rows
 
-from .fields import BeamName, Load, MaterialName, MeshType, Scalar, Section, number
-from .messages import Key, Problems, refuse, show, unseen, validated
+from .fields import BeamName, Load, MaterialName, MeshType, Section
+from .messages import Key, Problems, show, unseen, validated
 from .sections import GRID_PARAMETERS, GridConfig
 
 Factor = tuple[tuple[str, ...], list[tuple[Any, ...]]]
@@ -27,9 +26,11 @@ SAME_VALUE = 1e-9
 
 def factors(grid: GridConfig) -> list[Factor]:
     """Factors whose product is all combinations of a grid; forces of each beam go with the beam."""
+    columns = tuple(grid.rows[1:])
+    names = [name for name in GRID_PARAMETERS if getattr(grid, name) and name not in columns]
     found: list[Factor] = []
-    for group in grid.groups:
-        if not isinstance(grid.force, dict) or "force" not in group:
+    for group in filter(None, (columns, *((name,) for name in names))):
+        if group != ("force",) or not isinstance(grid.force, dict):
             found.append((group, list(zip(*(getattr(grid, name) for name in group), strict=True))))
     if isinstance(grid.force, dict):
         place = next(number for number, (group, _) in enumerate(found) if "beam" in group)
@@ -39,33 +40,12 @@ def factors(grid: GridConfig) -> list[Factor]:
     return found
 
 
-def combinations(name: str, grid: GridConfig, problems: Problems) -> Iterator[Combination]:
-    """Yield the combinations of a grid without excluded ones."""
+def combinations(grid: GridConfig) -> Iterator[Combination]:
+    """Yield the combinations of a grid."""
     parts = factors(grid)
     names = [*chain.from_iterable(group for group, _ in parts)]
-    left_out = [{key: values for key, values in one if values is not None} for one in grid.exclude]
-    matched = [False] * len(left_out)
     for rows in product(*(rows for _, rows in parts)):
-        combination = dict(zip(names, chain.from_iterable(rows)))
-        found = [all(_among(combination.get(key), values) for key, values in one.items()) for one in left_out]
-        if True in found:
-            matched = [before or now for before, now in zip(matched, found)]
-            continue
-        yield combination
-    for entry, there in enumerate(matched):
-        if not there:
-            shown = ", ".join(left_out[entry])
-            problems.add(
-                ("grids", name, "exclude", entry),
-                f"no combination of the grid has these values of {shown}; correct them, or remove the entry",
-            )
-
-
-def _among(value: Any, values: list[Any]) -> bool:
-    """Return whether a value is listed; numbers match within `SAME_VALUE`."""
-    if isinstance(value, float):
-        return any(abs(value - one) <= SAME_VALUE * abs(one) for one in values)
-    return value in values
+        yield dict(zip(names, chain.from_iterable(rows)))
 
 
 # -- CSV files ---------------------------------------------------------------------------------------------------------
@@ -89,8 +69,8 @@ def _table(path: Path, where: Sequence[Key], problems: Problems, example: str) -
     return rows
 
 
-def add_rows(content: Any, problems: Problems) -> None:
-    """Add the columns of the file of rows to each grid that has one, as zipped values."""
+def add_rows(content: Any, problems: Problems, files: list[str]) -> None:
+    """Add the columns of the file of rows to each grid that has one, and note the file."""
     grids = content.get("grids") if isinstance(content, dict) else None
     for name, grid in grids.items() if isinstance(grids, dict) else ():
         file = grid.get("rows") if isinstance(grid, dict) else None
@@ -112,42 +92,30 @@ def add_rows(content: Any, problems: Problems) -> None:
             for item, (line, _) in enumerate(rows):
                 problems.located((*where, key, item), f"{path}:{line}")
         problems.stop()
-        zipped = grid.get("zip") or []
-        zipped = [zipped] if isinstance(zipped, list) and zipped and isinstance(zipped[0], str) else zipped
-        grid.update(columns)
-        if len(columns) > 1 and isinstance(zipped, list):
-            grid["zip"] = [*zipped, [*columns]]
+        grid |= {key: tuple(values) for key, values in columns.items()} | {"rows": [file, *columns]}
+        files.append(file)
 
 
-def _printed(unit: str) -> Scalar:
-    """Annotation of a printed number of 0 or more in a unit of this size."""
-
-    def read(text: str) -> float:
-        try:
-            found = float(Decimal(text) * Decimal(unit))
-        except ArithmeticError:
-            found = math.nan
-        if not 0 <= found < math.inf:
-            raise refuse(f"{show(text)} is not a number of 0 or more; give the printed one, unsigned")
-        return found
-
-    return Scalar(read, {}, "a number")
+def _printed(unit: str) -> tuple[Any, ...]:
+    """Notes of a printed number in a unit of this size."""
+    title = "the printed number, of 0 or more and unsigned"
+    return Field(ge=0, le=Decimal("1e30"), title=title), AfterValidator(lambda found: float(found * Decimal(unit)))
 
 
 class PrintedCell(Section):
     """A printed table cell in SI units; magnitudes only. `remark` names contradictions in the print."""
 
-    table: Annotated[int, number("a whole number from 1", 1, math.inf, whole=True)]
+    table: Annotated[int, Field(ge=1, title="a whole number from 1")]
     beam: BeamName
     mesh_type: MeshType
-    mesh_size: Annotated[float, _printed("1e-3")] = Field(alias="mesh_size_mm")
+    mesh_size: Annotated[Decimal, *_printed("1e-3")] = Field(alias="mesh_size_mm")
     material: MaterialName
     load: Load
-    force: Annotated[float, _printed("1")] = Field(alias="force_N")
-    stiffness: Annotated[float, _printed("1")] = Field(alias="stiffness_N_per_m")
-    reference_displacement: Annotated[float, _printed("1e-3")] = Field(alias="reference_displacement_mm")
-    displacement: Annotated[float, _printed("1e-3")] = Field(alias="displacement_mm")
-    deformation_error: Annotated[float, _printed("1e-2")] = Field(alias="deformation_error_percent")
+    force: Annotated[Decimal, *_printed("1")] = Field(alias="force_N")
+    stiffness: Annotated[Decimal, *_printed("1")] = Field(alias="stiffness_N_per_m")
+    reference_displacement: Annotated[Decimal, *_printed("1e-3")] = Field(alias="reference_displacement_mm")
+    displacement: Annotated[Decimal, *_printed("1e-3")] = Field(alias="displacement_mm")
+    deformation_error: Annotated[Decimal, *_printed("1e-2")] = Field(alias="deformation_error_percent")
     remark: str
 
 

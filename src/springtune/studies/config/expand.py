@@ -147,7 +147,7 @@ def expand(config: StudyConfig, bodies: Declared, mesh_files: MeshFiles, problem
         curves: dict[CurveSpec, None] = {}
         absent = set()
         signs = {load: (LOADS[load].sign, LOADS[load].follower) for load in grid.load}
-        for one in combinations(name, grid, problems):
+        for one in combinations(grid):
             beam, load = make_beam(one["beam"], one.get("thickness")), one["load"]
             material = make_material(one["material"], one.get("young_modulus"), one.get("poisson_ratio"))
             if isinstance(material, Rubber):
@@ -180,8 +180,6 @@ def expand(config: StudyConfig, bodies: Declared, mesh_files: MeshFiles, problem
         for mesh_type, beam_name, length in sorted(absent):
             row = f"{{file: <path>, beam: {beam_name}, mesh_size: {length}}}"
             problems.add(("grids", name, "mesh_size"), f"no file for {length}; add {row} to mesh_files.{mesh_type}")
-        if not scenes and not absent:
-            problems.add(("grids", name, "exclude"), "leaves nothing of the grid; exclude less, or remove the grid")
         grids.append(Grid(name, tuple(scenes), tuple(curves)))
     problems.stop()
     return tuple(grids)

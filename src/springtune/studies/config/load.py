@@ -26,10 +26,11 @@ def load(path: str | Path, kinds: tuple[Kind, ...], beside: Path | None = None) 
     model = study_model(kinds)
     if content is None:
         problems.stop_at((), f"the file is empty; give the keys {', '.join(model.model_fields)}")
-    add_rows(content, problems)
+    files: list[str] = []
+    add_rows(content, problems, files)
     # Names that sections refer to; of a section that is no mapping, whose error is enough, nothing is known.
     given = content.items() if isinstance(content, dict) else ()
-    sections: dict[str, Any] = {key: one if isinstance(one, dict) else None for key, one in given} | {FILES: []}
+    sections: dict[str, Any] = {key: one if isinstance(one, dict) else None for key, one in given} | {FILES: files}
     config = validated(model, content, problems, context=sections)
     check_names(config, problems)
     problems.stop()
@@ -47,5 +48,5 @@ def load(path: str | Path, kinds: tuple[Kind, ...], beside: Path | None = None) 
     problems.stop()
     printed_path = beside / config.printed if config.printed else None
     about = {"name": path.stem, "path": path, "text": text, "printed_path": printed_path, "mesh_files": mesh_files}
-    about["files"] = tuple(beside / name for name in sections[FILES])
+    about["files"] = tuple(beside / name for name in files)
     return build(config, bodies, grids, kinds, problems, about)

@@ -1,19 +1,22 @@
 """Bounded YAML with the line of every key, and messages on it that name line, key, value and remedy."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
+from types import UnionType
+from typing import Annotated, Any, NoReturn, TypeVar, Union, get_args, get_origin
 
 import yaml
-from pydantic_core import PydanticCustomError, ValidationError
+from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticCustomError
 
+from springtune.problem.quantities import nearest
 from springtune.safe_io.escapes import UNSEEN, clipped, shown
 from springtune.safe_io.inputs import BeyondSize, read
 
-if TYPE_CHECKING:
-    from pydantic import BaseModel
-
-    Model = TypeVar("Model", bound=BaseModel)
+Model = TypeVar("Model", bound=BaseModel)
 
 Key = str | int
 """Step of a path into a file: a key or a list index."""
@@ -116,28 +119,119 @@ def part_of(content: Any, path: Iterable[Key]) -> tuple[tuple[Key, ...], Any]:
     """
     found: list[Key] = []
     for step in path:
-        if step in content if isinstance(content, dict) else isinstance(content, list) and isinstance(step, int):
+        if (
+            step in content
+            if isinstance(content, dict)
+            else isinstance(content, list | tuple) and isinstance(step, int)
+        ):
             found.append(step)
             content = content[step]
     return tuple(found), content
 
 
+def words(annotation: Any) -> str:
+    """What to give for a field or type: the title that it has, else in words."""
+    if isinstance(annotation, FieldInfo):
+        return annotation.title or words(annotation.annotation)
+    origin, (inside, *notes) = get_origin(annotation), get_args(annotation) or (None,)
+    if origin is Annotated:
+        return next((note.title for note in notes if isinstance(note, FieldInfo) and note.title), words(inside))
+    if origin in (Union, UnionType):
+        return words(inside)
+    if origin is list:
+        given = words(inside)
+        return "a list of sections" if given == SECTION else f"{given}, or a list"
+    return SECTION
+
+
+SECTION = "a section"
+
+
+@dataclass(frozen=True)
+class OrSection:
+    """Note of a value that may be a section, which a validator reads."""
+
+    section: type[BaseModel]
+
+
+def _branches(annotation: Any) -> Iterator[Any]:
+    """Types that a field or type may be: sections, lists, mappings and single values."""
+    if isinstance(annotation, FieldInfo):
+        annotation = Annotated[annotation.annotation, "a field", *annotation.metadata]
+    origin, parts = get_origin(annotation), get_args(annotation)
+    if origin is Annotated:
+        parts = parts[0], *(note.section for note in parts[1:] if isinstance(note, OrSection))
+    if origin in (Annotated, Union, UnionType):
+        yield from chain.from_iterable(map(_branches, parts))
+    else:
+        yield annotation
+
+
+def _inside(annotation: Any, path: Sequence[Key]) -> Any:
+    """Field or type at a path inside a type; None if there is none."""
+    if not path:
+        return annotation
+    for one in _branches(annotation):
+        origin = get_origin(one)
+        is_item = origin in (dict, list, tuple) and isinstance(path[0], int) == (origin is not dict)
+        below = get_args(one)[-1] if is_item else _keys(one).get(path[0])
+        if below is not None and (found := _inside(below, path[1:])) is not None:
+            return found
+    return None
+
+
+def _keys(annotation: Any) -> dict[Key, FieldInfo]:
+    """Fields of a section by their keys in the file."""
+    return {
+        field.alias or name: field
+        for one in _branches(annotation)
+        for name, field in getattr(one, "model_fields", {}).items()
+    }
+
+
+WHY = {"int_parsing": "is not a whole number"}
+WHY |= dict.fromkeys(("float_parsing", "decimal_parsing"), "is not a number")
+WHY |= dict.fromkeys(("greater_than", "greater_than_equal", "less_than_equal", "finite_number"), "is out of range")
+"""What is wrong with a value, by the type of pydantic's error."""
+
+
+def _message(model: Any, details: Any, path: tuple[Key, ...], value: Any) -> str:
+    """Message of an error of pydantic about the value at a path: the value, what is wrong with it, and the remedy."""
+    field, above = _inside(model, path), _keys(_inside(model, path[:-1]))
+    if details["type"] == "extra_forbidden":
+        return f"unknown key {show(path[-1])}; {nearest(str(path[-1]), map(str, above))}"
+    if details["type"] == "missing" and path[-1:] == details["loc"][-1:]:
+        return f"'{path[-1]}' is missing; give {words(field)}"
+    if details["type"] == "model_type":
+        return f"{show(value)} instead of keys and values; give the keys {', '.join(map(str, _keys(field)))}"
+    why = WHY.get(details["type"], "does not fit") if isinstance(value, str) else f"instead of {words(field)}"
+    return f"{show(value)} {why}; give {words(field)}"
+
+
 def validated(
-    model: "type[Model]", content: Any, problems: Problems, line: int = 0, context: Mapping[str, Any] | None = None
-) -> "Model":
+    model: type[Model], content: Any, problems: Problems, line: int = 0, context: Mapping[str, Any] | None = None
+) -> Model:
     """Return the model of a content; each error of pydantic is a problem with place, value and remedy."""
     try:
         return model.model_validate(content, context=context)
     except ValidationError as error:
-        for details in error.errors(include_url=False):
-            # pydantic's path has steps that the file has not: branches of a union, the item of a single value.
+        errors = error.errors(include_url=False)
+        # Of a section the first missing key is enough, and a misspelt one instead.
+        faulty = {details["loc"][:-1] for details in errors if details["type"] == "extra_forbidden"}
+        for details in errors:
+            # The path of pydantic has steps that the file has not: branches of a union, the item of a single value.
             path, value = part_of(content, details["loc"])
-            message = f"{show(value)}: {details['msg']}; see config/README.md"
             if details["type"] == "study":
                 path += details["ctx"]["path"] if isinstance(value, list | dict) else ()
                 message = details["ctx"]["message"].replace("{value}", show(part_of(content, path)[1]))
-            elif details["type"] == "dict_type":
-                message = f"{show(value)} instead of names and their values, such as {{name: value}}; give a mapping"
+            elif details["type"] != "missing":
+                message = _message(model, details, path, value)
+            elif details["loc"][:-1] not in faulty:
+                faulty.add(details["loc"][:-1])
+                path += details["loc"][-1:] if isinstance(value, dict) else ()
+                message = _message(model, details, path, value)
+            else:
+                continue
             problems.add(path, message, line)
         problems.stop()
         raise
@@ -152,7 +246,7 @@ def show(value: object) -> str:
     ("'200 mm'", 'an empty list', 'a mapping')
     """
     if isinstance(value, dict):
-        return "a mapping"
+        return "a mapping" if value else "an empty mapping"
     if isinstance(value, list):
         return "a list" if value else "an empty list"
     if value is None:
@@ -172,6 +266,8 @@ LARGEST_STUDY = 500_000
 
 MOST_VALUES = 100_000
 """Limit of values and keys, with aliases expanded."""
+
+LONGEST_TEXT = 1000
 
 DEEPEST = 20
 """Limit of nested lists and mappings."""
@@ -241,8 +337,11 @@ class _Reader:
         self.file, self.values = file, 0
         self.lines: dict[tuple[Key, ...], int] = {}
 
-    def refuse(self, node: yaml.Node, message: str) -> NoReturn:
-        raise StudyError(f"{self.file}:{node.start_mark.line + 1}: {message}")
+    def refuse(self, node: yaml.Node, message: str, path: tuple[Key, ...] = ()) -> NoReturn:
+        problems = Problems(self.file)
+        problems.add(path, message, node.start_mark.line + 1)
+        problems.stop()
+        raise AssertionError
 
     def content(self, node: yaml.Node, path: tuple[Key, ...]) -> Any:
         self.values += 1
@@ -251,21 +350,21 @@ class _Reader:
         if self.values > MOST_VALUES:
             most = f"more than {MOST_VALUES} values, aliases (*name) as what they stand for"
             self.refuse(node, f"{most}; give ranges of fewer values, or split the study into several")
-        self.check_tag(node)
+        if node.tag not in yaml.SafeLoader.yaml_constructors:
+            tag = node.tag.replace("tag:yaml.org,2002:", "!!")
+            remedy = "remove it, or put the value in quotes"
+            self.refuse(node, f"not YAML: {show(node.value)} has the unknown tag '{tag}'; {remedy}")
+        text = self.text(node, path) if isinstance(node, yaml.ScalarNode) else ""
         if node.tag == "tag:yaml.org,2002:null":
             return None
         self.lines.setdefault(path, node.start_mark.line + 1)
-        if isinstance(node, yaml.ScalarNode):
-            # The line break that ends a block is not the text's.
-            return self.text(node, path, node.value.rstrip("\n") if node.style in ("|", ">") else node.value)
         if isinstance(node, yaml.SequenceNode):
             return [self.content(item, (*path, number)) for number, item in enumerate(node.value)]
-        return self.mapping(node, path)
+        return self.mapping(node, path) if isinstance(node, yaml.MappingNode) else text
 
     def mapping(self, node: yaml.Node, path: tuple[Key, ...]) -> dict[str, Any]:
         found: dict[str, Any] = {}
         merged: dict[str, Any] = {}
-        lines: dict[tuple[Key, ...], int] = {}
         for key, value in node.value:
             if not isinstance(key, yaml.ScalarNode):
                 self.refuse(key, "a list or mapping cannot be a key; write a name before the colon")
@@ -276,31 +375,26 @@ class _Reader:
                         self.refuse(key, "'<<' merges mappings only; give it an alias such as *name")
                     merged = inherited | merged
                 continue
-            self.check_tag(key)
-            inside, line = (*path, key.value), key.start_mark.line + 1
-            name = self.text(key, inside, key.value)
-            if inside in lines:
-                why = f"'{name}' is given twice, first in line {lines[inside]}; rename or remove one"
-                Problems(self.file).stop_at(inside, why, line)
-            lines[inside] = line
+            inside = *path, key.value
+            name = self.text(key, inside)
+            if name in found:
+                why = f"'{name}' is given twice, first in line {self.lines[inside]}; rename or remove one"
+                self.refuse(key, why, inside)
             found[name] = self.content(value, inside)
-        self.lines |= lines
+            self.lines[inside] = key.start_mark.line + 1
         return merged | found
 
-    def check_tag(self, node: yaml.Node) -> None:
-        """Refuse values that YAML, and so Snakemake, would not accept."""
-        tag = node.tag.replace("tag:yaml.org,2002:", "!!")
-        if node.tag not in yaml.SafeLoader.yaml_constructors:
-            remedy = "remove it, or put the value in quotes"
-            self.refuse(node, f"not YAML: {show(node.value)} has the unknown tag '{tag}'; {remedy}")
+    def text(self, node: yaml.ScalarNode, path: tuple[Key, ...]) -> str:
+        """Text of a scalar; refuses what YAML, and so Snakemake, does not accept, and what is not one line."""
         try:
-            if isinstance(node, yaml.ScalarNode):
-                yaml.constructor.SafeConstructor().construct_object(node)
-        except (ValueError, ArithmeticError, LookupError):
+            yaml.constructor.SafeConstructor().construct_object(node)
+        except (yaml.YAMLError, ValueError, ArithmeticError, LookupError):
+            tag = node.tag.replace("tag:yaml.org,2002:", "!!")
             self.refuse(node, f"not YAML: {show(node.value)} is no {tag}; put it in quotes")
-
-    def text(self, node: yaml.Node, path: tuple[Key, ...], text: str) -> str:
-        """Refuse line breaks and control characters."""
+        # The line break that ends a block is not the text's.
+        text: str = node.value.rstrip("\n") if node.style in ("|", ">") else node.value
         if why := unseen(text):
-            Problems(self.file).stop_at(path, why, node.start_mark.line + 1)
+            self.refuse(node, why, path)
+        if len(text) > LONGEST_TEXT:
+            self.refuse(node, f"{show(text)}, {len(text)} characters; give at most {LONGEST_TEXT}", path)
         return text

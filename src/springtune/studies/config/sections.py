@@ -1,21 +1,20 @@
 """Models of the sections of a study; the JSON schema and the tables of config/README.md are generated from them."""
 
 import json
-from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self
 
-from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, create_model, model_validator
+from pydantic import AfterValidator, ConfigDict, Field, WithJsonSchema, create_model, model_validator
 
 from springtune.mesh.types import MESH_TYPES
 from springtune.problem.loads import LOADS
 from springtune.problem.materials import INCOMPRESSIBLE, MOST_TERMS, AnisotropicMaterial, AnyMaterial, Material
 
 from . import fields
-from .fields import Named, OneOrMore, Section, Words, default, expected_value, once, one_of
+from .fields import Named, OneOrMore, Section, default, one_of
 from .kind import Kind, kinds
-from .messages import refuse, show
+from .messages import refuse, words
 
 PLAUSIBLE = 20.0
 """Factor on sqrt(3)/2 E t beyond which a stated stiffness counts as an error of units."""
@@ -105,7 +104,7 @@ class MaterialConfig(Section):
     shear_modulus: fields.Stress | None = None
     """Shear modulus along and across the fibres."""
 
-    angle: Annotated[list[fields.Angle], OneOrMore(repeats=True)] | None = None
+    angle: fields.Angles | None = None
     """Angle of the fibres from the x axis, counter-clockwise; 0 by default. Several angles are the plies of a
     laminate of equal thicknesses and symmetric stacking."""
 
@@ -148,7 +147,7 @@ class MaterialConfig(Section):
             raise refuse(f"is {INCOMPRESSIBLE}", "poisson_ratio")
         for key in form:
             if getattr(self, key) is None:
-                raise refuse(f"'{key}' is missing; give {expected_value(type(self).model_fields[key])}", key)
+                raise refuse(f"'{key}' is missing; give {words(type(self).model_fields[key])}", key)
         if self.uniaxial_test is not None:
             return self  # files are read by who knows where they are
         try:
@@ -199,17 +198,10 @@ class StatedStiffness(Section):
 class PaperConfig(Section):
     """Parameters of the definition `paper`: stated stiffnesses."""
 
-    stiffness: list[StatedStiffness] = Field(min_length=1)
+    stiffness: list[StatedStiffness] = Field(
+        min_length=1, title="a list such as [{mesh_type: structured, material: steel, value: 170e6 N/m}]"
+    )
     """One entry for each mesh type and material of the grids with `paper`."""
-
-    @model_validator(mode="before")
-    @classmethod
-    def _listed(cls, value: object) -> object:
-        rows = value.get("stiffness") if isinstance(value, dict) else None
-        if rows is not None and (not isinstance(rows, list) or not rows):
-            example = "- {mesh_type: structured, material: steel, value: 170e6 N/m}"
-            raise refuse(f"{show(rows)} instead of a list; give entries such as {example}", "stiffness")
-        return value
 
 
 class CalibratedConfig(Section):
@@ -271,71 +263,9 @@ class MeshFileConfig(Section):
     """Unit of the coordinates in the file."""
 
 
-class ExcludeConfig(Section):
-    """Combinations that a grid leaves out: those with one of the given values of every given parameter."""
-
-    beam: Annotated[list[fields.BeamName], OneOrMore()] | None = None
-    """Beams."""
-
-    mesh_type: Annotated[list[fields.MeshType], OneOrMore()] | None = None
-    """Mesh types."""
-
-    mesh_size: fields.Lengths | None = None
-    """Lengths of an edge."""
-
-    material: Annotated[list[fields.MaterialName], OneOrMore()] | None = None
-    """Materials."""
-
-    load: Annotated[list[fields.Load], OneOrMore()] | None = None
-    """Loads."""
-
-    force: fields.Forces | None = None
-    """Magnitudes of the force."""
-
-    pressure: fields.Stresses | None = None
-    """Pressures."""
-
-    thickness: fields.Lengths | None = None
-    """Thicknesses."""
-
-    young_modulus: fields.Stresses | None = None
-    """Young's moduli."""
-
-    poisson_ratio: fields.PoissonRatios | None = None
-    """Poisson's ratios."""
-
-    stiffness_scale: fields.Ratios | None = None
-    """Scales of the stiffness."""
-
-    definition: Annotated[list[fields.DefinitionName], OneOrMore()] | None = None
-    """Definitions."""
-
-    kinematics: Annotated[list[fields.Kinematics], OneOrMore()] | None = None
-    """Kinematics."""
-
-    @model_validator(mode="after")
-    def _something(self) -> Self:
-        if all(values is None for _, values in self):
-            raise refuse("no parameter at all would leave nothing; give values of one such as {mesh_size: 1 mm}")
-        return self
-
-
-GRID_PARAMETERS = tuple(ExcludeConfig.model_fields)
-"""Keys of a grid whose values are combined."""
-
-
-Parameter = Annotated[str, one_of("parameter", GRID_PARAMETERS)]
-
-
-def _one_group(value: Any) -> Any:
-    return [value] if isinstance(value, list) and value and isinstance(value[0], str) else value
-
-
 def _rows_may_give(schema: dict[str, Any]) -> None:
-    """Required keys may come from a file of rows, and zipped values may repeat."""
+    """Required keys may come from a file of rows."""
     schema["anyOf"] = [{"required": schema.pop("required")}, {"required": ["rows"]}]
-    once = {name: {"uniqueItems": True} for name in GRID_PARAMETERS}
-    schema |= {"if": {"not": {"required": ["zip"]}}, "then": {"properties": once}}
 
 
 class GridConfig(Section):
@@ -351,20 +281,20 @@ class GridConfig(Section):
 
     model_config = ConfigDict(json_schema_extra=_rows_may_give)
 
-    beam: Annotated[list[fields.BeamName], OneOrMore(repeats=True)]
+    beam: OneOrMore[fields.BeamName]
     """Beams, by name."""
 
-    mesh_type: Annotated[list[fields.MeshType], OneOrMore(repeats=True)] = Field(
+    mesh_type: OneOrMore[fields.MeshType] = Field(
         description="A name under `mesh_files`, or one of these. "
         + " ".join(f"`{name}`: {one.summary}." for name, one in MESH_TYPES.items())
     )
     mesh_size: fields.Lengths
     """Lengths of an edge, at most the smaller side of each beam."""
 
-    material: Annotated[list[fields.MaterialName], OneOrMore(repeats=True)]
+    material: OneOrMore[fields.MaterialName]
     """Materials, by name."""
 
-    load: Annotated[list[fields.Load], OneOrMore(repeats=True)]
+    load: OneOrMore[fields.Load]
     """With the left end clamped, `traction` and `compression` act along x on the right end, `bending` along y. With
     the lower side clamped, `shear` acts along x on the upper side, which stays level, and `pressure` and
     `follower-pressure` act down on it. All are spread evenly."""
@@ -401,66 +331,24 @@ class GridConfig(Section):
                 raise refuse(f"load '{load}' has no pressed side; give 'force', or loads under pressure", "pressure")
         return self
 
-    definition: Annotated[list[fields.DefinitionName], OneOrMore(repeats=True)]
+    definition: OneOrMore[fields.DefinitionName]
     """Rules for the stiffness of every spring; `springtune definitions` lists them."""
 
-    kinematics: Annotated[list[fields.Kinematics], OneOrMore(repeats=True)] = default("nonlinear")
+    kinematics: OneOrMore[fields.Kinematics] = default("nonlinear")
     """`nonlinear`: springs keep their length law. `linear`: they keep their tangent at rest."""
 
-    zip: Annotated[
-        list[Annotated[list[Parameter], Field(min_length=2)]],
-        BeforeValidator(_one_group, json_schema_input_type=list[Parameter] | list[list[Parameter]]),
-        Words("a list of two parameters or more such as [mesh_size, force], or several such lists"),
-    ] = []
-    """Parameters whose values are paired instead of combined, such as `[mesh_size, force]`: the first with the
-    first, and so on. Give a list of such lists for several groups."""
-
-    exclude: Annotated[
-        list[ExcludeConfig],
-        BeforeValidator(
-            lambda value: [value] if isinstance(value, dict) else value,
-            json_schema_input_type=ExcludeConfig | list[ExcludeConfig],
-        ),
-        Words("keys and values to leave out such as {mesh_size: 1 mm}, or a list of several"),
-    ] = []
-    """Combinations to leave out, such as `{mesh_type: free, mesh_size: 1 mm}`."""
-
-    rows: fields.FileName | None = None
+    rows: Annotated[list[str], WithJsonSchema({"type": "string"}), Field(title="the path of a CSV file")] = []
     """CSV file of combinations, relative to the study's folder: one column for each parameter, named as its key,
-    and one row for each combination. Units stand beside the numbers (`5 mm`) or in the head (`mesh_size [mm]`).
-    Other parameters of the grid are combined with each row."""
+    and one row for each combination, such as a mesh size with its own force. Units stand beside the numbers (`5 mm`)
+    or in the head (`mesh_size [mm]`). Other parameters of the grid are combined with each row."""
 
     sensitivity: fields.Flag = default("true")
     """Whether each mesh, material, load and kinematics gets a sensitivity curve. Curves that `calibrated` needs are
     always computed."""
 
-    @property
-    def groups(self) -> list[tuple[str, ...]]:
-        """Groups of zipped parameters, and the others each alone, in the order of `GRID_PARAMETERS`."""
-        zipped = {name: tuple(group) for group in self.zip for name in group}
-        return list(dict.fromkeys(zipped.get(name, (name,)) for name in GRID_PARAMETERS if getattr(self, name)))
 
-    @model_validator(mode="after")
-    def _as_many(self) -> Self:
-        """Zipped lists are of equal lengths; in others no value stands twice."""
-        zipped = [name for group in self.zip for name in group]
-        for name in zipped:
-            if zipped.count(name) > 1:
-                raise refuse(f"'{name}' is zipped twice; name it once", "zip")
-        for group in self.groups:
-            lists = {name: getattr(self, name) for name in group}
-            if len(group) == 1 and isinstance(lists[group[0]], list):
-                once(lists[group[0]], *group)
-            elif None in lists.values():
-                absent = next(name for name, values in lists.items() if values is None)
-                remedy = "give it some, or leave it out of 'zip'"
-                raise refuse(f"'{absent}' is zipped and has no values; {remedy}", "zip")
-            elif len(group) > 1 and isinstance(self.force, dict) and "force" in group:
-                raise refuse("'force' is zipped and has values for each beam; give one list, or zip neither", "zip")
-            elif len(set(map(len, lists.values()))) > 1:
-                shown = ", ".join(f"{len(values)} of '{name}'" for name, values in lists.items())
-                raise refuse(f"{shown} cannot go together; give each as many values", "zip")
-        return self
+GRID_PARAMETERS = tuple(name for name in GridConfig.model_fields if name not in ("rows", "sensitivity"))
+"""Keys of a grid whose values are combined."""
 
 
 def _own_names(files: dict[str, Any]) -> dict[str, Any]:
@@ -476,10 +364,10 @@ class StudyConfig(Section):
     title: fields.Text
     """Title of the study, one line."""
 
-    beams: Annotated[dict[str, BeamConfig], Named("beam")] = {}
+    beams: Named[BeamConfig] = Field({}, title="a section for each beam, by name")
     """Beams that grids and sections name."""
 
-    materials: Annotated[dict[str, MaterialConfig], Named("material")] = {}
+    materials: Named[MaterialConfig] = Field({}, title="a section for each material, by name")
     """Materials that grids and sections name."""
 
     definitions: DefinitionsConfig = Field(default_factory=DefinitionsConfig)
@@ -488,11 +376,13 @@ class StudyConfig(Section):
     sensitivity: SensitivityConfig = Field(default_factory=SensitivityConfig)
     """Range of stiffness of the sensitivity curves."""
 
-    mesh_files: Annotated[dict[str, list[MeshFileConfig]], Named("mesh type"), AfterValidator(_own_names)] | None = None
+    mesh_files: Annotated[Named[list[MeshFileConfig]], AfterValidator(_own_names)] | None = Field(
+        None, title="a list of files for each mesh type, by name"
+    )
     """Your own mesh types: for each a list of files, one for each beam and mesh size."""
 
     outputs: list[str] = Field([])
-    further_references: Annotated[list[fields.FurtherReference], OneOrMore()] = []
+    further_references: OneOrMore[fields.FurtherReference] = []
     """References at finite strain for every beam, material and load, besides the one of small strain. The group
     `/finite_strain` has them and the networks' errors; under pressure `/block` has them, too. Each takes seconds.
     Incompressible materials have none in plane strain. 'yeoh-plane-stress' needs a material with a `uniaxial_test`
@@ -506,17 +396,19 @@ class StudyConfig(Section):
     alone: ClassVar[dict[str, tuple[str, ...]]] = {}
     """Keys of study kinds that a study may have instead of grids, and the keys that each needs."""
 
+    @model_validator(mode="before")
     @classmethod
-    def _needed(cls, given: Mapping[str, object]) -> dict[str, str]:
-        found = super()._needed(given)
-        own = {key: [name for name in needed if name not in GRIDS_NEED] for key, needed in cls.alone.items()}
-        for key in ("grids", *cls.alone):
-            if {key, *own.get(key, ())} & set(given):
-                found |= dict.fromkeys((key, *cls.alone.get(key, GRIDS_NEED)), "")
-        if len(found) == 1:  # the title
-            ways = [" and ".join(f"'{name}'" for name in (*others, key)) for key, others in own.items()]
-            found |= dict.fromkeys(("beams", "grids"), f", or {', '.join(ways)}") | {"materials": ""}
-        return {name: found[name] for name in cls.model_fields if name in found}
+    def _something(cls, value: Any) -> Any:
+        """Refuse a study of no grids nor a section that may stand alone, and one that lacks what these need."""
+        if not isinstance(value, dict):
+            return value
+        ways = {"grids": GRIDS_NEED} | cls.alone
+        given = {key for key, content in value.items() if content is not None}
+        needed = {name for way in given & {*ways} for name in ways[way]} if given & {*ways} else {"grids"}
+        for name in sorted(needed - given if given <= {*cls.model_fields} else ()):
+            others = f", or {', '.join(map(repr, cls.alone))}" if name == "grids" else ""
+            raise refuse(f"'{name}' is missing; give {words(cls.model_fields[name])}{others}", name)
+        return value
 
 
 GRIDS_NEED = ("beams", "materials")
@@ -535,7 +427,7 @@ def study_model(kinds: tuple[Kind, ...]) -> type[StudyConfig]:
         alone |= kind.alone or dict.fromkeys(optional_keys, GRIDS_NEED)
     meanings = "; ".join(f"`{output.name}`: {output.meaning}" for output in made)
     added["outputs"] = (
-        Annotated[list[Annotated[str, one_of("output", [output.name for output in made])]], OneOrMore()],
+        OneOrMore[Annotated[str, *one_of("output", [output.name for output in made])]],
         Field(
             [output.name for output in made if output.usual],
             description=f"Figures and tables of the dataset: {meanings}. "
@@ -544,8 +436,13 @@ def study_model(kinds: tuple[Kind, ...]) -> type[StudyConfig]:
     )
     listed = ", ".join(f"`{name}`" for name in alone)
     added["grids"] = (
-        Annotated[dict[str, grid], Named("grid", for_files=False)],
-        Field({}, description=f"Grids of scenes to compute. A study with one of {listed} needs none."),
+        dict[str, grid],
+        Field(
+            {},
+            min_length=1,
+            title="a section for each grid, by name",
+            description=f"Grids of scenes to compute. A study with one of {listed} needs none.",
+        ),
     )
     model = create_model("StudyConfig", __base__=StudyConfig, __doc__=StudyConfig.__doc__, **added)
     model.alone = alone

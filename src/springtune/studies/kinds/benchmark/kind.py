@@ -14,7 +14,7 @@ from springtune.springs.base import DEFINITIONS
 
 from ...config import fields
 from ...config.checks import check_able, check_known, check_particles, check_product, check_scene
-from ...config.fields import Named, OneOrMore, Section, default, number, one_of, optional
+from ...config.fields import Named, OneOrMore, Section, default, one_of, optional
 from ...config.kind import Kind
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key
 from ...runs.stages import Task, stage
@@ -24,8 +24,8 @@ from .outputs import OUTPUTS
 MOST_RUNS = 100_000
 """Most combinations of scenes, approaches and mesh sizes that a benchmark measures."""
 
-OtherApproach = Annotated[str, one_of("approach", OTHER_APPROACHES)]
-Seconds = Annotated[float, number("a number of seconds above 0, such as 0.5", 0, 3600, above=True)]
+OtherApproach = Annotated[str, *one_of("approach", OTHER_APPROACHES)]
+Seconds = Annotated[float, Field(gt=0, le=3600, title="a number of seconds above 0, such as 0.5")]
 
 
 class BenchmarkSceneConfig(Section):
@@ -47,20 +47,20 @@ class BenchmarkSceneConfig(Section):
 class BenchmarkConfig(Section):
     """Run time against error: every definition on every mesh type, and other approaches; one at a time."""
 
-    scenes: Annotated[dict[str, BenchmarkSceneConfig], Named("scene")]
+    scenes: Named[BenchmarkSceneConfig] = Field(title="a section for each scene, by name")
     """Scenes."""
 
     definition: fields.DefinitionNames
     """Definitions that derive a stiffness and need no reference."""
 
-    mesh_type: Annotated[list[fields.MeshType], OneOrMore()]
+    mesh_type: OneOrMore[fields.MeshType]
     """Mesh types of the definitions."""
 
-    approach: Annotated[list[OtherApproach], OneOrMore()] = Field(list(OTHER_APPROACHES))
+    approach: OneOrMore[OtherApproach] = Field(list(OTHER_APPROACHES))
     """Other approaches: finite elements, CalculiX where it is on the machine, and what the paper names:
     tensor-mass, pre-computed responses, boundary elements, free-form deformation. All without."""
 
-    mesh_size: Annotated[list[fields.Length], OneOrMore()]
+    mesh_size: OneOrMore[fields.Length]
     """Lengths of an edge."""
 
     finest: fields.Length | None = None

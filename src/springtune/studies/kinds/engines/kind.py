@@ -4,6 +4,8 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Annotated, Any
 
+from pydantic import Field
+
 from springtune.mechanics.integrators import PRECISIONS
 from springtune.mesh.types import MESH_TYPES
 from springtune.problem.loads import LOADS
@@ -11,7 +13,7 @@ from springtune.registry import imported
 from springtune.springs.base import DEFINITIONS
 
 from ...config import checks, fields
-from ...config.fields import OneOrMore, Scalar, Section, default, number, one_of, optional
+from ...config.fields import OneOrMore, Section, default, one_of, optional
 from ...config.kind import Kind
 from ...runs.keys import beam_key, declared_key, definition_key, distribution, installed, material_key, mesh_type_key
 from ...runs.stages import Task, stage
@@ -28,12 +30,12 @@ OWN_PRECISION = "own"
 """The first precision of each engine."""
 
 
-Count = Annotated[int, number("a whole number from 1 to 100000, such as 10", 1, 100_000, whole=True)]
-Distance = Annotated[float, number("a number up to 0.01, such as 0.0001", 0, 0.01, above=True)]
-EngineName = Annotated[str, Scalar(str, {"type": "string", "examples": ["xpbd"]}, "an engine such as 'xpbd'")]
-FrameTime = Annotated[float, fields.quantity("time")]
-Precision = Annotated[str, one_of("precision", (OWN_PRECISION, *PRECISIONS))]
-SceneName = Annotated[str, Scalar(str, {"type": "string"}, "the name of a scene")]
+Count = Annotated[int, Field(ge=1, le=100_000, title="a whole number from 1 to 100000, such as 10")]
+Distance = Annotated[float, Field(gt=0, le=0.01, title="a number up to 0.01, such as 0.0001")]
+EngineName = Annotated[str, Field(title="an engine such as 'xpbd'", examples=["xpbd"])]
+FrameTime = Annotated[float, *fields.quantity("time")]
+Precision = Annotated[str, *one_of("precision", (OWN_PRECISION, *PRECISIONS))]
+SceneName = Annotated[str, Field(title="the name of a scene")]
 
 
 class EngineSceneConfig(Section):
@@ -61,25 +63,25 @@ class EngineSceneConfig(Section):
 class EngineRunsConfig(Section):
     """Runs in engines: every combination of the values listed, as in a grid."""
 
-    scene: Annotated[list[SceneName], OneOrMore()] | None = None
+    scene: OneOrMore[SceneName] | None = None
     """Scenes; all of them without."""
 
     definition: fields.DefinitionNames
     """Definitions that need no reference. One whose energy an engine lacks is a hole that says so."""
 
-    engine: Annotated[list[EngineName], OneOrMore()]
+    engine: OneOrMore[EngineName]
     """Engines, keys of `springtune.ENGINES`. One that is not installed is a hole that says how it is."""
 
-    iterations: Annotated[list[Count], OneOrMore()] = default("10")
+    iterations: OneOrMore[Count] = default("10")
     """Iterations of the engine's solver in a step; 1 where an engine has none."""
 
-    substeps: Annotated[list[Count], OneOrMore()] = default("1")
+    substeps: OneOrMore[Count] = default("1")
     """Steps of a frame."""
 
-    dt: Annotated[list[FrameTime], OneOrMore()] = default("1/60 s")
+    dt: OneOrMore[FrameTime] = default("1/60 s")
     """Time of a frame, such as 1/60 s."""
 
-    precision: Annotated[list[Precision], OneOrMore()] = default(OWN_PRECISION)
+    precision: OneOrMore[Precision] = default(OWN_PRECISION)
     """Floating-point numbers; `own` is what an engine has by itself."""
 
     stiffness_factor: fields.Ratios = default("1")
@@ -89,10 +91,10 @@ class EngineRunsConfig(Section):
 class EnginesConfig(Section):
     """Scenes in the engines that people run, at the settings that they run them at."""
 
-    scenes: Annotated[dict[str, EngineSceneConfig], fields.Named("scene")]
+    scenes: fields.Named[EngineSceneConfig] = Field(title="a section for each scene, by name")
     """Scenes."""
 
-    runs: Annotated[dict[str, EngineRunsConfig], fields.Named("set of runs", for_files=False)]
+    runs: dict[str, EngineRunsConfig] = Field(min_length=1, title="a section for each set of runs, by name")
     """Sets of runs."""
 
     frames: Count | None = None

@@ -5,12 +5,14 @@ from itertools import product
 from math import nan
 from typing import Annotated
 
+from pydantic import Field
+
 from springtune.problem.geometry import Strip, Trapezoid
 from springtune.springs.base import DEFINITIONS
 
 from ...config import fields
 from ...config.checks import check_beam_material, check_for_triangles, check_particles, check_product
-from ...config.fields import OneOrMore, Section, default, number, one_of, optional
+from ...config.fields import OneOrMore, Section, default, one_of, optional
 from ...config.kind import Kind
 from ...runs.keys import definition_key, material_key, mesh_type_key
 from ...runs.stages import Task, stage
@@ -31,8 +33,8 @@ BAND = "twice its spread over three meshes of finite elements"
 MOST_STRIPS = 10_000
 """Most strips that a study lays; each takes seconds."""
 
-Friction = Annotated[float, number("a coefficient from 0 to 2, such as 0.3", 0, 2)]
-Loading = Annotated[str, one_of("loading", LOADINGS)]
+Friction = Annotated[float, Field(ge=0, le=2, title="a coefficient from 0 to 2, such as 0.3")]
+Loading = Annotated[str, *one_of("loading", LOADINGS)]
 
 
 class TrapezoidConfig(Section):
@@ -70,20 +72,20 @@ class LayingConfig(Section):
     definition: fields.DefinitionNames
     """Definitions that derive a stiffness and need no reference."""
 
-    mesh_size: Annotated[list[fields.Length], OneOrMore()]
+    mesh_size: OneOrMore[fields.Length]
     """Lengths of an edge."""
 
     reference_size: fields.Length = default("1 mm")
     """Length of an edge of the reference's finest mesh."""
 
-    loading: Annotated[list[Loading], OneOrMore()] = default("pressure")
+    loading: OneOrMore[Loading] = default("pressure")
     """`pressure`: on the upper face, following it; `gravity`: the same force as weight; `ends`: draws the ends down
     to the floor."""
 
     pressure: fields.Stress
     """Pressure, or weight over the upper face."""
 
-    friction: Annotated[list[Friction], OneOrMore()] = default("0")
+    friction: OneOrMore[Friction] = default("0")
     """Coulomb's coefficients of friction."""
 
 

@@ -1,11 +1,9 @@
 """Samples: a study's section ``samples``."""
 
-from collections.abc import Mapping
 from functools import cache
 from typing import Annotated, Any
 
-from pydantic import Field, GetCoreSchemaHandler, create_model
-from pydantic_core import CoreSchema, core_schema
+from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, TypeAdapter, WithJsonSchema, create_model
 
 from springtune.mesh.types import MESH_TYPES
 from springtune.problem.geometry import warn_of_size, warn_of_thickness
@@ -16,9 +14,9 @@ from springtune.springs.base import DEFINITIONS
 
 from ...config import fields
 from ...config.checks import MORE_SCENES, check_able, check_particles, in_mm, most_scenes
-from ...config.fields import OneOrMore, Scalar, Section, default, number, one_of, optional, quantity
+from ...config.fields import OneOrMore, Section, default, one_of, optional, quantity
 from ...config.kind import Kind
-from ...config.messages import refuse, show
+from ...config.messages import OrSection, refuse, show, words
 from ...runs.keys import definition_key, mesh_type_key, stage_key
 from ...runs.source import hash_of
 from ...runs.stages import Task, stage
@@ -28,63 +26,62 @@ from .outputs import OUTPUTS, QUANTITIES
 FURTHER_KEYS = {"uniform": (), "log-uniform": (), "triangular": ("mode",), "normal": ("mean", "deviation")}
 """Keys of each distribution besides its ends."""
 
-_NUMBERS = {
-    "poisson_ratio": fields.POISSON_RATIO,
-    "relative_mesh_size": number("a number above 0 and at most 1, such as 0.2", 0, 1, above=True),
+_NUMBERS: dict[str, Any] = {
+    "poisson_ratio": fields.PoissonRatio,
+    "relative_mesh_size": Annotated[float, Field(gt=0, le=1, title="a number above 0 and at most 1, such as 0.2")],
 }
 
 
 class DistributionConfig(Section):
-    """The distribution to draw a parameter from; `Distributed` adds its numbers."""
+    """The distribution to draw a parameter from; `distributed` adds its numbers."""
 
-    distribution: Annotated[str, one_of("distribution", FURTHER_KEYS)] = "uniform"
-
-    @classmethod
-    def _needed(cls, given: Mapping[str, object]) -> dict[str, str]:
-        name = str(given.get("distribution", "uniform"))
-        keys = ("from", "to", *FURTHER_KEYS.get(name, ()))
-        return {key: f": a {name} distribution needs {' and '.join(keys)}" for key in keys}
+    distribution: Annotated[str, *one_of("distribution", FURTHER_KEYS)] = "uniform"
 
 
-class Distributed:
-    """Annotation of a parameter: a value, or the distribution to draw it from."""
+def distributed(name: str, example: str) -> Any:
+    """Notes of a parameter: a value, or the distribution to draw it from."""
+    kind: Any = _NUMBERS.get(name) or Annotated[float, *quantity(PARAMETERS[name][0])]
+    keys: dict[str, Any] = {key: (kind, Field(alias=alias)) for key, alias in (("low", "from"), ("high", "to"))}
+    keys |= {key: (kind | None, None) for key in ("mode", "mean", "deviation")}
+    section = create_model(f"{name}_distribution", __base__=DistributionConfig, **keys)
+    alone = TypeAdapter(kind, config=ConfigDict(defer_build=True))
 
-    def __init__(self, name: str, example: str) -> None:
-        self.name, self.scalar = name, _NUMBERS.get(name) or quantity(PARAMETERS[name][0])
-        self.words = f"{self.scalar.words}, or a range such as `{example}`"
+    def read(value: object) -> dict[str, Any]:
+        if isinstance(value, dict | list):
+            return _checked(name, section.model_validate(value))
+        number = alone.validate_python(value)
+        return {"distribution": "fixed", "low": number, "high": number}
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        number = Annotated[float, self.scalar]
-        keys: dict[str, Any] = {name: (number, Field(alias=key)) for name, key in (("low", "from"), ("high", "to"))}
-        keys |= {key: (number | None, None) for key in ("mode", "mean", "deviation")}
-        section = create_model(f"{self.name}_distribution", __base__=DistributionConfig, **keys)
-        fixed = core_schema.no_info_after_validator_function(
-            lambda value: {"distribution": "fixed", "low": value, "high": value}, handler.generate_schema(number)
-        )
-        drawn = core_schema.no_info_after_validator_function(self._checked, handler.generate_schema(section))
-        choices: dict[Any, CoreSchema] = {"fixed": fixed, "drawn": drawn}
-        return core_schema.tagged_union_schema(
-            choices, lambda value: "drawn" if isinstance(value, dict | list) else "fixed"
-        )
+    def or_section(schema: dict[str, Any]) -> None:
+        schema.pop("additionalProperties"), schema.pop("type")
+        schema["anyOf"] = [alone.json_schema(), section.model_json_schema()]
 
-    def _checked(self, section: DistributionConfig) -> dict[str, Any]:
-        name = section.distribution
-        read = {key: value for key, value in section if key != "distribution" and value is not None}
-        texts = {key: show(number_text(value, PARAMETERS[self.name][2])) for key, value in read.items()}
-        low, high = read["low"], read["high"]
-        for key in read.keys() - {"low", "high", *FURTHER_KEYS[name]}:
-            raise refuse(f"a {name} distribution has no '{key}'; remove it", key)
-        if not low < high:
-            ends = f"{texts['low']} is not below 'to', {texts['high']}"
-            raise refuse(f"{ends}; exchange them, or give one value for a parameter that does not vary", "from")
-        if name == "log-uniform" and not low > 0:
-            raise refuse(f"{texts['low']} has no logarithm; give a 'from' above zero, or a uniform one", "from")
-        for key in {"mode", "mean"} & read.keys():
-            if not low <= read[key] <= high:
-                raise refuse(f"{texts[key]} is not between 'from' and 'to'; give a {key} between them", key)
-        if not read.get("deviation", 1.0) > 0:
-            raise refuse(f"{texts['deviation']} is no deviation; give one above zero, or one value", "deviation")
-        return {"distribution": name} | read
+    title = f"{words(kind)}, or a range such as `{example}`"
+    return BeforeValidator(read), OrSection(section), Field(title=title, json_schema_extra=or_section)
+
+
+def _checked(name: str, section: DistributionConfig) -> dict[str, Any]:
+    """Distribution whose keys go together."""
+    kind = section.distribution
+    read = {key: value for key, value in section if key != "distribution" and value is not None}
+    texts = {key: show(number_text(value, PARAMETERS[name][2])) for key, value in read.items()}
+    low, high = read["low"], read["high"]
+    for key in FURTHER_KEYS[kind]:
+        if key not in read:
+            raise refuse(f"'{key}' is missing; a {kind} distribution needs {' and '.join(FURTHER_KEYS[kind])}", key)
+    for key in read.keys() - {"low", "high", *FURTHER_KEYS[kind]}:
+        raise refuse(f"a {kind} distribution has no '{key}'; remove it", key)
+    if not low < high:
+        ends = f"{texts['low']} is not below 'to', {texts['high']}"
+        raise refuse(f"{ends}; exchange them, or give one value for a parameter that does not vary", "from")
+    if kind == "log-uniform" and not low > 0:
+        raise refuse(f"{texts['low']} has no logarithm; give a 'from' above zero, or a uniform one", "from")
+    for key in {"mode", "mean"} & read.keys():
+        if not low <= read[key] <= high:
+            raise refuse(f"{texts[key]} is not between 'from' and 'to'; give a {key} between them", key)
+    if not read.get("deviation", 1.0) > 0:
+        raise refuse(f"{texts['deviation']} is no deviation; give one above zero, or one value", "deviation")
+    return {"distribution": kind} | read
 
 
 MOST_SOLVED = 1024
@@ -106,45 +103,46 @@ class ParametersConfig(Section):
     deviation: 2 mm, to: 48 mm, distribution: normal}` is cut off at its ends.
     """
 
-    length: Annotated[Drawn, Distributed("length", "{from: 100 mm, to: 400 mm}")]
+    length: Annotated[Drawn, *distributed("length", "{from: 100 mm, to: 400 mm}")]
     """Extent along x, the direction of the load."""
 
-    height: Annotated[Drawn, Distributed("height", "{from: 20 mm, to: 80 mm}")]
+    height: Annotated[Drawn, *distributed("height", "{from: 20 mm, to: 80 mm}")]
     """Extent along y."""
 
-    thickness: Annotated[Drawn, Distributed("thickness", "{from: 1 mm, to: 2 mm}")] = default("1 mm")
+    thickness: Annotated[Drawn, *distributed("thickness", "{from: 1 mm, to: 2 mm}")] = default("1 mm")
     """Extent out of the plane."""
 
-    mesh_size: Annotated[Drawn, Distributed("mesh_size", "{from: 2 mm, to: 5 mm}")] | None = None
+    mesh_size: Annotated[Drawn, *distributed("mesh_size", "{from: 2 mm, to: 5 mm}")] | None = None
     """Length of an edge; at most the smaller side of any beam. Give this or `relative_mesh_size`."""
 
-    relative_mesh_size: Annotated[Drawn, Distributed("relative_mesh_size", "{from: 0.1, to: 0.3}")] | None = None
+    relative_mesh_size: Annotated[Drawn, *distributed("relative_mesh_size", "{from: 0.1, to: 0.3}")] | None = None
     """Length of an edge over the height."""
 
-    young_modulus: Annotated[Drawn, Distributed("young_modulus", "{from: 1 GPa, to: 210 GPa}")]
+    young_modulus: Annotated[Drawn, *distributed("young_modulus", "{from: 1 GPa, to: 210 GPa}")]
     """Young's modulus E."""
 
-    poisson_ratio: Annotated[Drawn, Distributed("poisson_ratio", "{from: 0, to: 0.5}")]
+    poisson_ratio: Annotated[Drawn, *distributed("poisson_ratio", "{from: 0, to: 0.5}")]
     """Poisson's ratio nu."""
 
-    force: Annotated[Drawn, Distributed("force", "{from: 1 kN, to: 20 kN}")]
+    force: Annotated[Drawn, *distributed("force", "{from: 1 kN, to: 20 kN}")]
     """Magnitude of the force. The load's name carries the sign."""
 
 
-def _read_size(value: str) -> int:
-    try:
-        size = int(value)
-    except ValueError:
-        raise refuse(f"{show(value)} is not a whole number; give a power of two such as 1024") from None
+def _power_of_two(size: int) -> int:
     if not SMALLEST_SIZE <= size <= MOST_SCENES or size & (size - 1):
         why = f"is not a power of two from {SMALLEST_SIZE} to {MOST_SCENES}, which keeps a sample even"
-        raise refuse(f"{show(value)} {why} and lets it be doubled; give one such as 1024")
+        raise refuse(f"'{size}' {why} and lets it be doubled; give one such as 1024")
     return size
 
 
-Size = Annotated[int, Scalar(_read_size, {"type": "integer", "minimum": SMALLEST_SIZE}, "a power of two such as 1024")]
-Seed = Annotated[int, number("a whole number from 0, such as 1", 0, 2**31, whole=True)]
-Design = Annotated[str, one_of("design", DESIGNS)]
+Size = Annotated[
+    int,
+    AfterValidator(_power_of_two),
+    WithJsonSchema({"type": "integer", "minimum": SMALLEST_SIZE}),
+    Field(title="a power of two such as 1024"),
+]
+Seed = Annotated[int, Field(ge=0, le=2**31, title="a whole number from 0, such as 1")]
+Design = Annotated[str, *one_of("design", DESIGNS)]
 
 
 class SamplesConfig(Section):
@@ -166,7 +164,7 @@ class SamplesConfig(Section):
     mesh_type: fields.MadeType = default("structured")
     """Generated mesh type."""
 
-    load: Annotated[list[fields.Load], OneOrMore()]
+    load: OneOrMore[fields.Load]
     """Loads; each acts on every point's scene."""
 
     definition: fields.DefinitionNames

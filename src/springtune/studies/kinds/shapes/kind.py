@@ -9,7 +9,6 @@ from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
-from pydantic import Field
 
 from springtune.mesh.cells import MeshError
 from springtune.problem.geometry import size_text
@@ -29,7 +28,7 @@ from ..scenes.plan import (
     stage_on_meshes,
 )
 from .outputs import DRAWING, OUTPUTS, OWN_FILE, mesh_name, stems
-from .sections import NAMED_GRIDS, NAMED_SHAPES
+from .sections import SHAPE_GRIDS_KEY, SHAPES_KEY
 
 MOST_DRAWN = 1500
 """Particles, about, of the largest mesh that is drawn where a coarser one is there."""
@@ -245,16 +244,7 @@ def _files(part):
 
 KIND = Kind(
     "shapes",
-    study_fields={
-        "shapes": (
-            NAMED_SHAPES,
-            Field(None, description="Shapes: bodies of any outline, or those of mesh files, and their loads."),
-        ),
-        "shape_grids": (
-            NAMED_GRIDS,
-            Field(None, description="What is to be computed of the shapes; it makes the group `/shapes`."),
-        ),
-    },
+    study_fields={"shapes": SHAPES_KEY, "shape_grids": SHAPE_GRIDS_KEY},
     alone={"shape_grids": ("shapes", "materials")},
     files=_files,
     check=_check,

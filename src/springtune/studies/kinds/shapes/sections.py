@@ -2,13 +2,13 @@
 
 from typing import Annotated, Any, Self
 
-from pydantic import Field, GetJsonSchemaHandler, ValidatorFunctionWrapHandler, model_validator
+from pydantic import Field, ValidatorFunctionWrapHandler, WithJsonSchema, WrapValidator, model_validator
 from pydantic_core import PydanticCustomError
 
 from springtune import units
 
 from ...config import fields
-from ...config.fields import Named, OneOrMore, Scalar, Section, Words, default, one_of, quantity
+from ...config.fields import Named, OneOrMore, Section, default, one_of, quantity, read_quantity
 from ...config.messages import refuse, show
 
 KINDS_OF_QUANTITY = {
@@ -25,28 +25,28 @@ PLACES |= {"reaction": {"of": "a group that is held"}, "area": {}, "energy": {}}
 """Keys for the place of a quantity, and what they name, by kind of quantity."""
 
 
-def both(kind: str) -> Words:
-    """Annotation of two quantities, along x and along y."""
+def both(kind: str) -> Any:
+    """Note of two quantities, along x and along y."""
     example = units.QUANTITY_KINDS[kind].example
     pair = f"0, {example}" if example.startswith("-") else f"{example}, 0"
-    return Words(f"{kind}s along x and y, such as [{pair}]")
+    return Field(title=f"{kind}s along x and y, such as [{pair}]")
 
 
-Displacement = Annotated[float, quantity("length", signed=True)]
-PressureValue = Annotated[float, quantity("stress", signed=True)]
-SignedForce = Annotated[float, quantity("force", signed=True)]
-Acceleration = Annotated[float, quantity("acceleration", signed=True)]
+Displacement = Annotated[float, *quantity("length", signed=True)]
+PressureValue = Annotated[float, *quantity("stress", signed=True)]
+SignedForce = Annotated[float, *quantity("force", signed=True)]
+Acceleration = Annotated[float, *quantity("acceleration", signed=True)]
 Place = Annotated[tuple[Displacement, Displacement], both("length")]
 ForceVector = Annotated[tuple[SignedForce, SignedForce], both("force")]
 Gravity = Annotated[tuple[Acceleration, Acceleration], both("acceleration")]
-GroupName = Annotated[str, Scalar(str, {"type": "string", "minLength": 1}, "the name of a group")]
-PointName = Annotated[str, Scalar(str, {"type": "string", "minLength": 1}, "the name of a point")]
-PartName = Annotated[str, Scalar(str, {"type": "string", "minLength": 1}, "the name of a part")]
-ShapeName = Annotated[str, Scalar(str, {"type": "string"}, "the name of a shape"), fields.declared("shape", "shapes")]
-LoadName = Annotated[str, Scalar(str, {"type": "string"}, "the name of a load of the shape")]
-Axis = Annotated[str, one_of("component", ("x", "y"))]
-StressComponent = Annotated[str, one_of("component", ("xx", "yy", "xy"))]
-Anything = Annotated[str, Scalar(str, {"type": ["string", "number"]}, "a value with its unit")]
+GroupName = Annotated[str, Field(min_length=1, title="the name of a group")]
+PointName = Annotated[str, Field(min_length=1, title="the name of a point")]
+PartName = Annotated[str, Field(min_length=1, title="the name of a part")]
+ShapeName = Annotated[str, Field(title="the name of a shape"), fields.declared("shape", "shapes")]
+LoadName = Annotated[str, Field(title="the name of a load of the shape")]
+Axis = Annotated[str, *one_of("component", ("x", "y"))]
+StressComponent = Annotated[str, *one_of("component", ("xx", "yy", "xy"))]
+Anything = Annotated[str, WithJsonSchema({"type": ["string", "number"]}), Field(title="a value with its unit")]
 
 
 def _or_text(*texts: str) -> Any:
@@ -75,9 +75,6 @@ class SegmentConfig(Section):
     """Group that it belongs to, for supports, loads and quantities."""
 
 
-SIDE_WORDS = Words("a list of sections; see below")
-
-
 class CircleConfig(Section):
     """A circle."""
 
@@ -94,7 +91,7 @@ class HoleConfig(Section):
     circle: CircleConfig | None = None
     """Where it is round."""
 
-    outline: Annotated[list[SegmentConfig], SIDE_WORDS] | None = None
+    outline: list[SegmentConfig] | None = None
     """Where it is not: a round of sides, in either sense."""
 
     group: GroupName | None = None
@@ -238,25 +235,25 @@ class QuantityConfig(Section):
     def expected_value(self) -> float | None:
         """In SI units."""
         unit = KINDS_OF_QUANTITY[self.kind]
-        return None if self.expected is None else quantity(unit, signed=True).read(self.expected)
+        return None if self.expected is None else read_quantity(self.expected, unit, signed=True)
 
 
 class ShapeLoadConfig(Section):
     """What is done to a shape, and what is asked of it."""
 
-    supports: Annotated[dict[str, SupportConfig], Named("support", for_files=False)]
+    supports: dict[str, SupportConfig] = Field(min_length=1, title="a section for each support, by name")
     """What is held, by group or point: `fixed`, or displacements such as `{y: 0 mm}`."""
 
-    forces: Annotated[dict[str, ForceVector], Words("forces such as [10 kN, 0], by group or point")] = {}
+    forces: dict[str, ForceVector] = Field({}, title="forces such as [10 kN, 0], by group or point")
     """Forces along x and y, by group or point: of a group the total one, spread evenly by length."""
 
-    pressures: Annotated[dict[str, PressureConfig], Words("a stress, or a section, by group; see below")] = {}
+    pressures: dict[str, PressureConfig] = Field({}, title="a stress, or a section, by group")
     """Pressures, by group; positive towards the body."""
 
     gravity: Gravity = default(["0", "0"])
     """Acceleration along x and y, such as `[0, -9.81 m/s^2]`; needs densities."""
 
-    quantities: Annotated[dict[str, QuantityConfig], Named("quantity")]
+    quantities: Named[QuantityConfig] = Field(title="a section for each quantity, by name")
     """Quantities of interest, by name; the first one stands for all where one is wanted."""
 
 
@@ -270,25 +267,20 @@ class ShapeFileConfig(Section):
     """Length of an edge, which names the mesh in the dataset."""
 
 
-class OneFileOrMore(Words):
-    """Annotation of a list of mesh files; a path alone is a list of one, of no mesh size."""
-
-    def __get_pydantic_json_schema__(self, schema: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        return {"anyOf": [{"type": "string", "minLength": 1}, handler(schema["schema"]) | {"minItems": 1}]}
-
-    def _read(self, value: object, handler: ValidatorFunctionWrapHandler) -> Any:
-        if isinstance(value, str):
-            return [ShapeFileConfig.model_construct(file=value, mesh_size=0.0)]
-        if not isinstance(value, list) or not value:
-            raise refuse(f"{show(value)} instead of {self.words}")
-        files = handler(value)
-        for number, one in enumerate(files):
-            if one.mesh_size in [other.mesh_size for other in files[:number]]:
-                raise refuse(f"{show(value[number])}: another file has this mesh size; correct one", number)
-        return files
+def _files(value: object, handler: ValidatorFunctionWrapHandler) -> Any:
+    """List of mesh files; a path alone is a list of one, of no mesh size."""
+    if isinstance(value, str):
+        return [ShapeFileConfig.model_construct(file=value, mesh_size=0.0)]
+    files = handler(value)
+    for number, one in enumerate(files):
+        if one.mesh_size in [other.mesh_size for other in files[:number]]:
+            raise refuse("{value}: another file has this mesh size; correct one", number)
+    return files
 
 
-SHAPE_FILES = OneFileOrMore("the path of a file, or a list such as [{file: fine.msh, mesh_size: 2 mm}]")
+def _or_path(schema: dict[str, Any]) -> None:
+    array = {key: schema.pop(key) for key in ("type", "items", "minItems")}
+    schema["anyOf"] = [{"type": "string", "minLength": 1}, array]
 
 
 class ShapeConfig(Section):
@@ -297,13 +289,15 @@ class ShapeConfig(Section):
     thickness: fields.Length = default("1 mm")
     """Extent out of the plane."""
 
-    outline: Annotated[list[SegmentConfig], SIDE_WORDS] | None = None
+    outline: list[SegmentConfig] | None = None
     """Round of its sides, counter-clockwise."""
 
     holes: list[HoleConfig] = []
     """Holes, and parts of other materials."""
 
-    file: Annotated[list[ShapeFileConfig], SHAPE_FILES] | None = None
+    file: (
+        Annotated[list[ShapeFileConfig], Field(min_length=1, json_schema_extra=_or_path), WrapValidator(_files)] | None
+    ) = Field(None, title="the path of a file, or a list such as [{file: fine.msh, mesh_size: 2 mm}]")
     """Mesh file in the place of an outline, of a format that meshio reads, its path relative to the study's folder;
     its groups are the shape's. Or a list of several with their mesh sizes: the finest one is the geometry of the
     reference."""
@@ -311,17 +305,17 @@ class ShapeConfig(Section):
     unit: fields.Length = default("1 m")
     """Unit of the coordinates in the file."""
 
-    points: Annotated[dict[str, Place], Words("places such as [48 mm, 52 mm], by name")] = {}
+    points: dict[str, Place] = Field({}, title="places such as [48 mm, 52 mm], by name")
     """Named points of an outline or inside of it: particles of every mesh."""
 
-    refined: Annotated[dict[str, fields.Ratio], Words("numbers above 0, by group, point or part")] = {}
+    refined: dict[str, fields.Ratio] = Field({}, title="numbers above 0, by group, point or part")
     """Where the mesh is finer: mesh size over that of the rest, by group, point or part, such as `{hole: 0.25}`;
     from there on it grows."""
 
-    parts: Annotated[dict[str, fields.MaterialName], Words("names of materials, by part")] = {}
+    parts: dict[str, fields.MaterialName] = Field({}, title="names of materials, by part")
     """Materials of the parts, by name; the rest is of the grid's material."""
 
-    loads: Annotated[dict[str, ShapeLoadConfig], Named("load")]
+    loads: Named[ShapeLoadConfig] = Field(title="a section for each load, by name")
     """Loads, by name."""
 
     @model_validator(mode="after")
@@ -343,22 +337,22 @@ class ShapeGridConfig(Section):
     A single value stands for a list of one. A scene that two grids ask for is solved once.
     """
 
-    shape: Annotated[list[ShapeName], OneOrMore()]
+    shape: OneOrMore[ShapeName]
     """Shapes, by name."""
 
     mesh_size: fields.Lengths | None = None
     """Lengths of an edge of triangles; not of shapes from files, whose mesh is that of the file."""
 
-    material: Annotated[list[fields.MaterialName], OneOrMore()]
+    material: OneOrMore[fields.MaterialName]
     """Materials, by name."""
 
-    load: Annotated[list[LoadName], OneOrMore()] | None = None
+    load: OneOrMore[LoadName] | None = None
     """Loads of the shapes, by name; all of each shape without."""
 
-    definition: Annotated[list[fields.DefinitionName], OneOrMore()]
+    definition: OneOrMore[fields.DefinitionName]
     """Definitions that derive a stiffness on triangles and need no reference."""
 
-    kinematics: Annotated[list[fields.Kinematics], OneOrMore()] = default("nonlinear")
+    kinematics: OneOrMore[fields.Kinematics] = default("nonlinear")
     """Whether springs keep their length law or their tangent at rest."""
 
     reference: fields.Flag = default("true")
@@ -369,6 +363,20 @@ class ShapeGridConfig(Section):
     law at finite strain. The group `/shapes_finite_strain` has it and the errors. Each takes seconds."""
 
 
-NAMED_SHAPES = Annotated[dict[str, ShapeConfig], Named("shape")] | None
-NAMED_GRIDS = Annotated[dict[str, ShapeGridConfig], Named("grid", for_files=False)] | None
-"""What a study has under ``shapes`` and ``shape_grids``."""
+SHAPES_KEY = (
+    Named[ShapeConfig] | None,
+    Field(
+        None,
+        title="a section for each shape, by name",
+        description="Shapes: bodies of any outline, or those of mesh files, and their loads.",
+    ),
+)
+SHAPE_GRIDS_KEY = (
+    Annotated[dict[str, ShapeGridConfig], Field(min_length=1)] | None,
+    Field(
+        None,
+        title="a section for each grid, by name",
+        description="What is to be computed of the shapes; it makes the group `/shapes`.",
+    ),
+)
+"""Types and fields of the sections ``shapes`` and ``shape_grids`` of a study."""

@@ -17,7 +17,7 @@ from ...runs.stages import Task, stage
 from . import AXES, EXPERIMENTS, ONCE
 from .outputs import OUTPUTS
 
-ExperimentName = Annotated[str, one_of("experiment", EXPERIMENTS)]
+ExperimentName = Annotated[str, *one_of("experiment", EXPERIMENTS)]
 
 
 class StabilityConfig(Section):
@@ -39,10 +39,10 @@ class StabilityConfig(Section):
     mesh_type: fields.MeshType = default("structured")
     """Mesh type of triangles."""
 
-    mesh_size: Annotated[list[fields.Length], OneOrMore()]
+    mesh_size: OneOrMore[fields.Length]
     """Lengths of an edge; most experiments take the coarsest."""
 
-    experiment: Annotated[list[ExperimentName], OneOrMore()] = Field(
+    experiment: OneOrMore[ExperimentName] = Field(
         list(EXPERIMENTS),
         description="; ".join(f"`{name}`: {text}" for name, text in EXPERIMENTS.items()) + ". All of them without.",
     )
