@@ -174,7 +174,7 @@ STRANGE = 'x=1), __import__("os").system("id") #\n\u2028"\\\u202e\U0001f600'
 
 @pytest.fixture(scope="session")
 def strange(tmp_path_factory):
-    """Page of a dataset whose dimension of beams, beams and study have a name that could be code."""
+    """Page of a dataset whose dimension of beams and beams have a name that could be code."""
 
     def renamed(data):
         if "beam" not in data.dims:
@@ -184,9 +184,7 @@ def strange(tmp_path_factory):
     tree = dataset("sensitivity")
     tree["status"].attrs = ROOT.empty(LABELS).status.attrs
     tree = tree.map_over_datasets(renamed)
-    return written(
-        tmp_path_factory.mktemp("strange"), {one.path: one.to_dataset() for one in tree.subtree}, study=STRANGE
-    )
+    return written(tmp_path_factory.mktemp("strange"), {one.path: one.to_dataset() for one in tree.subtree})
 
 
 @pytest.fixture(scope="session")

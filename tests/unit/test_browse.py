@@ -5,7 +5,6 @@ import json
 import re
 import zlib
 
-import h5netcdf
 import h5py
 import numpy as np
 import pytest
@@ -88,10 +87,10 @@ class TestPage:
         assert next(row for row in fields["variables"] if row["name"] == "x")["units"] == "m"
 
     def test_what_is_too_large_is_named(self, path):
-        with h5netcdf.File(path) as file:
-            whole, contents = packed(file)
+        with springtune.open(path) as tree:
+            whole, contents = packed(tree)
             room = sum(map(len, contents)) // 2
-            some, contents = packed(file, room)
+            some, contents = packed(tree, room)
         assert 0 < sum(map(len, contents)) <= 1.1 * room
         for group, less in zip(whole, some):
             names = [[row["name"] for row in one["variables"]] for one in (group, less)]

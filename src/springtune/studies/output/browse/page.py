@@ -2,38 +2,38 @@
 
 Numbers are packed as float32 without the digits that the page never shows. An array with a long last dimension (a
 curve, a field) keeps only rows with values, as differences from point to point. Bytes are sorted by their place in a
-number, where they are alike, and each group is compressed as a whole. `assets/payload.js` reads it.
+number, where they are alike, and each group is compressed as a whole. `assets/data.js` reads it.
 """
 
 import base64
 import hashlib
 import json
 import os
+import re
 import sys
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import asdict
 from importlib.util import find_spec
 from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
-import h5netcdf
-import h5py
 import jinja2
 import numpy as np
+import xarray as xr
 from markupsafe import Markup
 
+from springtune.problem.compare import sign_sentence
 from springtune.registry import imported
 from springtune.safe_io.atomic import write_json, write_text
-from springtune.safe_io.inputs import bounded
 
 from ...config.kind import modules
+from .. import reading
 from ..colours import ERROR_COLOURS, ERROR_RANGE
-from ..reading import REMEDY, check, dataset_file, guarded, most_of, reason
 from . import View
 
-SCRIPTS = ("payload", "words", "charts", "table", "cells", "shape", "explorer", "main")
+SCRIPTS = ("data", "words", "charts", "table", "plot", "shape", "cells", "main")
 """Modules of the page's own script, in the order in which they are put together."""
 
 LIBRARY = ("bokeh", "bokeh-api")
@@ -47,17 +47,9 @@ def views() -> dict[str, View]:
 
 def page(dataset: str | os.PathLike[str], files: Iterable[str] = ()) -> str:
     """Page of a dataset."""
-    path = dataset_file(dataset)
-    check(path)
-    try:
-        with guarded(path), bounded(most_of(path)), h5py.File(path) as opened:
-            with h5netcdf.File(opened, decode_vlen_strings=True) as file:
-                groups, contents = packed(file)
-    except (OSError, ValueError) as error:
-        raise ValueError(f"{path}: cannot be read ({reason(error)}); {REMEDY}") from None
+    with reading.open(dataset) as tree, reading.guarded(dataset):
+        groups, contents = packed(tree)
     attributes = groups[0]["attributes"]
-    if "springtune_version" not in attributes:
-        raise ValueError(f"{path}: is not a dataset of springtune; {REMEDY}")
     declared = {path: asdict(view) for path, view in views().items()}
     scale = {"colours": ERROR_COLOURS, "range": ERROR_RANGE}
     content = {"groups": groups, "declared": declared, "files": sorted(files), "scale": scale}
@@ -116,9 +108,14 @@ Packed = tuple[dict[str, Any], list[bytes]]
 """A group's description, and the bytes of each of its variables."""
 
 
-def packed(file: h5netcdf.File, room: int = ROOM) -> tuple[list[dict[str, Any]], list[bytes]]:
+def packed(tree: xr.DataTree, room: int = ROOM) -> tuple[list[dict[str, Any]], list[bytes]]:
     """Describe and pack the groups of a dataset."""
-    found = list(_walk(file, {}))
+    root = tree.to_dataset()
+    found = [
+        _described(node.path, node.to_dataset(), set(map(str, node.to_dataset(inherit=False).variables)), root)
+        for node in tree.subtree
+        if node.path == "/" or node.to_dataset(inherit=False).variables
+    ]
     contents = [zlib.compress(b"".join(parts), 9) for _, parts in found]
     if sum(map(len, contents)) > room:
         _lighten(found, room)
@@ -149,75 +146,118 @@ def _lighten(found: list[Packed], room: int) -> None:
         excess -= size
 
 
-def _walk(group: h5netcdf.Group, above: dict[str, Any]) -> Iterator[Packed]:
-    """Describe and pack a group and the groups below it; `above` holds labels that they share."""
-    # Once: h5netcdf looks up dimensions at each access.
-    read = {name: (variable.dimensions, _attributes(variable)) for name, variable in group.variables.items()}
-    labels = above | {
-        name: {
-            "labels": [_plain(one) for one in _values(group.variables[name], attributes).tolist()],
-            **_words_on(attributes),
-        }
-        for name, (dimensions, attributes) in read.items()
-        if dimensions == (name,)
-    }
-    if read or group.name == "/":
-        yield _described(group, read, labels)
-    for child in group.groups.values():
-        yield from _walk(child, labels)
-
-
-def _described(
-    group: h5netcdf.Group,
-    read: dict[str, tuple[tuple[str, ...], dict[str, Any]]],
-    labels: dict[str, Any],
-) -> Packed:
-    variables: list[dict[str, Any]] = []
-    parts: list[bytes] = []
-    sizes: dict[str, int] = {}
-    for name, (dimensions, attributes) in read.items():
-        if dimensions == (name,):
-            sizes[name] = len(labels[name]["labels"])
+def _described(path: str, data: xr.Dataset, own: set[str], root: xr.Dataset) -> Packed:
+    """Describe and pack a group: its `own` variables, with labels that it may share with the group above."""
+    rows, parts, sizes = [], [], {}
+    for name, array in data.variables.items():
+        if name not in own:
             continue
-        values = _values(group.variables[name], attributes)  # each read, packed and forgotten
-        sizes |= zip(dimensions, values.shape)
-        row, content = _variable(values)
-        row |= {"name": name, "dims": list(dimensions)} | _words_on(attributes)
-        if "flag_meanings" in attributes:
-            meanings = str(attributes["flag_meanings"]).split()
-            flags = np.ravel(attributes.get("flag_values", range(len(meanings)))).tolist()
+        sizes |= array.sizes
+        if array.dims == (name,):
+            continue
+        row: dict[str, Any] = {"name": name, "dims": list(array.dims)} | _words_on(array)
+        if "flag_meanings" in array.attrs:
+            meanings = str(array.attrs["flag_meanings"]).split()
+            flags = np.ravel(array.attrs.get("flag_values", range(len(meanings)))).tolist()
             row["flags"] = dict(zip(map(str, flags), meanings))
-        variables.append(row)
+        values = array.values  # each read, packed and forgotten
+        if name == "status":
+            values = _judged(data, row, values)
+        elif ERROR.search(str(name)) and row.get("units", "1") == "1":
+            row["error"] = True
+            if _signed(row, values):
+                row |= {"signed": True, "sign": _sign(str(name), data, root)}
+        packed_as, content = _variable(values)
+        rows.append(row | packed_as)
         parts.append(content)
-    described = {
-        "path": group.name,
-        "attributes": {key: _plain(value) for key, value in _attributes(group).items()},
-        "dims": [{"name": name, "size": size, **labels.get(name, {})} for name, size in sizes.items()],
-        "variables": variables,
-        "left_out": [],
-    }
-    return described, parts
+    dims = []
+    for name, size in sizes.items():
+        dims.append({"name": name, "size": size})
+        if name in data.coords:
+            dims[-1] |= {
+                "labels": [_plain(one) for one in data[name].values.tolist()],
+                **_words_on(data[name].variable),
+            }
+    attributes = {str(key): _plain(value) for key, value in data.attrs.items()}
+    return {"path": path, "attributes": attributes, "dims": dims, "variables": rows, "left_out": []}, parts
 
 
-def _attributes(holder: h5netcdf.Group | h5netcdf.Variable) -> dict[str, Any]:
-    """Attributes; netCDF's own library writes texts of one letter as bytes."""
-    found = dict(holder.attrs)
-    return {key: one.decode(errors="replace") if isinstance(one, bytes) else one for key, one in found.items()}
+def _words_on(array: xr.Variable) -> dict[str, str]:
+    """Attributes in words; netCDF's own library writes texts of one letter as bytes."""
+    found = {key: array.attrs[key] for key in ("units", "long_name") if key in array.attrs}
+    return {key: one.decode(errors="replace") if isinstance(one, bytes) else str(one) for key, one in found.items()}
 
 
-def _words_on(attributes: dict[str, Any]) -> dict[str, str]:
-    return {key: str(attributes[key]) for key in ("units", "long_name", "comment") if key in attributes}
+# -- errors ------------------------------------------------------------------------------------------------------------
+
+ERROR = re.compile(r"(^|_)errors?(?!_rate|_estimate)(_|$)")
+"""Names of errors; rates and estimates have no sign."""
+
+REFERENCES = {
+    "face_error": "reference_face_displacement",
+    "error": "reference_value",
+    "expected_error": "expected_value",
+}
+"""What an error is against, where that is no `reference_displacement`."""
 
 
-def _values(variable: h5netcdf.Variable, attributes: dict[str, Any]) -> np.ndarray:
-    """Values of a variable, decoded by the conventions of netCDF."""
-    values = np.asarray(variable[...])
-    fill = attributes.get("_FillValue")
-    if values.dtype.kind in "iuf" and fill is not None and np.isfinite(fill).all():
-        values = np.where(values == np.ravel(fill)[0], np.nan, values)
-    if values.dtype.kind in "iuf" and ("scale_factor" in attributes or "add_offset" in attributes):
-        values = values * float(attributes.get("scale_factor", 1)) + float(attributes.get("add_offset", 0))
-    return values
+def _judged(data: xr.Dataset, row: dict[str, Any], status: np.ndarray) -> np.ndarray:
+    """Statuses, of which solved cells that the linear reference cannot judge get one of their own."""
+    flags = {meaning: int(flag) for flag, meaning in row.get("flags", {}).items()}
+    if (
+        "solved" not in flags
+        or "reference_applies" not in data
+        or not set(data.reference_applies.dims) <= set(row["dims"])
+    ):
+        return status
+    beyond = max(flags.values()) + 1
+    applies = data.reference_applies.broadcast_like(data.status).transpose(*row["dims"]).values
+    found = np.where((status == flags["solved"]) & (applies == 0), beyond, status)
+    if (found == beyond).any():
+        row["flags"][str(beyond)] = "beyond_linear"
+    return found
+
+
+def _signed(row: dict[str, Any], values: np.ndarray) -> bool:
+    """Whether the sign of an error means something: not that of a norm, or of a number printed without one."""
+    said = row.get("long_name", "")
+    stated = re.search(r"signed|less 1|- 1$|network - reference", said)
+    return "without sign" not in said and bool(stated or (values < 0).any())
+
+
+def _sign(name: str, data: xr.Dataset, root: xr.Dataset) -> str:
+    """Which sign of a group's errors means too soft, by their references."""
+    reference = REFERENCES.get(name, "reference_displacement")
+    reference = reference if reference in data else "reference_displacement"
+    of = data if reference in data else root
+    if reference not in of or not re.fullmatch("(deformation_|second_|face_|expected_)?error", name):
+        return "positive: too large"
+    signs, others = np.sign(of[reference]), False
+    if "quantity_kind" in of:
+        displacements = of.quantity_kind == "displacement"
+        others = bool((signs.notnull() & ~displacements).any())
+        signs = signs.where(displacements)
+    said = _sign_of_displacements(signs)
+    if not others:
+        return said
+    return f"displacements: {said}; other quantities: positive: too large" if said else "positive: too large"
+
+
+def _sign_of_displacements(signs: xr.DataArray) -> str:
+    """Sentence by loads or quantities, whichever tell signs apart; empty without any sign."""
+    known = signs.values[np.isfinite(signs.values) & (signs.values != 0)]
+    if not known.size or (known == known[0]).all():
+        return sign_sentence({"": known[0]}) if known.size else ""
+    for name, where in (("load", "under"), ("quantity", "of")):
+        if name in signs.dims:
+            others = [one for one in signs.dims if one != name]
+            low, high = signs.min(others), signs.max(others)
+            if not ((low < 0) & (high > 0)).any():
+                return sign_sentence(dict(zip(signs[name].values.tolist(), (low + high).values.tolist())), where)
+    return "too soft: errors with the sign of their reference"
+
+
+# -- arrays ------------------------------------------------------------------------------------------------------------
 
 
 def _plain(value: Any) -> Any:

@@ -3,34 +3,30 @@
 const COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8a6bbe", "#7f7f7f"];
 const LIGHTER = ["#4da3e0", "#ff8c42", "#2fc79a", "#e59ac6", "#f0b93a", "#8ccdf5", "#b49be0", "#a8a8a8"]; // on dark ground
 const DASHES = ["solid", "6 3", "2 3", "8 3 2 3", "12 4"];
-const MARKERS = ["circle", "square", "diamond", "triangle", "inverted_triangle", "hex", "star", "plus"];
-const SHAPES = {
-  circle: "●", square: "■", diamond: "◆", triangle: "▲", inverted_triangle: "▼", hex: "⬢", star: "★", plus: "+",
-};
+const MARKERS = { circle: "●", square: "■", diamond: "◆", triangle: "▲", inverted_triangle: "▼", hex: "⬢", star: "★", plus: "+" };
 const BLUES = ["#f7fbff", "#c6dbef", "#6baed6", "#2171b5", "#08306b"];
-const CATEGORIES = ["#56b4e9", "#009e73", "#e69f00", "#d55e00", "#cc79a7", "#0072b2", "#8a6bbe", "#7f7f7f"];
+const STATUS_COLOURS = {
+  solved: "#009e73", beyond_linear: "#f0e442", linear_only: "#56b4e9", not_converged: "#e69f00", unstable: "#cc79a7", failed: "#d55e00",
+};
+const MISSING = "#8883", FONT = "system-ui, sans-serif";
 
 const dark = matchMedia("(prefers-color-scheme: dark)");
-
 let libraryReady;
 function library() {
-  libraryReady ||= Promise.all(["bokeh", "bokeh-api"].map(inflatedText)).then((texts) => {
-    for (const text of texts) {
-      const script = document.createElement("script");
-      script.textContent = text;
-      document.head.append(script);
-    }
+  libraryReady ||= Promise.all(["bokeh", "bokeh-api"].map((id) => inflated(id).text())).then((texts) => {
+    for (const text of texts) document.head.append(element("script", { text }));
     Bokeh.set_log_level("error");
     return Bokeh;
   });
   return libraryReady;
 }
 
+// Colour, dashes and marker of the line of a number.
 function look(i) {
-  const turn = Math.floor(i / COLOURS.length);
+  const turn = Math.floor(i / COLOURS.length), markers = Object.keys(MARKERS);
   return {
     color: (dark.matches ? LIGHTER : COLOURS)[i % COLOURS.length], dash: DASHES[(i + turn) % DASHES.length],
-    marker: MARKERS[(i + 3 * turn) % MARKERS.length],
+    marker: markers[(i + 3 * turn) % markers.length],
   };
 }
 
@@ -38,7 +34,7 @@ function ink(name) {
   return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 }
 
-// A colour between stops, at a share from 0 to 1.
+// A colour [red, green, blue] between stops, at a share from 0 to 1.
 function between(stops, share) {
   const place = Math.max(0, Math.min(1, share)) * (stops.length - 1), low = Math.min(Math.floor(place), stops.length - 2);
   const [one, other] = [stops[low], stops[low + 1]].map((text) => [1, 3, 5].map((i) => parseInt(text.slice(i, i + 2), 16)));
@@ -49,404 +45,177 @@ function css(rgb) {
   return `rgb(${rgb.join(",")})`;
 }
 
-function readableOn(rgb) {
-  return 0.299 * rgb[0] + 0.587 * rgb[1] + 0.114 * rgb[2] > 140 ? "#111" : "#fff";
-}
-
-// Colours of the finite values of a map, and its key: sizes of errors have the scale of the figures.
-function colouring(field, values, key) {
-  const scale = unitOf(field)[0], unit = unitOf(field)[1], finite = values.filter(Number.isFinite);
-  const low = Math.min(...finite), high = Math.max(...finite);
-  const ramp = (stops, from, to, words) => element("p", { class: "scale" }, element("span", { text: from }),
+// The key of a scale of colours.
+function ramp(stops, from, to, ...words) {
+  return element("p", { class: "scale" }, element("span", { text: from }),
     element("span", { class: "bar", style: `background: linear-gradient(to right, ${stops.join(",")})` }), element("span", { text: to }),
-    words ? element("span", { class: "soft", text: words }) : null, key);
-  if (isError(field)) {
-    const { colours, range } = window.springtune.scale, [least, most] = range.map(Math.log10);
-    return {
-      of: (value) => between(colours, (Math.log10(100 * Math.abs(value)) - least) / (most - least)),
-      key: ramp(colours, `≤ ${number(range[0])} %`, `≥ ${number(range[1])} %`, "size of the error, logarithmic"),
-    };
-  }
-  return {
-    of: (value) => between(BLUES, high > low ? (value - low) / (high - low) : 0.3),
-    key: finite.length ? ramp(BLUES, `${number(low * scale, 3)} ${unit}`, `${number(high * scale, 3)} ${unit}`) : key,
-  };
+    element("span", { class: "soft", text: words.filter(Boolean).join(" · ") }));
 }
 
-const charts = new Set();
-
-// A figure with its sources; `settings` that Bokeh cannot change later make another one.
+// A place on the page for one figure; a figure with other settings replaces it.
 class Chart {
-  constructor(holder, name, height = 300) {
+  constructor(holder) {
     this.holder = holder;
-    this.name = name;
-    this.height = height;
     this.sources = {};
-    charts.add(this);
   }
 
-  figure(settings, build) {
-    const key = JSON.stringify(settings);
-    if (this.key !== key) {
-      this.key = key;
-      this.made = this.make(settings, build);
-    }
-    return this.made;
-  }
-
-  async make(settings, build) {
+  // Show columns of data by the glyphs that `build` makes of their sources.
+  async draw(settings, data, build) {
+    const key = JSON.stringify([settings, dark.matches]);
+    this.wanted = key;
     const B = await library();
-    if (this.key !== JSON.stringify(settings)) return null; // something else is to be shown by now
-    this.ranges = {
-      x_range: new B.Range1d({ start: 1, end: 2 }), y_range: new B.Range1d({ start: 1, end: 2 }),
-    };
-    const fig = B.Plotting.figure({
-      height: this.height, sizing_mode: "stretch_width", tools: "pan,box_zoom,wheel_zoom,reset,save",
-      toolbar_location: "above", min_border_right: 14, ...this.ranges, ...settings.figure,
+    if (this.wanted !== key) return; // something else is to be shown by now
+    if (this.key === key) {
+      for (const [name, columns] of Object.entries(data)) this.sources[name].data = columns;
+      return;
+    }
+    this.clear();
+    this.key = this.wanted = key;
+    this.sources = Object.fromEntries(Object.entries(data).map(([name, columns]) => [name, new B.ColumnDataSource({ data: columns })]));
+    const { x, y, height, ...more } = settings;
+    this.figure = B.Plotting.figure({
+      height, sizing_mode: "stretch_width", tools: "pan,box_zoom,wheel_zoom,reset,save", toolbar_location: "above",
+      min_border_right: 14, x_axis_label: x.label, y_axis_label: y.label, x_axis_type: x.type || "linear", y_axis_type: y.type || "linear", ...more,
     });
-    fig.toolbar.logo = null;
-    fig.toolbar.autohide = true;
-    this.fig = fig;
-    this.sources = {};
-    build(fig, B);
-    this.restyle();
-    this.remove();
-    this.holder.replaceChildren();
-    const view = await B.Plotting.show(fig, this.holder);
-    if (this.fig === fig) this.view = view;
-    else dispose(view);
-    this.name_();
-    return fig;
-  }
-
-  // Bokeh's plots take the focus, without a name.
-  name_() {
-    const find = (root) => root.querySelector?.(".bk-events") || [...root.querySelectorAll("*")].map((one) => one.shadowRoot && find(one.shadowRoot)).find(Boolean);
-    const layer = this.view && find(this.holder);
+    this.figure.toolbar.logo = null;
+    this.figure.toolbar.autohide = true;
+    build(this.figure, B);
+    this.style(B, x, y);
+    this.holder.style.minHeight = `${height}px`;
+    this.view = B.Plotting.show(this.figure, this.holder);
+    // Bokeh's plots take the focus, without a name.
+    const layer = (await this.view).canvas_view?.events_el;
     layer?.setAttribute("role", "img");
-    layer?.setAttribute("aria-label", `Plot: ${this.spoken || this.name}`);
+    layer?.setAttribute("aria-label", `Plot: ${y.label} over ${x.label}`);
   }
 
-  remove() {
-    if (this.view) dispose(this.view);
+  style(B, x, y) {
+    const [text, soft, line, paper] = ["ink", "soft", "line", "paper"].map(ink), { figure } = this;
+    Object.assign(figure, { background_fill_color: paper, border_fill_color: paper, outline_line_color: null });
+    for (const [axis, { ticks }] of [[figure.below[0], x], [figure.left[0], y]]) {
+      Object.assign(axis, {
+        axis_label_text_color: text, axis_label_text_font: FONT, axis_label_text_font_style: "normal", axis_label_text_font_size: "13px",
+        major_label_text_color: soft, major_label_text_font: FONT, major_label_text_font_size: "12px", axis_line_color: line,
+        major_tick_line_color: line, minor_tick_line_color: null, major_tick_in: 0, major_label_policy: new B.NoOverlap({ min_distance: 4 }),
+      });
+      if (!ticks) continue;
+      axis.ticker = new B.FixedTicker({ ticks: ticks.map((one) => one[0]) });
+      axis.major_label_overrides = new Map(ticks);
+      const crowded = axis === figure.below[0] && ticks.map((one) => one[1]).join(" ").length * 7.5 > this.holder.clientWidth - 90;
+      if (crowded) axis.major_label_orientation = Math.PI / 4;
+    }
+    for (const grid of figure.center.filter((one) => "grid_line_color" in one)) {
+      grid.grid_line_color = line;
+      grid.ticker = figure[grid.dimension ? "left" : "below"][0].ticker;
+    }
+  }
+
+  // A figure that is not shown any more would go on listening.
+  clear() {
+    this.view?.then((view) => {
+      const shown = view.model.document, place = Bokeh.documents.indexOf(shown);
+      view.remove();
+      if (place >= 0) Bokeh.documents.splice(place, 1);
+      shown?.clear();
+    });
     this.view = null;
+    this.key = this.wanted = "";
+    this.holder.replaceChildren();
   }
 
-  source(name, columns) {
-    const data = Object.fromEntries(columns.map((column) => [column, []]));
-    return (this.sources[name] = new Bokeh.ColumnDataSource({ data }));
-  }
-
-  restyle() {
-    if (!this.fig) return;
-    const [text, soft, line, paper] = ["ink", "soft", "line", "paper"].map(ink);
-    const font = "system-ui, sans-serif";
-    const fig = this.fig;
-    fig.background_fill_color = paper;
-    fig.border_fill_color = paper;
-    fig.outline_line_color = null;
-    for (const side of ["above", "below", "left", "right"])
-      for (const axis of fig[side].filter((one) => "axis_label" in one)) {
-        Object.assign(axis, {
-          axis_label_text_color: text, major_label_text_color: soft, axis_line_color: line,
-          major_tick_line_color: line, minor_tick_line_color: null, axis_label_text_font: font,
-          major_label_text_font: font, axis_label_text_font_style: "normal", axis_label_text_font_size: "13px",
-          major_label_text_font_size: "12px", major_tick_in: 0,
-        });
-        // Rotated labels are names: all are kept.
-        if (axis.major_label_orientation === "horizontal") axis.major_label_policy = new Bokeh.NoOverlap({ min_distance: 4 });
-      }
-    for (const grid of fig.center.filter((one) => "grid_line_color" in one)) grid.grid_line_color = line;
-    this.recolour?.(text, soft);
-  }
-
-  axes(x, y, spoken_ = `${y} over ${x}`) {
-    this.spoken = spoken_;
-    this.name_();
-    for (const [side, words] of [["below", x], ["left", y]])
-      for (const axis of this.fig[side]) if ("axis_label" in axis) axis.axis_label = words;
-  }
-
-  ticks(side, labels) {
-    const axis = this.fig[side][0];
-    // As many labels as there is room for.
-    const step = Math.ceil(labels.length / (side === "below" ? Math.max(4, this.holder.clientWidth / 28) : 40));
-    const places = labels.map((_, i) => i).filter((i) => i % step === 0);
-    axis.ticker = new Bokeh.FixedTicker({ ticks: places });
-    axis.major_label_overrides = new Map(places.map((i) => [i, labels[i]]));
-    for (const grid of this.fig.center.filter((one) => one.dimension === (side === "below" ? 0 : 1))) grid.ticker = axis.ticker;
-    const crowded = side === "below" && labels.join(" ").length * 7.5 > this.holder.clientWidth - 90;
-    axis.major_label_orientation = crowded ? Math.PI / 4 : "horizontal";
-  }
-
-  window(x, y) {
-    for (const [name, [start, end]] of [["x_range", x], ["y_range", y]]) {
-      const range = this.fig[name];
-      range.setv({ start, end, reset_start: start, reset_end: end });
-    }
-  }
-
-  say(words) {
-    this.forget();
-    this.holder.replaceChildren(element("p", { class: "none", text: words }));
-  }
-
-  forget() {
-    this.remove();
-    this.fig = null;
-    this.key = "";
+  say(words, ...more) {
+    this.clear();
+    this.holder.style.minHeight = "";
+    this.holder.append(element("p", { class: "none", text: words }), ...more);
   }
 }
 
-// A figure that is not shown any more would go on listening.
-function dispose(view) {
-  const shown = view.model.document, place = Bokeh.documents.indexOf(shown);
-  view.remove();
-  if (place >= 0) Bokeh.documents.splice(place, 1);
-  shown?.clear();
+// Columns of rows: {name: [of each row]}.
+function columnsOf(rows, names) {
+  return Object.fromEntries(names.map((name) => [name, rows.map((one) => one[name])]));
 }
 
-function spread(values, log, margin = 0.06) {
-  const good = values.filter((one) => Number.isFinite(one) && (!log || one > 0));
-  if (!good.length) return log ? [0.1, 10] : [0, 1];
-  let low = Infinity, high = -Infinity;
-  for (const one of good) {
-    if (one < low) low = one;
-    if (one > high) high = one;
-  }
-  if (log) {
-    const factor = Math.max((high / low) ** margin, 1.15);
-    return [low / factor, high * factor];
-  }
-  const room = high > low ? margin * (high - low) : Math.abs(high) * 0.1 || 1;
-  return [low - room, high + room];
+function fields(...names) {
+  return Object.fromEntries(names.map((name) => [name, { field: name }]));
 }
 
-// Lines with markers: series of {name, x, y, hollow, tips}, upright marks of {x, name}.
-class Lines extends Chart {
-  async show({ series, marks = [], xlabel, ylabel, logx = false, logy = false, categories = null, xticks = null,
-    window = {}, zero = false }) {
-    const count = series.reduce((sum, one) => sum + one.x.length, 0);
-    const settings = {
-      figure: { x_axis_type: logx ? "log" : "linear", y_axis_type: logy ? "log" : "linear" },
-      categories, equal: Boolean(window.equal), xticks,
-    };
-    const made = await this.figure(settings, (fig, B) => {
-      const zeroLine = new B.Span({ dimension: "width", location: 0, line_width: 1.2, visible: false });
-      fig.add_layout(zeroLine);
-      this.zero = zeroLine;
-      const upright = this.source("marks", ["x", "low", "high", "at", "name", "align"]);
-      this.markLines = fig.segment({ field: "x" }, { field: "low" }, { field: "x" }, { field: "high" },
-        { source: upright, line_dash: "4 3", line_width: 1.3 });
-      const lines = this.source("lines", ["xs", "ys", "color", "dash", "width"]);
-      fig.multi_line({ field: "xs" }, { field: "ys" }, {
-        source: lines, line_color: { field: "color" }, line_dash: { field: "dash" }, line_width: { field: "width" },
-      });
-      const points = this.source("points", ["x", "y", "fill", "line", "marker", "size", "name", "tip"]);
-      const glyph = fig.scatter({ field: "x" }, { field: "y" }, {
-        source: points, marker: { field: "marker" }, size: { field: "size" }, fill_color: { field: "fill" },
-        line_color: { field: "line" }, line_width: 1.4,
-      });
-      this.markWords = fig.text({ field: "x" }, { field: "at" }, { field: "name" }, {
-        source: upright, text_font_size: "12px", text_font: "system-ui, sans-serif",
-        text_align: { field: "align" }, text_baseline: "bottom",
-      });
-      fig.add_tools(new B.HoverTool({ renderers: [glyph], tooltips: [["", "@name"], ["", "@tip"]] }));
-      this.recolour = (text, soft) => {
-        zeroLine.line_color = soft;
-        this.markLines.glyph.line_color = soft;
-        this.markWords.glyph.text_color = text;
-        this.markWords.glyph.background_fill_color = ink("paper");
-      };
-      if (categories) this.ticks("below", categories);
-      if (xticks) {
-        fig.below[0].ticker = new B.FixedTicker({ ticks: xticks });
-        fig.below[0].major_label_overrides = new Map(xticks.map((one) => [one, number(one)]));
-        for (const grid of fig.center.filter((one) => one.dimension === 0)) grid.ticker = fig.below[0].ticker;
-      }
-    });
-    if (!made || this.fig !== made) return; // something else is shown by now
-    const usable = (x, y) => Number.isFinite(x) && Number.isFinite(y) && (!logx || x > 0) && (!logy || y > 0);
-    const lines = { xs: [], ys: [], color: [], dash: [], width: [] };
-    const points = { x: [], y: [], fill: [], line: [], marker: [], size: [], name: [], tip: [] };
-    const paper = ink("paper"), small = count > 400;
-    const order = series.map((one, i) => [one, i]).sort(([a], [b]) => Boolean(b.faint) - Boolean(a.faint));
-    order.forEach(([one, i]) => {
-      const style = { ...look(i), ...one.look };
-      if (one.faint) style.color = ink("line");
-      if (one.line !== false) {
-        lines.xs.push(one.x.map((x, j) => (usable(x, one.y[j]) ? x : NaN)));
-        lines.ys.push(one.y.map((y, j) => (usable(one.x[j], y) ? y : NaN)));
-        lines.color.push(style.color === "ink" ? ink("ink") : style.color);
-        lines.dash.push(style.dash);
-        lines.width.push(one.width || 1.8);
-      }
-      if (one.markers === false) return;
-      one.x.forEach((x, j) => {
-        if (!usable(x, one.y[j])) return;
-        points.x.push(x);
-        points.y.push(one.y[j]);
-        points.fill.push(one.hollow?.[j] ? paper : style.color);
-        points.line.push(style.color);
-        points.marker.push(style.marker);
-        points.size.push(one.chosen === j ? 12 : small ? 3 : one.size || 6);
-        points.name.push(one.name);
-        points.tip.push(one.tips ? one.tips[j] : `${number(x)}, ${number(one.y[j])}`);
-      });
-    });
-    const range = (values, log, given) => given || spread(values, log);
-    const allX = [].concat(...lines.xs, points.x, marks.map((one) => one.x)), allY = [].concat(...lines.ys, points.y);
-    let x = categories ? [-0.5, categories.length - 0.5] : range(allX, logx, window.x);
-    let y = range(zero ? [...allY, 0] : allY, logy, window.y);
-    if (window.equal) [x, y] = this.fitted(x, y);
-    const sorted = marks.filter((one) => Number.isFinite(one.x) && (!logx || one.x > 0)).sort((a, b) => a.x - b.x);
-    const levels = Math.min(sorted.length, 4);
-    const head = (level) => logy ? y[1] / (y[1] / y[0]) ** (0.065 * (level + 1)) : y[1] - (y[1] - y[0]) * 0.075 * (level + 1);
-    this.sources.marks.data = {
-      x: sorted.map((one) => one.x), low: sorted.map(() => y[0]), high: sorted.map(() => y[1]),
-      at: sorted.map((_, i) => head(i % levels)), name: sorted.map((one) => ` ${one.name} `),
-      align: sorted.map((one) => ((one.x - x[0]) / (x[1] - x[0]) > 0.6 ? "right" : "left")),
-    };
-    this.sources.lines.data = lines;
-    this.sources.points.data = points;
-    this.zero.visible = zero && !logy;
-    this.axes(xlabel, ylabel);
-    this.window(x, y);
-  }
-
-  // Limits that give both axes one scale, in a figure of this size.
-  fitted(x, y) {
-    const width = Math.max(this.holder.clientWidth - 90, 100), height = this.height - 85;
-    const scale = Math.max((x[1] - x[0]) / width, (y[1] - y[0]) / height);
-    const middle = (range, length) => {
-      const centre = (range[0] + range[1]) / 2;
-      return [centre - (scale * length) / 2, centre + (scale * length) / 2];
-    };
-    return [middle(x, width), middle(y, height)];
-  }
+function hover(figure, B, glyph) {
+  figure.add_tools(new B.HoverTool({ renderers: [glyph], tooltips: [["", "@name"], ["", "@tip"]] }));
 }
 
-// Which line is which; drawn apart from the chart, since it wraps and can be read out.
-function legend(series, words = [], lit = null, light = null) {
-  const list = element("ul", { class: "legend" });
-  series.forEach((one, i) => {
-    if (!one.name) return;
-    const style = { ...look(i), ...one.look };
-    const colour = style.color === "ink" ? "currentColor" : style.color;
-    const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
-    svg.setAttribute("viewBox", "0 0 30 12");
-    svg.setAttribute("aria-hidden", "true");
-    const line = document.createElementNS(svg.namespaceURI, "path");
-    line.setAttribute("d", "M1 6H29");
-    line.setAttribute("stroke", colour);
-    line.setAttribute("stroke-width", "2");
-    if (style.dash !== "solid") line.setAttribute("stroke-dasharray", style.dash);
-    if (one.line !== false) svg.append(line);
-    if (one.markers !== false) {
-      const mark = document.createElementNS(svg.namespaceURI, "text");
-      mark.setAttribute("x", "15");
-      mark.setAttribute("y", "10");
-      mark.setAttribute("text-anchor", "middle");
-      mark.setAttribute("font-size", "11");
-      mark.setAttribute("fill", colour);
-      mark.textContent = SHAPES[style.marker];
-      svg.append(mark);
-    }
-    const entry = light ? element("button", { type: "button", "aria-pressed": String(lit.has(one.name)), title: "Show this line before the others", onclick: () => light(one.name) }, svg, one.name) : [svg, one.name];
-    list.append(element("li", {}, entry));
+// Lines with markers: series of {name, x, y, look, width, tips, hollow}, and upright marks of {x, name}. Axes are {label,
+// type, ticks}; `zero` draws the line of zero.
+function drawLines(chart, { series, marks = [], x, y, zero = false, equal = false, height = 320 }) {
+  const usable = (value, axis) => Number.isFinite(value) && (axis.type !== "log" || value > 0), lines = [], points = [];
+  for (const one of series) {
+    const there = one.x.map((value, j) => usable(value, x) && usable(one.y[j], y));
+    const color = one.look.color === "ink" ? ink("ink") : one.look.color;
+    if (one.line !== false) lines.push({ ...one.look, color, width: one.width || 1.8,
+      xs: one.x.map((value, j) => (there[j] ? value : NaN)), ys: one.y.map((value, j) => (there[j] ? value : NaN)) });
+    if (one.markers !== false) one.x.forEach((value, j) => there[j] && points.push({
+      x: value, y: one.y[j], fill: one.hollow?.[j] ? ink("paper") : color, line: color, marker: one.look.marker,
+      size: one.chosen === j ? 12 : one.x.length > 60 ? 3 : 6, name: one.name, tip: one.tips[j] }));
+  }
+  const all = series.flatMap((one) => one.x).filter((value) => usable(value, x)), ys = lines.flatMap((one) => one.ys).filter(Number.isFinite);
+  if (zero && y.type !== "log") lines.unshift({ xs: [Math.min(...all), Math.max(...all)], ys: [0, 0], color: ink("soft"), dash: "solid", width: 1 });
+  const upright = marks.slice().sort((a, b) => a.x - b.x).map((one, i) => ({ ...one, name: ` ${one.name} `, y: Math.max(...ys), shift: 15 * (i % 4) }));
+  return chart.draw({ x, y, height, match_aspect: equal }, {
+    lines: columnsOf(lines, ["xs", "ys", "color", "dash", "width"]), points: columnsOf(points, ["x", "y", "fill", "line", "marker", "size", "name", "tip"]),
+    marks: columnsOf(upright, ["x", "y", "name", "shift"]),
+  }, (figure, B) => {
+    const { marks: source } = chart.sources;
+    figure.vspan({ field: "x" }, { source, line_color: ink("soft"), line_dash: "4 3", line_width: 1.3 });
+    figure.multi_line({ ...fields("xs", "ys"), source: chart.sources.lines, line_color: { field: "color" },
+      line_dash: { field: "dash" }, line_width: { field: "width" } });
+    hover(figure, B, figure.scatter({ ...fields("x", "y", "marker", "size"), source: chart.sources.points, fill_color: { field: "fill" },
+      line_color: { field: "line" }, line_width: 1.4 }));
+    figure.text({ ...fields("x", "y"), text: { field: "name" }, y_offset: { field: "shift" }, source, text_font: FONT, text_font_size: "12px",
+      text_color: ink("ink"), text_baseline: "top", background_fill_color: ink("paper") });
   });
-  for (const word of words) list.append(element("li", { text: word }));
-  return list;
 }
 
-// Cells over two dimensions, coloured: {column, row, text, colour, missing, tip}.
-class Tiles extends Chart {
-  async show({ cells, columns, rows, xlabel, ylabel, pick, chosen = null }) {
-    this.pick = pick;
-    this.height = Math.max(170, Math.min(100 + 30 * rows.length, 640));
-    const made = await this.figure({ figure: { height: this.height }, columns, rows, width: this.holder.clientWidth }, (fig, B) => {
-      const tiles = this.source("tiles", ["x", "y", "fill", "tip", "what"]);
-      const hatched = this.source("hatched", ["x", "y"]);
-      const glyph = fig.rect({ field: "x" }, { field: "y" }, 0.97, 0.94, {
-        source: tiles, fill_color: { field: "fill" }, line_color: null,
-      });
-      fig.rect({ field: "x" }, { field: "y" }, 0.97, 0.94, {
-        source: hatched, fill_color: null, line_color: null, hatch_pattern: "/", hatch_color: "#8888", hatch_scale: 8,
-      });
-      const words = this.source("words", ["x", "y", "text", "color"]);
-      this.words = fig.text({ field: "x" }, { field: "y" }, { field: "text" }, {
-        source: words, text_color: { field: "color" }, text_align: "center",
-        text_baseline: "middle", text_font_size: "12px", text_font: "system-ui, sans-serif",
-      });
-      const frame = this.source("chosen", ["x", "y"]);
-      const ring = fig.rect({ field: "x" }, { field: "y" }, 0.97, 0.94, { source: frame, fill_color: null, line_width: 3 });
-      fig.add_tools(new B.HoverTool({ renderers: [glyph], tooltips: [["", "@what"], ["", "@tip"]] }), new B.TapTool({ renderers: [glyph] }));
-      tiles.selected.change.connect(() => {
-        const [place] = tiles.selected.indices;
-        if (place === undefined) return;
-        tiles.selected.indices = [];
-        this.pick?.(this.cells[place]);
-      });
-      glyph.nonselection_glyph = null;
-      glyph.selection_glyph = null;
-      for (const grid of fig.center.filter((one) => "grid_line_color" in one)) grid.visible = false;
-      this.ticks("below", columns);
-      this.ticks("left", rows);
-      fig.left[0].major_label_orientation = "horizontal";
-      this.recolour = (text) => (ring.glyph.line_color = text);
-    });
-    if (!made || this.fig !== made) return;
-    this.cells = cells;
-    const room = (this.holder.clientWidth - 110) / columns.length - 4, most = Math.max(...cells.map((one) => one.text?.length || 0));
-    const size = [12, 10].find((one) => most * 0.65 * one <= room), fits = size && rows.length <= 30;
-    if (fits) this.words.glyph.text_font_size = `${size}px`;
-    this.sources.tiles.data = {
-      x: cells.map((one) => one.column), y: cells.map((one) => rows.length - 1 - one.row),
-      fill: cells.map((one) => one.colour), tip: cells.map((one) => one.tip),
-      what: cells.map((one) => `${rows[one.row]}, ${columns[one.column]}`),
-    };
-    // Hatching takes long: not where tiles are pixels.
-    const gaps = cells.length <= 1500 ? cells.filter((one) => one.missing) : [];
-    this.sources.hatched.data = { x: gaps.map((one) => one.column), y: gaps.map((one) => rows.length - 1 - one.row) };
-    const said = fits ? cells.filter((one) => one.text) : [];
-    this.sources.words.data = {
-      x: said.map((one) => one.column), y: said.map((one) => rows.length - 1 - one.row),
-      text: said.map((one) => one.text), color: said.map((one) => one.ink || "#111"),
-    };
-    this.sources.chosen.data = chosen
-      ? { x: [chosen.column], y: [rows.length - 1 - chosen.row] } : { x: [], y: [] };
-    this.axes(xlabel, ylabel);
-    this.window([-0.5, columns.length - 0.5], [-0.5, rows.length - 0.5]);
-  }
-
-  ticks(side, labels) {
-    super.ticks(side, side === "left" ? labels.slice().reverse() : labels);
-  }
-}
-
-// Outlines of several rounds, such as that of a hole, as one line with gaps: each round is closed.
-function rounds(values, numbers) {
-  const found = [];
-  let first = 0;
-  values.forEach((one, i) => {
-    if (!Number.isFinite(one)) return;
-    if (i && numbers && numbers[i] !== numbers[i - 1]) {
-      found.push(values[first], NaN);
-      first = i;
-    }
-    found.push(one);
-  });
-  return [...found, values[first]];
+// Which line is which; apart from the chart, since it wraps and can be read out.
+function legend(series, words = []) {
+  const sign = ({ look: { color, marker }, markers }) => element("span", { "aria-hidden": "true",
+    style: `color: ${color === "ink" ? "currentColor" : color}`, text: markers === false ? "― " : `${MARKERS[marker]} ` });
+  return element("ul", { class: "legend" }, series.filter((one) => one.name).map((one) => element("li", {}, sign(one), one.name)),
+    words.filter(Boolean).map((text) => element("li", { text })));
 }
 
 // What hollow points are: their statuses, where a value stands.
 function hollowWords(series) {
-  const found = new Set(series.flatMap((one) => one.y.map((y, i) => (one.hollow?.[i] && Number.isFinite(y) ? one.words[i] : ""))));
-  found.delete("");
-  return found.size ? [`○ hollow: ${[...found].map(spoken).join(", ")}`] : [];
+  const found = new Set(series.flatMap((one) => one.words?.filter((_, i) => one.hollow[i] && Number.isFinite(one.y[i])) || []));
+  return found.size ? `○ hollow: ${[...found].map(spoken).join(", ")}` : "";
 }
 
-dark.addEventListener("change", () => {
-  for (const chart of charts) chart.restyle();
-  window.springtune?.redraw();
-});
+// Cells over two dimensions: {column, row, text, rgb or colour, tip, name}; `pick` gets one that is clicked.
+function drawTiles(chart, { cells, columns, rows, x, y, pick = null, chosen = null }) {
+  const fits = rows.length <= 30 && Math.max(...cells.map((one) => one.text.length)) * 7.5 <= (chart.holder.clientWidth - 110) / columns.length;
+  const placed = cells.map((one) => ({ ...one, x: one.column, y: rows.length - 1 - one.row, text: fits ? one.text : "",
+    colour: one.rgb ? css(one.rgb) : one.colour,
+    ink: !one.rgb ? "#111" : 0.299 * one.rgb[0] + 0.587 * one.rgb[1] + 0.114 * one.rgb[2] > 140 ? "#111" : "#fff" }));
+  const ticks = (labels) => labels.map((text, i) => [i, text]);
+  chart.cells = cells;
+  chart.pick = pick;
+  return chart.draw({
+    x: { label: x, ticks: ticks(columns) }, y: { label: y, ticks: ticks(rows.slice().reverse()) },
+    height: Math.max(170, Math.min(100 + 30 * rows.length, 640)), x_range: [-0.5, columns.length - 0.5], y_range: [-0.5, rows.length - 0.5] }, {
+    tiles: columnsOf(placed, ["x", "y", "colour", "text", "ink", "name", "tip"]),
+    chosen: columnsOf(placed.filter((one) => one.row === chosen?.row && one.column === chosen.column), ["x", "y"]),
+  }, (figure, B) => {
+    const { tiles } = chart.sources, size = { ...fields("x", "y"), width: 0.97, height: 0.94 };
+    const glyph = figure.rect({ ...size, source: tiles, fill_color: { field: "colour" }, line_color: null });
+    glyph.nonselection_glyph = glyph.selection_glyph = null;
+    figure.text({ ...fields("x", "y", "text"), source: tiles, text_color: { field: "ink" }, text_align: "center", text_baseline: "middle",
+      text_font: FONT, text_font_size: "12px" });
+    figure.rect({ ...size, source: chart.sources.chosen, fill_color: null, line_color: ink("ink"), line_width: 3 });
+    hover(figure, B, glyph);
+    if (pick) figure.add_tools(new B.TapTool({ renderers: [glyph] }));
+    tiles.selected.change.connect(() => {
+      const [place] = tiles.selected.indices;
+      if (place === undefined) return;
+      tiles.selected.indices = [];
+      chart.pick(chart.cells[place]);
+    });
+  });
+}

@@ -1,232 +1,152 @@
 // The page: its head, its views, and the selection that they share with the address.
 
-const MANY = 100; // times as many cells: their view is the first
-
-// How many cells a study asked for.
 function asked(tally) {
-  return Object.entries(tally || {}).reduce((sum, [word, count]) => sum + (word === "not_requested" ? 0 : count), 0);
+  return tally.reduce((sum, one) => sum + one[1], 0);
 }
 
-class Page {
-  constructor(content) {
-    Object.assign(this, content);
-    this.groups = Object.fromEntries(content.groups.map((row, i) => [row.path, new Group(row, i)]));
-    this.charts = {};
+// A view of any group: its networks, a plot of its variables, and what it holds.
+class Explorer {
+  constructor(page, group, view) {
+    Object.assign(this, { page, group, view, title: view.title });
   }
 
-  async start() {
-    const root = await this.groups["/"].load();
-    this.counted = Object.values(this.groups).filter((group) => group !== root && group.path !== "/sensitivity" && group.fields.status);
-    for (const group of this.counted) await group.load();
-    this.tally = asked(root.tally()) ? root.tally() : null;
-    this.head(root);
-    this.views = {};
-    if (this.tally) this.views.cells = new Cells(this, this.declared["/"] || { columns: [] });
-    if (Object.keys(root.fields).length && (this.tally || !root.fields.status))
-      this.views.compare = new Explorer(this, root, { ...(this.declared["/"] || { note: "", plots: [] }), title: "Compare" });
-    for (const [path, group] of Object.entries(this.groups)) {
-      if (path === "/") continue;
-      const declared = this.declared[path] || { note: "", plots: [] };
-      this.views[path.slice(1)] = new Explorer(this, group, { ...declared, title: declared.title || spoken(path.slice(1)) });
-    }
-    this.views.study = new About(this);
-    this.tabs();
-    addEventListener("hashchange", () => this.follow());
-    await this.follow();
+  async build(holder) {
+    const { group, view } = this, { fields: all, dims } = (await group.load()), left = group.left_out;
+    this.plot = new Plot(group, view.plots, { height: 400 });
+    const held = Object.values(all).map((field) => [field.name, field.long_name || "",
+      field.dims.length ? unitOf(field)[1] : withUnit(field, field.values[0], written(field, field.values[0], 5)),
+      element("span", { class: "soft", text: field.dims.map((name) => `${name} ${dims[name].size}`).join(", ") })]);
+    const notes = Object.entries(group.path === "/" ? {} : group.attributes);
+    const summary = element("summary", { text: `${held.length} variables over ${Object.keys(dims).length} dimensions` });
+    holder.append(element("h2", { text: view.title }), element("p", { text: view.note || "" }),
+      left.length ? element("p", { class: "none", text: `Too large for this page, and in dataset.nc only: ${left.join(", ")}.` }) : "",
+      ...(Network.drawnFrom(group) && group.path !== "/fields" ? [this.drawn()] : []), panel("plot", "Plot", this.plot.holder),
+      panel("holds", "What the group holds", element("details", { open: held.length <= 12 }, summary,
+        notes.map(([name, value]) => element("p", { class: "small", text: `${spoken(name)}: ${value}` })), plainTable(held))));
   }
 
-  // A group's cells by status, and what it counts first: "8 shapes".
-  holds(group) {
-    const tally = group.tally(), all = asked(tally);
-    if (!all) return null;
-    const first = group.fields.status.dims.find((name) => group.dims[name].size > 1), title = this.declared[group.path]?.title || spoken(group.path.slice(1));
-    const several = first && counted(group.labelsInUse(first), spoken(first));
-    const badges = Object.entries(tally).filter(([word, count]) => count && word !== "not_requested")
-      .map(([word, count]) => element("span", { class: "count" }, badge(word), ` ${count}`));
-    return element("span", { class: "holds" }, element("a", { href: `#view=${group.path.slice(1)}`, text: title }),
-      several ? `: ${several} ` : ": ", badges);
+  // Networks that no cell of the table has, such as those of shapes.
+  drawn() {
+    const network = this.network = new Network(this.group), moved = this.group.fields.displacement_x;
+    const names = moved.dims.slice(0, -1), first = names[0], choices = element("div", { class: "row" });
+    // Of the networks there are, take the one that has most of the labels, the first above all.
+    const change = (places) => {
+      const stride = moved.strides[names.at(-1)], there = upTo(moved.size / stride).map((row) => moved.placesOf(row * stride));
+      const like = (one) => names.filter((name) => one[name] === places[name]).length + names.length * (one[first] === places[first]);
+      this.places = there.filter((one) => network.has(one)).reduce((a, b) => (like(b) > like(a) ? b : a), places);
+      choices.replaceChildren(...selectors(this.group, names, this.places, change));
+      if (choices.isConnected) this.moved = network.show(this.places);
+    };
+    change({});
+    return panel("network", "The network over its reference", choices, network.holder);
   }
 
-  head(root) {
-    const about = root.attributes;
-    const words = [about.study, about.springtune_version && `springtune ${about.springtune_version}`,
-      about.git_commit && `commit ${about.git_commit.slice(0, 10)}`, about.created && about.created.slice(0, 10)].filter(Boolean);
-    document.getElementById("facts").textContent = words.join(" · ");
-    const end = document.getElementById("end");
-    if (this.tally) {
-      const all = asked(this.tally);
-      end.append(element("span", {}, element("b", { text: String(all) }), all === 1 ? " cell: " : " cells: "),
-        ...Object.entries(this.tally).filter(([word, count]) => count && word !== "not_requested")
-          .map(([word, count]) => element("span", { class: "count" }, badge(word), ` ${count}`)),
-        this.tally.not_requested ? element("span", { class: "soft", text: `${this.tally.not_requested} not requested` }) : "");
-      this.errors(root, end);
-    }
-    document.getElementById("holds").append(...this.counted.map((group) => this.holds(group)).filter(Boolean));
-    const links = document.getElementById("links");
-    const named = [["dataset.nc", "dataset.nc"], ["tables/index.html", "tables"], ["paper.pdf", "paper.pdf"], ["report.zip", "report"]];
-    for (const [path, text] of named)
-      if (path === "dataset.nc" || this.files.includes(path)) links.append(element("a", { href: path, text }));
-    for (const [view, text] of [["study", "config, provenance, figures"]]) links.append(element("a", { href: `#view=${view}`, text }));
-  }
-
-  errors(root, end) {
-    const field = root.fields[SCENE_ERROR], status = root.fields.status;
-    if (!field || field.dims.join() !== status.dims.join()) return;
-    const values = field.unpacked(), sizes = [];
-    let worst = -1;
-    for (let i = 0; i < values.length; i++) {
-      if (!Number.isFinite(values[i]) || status.meaning(status.valueAt(i)) !== "solved") continue;
-      sizes.push(Math.abs(values[i]));
-      if (worst < 0 || Math.abs(values[i]) > Math.abs(values[worst])) worst = i;
-    }
-    if (!sizes.length) return end.append(element("span", { class: "soft", text: this.tally.beyond_linear ? "no cell has an error that counts" : "no cell has an error" }));
-    sizes.sort((a, b) => a - b);
-    const middle = (sizes[(sizes.length - 1) >> 1] + sizes[sizes.length >> 1]) / 2;
-    const places = Object.fromEntries(status.dims.map((name) => [name, Math.floor(worst / status.strides[name]) % root.dims[name].size]));
-    const word = signWord(values[worst], root.fields.reference_displacement?.of(places));
-    end.append(element("span", { text: `|error|${this.tally.beyond_linear ? " where the reference applies" : ""}: median ${number(100 * middle, 3)} %, ` },
-      element("a", { href: this.address("cells", places), text: `largest ${number(100 * sizes.at(-1), 3)} %` }), word ? `, ${word}` : ""));
-  }
-
-  tabs() {
-    const list = document.getElementById("tabs");
-    this.buttons = Object.entries(this.views).map(([name, view]) => element("button", {
-      type: "button", role: "tab", id: `tab-${name}`, "aria-controls": "view", text: view.title,
-      onclick: () => this.open(name),
-      onkeydown: (event) => {
-        const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
-        if (!step) return;
-        const names = Object.keys(this.views), next = (names.indexOf(name) + step + names.length) % names.length;
-        this.open(names[next]);
-        this.buttons[next].focus();
-      },
-    }));
-    list.append(...this.buttons);
-  }
-
-  // What the address says: a view, and for each dimension of the root a label.
-  async follow() {
-    const wanted = new URLSearchParams(location.hash.slice(1));
-    const names = Object.keys(this.views);
-    const view = names.includes(wanted.get("view")) ? wanted.get("view") : [...wanted.keys()].length ? names[0] : this.first();
-    if (this.views.cells) {
-      const root = this.groups["/"], places = {};
-      for (const name of root.fields.status.dims) {
-        if (!wanted.has(name)) continue;
-        const place = Array.from({ length: root.dims[name].size }, (_, i) => String(root.label(name, i))).indexOf(wanted.get(name));
-        if (place >= 0) places[name] = place;
-      }
-      if (Object.keys(places).length) this.places = { ...(this.places || this.firstPlaces()), ...places };
-    }
-    await this.open(view, false);
-  }
-
-  // The view to begin with: that of cells, unless a few stand beside very many others.
-  first() {
-    const names = Object.keys(this.views), most = (name) => asked(this.counted.find((group) => group.path === `/${name}`)?.tally());
-    const largest = names.reduce((one, other) => (most(other) > most(one) ? other : one), names[0]);
-    return asked(this.tally) * MANY < most(largest) ? largest : names[0];
-  }
-
-  firstPlaces() {
-    const root = this.groups["/"], status = root.fields.status, values = status.unpacked();
-    const solved = values.findIndex((one) => status.meaning(one) === "solved");
-    const row = solved >= 0 ? solved : Math.max(0, values.findIndex((one) => status.meaning(one) !== "not_requested"));
-    return Object.fromEntries(status.dims.map((name) => [name, Math.floor(row / status.strides[name]) % root.dims[name].size]));
-  }
-
-  address(view, places) {
-    const root = this.groups["/"], found = new URLSearchParams();
-    if (view !== "cells") found.set("view", view);
-    if (view === "cells" && places)
-      for (const name of Object.keys(places)) if (root.dims[name].size > 1) found.set(name, String(root.label(name, places[name])));
-    return `#${String(found) || "view=cells"}`;
-  }
-
-  async open(name, remember = true) {
-    const view = this.views[name], holder = document.getElementById("view");
-    this.opened = name;
-    Object.keys(this.views).forEach((one, i) => {
-      this.buttons[i].setAttribute("aria-selected", String(one === name));
-      this.buttons[i].tabIndex = one === name ? 0 : -1;
-      if (one === name) this.buttons[i].scrollIntoView({ block: "nearest", inline: "nearest" });
-    });
-    this.holders ||= {};
-    const fresh = !this.holders[name];
-    const own = (this.holders[name] ||= element("div", { class: `view view-${name}` }));
-    holder.replaceChildren(own);
-    holder.setAttribute("aria-labelledby", `tab-${name}`);
-    if (fresh) await view.build(own);
-    if (name === "cells") {
-      this.places ||= this.firstPlaces();
-      performance.mark("table");
-      await view.show(this.places);
-    } else await view.show();
-    if (remember) this.remember();
-    performance.mark("shown");
-  }
-
-  remember() {
-    const address = this.address(this.opened, this.places);
-    if (location.hash !== address) history.replaceState(null, "", address);
-  }
-
-  // Draw what is open again, in the colours of now.
-  redraw() {
-    const view = this.views[this.opened];
-    return view.redraw ? view.redraw() : view.draw?.();
-  }
-
-  async choose(places) {
-    const begin = performance.now();
-    this.places = places;
-    this.remember();
-    await this.views.cells.show(places);
-    this.took = performance.now() - begin;
+  show() {
+    return Promise.all([this.plot.render(), this.network?.show(this.places)]);
   }
 }
 
 // The study as it was asked for, and where its results come from.
 class About {
   constructor(page) {
-    this.page = page;
-    this.title = "Study";
+    Object.assign(this, { page, title: "Study" });
   }
 
   build(holder) {
-    const about = this.page.groups["/"].attributes;
-    const plain = Object.entries(about).filter(([name, value]) => value !== "" && !["config", "software", "title"].includes(name));
-    let software = [];
-    try {
-      software = Object.entries(JSON.parse(about.software || "{}"));
-    } catch {
-      software = [["software", about.software]];
-    }
-    const table = (rows) => element("div", { class: "wide" }, element("table", { class: "plain" }, element("tbody", {}, rows.map(([name, value]) =>
-      element("tr", {}, element("th", { scope: "row", text: spoken(name) }), element("td", { text: String(value) }))))));
-    const link = (path) => element("li", {}, element("a", { href: path, text: path }));
-    const files = this.page.files;
-    const config = element("pre", { class: "code", tabindex: "0", role: "region", "aria-label": "The study's YAML", text: about.config || "" });
-    holder.append(element("h2", { text: about.title || "Study" }),
-      element("section", { class: "panel" }, element("h3", { text: "Where it comes from" }), table(plain)),
-      element("section", { class: "panel" }, element("h3", { text: "Versions" }), table(software)),
-      element("section", { class: "panel wide-panel" }, element("h3", { text: "The study, as run" }), config, copyButton(() => config.textContent, "Copy")),
-      element("section", { class: "panel wide-panel" }, element("h3", { text: "Files" }),
-        element("ul", { class: "links columns" }, link("dataset.nc"), files.map(link)),
+    const { config, software, title, ...about } = this.page.groups["/"].attributes;
+    const code = element("pre", { class: "code", tabindex: "0", role: "region", "aria-label": "The study's YAML", text: config || "" });
+    const links = ["dataset.nc", ...this.page.files].map((path) => element("li", {}, element("a", { href: path, text: path })));
+    holder.append(element("h2", { text: title || "Study" }),
+      panel("source", "Where it comes from", plainTable(Object.entries(about).map(([name, value]) => [spoken(name), String(value)])),
+        element("p", { class: "small", text: software })),
+      panel("config", "The study, as run", code),
+      panel("files", "Files", element("ul", { class: "links columns" }, links),
         element("p", { class: "soft small", text: "Links work where this page lies in the folder of its study." })));
   }
+}
 
-  show() {}
+class Page {
+  constructor(content) {
+    Object.assign(this, content);
+    this.groups = Object.fromEntries(content.groups.map((row, i) => [row.path, new Group(row, i)]));
+  }
+
+  async start() {
+    const root = await this.groups["/"].load(), others = Object.values(this.groups).filter((group) => group !== root);
+    this.counted = others.filter((group) => group.status && group.path !== "/sensitivity");
+    for (const group of this.counted) await group.load();
+    this.views = {};
+    const declared = (group, name) => ({ note: "", plots: [], columns: [], ...(this.declared[group.path] || { title: spoken(name) }) });
+    if (asked(root.tally())) this.views.cells = new Cells(this, declared(root, "cells"));
+    else if (Object.keys(root.fields).length && !root.fields.status) this.views.cells = new Explorer(this, root, declared(root, "cells"));
+    for (const group of others) this.views[group.path.slice(1)] = new Explorer(this, group, declared(group, group.path.slice(1)));
+    this.views.study = new About(this);
+    this.head(root);
+    document.getElementById("tabs").append(...Object.entries(this.views).map(([name, view]) => element("a", { href: `#view=${name}`, text: view.title })));
+    addEventListener("hashchange", () => this.follow());
+    dark.addEventListener("change", () => this.views[this.opened].show?.(this.places));
+    await this.follow();
+  }
+
+  head(root) {
+    const about = root.attributes, put = (id, ...children) => document.getElementById(id).append(...children.flat());
+    const count = ([word, number_]) => element("span", { class: "count" }, badge(word, number_)), all = asked(root.tally());
+    put("facts", [about.study, `springtune ${about.springtune_version}`, about.git_commit && `commit ${about.git_commit.slice(0, 10)}`,
+      about.created?.slice(0, 10)].filter(Boolean).join(" · "));
+    if (all) put("end", element("b", { text: all === 1 ? "1 cell:" : `${all} cells:` }), root.tally().map(count),
+      root.notRequested ? element("span", { class: "soft", text: `${root.notRequested} not requested` }) : "");
+    for (const group of this.counted.filter((one) => asked(one.tally()))) {
+      const name = group.path.slice(1);
+      put("holds", element("span", { class: "holds" }, element("a", { href: `#view=${name}`, text: this.views[name].title }), ": ", group.tally().map(count)));
+    }
+    const links = { "dataset.nc": "dataset.nc", "tables/index.html": "tables", "paper.pdf": "paper.pdf", "report.zip": "report" };
+    for (const [path, text] of Object.entries(links)) if (path === "dataset.nc" || this.files.includes(path)) put("links", element("a", { href: path, text }));
+  }
+
+  // What the address says: a view, and for each dimension of the root a label.
+  async follow() {
+    const wanted = new URLSearchParams(location.hash.slice(1)), names = Object.keys(this.views), root = this.groups["/"];
+    const places = {};
+    for (const name of root.status?.dims || []) {
+      const place = upTo(root.dims[name].size).findIndex((i) => String(root.label(name, i)) === wanted.get(name));
+      if (place >= 0) places[name] = place;
+    }
+    if (asked(root.tally())) this.places = { ...(this.places || this.firstPlaces(root)), ...places };
+    await this.open(names.includes(wanted.get("view")) ? wanted.get("view") : names[0]);
+  }
+
+  firstPlaces({ status }) {
+    const row = (test) => status.values.findIndex((one) => test(status.meaning(one)));
+    const solved = row((word) => word === "solved");
+    return status.placesOf(solved >= 0 ? solved : row((word) => word !== "not_requested"));
+  }
+
+  async open(name) {
+    const view = this.views[name], fresh = !view.holder;
+    this.opened = name;
+    for (const link of document.getElementById("tabs").children) {
+      if (link.hash === `#view=${name}`) link.setAttribute("aria-current", "page");
+      else link.removeAttribute("aria-current");
+    }
+    view.holder ||= element("div", { class: `view view-${name}` });
+    document.getElementById("view").replaceChildren(view.holder);
+    if (fresh) await view.build(view.holder);
+    await view.show?.(this.places);
+  }
+
+  choose(places) {
+    const root = this.groups["/"], named = Object.keys(places).filter((name) => root.dims[name].size > 1);
+    const address = new URLSearchParams(named.map((name) => [name, String(root.label(name, places[name]))]));
+    history.replaceState(null, "", `#${address || "view=cells"}`);
+    this.places = places;
+    return this.views.cells.show(places);
+  }
 }
 
 async function main() {
-  if (!("DecompressionStream" in window)) throw new Error("this browser is too old for this page; open dataset.nc with xarray instead");
-  const content = JSON.parse(await inflatedText("content"));
-  const page = new Page(content);
-  window.springtune = page;
-  await page.start();
+  window.springtune = new Page(await inflated("content").json());
+  await window.springtune.start();
   document.documentElement.dataset.ready = "yes";
-  performance.mark("ready");
 }
 
 main().catch((error) => {
