@@ -107,8 +107,8 @@ class TestSelection:
         assert "5 cells" not in browser.ask("return document.querySelector('#end').textContent")
         for word in ("solved", "linear only", "not converged", "unstable", "failed", "not requested"):
             assert word in browser.ask("return document.querySelector('#end').textContent")
-        place = browser.ask("const t = springtune.views.cells; const row = t.status.values.indexOf(5);"
-                            "return springtune.choose(t.status.placesOf(row)).then(() => t.facts.innerText)")  # fmt: skip
+        place = browser.ask("const t = springtune.views.cells, row = t.status.values.indexOf(5);"
+                            "await springtune.choose(t.status.placesOf(row)); return t.facts.innerText")  # fmt: skip
         assert "failed" in place and "the network <b>folded</b>" in place
 
 

@@ -148,7 +148,9 @@ def _lighten(found: list[Packed], room: int) -> None:
 
 def _described(path: str, data: xr.Dataset, own: set[str], root: xr.Dataset) -> Packed:
     """Describe and pack a group: its `own` variables, with labels that it may share with the group above."""
-    rows, parts, sizes = [], [], {}
+    rows: list[dict[str, Any]] = []
+    parts: list[bytes] = []
+    sizes: dict[Any, int] = {}
     for name, array in data.variables.items():
         if name not in own:
             continue
@@ -232,7 +234,7 @@ def _sign(name: str, data: xr.Dataset, root: xr.Dataset) -> str:
     of = data if reference in data else root
     if reference not in of or not re.fullmatch("(deformation_|second_|face_|expected_)?error", name):
         return "positive: too large"
-    signs, others = np.sign(of[reference]), False
+    signs, others = xr.apply_ufunc(np.sign, of[reference]), False
     if "quantity_kind" in of:
         displacements = of.quantity_kind == "displacement"
         others = bool((signs.notnull() & ~displacements).any())
