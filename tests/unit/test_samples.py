@@ -67,19 +67,19 @@ def run(*replaced, name="sample", outputs="tables"):
     return xr.load_datatree(campaign.folder / "dataset.nc", engine="h5netcdf"), campaign
 
 
-def solved(kinematics):
+def solved():
     """Dataset of a small sample under two loads, with two definitions."""
-    of = f"load: [traction, compression]\n  definition: [lattice, area]\n  kinematics: {kinematics}"
+    of = "load: [traction, compression]\n  definition: [lattice, area]"
     return run(("load: traction\n  definition: lattice", of), ("size: 16", "size: 8"))[0]
 
 
 @pytest.fixture(scope="module")
 def linear(tmp_path_factory, references):
-    """That of linear kinematics, which several tests look at."""
+    """That dataset, which several tests look at."""
     folder = tmp_path_factory.mktemp("linear")
     (folder / "references").symlink_to(references)
     with contextlib.chdir(folder):
-        return solved("linear")
+        return solved()
 
 
 class TestDesigns:
@@ -222,10 +222,8 @@ class TestOnce:
         sheet = Sheet(MESH_TYPES["right"](0.1, 0.04, 0.01), 1.0, like=before)
         assert sheet.mesh.edges is not before.mesh.edges
 
-    @pytest.mark.parametrize("kinematics", ["linear", "nonlinear"])
-    def test_sampled_scenes_are_those_of_a_sheet_each(self, here, linear, kinematics):
-        tree = linear if kinematics == "linear" else solved(kinematics)
-        data = tree["samples"].to_dataset()
+    def test_sampled_scenes_are_those_of_a_sheet_each(self, linear):
+        data = linear["samples"].to_dataset()
         for row in range(0, data.sizes["sample"], 7):
             one = data.isel(sample=row)
             box = [float(one[name]) for name in ("length", "height", "sample_mesh_size")]
@@ -235,7 +233,7 @@ class TestOnce:
                     material = Material(float(one.young_modulus), float(one.poisson_ratio))
                     springs, _ = sheet.derive(name, material)
                     force = LOADS[load].sign * float(one.force)
-                    wanted = sheet.solve(LOADS[load].kind, springs, force, kinematics)
+                    wanted = sheet.solve(LOADS[load].kind, springs, force, "linear")
                     found = one.sel(load=load, definition=name)
                     assert int(found.status) == wanted.status
                     assert float(found.displacement) == pytest.approx(wanted.displacement, rel=1e-9)
@@ -388,16 +386,14 @@ class TestFailures:
     def test_what_was_lost_of_one_mesh_type_is_tried_of_another(self, tmp_path):
         """Names of lost networks say all that these depend on, the code among it."""
         names = []
-        for kinematics in ("linear", "nonlinear"):
-            for mesh_type in ("structured", "right"):
-                how = ("size: 16", f"size: 8\n  design: sobol\n  mesh_type: {mesh_type}\n  kinematics: {kinematics}")
-                spent = Noting()
-                content, results = networks(tmp_path, how, spent=spent)
-                assert [found["messages"] for found in results] == [{}] * len(results)
-                # As if each network had been lost; meshes are the same of both kinematics.
-                names.append({name for name in spent.names if name.split()[2] != content["files"][0]["meshed"]})
-                for name in names[-1]:
-                    solve.crashed(content, name, "its process died")
+        for mesh_type in ("structured", "right"):
+            how = ("size: 16", f"size: 8\n  design: sobol\n  mesh_type: {mesh_type}")
+            spent = Noting()
+            content, results = networks(tmp_path, how, spent=spent)
+            assert [found["messages"] for found in results] == [{}] * len(results)
+            names.append(set(spent.names))  # as if each network had been lost
+            for name in names[-1]:
+                solve.crashed(content, name, "its process died")
         assert not set.intersection(*names) and len(set.union(*names)) == sum(map(len, names))
 
     def test_a_sample_that_is_singular_is_a_hole_and_the_others_are_solved(self, tmp_path):

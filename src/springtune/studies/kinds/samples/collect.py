@@ -11,7 +11,7 @@ import pandas as pd
 from springtune.problem.compare import deformation_error
 from springtune.problem.loads import LOADS
 from springtune.problem.status import Status
-from springtune.reference.answers import beyond_linear, unit_scales
+from springtune.reference.answers import unit_scales
 from springtune.springs.lattice import COEFFICIENT
 
 from ...output.dataset import Group
@@ -20,6 +20,7 @@ from ..scenes import any_reference
 from .designs import PARAMETERS, SOBOL_INDICES, blocks, roles
 from .interpolate import problem_key
 from .kind import MOST_SOLVED, UNIFORM, block_key, reference_key, result_key
+from .outputs import QUANTITIES
 from .solve import DRAWN
 
 OF_REFERENCES = ("sample", "load")
@@ -79,7 +80,7 @@ def groups(study, folder):
     axes = study.axes | {
         "sample": tuple(range(sample.rows)),
         "parameter": sample.varied,
-        "quantity": sample.quantities,
+        "quantity": tuple(QUANTITIES),
     }
     # Without a mesh, as beyond limits, a network has no particles; other definitions may have a mesh.
     particles = np.max([results[key]["particles"] for key in results if key != DRAWN], axis=0)
@@ -87,7 +88,8 @@ def groups(study, folder):
     frames = [pd.DataFrame(places | {"sample": axes["sample"], "particles": particles})]
     frames += chain.from_iterable(_of_load(load, sample, drawn, results, folder / "samples") for load in sample.loads)
     data = group.of_rows(axes, pd.concat(frames)).set_coords([*places])
-    data.attrs = {name: getattr(sample, name) for name in ("design", "size", "seed", "mesh_type", "kinematics")}
+    data.attrs = {name: getattr(sample, name) for name in ("design", "size", "seed", "mesh_type")}
+    data.attrs["kinematics"] = "linear"
     data.attrs["varied"] = " ".join(sample.varied)
     found = {SAMPLES.name: data}
     if sample.design == SOBOL_INDICES:
@@ -114,30 +116,27 @@ def _frame(found):
 
 def _of_load(load, sample, drawn, results, folder):
     """References, networks, their errors, and the uniform stiffness without an error under a load."""
-    kind, sign, is_linear = LOADS[load].kind, LOADS[load].sign, sample.kinematics == "linear"
+    kind, sign = LOADS[load].kind, LOADS[load].sign
     body, softness = SimpleNamespace(**drawn), COEFFICIENT * (drawn["young_modulus"] * drawn["thickness"])
     body.in_plane = body  # sheets of samples are in plane stress
     answers, why = _answers(sample, drawn, folder, kind, drawn["length"] / drawn["height"])
-    length, scale = unit_scales(body, body, kind)
-    force = sign * drawn["force"]
-    reference, applies = force * scale * answers.displacement, np.isfinite(answers.displacement)
-    if not is_linear:
-        per_force = np.abs(force) * scale / length
-        pairs = zip((per_force * answers.rotation).tolist(), (per_force * answers.strain).tolist())
-        applies = [np.isfinite(pair).all() and not beyond_linear(*pair) for pair in pairs]
-    values = {"reference_displacement": reference, "reference_error_estimate": answers.error_estimate}
-    values |= {"reference_applies": applies, "reference_message": why}
-    if "best_stiffness" in sample.quantities:  # the solved one times its displacement over the reference
-        found = results[result_key(sample, load, UNIFORM)]
-        solved = np.where(found["status"] == Status.SOLVED, sign * found["displacement"], np.nan)
-        values["best_stiffness"] = softness * (solved / reference)
+    _, scale = unit_scales(body, body, kind)
+    reference = sign * drawn["force"] * scale * answers.displacement
+    uniform = results[result_key(sample, load, UNIFORM)]
+    solved = np.where(uniform["status"] == Status.SOLVED, sign * uniform["displacement"], np.nan)
+    values = {
+        "reference_displacement": reference,
+        "reference_error_estimate": answers.error_estimate,
+        "reference_applies": np.isfinite(answers.displacement),
+        "reference_message": why,
+        "best_stiffness": softness * (solved / reference),
+    }
     rows = {"sample": range(sample.rows), "load": load}
     yield pd.DataFrame(rows | values)
     for name in sample.definitions:
         found = results[result_key(sample, load, name)]
         there = np.isin(found["status"], (Status.SOLVED, Status.LINEAR_ONLY, Status.UNSTABLE))
-        # With linear kinematics results are for a force of one sign.
-        displacement = np.where(there, (sign if is_linear else 1.0) * found["displacement"], np.nan)
+        displacement = np.where(there, sign * found["displacement"], np.nan)
         values = {"displacement": displacement, "deformation_error": deformation_error(displacement, reference)}
         values |= {"status": found["status"], "stiffness": softness if name == UNIFORM else np.nan}
         values["message"] = found["message"]
@@ -179,7 +178,7 @@ LEFT_OUT = "where a scene has no value the whole base sample is left out; base_s
 
 def _values(sample, data):
     """Labels of each quantity, load and definition, and values by row, NaN where a scene is not solved stably."""
-    for quantity, load, name in product(sample.quantities, sample.loads, sample.definitions):
+    for quantity, load, name in product(QUANTITIES, sample.loads, sample.definitions):
         one = data[[quantity, "status"]].sel(load=load, definition=name)
         values = one[quantity].values
         if quantity != "best_stiffness":

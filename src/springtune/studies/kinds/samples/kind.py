@@ -21,7 +21,7 @@ from ...runs.keys import definition_key, mesh_type_key, stage_key
 from ...runs.source import hash_of
 from ...runs.stages import Task, stage
 from .designs import DESIGNS, PARAMETERS, SMALLEST_SIZE, SOBOL_INDICES, blocks, roles, varied
-from .outputs import OUTPUTS, QUANTITIES
+from .outputs import OUTPUTS
 
 FURTHER_KEYS = {"uniform": (), "log-uniform": (), "triangular": ("mode",), "normal": ("mean", "deviation")}
 """Keys of each distribution besides its ends."""
@@ -146,7 +146,7 @@ Design = Annotated[str, *one_of("design", DESIGNS)]
 
 
 class SamplesConfig(Section):
-    """Scenes whose parameters are drawn from distributions, and which of these parameters matter.
+    """Scenes whose parameters are drawn from distributions, and which of these parameters matter, in linear kinematics.
 
     A sample of twice the size keeps its scenes and adds as many. Stored scenes are not solved again.
     """
@@ -170,10 +170,6 @@ class SamplesConfig(Section):
     definition: fields.DefinitionNames
     """Definitions that derive a stiffness and need no reference."""
 
-    kinematics: fields.Kinematics = default("linear")
-    """`linear` solves scenes once that differ in thickness, Young's modulus and force alone; `nonlinear` solves
-    each scene, which takes some ten times as long."""
-
     parameters: ParametersConfig
     """Parameters of the scenes."""
 
@@ -188,15 +184,9 @@ class SamplesConfig(Section):
         return [name for name in DEFINITIONS if name in self.definition]
 
     @property
-    def quantities(self) -> list[str]:
-        """Quantities that are looked at; only answers that scale with the force have a best stiffness."""
-        return [name for name in QUANTITIES if name != "best_stiffness" or self.kinematics == "linear"]
-
-    @property
     def solved(self) -> list[str]:
         """Definitions whose networks are solved: uniform springs tell the best stiffness."""
-        also = [UNIFORM] if "best_stiffness" in self.quantities else []
-        return list(dict.fromkeys([*self.definitions, *also]))
+        return list(dict.fromkeys([*self.definitions, UNIFORM]))
 
     @property
     def drawn(self) -> dict[str, Drawn]:
@@ -305,17 +295,10 @@ def _solved_with(mesh_type, definition):
     return hash_of(stage_key(SOLVE), mesh_type_key(mesh_type), definition_key(definition))
 
 
-def _load_of(sample, load):
-    """What results depend on of a load; linear ones are for 1 N."""
-    found = {"kind": LOADS[load].kind.name}
-    nonlinear = {"sign": LOADS[load].sign, "follower": LOADS[load].follower}
-    return found if sample.kinematics == "linear" else found | nonlinear
-
-
 def result_key(sample, load, definition):
     """Key of the scenes of a load and definition in the file of any base samples."""
     solved_with = _solved_with(sample.mesh_type, definition)
-    return hash_of(_load_of(sample, load), sample.mesh_type, sample.kinematics, solved_with)
+    return hash_of(LOADS[load].kind.name, sample.mesh_type, solved_with)
 
 
 def _references(study):
@@ -334,13 +317,13 @@ def _blocks(study):
     """Tasks of some base samples each; those of a sample of half the size are the first of them."""
     sample = study.parts["samples"]
     scenes = {
-        result_key(sample, load, definition): _load_of(sample, load) | {"definition": definition}
+        result_key(sample, load, definition): {"kind": LOADS[load].kind.name, "definition": definition}
         for load in sample.loads
         for definition in sample.solved
     }
-    shared = {name: getattr(sample, name) for name in ("design", "seed", "mesh_type", "kinematics")}
+    shared = {name: getattr(sample, name) for name in ("design", "seed", "mesh_type")}
     shared |= {"parameters": sample.drawn, "results": scenes}
-    shared["meshed"] = hash_of(stage_key(SOLVE), mesh_type_key(sample.mesh_type))
+    shared["meshed"] = hash_of(sample.mesh_type, stage_key(SOLVE), mesh_type_key(sample.mesh_type))
     for first, last in blocks(sample.design, sample.size):
         key, seconds = block_key(sample, first, last), 6e-4 * (last - first) * sample.each * len(scenes)
         values = {"first": first, "last": last}

@@ -1,6 +1,6 @@
 """Stage `sample`: the networks of sampled scenes.
 
-Networks have E t = 1 and carry the force over E t. In linear kinematics thickness, modulus and force only scale the
+Networks have E t = 1, linear kinematics, and carry 1 m of force over E t. Thickness, modulus and force only scale the
 result: rows that differ in these alone are solved once. Meshes with as many cells along x and y follow each other: they
 share numbering, sparsity and symbolic factorization.
 """
@@ -26,7 +26,7 @@ DRAWN = "drawn"
 GONE_NETWORK = "lost "
 """Prefix of the keys of networks beyond the limits."""
 
-TOGETHER = {"linear": 32, "nonlinear": 4}
+TOGETHER = 32
 """Tasks whose meshes are sorted together; among more tasks more meshes share cells."""
 
 SCALES = 1e-7
@@ -41,9 +41,8 @@ def run(content, attempts):
         present = store.stored(path)
         if not {DRAWN, *file["results"]} <= present:
             waiting.append(_Block(file, path, present))
-    count = TOGETHER[content["files"][0]["kinematics"]]
-    for begin in range(0, len(waiting), count):
-        _solve_together(waiting[begin : begin + count], attempts)
+    for begin in range(0, len(waiting), TOGETHER):
+        _solve_together(waiting[begin : begin + TOGETHER], attempts)
 
 
 def crashed(content, key, why):
@@ -121,8 +120,7 @@ def _solve_mesh(block, box, rows, like, scaling, attempts):
         return None
     for found in block.found.values():
         found["particles"][rows] = len(sheet.mesh.points)
-    drawn, kinematics = block.drawn, block.file["kinematics"]
-    linear, ratios = kinematics == "linear", drawn["poisson_ratio"][rows]
+    drawn, ratios = block.drawn, block.drawn["poisson_ratio"][rows]
     # This force deforms a network of E t = 1 as the row's force deforms the row's.
     loads = drawn["force"][rows] / (drawn["young_modulus"][rows] * drawn["thickness"][rows])
     for key, scene in block.missing.items():
@@ -137,13 +135,9 @@ def _solve_mesh(block, box, rows, like, scaling, attempts):
             continue
         for ratio in np.unique(ratios):
             alike = ratios == ratio
-            for load in (1.0,) if linear else np.unique(loads[alike]):
-                here = alike if linear else alike & (loads == load)
-                how = scene.get("sign", 1.0) * load, kinematics, scene.get("follower", False)
-                name = f"{key} {float(ratio)!r} {float(load)!r}"
-                found = attempt(name, partial(_solved, sheet, scene, ratio, *how))
-                if found:
-                    block.keep(key, rows[here], loads[here] if linear else 1.0, found)
+            found = attempt(f"{key} {float(ratio)!r}", partial(_solved, sheet, scene, ratio, 1.0))
+            if found:
+                block.keep(key, rows[alike], loads[alike], found)
     return sheet
 
 
@@ -155,7 +149,7 @@ def _objection(sheet, scene, drawn, row):
     """Return why results of a definition do not scale on a mesh, or an empty string; None without a result."""
     ratio, modulus, thickness = (float(drawn[name][row]) for name in ("poisson_ratio", "young_modulus", "thickness"))
     own, load = Sheet(sheet.mesh, thickness, like=sheet), 1.0 / (modulus * thickness)
-    answers = [_solved(sheet, scene, ratio, load, "linear"), _solved(own, scene, ratio, 1.0, "linear", modulus=modulus)]
+    answers = [_solved(sheet, scene, ratio, load), _solved(own, scene, ratio, 1.0, modulus)]
     unit, answer = (one["displacement"] for one in answers)
     if not np.isfinite([unit, answer]).all():
         return None
@@ -167,12 +161,12 @@ def _objection(sheet, scene, drawn, row):
     )
 
 
-def _solved(sheet, scene, ratio, load, kinematics, follower=False, modulus=1.0):
+def _solved(sheet, scene, ratio, load, modulus=1.0):
     """Result of a network under a force; with the default modulus E t = 1, and the force is over E t [m]."""
     kind = LOAD_KINDS[scene["kind"]]
     try:
         springs, _ = sheet.derive(scene["definition"], Material(modulus, float(ratio)))
     except DefinitionError as error:
         return _failed(f"{scene['definition']}: {error}")
-    found = sheet.solve(kind, springs, load, kinematics, follower)
+    found = sheet.solve(kind, springs, load, "linear")
     return {"displacement": found.displacement, "status": found.status, "message": found.message}
