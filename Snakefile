@@ -3,6 +3,8 @@
 #     snakemake                                          the paper's study
 #     snakemake --configfile config/quick.yaml           another one
 #     snakemake paper                                    the paper, and the studies that it reads
+#
+# Jobs run on the packages that Snakemake sees, since keys of results have their versions; so rules name no environment.
 
 
 from snakemake.utils import min_version
@@ -10,14 +12,24 @@ from snakemake.utils import min_version
 min_version("9.8")
 
 
-include: "workflow/rules/environment.smk"
-include: "workflow/rules/internals.smk"
 include: "workflow/rules/common.smk"
-include: "workflow/rules/hooks.smk"
+
+
+rule all:
+    message:
+        f"{RESULTS} is complete"
+    input:
+        # Stages, too, so that missing stored results are made again.
+        [job.record for job in JOBS.values()],
+        [job.products for job in JOBS.values() if not job.stage],
+
+
 include: "workflow/rules/stages.smk"
-include: "workflow/rules/collect.smk"
 include: "workflow/rules/outputs.smk"
-include: "workflow/rules/browse.smk"
+
+
+if Path(rules.collect.output.dataset) != RESULTS / rerun.DATASET:
+    refused("module of springtune: results are in results/<study> and take no other prefix; leave the prefix out")
 
 
 if config.get("paper", True):  # a study that is read for the paper has none of its own
@@ -25,21 +37,9 @@ if config.get("paper", True):  # a study that is read for the paper has none of 
     include: "workflow/rules/paper.smk"
 
 
-if not MODULE:
+if not IS_MODULE:
 
     report: "workflow/report/study.rst"
-
-
-rule all:
-    default_target: not HAS_TARGET
-    message:
-        f"{RESULTS} is complete"
-    input:
-        # Stages, too, so that missing stored results are made again.
-        STORED,
-        rules.collect.output,
-        OUTPUTS.values(),
-        str(RESULTS / rerun.PAGE),  # no report(): the report names the rule that made it
 
 
 onstart:
@@ -47,12 +47,8 @@ onstart:
 
 
 onsuccess:
-    log_end("ending")
+    end("ending")
 
 
 onerror:
-    log_end("broken")
-
-
-if MODULE:
-    add_hooks(onstart=begin, onsuccess=lambda: log_end("ending"), onerror=lambda: log_end("broken"))
+    end("broken")

@@ -1,19 +1,84 @@
-"""Snakemake logger plugin: a line that moves while a study runs on a terminal, elsewhere a line for each stage.
-
-Snakemake imports all plugins at each start, so the display is imported only by a run with work to do.
-"""
+"""Snakemake logger plugin: a line that moves while a study runs on a terminal, elsewhere a line for each rule."""
 
 import os
 import sys
+import threading
+import time
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from logging import WARNING, Handler, LogRecord
-from typing import TYPE_CHECKING
+from typing import TextIO
 
 from snakemake_interface_logger_plugins.base import LogHandlerBase
 from snakemake_interface_logger_plugins.common import LogEvent
 
-if TYPE_CHECKING:
-    from .display import Display
+from springtune.safe_io.tables import clock as clock_text
+
+PAUSE = 0.5
+"""Time between two pictures of the line that moves [s]."""
+
+LINE = "\r\x1b[?7l{}\x1b[K\x1b[?7h"
+"""Writes over the line of the cursor; the terminal cuts what is too long."""
+
+NUMBERS = {LogEvent.JOB_INFO: "jobid", LogEvent.JOB_FINISHED: "job_id", LogEvent.JOB_ERROR: "jobid"}
+"""Attribute with the number of the job, by event: the job runs, is done, or failed."""
+
+
+class Display:
+    """Display of a run until `stop`; `counts` has the number of jobs of each rule."""
+
+    def __init__(
+        self, counts: Mapping[str, int], stream: TextIO, moves: bool, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self.counts, self.stream, self.moves, self.clock = counts, stream, moves, clock
+        self.begun, self.over, self.writing = clock(), threading.Event(), threading.Lock()
+        self.rules, self.jobs = dict[int, str](), {event: set[int]() for event in NUMBERS}
+        if moves:
+            threading.Thread(target=self._move, daemon=True).start()
+
+    def follow(self, event: LogEvent, number: int, rule: str) -> None:
+        """Note what became of a job; elsewhere than on a terminal, write a line when its rule is done."""
+        if event == LogEvent.JOB_INFO:
+            self.rules[number] = rule
+        for what, jobs in self.jobs.items():
+            (jobs.add if what == event else jobs.discard)(number)
+        if event == LogEvent.JOB_FINISHED and not self.moves:
+            rule = self.rules.get(number, "")
+            if sum(self.rules.get(one) == rule for one in self.jobs[event]) == self.counts.get(rule):
+                self._write(f"{rule}: done; {self.line()}\n")
+
+    def tell(self, write: Callable[[], None]) -> None:
+        """Write something else, above the line that moves."""
+        with self.writing:
+            if self.moves:
+                self.stream.write(LINE.format(""))
+            write()
+
+    def stop(self) -> None:
+        """Stop, and remove the line that moves."""
+        self.over.set()
+        if self.moves:
+            self._write(LINE.format(""))
+
+    def line(self) -> str:
+        """Jobs done, times gone by and left at the rate so far, and the rules of the jobs that run."""
+        gone, count = self.clock() - self.begun, self.counts["total"]
+        running, done, failed = self.jobs.values()
+        left = f", about {clock_text(gone * (count - len(done)) / len(done))} left" if 0 < len(done) < count else ""
+        lost = f", {len(failed)} failed" if failed else ""
+        rules = dict.fromkeys(self.rules[number] for number in sorted(running))
+        head = f"{len(done)} of {count} jobs{lost}, {clock_text(gone)}{left}"
+        return ": ".join(filter(None, (head, ", ".join(rules) if self.moves else "")))
+
+    def _move(self) -> None:
+        while not self.over.is_set():
+            self._write(LINE.format(self.line()))
+            self.over.wait(PAUSE)
+
+    def _write(self, text: str) -> None:
+        with self.writing:
+            self.stream.write(text)
+            self.stream.flush()
 
 
 class LogHandler(LogHandlerBase):
@@ -52,38 +117,30 @@ class LogHandler(LogHandlerBase):
         super().close()
 
     def _show(self, record: LogRecord) -> None:
-        work, event = getattr(record, "work", None), getattr(record, "event", None)
+        event = getattr(record, "event", None)
         if not self.wanted:
             self.plain.emit(record)
-        elif work is not None:
-            from .display import Display
-
-            stream = sys.stderr
-            stream.write(f"{record.getMessage()}\n")
+        elif event == LogEvent.RUN_INFO and self.display is None:
             self.held.clear()
+            stream, counts = sys.stderr, vars(record)["stats"]
             moves = stream.isatty() and os.environ.get("TERM", "dumb") != "dumb" and not os.environ.get("CI")
-            self.display = Display(work, stream, moves)
+            stream.write(f"{counts['total']} jobs\n")
+            self.display = Display(counts, stream, moves)
         elif getattr(record, "ends", False):
             self.wanted = False  # what Snakemake says after it is shown
             self._stop()
             sys.stderr.write(f"{record.getMessage()}\n")
-        elif self.display is not None:
-            self._follow(self.display, record)
-        elif record.levelno < WARNING and event != LogEvent.JOB_INFO:
+        elif self.display is None and record.levelno < WARNING:
             self.held.append(record)
-        else:
-            # An error, or a job: without the Snakefile's hooks (--no-hooks) there is nothing to display.
-            self.wanted = record.levelno >= WARNING
+        elif self.display is None:  # an error before the run
             self._stop()
             self.plain.emit(record)
-
-    def _follow(self, display: "Display", record: LogRecord) -> None:
-        numbers = {LogEvent.JOB_INFO: "jobid", LogEvent.JOB_FINISHED: "job_id", LogEvent.JOB_ERROR: "jobid"}
-        event = getattr(record, "event", None)
-        if event in numbers:
-            display.follow(event, getattr(record, numbers[event]))
-        if record.levelno >= WARNING:
-            display.tell(lambda: self.plain.emit(record))
+        else:
+            display = self.display
+            if event in NUMBERS:
+                display.follow(event, getattr(record, NUMBERS[event]), getattr(record, "rule_name", ""))
+            if record.levelno >= WARNING:
+                display.tell(lambda: self.plain.emit(record))
 
     def _stop(self) -> None:
         """Remove the display, or write what was held back for want of one."""

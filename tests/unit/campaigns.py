@@ -28,9 +28,9 @@ def refusal(folder, text, name="study.yaml"):
 
 def do_stages(study, folder, *stages):
     """Run the jobs of a study, or of some of its stages, and assert that no task is broken."""
-    for one in plan(study, folder, 1).jobs.values():
+    for one in plan(study, folder).values():
         if not stages or one.stage.name in stages:
-            job.do(one.stage.module, one.content)
+            attempts.do(one.stage.module, one.content)
 
 
 class Campaign:

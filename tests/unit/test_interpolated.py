@@ -121,7 +121,7 @@ def test_the_dataset_is_that_of_references_solved_by_themselves(load, tmp_path):
 
 def test_what_cannot_be_interpolated_is_solved_by_itself(load, tmp_path):
     study = load(lengths(MANY))
-    (content,) = [job.content for job in plan(study, tmp_path, 1).jobs.values() if job.stage.name == "reference"]
+    (content,) = [job.content for job in plan(study, tmp_path).values() if job.stage.name == "reference"]
     (task,) = (task for file in content["files"] for task in file["tasks"])
     # What a build that is not certified stores.
     path = tmp_path / "references" / f"{task['key']}.h5"
@@ -142,7 +142,7 @@ def test_what_cannot_be_interpolated_is_solved_by_itself(load, tmp_path):
 
 def test_one_whose_process_dies_is_a_hole(load, tmp_path):
     study = load(lengths(MANY))
-    (job,) = [job for job in plan(study, tmp_path, 1).jobs.values() if job.stage.name == "reference"]
+    (job,) = [job for job in plan(study, tmp_path).values() if job.stage.name == "reference"]
     (task,) = (task for file in job.content["files"] for task in file["tasks"])
     reference.crashed(job.content, task["key"], "it died")
     assert any_reference.read(tmp_path / "references", references(study)[0])["message"] == "it died"

@@ -25,8 +25,7 @@ from springtune.studies.kinds.samples.designs import DESIGNS, blocks
 from springtune.studies.kinds.samples.figures import plot_sobol
 from springtune.studies.kinds.samples.kind import MOST_SOLVED
 from springtune.studies.runs import store
-from springtune.studies.runs.job import Attempts
-from springtune.studies.runs.stages import products
+from springtune.studies.runs.attempts import Attempts
 
 import tables
 from campaigns import Campaign, load_text

@@ -24,8 +24,7 @@ from springtune.studies.kinds.shapes.task_values import load as values_of
 from springtune.studies.output import page
 from springtune.studies.output.dataset import STATUS
 from springtune.studies.output.export import export
-from springtune.studies.runs.plan import plan, table_files
-from springtune.studies.runs.workload import results_of
+from springtune.studies.runs.plan import plan
 
 from campaigns import do_stages, load_text
 from tables import STUDIES
@@ -385,7 +384,7 @@ def test_references_are_told_apart_whatever_they_are_called(load, tmp_path):
     grid = content["shape_grids"]["all"]
     pairs = {"one": ("a", "b_c"), "other": ("a_b", "c")}
     content["shape_grids"] = {name: grid | {"shape": a, "material": b} for name, (a, b) in pairs.items()}
-    jobs = plan(load(yaml.safe_dump(content)), tmp_path / "results", 1).jobs.values()
+    jobs = plan(load(yaml.safe_dump(content)), tmp_path / "results").values()
     files = [file for job in jobs if job.stage.name == "shape_reference" for file in job.content["files"]]
     assert len({task["key"] for file in files for task in file["tasks"]}) == 2
 
@@ -395,16 +394,16 @@ def test_twins_are_counted_as_often_as_they_are_computed(load, tmp_path):
     content = yaml.safe_load(COOK)
     content["shapes"]["twin"] = content["shapes"]["cook"]
     content["shape_grids"]["all"] |= {"shape": ["cook", "twin"], "mesh_size": "16 mm"}
-    made = plan(load(yaml.safe_dump(content)), tmp_path / "results", 1).jobs.values()
+    made = plan(load(yaml.safe_dump(content)), tmp_path / "results").values()
     asked = dict.fromkeys((job.stage.name for job in made), 0)
     for job in made:
-        asked[job.stage.name] += len(set(results_of(job.content)))
+        asked[job.stage.name] += len(job.results)
     assert asked == {"shape_reference": 1, "shape_mesh": 2, "shape_solve": 4}
 
 
 def test_scenes_whose_mesh_could_not_be_made_are_holes_that_say_why(load, tmp_path):
     study = load(COOK.replace("[16 mm, 8 mm]", "16 mm").replace("linear}", "linear, reference: false}"))
-    jobs = {job.stage.name: job for job in plan(study, tmp_path / "results/study", 1).jobs.values()}
+    jobs = {job.stage.name: job for job in plan(study, tmp_path / "results/study").values()}
     mesh.crashed(jobs["shape_mesh"].content, "shape_cook_free_16mm", "it died")
     tree, told = done(study, tmp_path / "results/study")
     assert "2 failed" in told and set(tree["shapes"].message.values.ravel()) == {"mesh: it died"}

@@ -10,7 +10,7 @@ from springtune.studies.kinds.stability import AXES, EXPERIMENTS, ONCE
 from springtune.studies.kinds.stability import solve as stability
 from springtune.studies.kinds.stability.kind import KIND
 from springtune.studies.output.dataset import DIMENSIONS
-from springtune.studies.runs import job, store
+from springtune.studies.runs import attempts, job, store
 from springtune.studies.runs import keys as code
 
 from tables import STUDIES
@@ -59,7 +59,7 @@ def test_a_failing_experiment_is_stored_with_its_message(tmp_path):
              "definition": "axis-exact", "mesh_type": "free", "mesh_sizes": [5e-3]}  # fmt: skip
     tasks = [{"key": "one", "name": "contrast"} | setup]
     content = {"folder": str(tmp_path), "files": [{"name": "one", "tasks": tasks}]}
-    job.do("studies.kinds.stability.solve", content)
+    attempts.do("studies.kinds.stability.solve", content)
     assert store.read(tmp_path / "one.h5", ["one"])["one"]["experiment_message"]
 
 

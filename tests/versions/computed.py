@@ -15,6 +15,6 @@ if __name__ == "__main__":
     study, output = map(Path, sys.argv[1:])
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch) / "results"
-        for job in plan(load_study(study), folder, 1).jobs.values():
-            jobs.do(job.stage.module, job.content)
+        for job in plan(load_study(study), folder).values():
+            attempts.do(job.stage.module, job.content)
         collect.run(load_study(study), study, folder, output)

@@ -7,7 +7,7 @@ import h5py
 import pytest
 
 from springtune.studies.kinds import load_study
-from springtune.studies.runs import job, store
+from springtune.studies.runs import attempts, job, store
 from springtune.studies.runs.plan import plan
 
 from tables import STUDIES
@@ -20,12 +20,12 @@ TIMES = ("seconds",)
 
 def stages(study, folder, cores=1):
     """Modules of the jobs of a study and what they are to do, in an order in which they can run."""
-    return [(one.stage.module, one.content) for one in plan(study, folder, cores).jobs.values()]
+    return [(one.stage.module, one.content) for one in plan(study, folder).values()]
 
 
 def compute(module, content):
     """Do a job."""
-    job.do(module, content)
+    attempts.do(module, content)
 
 
 def keys(content):

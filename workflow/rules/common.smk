@@ -1,18 +1,67 @@
-"""The study, the plan of its jobs, and helpers that the rules share."""
+"""The study, its jobs, what the rules share, and what comes before the first job and after the last one.
+
+Reading a Snakefile writes nothing.
+"""
 
 import gc
+import os
 import re
 import sys
+import time
 import warnings
 from pathlib import Path
 
+from snakemake.exceptions import WorkflowError
+from snakemake.logging import logger
+
 from springtune.problem.geometry import AssumptionWarning
+from springtune.safe_io.atomic import remove_unfinished, to_present
 from springtune.safe_io.escapes import rst
 from springtune.studies.config.kind import FORMATS
 from springtune.studies.config.messages import StudyError
 from springtune.studies.kinds import load_study
-from springtune.studies.runs import locks, rerun, workload
-from springtune.studies.runs.plan import plan
+from springtune.studies.runs import locks, rerun
+from springtune.studies.runs.source import STATE, USUAL_STUDY, config_file, source_state, workflow_folder
+
+BEGUN = time.time()
+"""Start of this run [s since the epoch]; newer files are its products."""
+
+SOURCE = workflow_folder()
+IS_MODULE = "study" in config
+
+for variable, value in {
+    # One thread a process: solvers are sequential, and Snakemake shares out the cores.
+    "OPENBLAS_NUM_THREADS": "1",
+    "OMP_NUM_THREADS": "1",
+    # Keep freed memory in the process: returning it to the system between solves costs a third of their time.
+    "MALLOC_MMAP_THRESHOLD_": str(2**25),
+    "MALLOC_TRIM_THRESHOLD_": str(2**29),
+    "MALLOC_TOP_PAD_": str(2**25),
+    # HDF5 cannot open files on shared filesystems without locks. It needs none: files are renamed when complete.
+    "HDF5_USE_FILE_LOCKING": "FALSE",
+    # Jobs refuse to run if the source was edited since the run began.
+    STATE: source_state(),
+}.items():
+    os.environ.setdefault(variable, value)
+# Jobs run on the Python that runs Snakemake, whether its environment is activated or not.
+os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), *os.get_exec_path()])
+
+
+# The study.
+
+
+def chosen_study():
+    """The study of --configfile or of the paper; `config["study"]` of a module."""
+    if IS_MODULE:
+        if not isinstance(config["study"], str):
+            raise WorkflowError(f"study: {config['study']!r} is no path; give that of a study's YAML file")
+        return Path(config["study"])
+    named = [str(path) for path in workflow.configfiles]
+    if len(named) > 1:
+        raise WorkflowError(f"one study at a time: --configfile names {len(named)}: {', '.join(named)}")
+    deployed = Path("config/config.yaml")  # where workflows that others deploy have theirs
+    path = Path(named[0]) if named else deployed if deployed.is_file() else config_file(USUAL_STUDY)
+    return path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path
 
 
 def refused(why):
@@ -22,72 +71,56 @@ def refused(why):
 
 
 def loaded_study():
-    """The study; its warnings are printed by the run and not by its jobs, which read it, too."""
+    """The study of CONFIG, in a folder of results that is its own."""
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore" if IS_CHILD else "once", AssumptionWarning)
+            warnings.simplefilter("once", AssumptionWarning)
             warnings.showwarning = lambda message, *where: print(f"warning: {message}", file=sys.stderr)
-            return load_study(CONFIG)
-    except StudyError as error:
-        remedy = f"; as a module springtune takes its study by config: {{'study': 'config/mine.yaml'}}"
-        refused(f"{error}{remedy if MODULE and 'study' not in config else ''}")
+            found = load_study(CONFIG)
+        locks.check_paths(CONFIG, Path.cwd())
+        locks.check_claim(Path("results") / found.name, CONFIG)
+        return found
+    except (StudyError, locks.LockedError) as error:
+        refused(error)
 
 
-# Keys of results have the versions of the packages that Snakemake sees, so jobs must run on these.
-# Snakemake takes braces in a path of it for wildcards.
-ENVIRONMENT = None if DEPLOYED or "{" in str(SOURCE) else "../envs/springtune.yaml"
-"""What rules need, for readers and for `--lint`; see docs/how-to/use-conda-or-a-container.md."""
-
-if DEPLOYED and not IS_CHILD:
-    print("note: jobs run in the environment of Snakemake; --software-deployment-method is not used", file=sys.stderr)
-
-ON_CLUSTER = NODES is not None
-UNUSABLE_PATH = workload.refusal(CONFIG, Path.cwd(), SOURCE, Path(sys.executable), ON_CLUSTER)
-if UNUSABLE_PATH and not IS_CHILD:
-    refused(UNUSABLE_PATH)
-if MOVED:
-    refused(f"module {MODULE}: results are in results/<study> and take no other prefix; leave the prefix out")
-
+CONFIG = chosen_study()
 # Scenes and their tasks stay to the end: collecting garbage among them takes a fifth of the reading.
 gc.disable()
 STUDY = loaded_study()
 RESULTS = Path("results") / STUDY.name
-if not MODULE:
-    config |= {"title": rst(STUDY.title), "results": str(RESULTS)}  # for the report's text
-
-PLAN = plan(STUDY, RESULTS, cluster=ON_CLUSTER or IS_CHILD)
-JOBS = rerun.jobs(STUDY, PLAN)
+JOBS = rerun.jobs(STUDY, RESULTS)
 gc.freeze()
 gc.enable()
-try:
-    locks.check_claim(RESULTS, CONFIG)
-except locks.LockedError as error:
-    refused(error)
-workload.READ.append((STUDY, PLAN))
+rerun.READ.append((STUDY, JOBS))
+BUNDLES = [name for name, job in JOBS.items() if job.stage]
+"""Names of all jobs before the dataset."""
 
-STORED = [PLAN.record(name) for name in PLAN.jobs]
-"""Records of all jobs before the dataset."""
+if not IS_MODULE:
+    config |= {"title": rst(STUDY.title), "results": str(RESULTS)}  # for the report's text
 
 
-# Helpers of the stages.
+# What rules take.
 
 
 def done(stage):
     """Records of all jobs of a stage."""
-    return [PLAN.record(job.name) for job in PLAN.jobs.values() if job.stage.name == stage]
+    return [JOBS[name].record for name in BUNDLES if JOBS[name].stage.name == stage]
 
 
 def bundles():
     """Pattern of the labels of bundles."""
-    return "|".join(sorted({re.escape(job.label) for job in PLAN.jobs.values()})) or "none"
+    return "|".join(sorted({re.escape(JOBS[name].label) for name in BUNDLES})) or "none"
 
 
-def digest(name):
-    """Parameter of a job that changes with all that its results depend on, by the name of its record.
+def digest(wildcards):
+    """Parameter of a job that changes with all that its results depend on."""
+    return JOBS[f"{wildcards.stage}_{wildcards.bundle}"].digest
 
-    A function of the wildcards alone: Snakemake does not compare parameters that depend on input or output.
-    """
-    return lambda wildcards: JOBS[name.format(**dict(wildcards))].digest
+
+def study(wildcards):
+    """Path of the study; of a function Snakemake takes braces as they are."""
+    return str(CONFIG)
 
 
 # Figures and tables in Snakemake's report.
@@ -96,7 +129,7 @@ SHOWN = FORMATS[0]  # the format that browsers show
 CAPTIONS = {path.stem for path in (SOURCE / "workflow/report").glob("*.rst")}
 
 
-def files(one):
+def in_report(one):
     """Figures and tables of an output; browsable figures and all tables go into the report."""
     of_figures = one.figures(STUDY)
     paths = [RESULTS / file for file in rerun.output_files(one, STUDY)]
@@ -112,9 +145,45 @@ def shown(one, path, selection):
     named = path.stem.removesuffix("_".join(["", *selection.values()])) if selection else path.stem
     labels = {"name": named.replace("_", " ")}
     labels |= {dimension.replace("_", " "): str(label) for dimension, label in selection.items()}
-    return report(path, caption=caption(one.name), category=one.name, subcategory=path.parent.name, labels=labels)
+    caption = f"../report/{one.name if one.name in CAPTIONS else 'output'}.rst"
+    return report(path, caption=caption, category=one.name, subcategory=path.parent.name, labels=labels)
 
 
-def caption(name):
-    """Caption of an output: its own, or the general one."""
-    return f"../report/{name if name in CAPTIONS else 'output'}.rst"
+# The begin and the end of a run.
+
+
+def begin():
+    """Lock the studies and write the tasks of their jobs. A second call does nothing."""
+    if locks.HELD:
+        return
+    try:
+        for _, jobs in rerun.READ:
+            locks.check_idle(jobs["collect"].folder)
+        locks.begin([jobs["collect"].folder for _, jobs in rerun.READ])
+        for one, jobs in rerun.READ:
+            folder = jobs["collect"].folder
+            remove_unfinished(folder)
+            to_present(folder)  # Snakemake refuses products that are older than what they are made of
+            remove_unfinished(folder.parent, below=False)  # of what studies share
+            locks.claim(folder, one.path)
+            for job in jobs.values():
+                if job.stage:
+                    job.write()
+    except locks.LockedError as error:
+        raise WorkflowError(str(error)) from None
+    except OSError as error:
+        locks.end()
+        remedy = "make room or give leave to write there, then call the same command again"
+        raise WorkflowError(f"{error.filename or RESULTS} cannot be written: {error.strerror}; {remedy}") from None
+
+
+def end(how):
+    """Unlock the studies and log their summary, by a function of `springtune.studies.output.summary`."""
+    if not locks.HELD:
+        return
+    from springtune.studies.output import summary  # here: only a run needs it
+
+    locks.end()
+    text = getattr(summary, how)(*rerun.READ[0], BEGUN)
+    text += "".join(summary.beside(*one, BEGUN) for one in rerun.READ[1:])
+    logger.info(text, extra={"ends": True})

@@ -1,10 +1,9 @@
-"""Figures and tables from the dataset, one rule a job of outputs: those that share it share what it reads."""
+"""Figures, tables and the page to browse, from the dataset."""
 
 MADE = rerun.output_jobs(STUDY)
-REPORTED = {job: [path for one in made for path in files(one)] for job, made in MADE.items()}
-OUTPUTS = {job: list(JOBS[job].products) for job in MADE}  # plain: the report is to name the job's rule
+FIGURES_AND_TABLES = {job: [path for one in made for path in in_report(one)] for job, made in MADE.items()}
 
-for job, made in MADE.items():
+for job, made in MADE.items():  # those that share a job share what it reads
 
     rule:
         name:
@@ -14,7 +13,7 @@ for job, made in MADE.items():
         input:
             dataset=rules.collect.output.dataset,
         output:
-            *REPORTED[job],
+            *FIGURES_AND_TABLES[job],
             done=JOBS[job].record,
         params:
             folder=lambda wildcards, output: str(Path(output.done).parents[1]),
@@ -24,8 +23,29 @@ for job, made in MADE.items():
             RESULTS / f"logs/{job}.log",
         benchmark:
             RESULTS / f"benchmarks/{job}.tsv"
-        conda:
-            ENVIRONMENT
         shell:
             "python -m springtune.studies.output.present {input.dataset:q} {params.folder:q} {output.done:q} {params.digest:q}"
             " {params.outputs:q} > {log:q} 2>&1"
+
+
+rule browse:
+    message:
+        "Writing the page to browse: index.html"
+    input:
+        dataset=rules.collect.output.dataset,
+    output:
+        page=report(
+            RESULTS / rerun.PAGE, caption="../report/browse.rst", category="browse", labels={"name": "page to browse"}
+        ),
+        done=JOBS["browse"].record,
+    params:
+        digest=JOBS["browse"].digest,
+        # What the page links to; other jobs make it meanwhile.
+        files=rerun.linked(STUDY),
+    log:
+        RESULTS / "logs/browse.log",
+    benchmark:
+        RESULTS / "benchmarks/browse.tsv"
+    shell:
+        "python -m springtune.studies.output.browse.page {input.dataset:q} {output.page:q} {output.done:q}"
+        " {params.digest:q} {params.files:q} > {log:q} 2>&1"

@@ -6,9 +6,10 @@ PAPER_SOURCE = SOURCE / "workflow/paper"
 PAPER_DATASETS = [Path("results") / name / rerun.DATASET for name in rerun.PAPER_STUDIES]
 
 
-# Snakemake tells the targets after the Snakefile was read. Who wants neither the paper nor a job of a study that it reads
-# need not read these studies.
-PAPER_WANTED = any(word == "paper" or word.endswith("_paper") or Path(word).name == "paper.pdf" for word in WORDS)
+# By the words of the command, since Snakemake has the targets after the Snakefile was read. Who wants neither the paper
+# nor a job of a study that it reads need not read these studies.
+TARGETS = sys.argv[1:]
+PAPER_WANTED = any(word == "paper" or word.endswith("_paper") or Path(word).name == "paper.pdf" for word in TARGETS)
 
 if PAPER_WANTED:
     PAPER = rerun.paper_job(PAPER_SOURCE, PAPER_DATASETS, Path("results/paper"))
@@ -17,7 +18,7 @@ if PAPER_WANTED:
     except PaperError as error:
         refused(error)
 
-if PAPER_WANTED or any(word.startswith(tuple(f"{name}_" for name in rerun.PAPER_STUDIES)) for word in WORDS):
+if PAPER_WANTED or any(word.startswith(tuple(f"{name}_" for name in rerun.PAPER_STUDIES)) for word in TARGETS):
     for name in rerun.PAPER_STUDIES:
         if name != STUDY.name:
             prefix = f"{name}_"
@@ -51,8 +52,6 @@ rule paper:
         "results/paper/logs/paper.log",
     benchmark:
         "results/paper/benchmarks/paper.tsv"
-    conda:
-        ENVIRONMENT
     shell:
         "python -m springtune.studies.paper.build {params.source:q} {params.folder:q} {output.paper:q}"
         " {output.done:q} {params.digest:q} {input.datasets:q} > {log:q} 2>&1"

@@ -92,11 +92,11 @@ def run(most: int | None, results: Path | None, strict: bool, arguments: tuple[s
         studies = [study, *(load_study(config_file(f"{name}.yaml", path.parent)) for name in others)]
     if _plans(options):
         # A dry run removes no records. An option of the user's, which comes later, replaces this one.
-        outdated = _outdated(studies, _wants_slurm(options), "a run makes it again")
+        outdated = _outdated(studies, "a run makes it again")
         forced = ["--forcerun", *map(str, outdated)] if outdated else []
     elif _computes(options):
         _unlock(studies, [*_snakemake(), *workflow, "--unlock", f"--configfile={path}"])
-        found = _outdated(studies, _wants_slurm(options), "it is made again")
+        found = _outdated(studies, "it is made again")
         for record in found or {}:
             record.unlink()
         if found == {} and _asks_for_all(options):
@@ -179,11 +179,11 @@ def _unlock(studies: "list[Study]", command: list[str]) -> None:
         click.echo(f"{which}: the run before was killed and left its lock; the lock is removed", err=True)
 
 
-def _outdated(studies: "list[Study]", cluster: bool, remedy: str) -> dict[Path, str] | None:
+def _outdated(studies: "list[Study]", remedy: str) -> dict[Path, str] | None:
     """Records of outdated jobs, with the reasons; None if a job was never done. Missing files are printed."""
     from ..studies.runs import rerun
 
-    each = [rerun.outdated(study, _results(study), cluster) for study in studies]
+    each = [rerun.outdated(study, _results(study)) for study in studies]
     found = {record: why for one in each for record, why in (one or {}).items()}
     for why in filter(rerun.is_missing, found.values()):
         click.echo(f"{why}; {remedy}", err=True)

@@ -104,3 +104,18 @@ class TabledList(list[One]):
     def _repr_html_(self) -> str:
         heads, *rows = self.table()
         return html_table(", ".join({type(one).__name__: None for one in self}) or "none", rows, heads)
+
+
+def clock(seconds: float) -> str:
+    """Readable duration.
+
+    Examples
+    --------
+    >>> clock(3.4), clock(75), clock(7300)
+    ('3 s', '1:15 min', '2:01 h')
+    """
+    seconds = round(seconds)
+    if seconds < 60:
+        return f"{seconds} s"
+    minutes, rest = divmod(seconds, 60)
+    return f"{minutes}:{rest:02d} min" if minutes < 60 else f"{minutes // 60}:{minutes % 60:02d} h"

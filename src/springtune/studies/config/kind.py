@@ -91,47 +91,37 @@ class Output:
 class Stage:
     """A stage before the dataset; each of its jobs does a bundle of tasks.
 
-    Its module defines one task, see `springtune.studies.runs.job`. Most stages are made by
-    `springtune.studies.runs.stages.stage` from their tasks.
-
     Attributes
     ----------
     name : str
         Name of the rule, and first part of the names of its files.
     module : str
-        From the package on.
-    message : str
-        Description of a job.
-    content : callable
-        From a study, its folder and the values of a bundle's members to the content of the task file; empty without
-        tasks.
-    products : callable
-        From that content to the files that a job makes besides its record.
-    members : callable, optional
-        From a study to expected seconds and a value by name; None for a stage with the bundles of another one.
+        Module that does one task, from the package on, see `springtune.studies.runs.job`.
+    tasks : callable
+        From a study to its tasks, see `springtune.studies.runs.plan.Task`.
+    folder : str
+        Folder of its files, within the study's folder; by default its name.
     like : str
         Stage whose bundles it shares, and whose job of the same bundle it needs.
     every : tuple of str
         Stages that it needs all jobs of, besides the job of the same bundle.
     alone : bool
-        Whether a job has one member and the whole machine, so that its seconds can be measured.
-    folder : str
-        Folder of its files, within the study's folder.
-    tasks : callable, optional
-        From a study to the tasks, for a stage made from tasks.
+        Whether a job has the tasks of one name and the whole machine, so that its seconds can be measured.
+    endings : tuple of str
+        Endings of the files of a result.
     """
 
     name: str
     module: str
-    message: str
-    content: Callable[[Study, Path, list[Any]], dict[str, Any] | None]
-    products: Callable[[dict[str, Any]], Iterable[Path]]
-    members: Callable[[Study], Mapping[str, tuple[float, Any]]] | None = None
+    tasks: Callable[[Study], Iterable[Any]]
+    folder: str = ""
     like: str = ""
     every: tuple[str, ...] = ()
     alone: bool = False
-    folder: str = ""
-    tasks: Callable[[Study], Iterable[Any]] | None = None
+    endings: tuple[str, ...] = (".h5",)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "folder", self.folder or self.name)
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,8 +12,7 @@ from springtune.safe_io import atomic
 from ..config.kind import kinds, outputs
 from ..output import dataset, summing_up, text
 from ..runs import job, provenance, rerun
-from ..runs.plan import plan
-from ..runs.stages import rows
+from ..runs.plan import rows
 from ..runs.store import DamagedError
 from . import load_study
 
@@ -39,7 +38,7 @@ def run(study: "Study", config: str | Path, folder: Path, output: Path) -> None:
 def main(config: str, folder: str, output: str, record: str, digest: str) -> None:
     """Build a dataset and write the record of it."""
     study = load_study(config)
-    if rerun.jobs(study, plan(study, Path(folder)))[rerun.COLLECT].digest != digest:
+    if rerun.jobs(study, Path(folder))[rerun.COLLECT].digest != digest:
         raise SystemExit(f"{config} was changed while the study ran; call the same command again")
     run(study, config, Path(folder), Path(output))
     atomic.write_json(record, {"digest": digest})

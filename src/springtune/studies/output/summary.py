@@ -2,43 +2,45 @@
 
 import os
 import time
+from collections import Counter
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from springtune.safe_io.tables import aligned
+from springtune.safe_io.tables import aligned, clock
 
-from ..runs import rerun
-from ..runs.plan import Plan
-from ..runs.source import read_note
-from ..runs.workload import clock, results_of
+from ..runs.plan import Job
+from ..runs.source import RECORDS, read_note
 from .text import FILE, HOLES
 
 if TYPE_CHECKING:
     from ..config.model import Study
 
+Jobs = Mapping[str, Job]
 
-def ending(study: "Study", plan: Plan, since: float) -> str:
+
+def ending(study: "Study", jobs: Jobs, since: float) -> str:
     """Report at the end of a successful run."""
-    new, took = _computed(study, plan, since), clock(time.time() - since)
-    rows = [["new", new], ["took", took], ["results", _places(plan.folder)]]
-    return f"\n{_stored(study, plan)}\n{aligned(rows, 0)}\n"
+    new, took = _computed(jobs, since), clock(time.time() - since)
+    rows = [["new", new], ["took", took], ["results", _places(_folder(jobs))]]
+    return f"\n{_stored(study, jobs)}\n{aligned(rows, 0)}\n"
 
 
-def broken(study: "Study", plan: Plan, since: float) -> str:
+def broken(study: "Study", jobs: Jobs, since: float) -> str:
     """Report at the end of a failed run."""
     lines = [f"{study.name} is not complete: a job failed or was stopped."]
-    for path in _failed(plan, since):
+    for path in _failed(jobs, since):
         lines += [f"  {_last(path)}", f"    its log: {path}"]
     lines += ["What is computed is kept: the same command takes up where this one stopped."]
     return "\n" + "\n".join(lines) + "\n"
 
 
-def beside(study: "Study", plan: Plan, since: float) -> str:
+def beside(study: "Study", jobs: Jobs, since: float) -> str:
     """Report on a study that the paper needed."""
-    undone = [name for name in plan.jobs if not plan.record(name).exists()]
-    lines = [f"new in {study.name}: {_computed(study, plan, since)}"]
+    undone = [job.name for job in jobs.values() if job.stage and not job.record.exists()]
+    lines = [f"new in {study.name}: {_computed(jobs, since)}"]
     lines += [f"  not complete: {', '.join(undone)}"] if undone else []
-    return "\n".join([*lines, *(f"  its log: {path}" for path in _failed(plan, since))]) + "\n"
+    return "\n".join([*lines, *(f"  its log: {path}" for path in _failed(jobs, since))]) + "\n"
 
 
 def _last(log: Path) -> str:
@@ -51,10 +53,15 @@ def _last(log: Path) -> str:
     return "it could say nothing: the disk is full; make room" if full else "it said nothing"
 
 
-def _failed(plan: Plan, since: float) -> list[Path]:
+def _failed(jobs: Jobs, since: float) -> list[Path]:
     """Logs of jobs that failed or were stopped in this run, which wrote no record in it."""
-    logs = sorted((plan.folder / "logs").glob("*.log"))
-    return [path for path in logs if _time(path) >= since and _time(plan.record(path.stem)) < since]
+    logs = sorted((_folder(jobs) / "logs").glob("*.log"))
+    records = {path: _folder(jobs) / RECORDS / f"{path.stem}.json" for path in logs}
+    return [path for path, record in records.items() if _time(path) >= since and _time(record) < since]
+
+
+def _folder(jobs: Jobs) -> Path:
+    return next(iter(jobs.values())).folder
 
 
 def reminder(folder: Path) -> str:
@@ -72,29 +79,27 @@ def _time(path: Path) -> float:
     return path.stat().st_mtime if path.exists() else float("-inf")
 
 
-def _stored(study: "Study", plan: Plan) -> str:
+def _stored(study: "Study", jobs: Jobs) -> str:
     """Stored summary, if it is up to date."""
-    path = plan.folder / FILE
+    path = _folder(jobs) / FILE
     if not path.exists():
         return f"{study.title}\n\nThere is no dataset yet.\n"
-    if any(_time(plan.record(name)) > _time(path) for name in plan.jobs):
+    if any(job.stage and _time(job.record) > _time(path) for job in jobs.values()):
         return f"{study.title}\n\nThe dataset is older than these results.\n"
     return path.read_text()
 
 
-def _computed(study: "Study", plan: Plan, since: float) -> str:
+def _computed(jobs: Jobs, since: float) -> str:
     """Counts of computed and stored results by stage."""
-    new: dict[str, int] = {}
-    asked: dict[str, int] = {}
-    for name, job in plan.jobs.items():
-        record, stage = plan.record(name), job.stage.name
-        if record.exists():
-            asked[stage] = asked.get(stage, 0) + len(set(results_of(job.content)))
-            new[stage] = new.get(stage, 0) + (read_note(record).get("computed", 0) if _time(record) >= since else 0)
+    new, asked = Counter[str](), Counter[str]()
+    for job in jobs.values():
+        if job.stage and job.record.exists():
+            asked[job.stage.name] += len(job.results)
+            new[job.stage.name] += read_note(job.record).get("computed", 0) if _time(job.record) >= since else 0
     counts = [f"{stage} {number} of {asked[stage]}" for stage, number in new.items() if number]
     if counts:
         return ", ".join(counts) + ("" if new == asked else "; the others were stored before")
-    ran = [job.name for job in rerun.jobs(study, plan).values() if _time(job.record) >= since]
+    ran = [job.name for job in jobs.values() if _time(job.record) >= since]
     return f"nothing but {', '.join(ran)}" if ran else "nothing: all results were stored before"
 
 

@@ -19,7 +19,7 @@ from typing import TextIO
 
 from springtune.safe_io.atomic import write_json
 
-from .job import TASKS
+from .source import TASKS
 
 STUDY_FILE, RUN_FILE = f"{TASKS}/study.json", f"{TASKS}/run.json"
 """Files in a study's folder: the path of the config that was run last, and the process that runs it."""
@@ -30,6 +30,15 @@ HELD: list[TextIO] = []
 
 class LockedError(ValueError):
     """Another process computes a study, or its folder is another study's; the message has the reason and the remedy."""
+
+
+def check_paths(*paths: Path) -> None:
+    """Refuse paths that notes and datasets cannot hold."""
+    for path in paths:
+        try:
+            str(path).encode()
+        except UnicodeEncodeError:
+            raise LockedError(f"{str(path)!r}: not UTF-8, as texts of results are; rename the file or folder") from None
 
 
 def claim(folder: Path, config: Path) -> None:

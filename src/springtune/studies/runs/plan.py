@@ -1,49 +1,126 @@
-"""From a study to what each Snakemake job is to do: tasks bundled into jobs of about equal work.
+"""From a study to the jobs of its stages: tasks bundled into jobs of about equal work, and their stored results.
 
 One process a scene would be all start-up. The largest tasks are shared out first, by expected seconds that follow from
-numbers of particles alone, so that a study has the same jobs each time. A plan is made whenever the Snakefile is read,
-and written when a run begins: reading changes nothing.
+numbers of particles alone, so that a study has the same jobs each time and on each machine. A plan is made whenever the
+Snakefile is read, and written when a run begins: reading changes nothing.
 """
 
 import json
-import os
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from math import ceil
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from math import log2
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from springtune.safe_io import atomic
 
-from ..config.kind import kinds
-from .job import RECORDS, TASKS
-from .source import hash_of, read_note
+from ..config.kind import Stage, kinds
+from . import attempts, store
+from .keys import stage_key
+from .source import RECORDS, TASKS, hash_of, read_note
 
 if TYPE_CHECKING:
-    from ..config.kind import Output, Stage
     from ..config.model import Study
 
-CLUSTER_JOBS = 64
-"""Jobs of a stage on a cluster."""
-
-LEAST_SECONDS, LEAST_ON_CLUSTER = 1.0, 120.0
-"""Expected seconds that a job takes at least, against its start-up; on a cluster it also waits."""
-
-MANY_SECONDS = 10
-"""Multiple of these seconds for each job from which a stage gets four times as many, so that all cores end together."""
+MOST_JOBS = 64
+"""Most jobs of a stage."""
 
 
-def share_out(seconds: Mapping[str, float], cores: int, least: float = LEAST_SECONDS) -> dict[str, list[str]]:
-    """Share tasks out in bundles of about equal work.
+@dataclass(frozen=True)
+class Task:
+    """A task of a stage.
+
+    Attributes
+    ----------
+    values : dict
+        Argument of ``solve``, without labels, so that a new label computes nothing again.
+    also : sequence
+        Further parts of its key: code that its values choose, by `keys.definition_key` and `keys.mesh_type_key`.
+    labels : dict
+        Labels of its cell of the dataset; a label may be several.
+    of : object
+        Object of the study that it comes from.
+    seconds : float
+        Expected seconds, for bundles of about equal work.
+    name : str
+        Tasks of one name are in one bundle; by default a hash of its values.
+    file : str
+        Stem of the file of its result; by default its key.
+    shared : dict
+        Values that all tasks of that file share.
+    key : str
+        Key of its result; by default a hash of all inputs.
+    """
+
+    values: Mapping[str, Any]
+    also: Sequence[object] = ()
+    labels: Mapping[str, Any] = field(default_factory=dict)
+    of: Any = None
+    seconds: float = 0.0
+    name: str = ""
+    file: str = ""
+    shared: Mapping[str, Any] = field(default_factory=dict)
+    key: str = ""
+
+    def key_of(self, stage: Stage) -> str:
+        """Key of its result."""
+        return self.key or hash_of(self.values, stage_key(stage.module, attempts.MODULE), self.also)
+
+
+@dataclass(frozen=True)
+class Job:
+    """A job of a run.
+
+    `digest` is a hash of all that it depends on, without products of other jobs, which it ``reads``. Jobs of stages
+    have a label, which they share with the job of the stage before that made their meshes, and their tasks as
+    ``content``.
+    """
+
+    folder: Path
+    name: str
+    digest: str
+    products: tuple[str, ...]
+    reads: tuple[str, ...] = ()
+    stage: Stage | None = None
+    label: str = ""
+    content: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def record(self) -> Path:
+        """Record of the done job."""
+        return self.folder / RECORDS / f"{self.name}.json"
+
+    @property
+    def tasks(self) -> Path:
+        """Note of its tasks."""
+        return self.folder / TASKS / f"{self.name}.json"
+
+    @property
+    def results(self) -> set[tuple[str, str]]:
+        """File and key of each result that it is to make."""
+        return {(file["name"], task["key"]) for file in self.content["files"] for task in file["tasks"]}
+
+    def write(self) -> None:
+        """Write the note that the job reads; an unchanged one stays."""
+        if read_note(self.tasks).get("digest") != self.digest:
+            assert self.stage
+            note = {"digest": self.digest, "module": self.stage.module, "products": self.products}
+            atomic.write_bytes(self.tasks, json.dumps(note | {"content": self.content}).encode())
+
+
+def share_out(seconds: Mapping[str, float]) -> dict[str, list[str]]:
+    """Share tasks out in bundles of about equal work, the more the longer they take.
 
     Examples
     --------
-    >>> share_out({"coarse": 1.0, "fine": 4.0, "middle": 2.0}, cores=2)
+    >>> share_out({"coarse": 1.0, "fine": 4.0, "middle": 2.0})
     {'0': ['fine'], '1': ['coarse', 'middle']}
     """
     total = sum(seconds.values())
-    count = 4 * cores if total > MANY_SECONDS * least * cores else min(cores, ceil(total / least))
-    load = dict.fromkeys(map(str, range(max(1, min(count, len(seconds))))), 0.0)
+    # One job for 2 s, 8 for 2 minutes, 64 for 2 hours: against start-up, and for machines of many cores.
+    count = min(2 ** round(log2(total / 2) / 2), MOST_JOBS, len(seconds)) if total > 2 else 1
+    load = dict.fromkeys(map(str, range(count)), 0.0)
     bundles: dict[str, list[str]] = {}
     for name in sorted(seconds, key=lambda name: (-seconds[name], name)):
         label = min(load, key=lambda label: load[label])
@@ -52,89 +129,67 @@ def share_out(seconds: Mapping[str, float], cores: int, least: float = LEAST_SEC
     return {label: sorted(names) for label, names in bundles.items()}
 
 
-def stages() -> "tuple[Stage, ...]":
+def stages() -> tuple[Stage, ...]:
     """Stages of all study kinds."""
     return tuple(stage for kind in kinds() for stage in kind.stages)
 
 
-def table_files(output: "Output", study: "Study") -> list[str]:
-    """Files of an output's tables; for the page, all tables as CSV and the page itself."""
-    if not output.page:
-        return [*output.tables(study), *output.texts]
-    return [*(f"{stem}.csv" for kind in kinds() if kind.tables for stem in kind.tables(study)), "index.html"]
-
-
-@dataclass(frozen=True)
-class Tasks:
-    """Tasks of a job of a stage."""
-
-    stage: "Stage"
-    label: str
-    content: dict[str, Any]
-    digest: str
-    products: tuple[str, ...]
-
-    @property
-    def name(self) -> str:
-        """Stem of its files."""
-        return f"{self.stage.name}_{self.label}"
-
-
-@dataclass(frozen=True)
-class Plan:
-    """Jobs of a study's stages by name."""
-
-    folder: Path
-    jobs: dict[str, Tasks]
-
-    def labels(self, stage: str) -> list[str]:
-        """Labels of the bundles of a stage."""
-        return [job.label for job in self.jobs.values() if job.stage.name == stage]
-
-    def tasks(self, name: str) -> Path:
-        """Note of a job's tasks."""
-        return self.folder / TASKS / f"{name}.json"
-
-    def record(self, name: str) -> Path:
-        """Record of a done job."""
-        return self.folder / RECORDS / f"{name}.json"
-
-    def write(self) -> None:
-        """Write the notes that jobs read; unchanged files stay."""
-        for name, job in self.jobs.items():
-            path = self.tasks(name)
-            if read_note(path).get("digest") != job.digest:
-                content = {"digest": job.digest, "module": job.stage.module, "products": list(job.products)}
-                atomic.write_bytes(path, json.dumps(content | {"content": job.content}).encode())
-
-
-def plan(study: "Study", folder: Path, cores: int | None = None, cluster: bool = False) -> Plan:
-    """Plan the jobs of a study's stages for this machine, or for a cluster; nothing is written."""
-    cores, least = (CLUSTER_JOBS, LEAST_ON_CLUSTER) if cluster else (cores or os.cpu_count() or 1, LEAST_SECONDS)
-    jobs: dict[str, Tasks] = {}
-    members: Members = {}
+def plan(study: "Study", folder: Path) -> dict[str, Job]:
+    """Plan the jobs of a study's stages by name; nothing is written."""
+    jobs: dict[str, Job] = {}
     bundles: dict[str, dict[str, list[str]]] = {}
+    tasks: dict[str, dict[str, list[Task]]] = {}
     for kind in kinds():
-        for stage in kind.stages:
-            if stage.members:
-                found = dict(stage.members(study)) if study.parts[kind.name] else {}
-                seconds = {name: expected for name, (expected, _) in found.items()}
-                members[stage.name] = found
-                bundles[stage.name] = {n: [n] for n in found} if stage.alone else share_out(seconds, cores, least)
+        for stage in kind.stages if study.parts[kind.name] else ():
+            named = tasks[stage.name] = defaultdict(list)
+            for task in stage.tasks(study):
+                named[task.name or hash_of(task.values)].append(task)
+            if not stage.like:
+                seconds = {name: sum(task.seconds for task in own) for name, own in named.items()}
+                bundles[stage.name] = {name: [name] for name in named} if stage.alone else share_out(seconds)
     for stage in stages():
-        jobs |= {job.name: job for job in _jobs(stage, study, folder, members, bundles)}
-    return Plan(folder, jobs)
+        for label, names in bundles.get(stage.like or stage.name, {}).items():
+            own = [task for name in names for task in tasks[stage.name].get(name, ())]
+            if own:
+                job = _job(stage, folder, label, own)
+                jobs[job.name] = job
+    return jobs
 
 
-Members = dict[str, dict[str, tuple[float, Any]]]
-"""Seconds and value of what bundles hold, by stage and name."""
+def _job(stage: Stage, folder: Path, label: str, tasks: Iterable[Task]) -> Job:
+    files: dict[tuple[str, str], dict[str, Any]] = {}
+    for task in tasks:
+        key = task.key_of(stage)
+        name = task.file or key
+        file = files.setdefault((name, repr(task.shared)), {"name": name, **task.shared, "tasks": {}})
+        file["tasks"][key] = {"key": key, **task.values}
+    content = {
+        "results": str(folder),
+        "folder": str(folder / stage.folder),
+        "files": [file | {"tasks": list(file["tasks"].values())} for file in files.values()],
+    }
+    names = dict.fromkeys(name for name, _ in files)  # beams of one extent share a file
+    products = tuple(str(folder / stage.folder / f"{name}{ending}") for name in names for ending in stage.endings)
+    digest = hash_of(stage.module, content)
+    return Job(folder, f"{stage.name}_{label}", digest, products, stage=stage, label=label, content=content)
 
 
-def _jobs(
-    stage: "Stage", study: "Study", folder: Path, members: Members, bundles: dict[str, dict[str, list[str]]]
-) -> Iterator[Tasks]:
-    of = stage.like or stage.name
-    for label, names in bundles[of].items():
-        content = stage.content(study, folder, [members[of][name][1] for name in names])
-        if content:
-            yield Tasks(stage, label, content, hash_of(stage.module, content), tuple(map(str, stage.products(content))))
+def results(
+    stage: Stage, study: "Study", folder: Path, fields: Iterable[str] = ()
+) -> Iterator[tuple[Task, dict[str, Any]]]:
+    """Tasks of a stage and their stored results, in the order of the tasks."""
+    tasks, files = list(stage.tasks(study)), defaultdict(list)
+    keys = [task.key_of(stage) for task in tasks]
+    for task, key in zip(tasks, keys):
+        files[task.file or key].append(key)
+    fields = list(fields)
+    found = {name: store.read(folder / stage.folder / f"{name}.h5", held, fields) for name, held in files.items()}
+    for task, key in zip(tasks, keys):
+        yield task, dict(found[task.file or key][key])
+
+
+def rows(stage: Stage, study: "Study", folder: Path) -> Iterator[dict[str, Any]]:
+    """Rows of the stored results of a stage, each with the labels of its task."""
+    for task, result in results(stage, study, folder):
+        for row in result.get("rows", [result]):
+            yield {**task.labels, **row}

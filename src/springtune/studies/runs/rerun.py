@@ -4,17 +4,14 @@ Jobs of stages come from `springtune.studies.runs.plan`; the jobs after them are
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..config.kind import FORMATS, modules, outputs
-from .job import RECORDS, TASKS
+from ..config.kind import FORMATS, kinds, modules, outputs
 from .keys import stage_key
-from .plan import Plan, plan, table_files
+from .plan import Job, plan
 from .provenance import inputs
-from .source import PACKAGE, checksum, hash_of, read_note
-from .workload import results_of
+from .source import PACKAGE, TASKS, checksum, hash_of, read_note
 
 if TYPE_CHECKING:
     from ..config.kind import Output
@@ -32,20 +29,8 @@ PAPER, PAPER_FILE = "paper", "paper.pdf"
 PAPER_STUDIES = ("paper", "definitions", "block", "laying", "stability", "benchmark", "shapes")
 
 
-@dataclass(frozen=True)
-class Job:
-    """A job of a run.
-
-    `digest` is a hash of all that it depends on, without products of other jobs. It reads the first product of the job
-    `reads`, if any, and `inputs`, which several jobs make.
-    """
-
-    name: str
-    digest: str
-    products: tuple[str, ...]
-    record: Path
-    reads: str = ""
-    inputs: tuple[str, ...] = ()
+READ: "list[tuple[Study, dict[str, Job]]]" = []
+"""Studies that this process runs, with all their jobs: the requested one, and those that the paper reads."""
 
 
 def output_jobs(study: "Study") -> "dict[str, list[Output]]":
@@ -58,9 +43,12 @@ def output_jobs(study: "Study") -> "dict[str, list[Output]]":
 
 
 def output_files(output: "Output", study: "Study") -> list[str]:
-    """Files of an output."""
+    """Files of an output; for the page, all tables as CSV and the page itself."""
     figures = [f"figures/{stem}.{ending}" for stem in output.figures(study) for ending in FORMATS]
-    return figures + [f"{output.into}/{name}" for name in table_files(output, study)]
+    names = [*output.tables(study), *output.texts]
+    if output.page:
+        names = [*(f"{stem}.csv" for kind in kinds() if kind.tables for stem in kind.tables(study)), "index.html"]
+    return figures + [f"{output.into}/{name}" for name in names]
 
 
 def linked(study: "Study") -> list[str]:
@@ -69,27 +57,25 @@ def linked(study: "Study") -> list[str]:
     return [path for path in made if Path(path).suffix in (f".{FORMATS[0]}", ".html")]
 
 
-def jobs(study: "Study", plan: Plan) -> dict[str, Job]:
-    """All jobs of a study."""
-    folder = plan.folder
-    found = [Job(one.name, one.digest, one.products, plan.record(one.name)) for one in plan.jobs.values()]
-    made = [(COLLECT, _collect_digest(study, plan), [DATASET, SUMMARY], "")]
+def jobs(study: "Study", folder: Path) -> dict[str, Job]:
+    """All jobs of a study by name."""
+    found, read = plan(study, folder), (str(folder / DATASET),)
+    made = [(COLLECT, _collect_digest(study, found), [DATASET, SUMMARY])]
     for name, members in output_jobs(study).items():
         files = [file for one in members for file in output_files(one, study)]
-        made.append((name, _present_digest(members, files), files, COLLECT))
-    made.append((BROWSE, _browse_digest(study), [PAGE], COLLECT))
-    for name, digest, files, reads in made:
-        paths = tuple(str(folder / file) for file in files)
-        found.append(Job(name, digest, paths, plan.record(name), reads))
-    return {job.name: job for job in found}
+        made.append((name, _present_digest(members, files), files))
+    made.append((BROWSE, _browse_digest(study), [PAGE]))
+    for name, digest, files in made:
+        products = tuple(str(folder / file) for file in files)
+        found[name] = Job(folder, name, digest, products, () if name == COLLECT else read)
+    return found
 
 
-def _collect_digest(study: "Study", plan: Plan) -> str:
-    """Digest of a study's dataset: of the study's files, the jobs of its stages and the code."""
+def _collect_digest(study: "Study", jobs: dict[str, Job]) -> str:
+    """Digest of a study's dataset: of the study's files, the results of its stages and the code."""
     code = [stage_key(name) for name in ("studies.kinds.collect", *modules("kind", "collect"))]
     code += [stage_key(made.collect) for made in outputs().values() if made.collect and made.name in study.outputs]
-    # Whatever bundles they are in.
-    results = sorted(set(results_of([job.content for job in plan.jobs.values()])))
+    results = sorted({result for job in jobs.values() for result in job.results})  # whatever bundles they are in
     return hash_of(study.name, inputs(study, study.path.resolve().parent), results, code)
 
 
@@ -118,11 +104,13 @@ def paper_job(source: Path, datasets: "Iterable[Path]", folder: Path) -> Job:
     texts |= {f"examples/{path.name}": checksum(path) for path in examples}
     used = ["studies.paper.build", *(one.module for one in outputs().values() if one.module)]
     digest = hash_of(texts, [stage_key(name) for name in dict.fromkeys(used)])
-    record = folder / RECORDS / f"{PAPER}.json"
-    return Job(PAPER, digest, (str(folder / PAPER_FILE),), record, inputs=tuple(map(str, datasets)))
+    return Job(folder, PAPER, digest, (str(folder / PAPER_FILE),), tuple(map(str, datasets)))
 
 
-def fault(job: Job, found: dict[str, Job]) -> str:
+MISSING = " is missing"
+
+
+def fault(job: Job) -> str:
     """Return why a job must run, or an empty string; jobs before it count only by their products."""
     if not job.record.exists():
         return "not done yet"
@@ -131,13 +119,9 @@ def fault(job: Job, found: dict[str, Job]) -> str:
     for product in job.products:
         if not Path(product).exists():
             return f"{product}{MISSING}"
-    read = [*(found[job.reads].products[:1] if job.reads else ()), *job.inputs]
     made = job.record.stat().st_mtime_ns
-    newer = (path for path in map(Path, read) if path.exists() and path.stat().st_mtime_ns > made)
+    newer = (path for path in map(Path, job.reads) if path.exists() and path.stat().st_mtime_ns > made)
     return next((f"{path} is newer" for path in newer), "")
-
-
-MISSING = " is missing"
 
 
 def is_missing(why: str) -> bool:
@@ -145,14 +129,13 @@ def is_missing(why: str) -> bool:
     return why.endswith(MISSING)
 
 
-def outdated(study: "Study", folder: Path, cluster: bool = False) -> dict[Path, str] | None:
+def outdated(study: "Study", folder: Path) -> dict[Path, str] | None:
     """Return the records of done jobs that must run again, with the reasons; None if a job was never done.
 
     Snakemake does not find all of these: it compares parameters with its own notes, and knows no stored results.
     """
     if not (folder / TASKS).exists():  # never run: planning 10,000 scenes takes a second
         return None
-    found = jobs(study, plan(study, folder, cluster=cluster))
-    faults = {job.record: why for job in found.values() if (why := fault(job, found))}
+    faults = {job.record: why for job in jobs(study, folder).values() if (why := fault(job))}
     known = {record: why for record, why in faults.items() if record.exists()}
     return known if len(known) == len(faults) else known or None

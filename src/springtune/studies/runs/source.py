@@ -7,6 +7,9 @@ from typing import Any
 
 PACKAGE = Path(__file__).parents[2]
 
+TASKS, RECORDS = "tasks", "done"
+"""Folders of a study: notes of jobs to do, and records of done jobs."""
+
 CONFIG_FOLDER = Path("config")
 
 USUAL_STUDY = "paper.yaml"

@@ -15,9 +15,9 @@ from springtune.springs.base import DEFINITIONS
 from ...config import fields
 from ...config.checks import check_able, check_known, check_particles, check_product, check_scene
 from ...config.fields import Named, OneOrMore, Section, default, one_of, optional
-from ...config.kind import Kind
+from ...config.kind import Kind, Stage
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key
-from ...runs.stages import Task, stage
+from ...runs.plan import Task
 from . import OTHER_APPROACHES, THREAD_COUNTS, approach_names
 from .outputs import OUTPUTS
 
@@ -186,6 +186,6 @@ KIND = Kind(
         "thread_count": "number of threads of explicit steps",
         "precision": "floating-point numbers of explicit steps",
     },
-    stages=(stage("benchmark", "studies.kinds.benchmark.solve", "Timing approaches", _tasks, alone=True),),
+    stages=(Stage("benchmark", "studies.kinds.benchmark.solve", _tasks, alone=True),),
     outputs=OUTPUTS,
 )

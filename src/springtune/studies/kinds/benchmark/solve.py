@@ -27,7 +27,7 @@ from springtune.scene.motion import motion_of
 from springtune.scene.sheet import Sheet
 from springtune.springs.base import DefinitionError
 
-from ...runs.job import own_reason
+from ...runs.attempts import own_reason
 from . import PARTS, THREAD_COUNTS
 from .approaches import APPROACHES, network
 

@@ -6,7 +6,7 @@ from math import nan
 import numpy as np
 
 from ...output.dataset import Group
-from ...runs.stages import results
+from ...runs.plan import results
 from . import RUN_ENDS, SETTING
 from .kind import STAGE
 

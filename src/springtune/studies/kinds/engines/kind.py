@@ -14,9 +14,9 @@ from springtune.springs.base import DEFINITIONS
 
 from ...config import checks, fields
 from ...config.fields import OneOrMore, Section, default, one_of, optional
-from ...config.kind import Kind
+from ...config.kind import Kind, Stage
 from ...runs.keys import beam_key, declared_key, definition_key, distribution, installed, material_key, mesh_type_key
-from ...runs.stages import Task, stage
+from ...runs.plan import Task
 from . import SETTING
 from .outputs import OUTPUTS
 
@@ -194,7 +194,7 @@ def _tasks(study):
         yield Task(values, also, run.labels, run.of_curve, name=engine.name)
 
 
-STAGE = stage("engines", "studies.kinds.engines.solve", "Running scenes in engines", _tasks, alone=True)
+STAGE = Stage("engines", "studies.kinds.engines.solve", _tasks, alone=True)
 
 KIND = Kind(
     "engines",

@@ -13,9 +13,9 @@ from springtune.springs.base import DEFINITIONS
 from ...config import fields
 from ...config.checks import check_beam_material, check_for_triangles, check_particles, check_product
 from ...config.fields import OneOrMore, Section, default, one_of, optional
-from ...config.kind import Kind
+from ...config.kind import Kind, Stage
 from ...runs.keys import definition_key, material_key, mesh_type_key
-from ...runs.stages import Task, stage
+from ...runs.plan import Task
 from .outputs import OUTPUTS
 
 LOADINGS = ("pressure", "gravity", "ends")
@@ -171,7 +171,7 @@ KIND = Kind(
     summary=lambda part: [["strips", sum("definition" in labels for labels, _ in part), "laid on a trapezoid"]],
     variables=LAYING_VARIABLES,
     dimensions={"loading": "what lays the strip", "friction": "Coulomb's coefficient of friction"},
-    stages=(stage("laying", "studies.kinds.laying.solve", "Laying the strips", _tasks),),
+    stages=(Stage("laying", "studies.kinds.laying.solve", _tasks),),
     outputs=OUTPUTS,
     tables=lambda study: ["laying"] if study.parts["laying"] else [],
 )

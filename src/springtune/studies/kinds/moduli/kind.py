@@ -11,10 +11,10 @@ from springtune.springs.base import DEFINITIONS
 
 from ...config.checks import check_particles
 from ...config.fields import Flag, Length, Section, default
-from ...config.kind import Kind
+from ...config.kind import Kind, Stage
 from ...config.model import MeshSpec
 from ...runs.keys import definition_key, mesh_type_key
-from ...runs.stages import Task, stage
+from ...runs.plan import Task
 from ..scenes.plan import expected_seconds, mesh_key, mesh_parameters, mesh_source, particles
 from .outputs import OUTPUTS
 
@@ -127,6 +127,6 @@ KIND = Kind(
     },
     dimensions={"poisson_ratio": "Poisson's ratio that the definition is asked for"},
     attributes=_attributes,
-    stages=(stage("moduli", "studies.kinds.moduli.solve", "Measuring effective moduli", _tasks),),
+    stages=(Stage("moduli", "studies.kinds.moduli.solve", _tasks),),
     outputs=OUTPUTS,
 )

@@ -6,8 +6,7 @@ Where no such function is good enough the references of a small sample are solve
 from pathlib import Path
 from typing import Any
 
-from ...runs import store
-from ...runs.job import Attempts
+from ...runs.attempts import Attempts
 from ..scenes import unit_references
 from .designs import draw
 
@@ -23,12 +22,6 @@ def run(content: dict[str, Any], attempts: Attempts) -> None:
         unit_references.make_interpolant(
             Path(content["folder"]) / f"{task['key']}.h5", task | {"problems": problems}, attempts
         )
-
-
-def crashed(content: dict[str, Any], key: str, why: str) -> None:
-    """Store the failed result of a reference, or of an interpolant, whose process died."""
-    path = Path(content["folder"]) / f"{key.partition(' ')[0]}.h5"
-    store.add(path, {key: unit_references.failed({}, why)})
 
 
 def problem_key(interpolant: str, aspect_ratio: float, nu: float) -> str:

@@ -15,11 +15,11 @@ from springtune.springs.base import DEFINITIONS
 from ...config import fields
 from ...config.checks import MORE_SCENES, check_able, check_particles, in_mm, most_scenes
 from ...config.fields import OneOrMore, Section, default, one_of, optional, quantity
-from ...config.kind import Kind
+from ...config.kind import Kind, Stage
 from ...config.messages import OrSection, refuse, show, words
 from ...runs.keys import definition_key, mesh_type_key, stage_key
+from ...runs.plan import Task
 from ...runs.source import hash_of
-from ...runs.stages import Task, stage
 from .designs import DESIGNS, PARAMETERS, SMALLEST_SIZE, SOBOL_INDICES, blocks, roles, varied
 from .outputs import OUTPUTS
 
@@ -344,8 +344,8 @@ KIND = Kind(
     axes=lambda sample: {"load": set(sample.loads), "definition": set(sample.definitions)},
     summary=_summary,
     stages=(
-        stage("interpolate", INTERPOLATE, "Interpolating the references of samples", _references, folder="samples"),
-        stage("sample", SOLVE, "Solving the networks of samples", _blocks, folder="samples"),
+        Stage("interpolate", INTERPOLATE, _references, folder="samples"),
+        Stage("sample", SOLVE, _blocks, folder="samples"),
     ),
     outputs=OUTPUTS,
     tables=_tables,

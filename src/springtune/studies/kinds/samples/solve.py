@@ -23,9 +23,6 @@ from .designs import draw
 DRAWN = "drawn"
 """Key of the parameters among the results of a task."""
 
-GONE_NETWORK = "lost "
-"""Prefix of the keys of networks beyond the limits."""
-
 TOGETHER = 32
 """Tasks whose meshes are sorted together; among more tasks more meshes share cells."""
 
@@ -45,12 +42,6 @@ def run(content, attempts):
         _solve_together(waiting[begin : begin + TOGETHER], attempts)
 
 
-def crashed(content, key, why):
-    """Store that the process that solved a network died; its block is then solved without it."""
-    name = key.partition(" ")[0]
-    store.add(Path(content["folder"]) / f"{name}.h5", {f"{GONE_NETWORK}{key}": {"message": why}})
-
-
 class _Block:
     """Rows of some base samples, and the results of their scenes so far."""
 
@@ -59,8 +50,6 @@ class _Block:
         self.file, self.path = file, path
         self.missing = {key: scene for key, scene in file["results"].items() if key not in present}
         self.is_new = DRAWN not in present
-        lost = {name for name in present if name.startswith(GONE_NETWORK)}
-        self.lost = {name: one["message"] for name, one in store.read(path, lost).items()} if lost else {}
         self.drawn = draw(file["design"], file["seed"], file["parameters"], task["first"], task["last"])
         rows = len(self.drawn["length"])
         self.found = {
@@ -106,10 +95,7 @@ def _solve_mesh(block, box, rows, like, scaling, attempts):
     """Solve the scenes of rows of a block that share a mesh; return the meshed sheet, or None."""
 
     def attempt(name, function):
-        key = f"{block.file['name']} {rows[0]} {name}"
-        if f"{GONE_NETWORK}{key}" in block.lost:
-            return _failed(block.lost[f"{GONE_NETWORK}{key}"])
-        return attempts.attempt(key, function, _failed)
+        return attempts.attempt(f"{block.file['name']} {rows[0]} {name}", function, _failed)
 
     # One network at a time: the next one takes over the symbolic factor.
     mesh_type = MESH_TYPES[block.file["mesh_type"]]

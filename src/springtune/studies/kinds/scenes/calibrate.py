@@ -7,20 +7,27 @@ from springtune.springs.calibrated import calibrate
 from ...runs import store
 
 
-def run(content, attempts):
-    """Calibrate from the stored curves."""
-    results = {}
-    for group in content["groups"]:
-        try:
-            results[group["name"]] = {"stiffness": calibrate(_best(content, member) for member in group["members"])}
-        except ValueError as error:
-            results[group["name"]] = {"stiffness": None, "message": str(error)}
-    store.add(content["file"], results)
+def prepare(file, content):
+    """Folder of the curves."""
+    return Path(content["folder"])
 
 
-def _best(content, member):
+def solve(task, folder):
+    """Calibrated stiffness of a group of scenes [N/m], or None with the reason."""
+    try:
+        return {"stiffness": calibrate(_best(folder, member) for member in task["members"])}
+    except ValueError as error:
+        return {"stiffness": None, "message": str(error)}
+
+
+def failed(task, why):
+    """Result of a group that cannot be calibrated."""
+    return {"stiffness": None, "message": why}
+
+
+def _best(folder, member):
     """Name of a curve, its best stiffness [N/m], and the reason if it has none."""
     name = member["curve"]
-    curve = store.read(Path(content["curves"]) / f"{member['mesh']}.h5", [name])[name]
+    curve = store.read(folder / f"{member['mesh']}.h5", [name])[name]
     called = f"{member['mesh']} in {member['load']} of {member['force']:g} N"
     return called, curve["best_stiffness"], curve["best_message"]

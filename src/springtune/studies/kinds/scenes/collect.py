@@ -132,7 +132,7 @@ def _scenes(study, folder, answers):
         for one, result in answers.items()
         for kinematics in study.axes["kinematics"]
     }
-    calibration = store.everything(file) if (file := plan.calibration_file(study, folder)) else {}
+    calibration = stored.read_calibration(folder)
     cells, faces, fields = [], [], []
     for mesh, tasks in plan.scene_tasks(study).items():
         keys = [stored_key(task, calibration) for task in tasks]

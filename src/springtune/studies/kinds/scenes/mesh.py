@@ -31,29 +31,19 @@ def check_unchanged(source):
 def run(content, attempts, make=make):
     """Make the missing meshes of a bundle."""
     folder = content["folder"]
-    for task in content["files"]:
-        if stored.is_stored(folder, task["name"], task["key"]):
+    for name, task in ((file["name"], file["tasks"][0]) for file in content["files"]):
+        if stored.is_stored(folder, name, task["key"]):
             continue
         begin = time.perf_counter()
-        made = attempts.attempt(task["name"], partial(make, task), _failed)
+        made = attempts.attempt(name, partial(make, task), lambda why: {"message": f"mesh: {why}"})
         known = {"mesh_seconds": time.perf_counter() - begin}
         if made is None:
             continue
         attempts.computed += 1
         if isinstance(made, dict):
-            stored.refuse(folder, task["name"], task["key"], made)
+            stored.refuse(folder, name, task["key"], made)
             continue
         grouped = made if isinstance(made, GroupedMesh) else GroupedMesh(made)
         mesh = grouped.mesh
         known |= quality(mesh) | {"particles": len(mesh.points), "springs": len(mesh.edges)}
-        stored.write_made(folder, task["name"], task["key"], grouped, known)
-
-
-def crashed(content, name, why):
-    """Store that the process that makes a mesh died."""
-    key = next(task["key"] for task in content["files"] if task["name"] == name)
-    stored.refuse(content["folder"], name, key, _failed(why))
-
-
-def _failed(why):
-    return {"message": f"mesh: {why}"}
+        stored.write_made(folder, name, task["key"], grouped, known)

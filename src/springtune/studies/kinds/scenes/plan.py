@@ -14,9 +14,9 @@ from springtune.springs.base import DEFINITIONS
 from ...config.kind import Stage
 from ...config.model import keeps_fields, once_a_study, shown
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key, stage_key
+from ...runs.plan import Task
 from ...runs.source import hash_of
-from ...runs.stages import Task, products, stage
-from . import stored
+from .stored import CALIBRATION
 
 if TYPE_CHECKING:
     from springtune.problem.geometry import Beam
@@ -269,7 +269,8 @@ def _scene_tasks(study, mesh, scenes):
             own["stiffness_scale"] = scene.stiffness_scale
         further = {}
         if scene.definition == "calibrated":  # stiffness is proportional to thickness
-            group = further["calibration"] = calibration_name(scene)
+            group = calibration_name(scene)
+            further["calibration"] = calibrations(study)[group].key
             own["thickness_ratio"] = mesh.beam.thickness / _calibrating(study)[group][0].mesh.beam.thickness
         if scene in kept:
             further["keep_fields"] = True
@@ -330,25 +331,14 @@ def calibration_name(scene):
 # -- stages ------------------------------------------------------------------------------------------------------------
 
 
-def _mesh_members(study):
-    """Meshes by the stem of their files, and the expected seconds of each with all its scenes and curves."""
-    seconds, members, curves = defaultdict(float), defaultdict(list), curves_by_mesh(study)
+def _mesh_tasks(study):
+    """Tasks of meshes, each with the expected seconds of all its scenes and curves."""
+    curves = curves_by_mesh(study)
     for mesh, scenes in scenes_by_mesh(study).items():
         count = particles(mesh)
-        seconds[stem(mesh)] += (1 + len(curves.get(mesh, ()))) * expected_seconds(count)
-        seconds[stem(mesh)] += sum(expected_seconds(count, scene.definition) for scene in scenes)
-        members[stem(mesh)].append(mesh)
-    return {name: (seconds[name], meshes) for name, meshes in members.items()}
-
-
-def _meshes(study, folder, members):
-    files = [{"name": stem(mesh), "key": mesh_key(mesh)} | mesh_source(mesh) for mesh, *_ in members]
-    return {"folder": str(folder / "meshes"), "files": files}
-
-
-def mesh_products(content):
-    """Files of the meshes of a job, beams' or shapes'."""
-    return [path for mesh in content["files"] for path in stored.files(content["folder"], mesh["name"])]
+        seconds = (1 + len(curves.get(mesh, ()))) * expected_seconds(count)
+        seconds += sum(expected_seconds(count, scene.definition) for scene in scenes)
+        yield Task(mesh_source(mesh), seconds=seconds, name=stem(mesh), file=stem(mesh), key=mesh_key(mesh))
 
 
 def _reference_tasks(study):
@@ -371,104 +361,51 @@ def _reference_tasks(study):
         yield Task(values, seconds=3e-2 * expected_solves(box), name=key, key=key)
 
 
-def on_meshes(folder, name, files, **more):
-    """Content of a job whose tasks read meshes and references; empty without tasks."""
-    read = {one: str(folder / one) for one in ("meshes", "references")}
-    return files and {"folder": str(folder / name), "files": files} | read | more
+def _curve_tasks(study):
+    for mesh, curves in curves_by_mesh(study).items():
+        for task in (curve_task(study, one) for one in curves):
+            yield Task(task, name=stem(mesh), file=stem(mesh), key=task["key"])
 
 
-def mesh_stage(name, module, message, content, members):
-    """Stage that makes meshes."""
-    return Stage(name, module, message, content, mesh_products, members, folder="meshes")
+@once_a_study
+def calibrations(study):
+    """Tasks of the groups of scenes that share a calibrated stiffness, all in one job and file."""
 
-
-def stage_on_meshes(name, module, message, content, folder, mesh="mesh", every=()):
-    """Stage that works on the bundles of one that makes meshes."""
-    return Stage(name, module, message, content, products, like=mesh, every=every, folder=folder)
-
-
-def _sensitivity(study, folder, members):
-    curves = curves_by_mesh(study)
-    files = [
-        {"name": stem(mesh), "tasks": [curve_task(study, one) for one in curves[mesh]]}
-        for meshes in members
-        for mesh in meshes
-        if mesh in curves
-    ]
-    return on_meshes(folder, "curves", files)
-
-
-def _solve(study, folder, members):
-    tasks = scene_tasks(study)
-    files = [
-        {"name": stem(mesh), "thickness": mesh.beam.thickness, "tasks": tasks[mesh]}
-        for meshes in members
-        for mesh in meshes
-    ]
-    return on_meshes(folder, "solutions", files, calibration=calibration_file(study, folder))
-
-
-def calibration_file(study, folder):
-    """File of the calibrated stiffnesses of a study, if any scene is calibrated."""
-    any_is = any(scene.definition == "calibrated" for scene in study.scenes)
-    return str(folder / "calibration.h5") if any_is else None
-
-
-def _calibrate_members(study):
-    """All groups of scenes that share a calibrated stiffness, in one job."""
-    names = {calibration_name(scene) for scene in study.scenes if scene.definition == "calibrated"}
-    return {"all": (0.0, sorted(names))} if names else {}
-
-
-def _calibrate(study, folder, members):
     def named(curve):
         place = {"mesh": stem(curve.mesh), "curve": curve_task(study, curve)["key"]}
         return place | {"load": curve.load, "force": curve.force}
 
-    return {
-        "file": calibration_file(study, folder),
-        "curves": str(folder / "curves"),
-        "groups": [
-            {"name": name, "members": [named(one) for one in _calibrating(study)[name]]}
-            for names in members
-            for name in names
-        ],
-        "code": stage_key("studies.kinds.scenes.calibrate"),
-    }
+    code, found = stage_key("studies.kinds.scenes.calibrate"), {}
+    for name in sorted({calibration_name(scene) for scene in study.scenes if scene.definition == "calibrated"}):
+        members = [named(one) for one in _calibrating(study)[name]]
+        found[name] = Task({"members": members}, name="all", file=CALIBRATION, key=hash_of(members, code))
+    return found
+
+
+def _solve_tasks(study):
+    for mesh, tasks in scene_tasks(study).items():
+        shared, name = {"thickness": mesh.beam.thickness}, stem(mesh)
+        for task in tasks:
+            yield Task(task, name=name, file=name, shared=shared, key=task["key"])
 
 
 STAGES = (
-    stage(
-        "reference",
-        "studies.kinds.scenes.reference",
-        "Solving the finite-element references",
-        _reference_tasks,
-        "references",
-    ),
-    mesh_stage("mesh", "studies.kinds.scenes.mesh", "Meshing", _meshes, _mesh_members),
-    stage_on_meshes(
-        "sensitivity",
-        "studies.kinds.scenes.sensitivity",
-        "Tracing the sensitivity curves",
-        _sensitivity,
-        "curves",
-        every=("reference",),
-    ),
+    Stage("reference", "studies.kinds.scenes.reference", _reference_tasks, "references"),
+    Stage("mesh", "studies.kinds.scenes.mesh", _mesh_tasks, "meshes", endings=(".vtu", ".h5")),
+    Stage("sensitivity", "studies.kinds.scenes.sensitivity", _curve_tasks, "curves", like="mesh", every=("reference",)),
     Stage(
         "calibrate",
         "studies.kinds.scenes.calibrate",
-        "Calibrating the uniform stiffness",
-        _calibrate,
-        lambda content: [Path(content["file"])],
-        _calibrate_members,
+        lambda study: calibrations(study).values(),
+        "curves",
         every=("sensitivity",),
     ),
-    stage_on_meshes(
+    Stage(
         "solve",
         "studies.kinds.scenes.solve",
-        "Solving the networks",
-        _solve,
+        _solve_tasks,
         "solutions",
+        like="mesh",
         every=("reference", "calibrate"),
     ),
 )

@@ -11,8 +11,11 @@ from springtune.problem.geometry import Beam
 from springtune.problem.loads import LOAD_KINDS
 from springtune.problem.materials import Rubber, material_of
 
-from ...runs import job, store
-from .unit_references import failed, make_interpolant, solve_unit_problem
+from ...runs.attempts import solve_files
+from . import unit_references
+from .unit_references import make_interpolant, solve_unit_problem
+
+failed = unit_references.failed
 
 NOT_TESTED = "has no uniaxial_test, and so no law of Yeoh's: its references are neo-Hookean"
 OF_TESTED = "has a uniaxial_test, and so Yeoh's law: its reference is 'yeoh-plane-stress'"
@@ -22,26 +25,10 @@ OF_PLANE_STRAIN = "is in plane strain: its reference is 'neo-hooke-plane-strain'
 
 def run(content, attempts):
     """Solve the missing references of a bundle."""
-    interpolants, others = _divided(content)
-    job.solve_files(sys.modules[__name__], others, attempts)
-    for task in interpolants:
+    others = [file for file in content["files"] if "box" not in file["tasks"][0]]
+    solve_files(sys.modules[__name__], content | {"files": others}, attempts)
+    for task in (task for file in content["files"] for task in file["tasks"] if "box" in task):
         make_interpolant(Path(content["folder"]) / f"{task['key']}.h5", task, attempts)
-
-
-def crashed(content, key, why):
-    """Store the failed result of a reference whose process died."""
-    interpolants, others = _divided(content)
-    job.crashed_of_files(sys.modules[__name__], others, key, why)
-    # What an interpolant cannot do goes into its own file.
-    for task in interpolants:
-        if key in (task["key"], *task["problems"]):
-            store.add(Path(content["folder"]) / f"{task['key']}.h5", {key: failed(task, why)})
-
-
-def _divided(content):
-    """Tasks of interpolants, and the content of a job without them."""
-    tasks = [task for file in content["files"] for task in file["tasks"] if "box" in task]
-    return tasks, content | {"files": [file for file in content["files"] if "box" not in file["tasks"][0]]}
 
 
 def solve(task):

@@ -6,6 +6,7 @@ meets its reference is solved for here, too, where equilibria are at hand.
 """
 
 import time
+from pathlib import Path
 
 import numpy as np
 
@@ -22,7 +23,7 @@ from . import stored
 def prepare(family, content):
     """Sheet of a mesh, and the folder of references."""
     # Curves depend on stiffnesses alone, so the thickness is 1 m.
-    return Sheet(stored.prepared(content["meshes"], family["name"]).mesh, 1.0), content["references"]
+    return Sheet(stored.prepared(content, family).mesh, 1.0), Path(content["results"]) / "references"
 
 
 def failed(curve, why):

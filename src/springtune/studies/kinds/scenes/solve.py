@@ -3,6 +3,7 @@
 import time
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 
@@ -14,7 +15,6 @@ from springtune.reference.answers import field_error, interpolate
 from springtune.scene.sheet import Sheet, definition_of
 from springtune.springs.base import DEFINITIONS, DefinitionError
 
-from ...runs import store
 from . import stored
 from .stored import stored_key
 
@@ -23,9 +23,9 @@ parts = stored.parts
 
 def tasks(family, content):
     """Scenes of a mesh under the keys of their results, with their calibrated stiffness."""
-    calibration = store.everything(content["calibration"]) if content["calibration"] else {}
-    if not calibration:
+    if not any("calibration" in scene for scene in family["tasks"]):
         return family["tasks"]
+    calibration = stored.read_calibration(content["results"])
     return [
         scene | {"key": stored_key(scene, calibration), "calibrated": calibration.get(scene.get("calibration"))}
         for scene in family["tasks"]
@@ -37,13 +37,13 @@ def prepare(family, content):
 
     ``family`` is a file of the job's content (`springtune.studies.runs.job`): the scenes of one mesh.
     """
-    mesh, labels = stored.prepared(content["meshes"], family["name"]).mesh, ("x", "y", "displacements")
+    mesh, labels = stored.prepared(content, family).mesh, ("x", "y", "displacements")
 
     @cache
     def for_one(key, length):
         """Displacements for 1 N of a material that moves by 1 m; None where the reference has none."""
         scales = {"key": key, "length": length, "displacement": 1.0}
-        found = stored.read_reference(content["references"], scales, labels)
+        found = stored.read_reference(Path(content["results"]) / "references", scales, labels)
         return interpolate(*(found[label] for label in labels), mesh.points) if "x" in found else None
 
     def field(reference):

@@ -13,7 +13,7 @@ from springtune.mesh.formats import read_stored, write_mesh
 from springtune.mesh.groups import GroupedMesh
 
 from ...runs import store
-from ...runs.job import RefusedError
+from ...runs.attempts import RefusedError
 from ...runs.source import checksum, hash_of
 from ...runs.store import DamagedError
 
@@ -71,11 +71,12 @@ def read_notes(folder: str | Path, name: str) -> dict[str, Any]:
     return store.read(files(folder, name)[1], [NOTES])[NOTES]
 
 
-def prepared(folder: str | Path, name: str) -> GroupedMesh:
-    """Mesh by its name, for tasks that need it."""
-    if found := read(folder, name):
+def prepared(content: dict[str, Any], family: dict[str, Any]) -> GroupedMesh:
+    """Mesh of the tasks of a file."""
+    folder = Path(content["results"]) / "meshes"
+    if found := read(folder, family["name"]):
         return found
-    raise RefusedError(read_notes(folder, name)["message"])
+    raise RefusedError(read_notes(folder, family["name"])["message"])
 
 
 def read(folder: str | Path, name: str) -> GroupedMesh | None:
@@ -128,6 +129,16 @@ def scaled(found: dict[str, Any], reference: dict[str, Any]) -> dict[str, Any]:
 
 FIELD_ARRAYS = {"displacements": "f8", "spring_stiffnesses": "f4", "spring_forces": "f4"}
 """Arrays of all particles and springs, and their types."""
+
+
+CALIBRATION = "calibration"
+"""Stem of the file of calibrated stiffnesses, among the curves."""
+
+
+def read_calibration(folder: str | Path) -> dict[str, Any]:
+    """Calibrated stiffnesses of a study [N/m] by key; none where nothing is calibrated."""
+    path = Path(folder) / "curves" / f"{CALIBRATION}.h5"
+    return store.everything(path) if path.exists() else {}
 
 
 def stored_key(scene: dict[str, Any], calibration: dict[str, Any]) -> str:

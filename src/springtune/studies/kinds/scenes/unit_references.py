@@ -15,7 +15,7 @@ from springtune.reference.small_strain import ReferenceNotConvergedError, solve_
 from ...runs import store
 
 if TYPE_CHECKING:
-    from ...runs.job import Attempts
+    from ...runs.attempts import Attempts
 
 REFERENCE_TOLERANCE = 1e-4
 """Largest error estimate of an interpolant that stands for references that are solved by themselves [1]: theirs."""

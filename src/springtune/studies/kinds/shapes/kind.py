@@ -13,19 +13,16 @@ import numpy as np
 from springtune.mesh.cells import MeshError
 from springtune.problem.geometry import size_text
 
-from ...config.kind import Kind
-from ...runs.job import JOB
+from ...config.kind import Kind, Stage
+from ...runs.attempts import MODULE
 from ...runs.keys import definition_key, material_key, mesh_type_key, stage_key
+from ...runs.plan import Task
 from ...runs.source import hash_of
-from ...runs.stages import Task, stage
 from ..scenes.plan import (
     expected_seconds,
     file_source,
-    mesh_stage,
-    on_meshes,
     parameters,
     particles_in,
-    stage_on_meshes,
 )
 from .outputs import DRAWING, OUTPUTS, OWN_FILE, mesh_name, stems
 from .sections import SHAPE_GRIDS_KEY, SHAPES_KEY
@@ -93,7 +90,7 @@ def reference_task(part, shape, material, name, law=""):
     """Task of a reference of small strain, or of a law at finite strain."""
     task = {"shape": _source(part.shape[shape])} | _case(part, shape, material, name) | ({"law": law} if law else {})
     without = () if law else ("reference.finite_shapes", "reference.finite_strain")
-    code = stage_key("studies.kinds.shapes.reference", JOB, without=without), _reader(part.shape[shape])
+    code = stage_key("studies.kinds.shapes.reference", MODULE, without=without), _reader(part.shape[shape])
     key = hash_of(task | {"shape": parameters(task["shape"])}, code)
     return {"key": key} | task
 
@@ -134,21 +131,13 @@ def by_mesh(part):
 # -- stages ------------------------------------------------------------------------------------------------------------
 
 
-def _mesh_members(study):
-    """Meshes with their scenes, and the expected seconds of both."""
+def _mesh_tasks(study):
+    """Tasks of meshes, each with the expected seconds of all its scenes."""
     part = study.parts["shapes"]
-    return {
-        name: (sum(expected_seconds(particles(part, one), one.definition) for one in scenes), scenes)
-        for name, scenes in by_mesh(part).items()
-    }
-
-
-def _meshes(study, folder, members):
-    part = study.parts["shapes"]
-    return {
-        "folder": str(folder / "meshes"),
-        "files": [{"name": file_name(one), "key": mesh_key(part, one)} | mesh_source(part, one) for one, *_ in members],
-    }
+    for name, scenes in by_mesh(part).items():
+        seconds = sum(expected_seconds(particles(part, one), one.definition) for one in scenes)
+        one = scenes[0]
+        yield Task(mesh_source(part, one), seconds=seconds, name=name, file=file_name(one), key=mesh_key(part, one))
 
 
 def _reference_tasks(study):
@@ -158,32 +147,19 @@ def _reference_tasks(study):
         yield Task(task, seconds=2.0, name="/".join(one), key=task["key"])
 
 
-def _solve(study, folder, members):
+def _solve_tasks(study):
     part = study.parts["shapes"]
     kept = shown(part) if DRAWING in study.outputs else ()
-    files = [
-        {
-            "name": file_name(scenes[0]),
-            "shape": parameters(_source(part.shape[scenes[0].shape])),
-            "tasks": list({task["key"]: task for task in (scene_task(part, one, kept) for one in scenes)}.values()),
-        }
-        for scenes in members
-    ]
-    return on_meshes(folder, "solutions", files)
+    for name, scenes in by_mesh(part).items():
+        shared = {"shape": parameters(_source(part.shape[scenes[0].shape]))}
+        for task in (scene_task(part, one, kept) for one in scenes):
+            yield Task(task, name=name, file=file_name(scenes[0]), shared=shared, key=task["key"])
 
 
 STAGES = (
-    stage(
-        "shape_reference",
-        "studies.kinds.shapes.reference",
-        "Solving the references of shapes",
-        _reference_tasks,
-        "shape_references",
-    ),
-    mesh_stage("shape_mesh", "studies.kinds.shapes.mesh", "Meshing shapes", _meshes, _mesh_members),
-    stage_on_meshes(
-        "shape_solve", "studies.kinds.shapes.solve", "Solving the networks of shapes", _solve, "solutions", "shape_mesh"
-    ),
+    Stage("shape_reference", "studies.kinds.shapes.reference", _reference_tasks, "shape_references"),
+    Stage("shape_mesh", "studies.kinds.shapes.mesh", _mesh_tasks, "meshes", endings=(".vtu", ".h5")),
+    Stage("shape_solve", "studies.kinds.shapes.solve", _solve_tasks, "solutions", like="shape_mesh"),
 )
 
 

@@ -17,4 +17,4 @@ def make(source):
     return read_shape(source["file"], source["unit"])
 
 
-run, crashed = partial(mesh.run, make=make), mesh.crashed
+run = partial(mesh.run, make=make)

@@ -18,7 +18,7 @@ parts = stored.parts
 
 def prepare(family, content):
     """Shape, mesh, and the sheets by thickness, which scenes add."""
-    return family["shape"], stored.prepared(content["meshes"], family["name"]), {}
+    return family["shape"], stored.prepared(content, family), {}
 
 
 def failed(task, why):

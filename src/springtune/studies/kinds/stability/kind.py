@@ -11,9 +11,9 @@ from springtune.mesh.types import MESH_TYPES
 from ...config import fields
 from ...config.checks import check_beam_material, check_density, check_for_triangles, check_particles
 from ...config.fields import OneOrMore, Section, default, one_of, optional
-from ...config.kind import Kind
+from ...config.kind import Kind, Stage
 from ...runs.keys import beam_key, definition_key, material_key, mesh_type_key
-from ...runs.stages import Task, stage
+from ...runs.plan import Task
 from . import AXES, EXPERIMENTS, ONCE
 from .outputs import OUTPUTS
 
@@ -209,6 +209,6 @@ KIND = Kind(
     dimensions=DIMENSIONS,
     flags={"behaviour": BEHAVIOURS},
     sparse=True,
-    stages=(stage("stability", "studies.kinds.stability.solve", "Experiments on stability", _tasks),),
+    stages=(Stage("stability", "studies.kinds.stability.solve", _tasks),),
     outputs=OUTPUTS,
 )

@@ -1,0 +1,186 @@
+"""The tasks of a job whose results are missing, done in a worker process.
+
+The content of a job has the ``results`` of the study, the ``folder`` of the stage and its ``files``. A file has a
+``name``, ``tasks``, and values that its tasks share; each task has the ``key`` of its result. The module of a stage
+defines:
+
+- ``solve(task)`` returns its result, with ``prepare`` ``solve(task, made)``.
+- ``prepare(file, content)`` returns what the tasks of a file share, such as a mesh, or raises `RefusedError`.
+- ``failed(task, why)`` returns the result of a failed task; by default a status and a message.
+- ``parts(task, result)`` returns the parts of a result by key, if it is stored in several parts.
+- ``tasks(file, content)`` returns the tasks of a file, if their keys depend on other results.
+- ``order(task)`` is the sort key of tasks.
+
+All but ``solve`` are optional. A module with a loop of its own has ``run(content, attempts)``.
+
+A task that fails is a result with its reason; so is one whose process dies, and the worker is started anew for the
+others. A broken program ends the job when all other tasks are done.
+"""
+
+import ctypes
+import multiprocessing
+import os
+import signal
+import sys
+import tempfile
+import traceback
+from collections.abc import Callable, Mapping
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from functools import partial
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from springtune.problem.status import Status
+from springtune.registry import imported
+
+from . import store
+from .store import DamagedError
+
+MODULE = "studies.runs.attempts"
+"""This module; the keys of all results depend on it."""
+
+TRACEBACKS = 3
+"""Most tracebacks in the log of a job; similar tasks fail alike."""
+
+LONGEST_KEY = 4096
+
+Task = Mapping[str, Any]
+Result = dict[str, Any]
+
+
+class RefusedError(Exception):
+    """Tasks cannot be prepared."""
+
+
+def in_worker(name: str, content: dict[str, Any]) -> int:
+    """Do the tasks of a job in a worker process, started anew after each task that ends it; return their number."""
+    lost: dict[str, str] = {}
+    with tempfile.TemporaryFile() as under_way:
+        while True:
+            with ProcessPoolExecutor(1, multiprocessing.get_context("fork"), end_with_parent) as worker:
+                try:
+                    return worker.submit(do, name, content, lost, under_way.fileno()).result()
+                except BrokenProcessPool:
+                    key = os.pread(under_way.fileno(), LONGEST_KEY, 0).rstrip(b"\0").decode()
+            if not key or key in lost:
+                raise SystemExit("the process of this job died: is the machine's memory short?")
+            lost[key] = "the process that solved it died: a crash, or too little memory"
+
+
+def end_with_parent() -> None:
+    """Let the kernel end this process with its parent, where it can."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
+
+
+def do(name: str, content: dict[str, Any], lost: Mapping[str, str] | None = None, under_way: int | None = None) -> int:
+    """Do the tasks of a job whose results are missing; return their number.
+
+    ``lost`` has the reasons of tasks that are not to be tried again.
+    """
+    module, attempts = imported(name), Attempts(lost or {}, under_way)
+    getattr(module, "run", partial(solve_files, module))(content, attempts)
+    for error in attempts.broken[:TRACEBACKS]:
+        traceback.print_exception(error)
+    if attempts.broken:
+        first = traceback.format_exception_only(attempts.broken[0])[-1].strip()
+        raise SystemExit(f"{len(attempts.broken)} of this job's tasks could not be done: {first}")
+    return attempts.computed
+
+
+class Attempts:
+    """Attempts at the tasks of a job: how many were made, and errors of a broken program."""
+
+    def __init__(self, lost: Mapping[str, str], under_way: int | None = None) -> None:
+        self.lost, self.under_way = lost, under_way
+        self.computed, self.broken = 0, list[Exception]()
+
+    def attempt(self, key: str, function: Callable[[], Any], failed: Callable[[str], Any]) -> Any:
+        """Return the result of a task, a failed result for a reason of the task, or None if the program is broken."""
+        if key in self.lost:
+            return failed(self.lost[key])
+        self._note(key)
+        try:
+            return function()
+        except MemoryError:
+            return failed("not enough memory")
+        except DamagedError:
+            raise
+        except Exception as error:
+            why = own_reason(error)
+            if not why:
+                self.broken.append(error)
+                return None
+            return failed(why)
+        finally:
+            self._note("")
+
+    def _note(self, key: str) -> None:
+        """Note the task under way, where another process can read it."""
+        if self.under_way is not None:
+            os.pwrite(self.under_way, key.encode().ljust(LONGEST_KEY, b"\0"), 0)
+
+
+def own_reason(error: Exception) -> str:
+    """Return the reason of a failed task, or an empty string if the program is broken.
+
+    Examples
+    --------
+    >>> own_reason(ZeroDivisionError("division by zero"))
+    'ZeroDivisionError: division by zero'
+    >>> own_reason(TypeError("unsupported operand"))
+    ''
+    """
+    # By name: results shall not depend on the code of meshes and definitions for the sake of an exception.
+    names = {one.__name__ for one in type(error).__mro__}
+    if names & {"DefinitionError", "MeshError", "RefusedError"}:
+        return str(error)
+    # numpy's LinAlgError is a ValueError, and so is what scipy raises for numbers that are not finite.
+    own = names & {"ArithmeticError", "LinAlgError", "RuntimeError"} or "infs or NaNs" in str(error)
+    broken = names & {"NotImplementedError", "RecursionError"}
+    return f"{type(error).__name__}: {error}" if own and not broken else ""
+
+
+def solve_files(module: ModuleType, content: dict[str, Any], attempts: Attempts) -> None:
+    """Do the tasks of a job's files whose results are missing."""
+    for file in content["files"]:
+        _solve_file(module, content, file, attempts)
+
+
+def _solve_file(module: ModuleType, content: dict[str, Any], file: dict[str, Any], attempts: Attempts) -> None:
+    path = Path(content["folder"]) / f"{file['name']}.h5"
+    failed: Callable[[Task, str], Result] = getattr(module, "failed", _failed)
+    parts: Callable[[Task, Result], dict[str, Result]] = getattr(module, "parts", _one_part)
+    present = store.stored(path)
+    tasks = module.tasks(file, content) if hasattr(module, "tasks") else file["tasks"]
+    missing = [task for task in tasks if not parts(task, {}).keys() <= present]
+    if not missing:
+        return
+    shared: list[Any] = []
+    if hasattr(module, "prepare"):
+        shared = [attempts.attempt(file["name"], partial(module.prepare, file, content), RefusedError)]
+        if shared == [None]:
+            return
+    with store.Keeper(path) as keeper:
+        for task in sorted(missing, key=module.order) if hasattr(module, "order") else missing:
+            if shared and isinstance(shared[0], RefusedError):
+                result = failed(task, f"mesh: {shared[0]}")
+            else:
+                solve = partial(module.solve, task, *shared)
+                result = attempts.attempt(task["key"], solve, partial(failed, task))
+            if result is None:
+                continue
+            attempts.computed += 1
+            for key, part in parts(task, result).items():
+                if key != task["key"] or key not in present:  # stored numbers stay unchanged
+                    keeper[key] = part
+
+
+def _failed(task: Task, why: str) -> Result:
+    return {"status": Status.FAILED, "message": why}
+
+
+def _one_part(task: Task, result: Result) -> dict[str, Result]:
+    return {task["key"]: result}
